@@ -1,0 +1,226 @@
+//! Cells as they come out of a file: sorted into one block per kind, with the way back from the cell of the
+//! file to the cells of the mesh, so that data and sets given per cell of the file find their place.
+
+use std::collections::BTreeMap;
+
+use super::error::{Fault, MeshFileProblem, Place};
+use crate::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+
+/// Prefix of arrays that hold a named set: 1 inside, 0 outside.
+pub(super) const SET_PREFIX: &str = "set:";
+
+/// Where the cells that came from one cell of the file are.
+#[derive(Clone, Copy)]
+struct Span {
+    block: u32,
+    start: u32,
+    end: u32,
+}
+
+/// Cells being collected.
+#[derive(Default)]
+pub(super) struct Cells {
+    blocks: Vec<CellBlock>,
+    /// For each cell of the file: its cells here (none if it was skipped, several if it was cut).
+    spans: Vec<Span>,
+    /// Cells of unsupported kinds, by name.
+    skipped: BTreeMap<String, usize>,
+    cut: usize,
+}
+
+impl Cells {
+    /// Number of cells of the file so far, skipped ones included.
+    pub fn len(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// Starts the next cell of the file; cells pushed from now on come from it.
+    pub fn open(&mut self) {
+        self.spans.push(Span { block: 0, start: 0, end: 0 });
+    }
+
+    /// Adds a cell of the mesh to the open cell of the file.
+    pub fn push(&mut self, kind: CellKind, nodes: &[u32]) {
+        let at = self.blocks.iter().position(|block| block.kind == kind).unwrap_or_else(|| {
+            self.blocks.push(CellBlock::new(kind, Vec::new()));
+            self.blocks.len() - 1
+        });
+        let block = &mut self.blocks[at];
+        let index = block.len() as u32;
+        block.nodes.extend_from_slice(nodes);
+        if let Some(span) = self.spans.last_mut() {
+            if span.start == span.end {
+                *span = Span { block: at as u32, start: index, end: index };
+            }
+            span.end = index + 1;
+        }
+    }
+
+    /// Adds a polygon to the open cell of the file: triangle, quad, or a fan of triangles around its first
+    /// corner (right for convex polygons).
+    pub fn push_polygon(&mut self, nodes: &[u32]) {
+        match nodes {
+            [_, _, _] => self.push(CellKind::Triangle, nodes),
+            [_, _, _, _] => self.push(CellKind::Quad, nodes),
+            [first, rest @ ..] => {
+                self.cut += 1;
+                for pair in rest.windows(2) {
+                    self.push(CellKind::Triangle, &[*first, pair[0], pair[1]]);
+                }
+            }
+            [] => {}
+        }
+    }
+
+    /// Leaves the open cell of the file out, because its kind is not supported.
+    pub fn skip(&mut self, kind: impl Into<String>) {
+        *self.skipped.entry(kind.into()).or_default() += 1;
+    }
+
+    /// The mesh's cells that came from a cell of the file: index of the block and range in it.
+    fn span(&self, source: usize) -> Option<(usize, std::ops::Range<u32>)> {
+        self.spans.get(source).map(|span| (span.block as usize, span.start..span.end))
+    }
+
+    /// Gives the cells their data: one item per cell of the file. In a file with cells of several kinds an
+    /// array that is NaN for all cells of a kind is taken as missing there.
+    pub fn add_data(&mut self, name: &str, array: &DataArray) {
+        if let Some(set) = name.strip_prefix(SET_PREFIX)
+            && array.components == 1
+        {
+            let members = array.values.iter().enumerate().filter(|(_, v)| v.abs() > 0.0).map(|(i, _)| i);
+            self.add_set(set, members);
+            return;
+        }
+        let several = self.blocks.len() > 1;
+        self.add_data_where(name, array, |values| !several || values.iter().any(|value| !value.is_nan()));
+    }
+
+    /// Gives the cells their data, one item per cell of the file, in those blocks where `keep` says so.
+    pub fn add_data_where(&mut self, name: &str, array: &DataArray, keep: impl Fn(&[f64]) -> bool) {
+        let mut split: Vec<Vec<f64>> = vec![Vec::new(); self.blocks.len()];
+        for source in 0..self.len() {
+            if let Some((block, range)) = self.span(source) {
+                for _ in range {
+                    split[block].extend_from_slice(array.item(source));
+                }
+            }
+        }
+        for (block, values) in self.blocks.iter_mut().zip(split) {
+            if keep(&values) {
+                block.data.insert(name.to_owned(), DataArray { components: array.components, values });
+            }
+        }
+    }
+
+    /// Adds cells of the file to a named set. A set without any cell is kept, empty, in the first block.
+    pub fn add_set(&mut self, name: &str, sources: impl IntoIterator<Item = usize>) {
+        for source in sources {
+            if let Some((block, range)) = self.span(source)
+                && !range.is_empty()
+            {
+                let sets = &mut self.blocks[block].sets;
+                match sets.get_mut(name) {
+                    Some(set) => set.extend(range),
+                    None => {
+                        sets.insert(name.to_owned(), range.collect());
+                    }
+                }
+            }
+        }
+        let known = self.blocks.iter().any(|block| block.sets.contains_key(name));
+        if let Some(block) = self.blocks.first_mut()
+            && !known
+        {
+            block.sets.insert(name.to_owned(), Vec::new());
+        }
+    }
+
+    /// The mesh, or the reason why there is none; adds what was left out to the notes.
+    pub fn into_mesh(
+        self,
+        points: Vec<Vector3>,
+        point_data: BTreeMap<String, DataArray>,
+        notes: &mut Vec<String>,
+    ) -> Result<Mesh, Fault> {
+        if points.is_empty() {
+            return Err(Fault::whole(MeshFileProblem::NoPoints));
+        }
+        let kinds: Vec<String> = self.skipped.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+        let kinds = kinds.join(", ");
+        // Points beside cells of higher order are no mesh to simulate.
+        let only_vertices = self.blocks.iter().all(|block| block.kind == CellKind::Vertex);
+        if self.blocks.is_empty() || only_vertices && !kinds.is_empty() {
+            return Err(Fault::whole(if kinds.is_empty() {
+                MeshFileProblem::NoCells
+            } else {
+                MeshFileProblem::UnsupportedCells { kinds }
+            }));
+        }
+        if !kinds.is_empty() {
+            notes.push(format!("left out, as their kind is not supported: {kinds} cells"));
+        }
+        if self.cut > 0 {
+            notes.push(format!("{} polygons with more than 4 corners were cut into triangles", self.cut));
+        }
+        let mut blocks = self.blocks;
+        for set in blocks.iter_mut().flat_map(|block| block.sets.values_mut()) {
+            set.sort_unstable();
+            set.dedup();
+        }
+        let mut mesh = Mesh { points, blocks, ..Mesh::default() };
+        for (name, array) in point_data {
+            match name.strip_prefix(SET_PREFIX) {
+                Some(set) if array.components == 1 => {
+                    let members = array.values.iter().enumerate().filter(|(_, v)| v.abs() > 0.0);
+                    mesh.point_sets.insert(set.to_owned(), members.map(|(i, _)| i as u32).collect());
+                }
+                _ => {
+                    mesh.point_data.insert(name, array);
+                }
+            }
+        }
+        Ok(mesh)
+    }
+}
+
+/// A point of a file, which must be finite. `number` is its number in the file.
+pub(super) fn finite(x: f64, y: f64, z: f64, number: u64, place: Place) -> Result<Vector3, Fault> {
+    if x.is_finite() && y.is_finite() && z.is_finite() {
+        Ok(Vector3::new(x, y, z))
+    } else {
+        Err(Fault { place, problem: MeshFileProblem::NotFinite { point: number, x, y, z } })
+    }
+}
+
+/// All points of an array of coordinates, numbered from 0.
+pub(super) fn finite_points(coordinates: &[f64], place: Place) -> Result<Vec<Vector3>, Fault> {
+    index_limit(coordinates.len() / 3, place)?;
+    let points = coordinates.chunks_exact(3).enumerate();
+    points.map(|(i, x)| finite(x[0], x[1], x[2], i as u64, place)).collect()
+}
+
+/// Indices are `u32`: more points or cells than that are an error.
+pub(super) fn index_limit(count: usize, place: Place) -> Result<(), Fault> {
+    if count < u32::MAX as usize {
+        return Ok(());
+    }
+    Err(Fault::unsupported(
+        place,
+        format!("{count} points or cells (the limit is {})", u32::MAX - 1),
+        "use a coarser mesh",
+    ))
+}
+
+/// The index of a node numbered from 0, if there are that many points.
+pub(super) fn node(
+    index: i64,
+    points: usize,
+    place: Place,
+    cell: impl FnOnce() -> String,
+) -> Result<u32, Fault> {
+    match u32::try_from(index) {
+        Ok(node) if (node as usize) < points => Ok(node),
+        _ => Err(Fault { place, problem: MeshFileProblem::UndefinedNode { node: index, cell: cell() } }),
+    }
+}

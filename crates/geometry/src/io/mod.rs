@@ -1,0 +1,302 @@
+//! Mesh files in and out.
+//!
+//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL
+//! and PLY, text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The reader goes by the first bytes
+//! where they tell the format, otherwise by the ending. Cells are linear: vertex, line, triangle, quad, tet,
+//! hex; others are left out and noted, and an error only if nothing is left.
+
+mod base64;
+mod cells;
+mod cursor;
+mod error;
+mod gmsh;
+mod obj;
+mod off;
+mod ply;
+mod stl;
+mod surface_out;
+mod vtk;
+mod vtk_cells;
+mod vtu;
+mod vtu_write;
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use crate::Mesh;
+pub use error::{MeshFileError, MeshFileProblem, Place};
+use surface_out::SurfaceOut;
+pub use vtu_write::{VtuOptions, save_vtu, write_pvd, write_vtu};
+
+/// A format of mesh files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Gmsh, `.msh`.
+    Gmsh,
+    /// Legacy VTK, `.vtk`.
+    Vtk,
+    /// VTK XML unstructured grid, `.vtu`.
+    Vtu,
+    /// VTK XML poly-data, `.vtp`.
+    Vtp,
+    /// Wavefront OBJ, `.obj`.
+    Obj,
+    /// Object file format, `.off`.
+    Off,
+    /// Stereolithography, `.stl`.
+    Stl,
+    /// Polygon file format, `.ply`.
+    Ply,
+}
+
+impl Format {
+    /// All formats that can be read.
+    pub const ALL: &[Self] =
+        &[Self::Gmsh, Self::Vtk, Self::Vtu, Self::Vtp, Self::Obj, Self::Off, Self::Stl, Self::Ply];
+
+    /// The formats that can be written.
+    pub const WRITTEN: &[Self] = &[Self::Vtu, Self::Gmsh, Self::Obj, Self::Stl, Self::Ply];
+
+    /// Its name, as people say it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gmsh => "Gmsh",
+            Self::Vtk => "legacy VTK",
+            Self::Vtu => "VTU",
+            Self::Vtp => "VTP",
+            Self::Obj => "OBJ",
+            Self::Off => "OFF",
+            Self::Stl => "STL",
+            Self::Ply => "PLY",
+        }
+    }
+
+    /// The ending of its files, without the point.
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Gmsh => "msh",
+            Self::Vtk => "vtk",
+            Self::Vtu => "vtu",
+            Self::Vtp => "vtp",
+            Self::Obj => "obj",
+            Self::Off => "off",
+            Self::Stl => "stl",
+            Self::Ply => "ply",
+        }
+    }
+
+    /// The format that the ending of a path names, in capitals or not.
+    pub fn of_path(path: &Path) -> Option<Self> {
+        let extension = path.extension().and_then(OsStr::to_str)?;
+        Self::ALL.iter().copied().find(|format| extension.eq_ignore_ascii_case(format.extension()))
+    }
+
+    /// The format that the first bytes of a file tell, for formats that begin with a word of their own.
+    fn of_bytes(bytes: &[u8]) -> Option<Self> {
+        let bytes = bytes.trim_ascii_start();
+        let begins: [(&[u8], Self); 8] = [
+            (b"$MeshFormat", Self::Gmsh),
+            (b"$NOD", Self::Gmsh),
+            (b"$Comments", Self::Gmsh),
+            (b"# vtk DataFile", Self::Vtk),
+            (b"<?xml", Self::Vtu),
+            (b"<VTKFile", Self::Vtu),
+            (b"ply\n", Self::Ply),
+            (b"ply\r", Self::Ply),
+        ];
+        begins.into_iter().find(|(begin, _)| bytes.starts_with(begin)).map(|(_, format)| format)
+    }
+
+    fn list(formats: &[Self]) -> String {
+        let named: Vec<String> =
+            formats.iter().map(|format| format!("{} (.{})", format.name(), format.extension())).collect();
+        named.join(", ")
+    }
+}
+
+/// What a mesh file held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshFile {
+    /// The mesh, its points and cells in the order of the file.
+    pub mesh: Mesh,
+    /// The format found, e.g. `Gmsh 2.2 ASCII`.
+    pub format: String,
+    /// What was left out or changed, one sentence each.
+    pub notes: Vec<String>,
+    /// The time that the file gives for its data [s].
+    pub time: Option<f64>,
+}
+
+/// Reads a mesh file.
+pub fn read(path: &Path) -> Result<MeshFile, MeshFileError> {
+    let by_ending = Format::of_path(path);
+    // Whether it can be opened is said first: a missing file is not of an unsupported format.
+    let bytes = fs::read(path).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
+    let by_content = Format::of_bytes(&bytes);
+    let Some(format) = by_content.or(by_ending) else {
+        return Err(MeshFileError::UnsupportedFormat { path: path.to_owned() });
+    };
+    let mut file = read_of(path, &bytes, format)?;
+    if let Some(ending) = by_ending
+        && !file.format.starts_with(ending.name())
+    {
+        file.notes.push(format!("the ending says {}, but the file is {}", ending.name(), file.format));
+    }
+    Ok(file)
+}
+
+/// Reads a mesh from the bytes of a file. Errors name the file `bytes.EXTENSION`.
+pub fn read_bytes(bytes: &[u8], format: Format) -> Result<MeshFile, MeshFileError> {
+    read_of(Path::new(&format!("bytes.{}", format.extension())), bytes, format)
+}
+
+fn read_of(path: &Path, bytes: &[u8], format: Format) -> Result<MeshFile, MeshFileError> {
+    let result = match format {
+        Format::Gmsh => gmsh::read(bytes),
+        Format::Vtk => vtk::read(bytes),
+        Format::Vtu | Format::Vtp => vtu::read(bytes),
+        Format::Obj => obj::read(bytes),
+        Format::Off => off::read(bytes),
+        Format::Stl => stl::read(bytes),
+        Format::Ply => ply::read(bytes),
+    };
+    result.map_err(|fault| MeshFileError::Content {
+        path: path.to_owned(),
+        place: fault.place,
+        problem: fault.problem,
+    })
+}
+
+/// Writes a mesh file in the format of the ending, in place of an older one only once it is complete.
+///
+/// `.vtu` and `.msh` (Gmsh 4.1) keep everything. `.ply`, `.obj` and `.stl` hold only the triangles and quads:
+/// PLY with all their data and sets, OBJ with the cell sets as groups, STL as bare triangles.
+pub fn write(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
+    let format = Format::of_path(path).filter(|format| Format::WRITTEN.contains(format));
+    let Some(format) = format else {
+        return Err(MeshFileError::UnwritableFormat { path: path.to_owned() });
+    };
+    check(path, mesh)?;
+    match format {
+        Format::Gmsh => {
+            check_gmsh(path, mesh)?;
+            save(path, |out| gmsh::write(out, mesh))
+        }
+        Format::Obj => {
+            let surface = SurfaceOut::new(path, mesh)?;
+            save(path, |out| obj::write(out, &surface))
+        }
+        Format::Stl => {
+            let surface = SurfaceOut::new(path, mesh)?;
+            save(path, |out| stl::write(out, &surface))
+        }
+        Format::Ply => {
+            let surface = SurfaceOut::new(path, mesh)?;
+            save(path, |out| ply::write(out, &surface, &mesh.point_data, &mesh.point_sets))
+        }
+        _ => save(path, |out| vtu_write::write(out, mesh, &VtuOptions::default())),
+    }
+}
+
+/// Writes a file under another name beside it, then gives it its name: whoever reads it finds the old file or
+/// the new one, never a part.
+fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), MeshFileError> {
+    let failed = |source| MeshFileError::Write { path: path.to_owned(), source };
+    let Some(name) = path.file_name() else {
+        return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name")));
+    };
+    let mut beside = OsStr::new(".").to_owned();
+    beside.push(name);
+    beside.push(format!(".{}.tmp", std::process::id()));
+    let beside = path.with_file_name(beside);
+    let written = fs::File::create(&beside).and_then(|file| {
+        let mut out = BufWriter::with_capacity(1 << 16, file);
+        write(&mut out)?;
+        out.flush()?;
+        fs::rename(&beside, path)
+    });
+    written.map_err(|error| {
+        // The unfinished file is of no use; the error that led here is the one to tell.
+        let _ = fs::remove_file(&beside);
+        failed(error)
+    })
+}
+
+/// Whether a mesh is whole: finite points, nodes and sets in range, data of the right length.
+fn check(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
+    match problem(mesh) {
+        Some(problem) => Err(MeshFileError::Mesh { path: path.to_owned(), problem }),
+        None => Ok(()),
+    }
+}
+
+/// What is wrong with a mesh, if anything.
+fn problem(mesh: &Mesh) -> Option<String> {
+    let points = mesh.points.len();
+    if points == 0 || mesh.blocks.iter().all(|block| block.is_empty()) {
+        return Some("the mesh has no points or no cells; there is nothing to write".to_owned());
+    }
+    if let Some(at) = mesh.points.iter().position(|x| !x.iter().all(|x| x.is_finite())) {
+        let x = mesh.points[at];
+        return Some(format!("point {at} is not finite ({}, {}, {})", x.x, x.y, x.z));
+    }
+    let wrong = |name: &str, array: &crate::DataArray, items: usize, whose: &str| {
+        let fits = array.components > 0 && Some(array.values.len()) == items.checked_mul(array.components);
+        let (found, components) = (array.values.len(), array.components);
+        (!fits).then(|| {
+            format!("data `{name}` of the {whose} have {found} numbers, not {components} for each of {items}")
+        })
+    };
+    for (name, array) in &mesh.point_data {
+        if let Some(problem) = wrong(name, array, points, "points") {
+            return Some(problem);
+        }
+    }
+    for (name, set) in &mesh.point_sets {
+        if let Some(point) = set.iter().find(|&&point| point as usize >= points) {
+            return Some(format!("the set `{name}` holds point {point} of only {points}"));
+        }
+    }
+    let mut components = std::collections::BTreeMap::new();
+    for block in &mesh.blocks {
+        let kind = block.kind.name();
+        if block.nodes.len() % block.kind.node_count() != 0 {
+            return Some(format!("the {kind} cells have {} nodes in all", block.nodes.len()));
+        }
+        if let Some(at) = block.nodes.iter().position(|&node| node as usize >= points) {
+            let cell = at / block.kind.node_count();
+            return Some(format!("{kind} {cell} uses node {} of only {points}", block.nodes[at]));
+        }
+        for (name, array) in &block.data {
+            if let Some(problem) = wrong(name, array, block.len(), &format!("{kind} cells")) {
+                return Some(problem);
+            }
+            if *components.entry(name).or_insert(array.components) != array.components {
+                return Some(format!("data `{name}` have different numbers of components per kind of cell"));
+            }
+        }
+        for (name, set) in &block.sets {
+            if let Some(cell) = set.iter().find(|&&cell| cell as usize >= block.len()) {
+                return Some(format!("the set `{name}` holds {kind} {cell} of only {}", block.len()));
+            }
+        }
+    }
+    None
+}
+
+/// Gmsh's data have at most 9 components.
+fn check_gmsh(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
+    let mut arrays = mesh.point_data.iter().chain(mesh.blocks.iter().flat_map(|block| &block.data));
+    match arrays.find(|(_, array)| array.components > 9) {
+        Some((name, array)) => Err(MeshFileError::Mesh {
+            path: path.to_owned(),
+            problem: format!(
+                "data `{name}` have {} components, and Gmsh's at most 9; write .vtu",
+                array.components
+            ),
+        }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,886 @@
+//! Which nodes or boundary faces of a mesh are meant, as a scene file says it: a box, a plane, a named set, a
+//! label, what lies between two labels, and unions, intersections and differences of these.
+//! Leaves out: cells inside; selections of the moving body (positions are those of the mesh).
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::cell::{diagonal, finite_bounds, is_finite};
+use crate::surface::{cell_label, face_key, label_boundary, label_nodes, labels};
+use crate::{CellBlock, Mesh, Surface, Vector3};
+
+/// Slack of every comparison of positions, as part of the diagonal of the mesh's bounding box.
+const SLACK: f64 = 1e-9;
+/// Default tolerance of a plane, as part of the diagonal of the mesh's bounding box.
+const PLANE_TOLERANCE: f64 = 1e-5;
+/// Slack of the comparison of angles [°].
+const ANGLE_SLACK: f64 = 1e-6;
+
+/// Nodes or boundary faces of a body, chosen by position, by name or by label. Positions are those of the mesh
+/// before any motion [m].
+///
+/// Where faces are asked for, a boundary face is selected if all its nodes are; `normal` looks at the face itself,
+/// `label` and sets of volume cells at the cell behind it, and sets of triangles or quads name faces directly. The
+/// boundary of a mesh of triangles and quads alone is the whole mesh.
+#[derive(Deserialize, Serialize, JsonSchema, Clone, Debug, PartialEq)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Selection {
+    /// Everything: `"all"`.
+    All,
+    /// Everything on the boundary: `"boundary"`.
+    Boundary,
+    /// Everything in an axis-aligned box [m]: `{ box = [[0, 0, 0], [0.1, 0.1, 0.02]] }`, the corner of the smallest
+    /// coordinates first. Its sides belong to it, with a slack of 1e-9 of the diagonal of the mesh's bounding box.
+    Box([[f64; 3]; 2]),
+    /// Everything in a sphere: `{ sphere = { centre = [0, 0, 0], radius = 0.02 } }`. Its surface belongs to it, with
+    /// the slack of `box`.
+    Sphere {
+        /// Its centre [m].
+        centre: [f64; 3],
+        /// Its radius [m], 0 or more.
+        #[schemars(range(min = 0.0))]
+        radius: f64,
+    },
+    /// Everything on one side of a plane: `{ half-space = { point = [0, 0, 0.05], normal = [0, 0, 1] } }`. The plane
+    /// belongs to it, with the slack of `box`.
+    HalfSpace {
+        /// A point of the plane [m].
+        point: [f64; 3],
+        /// Points to the side that is selected; of any length but 0, without unit.
+        normal: [f64; 3],
+    },
+    /// Everything on a plane: `{ plane = { point = [0, 0, 0], normal = [0, 0, 1] } }`.
+    Plane {
+        /// A point of the plane [m].
+        point: [f64; 3],
+        /// Perpendicular to the plane; of any length but 0, without unit.
+        normal: [f64; 3],
+        /// Greatest distance from the plane [m], 0 or more. Default: 1e-5 of the diagonal of the mesh's bounding box,
+        /// which is 1e-6 m for an organ of 0.1 m.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        tolerance: Option<f64>,
+    },
+    /// Boundary faces (and their nodes) that look in a direction: `{ normal = { direction = [0, 0, 1], within = 30 } }`.
+    Normal {
+        /// The direction; of any length but 0, without unit.
+        direction: [f64; 3],
+        /// Greatest angle between the direction and the outward normal of a face [°], from 0 to 180.
+        #[schemars(range(min = 0.0, max = 180.0))]
+        within: f64,
+    },
+    /// The nodes closest to a point: `{ nearest = { point = [0, 0, 0.05] } }`. Of nodes at the same distance, those of
+    /// smaller index.
+    Nearest {
+        /// The point [m].
+        point: [f64; 3],
+        /// How many nodes, 1 or more (all, if the mesh has fewer). Default: 1.
+        #[serde(default = "one")]
+        #[schemars(range(min = 1))]
+        count: u32,
+    },
+    /// A named set of the mesh file, of points or of cells: `{ set = "left-lobe" }`.
+    Set(String),
+    /// Everything of the cells with a label (cell data `label`): `{ label = 2 }`.
+    Label(i32),
+    /// Nodes shared by cells of two labels, the interface of two regions: `{ label-boundary = [1, 2] }`.
+    LabelBoundary([i32; 2]),
+    /// Nodes by index, counted from 0: `{ ids = [0, 5, 17] }`.
+    Ids(Vec<u32>),
+    /// What any of the selections holds: `{ union = [{ set = "a" }, { set = "b" }] }`.
+    Union(Vec<Selection>),
+    /// What every one of the selections holds: `{ intersection = ["boundary", { label = 2 }] }`.
+    Intersection(Vec<Selection>),
+    /// What the first selection holds and none of the others: `{ difference = ["boundary", { set = "cut" }] }`.
+    Difference(Vec<Selection>),
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// Why a selection has no result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SelectionError {
+    /// No set has the name.
+    #[error("no set is named `{name}`{}", sets_instead(.nearest, .known))]
+    UnknownSet {
+        /// The name asked for.
+        name: String,
+        /// The most similar name, if one is similar.
+        nearest: Option<String>,
+        /// All names, sorted.
+        known: Vec<String>,
+    },
+    /// A set of the mesh names something beyond its end.
+    #[error(
+        "set `{name}` of the mesh is broken: it names {of} {index}, but there are {count}, counted from 0"
+    )]
+    BrokenSet {
+        /// Name of the set.
+        name: String,
+        /// `node`, `tet`, `triangle`, …
+        of: &'static str,
+        /// The index that does not exist.
+        index: u32,
+        /// How many there are.
+        count: usize,
+    },
+    /// A node index is beyond the last node.
+    #[error("there is no node {id}: the mesh has {count} nodes, counted from 0")]
+    NoSuchNode {
+        /// The index asked for.
+        id: u32,
+        /// Number of nodes.
+        count: usize,
+    },
+    /// No cell has the label.
+    #[error("no cell has label {label}: {}", known_labels(.known))]
+    UnknownLabel {
+        /// The label asked for.
+        label: i32,
+        /// All labels, increasing.
+        known: Vec<i32>,
+    },
+    /// A direction without length.
+    #[error("{what} is zero: it must point somewhere, for example [0, 0, 1]")]
+    ZeroDirection {
+        /// Which one: `normal of the plane`, …
+        what: &'static str,
+    },
+    /// The smallest corner of a box is beyond the largest.
+    #[error("box is empty along {axis}: it begins at {min} m and ends at {max} m; swap the two")]
+    ReversedBox {
+        /// `x`, `y` or `z`.
+        axis: char,
+        /// Where the box begins [m].
+        min: f64,
+        /// Where the box ends [m].
+        max: f64,
+    },
+    /// A number is infinite or not a number.
+    #[error("{what} must be finite, not {value}")]
+    NotFinite {
+        /// Which one: `centre of the sphere`, …
+        what: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// A number is outside of its range.
+    #[error("{what} must be {range}, not {value}")]
+    OutOfRange {
+        /// Which one: `radius of the sphere`, …
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// What it has to be.
+        range: &'static str,
+    },
+    /// Too few operands.
+    #[error("{operation} needs {least} or more selections, but has {count}")]
+    TooFewParts {
+        /// `union`, `intersection` or `difference`.
+        operation: &'static str,
+        /// How many it needs.
+        least: usize,
+        /// How many it has.
+        count: usize,
+    },
+    /// Nothing is selected.
+    #[error("{selection} selects no {wanted}: {hint}")]
+    Empty {
+        /// The selection, in words.
+        selection: String,
+        /// `nodes` or `boundary faces`.
+        wanted: &'static str,
+        /// Why, as far as can be said, and where the mesh is.
+        hint: String,
+    },
+}
+
+fn sets_instead(nearest: &Option<String>, known: &[String]) -> String {
+    let all = format!("the mesh has `{}`", known.join("`, `"));
+    match nearest {
+        _ if known.is_empty() => ": the mesh has no sets".to_owned(),
+        Some(name) => format!("; did you mean `{name}`? ({all})"),
+        None => format!(": {all}"),
+    }
+}
+
+fn known_labels(labels: &[i32]) -> String {
+    match labels {
+        [] => "the mesh has no cell data named `label`".to_owned(),
+        _ => format!("the mesh has {}", list(labels)),
+    }
+}
+
+fn list<T: ToString>(items: &[T]) -> String {
+    items.iter().map(T::to_string).collect::<Vec<_>>().join(", ")
+}
+
+type Indices = Result<Vec<u32>, SelectionError>;
+
+impl Selection {
+    /// The selected nodes of `mesh`, increasing, each once, never none. `surface` is the boundary of `mesh`.
+    pub fn nodes(&self, mesh: &Mesh, surface: &Surface) -> Indices {
+        let view = View { mesh, surface };
+        let nodes = self.evaluate(&|leaf| view.nodes(leaf))?;
+        if nodes.is_empty() { Err(view.empty(self, Wanted::Nodes)) } else { Ok(nodes) }
+    }
+
+    /// The selected faces of `surface`, which is the boundary of `mesh`, as indices into `surface.faces`,
+    /// increasing, each once, never none.
+    pub fn faces(&self, mesh: &Mesh, surface: &Surface) -> Indices {
+        let view = View { mesh, surface };
+        let faces = self.evaluate(&|leaf| view.faces(leaf))?;
+        if faces.is_empty() { Err(view.empty(self, Wanted::Faces)) } else { Ok(faces) }
+    }
+
+    /// Checks all numbers that can be checked without a mesh: finite, in range, directions not zero.
+    /// [`nodes`](Self::nodes) and [`faces`](Self::faces) do so first.
+    pub fn check(&self) -> Result<(), SelectionError> {
+        match self {
+            Self::Box([low, high]) => {
+                finite("corner of the box", low)?;
+                finite("corner of the box", high)?;
+                let reversed = (0..3).find(|&axis| low[axis] > high[axis]);
+                reversed.map_or(Ok(()), |axis| {
+                    let (min, max) = (low[axis], high[axis]);
+                    Err(SelectionError::ReversedBox { axis: ['x', 'y', 'z'][axis], min, max })
+                })
+            }
+            Self::Sphere { centre, radius } => {
+                finite("centre of the sphere", centre)?;
+                in_range("radius of the sphere", *radius, f64::INFINITY, "0 or more")
+            }
+            Self::HalfSpace { point, normal } => {
+                finite("point of the half-space", point)?;
+                unit("normal of the half-space", normal).map(|_| ())
+            }
+            Self::Plane { point, normal, tolerance } => {
+                finite("point of the plane", point)?;
+                unit("normal of the plane", normal)?;
+                in_range("tolerance of the plane", tolerance.unwrap_or(0.0), f64::INFINITY, "0 or more")
+            }
+            Self::Normal { direction, within } => {
+                unit("direction of the normal", direction)?;
+                in_range("angle `within`", *within, 180.0, "from 0 to 180 degrees")
+            }
+            Self::Nearest { point, count } => {
+                finite("point to be near to", point)?;
+                if *count == 0 {
+                    let (what, range) = ("count of nearest nodes", "1 or more");
+                    return Err(SelectionError::OutOfRange { what, value: 0.0, range });
+                }
+                Ok(())
+            }
+            Self::Union(parts) => check_parts("union", 1, parts),
+            Self::Intersection(parts) => check_parts("intersection", 1, parts),
+            Self::Difference(parts) => check_parts("difference", 2, parts),
+            Self::All | Self::Boundary | Self::Set(_) | Self::Label(_) => Ok(()),
+            Self::LabelBoundary(_) | Self::Ids(_) => Ok(()),
+        }
+    }
+
+    /// The operands of a union, intersection or difference.
+    fn parts(&self) -> Option<&[Self]> {
+        match self {
+            Self::Union(parts) | Self::Intersection(parts) | Self::Difference(parts) => Some(parts),
+            _ => None,
+        }
+    }
+
+    /// Unions, intersections and differences of what `leaf` says of the other selections.
+    fn evaluate(&self, leaf: &dyn Fn(&Self) -> Indices) -> Indices {
+        self.check()?;
+        let Some(parts) = self.parts() else { return leaf(self) };
+        let mut results = parts.iter().map(|part| part.evaluate(leaf)).collect::<Result<Vec<_>, _>>()?;
+        let mut first = results.remove(0);
+        for other in results {
+            match self {
+                Self::Union(_) => first.extend(other),
+                Self::Intersection(_) => first.retain(|index| other.binary_search(index).is_ok()),
+                _ => first.retain(|index| other.binary_search(index).is_err()),
+            }
+        }
+        Ok(sorted(first))
+    }
+
+    /// How far a point [m] is from a region of space, 0 inside; `None` for selections of another sort.
+    fn gap(&self, p: &Vector3) -> Option<f64> {
+        // `check` has made sure that normals are not zero.
+        let height = |point: &[f64; 3], normal: &[f64; 3]| {
+            (p - Vector3::from(*point)).dot(&Vector3::from(*normal).normalize())
+        };
+        match self {
+            Self::Box([low, high]) => {
+                Some((p.sup(&Vector3::from(*low)).inf(&Vector3::from(*high)) - p).norm())
+            }
+            Self::Sphere { centre, radius } => Some(((p - Vector3::from(*centre)).norm() - radius).max(0.0)),
+            Self::HalfSpace { point, normal } => Some((-height(point, normal)).max(0.0)),
+            Self::Plane { point, normal, .. } => Some(height(point, normal).abs()),
+            _ => None,
+        }
+    }
+}
+
+/// What is selected from.
+struct View<'m> {
+    mesh: &'m Mesh,
+    surface: &'m Surface,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Wanted {
+    Nodes,
+    Faces,
+}
+
+impl Wanted {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Nodes => "nodes",
+            Self::Faces => "boundary faces",
+        }
+    }
+}
+
+impl View<'_> {
+    /// Nodes of a selection that is no union, intersection or difference.
+    fn nodes(&self, leaf: &Selection) -> Indices {
+        match leaf {
+            Selection::All => Ok((0..self.mesh.points.len() as u32).collect()),
+            Selection::Boundary => Ok(self.surface.nodes()),
+            Selection::Normal { .. } => {
+                let faces = self.faces(leaf)?;
+                let faces = faces.iter().map(|&face| &self.surface.faces[face as usize]);
+                Ok(sorted(faces.flat_map(|face| face.nodes()).copied().collect()))
+            }
+            Selection::Nearest { point, count } => Ok(self.nearest(point, *count)),
+            Selection::Set(name) => {
+                let set = self.set(name)?;
+                let cells = set.cells.iter();
+                let nodes =
+                    cells.flat_map(|(block, cells)| cells.iter().flat_map(|&c| block.cell(c as usize)));
+                let nodes: Vec<u32> = nodes.chain(set.points).copied().collect();
+                self.check_nodes(&nodes).map(|()| sorted(nodes))
+            }
+            Selection::Label(label) => {
+                self.check_label(*label)?;
+                Ok(label_nodes(self.mesh, *label))
+            }
+            Selection::LabelBoundary(pair) => {
+                pair.iter().try_for_each(|&label| self.check_label(label))?;
+                Ok(label_boundary(self.mesh, *pair))
+            }
+            Selection::Ids(ids) => self.check_nodes(ids).map(|()| sorted(ids.clone())),
+            _ => Ok(self.region(leaf)),
+        }
+    }
+
+    /// Boundary faces of a selection that is no union, intersection or difference.
+    fn faces(&self, leaf: &Selection) -> Indices {
+        match leaf {
+            Selection::All | Selection::Boundary => Ok(self.faces_where(|_| true)),
+            Selection::Normal { direction, within } => {
+                let direction = unit("direction of the normal", direction)?;
+                Ok(self.faces_where(|face| {
+                    self.angle(face, &direction).is_some_and(|angle| angle <= within + ANGLE_SLACK)
+                }))
+            }
+            Selection::Label(label) => {
+                self.check_label(*label)?;
+                Ok(self.faces_where(|face| {
+                    let parent = self.surface.faces[face].parent;
+                    let block = self.mesh.block(parent.kind);
+                    block.and_then(|block| cell_label(block, parent.index)) == Some(*label)
+                }))
+            }
+            Selection::Set(name) => self.faces_of_set(name),
+            _ => Ok(self.faces_among(&self.nodes(leaf)?)),
+        }
+    }
+
+    fn faces_where(&self, wanted: impl Fn(usize) -> bool) -> Vec<u32> {
+        (0..self.surface.faces.len()).filter(|&face| wanted(face)).map(|face| face as u32).collect()
+    }
+
+    /// Faces whose nodes are all among `nodes`.
+    fn faces_among(&self, nodes: &[u32]) -> Vec<u32> {
+        let mut chosen = vec![false; self.mesh.points.len()];
+        nodes.iter().for_each(|&node| chosen[node as usize] = true);
+        self.faces_where(|face| self.surface.faces[face].nodes().iter().all(|&node| chosen[node as usize]))
+    }
+
+    /// Faces of the cells in a set, faces that are cells in it, and faces whose nodes are all in it.
+    fn faces_of_set(&self, name: &str) -> Indices {
+        let set = self.set(name)?;
+        let mut nodes = set.points.to_vec();
+        let mut parents = Vec::new();
+        let mut keys = Vec::new();
+        for (block, cells) in &set.cells {
+            let cells_nodes = cells.iter().map(|&cell| block.cell(cell as usize));
+            match block.kind.dimension() {
+                0 | 1 => nodes.extend(cells_nodes.flatten()),
+                2 => keys.extend(cells_nodes.map(face_key)),
+                _ => parents.extend(cells.iter().map(|&cell| (block.kind, cell))),
+            }
+        }
+        self.check_nodes(&nodes)?;
+        parents.sort_unstable();
+        keys.sort_unstable();
+        let mut faces = self.faces_where(|face| {
+            let face = &self.surface.faces[face];
+            parents.binary_search(&(face.parent.kind, face.parent.index)).is_ok()
+                || keys.binary_search(&face_key(face.nodes())).is_ok()
+        });
+        faces.extend(self.faces_among(&nodes));
+        Ok(sorted(faces))
+    }
+
+    /// Nodes in a region of space.
+    fn region(&self, leaf: &Selection) -> Vec<u32> {
+        let diagonal = diagonal(&self.mesh.points);
+        let tolerance = match leaf {
+            Selection::Plane { tolerance, .. } => tolerance.unwrap_or(PLANE_TOLERANCE * diagonal),
+            _ => 0.0,
+        };
+        let reach = tolerance + SLACK * diagonal;
+        let points = (0u32..).zip(&self.mesh.points);
+        points.filter(|(_, p)| leaf.gap(p).is_some_and(|gap| gap <= reach)).map(|(node, _)| node).collect()
+    }
+
+    fn nearest(&self, point: &[f64; 3], count: u32) -> Vec<u32> {
+        let point = Vector3::from(*point);
+        let finite = (0u32..).zip(&self.mesh.points).filter(|(_, p)| is_finite(p));
+        let mut nodes: Vec<(f64, u32)> = finite.map(|(node, p)| ((p - point).norm(), node)).collect();
+        let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if (count as usize) < nodes.len() {
+            nodes.select_nth_unstable_by(count as usize, order);
+            nodes.truncate(count as usize);
+        }
+        sorted(nodes.into_iter().map(|(_, node)| node).collect())
+    }
+
+    /// Angle between the normal of a face and a unit vector [°]; `None` for a face without area.
+    fn angle(&self, face: usize, direction: &Vector3) -> Option<f64> {
+        let normal = self.surface.faces[face].normal(&self.mesh.points);
+        let (sine, cosine) = (normal.cross(direction).norm(), normal.dot(direction));
+        (normal != Vector3::zeros()).then(|| sine.atan2(cosine).to_degrees())
+    }
+
+    /// The point set and the cell sets of a name; cells that it names exist.
+    fn set(&self, name: &str) -> Result<NamedSet<'_>, SelectionError> {
+        let points = self.mesh.point_sets.get(name);
+        let blocks = self.mesh.blocks.iter();
+        let cells: Vec<_> =
+            blocks.filter_map(|block| Some((block, block.sets.get(name)?.as_slice()))).collect();
+        if points.is_none() && cells.is_empty() {
+            return Err(self.unknown_set(name));
+        }
+        for (block, set) in &cells {
+            check_indices(name, block.kind.name(), set, block.len())?;
+        }
+        let points = points.map_or(&[][..], Vec::as_slice);
+        check_indices(name, "node", points, self.mesh.points.len())?;
+        Ok(NamedSet { points, cells })
+    }
+
+    fn unknown_set(&self, name: &str) -> SelectionError {
+        let known = self.mesh.set_names();
+        let similar = known.iter().map(|other| (strsim::jaro_winkler(name, other), *other));
+        let nearest = similar.filter(|(likeness, _)| *likeness > 0.7).max_by(|a, b| a.0.total_cmp(&b.0));
+        SelectionError::UnknownSet {
+            name: name.to_owned(),
+            nearest: nearest.map(|(_, name)| name.to_owned()),
+            known: known.into_iter().map(str::to_owned).collect(),
+        }
+    }
+
+    fn check_nodes(&self, nodes: &[u32]) -> Result<(), SelectionError> {
+        let count = self.mesh.points.len();
+        let beyond = nodes.iter().find(|&&node| node as usize >= count);
+        beyond.map_or(Ok(()), |&id| Err(SelectionError::NoSuchNode { id, count }))
+    }
+
+    fn check_label(&self, label: i32) -> Result<(), SelectionError> {
+        let known = labels(self.mesh);
+        if known.contains(&label) { Ok(()) } else { Err(SelectionError::UnknownLabel { label, known }) }
+    }
+
+    /// The error for a selection that selects nothing.
+    fn empty(&self, selection: &Selection, wanted: Wanted) -> SelectionError {
+        let mut hint = self.reason(selection, wanted);
+        if let Some((low, high)) = finite_bounds(&self.mesh.points) {
+            let (low, high) = (position(&low), position(&high));
+            hint += &format!("; the mesh lies between {low} and {high} m");
+        }
+        SelectionError::Empty { selection: selection.to_string(), wanted: wanted.name(), hint }
+    }
+
+    /// Why a selection selects nothing.
+    fn reason(&self, selection: &Selection, wanted: Wanted) -> String {
+        if self.mesh.points.is_empty() {
+            return "the mesh has no points".to_owned();
+        }
+        if wanted == Wanted::Faces && self.surface.faces.is_empty() {
+            return "the mesh has no boundary faces".to_owned();
+        }
+        if let Some(parts) = selection.parts() {
+            let counts = parts.iter().map(|part| {
+                let count = match wanted {
+                    Wanted::Nodes => part.evaluate(&|leaf| self.nodes(leaf)),
+                    Wanted::Faces => part.evaluate(&|leaf| self.faces(leaf)),
+                };
+                format!("{part} selects {}", count.map_or(0, |found| found.len()))
+            });
+            return counts.collect::<Vec<_>>().join(", ");
+        }
+        let nodes = self.nodes(selection).map_or(0, |nodes| nodes.len());
+        if wanted == Wanted::Faces && nodes > 0 {
+            return format!("it holds {nodes} nodes, but they make up no whole boundary face");
+        }
+        match selection {
+            Selection::Boundary => "the mesh has no boundary faces".to_owned(),
+            Selection::Normal { direction, .. } => self.closest_normal(direction),
+            Selection::Set(_) => "the set is empty".to_owned(),
+            Selection::Ids(_) => "the list is empty".to_owned(),
+            Selection::LabelBoundary([a, b]) => format!("cells of labels {a} and {b} share no node"),
+            _ => self.closest_node(selection),
+        }
+    }
+
+    fn closest_node(&self, region: &Selection) -> String {
+        let gaps = self.mesh.points.iter().enumerate();
+        let gaps = gaps.filter_map(|(node, p)| Some((region.gap(p).filter(|gap| gap.is_finite())?, node)));
+        let Some((gap, node)) = gaps.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return "no point of the mesh is finite".to_owned();
+        };
+        let at = position(&self.mesh.points[node]);
+        format!("the closest, node {node} at {at}, is {} m away", number(gap))
+    }
+
+    fn closest_normal(&self, direction: &[f64; 3]) -> String {
+        let Some(direction) = Vector3::from(*direction).try_normalize(0.0) else { return String::new() };
+        let angles = (0..self.surface.faces.len()).filter_map(|face| self.angle(face, &direction));
+        match angles.min_by(f64::total_cmp) {
+            Some(angle) => format!("the closest normal of a boundary face is {}° away", number(angle)),
+            None => "the mesh has no boundary faces".to_owned(),
+        }
+    }
+}
+
+/// Everything of one name.
+struct NamedSet<'m> {
+    points: &'m [u32],
+    cells: Vec<(&'m CellBlock, &'m [u32])>,
+}
+
+fn check_indices(name: &str, of: &'static str, indices: &[u32], count: usize) -> Result<(), SelectionError> {
+    let beyond = indices.iter().find(|&&index| index as usize >= count);
+    beyond.map_or(Ok(()), |&index| Err(SelectionError::BrokenSet { name: name.to_owned(), of, index, count }))
+}
+
+fn check_parts(operation: &'static str, least: usize, parts: &[Selection]) -> Result<(), SelectionError> {
+    let count = parts.len();
+    if count < least {
+        return Err(SelectionError::TooFewParts { operation, least, count });
+    }
+    parts.iter().try_for_each(Selection::check)
+}
+
+fn finite(what: &'static str, values: &[f64]) -> Result<(), SelectionError> {
+    let odd = values.iter().find(|value| !value.is_finite());
+    odd.map_or(Ok(()), |&value| Err(SelectionError::NotFinite { what, value }))
+}
+
+fn in_range(what: &'static str, value: f64, max: f64, range: &'static str) -> Result<(), SelectionError> {
+    finite(what, &[value])?;
+    if (0.0..=max).contains(&value) { Ok(()) } else { Err(SelectionError::OutOfRange { what, value, range }) }
+}
+
+/// A direction as a unit vector.
+fn unit(what: &'static str, direction: &[f64; 3]) -> Result<Vector3, SelectionError> {
+    finite(what, direction)?;
+    Vector3::from(*direction).try_normalize(0.0).ok_or(SelectionError::ZeroDirection { what })
+}
+
+/// Increasing, each once.
+fn sorted(mut indices: Vec<u32>) -> Vec<u32> {
+    indices.sort_unstable();
+    indices.dedup();
+    indices
+}
+
+/// Six digits at most, for a message.
+fn number(x: f64) -> String {
+    let short = format!("{x:.5e}").parse::<f64>().unwrap_or(x);
+    if short == 0.0 || (1e-4..1e6).contains(&short.abs()) { short.to_string() } else { format!("{short:e}") }
+}
+
+fn position(p: &Vector3) -> String {
+    format!("[{}, {}, {}]", number(p.x), number(p.y), number(p.z))
+}
+
+impl fmt::Display for Selection {
+    /// In words, for messages.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let joined = |parts: &[Self]| parts.iter().map(Self::to_string).collect::<Vec<_>>().join("; ");
+        match self {
+            Self::All => write!(f, "`all`"),
+            Self::Boundary => write!(f, "`boundary`"),
+            Self::Box([low, high]) => write!(f, "box from {low:?} to {high:?}"),
+            Self::Sphere { centre, radius } => write!(f, "sphere around {centre:?} of radius {radius}"),
+            Self::HalfSpace { point, normal } => write!(f, "half-space at {point:?} towards {normal:?}"),
+            Self::Plane { point, normal, .. } => write!(f, "plane at {point:?} with normal {normal:?}"),
+            Self::Normal { direction, within } => write!(f, "normal within {within}° of {direction:?}"),
+            Self::Nearest { point, count } => write!(f, "nearest {count} to {point:?}"),
+            Self::Set(name) => write!(f, "set `{name}`"),
+            Self::Label(label) => write!(f, "label {label}"),
+            Self::LabelBoundary([a, b]) => write!(f, "boundary of labels {a} and {b}"),
+            Self::Ids(ids) => write!(f, "list of {} ids", ids.len()),
+            Self::Union(parts) => write!(f, "union of ({})", joined(parts)),
+            Self::Intersection(parts) => write!(f, "intersection of ({})", joined(parts)),
+            Self::Difference(parts) => write!(f, "difference of ({})", joined(parts)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{block_of_hexes, block_of_tets, points};
+    use crate::{CellKind, DataArray, boundary};
+
+    /// A selection as a scene file has it.
+    fn parse(toml: &str) -> Selection {
+        read(toml).unwrap_or_else(|error| panic!("{toml}: {error}"))
+    }
+
+    fn read(toml: &str) -> Result<Selection, toml::de::Error> {
+        #[derive(Deserialize)]
+        struct Table {
+            nodes: Selection,
+        }
+        toml::from_str::<Table>(&format!("nodes = {toml}")).map(|table| table.nodes)
+    }
+
+    /// 2 × 2 × 2 unit cubes with labels 1 (x < 1) and 2, and sets.
+    fn block() -> Mesh {
+        let mut mesh = block_of_hexes([2, 2, 2]);
+        let labels = (0..8).map(|cell| if cell % 2 == 0 { 1.0 } else { 2.0 }).collect();
+        mesh.blocks[0].data.insert("label".into(), DataArray::scalar(labels));
+        mesh.blocks[0].sets.insert("first-cell".into(), vec![0]);
+        mesh.point_sets.insert("bottom".into(), (0..9).collect());
+        mesh.block_mut(CellKind::Quad).nodes.extend([0, 1, 4, 3, 4, 13, 14, 5]);
+        mesh.blocks[1].sets.insert("skin".into(), vec![0]);
+        mesh.blocks[1].sets.insert("inner".into(), vec![1]);
+        mesh
+    }
+
+    fn nodes(toml: &str) -> Vec<u32> {
+        let mesh = block();
+        parse(toml).nodes(&mesh, &boundary(&mesh)).unwrap()
+    }
+
+    fn faces(toml: &str) -> Vec<u32> {
+        let mesh = block();
+        parse(toml).faces(&mesh, &boundary(&mesh)).unwrap()
+    }
+
+    fn node_error(toml: &str) -> String {
+        let mesh = block();
+        parse(toml).nodes(&mesh, &boundary(&mesh)).unwrap_err().to_string()
+    }
+
+    const FORMS: [&str; 17] = [
+        r#""all""#,
+        r#""boundary""#,
+        "{ box = [[0, 0, 0], [1, 1.5, 1]] }",
+        "{ sphere = { centre = [0, 0, 0], radius = 1 } }",
+        "{ half-space = { point = [0, 0, 1], normal = [0, 0, 3] } }",
+        "{ plane = { point = [0, 0, 0], normal = [0, 0, 1] } }",
+        "{ plane = { point = [0, 0, 0.1], normal = [0, 0, 1], tolerance = 0.2 } }",
+        "{ normal = { direction = [0, 0, 1], within = 30.0 } }",
+        "{ nearest = { point = [0.1, 0, 0] } }",
+        "{ nearest = { point = [0, 0, 0], count = 4 } }",
+        r#"{ set = "bottom" }"#,
+        "{ label = 2 }",
+        "{ label-boundary = [1, 2] }",
+        "{ ids = [5, 3, 5] }",
+        r#"{ union = [{ ids = [1] }, "boundary"] }"#,
+        r#"{ intersection = ["boundary", { label = 2 }] }"#,
+        r#"{ difference = ["all", "boundary"] }"#,
+    ];
+
+    #[test]
+    fn every_form_is_read_written_back_and_selects_nodes() {
+        let counts = [27, 26, 8, 4, 18, 9, 9, 9, 1, 4, 9, 18, 9, 2, 26, 17, 1];
+        for (form, count) in FORMS.into_iter().zip(counts) {
+            let selection = parse(form);
+            let again = serde_json::to_string(&selection).unwrap();
+            assert_eq!(serde_json::from_str::<Selection>(&again).unwrap(), selection);
+            assert_eq!(nodes(form).len(), count, "{form}");
+        }
+    }
+
+    #[test]
+    fn nodes_are_increasing_and_unique() {
+        assert_eq!(nodes("{ ids = [5, 3, 5] }"), [3, 5]);
+        assert_eq!(nodes("{ union = [{ ids = [5] }, { ids = [3, 5] }] }"), [3, 5]);
+        assert_eq!(nodes(r#"{ difference = ["all", "boundary"] }"#), [13]);
+        assert_eq!(nodes("{ nearest = { point = [0.1, 0, 0] } }"), [0]);
+        assert_eq!(nodes("{ label-boundary = [1, 2] }"), [1, 4, 7, 10, 13, 16, 19, 22, 25]);
+    }
+
+    #[test]
+    fn regions_include_their_boundary_in_spite_of_rounding() {
+        let mut mesh = block_of_hexes([3, 3, 3]);
+        mesh.points.iter_mut().for_each(|p| *p *= 0.1);
+        let surface = boundary(&mesh);
+        // 3 × 0.1 > 0.3 in floating point.
+        for (form, count) in [
+            ("{ box = [[0, 0, 0.3], [0.3, 0.3, 0.3]] }", 16),
+            ("{ half-space = { point = [0, 0, 0.3], normal = [0, 0, -1] } }", 64),
+            ("{ sphere = { centre = [0, 0, 0], radius = 0.1 } }", 4),
+            ("{ plane = { point = [0, 0, 0.3], normal = [0, 0, 1], tolerance = 0 } }", 16),
+        ] {
+            assert_eq!(parse(form).nodes(&mesh, &surface).unwrap().len(), count, "{form}");
+        }
+    }
+
+    #[test]
+    fn faces_follow_their_nodes_their_normal_or_their_cell() {
+        assert_eq!(faces(r#""all""#).len(), 24);
+        assert_eq!(faces("{ plane = { point = [0, 0, 0], normal = [0, 0, 1] } }").len(), 4);
+        assert_eq!(faces("{ normal = { direction = [0, 0, 1], within = 30 } }").len(), 4);
+        assert_eq!(faces("{ normal = { direction = [0, 0, 1], within = 90 } }").len(), 20);
+        assert_eq!(faces(r#"{ set = "bottom" }"#).len(), 4);
+        assert_eq!(faces(r#"{ set = "first-cell" }"#).len(), 3);
+        assert_eq!(faces(r#"{ set = "skin" }"#).len(), 1);
+        assert_eq!(faces("{ label = 1 }").len(), 12);
+        assert_eq!(faces("{ intersection = [{ label = 1 }, { set = \"bottom\" }] }").len(), 2);
+        assert_eq!(faces("{ difference = [\"all\", { label = 1 }, { set = \"bottom\" }] }").len(), 10);
+    }
+
+    #[test]
+    fn faces_of_tets_work_too() {
+        let mesh = block_of_tets([2, 2, 2]);
+        let surface = boundary(&mesh);
+        let top = parse("{ normal = { direction = [0, 0, 1], within = 1 } }");
+        let plane = parse("{ plane = { point = [0, 0, 2], normal = [0, 0, 1] } }");
+        let faces = top.faces(&mesh, &surface).unwrap();
+        assert_eq!(faces.len(), 8);
+        assert_eq!(faces, plane.faces(&mesh, &surface).unwrap());
+        assert_eq!(top.nodes(&mesh, &surface), plane.nodes(&mesh, &surface));
+    }
+
+    #[test]
+    fn a_shell_is_its_own_boundary() {
+        let mut mesh = Mesh {
+            points: points(&[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]),
+            ..Mesh::default()
+        };
+        mesh.block_mut(CellKind::Triangle).nodes.extend([0, 1, 2, 0, 2, 3]);
+        mesh.blocks[0].sets.insert("half".into(), vec![1]);
+        let surface = boundary(&mesh);
+        assert_eq!(parse(r#"{ set = "half" }"#).faces(&mesh, &surface).unwrap(), [1]);
+        assert_eq!(parse(r#""boundary""#).nodes(&mesh, &surface).unwrap().len(), 4);
+    }
+
+    #[test]
+    fn errors_say_what_to_try() {
+        for (form, words) in [
+            (
+                r#"{ set = "botom" }"#,
+                "; did you mean `bottom`? (the mesh has `bottom`, `first-cell`, `inner`",
+            ),
+            ("{ ids = [27] }", "there is no node 27: the mesh has 27 nodes, counted from 0"),
+            ("{ label = 3 }", "no cell has label 3: the mesh has 1, 2"),
+            ("{ box = [[0, 5, 0], [1, 1, 1]] }", "along y: it begins at 5 m and ends at 1 m"),
+            ("{ plane = { point = [0, 0, 0], normal = [0, 0, 0] } }", "normal of the plane is zero"),
+            (
+                "{ sphere = { centre = [0, nan, 0], radius = 1 } }",
+                "centre of the sphere must be finite, not NaN",
+            ),
+            (
+                "{ sphere = { centre = [0, 0, 0], radius = -1 } }",
+                "radius of the sphere must be 0 or more, not -1",
+            ),
+            ("{ normal = { direction = [0, 0, 1], within = 200 } }", "from 0 to 180 degrees, not 200"),
+            ("{ nearest = { point = [0, 0, 0], count = 0 } }", "1 or more, not 0"),
+            ("{ difference = [\"all\"] }", "difference needs 2 or more selections, but has 1"),
+            ("{ union = [] }", "union needs 1 or more selections, but has 0"),
+        ] {
+            let error = node_error(form);
+            assert!(error.contains(words), "{form}: {error}");
+        }
+    }
+
+    #[test]
+    fn empty_selections_say_how_far_off_they_are() {
+        let whole = "the mesh lies between [0, 0, 0] and [2, 2, 2] m";
+        for (form, words) in [
+            (
+                "{ box = [[2.5, 0, 0], [3, 2, 2]] }",
+                "selects no nodes: the closest, node 2 at [2, 0, 0], is 0.5 m away",
+            ),
+            ("{ sphere = { centre = [0.5, 0.5, 0.5], radius = 0.1 } }", "is 0.766025 m away"),
+            ("{ plane = { point = [0, 0, 0.25], normal = [0, 0, 2] } }", "is 0.25 m away"),
+            ("{ half-space = { point = [0, 0, 7], normal = [0, 0, 1] } }", "is 5 m away"),
+            ("{ normal = { direction = [1, 1, 0], within = 10 } }", "of a boundary face is 45° away"),
+            ("{ ids = [] }", "the list is empty"),
+            ("{ intersection = [{ ids = [1] }, { ids = [2, 3] }] }", "list of 2 ids selects 2; "),
+        ] {
+            let error = node_error(form);
+            assert!(error.contains(words) && error.contains(whole), "{form}: {error}");
+        }
+        let mesh = block();
+        let surface = boundary(&mesh);
+        let error = parse("{ ids = [0, 1] }").faces(&mesh, &surface).unwrap_err().to_string();
+        assert!(error.contains("it holds 2 nodes, but they make up no whole boundary face"), "{error}");
+        let error = parse(r#"{ set = "inner" }"#).faces(&mesh, &surface).unwrap_err().to_string();
+        assert!(error.contains("no whole boundary face"), "{error}");
+        let error = Selection::All.nodes(&Mesh::default(), &Surface::default()).unwrap_err().to_string();
+        assert!(error.contains("the mesh has no points"), "{error}");
+    }
+
+    #[test]
+    fn broken_sets_are_errors() {
+        let mut mesh = block();
+        mesh.blocks[0].sets.insert("broken".into(), vec![8]);
+        mesh.point_sets.insert("gone".into(), vec![99]);
+        let surface = boundary(&mesh);
+        for (name, words) in [("broken", "it names hex 8, but there are 8"), ("gone", "it names node 99")] {
+            let selection = Selection::Set(name.into());
+            assert!(selection.nodes(&mesh, &surface).unwrap_err().to_string().contains(words));
+            assert!(selection.faces(&mesh, &surface).is_err());
+        }
+    }
+
+    #[test]
+    fn misspelt_forms_are_refused() {
+        for form in [
+            r#""everything""#,
+            "{ sphere = { center = [0, 0, 0], radius = 1 } }",
+            "{ plane = { point = [0, 0, 0], normal = [0, 0, 1], tol = 1 } }",
+            "{ box = [[0, 0], [1, 1, 1]] }",
+            "{ ids = [-1] }",
+        ] {
+            assert!(read(form).is_err(), "{form}");
+        }
+    }
+
+    #[test]
+    fn schema_describes_every_form() {
+        let schema = serde_json::to_value(schemars::schema_for!(Selection)).unwrap();
+        let text = schema.to_string();
+        for word in ["half-space", "label-boundary", "\"boundary\"", "Greatest angle", "\"difference\""] {
+            assert!(text.contains(word), "{word} not in {text}");
+        }
+        let forms = schema["oneOf"].as_array().unwrap();
+        assert!(forms.iter().all(|form| form["description"].is_string() || form["enum"].is_array()));
+    }
+}

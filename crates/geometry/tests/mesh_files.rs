@@ -1,0 +1,850 @@
+//! Mesh files in and out: files of other programs (see `data/README.md`), round trips of our own, and broken
+//! files, which must give errors and never a panic.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use pliant_geometry::io::{
+    Format, MeshFile, MeshFileError, MeshFileProblem, Place, VtuOptions, read, read_bytes, save_vtu, write,
+    write_pvd, write_vtu,
+};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+
+fn data() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data")
+}
+
+fn read_data(name: &str) -> MeshFile {
+    read(&data().join(name)).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A folder of its own for a test, under Cargo's folder for them.
+fn scratch(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn points(coordinates: &[[f64; 3]]) -> Vec<Vector3> {
+    coordinates.iter().map(|&[x, y, z]| Vector3::new(x, y, z)).collect()
+}
+
+/// The mixed mesh of `data/generate.py`, written here a second time by hand.
+fn mixed() -> Mesh {
+    let mut mesh = Mesh {
+        points: points(&[
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 1.0],
+            [1.0, 1.0, 1.0],
+            [0.0, 1.0, 1.0],
+            [0.5, 0.25, 2.125],
+        ]),
+        blocks: vec![
+            CellBlock::new(CellKind::Hex, vec![0, 1, 2, 3, 4, 5, 6, 7]),
+            CellBlock::new(CellKind::Tet, vec![4, 5, 6, 8, 4, 6, 7, 8]),
+            CellBlock::new(CellKind::Triangle, vec![4, 5, 8, 5, 6, 8]),
+            CellBlock::new(CellKind::Quad, vec![0, 3, 2, 1]),
+            CellBlock::new(CellKind::Line, vec![0, 1, 1, 2]),
+            CellBlock::new(CellKind::Vertex, vec![8]),
+        ],
+        ..Mesh::default()
+    };
+    let velocity = mesh.points.iter().flat_map(|x| [2.0 * x.x + 1.0, 2.0 * x.y + 1.0, 2.0 * x.z + 1.0]);
+    mesh.point_data = BTreeMap::from([
+        ("temperature".to_owned(), DataArray::scalar((0..9).map(|i| 0.5 * f64::from(i)).collect())),
+        ("velocity".to_owned(), DataArray { components: 3, values: velocity.collect() }),
+        ("number".to_owned(), DataArray::scalar((0..9).map(|i| 1000.0 * f64::from(i)).collect())),
+    ]);
+    let mut label = 10.0;
+    let mut stress = 0.0;
+    for block in &mut mesh.blocks {
+        let labels = (0..block.len()).map(|i| label + i as f64).collect();
+        let stresses = (0..9 * block.len()).map(|i| stress + 0.125 * i as f64).collect();
+        label += block.len() as f64;
+        stress += 9.0 * 0.125 * block.len() as f64;
+        block.data.insert("label".to_owned(), DataArray::scalar(labels));
+        block.data.insert("stress".to_owned(), DataArray { components: 9, values: stresses });
+    }
+    mesh
+}
+
+/// The mixed mesh with sets of points and cells.
+fn with_sets() -> Mesh {
+    let mut mesh = mixed();
+    mesh.point_sets.insert("top & tip".to_owned(), vec![4, 5, 8]);
+    mesh.point_sets.insert("fixed".to_owned(), vec![0, 1]);
+    mesh.block_mut(CellKind::Tet).sets.insert("tumour \"2\"".to_owned(), vec![1]);
+    mesh.block_mut(CellKind::Tet).sets.insert("all".to_owned(), vec![0, 1]);
+    mesh.block_mut(CellKind::Hex).sets.insert("all".to_owned(), vec![0]);
+    mesh.block_mut(CellKind::Triangle).sets.insert("wall".to_owned(), vec![0]);
+    mesh
+}
+
+// --- files of other programs --------------------------------------------------------------------------------
+
+#[test]
+fn vtu_of_vtk_in_every_storage() {
+    for name in [
+        "ascii.vtu",
+        "inline.vtu",
+        "inline-64-big.vtu",
+        "inline-zlib.vtu",
+        "appended-raw.vtu",
+        "appended-raw-zlib.vtu",
+        "appended-raw-32-big.vtu",
+        "appended-base64.vtu",
+        "appended-base64-zlib-big.vtu",
+    ] {
+        let file = read_data(name);
+        assert_eq!(file.mesh, mixed(), "{name}");
+        assert_eq!(file.time, Some(0.25), "{name}");
+        assert!(file.format.starts_with("VTU"), "{name}");
+        assert!(file.notes.is_empty(), "{name}: {:?}", file.notes);
+    }
+}
+
+#[test]
+fn legacy_vtk_of_vtk() {
+    for (name, format) in [
+        ("v42.vtk", "legacy VTK 4.2 ASCII"),
+        ("v42-binary.vtk", "legacy VTK 4.2 binary"),
+        ("v51.vtk", "legacy VTK 5.1 ASCII"),
+        ("v51-binary.vtk", "legacy VTK 5.1 binary"),
+    ] {
+        let file = read_data(name);
+        assert_eq!(file.mesh, mixed(), "{name}");
+        assert_eq!(file.time, Some(0.25), "{name}");
+        assert_eq!(file.format, format);
+        assert!(file.notes.is_empty(), "{name}: {:?}", file.notes);
+    }
+}
+
+#[test]
+fn vtk_files_of_meshio() {
+    for name in ["meshio.vtu", "meshio-zlib.vtu", "meshio-v42.vtk", "meshio-v51.vtk"] {
+        assert_eq!(read_data(name).mesh, mixed(), "{name}");
+    }
+}
+
+#[test]
+fn poly_data_is_split_into_cells() {
+    for name in ["poly-v42.vtk", "poly-v51-binary.vtk", "poly.vtp"] {
+        let mesh = read_data(name).mesh;
+        let nodes = |kind| mesh.block(kind).unwrap().nodes.as_slice();
+        let ids = |kind| mesh.block(kind).unwrap().data["id"].values.as_slice();
+        assert_eq!(nodes(CellKind::Vertex), [8]);
+        assert_eq!(nodes(CellKind::Line), [0, 1, 1, 4]);
+        assert_eq!(nodes(CellKind::Quad), [1, 4, 5, 2]);
+        // The triangle, the pentagon as a fan, the strip with its second triangle turned round.
+        assert_eq!(
+            nodes(CellKind::Triangle),
+            [0, 1, 2, 3, 2, 7, 3, 7, 8, 3, 8, 6, 3, 2, 6, 6, 2, 7],
+            "{name}"
+        );
+        assert_eq!(ids(CellKind::Vertex), [0.0]);
+        assert_eq!(ids(CellKind::Line), [1.0, 1.0]);
+        assert_eq!(ids(CellKind::Triangle), [2.0, 4.0, 4.0, 4.0, 5.0, 5.0]);
+        assert_eq!(ids(CellKind::Quad), [3.0]);
+        let colour = &mesh.point_data["colour of point"];
+        assert_eq!((colour.components, colour.item(8)), (3, [24.0, 25.0, 26.0].as_slice()));
+    }
+}
+
+fn tet_volume(mesh: &Mesh) -> f64 {
+    let tets = mesh.block(CellKind::Tet).unwrap();
+    tets.cells()
+        .map(|cell| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i| mesh.points[cell[i] as usize]);
+            (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
+        })
+        .sum()
+}
+
+#[test]
+fn gmsh_groups_labels_and_data() {
+    for (name, format) in [
+        ("gmsh22.msh", "Gmsh 2.2 ASCII"),
+        ("gmsh22-binary.msh", "Gmsh 2.2 binary"),
+        ("gmsh41.msh", "Gmsh 4.1 ASCII"),
+        ("gmsh41-binary.msh", "Gmsh 4.1 binary"),
+    ] {
+        let file = read_data(name);
+        let mesh = &file.mesh;
+        assert_eq!(file.format, format);
+        assert_eq!(file.time, Some(0.5));
+        assert_eq!(mesh.points.len(), 23, "{name}");
+        // Two unit cubes; every tet the right way round.
+        assert!((tet_volume(mesh) - 2.0).abs() < 1e-14, "{name}");
+        let tets = mesh.block(CellKind::Tet).unwrap();
+        assert_eq!(tets.len(), 48);
+        assert_eq!(tets.sets["all"], (0..48).collect::<Vec<u32>>());
+        // Sets and labels tell the cubes apart as their positions do.
+        for (i, cell) in tets.cells().enumerate() {
+            let is_left = cell.iter().all(|&node| mesh.points[node as usize].x <= 1.0);
+            let set = if is_left { "left lobe" } else { "right lobe" };
+            assert!(tets.sets[set].contains(&(i as u32)));
+            assert_eq!(tets.data["label"].values[i], if is_left { 5.0 } else { 6.0 });
+        }
+        assert_eq!(tets.sets["left lobe"].len() + tets.sets["right lobe"].len(), 48);
+        let triangles = mesh.block(CellKind::Triangle).unwrap();
+        assert_eq!(triangles.sets["wall"], [0, 1, 2, 3]);
+        assert_eq!(triangles.data["label"].values, [8.0; 4]);
+        assert!(!triangles.data.contains_key("flow"));
+        assert_eq!(mesh.point_sets["pins"], [0, 1]);
+        assert_eq!(mesh.block(CellKind::Vertex).unwrap().nodes, [0, 1]);
+        let speed = &mesh.point_data["speed"];
+        for (x, speed) in mesh.points.iter().zip(&speed.values) {
+            assert!((x.x + 10.0 * x.y - speed).abs() < 1e-12);
+        }
+        // The data of each tet is its number in Gmsh, three times: one number each, increasing.
+        let flow = &tets.data["flow"];
+        assert_eq!((flow.components, flow.len()), (3, 48));
+        assert!(flow.values.chunks(3).all(|v| v[0] == v[1] && v[1] == v[2]));
+        assert!(flow.values.chunks(3).is_sorted_by(|a, b| a[0] < b[0]));
+    }
+    // Versions 2.2 and 4.1, text and binary, hold the same mesh.
+    let expected = read_data("gmsh41.msh").mesh;
+    assert_eq!(read_data("gmsh41-binary.msh").mesh, expected);
+    assert_eq!(read_data("gmsh22-binary.msh").mesh, read_data("gmsh22.msh").mesh);
+    assert_eq!(read_data("gmsh22.msh").mesh.points, expected.points);
+}
+
+#[test]
+fn gmsh_1_has_labels_but_no_names() {
+    let file = read_data("gmsh1.msh");
+    assert_eq!(file.format, "Gmsh 1 ASCII");
+    let tets = file.mesh.block(CellKind::Tet).unwrap();
+    assert_eq!(tets.len(), 48);
+    assert!((tet_volume(&file.mesh) - 2.0).abs() < 1e-14);
+    let of_five = tets.data["label"].values.iter().filter(|&&label| label == 5.0).count();
+    assert_eq!(of_five, 24);
+    assert!(tets.sets.is_empty());
+    assert!(file.notes.iter().any(|note| note.contains("48 cells were given once per physical group")));
+}
+
+#[test]
+fn partitioned_gmsh_keeps_its_group() {
+    for name in ["partitioned.msh", "partitioned-binary.msh"] {
+        let mesh = read_data(name).mesh;
+        let hexes = mesh.block(CellKind::Hex).unwrap();
+        assert_eq!(hexes.len(), 2, "{name}");
+        assert_eq!(hexes.sets["bar"], [0, 1]);
+        assert_eq!(hexes.data["label"].values, [3.0, 3.0]);
+        assert_eq!(mesh.points.len(), 12);
+    }
+}
+
+#[test]
+fn surfaces_of_other_programs() {
+    let expected = points(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.5]]);
+    let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    for name in [
+        "meshio.stl",
+        "meshio-binary.stl",
+        "vtk.stl",
+        "vtk-binary.stl",
+        "meshio.off",
+        "meshio.obj",
+        "vtk.obj",
+        "vtk-big.ply",
+    ] {
+        let mesh = read_data(name).mesh;
+        assert_eq!(mesh.points.len(), 4, "{name}");
+        assert_eq!(mesh.blocks.len(), 1, "{name}");
+        // STL numbers its points by their first use: compare the corners' positions.
+        let block = &mesh.blocks[0];
+        assert_eq!((block.kind, block.len()), (CellKind::Triangle, 4));
+        for (cell, face) in block.cells().zip(faces) {
+            for (&node, corner) in cell.iter().zip(face) {
+                assert_eq!(mesh.points[node as usize], expected[corner], "{name}");
+            }
+        }
+    }
+    for name in ["meshio.ply", "meshio-binary.ply"] {
+        let mesh = read_data(name).mesh;
+        assert_eq!(mesh.points, mixed().points[..8]);
+        assert_eq!(mesh.block(CellKind::Triangle).unwrap().nodes, [0, 2, 1]);
+        assert_eq!(mesh.block(CellKind::Quad).unwrap().nodes, [4, 5, 6, 7, 0, 1, 5, 4]);
+        assert_eq!(mesh.point_data["temperature"].values, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5]);
+    }
+}
+
+// --- variants written by hand -------------------------------------------------------------------------------
+
+fn text(content: &str, format: Format) -> MeshFile {
+    read_bytes(content.as_bytes(), format).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn obj_groups_negative_indices_and_polygons() {
+    let file = text(
+        "# a comment\nmtllib x.mtl\no body\nv 0 0 0 1.0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv -1 0.5 0\nvn 0 0 1\nvt 0 0\n\
+         g left  top\nusemtl skin\nf 1/1/1 2//1 \\\n 3/1\nf -5 -4 -3 -2 # quad\ng\nf 1 2 3 4 5\nl 1 2 3\np 5\nsp 1\n",
+        Format::Obj,
+    );
+    let mesh = file.mesh;
+    assert_eq!(mesh.block(CellKind::Triangle).unwrap().nodes, [0, 1, 2, 0, 1, 2, 0, 2, 3, 0, 3, 4]);
+    assert_eq!(mesh.block(CellKind::Quad).unwrap().nodes, [0, 1, 2, 3]);
+    assert_eq!(mesh.block(CellKind::Line).unwrap().nodes, [0, 1, 1, 2]);
+    assert_eq!(mesh.block(CellKind::Vertex).unwrap().nodes, [4]);
+    let triangles = &mesh.block(CellKind::Triangle).unwrap().sets;
+    assert_eq!(triangles["left"], [0]);
+    assert_eq!(triangles["top"], [0]);
+    assert_eq!(triangles["skin"], [0, 1, 2, 3]);
+    assert_eq!(triangles["body"], [0, 1, 2, 3]);
+    assert_eq!(mesh.block(CellKind::Quad).unwrap().sets["left"], [0]);
+    assert_eq!(file.notes.len(), 2, "{:?}", file.notes);
+}
+
+#[test]
+fn off_with_comments_counts_beside_the_word_and_colours() {
+    let counts_beside =
+        "OFF 4 2 0 # counts\n# comment\n0 0 0\n1 0 0\n\n1 1 0\n0 1 0\n3 0 1 2 255 0 0\n4 0 1 2 3\n";
+    let counts_below =
+        "COFF\n4 2\n0 0 0 1 1 1 1\n1 0 0 1 1 1 1\n1 1 0 1 1 1 1\n0 1 0 1 1 1 1\n3 0 1 2\n4 0 1 2 3\n";
+    let without_word = "4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n4 0 1 2 3";
+    for content in [counts_beside, counts_below, without_word] {
+        let mesh = text(content, Format::Off).mesh;
+        assert_eq!(mesh.points, mixed().points[..4]);
+        assert_eq!(mesh.block(CellKind::Triangle).unwrap().nodes, [0, 1, 2]);
+        assert_eq!(mesh.block(CellKind::Quad).unwrap().nodes, [0, 1, 2, 3]);
+    }
+}
+
+#[test]
+fn stl_solids_become_sets_and_corners_are_shared() {
+    let facet = |a: &str, b: &str, c: &str| {
+        format!(
+            "facet normal 0 0 1\n outer loop\n vertex {a}\n vertex {b}\n vertex {c}\n endloop\nendfacet\n"
+        )
+    };
+    let content = format!(
+        "solid left lobe\n{}{}endsolid left lobe\nsolid\n{}endsolid\n",
+        facet("0 0 0", "1 0 0", "1 1 0"),
+        facet("0 0 0", "0.0 0.0 -0.0", "1 1 0"),
+        facet("0 -0 0", "1 1 0", "0 1 0")
+    );
+    let file = text(&content, Format::Stl);
+    assert_eq!(file.mesh.points, mixed().points[..4]);
+    let triangles = &file.mesh.blocks[0];
+    assert_eq!(triangles.nodes, [0, 1, 2, 0, 2, 3]);
+    assert_eq!(triangles.sets, BTreeMap::from([("left lobe".to_owned(), vec![0])]));
+    assert!(file.notes[0].contains("1 triangles with two equal corners"));
+}
+
+#[test]
+fn binary_stl_whose_head_begins_like_text() {
+    let mut bytes = fs::read(data().join("meshio-binary.stl")).unwrap();
+    bytes[..12].copy_from_slice(b"solid facet ");
+    let file = read_bytes(&bytes, Format::Stl).unwrap();
+    assert_eq!(file.format, "STL binary");
+    assert_eq!(file.mesh.points.len(), 4);
+}
+
+#[test]
+fn ply_properties_become_data_and_sets() {
+    let file = text(
+        "ply\nformat ascii 1.0\ncomment x\nelement material 1\nproperty list uchar float colours\n\
+         element vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+         property float speed_0\nproperty float speed_1\nproperty uchar set:fixed\n\
+         element face 2\nproperty list uchar int vertex_index\nproperty int label\nproperty uchar set:wall\n\
+         element edge 1\nproperty int vertex1\nproperty int vertex2\nproperty int label\nend_header\n\
+         2 0.5 0.25\n0 0 0 1 2 1\n1 0 0 3 4 0\n1 1 0 5 6 0\n0 1 0 7 8 1\n3 0 1 2 7 0\n4 0 1 2 3 8 1\n0 1 9\n",
+        Format::Ply,
+    );
+    let mesh = file.mesh;
+    assert_eq!(
+        mesh.point_data["speed"],
+        DataArray { components: 2, values: (1..=8).map(f64::from).collect() }
+    );
+    assert_eq!(mesh.point_sets["fixed"], [0, 3]);
+    let label = |kind| mesh.block(kind).unwrap().data["label"].values.clone();
+    assert_eq!(label(CellKind::Triangle), [7.0]);
+    assert_eq!(label(CellKind::Quad), [8.0]);
+    assert_eq!(label(CellKind::Line), [9.0]);
+    assert_eq!(mesh.block(CellKind::Quad).unwrap().sets["wall"], [0]);
+    assert!(!mesh.block(CellKind::Line).unwrap().sets.contains_key("wall"));
+}
+
+#[test]
+fn gmsh_numbers_need_not_be_contiguous() {
+    let mesh = text(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n70 1 0 0\n5 0 0 0\n1000000007 0 0 1\n71 0 1 0\n$EndNodes\n\
+         $Elements\n1\n9 4 2 -3 1 5 70 71 1000000007\n$EndElements\n\
+         $NodeData\n1\n\"u\"\n1\n0.0\n3\n0\n1\n2\n71 4.5\n70 1.5\n$EndNodeData\n",
+        Format::Gmsh,
+    )
+    .mesh;
+    assert_eq!(mesh.block(CellKind::Tet).unwrap().nodes, [1, 0, 3, 2]);
+    assert_eq!(mesh.block(CellKind::Tet).unwrap().data["label"].values, [3.0]);
+    let u = &mesh.point_data["u"].values;
+    assert_eq!((u[0], u[3]), (1.5, 4.5));
+    assert!(u[1].is_nan() && u[2].is_nan());
+}
+
+#[test]
+fn gmsh_binary_of_the_other_byte_order() {
+    let mut bytes = b"$MeshFormat\n2.2 1 8\n".to_vec();
+    bytes.extend(1_i32.to_be_bytes());
+    bytes.extend(b"\n$EndMeshFormat\n$Nodes\n3\n");
+    for (i, x) in [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5_f64]].into_iter().enumerate() {
+        bytes.extend((i as i32 + 1).to_be_bytes());
+        x.iter().for_each(|x| bytes.extend(x.to_be_bytes()));
+    }
+    bytes.extend(b"\n$EndNodes\n$Elements\n1\n");
+    [2, 1, 2, 1, 42, 1, 1, 2, 3_i32].iter().for_each(|i| bytes.extend(i.to_be_bytes()));
+    bytes.extend(b"\n$EndElements\n");
+    let mesh = read_bytes(&bytes, Format::Gmsh).unwrap().mesh;
+    assert_eq!(mesh.points[2], Vector3::new(0.0, 1.0, 0.5));
+    assert_eq!(mesh.blocks[0].nodes, [0, 1, 2]);
+    assert_eq!(mesh.blocks[0].data["label"].values, [42.0]);
+
+    let mut bytes = b"$MeshFormat\n4.1 1 8\n".to_vec();
+    bytes.extend(1_i32.to_be_bytes());
+    bytes.extend(b"\n$EndMeshFormat\n$Nodes\n");
+    [1, 3, 1, 3_u64].iter().for_each(|i| bytes.extend(i.to_be_bytes()));
+    [2, 1, 0_i32].iter().for_each(|i| bytes.extend(i.to_be_bytes()));
+    [3, 1, 2, 3_u64].iter().for_each(|i| bytes.extend(i.to_be_bytes()));
+    [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.5_f64].iter().for_each(|x| bytes.extend(x.to_be_bytes()));
+    bytes.extend(b"\n$EndNodes\n$Elements\n");
+    [1, 1, 1, 1_u64].iter().for_each(|i| bytes.extend(i.to_be_bytes()));
+    [2, 1, 2_i32].iter().for_each(|i| bytes.extend(i.to_be_bytes()));
+    [1, 1, 1, 2, 3_u64].iter().for_each(|i| bytes.extend(i.to_be_bytes()));
+    bytes.extend(b"\n$EndElements\n");
+    let mesh = read_bytes(&bytes, Format::Gmsh).unwrap().mesh;
+    assert_eq!(mesh.points[2], Vector3::new(0.0, 1.0, 0.5));
+    assert_eq!(mesh.blocks[0].nodes, [0, 1, 2]);
+}
+
+#[test]
+fn pixels_and_voxels_are_reordered() {
+    let mesh = text(
+        "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n\
+         0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1\nCELLS 2 14\n8 0 1 2 3 4 5 6 7\n4 0 1 2 3\n\
+         CELL_TYPES 2\n11\n8\nCELL_DATA 2\nSCALARS a float\nLOOKUP_TABLE default\n1 2\n\
+         POINT_DATA 8\nSCALARS b int 1\n1 2 3 4 5 6 7 8\nVECTORS v double\n\
+         0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9\n",
+        Format::Vtk,
+    )
+    .mesh;
+    assert_eq!(mesh.block(CellKind::Hex).unwrap().nodes, [0, 1, 3, 2, 4, 5, 7, 6]);
+    assert_eq!(mesh.block(CellKind::Quad).unwrap().nodes, [0, 1, 3, 2]);
+    assert_eq!(mesh.block(CellKind::Quad).unwrap().data["a"].values, [2.0]);
+    assert_eq!(mesh.point_data["b"].values[7], 8.0);
+    assert_eq!(mesh.point_data["v"].item(7), [0.0, 0.0, 9.0]);
+}
+
+#[test]
+fn pieces_of_a_vtu_are_joined() {
+    let piece = |x: f64, extra: &str| {
+        format!(
+            "<Piece NumberOfPoints=\"2\" NumberOfCells=\"1\"><PointData>{extra}</PointData>\
+             <Points><DataArray type=\"Float32\" NumberOfComponents=\"3\">{x} 0 0 {x} 1 0</DataArray></Points>\
+             <Cells><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1</DataArray>\
+             <DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">2</DataArray>\
+             <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">3</DataArray></Cells></Piece>"
+        )
+    };
+    let extra = "<DataArray type=\"Float32\" Name=\"t\" format=\"ascii\">5 6</DataArray>";
+    let content = format!(
+        "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>{}{}</UnstructuredGrid></VTKFile>",
+        piece(0.0, ""),
+        piece(1.0, extra)
+    );
+    let mesh = text(&content, Format::Vtu).mesh;
+    assert_eq!(mesh.blocks[0].nodes, [0, 1, 2, 3]);
+    assert_eq!(mesh.points[3], Vector3::new(1.0, 1.0, 0.0));
+    let t = &mesh.point_data["t"].values;
+    assert!(t[0].is_nan() && t[1].is_nan());
+    assert_eq!(t[2..], [5.0, 6.0]);
+}
+
+#[test]
+fn content_tells_the_format_before_the_ending_does() {
+    let path = scratch("content").join("really-vtk.VTU");
+    fs::copy(data().join("v42.vtk"), &path).unwrap();
+    let file = read(&path).unwrap();
+    assert_eq!(file.mesh, mixed());
+    assert!(file.notes[0].contains("the ending says VTU, but the file is legacy VTK"), "{:?}", file.notes);
+}
+
+// --- errors -------------------------------------------------------------------------------------------------
+
+/// The error of a file of some bytes.
+fn error(content: &str, format: Format) -> (Place, MeshFileProblem, String) {
+    match read_bytes(content.as_bytes(), format) {
+        Err(error) => {
+            let message = error.to_string();
+            match error {
+                MeshFileError::Content { place, problem, .. } => (place, problem, message),
+                other => panic!("{other:?}"),
+            }
+        }
+        Ok(file) => panic!("read as {file:?}"),
+    }
+}
+
+#[test]
+fn errors_say_what_is_wrong_and_where() {
+    let tet = |nodes: &str, element: &str| {
+        format!(
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n{nodes}\n$EndNodes\n$Elements\n1\n{element}\n$EndElements\n"
+        )
+    };
+    let good = "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1";
+    let (place, problem, message) = error(&tet(good, "1 4 2 1 1 1 2 3 5"), Format::Gmsh);
+    assert_eq!(place, Place::Line(13));
+    assert_eq!(problem, MeshFileProblem::UndefinedNode { node: 5, cell: "tet 1".to_owned() });
+    assert!(message.starts_with("cannot read `bytes.msh`, line 13: tet 1 uses node 5"), "{message}");
+
+    let (place, problem, _) =
+        error(&tet("1 0 0 0\n2 1 0 x\n3 0 1 0\n4 0 0 1", "1 4 0 1 2 3 4"), Format::Gmsh);
+    assert_eq!(place, Place::Line(7));
+    assert!(matches!(problem, MeshFileProblem::BadNumber { ref text, .. } if text == "x"));
+
+    let (place, problem, message) =
+        error(&tet("1 0 0 0\n2 1 0 nan\n3 0 1 0\n4 0 0 1", "1 4 0 1 2 3 4"), Format::Gmsh);
+    assert_eq!(place, Place::Line(7));
+    assert!(matches!(problem, MeshFileProblem::NotFinite { point: 2, .. }), "{message}");
+
+    let (_, problem, message) = error(&tet(good, "1 11 0 1 2 3 4 1 2 3 4 1 2"), Format::Gmsh);
+    assert!(matches!(problem, MeshFileProblem::UnsupportedCells { .. }));
+    assert!(message.contains("1 quadratic tet (tet10)"), "{message}");
+    assert!(matches!(
+        error("$MeshFormat\n4.0 0 8\n", Format::Gmsh).1,
+        MeshFileProblem::UnsupportedVariant { .. }
+    ));
+    assert_eq!(error("v 0 0 0\n", Format::Obj).1, MeshFileProblem::NoCells);
+    assert_eq!(error("# nothing\n", Format::Obj).1, MeshFileProblem::NoPoints);
+    let (place, problem, _) = error("v 0 0 0\nv 1 0 0\n\nf 1 2 3\n", Format::Obj);
+    assert_eq!(place, Place::Line(4));
+    assert!(matches!(problem, MeshFileProblem::UndefinedNode { node: 3, .. }));
+    let (place, _, message) = error("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1\n3 0 1 2\n", Format::Off);
+    assert_eq!(place, Place::Line(5), "{message}");
+    let (place, ..) = error("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 inf\n", Format::Stl);
+    assert_eq!(place, Place::Line(4));
+    let lz4 = read(&data().join("appended-lz4.vtu")).unwrap_err().to_string();
+    assert!(lz4.contains("vtkLZ4DataCompressor is not supported; save the file with zlib"), "{lz4}");
+    let quadratic = read(&data().join("quadratic.msh")).unwrap_err().to_string();
+    assert!(quadratic.contains("48 quadratic tet (tet10)"), "{quadratic}");
+}
+
+#[test]
+fn errors_of_paths() {
+    let missing = read(Path::new("no/such/file.vtu"));
+    assert!(matches!(missing, Err(MeshFileError::Open { .. })));
+    let folder = scratch("paths");
+    let unknown = folder.join("mesh.inp");
+    fs::write(&unknown, "*Heading").unwrap();
+    let message = read(&unknown).unwrap_err().to_string();
+    assert!(message.contains("formats read: Gmsh (.msh), legacy VTK (.vtk), VTU (.vtu)"), "{message}");
+    let message = write(&folder.join("mesh.vtk"), &mixed()).unwrap_err().to_string();
+    assert!(message.contains("formats written: VTU (.vtu), Gmsh (.msh), OBJ (.obj)"), "{message}");
+    assert!(matches!(write(&folder.join("no/where.vtu"), &mixed()), Err(MeshFileError::Write { .. })));
+}
+
+#[test]
+fn announced_counts_allocate_nothing() {
+    let gmsh = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4000000000\n1 0 0 0\n";
+    let vtk = "# vtk DataFile Version 3.0\nx\nBINARY\nDATASET POLYDATA\nPOINTS 4000000000 double\n1234";
+    let off = "OFF\n4000000000 4000000000 0\n0 0 0\n";
+    let ply = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\n\
+               property float y\nproperty float z\nelement nothing 18446744073709551615\nend_header\n0123";
+    let vtu = "<VTKFile type=\"UnstructuredGrid\" compressor=\"vtkZLibDataCompressor\"><UnstructuredGrid>\
+               <Piece NumberOfPoints=\"1\" NumberOfCells=\"1\"><Points><DataArray type=\"Float32\" \
+               NumberOfComponents=\"3\" format=\"binary\">/////wAAAEAAAABA/////w==</DataArray></Points></Piece>\
+               </UnstructuredGrid></VTKFile>";
+    let mut stl = vec![0; 100];
+    stl[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+    let cases = [
+        (gmsh.as_bytes(), Format::Gmsh),
+        (vtk.as_bytes(), Format::Vtk),
+        (off.as_bytes(), Format::Off),
+        (ply.as_bytes(), Format::Ply),
+        (vtu.as_bytes(), Format::Vtu),
+        (&stl, Format::Stl),
+    ];
+    for (bytes, format) in cases {
+        match read_bytes(bytes, format) {
+            Err(MeshFileError::Content { problem: MeshFileProblem::Truncated { .. }, .. }) => {}
+            other => panic!("{format:?}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn deep_xml_is_an_error_or_a_mesh_but_no_crash() {
+    let content = format!("<VTKFile type=\"PolyData\">{}", "<a>".repeat(200_000));
+    assert!(read_bytes(content.as_bytes(), Format::Vtu).is_err());
+}
+
+/// Cuts every file at many places and turns bytes: whatever comes, it is a mesh or an error, and soon.
+#[test]
+fn broken_files_never_panic() {
+    let mut state = 0x2545_f491_4f6c_dd1d_u64;
+    let mut random = move || {
+        // Knuth's MMIX constants.
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    let mut files: Vec<(Vec<u8>, Format, String)> = fs::read_dir(data())
+        .unwrap()
+        .filter_map(|entry| {
+            let path = entry.unwrap().path();
+            let format = Format::of_path(&path)?;
+            Some((fs::read(&path).unwrap(), format, path.display().to_string()))
+        })
+        .collect();
+    files.sort_by(|a, b| a.2.cmp(&b.2));
+    assert!(files.len() > 30);
+    let folder = scratch("broken");
+    for (name, mesh) in [("own.msh", with_sets()), ("own.ply", with_sets()), ("own.obj", with_sets())] {
+        write(&folder.join(name), &mesh).unwrap();
+        let bytes = fs::read(folder.join(name)).unwrap();
+        files.push((bytes, Format::of_path(Path::new(name)).unwrap(), name.to_owned()));
+    }
+    let mut ok = 0;
+    let mut errors = 0;
+    for (bytes, format, name) in &files {
+        let mut try_bytes = |bytes: &[u8]| {
+            let start = Instant::now();
+            match read_bytes(bytes, *format) {
+                Ok(file) => {
+                    // What is read can be used: all nodes are there.
+                    let points = file.mesh.points.len();
+                    assert!(file.mesh.blocks.iter().flat_map(|b| &b.nodes).all(|&n| (n as usize) < points));
+                    ok += 1;
+                }
+                Err(error) => {
+                    assert!(!error.to_string().is_empty());
+                    errors += 1;
+                }
+            }
+            assert!(start.elapsed() < Duration::from_secs(2), "{name}");
+        };
+        let step = (bytes.len() / 150).max(1);
+        for length in (0..bytes.len()).step_by(step) {
+            try_bytes(&bytes[..length]);
+        }
+        for _ in 0..400 {
+            let mut turned = bytes.clone();
+            for _ in 0..=random() % 4 {
+                let at = random() % turned.len();
+                turned[at] = match random() % 4 {
+                    0 => b'9',
+                    1 => b'-',
+                    2 => 0xff,
+                    _ => random() as u8,
+                };
+            }
+            try_bytes(&turned);
+        }
+    }
+    assert!(ok > 1000 && errors > 1000, "{ok} {errors}");
+}
+
+// --- what we write ------------------------------------------------------------------------------------------
+
+#[test]
+fn vtu_round_trip_is_exact() {
+    let folder = scratch("vtu");
+    for compress in [false, true] {
+        let path = folder.join(format!("mixed-{compress}.vtu"));
+        let options = VtuOptions { compress, single: false, time: Some(0.1) };
+        save_vtu(&path, &with_sets(), &options).unwrap();
+        let file = read(&path).unwrap();
+        assert_eq!(file.mesh, with_sets());
+        assert_eq!(file.time, Some(0.1));
+        assert!(file.notes.is_empty());
+    }
+    write(&folder.join("plain.vtu"), &with_sets()).unwrap();
+    assert_eq!(read(&folder.join("plain.vtu")).unwrap().mesh, with_sets());
+    // All numbers of the mixed mesh are exact in 32 bits.
+    let mut bytes = Vec::new();
+    write_vtu(&mut bytes, &with_sets(), &VtuOptions { compress: true, single: true, time: None }).unwrap();
+    let file = read_bytes(&bytes, Format::Vtu).unwrap();
+    assert_eq!(file.mesh, with_sets());
+    assert_eq!(file.time, None);
+}
+
+#[test]
+fn vtu_data_of_one_kind_only_stay_with_it() {
+    let mut mesh = mixed();
+    mesh.block_mut(CellKind::Quad).data.clear();
+    mesh.block_mut(CellKind::Tet).data.remove("stress");
+    let mut bytes = Vec::new();
+    write_vtu(&mut bytes, &mesh, &VtuOptions::default()).unwrap();
+    assert_eq!(read_bytes(&bytes, Format::Vtu).unwrap().mesh, mesh);
+}
+
+#[test]
+fn vtu_compresses_arrays_of_several_blocks() {
+    // 40,000 points are 960 kB of coordinates, eight blocks.
+    let n = 40_000;
+    let mut mesh = Mesh {
+        points: (0..n).map(|i| Vector3::new(f64::from(i).sin(), f64::from(i), 0.25)).collect(),
+        blocks: vec![CellBlock::new(CellKind::Line, (0..n as u32 - 1).flat_map(|i| [i, i + 1]).collect())],
+        ..Mesh::default()
+    };
+    let zeros = DataArray { components: 9, values: vec![0.0; 9 * n as usize] };
+    mesh.point_data.insert("zero".to_owned(), zeros);
+    let mut bytes = Vec::new();
+    write_vtu(&mut bytes, &mesh, &VtuOptions { compress: true, ..VtuOptions::default() }).unwrap();
+    assert!(bytes.len() < 1_000_000, "{}", bytes.len());
+    assert_eq!(read_bytes(&bytes, Format::Vtu).unwrap().mesh, mesh);
+}
+
+#[test]
+fn gmsh_round_trip_keeps_everything_but_quotes() {
+    let folder = scratch("gmsh");
+    let path = folder.join("mixed.msh");
+    write(&path, &with_sets()).unwrap();
+    let mut mesh = read(&path).unwrap().mesh;
+    // Point sets are vertex cells in Gmsh: the vertices that were added, and their sets, are the only excess.
+    let vertices = mesh.blocks.iter().position(|block| block.kind == CellKind::Vertex).unwrap();
+    let vertices = mesh.blocks.remove(vertices);
+    let mut nodes = vertices.nodes.clone();
+    nodes.sort_unstable();
+    assert_eq!(nodes, [0, 1, 4, 5, 8]);
+    let mut expected = with_sets();
+    expected.blocks.pop();
+    // Names stand in quotes and cannot hold any.
+    let tets = expected.block_mut(CellKind::Tet);
+    let set = tets.sets.remove("tumour \"2\"").unwrap();
+    tets.sets.insert("tumour '2'".to_owned(), set);
+    assert_eq!(mesh, expected);
+
+    // Written again it does not change any more.
+    let once = read(&path).unwrap().mesh;
+    write(&path, &once).unwrap();
+    // As texts, because the added vertices have no stress: NaN.
+    assert_eq!(format!("{:?}", read(&path).unwrap().mesh), format!("{once:?}"));
+}
+
+#[test]
+fn gmsh_keeps_cell_order_labels_and_overlapping_sets() {
+    let mut mesh = Mesh { points: mixed().points, ..Mesh::default() };
+    let tets = mesh.block_mut(CellKind::Tet);
+    tets.nodes = vec![4, 5, 6, 8, 4, 6, 7, 8, 0, 1, 2, 5, 0, 2, 3, 7];
+    tets.data.insert("label".to_owned(), DataArray::scalar(vec![2.0, 1.0, 2.0, 1.0]));
+    tets.sets.insert("one".to_owned(), vec![1, 3]);
+    tets.sets.insert("end".to_owned(), vec![0, 3]);
+    let path = scratch("gmsh-order").join("order.msh");
+    write(&path, &mesh).unwrap();
+    assert_eq!(read(&path).unwrap().mesh, mesh);
+    // The set of exactly the cells with label 1 is the physical group 1.
+    let content = fs::read_to_string(&path).unwrap();
+    assert!(content.contains("3 1 \"one\"") && content.contains("3 3 \"end\""), "{content}");
+
+    // Labels that cannot be numbers of groups are kept as data.
+    for labels in [vec![0.0, -1.0, 2.5, 1.0], vec![0.0; 4]] {
+        mesh.block_mut(CellKind::Tet).data.insert("label".to_owned(), DataArray::scalar(labels));
+        write(&path, &mesh).unwrap();
+        assert_eq!(read(&path).unwrap().mesh, mesh);
+    }
+}
+
+#[test]
+fn files_of_gmsh_survive_our_writers() {
+    let folder = scratch("survive");
+    let mesh = read_data("gmsh41.msh").mesh;
+    for name in ["again.msh", "again.vtu"] {
+        write(&folder.join(name), &mesh).unwrap();
+        assert_eq!(read(&folder.join(name)).unwrap().mesh, mesh, "{name}");
+    }
+}
+
+#[test]
+fn surfaces_round_trip() {
+    let folder = scratch("surfaces");
+    let mut mesh = mixed();
+    mesh.blocks.retain(|block| matches!(block.kind, CellKind::Triangle | CellKind::Quad));
+    mesh.block_mut(CellKind::Triangle).sets.insert("wall".to_owned(), vec![0]);
+    mesh.block_mut(CellKind::Quad).sets.insert("wall".to_owned(), vec![0]);
+    mesh.block_mut(CellKind::Quad).sets.insert("ground".to_owned(), vec![0]);
+    mesh.point_sets.insert("fixed".to_owned(), vec![3, 8]);
+
+    write(&folder.join("s.ply"), &mesh).unwrap();
+    assert_eq!(read(&folder.join("s.ply")).unwrap().mesh, mesh);
+
+    write(&folder.join("s.OBJ"), &mesh).unwrap();
+    let mut bare = mesh.clone();
+    bare.point_data.clear();
+    bare.point_sets.clear();
+    bare.blocks.iter_mut().for_each(|block| block.data.clear());
+    assert_eq!(read(&folder.join("s.OBJ")).unwrap().mesh, bare);
+
+    write(&folder.join("s.stl"), &mesh).unwrap();
+    let back = read(&folder.join("s.stl")).unwrap().mesh;
+    assert_eq!(back.blocks[0].len(), 4);
+    let corner = |mesh: &Mesh, cell: usize, i: usize| mesh.points[mesh.blocks[0].cell(cell)[i] as usize];
+    for cell in 0..2 {
+        for i in 0..3 {
+            assert_eq!(corner(&back, cell, i), corner(&mesh, cell, i));
+        }
+    }
+}
+
+#[test]
+fn surfaces_of_a_volume_mesh_leave_its_inner_points_out() {
+    let folder = scratch("skin");
+    write(&folder.join("skin.obj"), &with_sets()).unwrap();
+    // The triangles and the quad use all points but 7.
+    let mesh = read(&folder.join("skin.obj")).unwrap().mesh;
+    assert_eq!(mesh.points.len(), 8);
+    assert_eq!(mesh.points[7], mixed().points[8]);
+    let mut bare = mixed();
+    bare.blocks.retain(|block| block.kind == CellKind::Tet);
+    for name in ["x.obj", "x.stl", "x.ply"] {
+        let message = write(&folder.join(name), &bare).unwrap_err().to_string();
+        assert!(message.contains("extract its surface first"), "{message}");
+        assert!(!folder.join(name).exists());
+    }
+}
+
+#[test]
+fn meshes_that_are_not_whole_are_not_written() {
+    let folder = scratch("whole");
+    let path = folder.join("bad.vtu");
+    let cases: [(&str, fn(&mut Mesh)); 6] = [
+        ("point 3 is not finite", |mesh| mesh.points[3].y = f64::NAN),
+        ("tet 1 uses node 99 of only 9", |mesh| mesh.blocks[1].nodes[7] = 99),
+        ("data `velocity` of the points have 26 numbers", |mesh| {
+            mesh.point_data.get_mut("velocity").unwrap().values.pop();
+        }),
+        ("the set `far` holds point 9", |mesh| {
+            mesh.point_sets.insert("far".to_owned(), vec![9]);
+        }),
+        ("different numbers of components", |mesh| {
+            let values = vec![0.0; 2];
+            mesh.blocks[0].data.insert("label".to_owned(), DataArray { components: 2, values });
+        }),
+        ("no points or no cells", |mesh| mesh.blocks.clear()),
+    ];
+    for (expected, spoil) in cases {
+        let mut mesh = mixed();
+        spoil(&mut mesh);
+        let message = write(&path, &mesh).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn pvd_lists_the_files_of_a_series() {
+    let folder = scratch("pvd");
+    let files = [(0.0, "step_000000.vtu".to_owned()), (0.01, "a&b.vtu".to_owned())];
+    write_pvd(&folder.join("series.pvd"), &files).unwrap();
+    let content = fs::read_to_string(folder.join("series.pvd")).unwrap();
+    assert!(content.contains("timestep=\"0.01\" group=\"\" part=\"0\" file=\"a&amp;b.vtu\""), "{content}");
+    assert!(write_pvd(&folder.join("series.pvd"), &[(f64::NAN, "x".to_owned())]).is_err());
+    // The good list is still there, and nothing else.
+    assert_eq!(fs::read_to_string(folder.join("series.pvd")).unwrap(), content);
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+}

@@ -1,0 +1,202 @@
+//! The largest stable step of the central difference method at rest.
+//!
+//! *Element bound* (rigorous, Irons and Treharne): λ_max(K_e) ≤ V (λ+2μ) Σ|B_a|², hence
+//! Δt_e = 2/√(n (λ+2μ)/ρ Σ|B_a|²) and Δt_cr ≥ min Δt_e.
+//! *True limit*: 2/ω_max of the assembled, constrained operator M⁻¹K by the Lanczos method, the accelerated form of the
+//! power iteration: the same operator calls, far fewer of them. K v = (f(hv) − f(−hv))/2h.
+
+use rayon::prelude::*;
+
+use crate::forces::InternalForces;
+use crate::model::{Contradiction, FREE, Model, Solid};
+use crate::tensor::Vector;
+
+/// The smallest element bound of a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ElementBound {
+    /// Step [s].
+    pub step: f64,
+    /// The solid of the cell that sets it.
+    pub solid: usize,
+    /// The cell in that solid.
+    pub cell: usize,
+}
+
+/// The bound [s] of one cell.
+pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
+    let wave = solid.material.law.longitudinal_modulus() / solid.material.density;
+    let n = solid.cells.nodes_per_cell() as f64;
+    2.0 / (n * wave * solid.cells.gradient_square_sum(cell)).sqrt()
+}
+
+/// The smallest bound over all cells; `None` without cells.
+pub fn element_bound(model: &Model) -> Option<ElementBound> {
+    let mut worst: Option<ElementBound> = None;
+    for (index, solid) in model.solids.iter().enumerate() {
+        for cell in 0..solid.cells.len() {
+            let step = cell_bound(solid, cell);
+            if worst.is_none_or(|w| step < w.step) {
+                worst = Some(ElementBound { step, solid: index, cell });
+            }
+        }
+    }
+    worst
+}
+
+/// The true limit of the assembled operator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrueLimit {
+    /// Step [s].
+    pub step: f64,
+    /// Relative error bound of the largest eigenvalue (residual of its Ritz vector); it is counted in, on the safe side.
+    pub error: f64,
+    /// Force evaluations spent.
+    pub force_calls: usize,
+    /// Wall time of one force evaluation in double precision [s], measured on the way.
+    pub seconds_per_call: f64,
+}
+
+const LARGEST_SUBSPACE: usize = 200;
+const TOLERANCE: f64 = 1e-4;
+
+/// The true limit at rest; infinite if every node is held.
+///
+/// # Errors
+/// If constraints contradict each other.
+pub fn true_limit(model: &Model) -> Result<TrueLimit, Contradiction> {
+    let owners = model.constrained_components()?;
+    let mut operator = Operator::new(model, &owners);
+    let started = std::time::Instant::now();
+    let (eigenvalue, error) = largest_eigenvalue(&mut operator, model.node_count());
+    let seconds_per_call = started.elapsed().as_secs_f64() / operator.calls.max(1) as f64;
+    Ok(TrueLimit { step: 2.0 / eigenvalue.sqrt(), error, force_calls: operator.calls, seconds_per_call })
+}
+
+/// The symmetric operator M^(−1/2) K M^(−1/2) on the free components.
+struct Operator {
+    forces: InternalForces<f64>,
+    history: Vec<Vec<crate::tensor::Symmetric<f64>>>,
+    /// M^(−1/2), zero on held components.
+    inverse_root_mass: Vec<Vector<f64>>,
+    displacement: Vec<Vector<f64>>,
+    amplitude: f64,
+    calls: usize,
+}
+
+impl Operator {
+    fn new(model: &Model, owners: &[[u32; 3]]) -> Self {
+        let inverse_root_mass = (model.mass.iter().zip(owners))
+            .map(|(&m, owner)| owner.map(|o| if o == FREE && m > 0.0 { 1.0 / m.sqrt() } else { 0.0 }))
+            .collect();
+        // Displacements of a millionth of a typical cell: far from round-off and from the law's curvature.
+        let smallest = (model.solids.iter())
+            .flat_map(|solid| {
+                (0..solid.cells.len()).map(|c| solid.cells.gradient_square_sum(c).sqrt().recip())
+            })
+            .fold(f64::INFINITY, f64::min);
+        Self {
+            forces: InternalForces::new(model, 1.0),
+            history: vec![Vec::new(); model.solids.len()],
+            inverse_root_mass,
+            displacement: vec![[0.0; 3]; model.node_count()],
+            amplitude: 1e-6 * smallest,
+            calls: 0,
+        }
+    }
+
+    fn apply(&mut self, v: &[Vector<f64>], out: &mut [Vector<f64>]) {
+        let largest = (v.iter().zip(&self.inverse_root_mass))
+            .flat_map(|(v, w)| (0..3).map(move |c| (v[c] * w[c]).abs()))
+            .fold(f64::MIN_POSITIVE, f64::max);
+        let h = self.amplitude / largest;
+        out.fill([0.0; 3]);
+        for sign in [1.0, -1.0] {
+            for ((u, v), w) in self.displacement.iter_mut().zip(v).zip(&self.inverse_root_mass) {
+                *u = [0, 1, 2].map(|c| sign * h * v[c] * w[c]);
+            }
+            self.forces.evaluate(&self.displacement, &mut self.history);
+            self.calls += 1;
+            let (forces, scale) = (&self.forces, sign / (2.0 * h));
+            out.par_iter_mut().zip(&self.inverse_root_mass).enumerate().with_min_len(512).for_each(
+                |(node, (out, w))| {
+                    let f = forces.at(node);
+                    for c in 0..3 {
+                        out[c] += scale * f[c] * w[c];
+                    }
+                },
+            );
+        }
+    }
+}
+
+/// Largest eigenvalue by Lanczos, with its residual added, and the relative residual.
+fn largest_eigenvalue(operator: &mut Operator, nodes: usize) -> (f64, f64) {
+    let mut v: Vec<Vector<f64>> = start_vector(nodes, &operator.inverse_root_mass);
+    let mut before = vec![[0.0; 3]; nodes];
+    let mut w = vec![[0.0; 3]; nodes];
+    let (mut alphas, mut betas): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    if inner(&v, &v) == 0.0 {
+        return (0.0, 0.0);
+    }
+    loop {
+        operator.apply(&v, &mut w);
+        let alpha = inner(&w, &v);
+        let beta_before = betas.last().copied().unwrap_or(0.0);
+        for ((w, v), b) in w.iter_mut().zip(&v).zip(&before) {
+            for c in 0..3 {
+                w[c] -= alpha * v[c] + beta_before * b[c];
+            }
+        }
+        let beta = inner(&w, &w).sqrt();
+        alphas.push(alpha);
+        let finished = alphas.len() >= LARGEST_SUBSPACE || beta < 1e-12 * alpha.abs();
+        if finished || alphas.len().is_multiple_of(10) {
+            let (ritz, last) = largest_ritz_pair(&alphas, &betas);
+            let residual = beta * last.abs();
+            if finished || residual < TOLERANCE * ritz {
+                return (ritz + residual, residual / ritz);
+            }
+        }
+        betas.push(beta);
+        std::mem::swap(&mut before, &mut v);
+        for (v, w) in v.iter_mut().zip(&w) {
+            *v = w.map(|x| x / beta);
+        }
+    }
+}
+
+/// A unit vector without pattern, the same in every run, zero on held components.
+fn start_vector(nodes: usize, mask: &[Vector<f64>]) -> Vec<Vector<f64>> {
+    let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let mut v: Vec<Vector<f64>> =
+        (0..nodes).map(|node| mask[node].map(|m| if m > 0.0 { random() } else { 0.0 })).collect();
+    let norm = inner(&v, &v).sqrt();
+    if norm > 0.0 {
+        v.iter_mut().flatten().for_each(|x| *x /= norm);
+    }
+    v
+}
+
+fn inner(a: &[Vector<f64>], b: &[Vector<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).sum()
+}
+
+/// The largest eigenvalue of the tridiagonal matrix and the last entry of its unit eigenvector.
+fn largest_ritz_pair(alphas: &[f64], betas: &[f64]) -> (f64, f64) {
+    let n = alphas.len();
+    let mut matrix = nalgebra::DMatrix::<f64>::zeros(n, n);
+    for i in 0..n {
+        matrix[(i, i)] = alphas[i];
+        if i + 1 < n {
+            matrix[(i, i + 1)] = betas[i];
+            matrix[(i + 1, i)] = betas[i];
+        }
+    }
+    let eigen = matrix.symmetric_eigen();
+    let top = eigen.eigenvalues.imax();
+    (eigen.eigenvalues[top], eigen.eigenvectors[(n - 1, top)])
+}

@@ -1,0 +1,123 @@
+//! How a motion or a load grows over time: a factor from 0 to 1 between two times, or a table.
+
+/// A factor over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Its form.
+    pub shape: Shape,
+    /// Time [s] at which it leaves 0.
+    pub from: f64,
+    /// Time [s] at which it reaches 1 and stays there.
+    pub to: f64,
+}
+
+/// The form of a curve.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Linear; its kinks send waves through an explicit model.
+    Ramp,
+    /// 3s² − 2s³: continuous velocity.
+    SmoothStep,
+    /// 10s³ − 15s⁴ + 6s⁵: continuous acceleration.
+    Polynomial,
+    /// 1 from the start.
+    Hold,
+    /// (time [s], factor), linear between the points, constant outside; times increase.
+    Table(Vec<(f64, f64)>),
+}
+
+impl Curve {
+    /// The factor at a time [s].
+    pub fn value(&self, time: f64) -> f64 {
+        match &self.shape {
+            Shape::Hold => f64::from(u8::from(time >= self.from)),
+            Shape::Table(points) => interpolate(points, time),
+            Shape::Ramp | Shape::SmoothStep | Shape::Polynomial => {
+                let s = ((time - self.from) / (self.to - self.from)).clamp(0.0, 1.0);
+                match self.shape {
+                    Shape::Ramp => s,
+                    Shape::SmoothStep => s * s * (3.0 - 2.0 * s),
+                    _ => s * s * s * (10.0 + s * (6.0 * s - 15.0)),
+                }
+            }
+        }
+    }
+
+    /// ∫ factor dt from 0 to a time [s]: the displacement that a velocity with this curve makes.
+    pub fn integral(&self, time: f64) -> f64 {
+        if let Shape::Table(points) = &self.shape {
+            return integrate(points, time);
+        }
+        // ∫ before 0 never counts: curves start at 0 or later.
+        let length = self.to - self.from;
+        let s = ((time - self.from) / length).clamp(0.0, 1.0);
+        let after = (time - self.to).max(0.0);
+        match self.shape {
+            Shape::Hold => (time - self.from).max(0.0),
+            Shape::Ramp => length * s * s / 2.0 + after,
+            Shape::SmoothStep => length * s * s * s * (1.0 - s / 2.0) + after,
+            _ => length * s.powi(4) * (2.5 + s * (s - 3.0)) + after,
+        }
+    }
+
+    /// True if the factor never changes.
+    pub fn is_constant(&self) -> bool {
+        match &self.shape {
+            Shape::Hold => self.from <= 0.0,
+            Shape::Table(points) => points.len() == 1,
+            _ => false,
+        }
+    }
+}
+
+fn interpolate(points: &[(f64, f64)], time: f64) -> f64 {
+    let next = points.partition_point(|&(t, _)| t <= time);
+    match (next.checked_sub(1).map(|i| points[i]), points.get(next)) {
+        (Some((t0, f0)), Some(&(t1, f1))) => f0 + (f1 - f0) * (time - t0) / (t1 - t0),
+        (Some((_, f)), None) | (None, Some(&(_, f))) => f,
+        (None, None) => 0.0,
+    }
+}
+
+fn integrate(points: &[(f64, f64)], time: f64) -> f64 {
+    let mut knots: Vec<f64> = points.iter().map(|&(t, _)| t).filter(|&t| t > 0.0 && t < time).collect();
+    knots.insert(0, 0.0);
+    knots.push(time);
+    knots
+        .windows(2)
+        .map(|w| 0.5 * (interpolate(points, w[0]) + interpolate(points, w[1])) * (w[1] - w[0]))
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curves() -> Vec<Curve> {
+        let table = Shape::Table(vec![(0.0, 0.0), (0.4, 1.0), (0.9, -0.5), (1.5, 0.2)]);
+        [Shape::Ramp, Shape::SmoothStep, Shape::Polynomial, Shape::Hold, table]
+            .map(|shape| Curve { shape, from: 0.25, to: 1.25 })
+            .to_vec()
+    }
+
+    #[test]
+    fn integral_is_the_area_under_the_curve() {
+        for curve in curves() {
+            for time in [0.1, 0.5, 1.0, 1.25, 2.0] {
+                let n = 20_000;
+                let h = time / f64::from(n);
+                let sum: f64 = (0..n).map(|i| curve.value((f64::from(i) + 0.5) * h) * h).sum();
+                assert!((curve.integral(time) - sum).abs() < 1e-4, "{curve:?} at {time}");
+            }
+        }
+    }
+
+    #[test]
+    fn steps_start_at_zero_and_end_at_one() {
+        for curve in &curves()[..3] {
+            assert_eq!(curve.value(0.25), 0.0);
+            assert_eq!(curve.value(1.25), 1.0);
+            assert!((curve.value(0.75) - 0.5).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! The uniform-strain hexahedron of Flanagan and Belytschko (1981) in total-Lagrangian form (Joldes, Wittek and
+//! Miller 2008): mean gradients and exact volume by 2×2×2 Gauss points (the centroid gradient fails the patch test),
+//! and stiffness against the four hourglass patterns, scaled by the shear modulus so that it does not lock.
+
+use super::Rest;
+use crate::tensor::{Vector, dot};
+
+/// Reference coordinates (ξ, η, ζ) of the corners, in the node order of VTK.
+pub const HEX_CORNERS: [[f64; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+];
+
+/// A hexahedron at rest.
+#[derive(Clone, Copy, Debug)]
+pub struct Hex8 {
+    /// Volume and mean gradients.
+    pub rest: Rest<8>,
+    /// The four hourglass vectors γ: orthogonal to every linear field.
+    pub hourglass: [[f64; 8]; 4],
+    /// Smallest Jacobian determinant at the corners over the mean one; ≤ 0 for a folded cell.
+    pub worst_corner: f64,
+}
+
+/// The rest quantities of a hexahedron from its nodes [m].
+pub fn hex8(x: &[Vector<f64>; 8]) -> Hex8 {
+    let gauss = 1.0 / 3.0_f64.sqrt();
+    let mut volume = 0.0;
+    let mut gradient = [[0.0; 3]; 8];
+    for corner in HEX_CORNERS {
+        let (determinant, derivative) = shape_derivatives(x, corner.map(|c| c * gauss));
+        volume += determinant;
+        for (mean, b) in gradient.iter_mut().zip(derivative) {
+            for (m, b) in mean.iter_mut().zip(b) {
+                *m += determinant * b;
+            }
+        }
+    }
+    for b in gradient.iter_mut().flatten() {
+        *b /= volume;
+    }
+    let worst = HEX_CORNERS.iter().map(|&c| shape_derivatives(x, c).0).fold(f64::INFINITY, f64::min);
+    Hex8 {
+        rest: Rest { volume, gradient },
+        hourglass: hourglass_vectors(x, &gradient),
+        worst_corner: worst * 8.0 / volume.abs(),
+    }
+}
+
+/// det ∂X/∂ξ and ∂N_a/∂X at a point of the reference cube.
+fn shape_derivatives(x: &[Vector<f64>; 8], at: Vector<f64>) -> (f64, [Vector<f64>; 8]) {
+    let local = HEX_CORNERS.map(|c| {
+        let f = [1.0 + c[0] * at[0], 1.0 + c[1] * at[1], 1.0 + c[2] * at[2]];
+        [c[0] * f[1] * f[2] / 8.0, f[0] * c[1] * f[2] / 8.0, f[0] * f[1] * c[2] / 8.0]
+    });
+    let mut jacobian = nalgebra::Matrix3::<f64>::zeros();
+    for (node, d) in x.iter().zip(local) {
+        for i in 0..3 {
+            for j in 0..3 {
+                jacobian[(i, j)] += node[i] * d[j];
+            }
+        }
+    }
+    let determinant = jacobian.determinant();
+    let inverse = jacobian.try_inverse().unwrap_or_else(nalgebra::Matrix3::zeros);
+    let gradient = local.map(|d| {
+        let mut b = [0.0; 3];
+        for (i, entry) in b.iter_mut().enumerate() {
+            *entry = (0..3).map(|j| d[j] * inverse[(j, i)]).sum();
+        }
+        b
+    });
+    (determinant, gradient)
+}
+
+/// γ_ca = Γ_ca − B_a · Σ_b X_b Γ_cb.
+fn hourglass_vectors(x: &[Vector<f64>; 8], gradient: &[Vector<f64>; 8]) -> [[f64; 8]; 4] {
+    let patterns: [fn([f64; 3]) -> f64; 4] = [
+        |[_, eta, zeta]| eta * zeta,
+        |[xi, _, zeta]| xi * zeta,
+        |[xi, eta, _]| xi * eta,
+        |[xi, eta, zeta]| xi * eta * zeta,
+    ];
+    patterns.map(|pattern| {
+        let gamma = HEX_CORNERS.map(pattern);
+        let mut moment = [0.0; 3];
+        for (node, g) in x.iter().zip(gamma) {
+            for (m, xi) in moment.iter_mut().zip(node) {
+                *m += g * xi;
+            }
+        }
+        let mut vector = gamma;
+        for (v, &b) in vector.iter_mut().zip(gradient) {
+            *v -= dot(b, moment);
+        }
+        vector
+    })
+}

@@ -1,0 +1,208 @@
+//! The battery every element runs through: patch test, rigid motion, f = dE/du, Σf = 0, Στ = 0.
+
+use super::*;
+use crate::law::{AnyLaw, NeoHookean, Split, TransverselyIsotropic};
+use crate::model::{Body, Cells, Material};
+use crate::prony::Prony;
+use crate::tensor::cross;
+
+struct Random(u64);
+
+impl Random {
+    /// Uniform in (−½, ½).
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+
+    fn vector(&mut self, size: f64) -> Vector<f64> {
+        [0, 1, 2].map(|_| 2.0 * size * self.next())
+    }
+}
+
+const CELLS: u32 = 3;
+
+/// A cube of 3×3×3 cells of edge 0.1, interior nodes moved by up to 12 % of an edge, as hexes or tets.
+fn distorted_cube(hexes: bool, law: AnyLaw) -> Model {
+    let mut random = Random(7);
+    let n = CELLS + 1;
+    let mut rest = Vec::new();
+    for (z, y, x) in (0..n).flat_map(|z| (0..n).flat_map(move |y| (0..n).map(move |x| (z, y, x)))) {
+        let interior = [x, y, z].iter().all(|&i| i > 0 && i < CELLS);
+        let shift = if interior { random.vector(0.012) } else { [0.0; 3] };
+        rest.push(add([x, y, z].map(|i| f64::from(i) * 0.1), shift));
+    }
+    let mut hex_nodes = Vec::new();
+    for (z, y, x) in (0..CELLS).flat_map(|z| (0..CELLS).flat_map(move |y| (0..CELLS).map(move |x| (z, y, x))))
+    {
+        let at = |dx: u32, dy: u32, dz: u32| ((z + dz) * n + y + dy) * n + x + dx;
+        hex_nodes.push([
+            at(0, 0, 0),
+            at(1, 0, 0),
+            at(1, 1, 0),
+            at(0, 1, 0),
+            at(0, 0, 1),
+            at(1, 0, 1),
+            at(1, 1, 1),
+            at(0, 1, 1),
+        ]);
+    }
+    // Kuhn's split: all six tets around the diagonal 0–6.
+    const KUHN: [[usize; 4]; 6] =
+        [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
+    let tets = || hex_nodes.iter().flat_map(|hex| KUHN.map(|tet| tet.map(|corner| hex[corner]))).collect();
+    let cells =
+        if hexes { Cells::hex8(hex_nodes.clone(), &rest, 0.2, 700.0) } else { Cells::tet4(tets(), &rest) };
+    let mut model = Model { mass: vec![0.0; rest.len()], rest, ..Model::default() };
+    model.bodies.push(Body { name: "cube".into(), nodes: 0..n.pow(3), damping: 0.0 });
+    let material = Material { law, prony: Prony::default(), density: 1000.0 };
+    let count = cells.len();
+    let fibre = if material.law.needs_fibre() { vec![[0.6, 0.0, 0.8]; count] } else { vec![] };
+    model.add_solid(Solid { body: 0, material, cells, fibre, original: (0..count as u32).collect() });
+    model
+}
+
+fn laws() -> [AnyLaw; 2] {
+    let matrix = NeoHookean { shear: 700.0, bulk: 5000.0 };
+    [
+        AnyLaw::NeoHookean(matrix),
+        AnyLaw::TransverselyIsotropic(TransverselyIsotropic { matrix, fibre: 1100.0 }),
+    ]
+}
+
+fn forces(model: &Model, displacement: &[Vector<f64>]) -> (Vec<Vector<f64>>, f64) {
+    let mut internal = InternalForces::new(model, 1.0);
+    let (hourglass, _) = internal.evaluate(displacement, &mut vec![Vec::new(); model.solids.len()]);
+    ((0..model.node_count()).map(|node| internal.at(node)).collect(), hourglass)
+}
+
+fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
+    let state = crate::State { displacement: displacement.to_vec(), ..crate::State::at_rest(model) };
+    let stored: f64 = (0..model.solids[0].cells.len())
+        .map(|cell| {
+            let fields = crate::recover::cell_fields(model, &state, 0, cell);
+            fields.energy_density * model.solids[0].cells.volume(cell)
+        })
+        .sum();
+    stored + forces(model, displacement).1
+}
+
+fn both_elements() -> impl Iterator<Item = Model> {
+    laws().into_iter().flat_map(|law| [true, false].map(|hexes| distorted_cube(hexes, law)))
+}
+
+fn largest(forces: impl IntoIterator<Item = Vector<f64>>) -> f64 {
+    forces.into_iter().flatten().fold(0.0, |a, b| f64::max(a, b.abs()))
+}
+
+#[test]
+fn patch_test_on_distorted_cells() {
+    // A homogeneous deformation must leave every interior node in balance, to round-off.
+    let h = Tensor([[0.12, 0.2, -0.05], [0.03, -0.1, 0.1], [-0.08, 0.07, 0.15]]);
+    for model in both_elements() {
+        let displacement: Vec<_> = model.rest.iter().map(|&x| h.apply(x)).collect();
+        let (forces, hourglass) = forces(&model, &displacement);
+        let scale = largest(forces.iter().copied());
+        let interior = |x: &Vector<f64>| x.iter().all(|&c| c > 0.01 && c < 0.29);
+        let residual = largest(forces.iter().zip(&model.rest).filter(|(_, x)| interior(x)).map(|(&f, _)| f));
+        assert!(residual < 1e-12 * scale, "{}: {residual:e} of {scale:e}", model.solids[0].cells.element());
+        assert!(hourglass < 1e-24);
+    }
+}
+
+#[test]
+fn rigid_motion_costs_no_force_and_no_energy() {
+    // A turn by 70° about (1, 2, 2)/3 and a shift by 20 edges.
+    let (c, s) = (70.0_f64.to_radians().cos(), 70.0_f64.to_radians().sin());
+    let k = [1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0];
+    let turn = |x: Vector<f64>| {
+        let along = scale(k, dot(k, x) * (1.0 - c));
+        add(add(scale(x, c), scale(cross(k, x), s)), along)
+    };
+    for model in both_elements() {
+        let displacement: Vec<_> =
+            model.rest.iter().map(|&x| add(sub(turn(x), x), [2.0, -1.0, 0.5])).collect();
+        // Against the force of 1 % strain on a face of a cell: 50 Pa × 0.01 m².
+        assert!(largest(forces(&model, &displacement).0) < 1e-12 * 0.5);
+        assert!(energy(&model, &displacement) < 1e-12 * 0.01);
+    }
+}
+
+#[test]
+fn force_is_the_derivative_of_energy() {
+    let mut random = Random(3);
+    for model in both_elements() {
+        let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.008)).collect();
+        let (forces, _) = forces(&model, &displacement);
+        let scale = largest(forces.iter().copied());
+        for node in [0, 21, 42, 63] {
+            for component in 0..3 {
+                let shifted = |by: f64| {
+                    let mut moved = displacement.clone();
+                    moved[node][component] += by;
+                    energy(&model, &moved)
+                };
+                let slope = (shifted(1e-6) - shifted(-1e-6)) / 2e-6;
+                assert!((slope - forces[node][component]).abs() < 1e-7 * scale);
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_and_torques_sum_to_zero() {
+    let mut random = Random(5);
+    for model in both_elements() {
+        let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
+        let (forces, _) = forces(&model, &displacement);
+        let scale = largest(forces.iter().copied());
+        let (mut sum, mut torque) = ([0.0; 3], [0.0; 3]);
+        for ((&f, &x), &u) in forces.iter().zip(&model.rest).zip(&displacement) {
+            sum = add(sum, f);
+            torque = add(torque, cross(add(x, u), f));
+        }
+        assert!(largest([sum]) < 1e-12 * scale, "{sum:?}");
+        assert!(largest([torque]) < 1e-12 * scale, "{torque:?}");
+    }
+}
+
+#[test]
+fn a_lumped_mass_is_the_whole_mass() {
+    for model in both_elements() {
+        let total: f64 = model.mass.iter().sum();
+        assert!((total - 1000.0 * 0.027).abs() < 1e-12 * total);
+    }
+}
+
+#[test]
+fn single_precision_follows_double() {
+    let mut random = Random(11);
+    for model in both_elements() {
+        let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
+        let (fine, _) = forces(&model, &displacement);
+        let coarse_displacement: Vec<Vector<f32>> = displacement.iter().map(|&u| cast(u)).collect();
+        let mut coarse = InternalForces::<f32>::new(&model, 1.0);
+        coarse.evaluate(&coarse_displacement, &mut [Vec::new()]);
+        let scale = largest(fine.iter().copied());
+        for (node, f) in fine.iter().enumerate() {
+            for (a, b) in f.iter().zip(coarse.at(node)) {
+                assert!((a - f64::from(b)).abs() < 3e-6 * scale);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_inverted_cell_is_found() {
+    let model = distorted_cube(false, laws()[0]);
+    let mut displacement = vec![[0.0; 3]; model.node_count()];
+    displacement[21] = [0.3, 0.0, 0.0];
+    let (_, inverted) = InternalForces::new(&model, 1.0).evaluate(&displacement, &mut [Vec::new()]);
+    let (solid, cell, determinant) = inverted.unwrap();
+    assert_eq!(solid, 0);
+    assert!(determinant < 0.0);
+    assert!(model.solids[0].cells.nodes(cell).contains(&21));
+    let Split { isochoric, .. } =
+        laws()[0].energy(&Deformation::from_displacement_gradient(&Tensor::ZERO), [0.0; 3]);
+    assert_eq!(isochoric, 0.0);
+}

@@ -1,0 +1,59 @@
+//! Coupled neo-Hookean law (thesis 5.9): Ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 (J − 1)².
+//! Equal to the split law to first order only (λ = κ − 2μ/3): name the law beside every number.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
+use crate::Real;
+use crate::tensor::{Symmetric, Vector};
+
+/// Neo-Hookean solid whose shear term changes volume too.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoupledNeoHookean {
+    /// Shear modulus μ [Pa].
+    pub shear: f64,
+    /// Lamé's first constant λ [Pa].
+    pub lame: f64,
+}
+
+/// Parameters of the coupled neo-Hookean law: Ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 (J − 1)², λ = κ − 2μ/3.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct CoupledNeoHookeanParameters {
+    /// The two moduli.
+    #[serde(flatten)]
+    pub elastic: ElasticConstants,
+}
+
+impl Law for CoupledNeoHookean {
+    type Parameters = CoupledNeoHookeanParameters;
+
+    fn new(parameters: &CoupledNeoHookeanParameters) -> Result<Self, ParameterError> {
+        let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
+        Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
+    }
+
+    #[inline(always)]
+    fn energy<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Split<R> {
+        let x = deformation.volume_change;
+        let shape = deformation.strain_twice.trace() - R::of(2.0) * x.ln_1p();
+        Split { isochoric: R::of(0.5 * self.shear) * shape, volumetric: R::of(0.5 * self.lame) * x * x }
+    }
+
+    #[inline(always)]
+    fn stress<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Split<Symmetric<R>> {
+        // I − C⁻¹ = C⁻¹ (C − I).
+        let inverse = deformation.inverse_cauchy_green;
+        let shape = inverse.commuting_product(&deformation.strain_twice);
+        let pressure = R::of(self.lame) * deformation.volume_change;
+        Split {
+            isochoric: shape * R::of(self.shear),
+            volumetric: inverse * (deformation.volume_ratio * pressure),
+        }
+    }
+
+    fn small_strain(&self) -> SmallStrainModuli {
+        SmallStrainModuli { shear: self.shear, bulk: self.lame + 2.0 / 3.0 * self.shear }
+    }
+}

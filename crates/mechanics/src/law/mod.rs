@@ -1,0 +1,174 @@
+//! Constitutive laws: energy and second Piola–Kirchhoff stress from the deformation gradient.
+//!
+//! A law is a small struct of parameters, its methods generic over the number type, so that the same lines
+//! run as reference and as fast path. The history of viscoelasticity wraps a law (see [`prony`](crate::prony));
+//! it is not a law of its own. To add a law: its file here, its line in the registry below, its line in the battery.
+
+mod coupled_neo_hookean;
+mod deformation;
+mod elastic_constants;
+mod neo_hookean;
+mod transversely_isotropic;
+
+#[cfg(test)]
+mod battery;
+
+pub use coupled_neo_hookean::CoupledNeoHookean;
+pub use deformation::Deformation;
+pub use elastic_constants::ElasticConstants;
+pub use neo_hookean::NeoHookean;
+pub use transversely_isotropic::{FibreConvention, TransverselyIsotropic};
+
+use schemars::{JsonSchema, Schema};
+use serde::de::DeserializeOwned;
+
+use crate::Real;
+use crate::tensor::{Symmetric, Vector};
+
+/// A quantity split into the part that changes shape and the part that changes volume.
+#[derive(Clone, Copy, Debug)]
+pub struct Split<T> {
+    /// The part from the isochoric energy (for an unsplit law: the part that carries the shear modulus).
+    pub isochoric: T,
+    /// The part from the volumetric energy.
+    pub volumetric: T,
+}
+
+/// Isotropic moduli of a law at rest [Pa].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmallStrainModuli {
+    /// Shear modulus of the matrix [Pa].
+    pub shear: f64,
+    /// Bulk modulus [Pa].
+    pub bulk: f64,
+}
+
+/// What is wrong with a parameter of a law.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{message}")]
+pub struct ParameterError {
+    /// The key at fault, as in a scene file.
+    pub key: &'static str,
+    /// What is wrong, with the number.
+    pub message: String,
+    /// What to do about it.
+    pub help: String,
+}
+
+/// A hyperelastic law.
+pub trait Law: Copy + Send + Sync + 'static {
+    /// What a user gives, each parameter with unit and range.
+    type Parameters: DeserializeOwned + JsonSchema;
+
+    /// True if the law needs a fibre direction in every cell.
+    const FIBRE: bool = false;
+
+    /// Checks and converts the user's parameters.
+    fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
+
+    /// Strain energy per reference volume [J/m³]. `fibre` is the unit direction at rest.
+    fn energy<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Split<R>;
+
+    /// Second Piola–Kirchhoff stress [Pa].
+    fn stress<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Split<Symmetric<R>>;
+
+    /// Moduli at rest, without the fibres.
+    fn small_strain(&self) -> SmallStrainModuli;
+
+    /// An upper bound of ρc² over all directions at rest [Pa]: λ + 2μ, plus what fibres add.
+    fn longitudinal_modulus(&self) -> f64 {
+        let SmallStrainModuli { shear, bulk } = self.small_strain();
+        bulk + 4.0 / 3.0 * shear
+    }
+}
+
+/// Declares the laws a scene can name: the one place where a name meets a type.
+macro_rules! registry {
+    ($($(#[$doc:meta])* $name:literal => $law:ident,)*) => {
+        /// Any law of the registry.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum AnyLaw {
+            $($(#[$doc])* $law($law),)*
+        }
+
+        impl AnyLaw {
+            /// The names of all laws, as in a scene file.
+            pub const NAMES: &[&str] = &[$($name),*];
+
+            /// The schema of a law's parameters; `None` for an unknown name.
+            pub fn schema(name: &str) -> Option<Schema> {
+                match name {
+                    $($name => Some(schemars::schema_for!(<$law as Law>::Parameters)),)*
+                    _ => None,
+                }
+            }
+
+            /// A law from its name and its parameters as JSON. An unknown name or a value of the wrong type is
+            /// reported under the key `type`.
+            pub fn from_json(name: &str, parameters: serde_json::Value) -> Result<Self, ParameterError> {
+                let unreadable = |message: String| ParameterError {
+                    key: "type",
+                    message,
+                    help: format!("known laws: {}", Self::NAMES.join(", ")),
+                };
+                match name {
+                    $($name => {
+                        let parameters = serde_json::from_value::<<$law as Law>::Parameters>(parameters)
+                            .map_err(|error| unreadable(error.to_string()))?;
+                        <$law as Law>::new(&parameters).map(Self::$law)
+                    })*
+                    _ => Err(unreadable(format!("there is no law `{name}`"))),
+                }
+            }
+
+            /// The name in a scene file.
+            pub fn name(&self) -> &'static str {
+                match self { $(Self::$law(_) => $name,)* }
+            }
+
+            /// True if the law needs a fibre direction in every cell.
+            pub fn needs_fibre(&self) -> bool {
+                match self { $(Self::$law(_) => <$law as Law>::FIBRE,)* }
+            }
+        }
+
+        /// Runs `$body` with `$bound` the concrete law, so that a kernel is compiled for each.
+        macro_rules! with_law {
+            ($any:expr, $bound:ident => $body:expr) => {
+                match $any { $($crate::law::AnyLaw::$law($bound) => $body,)* }
+            };
+        }
+        pub(crate) use with_law;
+    };
+}
+
+registry! {
+    /// Split neo-Hookean, the default of soft tissue.
+    "neo-hookean" => NeoHookean,
+    /// Neo-Hookean with coupled shear and volume terms.
+    "coupled-neo-hookean" => CoupledNeoHookean,
+    /// Neo-Hookean matrix with one family of fibres.
+    "transversely-isotropic" => TransverselyIsotropic,
+}
+
+impl AnyLaw {
+    /// Strain energy per reference volume [J/m³]; see [`Law::energy`].
+    pub fn energy(&self, deformation: &Deformation<f64>, fibre: Vector<f64>) -> Split<f64> {
+        with_law!(self, law => law.energy(deformation, fibre))
+    }
+
+    /// Second Piola–Kirchhoff stress [Pa]; see [`Law::stress`].
+    pub fn stress(&self, deformation: &Deformation<f64>, fibre: Vector<f64>) -> Split<Symmetric<f64>> {
+        with_law!(self, law => law.stress(deformation, fibre))
+    }
+
+    /// Moduli at rest; see [`Law::small_strain`].
+    pub fn small_strain(&self) -> SmallStrainModuli {
+        with_law!(self, law => law.small_strain())
+    }
+
+    /// Upper bound of ρc² at rest [Pa]; see [`Law::longitudinal_modulus`].
+    pub fn longitudinal_modulus(&self) -> f64 {
+        with_law!(self, law => law.longitudinal_modulus())
+    }
+}

@@ -1,0 +1,56 @@
+//! Mechanics of soft solids: constitutive laws, elements, constraints, loads, and explicit time stepping by total
+//! Lagrangian explicit dynamics (Miller et al. 2007). Knows nothing of files or windows. SI units throughout.
+//!
+//! [`Model`] is constant, [`State`] changes, [`CentralDifference`] advances a state on a model:
+//!
+//! ```
+//! use pliant_mechanics::curve::{Curve, Shape};
+//! use pliant_mechanics::law::{AnyLaw, NeoHookean};
+//! use pliant_mechanics::load::{Load, LoadKind};
+//! use pliant_mechanics::model::{Body, Cells, Constraint, Material, Model, Motion, Solid};
+//! use pliant_mechanics::{CentralDifference, State, critical_step};
+//!
+//! // One tetrahedron, one face held, falling under its own weight.
+//! let rest = vec![[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
+//! let mut model = Model { mass: vec![0.0; 4], rest, ..Model::default() };
+//! model.bodies.push(Body { name: "block".into(), nodes: 0..4, damping: 0.0 });
+//! let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, bulk: 10_000.0 });
+//! let material = Material { law, prony: Default::default(), density: 1000.0 };
+//! let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
+//! model.add_solid(Solid { body: 0, material, cells, fibre: vec![], original: vec![0] });
+//! let motion = Motion::Fixed;
+//! model.constraints.push(Constraint { name: "base".into(), nodes: vec![0, 1, 2], components: [true; 3], motion });
+//! let gravity = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -9.81] };
+//! let curve = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
+//! model.loads.push(Load { name: "gravity".into(), kind: gravity, curve, surface: None });
+//!
+//! let step = 0.9 * critical_step::element_bound(&model).unwrap().step;
+//! let mut state = State::<f64>::at_rest(&model);
+//! let mut stepper = CentralDifference::new(&model, step)?;
+//! for _ in 0..10 {
+//!     stepper.evaluate(&mut state)?;
+//!     stepper.advance(&mut state);
+//! }
+//! assert!(state.displacement[3][2] < 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod critical_step;
+pub mod curve;
+pub mod element;
+mod forces;
+pub mod law;
+pub mod load;
+pub mod mapping;
+pub mod model;
+pub mod prony;
+mod real;
+pub mod recover;
+mod state;
+mod stepper;
+pub mod tensor;
+
+pub use model::Model;
+pub use real::Real;
+pub use state::{State, Work};
+pub use stepper::{BALANCE_LIMIT, BALANCE_STEPS, CentralDifference, Energies, StepError, balance_floor};

@@ -1,0 +1,131 @@
+//! Loads: nodal forces, tractions per reference area, pressure that follows the deformed surface, gravity.
+
+use crate::curve::Curve;
+use crate::mapping::Mapping;
+use crate::tensor::{Vector, add, cross, scale, sub};
+
+/// A face of three or four nodes, outward order.
+pub type Face = [u32; 4];
+
+/// The fourth entry of a triangular [`Face`].
+pub const NO_NODE: u32 = u32::MAX;
+
+/// A load with its course over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Load {
+    /// Its name in messages.
+    pub name: String,
+    /// What acts.
+    pub kind: LoadKind,
+    /// Factor over time.
+    pub curve: Curve,
+    /// The carried surface the node numbers refer to; `None`: the model's own nodes.
+    pub surface: Option<usize>,
+}
+
+/// What a load does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoadKind {
+    /// A dead force [N] on each of some nodes (nodal forces and tractions become this).
+    Forces(Vec<(u32, Vector<f64>)>),
+    /// Pressure [Pa] on faces, pushing against the outward normal of the deformed face.
+    Pressure {
+        /// The faces.
+        faces: Vec<Face>,
+        /// Pressure [Pa].
+        pressure: f64,
+    },
+    /// Acceleration [m/s²] of one body.
+    Gravity {
+        /// The body.
+        body: usize,
+        /// Acceleration [m/s²].
+        acceleration: Vector<f64>,
+    },
+}
+
+impl Load {
+    /// Adds the nodal forces [N] at a time. `position` gives the current place of a (carried or own) node; gravity is
+    /// not added here: it acts through the masses.
+    pub fn add_forces(
+        &self,
+        time: f64,
+        mapping: Option<&Mapping>,
+        position: impl Fn(u32) -> Vector<f64>,
+        forces: &mut [Vector<f64>],
+    ) {
+        let factor = self.curve.value(time);
+        if factor == 0.0 {
+            return;
+        }
+        let mut apply = |node: u32, force: Vector<f64>| match mapping {
+            Some(mapping) => mapping.apply_transpose_row(node as usize, force, forces),
+            None => forces[node as usize] = add(forces[node as usize], force),
+        };
+        match &self.kind {
+            LoadKind::Forces(list) => {
+                for &(node, force) in list {
+                    apply(node, scale(force, factor));
+                }
+            }
+            LoadKind::Pressure { faces, pressure } => {
+                for face in faces {
+                    for (node, area) in face_areas(face, &position) {
+                        apply(node, scale(area, -factor * pressure));
+                    }
+                }
+            }
+            LoadKind::Gravity { .. } => {}
+        }
+    }
+}
+
+/// The part of a face's area vector [m²] that belongs to each of its nodes: ∫ N_a n dA, exact for flat triangles and
+/// for bilinear quads (2×2 Gauss points).
+pub fn face_areas(
+    face: &Face,
+    position: impl Fn(u32) -> Vector<f64>,
+) -> impl Iterator<Item = (u32, Vector<f64>)> {
+    let corner_count = if face[3] == NO_NODE { 3 } else { 4 };
+    let mut areas = [[0.0; 3]; 4];
+    if corner_count == 3 {
+        let [a, b, c] = [face[0], face[1], face[2]].map(&position);
+        let third = scale(cross(sub(b, a), sub(c, a)), 1.0 / 6.0);
+        areas[..3].fill(third);
+    } else {
+        let x = face.map(&position);
+        const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        for point in CORNERS {
+            let [xi, eta] = point.map(|p| p / 3.0_f64.sqrt());
+            let (mut along_xi, mut along_eta) = ([0.0; 3], [0.0; 3]);
+            for (node, c) in x.iter().zip(CORNERS) {
+                along_xi = add(along_xi, scale(*node, c[0] * (1.0 + c[1] * eta) / 4.0));
+                along_eta = add(along_eta, scale(*node, c[1] * (1.0 + c[0] * xi) / 4.0));
+            }
+            let normal = cross(along_xi, along_eta);
+            for (area, c) in areas.iter_mut().zip(CORNERS) {
+                *area = add(*area, scale(normal, (1.0 + c[0] * xi) * (1.0 + c[1] * eta) / 4.0));
+            }
+        }
+    }
+    let nodes = *face;
+    (0..corner_count).map(move |k| (nodes[k], areas[k]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const POINTS: [Vector<f64>; 4] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
+    #[test]
+    fn a_quad_shares_its_area_equally_and_a_triangle_too() {
+        let position = |node: u32| POINTS[node as usize];
+        for (node, area) in face_areas(&[0, 1, 2, 3], position) {
+            assert!((area[2] - 0.5).abs() < 1e-15, "node {node}: {area:?}");
+        }
+        let triangle: Vec<_> = face_areas(&[0, 1, 2, NO_NODE], position).collect();
+        assert_eq!(triangle.len(), 3);
+        assert!(triangle.iter().all(|(_, area)| (area[2] - 1.0 / 3.0).abs() < 1e-15));
+    }
+}

@@ -1,0 +1,301 @@
+//! The model: everything constant, built once and shared between threads. Arrays are in the order of the nodes, all
+//! bodies one after another.
+
+use std::ops::Range;
+
+use crate::curve::Curve;
+use crate::element::{Hex8, Rest, hex8, tet4};
+use crate::law::AnyLaw;
+use crate::load::Load;
+use crate::mapping::Mapping;
+use crate::prony::Prony;
+use crate::tensor::Vector;
+
+/// Bodies, what holds and loads them, and the surfaces they carry.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// Rest positions [m] of the nodes.
+    pub rest: Vec<Vector<f64>>,
+    /// Lumped masses [kg] of the nodes.
+    pub mass: Vec<f64>,
+    /// The bodies.
+    pub bodies: Vec<Body>,
+    /// The solid parts: one per body, element and law.
+    pub solids: Vec<Solid>,
+    /// Prescribed motions.
+    pub constraints: Vec<Constraint>,
+    /// Loads.
+    pub loads: Vec<Load>,
+    /// Surfaces carried by bodies.
+    pub surfaces: Vec<Surface>,
+}
+
+/// A body.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Its name.
+    pub name: String,
+    /// Its nodes.
+    pub nodes: Range<u32>,
+    /// Mass-proportional damping α [1/s].
+    pub damping: f64,
+}
+
+/// A law with its history, and the density.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// The elastic law.
+    pub law: AnyLaw,
+    /// Its relaxation.
+    pub prony: Prony,
+    /// Mass per reference volume [kg/m³].
+    pub density: f64,
+}
+
+/// The cells of one body that share an element and a material.
+#[derive(Clone, Debug)]
+pub struct Solid {
+    /// The body.
+    pub body: usize,
+    /// The material.
+    pub material: Material,
+    /// The cells with their element.
+    pub cells: Cells,
+    /// Unit fibre direction at rest, one per cell; empty if the law has none.
+    pub fibre: Vec<Vector<f64>>,
+    /// The number of each cell in the user's mesh, counted over the cells of its kind.
+    pub original: Vec<u32>,
+}
+
+/// Cells of one element type.
+#[derive(Clone, Debug)]
+pub enum Cells {
+    /// Linear tetrahedra.
+    Tet4(CellBlock<4>),
+    /// Uniform-strain hexahedra.
+    Hex8(CellBlock<8>),
+}
+
+/// Runs `$body` with `$bound` the concrete [`CellBlock`].
+macro_rules! with_cells {
+    ($cells:expr, $bound:ident => $body:expr) => {
+        match $cells {
+            $crate::model::Cells::Tet4($bound) => $body,
+            $crate::model::Cells::Hex8($bound) => $body,
+        }
+    };
+}
+pub(crate) use with_cells;
+
+/// Cells of `N` nodes at rest, struct of arrays.
+#[derive(Clone, Debug)]
+pub struct CellBlock<const N: usize> {
+    /// Nodes of each cell, numbered in the model.
+    pub nodes: Vec<[u32; N]>,
+    /// Volume [m³] and mean gradients [1/m] of each cell.
+    pub rest: Vec<Rest<N>>,
+    /// Stiffness against hourglass patterns; `None` for an element that has none.
+    pub hourglass: Option<Hourglass<f64, N>>,
+}
+
+/// Hourglass control: energy ½ k Σ_c |Σ_a γ_ca u_a|².
+#[derive(Clone, Debug)]
+pub struct Hourglass<R, const N: usize> {
+    /// The patterns γ, four per cell.
+    pub patterns: Vec<[[R; N]; 4]>,
+    /// k = c μ V ΣB²/8 [N/m], one per cell.
+    pub stiffness: Vec<R>,
+}
+
+impl Cells {
+    /// Tetrahedra from their nodes.
+    pub fn tet4(nodes: Vec<[u32; 4]>, rest: &[Vector<f64>]) -> Self {
+        let quantities = nodes.iter().map(|cell| tet4(&cell.map(|n| rest[n as usize]))).collect();
+        Self::Tet4(CellBlock { nodes, rest: quantities, hourglass: None })
+    }
+
+    /// Hexahedra from their nodes; `hourglass` is the coefficient c, `shear` the modulus μ [Pa] that scales it.
+    pub fn hex8(nodes: Vec<[u32; 8]>, rest: &[Vector<f64>], hourglass: f64, shear: f64) -> Self {
+        let hexes: Vec<Hex8> = nodes.iter().map(|cell| hex8(&cell.map(|n| rest[n as usize]))).collect();
+        let stiffness =
+            |hex: &Hex8| hourglass * shear * hex.rest.volume * hex.rest.gradient_square_sum() / 8.0;
+        Self::Hex8(CellBlock {
+            nodes,
+            rest: hexes.iter().map(|hex| hex.rest).collect(),
+            hourglass: Some(Hourglass {
+                patterns: hexes.iter().map(|hex| hex.hourglass).collect(),
+                stiffness: hexes.iter().map(stiffness).collect(),
+            }),
+        })
+    }
+
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        with_cells!(self, block => block.nodes.len())
+    }
+
+    /// True without any cell.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Nodes per cell.
+    pub fn nodes_per_cell(&self) -> usize {
+        match self {
+            Self::Tet4(_) => 4,
+            Self::Hex8(_) => 8,
+        }
+    }
+
+    /// The nodes of a cell.
+    pub fn nodes(&self, cell: usize) -> &[u32] {
+        with_cells!(self, block => block.nodes[cell].as_slice())
+    }
+
+    /// Rest volume [m³] of a cell.
+    pub fn volume(&self, cell: usize) -> f64 {
+        with_cells!(self, block => block.rest[cell].volume)
+    }
+
+    /// Σ |B_a|² [1/m²] of a cell.
+    pub fn gradient_square_sum(&self, cell: usize) -> f64 {
+        with_cells!(self, block => block.rest[cell].gradient_square_sum())
+    }
+
+    /// The name of the element in a scene file.
+    pub fn element(&self) -> &'static str {
+        match self {
+            Self::Tet4(_) => "tet4",
+            Self::Hex8(_) => "hex8",
+        }
+    }
+}
+
+/// A prescribed motion of some nodes.
+#[derive(Clone, Debug)]
+pub struct Constraint {
+    /// Its name.
+    pub name: String,
+    /// The nodes.
+    pub nodes: Vec<u32>,
+    /// Which components (x, y, z) it prescribes.
+    pub components: [bool; 3],
+    /// Where they go.
+    pub motion: Motion,
+}
+
+/// The course of a prescribed motion.
+#[derive(Clone, Debug)]
+pub enum Motion {
+    /// They stay where they are at rest.
+    Fixed,
+    /// Displacement [m] × curve.
+    Displacement(Vector<f64>, Curve),
+    /// Velocity [m/s] × curve; the displacement is its integral.
+    Velocity(Vector<f64>, Curve),
+}
+
+impl Motion {
+    /// Displacement [m] at a time [s].
+    pub fn displacement(&self, time: f64) -> Vector<f64> {
+        match self {
+            Self::Fixed => [0.0; 3],
+            Self::Displacement(by, curve) => by.map(|b| b * curve.value(time)),
+            Self::Velocity(velocity, curve) => velocity.map(|v| v * curve.integral(time)),
+        }
+    }
+}
+
+/// A surface carried by a body.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Its name.
+    pub name: String,
+    /// The body that carries it.
+    pub body: usize,
+    /// Rest positions [m] of its points.
+    pub rest: Vec<Vector<f64>>,
+    /// How it follows the body's nodes (numbered in the model).
+    pub mapping: Mapping,
+}
+
+/// Two constraints that ask for different things of one node.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("`{first}` and `{second}` both prescribe {} of node {node} of `{body}`, and differently", ["x", "y", "z"][*component])]
+pub struct Contradiction {
+    /// The first constraint.
+    pub first: String,
+    /// The second constraint.
+    pub second: String,
+    /// The body.
+    pub body: String,
+    /// The node, numbered in its body.
+    pub node: u32,
+    /// 0, 1 or 2 for x, y, z.
+    pub component: usize,
+}
+
+/// No constraint on a component of a node.
+pub const FREE: u32 = u32::MAX;
+
+impl Model {
+    /// Adds ρV/N of every cell of a solid to its nodes.
+    pub fn add_solid(&mut self, solid: Solid) {
+        for cell in 0..solid.cells.len() {
+            let nodes = solid.cells.nodes(cell);
+            let share = solid.material.density * solid.cells.volume(cell) / nodes.len() as f64;
+            for &node in nodes {
+                self.mass[node as usize] += share;
+            }
+        }
+        self.solids.push(solid);
+    }
+
+    /// Number of nodes.
+    pub fn node_count(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.solids.iter().map(|solid| solid.cells.len()).sum()
+    }
+
+    /// The body of a node and the node's number in it.
+    pub fn locate_node(&self, node: u32) -> (usize, u32) {
+        let body = self.bodies.partition_point(|body| body.nodes.end <= node);
+        (body, node - self.bodies[body].nodes.start)
+    }
+
+    /// The constraint on each component of each node, [`FREE`] where there is none. Fixing a component twice is
+    /// allowed (the first keeps the reaction).
+    ///
+    /// # Errors
+    /// If two constraints prescribe different motions for one component of a node.
+    pub fn constrained_components(&self) -> Result<Vec<[u32; 3]>, Contradiction> {
+        let mut owners = vec![[FREE; 3]; self.node_count()];
+        for (index, constraint) in self.constraints.iter().enumerate() {
+            for &node in &constraint.nodes {
+                for component in (0..3).filter(|&c| constraint.components[c]) {
+                    let owner = &mut owners[node as usize][component];
+                    if *owner == FREE {
+                        *owner = index as u32;
+                        continue;
+                    }
+                    let first = &self.constraints[*owner as usize];
+                    if !matches!((&first.motion, &constraint.motion), (Motion::Fixed, Motion::Fixed)) {
+                        let (body, local) = self.locate_node(node);
+                        return Err(Contradiction {
+                            first: first.name.clone(),
+                            second: constraint.name.clone(),
+                            body: self.bodies[body].name.clone(),
+                            node: local,
+                            component,
+                        });
+                    }
+                }
+            }
+        }
+        Ok(owners)
+    }
+}

@@ -1,0 +1,69 @@
+//! The state: everything that changes in a run. `Clone` is a snapshot.
+
+use crate::Real;
+use crate::model::{FREE, Model};
+use crate::tensor::{Symmetric, Vector};
+
+/// What a stepper advances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State<R> {
+    /// Time [s].
+    pub time: f64,
+    /// Steps done.
+    pub steps: u64,
+    /// Displacements u of the nodes [m].
+    pub displacement: Vec<Vector<R>>,
+    /// The last increments, u − u one step before [m].
+    pub increment: Vec<Vector<R>>,
+    /// History of each solid: [`Prony::slots`](crate::prony::Prony::slots) tensors per cell, cell after cell.
+    pub history: Vec<Vec<Symmetric<R>>>,
+    /// Energies so far.
+    pub work: Work,
+}
+
+/// Work accumulated over the steps [J].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Work {
+    /// ∫ f_int · du, stored and viscous part and hourglass together, to the current time.
+    pub internal: f64,
+    /// Work of loads and of prescribed motions, to the current time.
+    pub external: f64,
+    /// Energy taken by mass-proportional damping, to the current time.
+    pub damping: f64,
+    /// Running maximum of kinetic energy, internal and |external| work.
+    pub largest: f64,
+    /// Steps in a row that were off balance.
+    pub(crate) steps_off_balance: u32,
+    /// First half of the internal work of the step under way.
+    pub(crate) pending_internal: f64,
+    /// First half of the external work of the step under way.
+    pub(crate) pending_external: f64,
+    /// Damping power [W] at the last evaluation.
+    pub(crate) damping_power: f64,
+}
+
+impl<R: Real> State<R> {
+    /// At rest at time 0, prescribed nodes where their motion starts.
+    pub fn at_rest(model: &Model) -> Self {
+        let mut displacement = vec![[R::ZERO; 3]; model.node_count()];
+        if let Ok(owners) = model.constrained_components() {
+            for (u, owner) in displacement.iter_mut().zip(owners) {
+                for component in (0..3).filter(|&c| owner[c] != FREE) {
+                    let motion = &model.constraints[owner[component] as usize].motion;
+                    u[component] = R::of(motion.displacement(0.0)[component]);
+                }
+            }
+        }
+        let history = |solid: &crate::model::Solid| {
+            vec![Symmetric::ZERO; solid.cells.len() * solid.material.prony.slots()]
+        };
+        Self {
+            time: 0.0,
+            steps: 0,
+            increment: vec![[R::ZERO; 3]; model.node_count()],
+            displacement,
+            history: model.solids.iter().map(history).collect(),
+            work: Work::default(),
+        }
+    }
+}

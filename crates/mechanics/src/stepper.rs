@@ -1,0 +1,448 @@
+//! The central difference method in incremental form: with a = α Δt/2,
+//! Δuⁿ⁺¹ = ((1 − a) Δuⁿ + Δt²/m (R − f)) / (1 + a), uⁿ⁺¹ = uⁿ + Δuⁿ⁺¹
+//! (thesis 5.28–5.32 without the cancellation in 2uⁿ − uⁿ⁻¹). Damping does not lower the stable step.
+//!
+//! A step has two halves: [`CentralDifference::evaluate`] finds forces, the coming increments, reactions and energies
+//! at the current time, so that all that an observer sees belongs to one instant; [`CentralDifference::advance`] moves.
+//! Runs on the current rayon pool; sums go in the order of the nodes for any number of threads.
+
+use rayon::prelude::*;
+
+use crate::Real;
+use crate::forces::InternalForces;
+use crate::load::LoadKind;
+use crate::model::{Contradiction, FREE, Model};
+use crate::state::State;
+use crate::tensor::{Vector, add, cast};
+
+/// Nodes per parallel task.
+const CHUNK: usize = 512;
+
+/// The balance is judged once an energy exceeds this fraction of Σ V (λ+2μ): below it, round-off counts.
+pub fn balance_floor<R: Real>() -> f64 {
+    // 1e-9 in double and 1e-6 in single precision.
+    (R::EPSILON * 10.0).max(1e-9)
+}
+
+/// A run whose energies are off by more than this fraction of the largest one ends …
+pub const BALANCE_LIMIT: f64 = 0.05;
+
+/// … once they are so for this many steps in a row. A shock unbalances the few steps in which the struck nodes move
+/// but their stress wave is not yet resolved; a stable vibration with more than 5 % of its energy in the step error
+/// (ωΔt > 0.45) passes through zero every seventh step; only a growing one stays.
+pub const BALANCE_STEPS: u32 = 20;
+
+/// Energies at one instant [J].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energies {
+    /// ½ Σ m v².
+    pub kinetic: f64,
+    /// ∫ f_int · du without hourglass control: stored and viscous part together.
+    pub internal: f64,
+    /// Taken by mass-proportional damping.
+    pub damping: f64,
+    /// Held by hourglass control.
+    pub hourglass: f64,
+    /// Work of loads and prescribed motions.
+    pub external: f64,
+    /// |kinetic + internal + damping + hourglass − external| over the largest of them so far.
+    pub balance: f64,
+}
+
+/// Why a step could not be taken.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// A displacement is not a number or infinite.
+    #[error("the displacement of node {node} of `{body}` is no longer finite at t = {time:.6} s")]
+    NotFinite {
+        /// The body.
+        body: String,
+        /// The node, numbered in its body.
+        node: u32,
+        /// Time [s].
+        time: f64,
+    },
+    /// A cell is turned inside out.
+    #[error("element {element} of `{body}` is inverted (det F = {determinant:.3e}) at t = {time:.6} s")]
+    Inverted {
+        /// The body.
+        body: String,
+        /// The element, numbered as in the user's mesh.
+        element: u32,
+        /// Its first node, numbered in its body.
+        node: u32,
+        /// det F.
+        determinant: f64,
+        /// Time [s].
+        time: f64,
+    },
+    /// Energy appears or vanishes: the run is unstable.
+    #[error(
+        "the energies are off balance by {:.0} % at t = {time:.6} s; the fastest node is {node} of `{body}`",
+        balance * 100.0
+    )]
+    Unbalanced {
+        /// The body of the fastest node.
+        body: String,
+        /// The fastest node, numbered in its body.
+        node: u32,
+        /// The balance, as a fraction.
+        balance: f64,
+        /// Time [s].
+        time: f64,
+    },
+}
+
+impl StepError {
+    /// What to try.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::NotFinite { .. } | Self::Unbalanced { .. } => {
+                "the step is too large for the deformed state: try a smaller `step`, a slower motion or a smoother curve"
+            }
+            Self::Inverted { .. } => {
+                "try a slower or smaller motion, a smaller `step`, more damping, or a finer mesh there"
+            }
+        }
+    }
+}
+
+/// Sums over the nodes of one task.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    kinetic: f64,
+    damping_power: f64,
+    internal_before: f64,
+    internal_after: f64,
+    external_before: f64,
+    external_after: f64,
+}
+
+impl Sums {
+    fn merge(self, b: &Self) -> Self {
+        Self {
+            kinetic: self.kinetic + b.kinetic,
+            damping_power: self.damping_power + b.damping_power,
+            internal_before: self.internal_before + b.internal_before,
+            internal_after: self.internal_after + b.internal_after,
+            external_before: self.external_before + b.external_before,
+            external_after: self.external_after + b.external_after,
+        }
+    }
+}
+
+/// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that a restart
+/// would lose.
+pub struct CentralDifference<'m, R> {
+    model: &'m Model,
+    step: f64,
+    forces: InternalForces<R>,
+    owners: Vec<[u32; 3]>,
+    mass: Vec<R>,
+    /// α of each node [1/s].
+    damping: Vec<R>,
+    /// Acceleration [m/s²] by gravity of each body at the current time.
+    gravity: Vec<Vector<f64>>,
+    body_of: Vec<u16>,
+    /// Forces of loads [N].
+    load: Vec<Vector<f64>>,
+    /// Prescribed displacement [m] of each constraint now and after the step.
+    target: Vec<[Vector<f64>; 2]>,
+    next: Vec<Vector<R>>,
+    reaction: Vec<Vector<R>>,
+    sums: Vec<Sums>,
+    energies: Energies,
+    balance_floor: f64,
+}
+
+impl<'m, R: Real> CentralDifference<'m, R> {
+    /// A stepper for steps of `step` seconds.
+    ///
+    /// # Errors
+    /// If constraints contradict each other.
+    pub fn new(model: &'m Model, step: f64) -> Result<Self, Contradiction> {
+        let nodes = model.node_count();
+        let mut damping = vec![R::ZERO; nodes];
+        let mut body_of = vec![0; nodes];
+        for (index, body) in model.bodies.iter().enumerate() {
+            let range = body.nodes.start as usize..body.nodes.end as usize;
+            damping[range.clone()].fill(R::of(body.damping));
+            body_of[range].fill(index as u16);
+        }
+        let stiffness: f64 = (model.solids.iter())
+            .map(|solid| {
+                let volume: f64 = (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum();
+                volume * solid.material.law.longitudinal_modulus()
+            })
+            .sum();
+        Ok(Self {
+            model,
+            step,
+            forces: InternalForces::new(model, step),
+            owners: model.constrained_components()?,
+            mass: model.mass.iter().map(|&m| R::of(m)).collect(),
+            damping,
+            gravity: vec![[0.0; 3]; model.bodies.len()],
+            body_of,
+            load: vec![[0.0; 3]; nodes],
+            target: vec![[[0.0; 3]; 2]; model.constraints.len()],
+            next: vec![[R::ZERO; 3]; nodes],
+            reaction: vec![[R::ZERO; 3]; nodes],
+            sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
+            energies: Energies::default(),
+            balance_floor: balance_floor::<R>() * stiffness,
+        })
+    }
+
+    /// The step size [s].
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Forces, coming increments, reactions and energies at the current time.
+    ///
+    /// # Errors
+    /// If the state is not finite, a cell is inverted, or the energies do not balance.
+    pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
+        let (hourglass, inverted) = self.forces.evaluate(&state.displacement, &mut state.history);
+        self.apply_loads(state);
+        if state.steps == 0 {
+            self.start(state);
+        }
+        self.set_targets(state.time);
+        self.pass_over_nodes(state);
+        let sums = self.sums.iter().fold(Sums::default(), Sums::merge);
+        self.check_state(state, &sums, inverted)?;
+        self.settle_energies(state, &sums, hourglass)
+    }
+
+    /// Moves to the next instant; [`evaluate`](Self::evaluate) has gone before.
+    pub fn advance(&mut self, state: &mut State<R>) {
+        std::mem::swap(&mut state.increment, &mut self.next);
+        let (owners, target) = (&self.owners, &self.target);
+        (state.displacement.par_iter_mut().zip(&state.increment).zip(owners)).with_min_len(CHUNK).for_each(
+            |((u, du), owner)| {
+                *u = add(*u, *du);
+                for component in (0..3).filter(|&c| owner[c] != FREE) {
+                    u[component] = R::of(target[owner[component] as usize][1][component]);
+                }
+            },
+        );
+        state.work.internal += state.work.pending_internal;
+        state.work.external += state.work.pending_external;
+        state.steps += 1;
+        state.time = state.steps as f64 * self.step;
+    }
+
+    /// Energies at the last evaluation.
+    pub fn energies(&self) -> &Energies {
+        &self.energies
+    }
+
+    /// Energy [J] above which the balance is judged.
+    pub fn balance_floor(&self) -> f64 {
+        self.balance_floor
+    }
+
+    /// Force [N] that holds or moves the nodes of a constraint, summed, at the last evaluation.
+    pub fn reaction(&self, constraint: usize) -> Vector<f64> {
+        let mut sum = [0.0; 3];
+        for &node in &self.model.constraints[constraint].nodes {
+            for (component, sum) in sum.iter_mut().enumerate() {
+                if self.owners[node as usize][component] == constraint as u32 {
+                    *sum += self.reaction[node as usize][component].to_f64();
+                }
+            }
+        }
+        sum
+    }
+
+    /// Velocity [m/s] of a node at the last evaluation: the mean of the increments before and after.
+    pub fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
+        let (before, after) = (state.increment[node], self.next[node]);
+        [0, 1, 2].map(|c| (before[c].to_f64() + after[c].to_f64()) / (2.0 * self.step))
+    }
+
+    fn apply_loads(&mut self, state: &State<R>) {
+        if self.model.loads.is_empty() {
+            return;
+        }
+        self.load.fill([0.0; 3]);
+        self.gravity.fill([0.0; 3]);
+        let (model, u) = (self.model, &state.displacement);
+        for load in &model.loads {
+            if let LoadKind::Gravity { body, acceleration } = load.kind {
+                let factor = load.curve.value(state.time);
+                self.gravity[body] = add(self.gravity[body], acceleration.map(|a| a * factor));
+            }
+            match load.surface.map(|index| &model.surfaces[index]) {
+                Some(surface) => {
+                    let place = |point: u32| {
+                        add(surface.rest[point as usize], surface.mapping.apply_row(point as usize, u))
+                    };
+                    load.add_forces(state.time, Some(&surface.mapping), place, &mut self.load);
+                }
+                None => {
+                    let place = |node: u32| add(model.rest[node as usize], cast(u[node as usize]));
+                    load.add_forces(state.time, None, place, &mut self.load);
+                }
+            }
+        }
+    }
+
+    fn set_targets(&mut self, time: f64) {
+        for (target, constraint) in self.target.iter_mut().zip(&self.model.constraints) {
+            *target = [time, time + self.step].map(|t| constraint.motion.displacement(t));
+        }
+    }
+
+    /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with v⁰ = 0: the increment before the first step.
+    fn start(&self, state: &mut State<R>) {
+        let half = 0.5 * self.step * self.step;
+        for (node, increment) in state.increment.iter_mut().enumerate() {
+            let applied = self.applied(node);
+            let internal = self.forces.at(node);
+            for component in 0..3 {
+                increment[component] = if self.owners[node][component] == FREE {
+                    R::of(
+                        -half * (applied[component] - internal[component]).to_f64()
+                            / self.mass[node].to_f64(),
+                    )
+                } else {
+                    R::ZERO
+                };
+            }
+        }
+    }
+
+    /// The force [N] of loads and gravity on a node.
+    #[inline(always)]
+    fn applied(&self, node: usize) -> Vector<R> {
+        let gravity = self.gravity[self.body_of[node] as usize];
+        let mass = self.model.mass[node];
+        [0, 1, 2].map(|c| R::of(self.load[node][c] + mass * gravity[c]))
+    }
+
+    fn pass_over_nodes(&mut self, state: &State<R>) {
+        let mut next = std::mem::take(&mut self.next);
+        let mut reaction = std::mem::take(&mut self.reaction);
+        let mut sums = std::mem::take(&mut self.sums);
+        (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(&mut sums)).enumerate().for_each(
+            |(task, ((next, reaction), sums))| {
+                *sums = Sums::default();
+                for (offset, (next, reaction)) in next.iter_mut().zip(reaction).enumerate() {
+                    let node = task * CHUNK + offset;
+                    (*next, *reaction) = self.pass_node(node, state.increment[node], sums);
+                }
+            },
+        );
+        (self.next, self.reaction, self.sums) = (next, reaction, sums);
+    }
+
+    /// The coming increment of a node and its reaction.
+    #[inline(always)]
+    fn pass_node(&self, node: usize, before: Vector<R>, sums: &mut Sums) -> (Vector<R>, Vector<R>) {
+        let (m, alpha, dt) = (self.mass[node], self.damping[node], R::of(self.step));
+        let half = R::of(0.5);
+        let internal = self.forces.at(node);
+        let applied = self.applied(node);
+        let owner = self.owners[node];
+        let a = half * alpha * dt;
+        let mut next = [R::ZERO; 3];
+        let mut reaction = [R::ZERO; 3];
+        for c in 0..3 {
+            let mut external = applied[c];
+            if owner[c] == FREE {
+                next[c] =
+                    ((R::ONE - a) * before[c] + dt * dt / m * (applied[c] - internal[c])) / (R::ONE + a);
+            } else {
+                let [now, then] = self.target[owner[c] as usize];
+                next[c] = R::of(then[c] - now[c]);
+                let velocity = (before[c] + next[c]) / (R::of(2.0) * dt);
+                let inertia = m * ((next[c] - before[c]) / (dt * dt) + alpha * velocity);
+                reaction[c] = inertia + internal[c] - applied[c];
+                external += reaction[c];
+            }
+            let velocity = ((before[c] + next[c]) / (R::of(2.0) * dt)).to_f64();
+            let momentum = m.to_f64() * velocity;
+            sums.kinetic += 0.5 * momentum * velocity;
+            sums.damping_power += alpha.to_f64() * momentum * velocity;
+            sums.internal_before += 0.5 * (internal[c] * before[c]).to_f64();
+            sums.internal_after += 0.5 * (internal[c] * next[c]).to_f64();
+            sums.external_before += 0.5 * (external * before[c]).to_f64();
+            sums.external_after += 0.5 * (external * next[c]).to_f64();
+        }
+        (next, reaction)
+    }
+
+    fn check_state(
+        &self,
+        state: &State<R>,
+        sums: &Sums,
+        inverted: Option<(usize, usize, f64)>,
+    ) -> Result<(), StepError> {
+        let finite =
+            sums.kinetic.is_finite() && sums.internal_after.is_finite() && sums.external_after.is_finite();
+        if !finite {
+            let lost = |u: &Vector<R>| u.iter().any(|x| !x.to_f64().is_finite());
+            let node = (state.displacement.iter().position(lost)).or_else(|| self.next.iter().position(lost));
+            let (body, node) = self.model.locate_node(node.unwrap_or(0) as u32);
+            let body = self.model.bodies[body].name.clone();
+            return Err(StepError::NotFinite { body, node, time: state.time });
+        }
+        if let Some((solid, cell, determinant)) = inverted {
+            let solid = &self.model.solids[solid];
+            return Err(StepError::Inverted {
+                body: self.model.bodies[solid.body].name.clone(),
+                element: solid.original[cell],
+                node: self.model.locate_node(solid.cells.nodes(cell)[0]).1,
+                determinant,
+                time: state.time,
+            });
+        }
+        Ok(())
+    }
+
+    fn settle_energies(
+        &mut self,
+        state: &mut State<R>,
+        sums: &Sums,
+        hourglass: f64,
+    ) -> Result<(), StepError> {
+        let work = &mut state.work;
+        if state.steps > 0 {
+            work.internal += sums.internal_before;
+            work.external += sums.external_before;
+            work.damping += 0.5 * (work.damping_power + sums.damping_power) * self.step;
+        }
+        work.damping_power = sums.damping_power;
+        work.pending_internal = sums.internal_after;
+        work.pending_external = sums.external_after;
+        let internal = work.internal - hourglass;
+        work.largest = work.largest.max(sums.kinetic).max(internal).max(work.external.abs());
+        let missing = (sums.kinetic + work.internal + work.damping - work.external).abs();
+        let balance = missing / work.largest.max(self.balance_floor);
+        self.energies = Energies {
+            kinetic: sums.kinetic,
+            internal,
+            damping: work.damping,
+            hourglass,
+            external: work.external,
+            balance,
+        };
+        let off = work.largest > self.balance_floor && balance > BALANCE_LIMIT;
+        work.steps_off_balance = if off { work.steps_off_balance + 1 } else { 0 };
+        if work.steps_off_balance >= BALANCE_STEPS {
+            let (body, node) = self.model.locate_node(self.fastest_node());
+            let body = self.model.bodies[body].name.clone();
+            return Err(StepError::Unbalanced { body, node, balance, time: state.time });
+        }
+        Ok(())
+    }
+
+    fn fastest_node(&self) -> u32 {
+        let speed = |u: &Vector<R>| u.iter().map(|x| x.to_f64() * x.to_f64()).sum::<f64>();
+        let fastest = self.next.iter().enumerate().max_by(|(_, a), (_, b)| speed(a).total_cmp(&speed(b)));
+        fastest.map_or(0, |(node, _)| node as u32)
+    }
+}

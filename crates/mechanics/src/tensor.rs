@@ -1,0 +1,231 @@
+//! Vectors and tensors of three dimensions, generic over the number type of the kernel.
+//! Only what laws and elements need; everything is inlined.
+
+use std::ops::{Add, Mul, Sub};
+
+use crate::Real;
+
+/// A vector in space.
+pub type Vector<R> = [R; 3];
+
+/// a + b.
+#[inline(always)]
+pub fn add<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// a − b.
+#[inline(always)]
+pub fn sub<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// s a.
+#[inline(always)]
+pub fn scale<R: Real>(a: Vector<R>, s: R) -> Vector<R> {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+/// a · b.
+#[inline(always)]
+pub fn dot<R: Real>(a: Vector<R>, b: Vector<R>) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// a × b.
+#[inline(always)]
+pub fn cross<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// A vector in another number type.
+#[inline(always)]
+pub fn cast<A: Real, B: Real>(a: Vector<A>) -> Vector<B> {
+    a.map(|x| B::of(x.to_f64()))
+}
+
+/// A tensor of second order, rows first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tensor<R>(pub [[R; 3]; 3]);
+
+impl<R: Real> Tensor<R> {
+    /// All zeros.
+    pub const ZERO: Self = Self([[R::ZERO; 3]; 3]);
+
+    /// The identity.
+    pub const IDENTITY: Self =
+        Self([[R::ONE, R::ZERO, R::ZERO], [R::ZERO, R::ONE, R::ZERO], [R::ZERO, R::ZERO, R::ONE]]);
+
+    /// a ⊗ b added to the tensor.
+    #[inline(always)]
+    pub fn add_outer(&mut self, a: Vector<R>, b: Vector<R>) {
+        for (row, ai) in self.0.iter_mut().zip(a) {
+            for (entry, bj) in row.iter_mut().zip(b) {
+                *entry += ai * bj;
+            }
+        }
+    }
+
+    /// T a.
+    #[inline(always)]
+    pub fn apply(&self, a: Vector<R>) -> Vector<R> {
+        [dot(self.0[0], a), dot(self.0[1], a), dot(self.0[2], a)]
+    }
+
+    /// The transpose.
+    #[inline(always)]
+    pub fn transpose(&self) -> Self {
+        let t = &self.0;
+        Self([[t[0][0], t[1][0], t[2][0]], [t[0][1], t[1][1], t[2][1]], [t[0][2], t[1][2], t[2][2]]])
+    }
+
+    /// The determinant.
+    #[inline(always)]
+    pub fn determinant(&self) -> R {
+        dot(self.0[0], cross(self.0[1], self.0[2]))
+    }
+
+    /// The sum of the principal minors of order two.
+    #[inline(always)]
+    pub fn second_invariant(&self) -> R {
+        let t = &self.0;
+        t[0][0] * t[1][1] - t[0][1] * t[1][0] + t[1][1] * t[2][2] - t[1][2] * t[2][1] + t[0][0] * t[2][2]
+            - t[0][2] * t[2][0]
+    }
+
+    /// The trace.
+    #[inline(always)]
+    pub fn trace(&self) -> R {
+        self.0[0][0] + self.0[1][1] + self.0[2][2]
+    }
+
+    /// T S with a symmetric S.
+    #[inline(always)]
+    pub fn times_symmetric(&self, s: &Symmetric<R>) -> Self {
+        let [xx, yy, zz, xy, yz, xz] = s.0;
+        let columns = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        Self(self.0.map(|row| [dot(row, columns[0]), dot(row, columns[1]), dot(row, columns[2])]))
+    }
+}
+
+/// A symmetric tensor in the order 11, 22, 33, 12, 23, 13.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Symmetric<R>(pub [R; 6]);
+
+impl<R: Real> Symmetric<R> {
+    /// All zeros.
+    pub const ZERO: Self = Self([R::ZERO; 6]);
+
+    /// The identity.
+    pub const IDENTITY: Self = Self([R::ONE, R::ONE, R::ONE, R::ZERO, R::ZERO, R::ZERO]);
+
+    /// a ⊗ a.
+    #[inline(always)]
+    pub fn dyad(a: Vector<R>) -> Self {
+        Self([a[0] * a[0], a[1] * a[1], a[2] * a[2], a[0] * a[1], a[1] * a[2], a[0] * a[2]])
+    }
+
+    /// Tᵀ T + T + Tᵀ: C − I from the displacement gradient T.
+    #[inline(always)]
+    pub fn green_lagrange_twice(h: &Tensor<R>) -> Self {
+        let t = h.transpose().0;
+        let entry = |i: usize, j: usize| h.0[i][j] + h.0[j][i] + dot(t[i], t[j]);
+        Self([entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(1, 2), entry(0, 2)])
+    }
+
+    /// The trace.
+    #[inline(always)]
+    pub fn trace(&self) -> R {
+        self.0[0] + self.0[1] + self.0[2]
+    }
+
+    /// a · S a.
+    #[inline(always)]
+    pub fn quadratic(&self, a: Vector<R>) -> R {
+        dot(a, self.apply(a))
+    }
+
+    /// S a.
+    #[inline(always)]
+    pub fn apply(&self, a: Vector<R>) -> Vector<R> {
+        let [xx, yy, zz, xy, yz, xz] = self.0;
+        [dot([xx, xy, xz], a), dot([xy, yy, yz], a), dot([xz, yz, zz], a)]
+    }
+
+    /// The cofactor matrix (= adjugate, since symmetric): S⁻¹ det S.
+    #[inline(always)]
+    pub fn cofactor(&self) -> Self {
+        let [xx, yy, zz, xy, yz, xz] = self.0;
+        Self([
+            yy * zz - yz * yz,
+            xx * zz - xz * xz,
+            xx * yy - xy * xy,
+            xz * yz - xy * zz,
+            xy * xz - xx * yz,
+            xy * yz - xz * yy,
+        ])
+    }
+
+    /// A B for two symmetric tensors that commute, so that the product is symmetric too.
+    #[inline(always)]
+    pub fn commuting_product(&self, b: &Self) -> Self {
+        let [a0, a1, a2, a3, a4, a5] = self.0;
+        let [b0, b1, b2, b3, b4, b5] = b.0;
+        Self([
+            a0 * b0 + a3 * b3 + a5 * b5,
+            a3 * b3 + a1 * b1 + a4 * b4,
+            a5 * b5 + a4 * b4 + a2 * b2,
+            a0 * b3 + a3 * b1 + a5 * b4,
+            a3 * b5 + a1 * b4 + a4 * b2,
+            a0 * b5 + a3 * b4 + a5 * b2,
+        ])
+    }
+
+    /// As a full tensor.
+    #[inline(always)]
+    pub fn full(&self) -> Tensor<R> {
+        let [xx, yy, zz, xy, yz, xz] = self.0;
+        Tensor([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    }
+
+    /// F S Fᵀ.
+    #[inline(always)]
+    pub fn push_forward(&self, f: &Tensor<R>) -> Self {
+        let p = f.times_symmetric(self).0;
+        let f = &f.0;
+        Self([
+            dot(p[0], f[0]),
+            dot(p[1], f[1]),
+            dot(p[2], f[2]),
+            dot(p[0], f[1]),
+            dot(p[1], f[2]),
+            dot(p[0], f[2]),
+        ])
+    }
+}
+
+impl<R: Real> Add for Symmetric<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        let (a, b) = (self.0, b.0);
+        Self([a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]])
+    }
+}
+
+impl<R: Real> Sub for Symmetric<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        let (a, b) = (self.0, b.0);
+        Self([a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5]])
+    }
+}
+
+impl<R: Real> Mul<R> for Symmetric<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, s: R) -> Self {
+        Self(self.0.map(|x| x * s))
+    }
+}

@@ -1,0 +1,125 @@
+//! What can be wrong with a request for a mesh.
+
+use pliant_geometry::Vector3;
+
+/// Why no mesh was made. Lengths in metres.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshingError {
+    /// A length or a factor is zero, negative, infinite or NaN.
+    #[error("{what} is {value}; it must be positive and finite")]
+    NotPositive {
+        /// Which quantity.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A position has an infinite or NaN coordinate.
+    #[error("{what} is ({}, {}, {}) m; it must be finite", value.x, value.y, value.z)]
+    NotFinite {
+        /// Which position.
+        what: &'static str,
+        /// Its value.
+        value: Vector3,
+    },
+    /// An explicit number of cells is zero.
+    #[error("0 cells asked for along {axis}; at least 1 is needed")]
+    NoCellsAlong {
+        /// `x`, `y` or `z`.
+        axis: char,
+    },
+    /// A tube without a wall.
+    #[error("the inner radius {inner} m must be below the outer radius {outer} m")]
+    NoWall {
+        /// Inner radius [m].
+        inner: f64,
+        /// Outer radius [m].
+        outer: f64,
+    },
+    /// The box of a field is empty or not finite.
+    #[error(
+        "the box of the body runs from ({}, {}, {}) to ({}, {}, {}) m; it must be finite and longer than 0 \
+         along every axis",
+        low.x, low.y, low.z, high.x, high.y, high.z
+    )]
+    BadBox {
+        /// Smallest corner [m].
+        low: Vector3,
+        /// Largest corner [m].
+        high: Vector3,
+    },
+    /// The mesh would have more cells than allowed. Found before the cells are allocated, except for bodies
+    /// thinner than the samples of the estimate.
+    #[error(
+        "about {estimate} cells exceed the limit of {limit}; an edge {} times as long would fit",
+        factor(*estimate, *limit)
+    )]
+    TooManyCells {
+        /// Expected number of cells.
+        estimate: u64,
+        /// Cells allowed.
+        limit: usize,
+    },
+    /// The body fills too little of its box: the lattice over the box would not fit, though the cells might.
+    #[error(
+        "the box of the body needs a lattice of {cubes} cubes, more than {limit}; use a longer edge or \
+         a tighter box"
+    )]
+    LatticeTooLarge {
+        /// Cubes of the lattice.
+        cubes: u64,
+        /// Cubes allowed: a fixed multiple of the limit on cells.
+        limit: usize,
+    },
+    /// No cell lies in the body.
+    #[error(
+        "no cell of edge {edge} m fits the body, whose box is {} × {} × {} m; use a shorter edge",
+        size.x, size.y, size.z
+    )]
+    NoCells {
+        /// Edge asked for [m].
+        edge: f64,
+        /// Size of the box of the body [m].
+        size: Vector3,
+    },
+    /// The field is NaN or infinite somewhere.
+    #[error(
+        "the field is {value} at ({}, {}, {}) m; it must be finite around the body",
+        point.x, point.y, point.z
+    )]
+    FieldNotFinite {
+        /// Value found.
+        value: f64,
+        /// Where [m].
+        point: Vector3,
+    },
+    /// The body reaches beyond its own box.
+    #[error(
+        "the body reaches ({}, {}, {}) m, outside the box it gives; make the box larger",
+        point.x, point.y, point.z
+    )]
+    BodyLeavesBox {
+        /// A point of the body outside the box [m].
+        point: Vector3,
+    },
+}
+
+/// By how much the edge must grow for the cells to fit, rounded up to two decimals.
+fn factor(estimate: u64, limit: usize) -> f64 {
+    ((estimate as f64 / limit.max(1) as f64).cbrt() * 100.0).ceil() / 100.0
+}
+
+pub(crate) fn require_positive(what: &'static str, value: f64) -> Result<(), MeshingError> {
+    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(MeshingError::NotPositive { what, value }) }
+}
+
+pub(crate) fn require_finite(what: &'static str, value: Vector3) -> Result<(), MeshingError> {
+    if value.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(MeshingError::NotFinite { what, value }) }
+}
+
+/// Compares a number of cells, known or estimated, with the limit.
+pub(crate) fn require_at_most(estimate: f64, limit: usize) -> Result<(), MeshingError> {
+    if estimate > limit as f64 {
+        return Err(MeshingError::TooManyCells { estimate: estimate as u64, limit });
+    }
+    Ok(())
+}

@@ -1,0 +1,60 @@
+//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields filled with tetrahedra
+//! (isosurface stuffing) or cubes. Lengths are in metres. The same request gives the same mesh, bit for bit,
+//! on any number of threads.
+//! Leaves out: images and surfaces as input, optimisation of the cells.
+//!
+//! ```
+//! use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Organ, Phantom, Resolution, Stuffing, VolumeCell};
+//!
+//! // A liver of about 0.8 l in tetrahedra with edges of 10 mm.
+//! let liver = Phantom::new(Organ::Liver, 1.0)?;
+//! let filled = Stuffing::new(0.010).mesh(&liver)?;
+//! assert!(filled.mesh.blocks[0].len() > 8000);
+//! assert_eq!(filled.non_manifold_edges, 0);
+//!
+//! // A bar of 40 × 10 × 10 mm in hexahedra, to be held at one end by its point set.
+//! let bar = Block::new([0.04, 0.01, 0.01]);
+//! let mesh = bar.mesh(Resolution::Edge(0.005), VolumeCell::Hex, DEFAULT_CELL_LIMIT)?;
+//! assert_eq!(mesh.blocks[0].len(), 8 * 2 * 2);
+//! assert_eq!(mesh.point_sets["x-min"].len(), 9);
+//! # Ok::<(), pliant_meshing::MeshingError>(())
+//! ```
+
+// Units stand in brackets; rustdoc takes [m] for a link.
+
+mod error;
+mod extent;
+mod field;
+mod lattice;
+mod phantom;
+mod stencil;
+mod structured;
+mod stuffing;
+mod topology;
+mod voxels;
+
+use pliant_geometry::Mesh;
+
+pub use error::MeshingError;
+pub use field::{Ellipsoid, ImplicitField};
+pub use phantom::{Organ, Phantom, brain_label};
+pub use structured::{Block, Resolution, Tube, VolumeCell};
+pub use stuffing::Stuffing;
+pub use voxels::Voxels;
+
+/// Cells allowed in a mesh unless the caller says otherwise. Limits above 2²⁵ (34 million) act as 2²⁵.
+pub const DEFAULT_CELL_LIMIT: usize = 5_000_000;
+
+/// The body of a field as a mesh, and what was left out of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FieldMesh {
+    /// One block of cells, the largest face-connected component.
+    pub mesh: Mesh,
+    /// Smaller components that were dropped.
+    pub dropped_components: usize,
+    /// Cells in them.
+    pub dropped_cells: usize,
+    /// Edges of the boundary that more than two boundary faces share: there the body touches itself, where a
+    /// gap is thinner than the cells.
+    pub non_manifold_edges: usize,
+}

@@ -1,0 +1,8 @@
+//! What the meshes of this crate promise: volume, conformity, quality, determinism, errors.
+
+mod checks;
+mod errors;
+mod phantoms;
+mod structured;
+mod stuffing;
+mod voxels;

@@ -1,0 +1,121 @@
+//! Constraints: which nodes are held or moved, and that no two contradict each other.
+
+use pliant_geometry::Selection;
+use pliant_mechanics::model::{Constraint, Motion};
+
+use super::Builder;
+use crate::diagnostic::Diagnostic;
+use crate::format::{Axis, MoveTable};
+use crate::registry::{ConstraintTable, LoadTable};
+
+impl Builder<'_> {
+    pub(super) fn add_constraints(&mut self) {
+        let scene = self.scene;
+        for (name, table) in &scene.constraints {
+            let path = ["constraint", name.as_str()];
+            let (body, selection, axes) = match table {
+                ConstraintTable::Fix(fix) => (&fix.body, &fix.nodes, &fix.components),
+                ConstraintTable::Move(moved) => (&moved.body, &moved.nodes, &moved.components),
+            };
+            let motion = match table {
+                ConstraintTable::Fix(_) => Some(Motion::Fixed),
+                ConstraintTable::Move(moved) => self.motion(moved, &path),
+            };
+            let components = self.components(axes.as_deref(), &path);
+            let body = self.find_body(body, &[path[0], path[1], "body"]);
+            let nodes = body.and_then(|body| self.body_nodes(body, selection, &[path[0], path[1], "nodes"]));
+            if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
+                self.model.constraints.push(Constraint { name: name.clone(), nodes, components, motion });
+            }
+        }
+        if let Err(contradiction) = self.model.constrained_components() {
+            let first = self.source().key_span(&["constraint", &contradiction.first]);
+            let second = self.source().key_span(&["constraint", &contradiction.second]);
+            let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
+            let diagnostic = Diagnostic::error(contradiction.to_string())
+                .at(second, "contradicts …")
+                .also(first, "… this one")
+                .help(help);
+            self.out.push(diagnostic);
+        }
+    }
+
+    fn motion(&mut self, table: &MoveTable, path: &[&str]) -> Option<Motion> {
+        let curve = self.curve(&table.timing, path);
+        match (table.by, table.velocity) {
+            (Some(by), None) => Some(Motion::Displacement(by, curve?)),
+            (None, Some(velocity)) => Some(Motion::Velocity(velocity, curve?)),
+            (by, _) => {
+                let found = if by.is_some() { "both" } else { "neither" };
+                let message = format!("a motion has exactly one of `by` and `velocity`, found {found}");
+                self.error(path, message, "this motion", "`by` in metres, `velocity` in metres per second");
+                None
+            }
+        }
+    }
+
+    fn components(&mut self, axes: Option<&[Axis]>, path: &[&str]) -> Option<[bool; 3]> {
+        match axes {
+            None => Some([true; 3]),
+            Some([]) => {
+                let at = [path, &["components"]].concat();
+                self.error(
+                    &at,
+                    "`components` is empty",
+                    "here",
+                    "name x, y, z, or leave it out for all three",
+                );
+                None
+            }
+            Some(axes) => Some([Axis::X, Axis::Y, Axis::Z].map(|axis| axes.contains(&axis))),
+        }
+    }
+
+    /// The nodes of a body that a selection holds, numbered in the model.
+    pub(super) fn body_nodes(
+        &mut self,
+        body: usize,
+        selection: &Selection,
+        path: &[&str],
+    ) -> Option<Vec<u32>> {
+        let built = &self.bodies[body];
+        let first = self.model.bodies[body].nodes.start;
+        match selection.nodes(&built.mesh, &built.boundary) {
+            Ok(nodes) => Some(nodes.into_iter().map(|node| first + node).collect()),
+            Err(error) => {
+                self.error(path, error.to_string(), "this selection", "");
+                None
+            }
+        }
+    }
+
+    /// Says which bodies nothing holds.
+    pub(super) fn check_free_bodies(&mut self) {
+        let scene = self.scene;
+        for (index, body) in self.model.bodies.iter().enumerate() {
+            let held =
+                self.model.constraints.iter().any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)));
+            if held {
+                continue;
+            }
+            let name = &body.name;
+            let surfaces = self.model.surfaces.iter().filter(|s| s.body == index).map(|s| s.name.as_str());
+            let own: Vec<&str> = surfaces.chain([name.as_str()]).collect();
+            let loaded = scene.loads.iter().any(|(_, load)| match load {
+                LoadTable::Force(l) => own.contains(&l.on.as_str()),
+                LoadTable::Traction(l) => own.contains(&l.on.as_str()),
+                LoadTable::Pressure(l) => own.contains(&l.on.as_str()),
+                LoadTable::Gravity(_) => false,
+            });
+            let falls = scene.scene.gravity.is_some()
+                || scene.loads.iter().any(|(_, load)| matches!(load, LoadTable::Gravity(g) if g.on.as_ref().is_none_or(|on| on == name)));
+            let fate = match (falls, loaded) {
+                (true, false) => "gravity makes it fall",
+                (false, true) => "its loads push it away",
+                (true, true) => "gravity and its loads carry it away",
+                (false, false) => "and nothing moves it",
+            };
+            self.notes.push(format!("`{name}` is held by no constraint: {fate}"));
+        }
+    }
+}

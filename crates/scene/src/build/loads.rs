@@ -1,0 +1,204 @@
+//! Loads: forces on nodes, tractions and pressures on faces, gravity. And the references of outputs.
+
+use pliant_geometry::{Mesh, Selection, Surface, Vector3, boundary};
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
+
+use super::{Builder, Target, suggestion};
+use crate::format::{CsvTable, FieldName, ForceTable, VtuTable};
+use crate::registry::{LoadTable, OutputTable};
+
+impl Builder<'_> {
+    pub(super) fn add_loads(&mut self) {
+        let scene = self.scene;
+        if let Some(acceleration) = scene.scene.gravity {
+            for body in 0..self.model.bodies.len() {
+                let curve = Curve { shape: Shape::Hold, from: 0.0, to: scene.scene.until };
+                let kind = LoadKind::Gravity { body, acceleration };
+                self.model.loads.push(Load { name: "gravity".into(), kind, curve, surface: None });
+            }
+        }
+        for (name, table) in &scene.loads {
+            let path = ["load", name.as_str()];
+            if let Some(loads) = self.loads(table, &path) {
+                let named = |(kind, curve, surface)| Load { name: name.clone(), kind, curve, surface };
+                self.model.loads.extend(loads.into_iter().map(named));
+            }
+        }
+    }
+
+    fn loads(&mut self, table: &LoadTable, path: &[&str]) -> Option<Vec<(LoadKind, Curve, Option<usize>)>> {
+        let at = |key| [path, &[key]].concat();
+        let timing = match table {
+            LoadTable::Force(l) => &l.timing,
+            LoadTable::Traction(l) => &l.timing,
+            LoadTable::Pressure(l) => &l.timing,
+            LoadTable::Gravity(l) => &l.timing,
+        };
+        let curve = self.curve(timing, path);
+        if let LoadTable::Gravity(gravity) = table {
+            let bodies = match &gravity.on {
+                Some(name) => vec![self.find_body(name, &at("on"))?],
+                None => (0..self.model.bodies.len()).collect(),
+            };
+            let curve = curve?;
+            let load = |body| LoadKind::Gravity { body, acceleration: gravity.acceleration };
+            return Some(bodies.into_iter().map(|body| (load(body), curve.clone(), None)).collect());
+        }
+        let on = match table {
+            LoadTable::Force(l) => &l.on,
+            LoadTable::Traction(l) => &l.on,
+            LoadTable::Pressure(l) => &l.on,
+            LoadTable::Gravity(_) => return None,
+        };
+        let target = self.find_target(on, &at("on"))?;
+        let kind = match table {
+            LoadTable::Force(l) => self.nodal_forces(l, target, path),
+            LoadTable::Traction(l) => self
+                .faces(target, &l.faces, &at("faces"))
+                .map(|faces| LoadKind::Forces(self.traction_forces(target, &faces, l.traction))),
+            LoadTable::Pressure(l) => self
+                .faces(target, &l.faces, &at("faces"))
+                .map(|faces| LoadKind::Pressure { faces, pressure: l.pressure }),
+            LoadTable::Gravity(_) => None,
+        };
+        let surface = match target {
+            Target::Body(_) => None,
+            Target::Surface(index) => Some(index),
+        };
+        Some(vec![(kind?, curve?, surface)])
+    }
+
+    fn nodal_forces(&mut self, table: &ForceTable, target: Target, path: &[&str]) -> Option<LoadKind> {
+        let at = [path, &["nodes"]].concat();
+        let nodes = match target {
+            Target::Body(body) => self.body_nodes(body, &table.nodes, &at)?,
+            Target::Surface(index) => {
+                let (mesh, boundary) = self.surface_mesh(index);
+                match table.nodes.nodes(&mesh, &boundary) {
+                    Ok(nodes) => nodes,
+                    Err(error) => {
+                        self.error(&at, error.to_string(), "this selection", "");
+                        return None;
+                    }
+                }
+            }
+        };
+        let force = match (table.each, table.total) {
+            (Some(each), None) => each,
+            (None, Some(total)) => total.map(|f| f / nodes.len() as f64),
+            (each, _) => {
+                let found = if each.is_some() { "both" } else { "neither" };
+                let message = format!("a force has exactly one of `each` and `total`, found {found}");
+                self.error(
+                    path,
+                    message,
+                    "this force",
+                    "`each` acts on every node, `total` is shared among them",
+                );
+                return None;
+            }
+        };
+        Some(LoadKind::Forces(nodes.into_iter().map(|node| (node, force)).collect()))
+    }
+
+    /// The selected faces of a body (numbered in the model) or of a carried surface (numbered in it).
+    fn faces(&mut self, target: Target, selection: &Selection, path: &[&str]) -> Option<Vec<Face>> {
+        let result = match target {
+            Target::Body(body) => {
+                let (built, first) = (&self.bodies[body], self.model.bodies[body].nodes.start);
+                select_faces(selection, &built.mesh, &built.boundary, first)
+            }
+            Target::Surface(index) => {
+                let (mesh, boundary) = self.surface_mesh(index);
+                select_faces(selection, &mesh, &boundary, 0)
+            }
+        };
+        result.map_err(|error| self.error(path, error, "this selection", "")).ok()
+    }
+
+    fn surface_mesh(&self, index: usize) -> (Mesh, Surface) {
+        let mesh = self.surfaces[index].clone();
+        let boundary = boundary(&mesh);
+        (mesh, boundary)
+    }
+
+    fn traction_forces(&self, target: Target, faces: &[Face], traction: [f64; 3]) -> Vec<(u32, [f64; 3])> {
+        let rest = match target {
+            Target::Body(_) => &self.model.rest,
+            Target::Surface(index) => &self.model.surfaces[index].rest,
+        };
+        let share = |(node, area): (u32, [f64; 3])| {
+            let size = Vector3::from(area).norm();
+            (node, traction.map(|t| t * size))
+        };
+        faces.iter().flat_map(|face| face_areas(face, |node| rest[node as usize])).map(share).collect()
+    }
+
+    pub(super) fn check_outputs(&mut self) {
+        let scene = self.scene;
+        for (name, table) in &scene.outputs {
+            let path = ["output", name.as_str()];
+            match table {
+                OutputTable::Vtu(vtu) => self.check_vtu(vtu, &path),
+                OutputTable::Csv(csv) => self.check_csv(csv, &path),
+            }
+        }
+    }
+
+    fn check_vtu(&mut self, table: &VtuTable, path: &[&str]) {
+        let at = |key| [path, &[key]].concat();
+        let Some(on) = &table.on else { return };
+        if let Some(Target::Surface(_)) = self.find_target(on, &at("on"))
+            && let Some(field) = table.data.iter().find(|field| !field.is_nodal())
+        {
+            let message =
+                format!("`{}` belongs to cells; a carried surface has none of its body's", field.name());
+            self.error(
+                &at("data"),
+                message,
+                "here",
+                "write displacement and velocity on surfaces, stresses on the body",
+            );
+        }
+    }
+
+    fn check_csv(&mut self, table: &CsvTable, path: &[&str]) {
+        for (index, wanted) in table.reactions.iter().flatten().enumerate() {
+            let known: Vec<&str> = self.scene.constraints.iter().map(|(name, _)| name.as_str()).collect();
+            if !known.contains(&wanted.as_str()) {
+                let index = index.to_string();
+                let at = [path, &["reactions", &index]].concat();
+                let help = suggestion(wanted, &known, "constraints");
+                self.error(&at, format!("there is no constraint `{wanted}`"), "no such constraint", help);
+            }
+        }
+        for (name, probe) in &table.probes {
+            let at = |key| [path, &["probes", name.as_str(), key]].concat();
+            if let Some(Target::Surface(_)) = self.find_target(&probe.on, &at("on"))
+                && let Some(field) = probe.data.iter().copied().find(|field| !FieldName::is_nodal(*field))
+            {
+                let message =
+                    format!("`{}` belongs to cells; a carried surface has none of its body's", field.name());
+                self.error(&at("data"), message, "here", "probe the body for stresses");
+            }
+        }
+    }
+}
+
+fn select_faces(
+    selection: &Selection,
+    mesh: &Mesh,
+    boundary: &Surface,
+    first: u32,
+) -> Result<Vec<Face>, String> {
+    let face = |index: u32| {
+        let mut face = [NO_NODE; 4];
+        for (own, node) in face.iter_mut().zip(boundary.faces[index as usize].nodes()) {
+            *own = first + node;
+        }
+        face
+    };
+    let selected = selection.faces(mesh, boundary).map_err(|error| error.to_string())?;
+    Ok(selected.into_iter().map(face).collect())
+}

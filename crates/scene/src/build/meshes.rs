@@ -1,0 +1,332 @@
+//! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and repaired.
+
+use std::path::PathBuf;
+
+use pliant_geometry::{CellKind, DataArray, Mesh, Vector3, boundary, diagnose, io, reorder};
+use pliant_meshing::{
+    Block, DEFAULT_CELL_LIMIT, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Phantom, Resolution,
+    Stuffing, Tube, VolumeCell, Voxels, brain_label,
+};
+
+use super::Builder;
+use crate::diagnostic::Diagnostic;
+use crate::format::{Cells, Fix, MeshTable, Organ};
+
+/// A mesh and where it comes from.
+pub(crate) struct MeshOrigin {
+    pub(crate) mesh: Mesh,
+    pub(crate) origin: String,
+}
+
+/// An organ larger or smaller than this [m] is probably in other units.
+const PLAUSIBLE_SIZE: [f64; 2] = [1e-3, 10.0];
+
+impl Builder<'_> {
+    /// The mesh of the table at `path` (`body.NAME.mesh`), in metres; diagnostics if it can't be had.
+    pub(super) fn mesh(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+        let given = [
+            ("file", table.file.is_some()),
+            ("block", table.block.is_some()),
+            ("ellipsoid", table.ellipsoid.is_some()),
+            ("tube", table.tube.is_some()),
+            ("organ", table.organ.is_some()),
+        ];
+        let sources: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
+        let [source] = sources[..] else {
+            let message = format!("a mesh comes from exactly one source, found {}", sources.len());
+            let help = "give one of `file`, `block`, `ellipsoid`, `tube`, `organ`";
+            self.error(path, message, "this mesh", help);
+            return None;
+        };
+        if let Some((&low, _)) = table.at.iter().zip(0..).find(|(x, _)| !x.is_finite()) {
+            self.error(path, format!("`at` must be finite, found {low}"), "this mesh", "");
+            return None;
+        }
+        let mut made = match &table.file {
+            Some(file) => self.file(file.clone(), table, path)?,
+            None => self.shape(source, table, path)?,
+        };
+        let shift = Vector3::from(table.at);
+        for point in &mut made.mesh.points {
+            *point = *point * table.scale + shift;
+        }
+        Some(made)
+    }
+
+    fn file(&mut self, file: PathBuf, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+        let at = |key| [path, &[key]].concat();
+        for (key, given) in [("edge", table.edge.is_some()), ("as", table.cells != Cells::Tets)] {
+            if given {
+                let message = format!("`{key}` is for built-in shapes; a mesh file has its own cells");
+                self.error(&at(key), message, "here", "leave it out");
+                return None;
+            }
+        }
+        match io::read(&self.scene.folder.join(&file)) {
+            Ok(read) => {
+                let name = file.display();
+                self.notes.extend(read.notes.iter().map(|note| format!("{name}: {note}")));
+                Some(MeshOrigin { mesh: read.mesh, origin: format!("{name} ({})", read.format) })
+            }
+            Err(error) => {
+                let help = "file names are relative to the scene file";
+                self.error(&at("file"), error.to_string(), "this file", help);
+                None
+            }
+        }
+    }
+
+    fn shape(&mut self, source: &str, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+        let at = |key| [path, &[key]].concat();
+        let counted = table.block.as_ref().is_some_and(|block| block.cells.is_some());
+        let edge = match (table.edge, counted) {
+            (Some(edge), false) => edge,
+            (None, true) => 0.0,
+            (Some(_), true) => {
+                self.error(&at("edge"), "`edge` and `cells` are both given", "here", "leave one of them out");
+                return None;
+            }
+            (None, false) => {
+                let help = "add `edge`, the size of a cell in metres, for example `edge = 0.01`";
+                self.error(&at(source), format!("`{source}` needs `edge`"), "this shape", help);
+                return None;
+            }
+        };
+        if table.fix.is_some() {
+            self.error(&at("fix"), "`fix` repairs mesh files; shapes need none", "here", "leave it out");
+            return None;
+        }
+        // The scale of an organ is applied to its field, so that `edge` stays in metres; other shapes are in metres.
+        if table.organ.is_none() && table.scale != 1.0 {
+            let help = "give the shape in metres, or use `scale` with `file` or `organ`";
+            self.error(&at("scale"), format!("`scale` does not go with `{source}`"), "here", help);
+            return None;
+        }
+        match make_shape(table, edge) {
+            Ok(FieldMesh { mut mesh, dropped_components, dropped_cells, non_manifold_edges }) => {
+                if dropped_components > 0 {
+                    let note = format!(
+                        "{source}: {dropped_cells} cells in {dropped_components} loose parts were dropped"
+                    );
+                    self.notes.push(note);
+                }
+                if non_manifold_edges > 0 {
+                    self.notes.push(format!(
+                        "{source}: the surface touches itself along {non_manifold_edges} edges, where a gap is thinner than `edge`"
+                    ));
+                }
+                if table.organ.is_some() {
+                    // `mesh` scales by `table.scale` afterwards.
+                    mesh.points.iter_mut().for_each(|p| *p /= table.scale);
+                }
+                Some(MeshOrigin { mesh, origin: describe_shape(source, table) })
+            }
+            Err(error) => {
+                self.error(&at(source), error.to_string(), "this shape", "");
+                None
+            }
+        }
+    }
+
+    /// Applies the repairs a body's mesh asks for and refuses what cannot be simulated.
+    pub(super) fn repair_and_check(&mut self, mesh: &mut Mesh, table: &MeshTable, path: &[&str]) -> bool {
+        let fixes: &[Fix] = table.fix.as_ref().map_or(&[], |fixes| fixes.as_slice());
+        for fix in fixes {
+            let what = match fix {
+                Fix::Reorder => format!("{} inverted cells reordered", reorder(mesh)),
+                Fix::DropUnused => format!("{} unused nodes dropped", mesh.drop_unused_points()),
+                Fix::Merge => {
+                    format!("{} duplicate nodes merged", mesh.merge_points(&diagnose(mesh).duplicate_nodes))
+                }
+            };
+            self.notes.push(format!("`{}`: {what}", path[1]));
+        }
+        let found = diagnose(mesh);
+        let key = [path, &[if table.file.is_some() { "file" } else { "organ" }]].concat();
+        if mesh.volume_blocks().all(|block| block.is_empty()) {
+            let help = "a solid body needs tets or hexes; this mesh has only surface cells or none";
+            self.error(&key, format!("`{}` has no volume elements", path[1]), "this mesh", help);
+            return false;
+        }
+        let problems: Vec<(String, &str)> = [
+            (!found.non_finite_nodes.is_empty()).then(|| {
+                (
+                    format!("nodes with coordinates that are not finite: {}", list(&found.non_finite_nodes)),
+                    "repair the mesh file",
+                )
+            }),
+            (!found.out_of_range_cells.is_empty()).then(|| {
+                (
+                    format!(
+                        "elements that name nodes which do not exist: {}",
+                        list_cells(&found.out_of_range_cells)
+                    ),
+                    "repair the mesh file",
+                )
+            }),
+            (!found.inverted_cells.is_empty()).then(|| {
+                (
+                    format!("inverted elements at rest: {}", list_cells(&found.inverted_cells)),
+                    "add `fix = [\"reorder\"]` to the mesh to swap their nodes",
+                )
+            }),
+            (!found.degenerate_cells.is_empty()).then(|| {
+                (
+                    format!("elements without volume at rest: {}", list_cells(&found.degenerate_cells)),
+                    "remesh there: their stable time step is zero",
+                )
+            }),
+            (!found.unused_nodes.is_empty()).then(|| {
+                (
+                    format!("nodes that no element uses: {}", list(&found.unused_nodes)),
+                    "add `fix = [\"drop-unused\"]` to the mesh",
+                )
+            }),
+            (!found.duplicate_nodes.is_empty()).then(|| {
+                (
+                    format!("nodes at the same place: {}", list_pairs(&found.duplicate_nodes)),
+                    "add `fix = [\"merge\"]` to the mesh to join them",
+                )
+            }),
+            (!found.duplicate_cells.is_empty()).then(|| {
+                (
+                    format!("{} elements are there twice", found.duplicate_cells.len()),
+                    "remove them from the mesh file",
+                )
+            }),
+            (!found.crowded_faces.is_empty()).then(|| {
+                (
+                    format!("{} faces belong to more than two elements", found.crowded_faces.len()),
+                    "elements overlap: remesh",
+                )
+            }),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        for (message, help) in &problems {
+            self.error(&key, format!("`{}`: {message}", path[1]), "this mesh", *help);
+        }
+        if problems.is_empty() {
+            self.doubt_size(mesh, path);
+            if found.components > 1 {
+                self.notes.push(format!("`{}` is made of {} separate parts", path[1], found.components));
+            }
+        }
+        problems.is_empty()
+    }
+
+    fn doubt_size(&mut self, mesh: &Mesh, path: &[&str]) {
+        let Some((low, high)) = mesh.bounds() else { return };
+        let size = (high - low).norm();
+        if !(PLAUSIBLE_SIZE[0]..=PLAUSIBLE_SIZE[1]).contains(&size) {
+            let factor =
+                if size > PLAUSIBLE_SIZE[1] { "0.001 if the mesh is in millimetres" } else { "1000 or 1" };
+            let place = self.source().span(path);
+            let message = format!("`{}` measures {size:.3e} m across: is that its size in metres?", path[1]);
+            let help = format!("`scale` brings the mesh to metres: {factor}");
+            self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(help));
+        }
+    }
+}
+
+fn make_shape(table: &MeshTable, edge: f64) -> Result<FieldMesh, MeshingError> {
+    let kind = match table.cells {
+        Cells::Tets => VolumeCell::Tet,
+        Cells::Hexes => VolumeCell::Hex,
+    };
+    let whole = |mesh| FieldMesh { mesh, dropped_components: 0, dropped_cells: 0, non_manifold_edges: 0 };
+    if let Some(block) = &table.block {
+        let resolution = match block.cells {
+            Some(cells) => Resolution::Counts(cells.map(|n| n as usize)),
+            None => Resolution::Edge(edge),
+        };
+        return Block::new(block.size).mesh(resolution, kind, DEFAULT_CELL_LIMIT).map(whole);
+    }
+    if let Some(tube) = &table.tube {
+        let tube =
+            Tube { inner_radius: tube.inner_radius, outer_radius: tube.outer_radius, length: tube.length };
+        return tube.mesh(edge, kind, DEFAULT_CELL_LIMIT).map(whole);
+    }
+    let fill = |field: &dyn ImplicitField| match table.cells {
+        Cells::Tets => Stuffing::new(edge).mesh(field),
+        Cells::Hexes => Voxels::new(edge).mesh(field),
+    };
+    if let Some(ellipsoid) = &table.ellipsoid {
+        return fill(&Ellipsoid { centre: Vector3::zeros(), radii: Vector3::from(ellipsoid.radii) });
+    }
+    match table.organ {
+        Some(Organ::Brain) => {
+            let mut made = fill(&Phantom::new(pliant_meshing::Organ::Brain, table.scale)?)?;
+            label_brain(&mut made.mesh, table.scale);
+            Ok(made)
+        }
+        _ => fill(&Phantom::new(pliant_meshing::Organ::Liver, table.scale)?),
+    }
+}
+
+/// Brain tissue 1, ventricles 2, tumour 3, by the centre of each cell.
+fn label_brain(mesh: &mut Mesh, scale: f64) {
+    let Mesh { points, blocks, .. } = mesh;
+    for block in blocks {
+        let label = |cell: &[u32]| {
+            let sum: Vector3 = cell.iter().map(|&node| points[node as usize]).sum();
+            // A cut boundary cell may have its centre just outside: it is tissue.
+            f64::from(brain_label(&(sum / cell.len() as f64), scale).max(1))
+        };
+        let labels = block.cells().map(label).collect();
+        block.data.insert("label".into(), DataArray::scalar(labels));
+    }
+}
+
+fn describe_shape(source: &str, table: &MeshTable) -> String {
+    let cells = match table.cells {
+        Cells::Tets => "tets",
+        Cells::Hexes => "hexes",
+    };
+    let name = match table.organ {
+        Some(Organ::Liver) => "built-in liver",
+        Some(Organ::Brain) => "built-in brain",
+        None => source,
+    };
+    match table.edge {
+        Some(edge) => format!("{name}, {cells} of {edge} m"),
+        None => format!("{name}, {cells}"),
+    }
+}
+
+/// The surface cells of a mesh, or the boundary of its volume cells, as a mesh of triangles and quads.
+pub(super) fn surface_of(mesh: Mesh) -> Mesh {
+    if mesh.volume_blocks().any(|block| !block.is_empty()) {
+        return boundary(&mesh).to_mesh(&mesh.points).0;
+    }
+    let mut surface = mesh;
+    surface
+        .blocks
+        .retain(|block| matches!(block.kind, CellKind::Triangle | CellKind::Quad) && !block.is_empty());
+    surface
+}
+
+const SHOWN: usize = 10;
+
+fn shorten(items: impl ExactSizeIterator<Item = String>) -> String {
+    let count = items.len();
+    let shown = items.take(SHOWN).collect::<Vec<_>>().join(", ");
+    if count > SHOWN {
+        format!("{shown}, … ({count} in all; counted from 0)")
+    } else {
+        format!("{shown} (counted from 0)")
+    }
+}
+
+fn list(nodes: &[u32]) -> String {
+    shorten(nodes.iter().map(u32::to_string))
+}
+
+fn list_pairs(pairs: &[[u32; 2]]) -> String {
+    shorten(pairs.iter().map(|[a, b]| format!("{a} and {b}")))
+}
+
+fn list_cells(cells: &[pliant_geometry::CellId]) -> String {
+    shorten(cells.iter().map(|cell| format!("{} {}", cell.kind.name(), cell.index)))
+}

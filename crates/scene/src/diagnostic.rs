@@ -1,0 +1,359 @@
+//! What a user is told about a mistake in a scene: a message, the place in the user's own file, what to try.
+//!
+//! All mistakes of a file are collected and shown together. [`SceneErrors`] is what a command line prints: through
+//! miette's graphical handler with the lines underlined, or one mistake a line with [`SceneErrors::plain`].
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use miette::{LabeledSpan, NamedSource, SourceCode};
+
+/// How grave a [`Diagnostic`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The scene cannot run.
+    Error,
+    /// The scene runs, but perhaps not as meant.
+    Warning,
+}
+
+/// Where a value of a scene was given.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In the scene file, these bytes of its text.
+    File(Range<usize>),
+    /// As an option of the command; the file has no line to show.
+    CommandLine,
+}
+
+impl From<Range<usize>> for Place {
+    fn from(span: Range<usize>) -> Self {
+        Place::File(span)
+    }
+}
+
+/// One mistake, or one doubt, about a scene.
+///
+/// ```
+/// use pliant_scene::diagnostic::Diagnostic;
+/// let diagnostic = Diagnostic::error("unknown law `parenchima`")
+///     .at(41..53, "no [law.parenchima] in this file")
+///     .help("did you mean `parenchyma`?");
+/// assert_eq!(diagnostic.span, Some(41..53));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Diagnostic {
+    /// Error or warning.
+    pub severity: Severity,
+    /// What is wrong, with which number; makes sense without the label.
+    pub message: String,
+    /// The bytes of the scene's text to underline; none where the file has no such place.
+    pub span: Option<Range<usize>>,
+    /// What is written under the underlined text.
+    pub label: String,
+    /// What to try.
+    pub help: Option<String>,
+    /// Other places that have to do with it, each with its label.
+    pub also: Vec<(Range<usize>, String)>,
+}
+
+impl Diagnostic {
+    fn new(severity: Severity, message: String) -> Self {
+        Self { severity, message, span: None, label: String::new(), help: None, also: Vec::new() }
+    }
+
+    /// A mistake that keeps the scene from running.
+    pub fn error(message: impl Into<String>) -> Self {
+        Self::new(Severity::Error, message.into())
+    }
+
+    /// A doubt that the scene can run with.
+    pub fn warning(message: impl Into<String>) -> Self {
+        Self::new(Severity::Warning, message.into())
+    }
+
+    /// Underlines a place and writes `label` under it. For a value given on the command line the message says so
+    /// instead.
+    pub fn at(mut self, place: impl Into<Place>, label: impl Into<String>) -> Self {
+        match place.into() {
+            Place::File(span) => {
+                self.span = Some(span);
+                self.label = label.into();
+            }
+            Place::CommandLine => self.message.push_str(" (given on the command line)"),
+        }
+        self
+    }
+
+    /// Underlines a further place.
+    pub fn also(self, place: impl Into<Place>, label: impl Into<String>) -> Self {
+        match place.into() {
+            Place::File(span) => {
+                let mut diagnostic = self;
+                diagnostic.also.push((span, label.into()));
+                diagnostic
+            }
+            Place::CommandLine => self.help(format!("{} (on the command line)", label.into())),
+        }
+    }
+
+    /// Adds a line of advice.
+    pub fn help(mut self, advice: impl Into<String>) -> Self {
+        let advice = advice.into();
+        match &mut self.help {
+            _ if advice.is_empty() => {}
+            Some(help) => {
+                help.push('\n');
+                help.push_str(&advice);
+            }
+            None => self.help = Some(advice),
+        }
+        self
+    }
+
+    /// Whether this keeps the scene from running.
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Diagnostic {}
+
+/// The source text comes from the [`SceneErrors`] that the diagnostic is shown with.
+impl miette::Diagnostic for Diagnostic {
+    fn severity(&self) -> Option<miette::Severity> {
+        Some(match self.severity {
+            Severity::Error => miette::Severity::Error,
+            Severity::Warning => miette::Severity::Warning,
+        })
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let span = self.span.clone()?;
+        let label = |span: &Range<usize>, text: &str| {
+            let text = (!text.is_empty()).then(|| text.to_owned());
+            (text, span.clone())
+        };
+        let (text, span) = label(&span, &self.label);
+        let first = LabeledSpan::new_primary_with_span(text, span);
+        let others = self.also.iter().map(move |(span, text)| {
+            let (text, span) = label(span, text);
+            LabeledSpan::new_with_span(text, span)
+        });
+        Some(Box::new(std::iter::once(first).chain(others)))
+    }
+}
+
+/// All that was found about one scene, with the scene's text to show it in.
+///
+/// Its `Display` is the headline that miette's handlers print above the underlined lines: the message where there is one
+/// finding, their number where there are several. Logs want [`plain`](Self::plain).
+#[derive(Debug, Clone)]
+pub struct SceneErrors {
+    source: NamedSource<Arc<str>>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl SceneErrors {
+    /// Puts diagnostics together with the text they are about, in the order of the text.
+    pub fn new(name: impl Into<String>, text: Arc<str>, mut diagnostics: Vec<Diagnostic>) -> Self {
+        for diagnostic in &mut diagnostics {
+            // A place outside the text would make miette show nothing of it.
+            diagnostic.span = diagnostic.span.take().map(|span| clamp(&text, span));
+            for (span, _) in &mut diagnostic.also {
+                *span = clamp(&text, span.clone());
+            }
+        }
+        diagnostics.sort_by_key(|diagnostic| diagnostic.span.as_ref().map_or(usize::MAX, |span| span.start));
+        Self { source: NamedSource::new(name.into(), text), diagnostics }
+    }
+
+    /// The name of the scene, mostly the path of its file.
+    pub fn name(&self) -> &str {
+        self.source.name()
+    }
+
+    /// The text of the scene.
+    pub fn text(&self) -> &str {
+        self.source.inner()
+    }
+
+    /// What was found, in the order of the text; what has no place in it comes last.
+    pub fn diagnostics(&self) -> &[Diagnostic] {
+        &self.diagnostics
+    }
+
+    /// Line and column, both counted from 1, the column in characters, of a diagnostic's place.
+    pub fn line_and_column(&self, diagnostic: &Diagnostic) -> Option<(usize, usize)> {
+        let before = self.text().get(..diagnostic.span.as_ref()?.start)?;
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
+    }
+
+    /// For logs, one finding a line: `liver.toml:12:17: error: … (help: …)`.
+    pub fn plain(&self) -> impl fmt::Display + '_ {
+        Plain(self)
+    }
+
+    /// The diagnostic that stands for the whole where there is just one.
+    fn single(&self) -> Option<&Diagnostic> {
+        match self.diagnostics.as_slice() {
+            [diagnostic] => Some(diagnostic),
+            _ => None,
+        }
+    }
+}
+
+/// The nearest span that lies in the text, on the borders of characters.
+fn clamp(text: &str, span: Range<usize>) -> Range<usize> {
+    let floor = |at: usize| (0..=at.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
+    let ceil = |at: usize| (at..=text.len()).find(|&at| text.is_char_boundary(at)).unwrap_or(text.len());
+    let start = floor(span.start);
+    start..ceil(span.end).max(start)
+}
+
+impl fmt::Display for SceneErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(diagnostic) = self.single() {
+            return diagnostic.fmt(f);
+        }
+        let errors = self.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count();
+        let warnings = self.diagnostics.len() - errors;
+        let count = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
+        match (errors, warnings) {
+            (_, 0) => write!(f, "{} in {}", count(errors, "mistake"), self.name()),
+            (0, _) => write!(f, "{} about {}", count(warnings, "warning"), self.name()),
+            _ => write!(
+                f,
+                "{} and {} in {}",
+                count(errors, "mistake"),
+                count(warnings, "warning"),
+                self.name()
+            ),
+        }
+    }
+}
+
+impl std::error::Error for SceneErrors {}
+
+impl miette::Diagnostic for SceneErrors {
+    fn severity(&self) -> Option<miette::Severity> {
+        let error = self.diagnostics.iter().any(Diagnostic::is_error);
+        Some(if error { miette::Severity::Error } else { miette::Severity::Warning })
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.single().and_then(miette::Diagnostic::help)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        Some(&self.source)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        self.single().and_then(miette::Diagnostic::labels)
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn miette::Diagnostic> + 'a>> {
+        let related = self.diagnostics.iter().map(|diagnostic| diagnostic as &dyn miette::Diagnostic);
+        self.single().is_none().then(|| Box::new(related) as _)
+    }
+}
+
+/// The lines of [`SceneErrors::plain`].
+struct Plain<'a>(&'a SceneErrors);
+
+impl fmt::Display for Plain<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, diagnostic) in self.0.diagnostics.iter().enumerate() {
+            if i > 0 {
+                f.write_str("\n")?;
+            }
+            f.write_str(self.0.name())?;
+            if let Some((line, column)) = self.0.line_and_column(diagnostic) {
+                write!(f, ":{line}:{column}")?;
+            }
+            let severity = if diagnostic.is_error() { "error" } else { "warning" };
+            write!(f, ": {severity}: {}", diagnostic.message.replace('\n', " "))?;
+            if let Some(help) = &diagnostic.help {
+                write!(f, " (help: {})", help.replace('\n', "; "))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "[law.liver]\n# weich\nshear-modulus = -3.0  # Pa\nµ = 1\n";
+
+    fn rendered(errors: &SceneErrors) -> String {
+        let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::unicode_nocolor());
+        let mut page = String::new();
+        handler.with_width(100).render_report(&mut page, errors).unwrap();
+        page
+    }
+
+    fn negative() -> Diagnostic {
+        Diagnostic::error("`shear-modulus` must be greater than 0, found -3")
+            .at(36..40, "must be greater than 0")
+            .help("give it in Pa")
+    }
+
+    #[test]
+    fn a_single_mistake_shows_the_users_own_line_underlined() {
+        let errors = SceneErrors::new("liver.toml", TEXT.into(), vec![negative()]);
+        let page = rendered(&errors);
+        let lines: Vec<&str> = page.lines().map(str::trim_end).collect();
+        assert_eq!(lines[0], "  × `shear-modulus` must be greater than 0, found -3");
+        assert_eq!(lines[1].trim(), "╭─[liver.toml:3:17]");
+        let at = lines.iter().position(|line| line.ends_with("3 │ shear-modulus = -3.0  # Pa")).expect(&page);
+        assert!(lines[at + 1].ends_with("·                 ──┬─"), "{page}");
+        assert!(lines[at + 2].ends_with("╰── must be greater than 0"), "{page}");
+        assert!(page.contains("help: give it in Pa"), "{page}");
+    }
+
+    #[test]
+    fn several_mistakes_are_shown_together_in_the_order_of_the_file() {
+        let unknown = Diagnostic::error("unknown key `µ`").at(47..49, "not known").also(0..11, "in this law");
+        let nowhere = Diagnostic::warning("`until` is long").at(Place::CommandLine, "");
+        let errors = SceneErrors::new("liver.toml", TEXT.into(), vec![nowhere, unknown, negative()]);
+        let page = rendered(&errors);
+        assert!(page.contains("2 mistakes and 1 warning in liver.toml"), "{page}");
+        let place = |what: &str| page.find(what).unwrap_or_else(|| panic!("no {what} in {page}"));
+        assert!(place("greater than 0, found -3") < place("unknown key `µ`"), "{page}");
+        assert!(place("4 │ µ = 1") < place("`until` is long (given on the command line)"), "{page}");
+        assert!(page.contains("in this law"), "{page}");
+        assert_eq!(
+            errors.plain().to_string(),
+            "liver.toml:3:17: error: `shear-modulus` must be greater than 0, found -3 (help: give it in Pa)\n\
+             liver.toml:4:1: error: unknown key `µ`\n\
+             liver.toml: warning: `until` is long (given on the command line)"
+        );
+    }
+
+    #[test]
+    fn places_outside_the_text_or_inside_a_character_are_moved_into_it() {
+        for span in [500..600, 48..48, TEXT.len()..TEXT.len() + 9, 48..50] {
+            let errors =
+                SceneErrors::new("x", TEXT.into(), vec![Diagnostic::error("m").at(span.clone(), "l")]);
+            let moved = errors.diagnostics()[0].span.clone().unwrap();
+            assert!(TEXT.get(moved).is_some(), "{span:?}");
+            assert!(!rendered(&errors).contains("Failed"), "{span:?}");
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Bodies, their meshes, and the surfaces they carry.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A solid body.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BodyTable {
+    /// Its mesh, from a file or a built-in shape.
+    pub mesh: MeshTable,
+    /// The element; if not given, `tet4` for tets and `hex8` for hexes.
+    #[serde(default)]
+    pub element: Option<Element>,
+    /// The name of its law, or a law for each cell label: `{ 1 = "parenchyma", 2 = "tumour" }`.
+    pub law: LawChoice,
+    /// Mass per volume [kg/m³].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// Mass-proportional damping [1/s].
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub damping: f64,
+    /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus.
+    #[serde(default = "default_hourglass")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub hourglass: f64,
+    /// Fibre direction at rest; overrides that of the law.
+    #[serde(default)]
+    pub fibre: Option<Fibre>,
+}
+
+fn default_hourglass() -> f64 {
+    0.2
+}
+
+/// Which law where.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum LawChoice {
+    /// One law for the whole body.
+    One(String),
+    /// A law for each cell label.
+    ByLabel(BTreeMap<String, String>),
+}
+
+/// Fibre direction.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Fibre {
+    /// The same direction everywhere; its length does not matter.
+    Uniform([f64; 3]),
+    /// A direction for each cell, from the mesh.
+    PerCell(FibreField),
+}
+
+/// Fibre directions carried by the mesh.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct FibreField {
+    /// The name of a cell-data array with three components.
+    pub cell_data: String,
+}
+
+/// How cells resist deformation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Element {
+    /// Linear tetrahedron; locks for nearly incompressible tissue (Poisson's ratio above 0.4).
+    Tet4,
+    /// Uniform-strain hexahedron with hourglass control.
+    Hex8,
+}
+
+/// A mesh: exactly one of `file`, `block`, `ellipsoid`, `tube`, `organ`.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct MeshTable {
+    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY.
+    #[serde(default)]
+    pub file: Option<PathBuf>,
+    /// A box from the origin.
+    #[serde(default)]
+    pub block: Option<BlockShape>,
+    /// An ellipsoid about the origin.
+    #[serde(default)]
+    pub ellipsoid: Option<EllipsoidShape>,
+    /// A tube along z from the origin.
+    #[serde(default)]
+    pub tube: Option<TubeShape>,
+    /// A built-in organ, centred on the origin.
+    #[serde(default)]
+    pub organ: Option<Organ>,
+    /// Target edge length of the cells of a built-in shape [m].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub edge: Option<f64>,
+    /// Cells of a built-in shape.
+    #[serde(default, rename = "as")]
+    pub cells: Cells,
+    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).
+    #[serde(default = "one")]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub scale: f64,
+    /// Shift after scaling [m].
+    #[serde(default)]
+    pub at: [f64; 3],
+    /// Repairs of a mesh file, in this order.
+    #[serde(default)]
+    pub fix: Option<Fixes>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// One repair or several.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Fixes {
+    /// One.
+    One(Fix),
+    /// Several, in order.
+    Several(Vec<Fix>),
+}
+
+impl Fixes {
+    /// The repairs in order.
+    pub fn as_slice(&self) -> &[Fix] {
+        match self {
+            Self::One(fix) => std::slice::from_ref(fix),
+            Self::Several(fixes) => fixes,
+        }
+    }
+}
+
+/// A repair of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fix {
+    /// Swap nodes of inverted cells.
+    Reorder,
+    /// Remove nodes that no cell uses.
+    DropUnused,
+    /// Join nodes at the same place.
+    Merge,
+}
+
+/// Cells of a built-in shape.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cells {
+    /// Tetrahedra.
+    #[default]
+    Tets,
+    /// Hexahedra: structured for blocks and tubes, voxels for ellipsoids and organs.
+    Hexes,
+}
+
+/// A box with one corner at the origin.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BlockShape {
+    /// Lengths along x, y, z [m].
+    pub size: [f64; 3],
+    /// Cells along x, y, z; if not given, from `edge`.
+    #[serde(default)]
+    pub cells: Option<[u32; 3]>,
+}
+
+/// An ellipsoid about the origin.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct EllipsoidShape {
+    /// Half axes along x, y, z [m].
+    pub radii: [f64; 3],
+}
+
+/// A tube about the z axis from z = 0.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct TubeShape {
+    /// Inner radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub inner_radius: f64,
+    /// Outer radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub outer_radius: f64,
+    /// Length [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub length: f64,
+}
+
+/// A built-in organ of analytic shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Organ {
+    /// A liver of 0.77 l; about 1.5 l at scale 1.25.
+    Liver,
+    /// A brain of 1.3 l with sulci and fissure.
+    Brain,
+}
+
+/// A finer surface carried by a body.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SurfaceTable {
+    /// The body that carries it.
+    pub on: String,
+    /// The surface: triangles or quads of a file, or the boundary of a built-in shape.
+    pub mesh: MeshTable,
+}

@@ -1,0 +1,148 @@
+//! Constraints and loads.
+
+use pliant_geometry::Selection;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A component of space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Axis {
+    /// Along x.
+    X,
+    /// Along y.
+    Y,
+    /// Along z.
+    Z,
+}
+
+/// How a motion or a load grows.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CurveShape {
+    /// Linear from 0 to 1; its kinks send waves through the body.
+    Ramp,
+    /// 3s² − 2s³: starts and ends without a jolt.
+    SmoothStep,
+    /// 10s³ − 15s⁴ + 6s⁵: smoother still.
+    #[serde(rename = "polynomial-10-15-6")]
+    Polynomial,
+    /// All of it from the start.
+    Hold,
+    /// Pairs of time [s] and factor, linear in between, constant outside; times increase.
+    Table(Vec<[f64; 2]>),
+}
+
+/// The course over time: the factor goes from 0 at `from` to 1 at `to`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct Timing {
+    /// The form of the growth.
+    #[serde(default)]
+    pub curve: Option<CurveShape>,
+    /// Time [s] at which it starts.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub from: f64,
+    /// Time [s] at which it is complete; if not given, the end of the scene.
+    #[serde(default)]
+    pub to: Option<f64>,
+}
+
+/// Nodes held where they are.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct FixTable {
+    /// The body.
+    pub body: String,
+    /// Which nodes.
+    pub nodes: Selection,
+    /// Components held; if not given, all three.
+    #[serde(default)]
+    pub components: Option<Vec<Axis>>,
+}
+
+/// Nodes moved as prescribed: exactly one of `by` and `velocity`. Curve: `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct MoveTable {
+    /// The body.
+    pub body: String,
+    /// Which nodes.
+    pub nodes: Selection,
+    /// Displacement [m], reached along the curve.
+    #[serde(default)]
+    pub by: Option<[f64; 3]>,
+    /// Velocity [m/s], multiplied by the curve.
+    #[serde(default)]
+    pub velocity: Option<[f64; 3]>,
+    /// Components prescribed; if not given, all three.
+    #[serde(default)]
+    pub components: Option<Vec<Axis>>,
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
+/// Forces on nodes: exactly one of `each` and `total`. Curve: `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct ForceTable {
+    /// The body or the carried surface.
+    pub on: String,
+    /// Which nodes.
+    pub nodes: Selection,
+    /// Force on each node [N].
+    #[serde(default)]
+    pub each: Option<[f64; 3]>,
+    /// Force [N] shared equally among the nodes.
+    #[serde(default)]
+    pub total: Option<[f64; 3]>,
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
+/// A force per reference area on faces. Curve: `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct TractionTable {
+    /// The body or the carried surface.
+    pub on: String,
+    /// Which faces: those with all nodes selected.
+    pub faces: Selection,
+    /// Force per area at rest [Pa]; its direction stays.
+    pub traction: [f64; 3],
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
+/// Pressure on faces that follows them as they deform. Curve: `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct PressureTable {
+    /// The body or the carried surface.
+    pub on: String,
+    /// Which faces: those with all nodes selected.
+    pub faces: Selection,
+    /// Pressure [Pa]; positive pushes inwards.
+    pub pressure: f64,
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
+/// An acceleration, in addition to `gravity` of `[scene]`. Curve: `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct GravityTable {
+    /// The body; if not given, all.
+    #[serde(default)]
+    pub on: Option<String>,
+    /// Acceleration [m/s²].
+    pub acceleration: [f64; 3],
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}

@@ -1,0 +1,99 @@
+//! The scene as the user wrote it: plain data, nothing computed. Every parameter is declared here once (or, for a law,
+//! beside its formulas) with meaning, unit, range and default; schema, checks and reference page come from that.
+
+mod body;
+mod load;
+mod output;
+
+pub use body::{
+    BlockShape, BodyTable, Cells, Element, EllipsoidShape, Fibre, Fix, Fixes, LawChoice, MeshTable, Organ,
+};
+pub use body::{SurfaceTable, TubeShape};
+pub use load::{
+    Axis, CurveShape, FixTable, ForceTable, GravityTable, MoveTable, PressureTable, Timing, TractionTable,
+};
+pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
+
+use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// What the scene is and how long it lasts.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SceneTable {
+    /// A title for reports.
+    #[serde(default)]
+    pub title: String,
+    /// Simulated time [s].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub until: f64,
+    /// Acceleration of all bodies [m/s²], from the start; for one that grows, use a load of type `gravity`.
+    #[serde(default)]
+    pub gravity: Option<[f64; 3]>,
+}
+
+/// How the scene is run.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RunTable {
+    /// Number type of the solver.
+    #[serde(default)]
+    pub precision: Precision,
+    /// Time step [s]; `auto`: 0.9 × the element bound of the critical step.
+    #[serde(default)]
+    pub step: StepChoice,
+    /// Threads; 0: one per core. The number never changes a result.
+    #[serde(default)]
+    pub threads: u32,
+}
+
+/// Number type of the solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// 32-bit numbers: faster, about six digits.
+    Single,
+    /// 64-bit numbers: the reference.
+    #[default]
+    Double,
+}
+
+/// A time step.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum StepChoice {
+    /// Chosen from the mesh and the laws.
+    Auto(Auto),
+    /// Seconds.
+    Seconds(#[schemars(extend("exclusiveMinimum" = 0.0))] f64),
+}
+
+/// The word `auto`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Auto {
+    /// Let Pliant choose.
+    Auto,
+}
+
+impl Default for StepChoice {
+    fn default() -> Self {
+        Self::Auto(Auto::Auto)
+    }
+}
+
+/// What every law can have beside its own parameters.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LawExtras {
+    /// Fibre direction at rest, for laws with fibres; a body may give its own.
+    #[serde(default)]
+    pub fibre: Option<Fibre>,
+    /// Relaxation by Prony series; any number of terms on either part of the stress.
+    #[serde(default)]
+    pub prony: Vec<PronyTerm>,
+    /// How the relaxation advances over a step.
+    #[serde(default)]
+    pub prony_update: PronyUpdate,
+}

@@ -1,0 +1,141 @@
+//! Outputs.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A field of a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FieldName {
+    /// Displacement [m].
+    Displacement,
+    /// Velocity [m/s].
+    Velocity,
+    /// Cauchy stress [Pa].
+    CauchyStress,
+    /// Second Piola–Kirchhoff stress [Pa].
+    Pk2Stress,
+    /// Von Mises stress [Pa].
+    VonMises,
+    /// Green–Lagrange strain.
+    GreenStrain,
+    /// Stretch along the fibre; not a number where the law has none.
+    FibreStretch,
+    /// Pressure [Pa], minus a third of the trace of the Cauchy stress.
+    Pressure,
+    /// Volume ratio J.
+    #[serde(rename = "J")]
+    VolumeRatio,
+    /// Strain energy of the instantaneous elastic law per volume at rest [J/m³].
+    EnergyDensity,
+}
+
+impl FieldName {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+            Self::CauchyStress => "cauchy-stress",
+            Self::Pk2Stress => "pk2-stress",
+            Self::VonMises => "von-mises",
+            Self::GreenStrain => "green-strain",
+            Self::FibreStretch => "fibre-stretch",
+            Self::Pressure => "pressure",
+            Self::VolumeRatio => "J",
+            Self::EnergyDensity => "energy-density",
+        }
+    }
+
+    /// Numbers per point or cell.
+    pub fn components(self) -> usize {
+        match self {
+            Self::Displacement | Self::Velocity => 3,
+            Self::CauchyStress | Self::Pk2Stress | Self::GreenStrain => 9,
+            Self::VonMises
+            | Self::FibreStretch
+            | Self::Pressure
+            | Self::VolumeRatio
+            | Self::EnergyDensity => 1,
+        }
+    }
+
+    /// True for fields that live on nodes.
+    pub fn is_nodal(self) -> bool {
+        matches!(self, Self::Displacement | Self::Velocity)
+    }
+}
+
+/// Where fields of cells are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum At {
+    /// On the cells, as computed.
+    #[default]
+    Cells,
+    /// On the points: mean of the cells around, weighted by volume.
+    Points,
+}
+
+/// A series of VTU files for ParaView, with its `.pvd`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct VtuTable {
+    /// The body or the carried surface; if not given, all bodies together.
+    #[serde(default)]
+    pub on: Option<String>,
+    /// Time between frames [s]; the first and the last instant are always written.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub every: f64,
+    /// The fields.
+    #[serde(default = "default_fields")]
+    pub data: Vec<FieldName>,
+    /// Where fields of cells are written.
+    #[serde(default)]
+    pub at: At,
+}
+
+fn default_fields() -> Vec<FieldName> {
+    vec![FieldName::Displacement, FieldName::VonMises]
+}
+
+/// A table over time: reactions, energies, probes.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CsvTable {
+    /// Time between rows [s]; the first and the last instant are always written.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub every: f64,
+    /// Constraints whose reaction [N] is written; if not given, all.
+    #[serde(default)]
+    pub reactions: Option<Vec<String>>,
+    /// Whether energies [J] are written.
+    #[serde(default = "yes")]
+    pub energy: bool,
+    /// Points of bodies or surfaces whose fields are written.
+    #[serde(default)]
+    pub probes: BTreeMap<String, ProbeTable>,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// A point that is followed.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ProbeTable {
+    /// The body.
+    pub on: String,
+    /// Its place at rest [m]; outside the body, the nearest cell carries it.
+    pub at: [f64; 3],
+    /// The fields; tensors as nine columns xx, xy, …, zz.
+    #[serde(default = "default_probe_fields")]
+    pub data: Vec<FieldName>,
+}
+
+fn default_probe_fields() -> Vec<FieldName> {
+    vec![FieldName::Displacement]
+}

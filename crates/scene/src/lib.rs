@@ -1,0 +1,56 @@
+//! Scene files and what runs them: a text is read into a [`Scene`], built into a model, and run with its outputs.
+//!
+//! ```
+//! use pliant_scene::{Scene, source::Source};
+//!
+//! let text = r#"
+//!     [scene]
+//!     until = 0.01
+//!     gravity = [0, 0, -9.81]
+//!
+//!     [law.tissue]
+//!     type = "neo-hookean"
+//!     young-modulus = 3000
+//!     poisson-ratio = 0.45
+//!
+//!     [body.block]
+//!     mesh = { block = { size = [0.1, 0.1, 0.1] }, edge = 0.05 }
+//!     law = "tissue"
+//!     density = 1000
+//!
+//!     [constraint.base]
+//!     type = "fix"
+//!     body = "block"
+//!     nodes = { set = "z-min" }
+//! "#;
+//! let scene = Scene::from_source(Source::parse("block.toml", text)?, ".".into())?;
+//! let built = pliant_scene::build(&scene)?;
+//! let plan = pliant_scene::plan(&scene, &built)?;
+//! assert_eq!(built.model.node_count(), 27);
+//! assert!(plan.bound.step <= plan.limit.step);
+//! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
+//! ```
+
+mod build;
+pub mod checker;
+pub mod diagnostic;
+pub mod format;
+mod output;
+mod overview;
+mod plan;
+pub mod reference;
+pub mod registry;
+mod run;
+mod scene;
+pub mod source;
+mod starter;
+
+pub use build::{Built, BuiltBody, build};
+pub use output::{
+    BodySummary, FailureSummary, OutputError, OutputFolder, Summary, failed_input, failed_output,
+};
+pub use overview::overview;
+pub use plan::{LimitingElement, Plan, SAFETY, plan};
+pub use run::{Progress, run};
+pub use scene::{ReadError, Scene, open, scene_file};
+pub use starter::starter;

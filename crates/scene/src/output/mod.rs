@@ -1,0 +1,128 @@
+//! Observers: what looks at a run and writes it down. They never change the state.
+
+mod csv;
+mod fields;
+mod folder;
+mod plot;
+mod summary;
+mod vtu;
+
+use std::path::{Path, PathBuf};
+
+use pliant_mechanics::{CentralDifference, Real, State};
+
+pub use folder::OutputFolder;
+pub use summary::{BodySummary, FailureSummary, Summary, failed_input, failed_output};
+
+pub(crate) use plot::plot;
+pub(crate) use summary::{bodies, markdown, number, summarise};
+
+use crate::build::Built;
+use crate::registry::OutputTable;
+use crate::scene::Scene;
+
+/// An output that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("`{path}` cannot be written: {reason}")]
+pub struct OutputError {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What the system says.
+    pub reason: String,
+}
+
+impl OutputError {
+    pub(crate) fn new(path: &Path, reason: impl ToString) -> Self {
+        Self { path: path.to_owned(), reason: reason.to_string() }
+    }
+}
+
+/// One instant of a run, seen between the two halves of a step.
+pub(crate) struct Frame<'a, R> {
+    pub built: &'a Built,
+    pub state: &'a State<R>,
+    pub stepper: &'a CentralDifference<'a, R>,
+}
+
+impl<R: Real> Frame<'_, R> {
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+}
+
+/// Looks at the instants of a run.
+pub(crate) trait Observer<R> {
+    /// Writes down an instant.
+    fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError>;
+}
+
+/// When an observer looks: at the first instant, at the one nearest to each multiple of an interval, and at the last.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Schedule {
+    every: f64,
+    seen: u64,
+}
+
+impl Schedule {
+    pub fn new(every: f64) -> Self {
+        Self { every, seen: 0 }
+    }
+
+    /// Whether an instant is to be looked at.
+    pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
+        let due = last || time + 0.5 * step >= self.seen as f64 * self.every;
+        if due {
+            self.seen = ((time + 0.5 * step) / self.every).floor() as u64 + 1;
+        }
+        due
+    }
+}
+
+/// An observer with its schedule.
+pub(crate) type Scheduled<R> = (Schedule, Box<dyn Observer<R>>);
+
+/// The observers of a scene's outputs. Their files are opened here; all paths go to `files`.
+pub(crate) fn observers<R: Real>(
+    scene: &Scene,
+    built: &Built,
+    folder: &Path,
+    files: &mut Vec<PathBuf>,
+) -> Result<Vec<Scheduled<R>>, OutputError> {
+    let mut all: Vec<Scheduled<R>> = Vec::new();
+    for (name, table) in &scene.outputs {
+        match table {
+            OutputTable::Vtu(table) => {
+                let series = vtu::Series::<R>::new(built, table, folder, name)?;
+                files.push(series.index().to_owned());
+                all.push((Schedule::new(table.every), Box::new(series)));
+            }
+            OutputTable::Csv(table) => {
+                let rows = csv::Rows::new(built, table, folder, name)?;
+                files.push(rows.path().to_owned());
+                all.push((Schedule::new(table.every), Box::new(rows)));
+            }
+        }
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_schedule_sees_the_first_the_nearest_and_the_last_instant() {
+        let mut schedule = Schedule::new(0.1);
+        let step = 0.03;
+        let seen: Vec<u32> =
+            (0..=10).filter(|&n| schedule.is_due(f64::from(n) * step, step, n == 10)).collect();
+        // 0.00, 0.09, 0.21, 0.30.
+        assert_eq!(seen, [0, 3, 7, 10]);
+    }
+
+    #[test]
+    fn an_interval_below_the_step_sees_every_instant_once() {
+        let mut schedule = Schedule::new(0.01);
+        assert!((0..20).all(|n| schedule.is_due(f64::from(n) * 0.05, 0.05, false)));
+    }
+}

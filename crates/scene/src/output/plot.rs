@@ -1,0 +1,102 @@
+//! The SVG plot of a run: the size of each reaction, and the energies, over time.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use crate::build::Built;
+use crate::run::History;
+
+const SIZE: (u32, u32) = (900, 760);
+
+/// Colours that colour-blind eyes tell apart (Okabe and Ito 2008).
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 0, 0),
+];
+
+/// A named curve.
+struct Curve<'a> {
+    name: &'a str,
+    values: Vec<f64>,
+}
+
+/// The plot as SVG text; the error is what the drawing library says.
+pub(crate) fn plot(built: &Built, history: &History) -> Result<String, String> {
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(|error| error.to_string())?;
+        let (upper, lower) = root.split_vertically(SIZE.1 / 2);
+        let reactions: Vec<Curve<'_>> = (built.model.constraints.iter().enumerate())
+            .map(|(index, constraint)| Curve {
+                name: &constraint.name,
+                values: history.reactions.iter().map(|row| row[index]).collect(),
+            })
+            .collect();
+        panel(&upper, "Reaction", "N", &history.times, &reactions)?;
+        let energy = |name, of: fn(&pliant_mechanics::Energies) -> f64| Curve {
+            name,
+            values: history.energies.iter().map(of).collect(),
+        };
+        let energies = [
+            energy("external work", |e| e.external),
+            energy("internal", |e| e.internal),
+            energy("kinetic", |e| e.kinetic),
+            energy("damping", |e| e.damping),
+            energy("hourglass", |e| e.hourglass),
+        ];
+        panel(&lower, "Energy", "J", &history.times, &energies)?;
+        root.present().map_err(|error| error.to_string())?;
+    }
+    Ok(svg)
+}
+
+fn panel(
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
+    title: &str,
+    unit: &str,
+    times: &[f64],
+    curves: &[Curve<'_>],
+) -> Result<(), String> {
+    let finite = curves.iter().flat_map(|curve| &curve.values).copied().filter(|value| value.is_finite());
+    let (low, high) = finite.fold((0.0_f64, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+    let margin = 0.05 * (high - low).max(f64::MIN_POSITIVE);
+    let end = times.last().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
+    let draw = || -> Result<(), Box<dyn std::error::Error + '_>> {
+        let mut chart = ChartBuilder::on(area)
+            .caption(format!("{title} [{unit}]"), ("sans-serif", 18))
+            .margin(12)
+            .x_label_area_size(36)
+            .y_label_area_size(76)
+            .build_cartesian_2d(0.0..end, low - if low < 0.0 { margin } else { 0.0 }..high + margin)?;
+        chart
+            .configure_mesh()
+            .light_line_style(WHITE)
+            .x_desc("time [s]")
+            .label_style(("sans-serif", 14))
+            .draw()?;
+        for (curve, &colour) in curves.iter().zip(COLOURS.iter().cycle()) {
+            let points =
+                times.iter().copied().zip(curve.values.iter().copied()).filter(|(_, v)| v.is_finite());
+            chart
+                .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
+                .label(curve.name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], colour.stroke_width(2)));
+        }
+        if !curves.is_empty() {
+            let mut labels = chart.configure_series_labels();
+            labels
+                .background_style(WHITE.mix(0.8))
+                .border_style(BLACK.mix(0.3))
+                .label_font(("sans-serif", 14));
+            labels.position(SeriesLabelPosition::UpperLeft).draw()?;
+        }
+        Ok(())
+    };
+    draw().map_err(|error| error.to_string())
+}

@@ -1,0 +1,300 @@
+//! What a run came to: as one JSON object, and as a page to read.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use pliant_mechanics::{Energies, StepError};
+use serde::Serialize;
+use serde_json::{Map, Value as Json, json};
+
+use super::OutputError;
+use crate::build::Built;
+use crate::plan::{LimitingElement, Plan};
+use crate::run::{History, Outcome};
+use crate::scene::Scene;
+
+/// The result of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// `done` or `failed`.
+    pub status: &'static str,
+    /// Why it failed.
+    pub error: Option<FailureSummary>,
+    /// The bodies.
+    pub bodies: Vec<BodySummary>,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Number of elements.
+    pub elements: usize,
+    /// Mass [kg].
+    pub mass: f64,
+    /// Time step [s].
+    pub step: f64,
+    /// Smallest element bound of the critical step [s].
+    pub element_bound: f64,
+    /// Limit of the assembled operator [s].
+    pub true_limit: f64,
+    /// The element that sets the bound.
+    pub limiting_element: LimitingElement,
+    /// Steps taken.
+    pub steps: u64,
+    /// Simulated time [s].
+    pub time: f64,
+    /// Wall time of the steps and their outputs [s].
+    pub wall_seconds: f64,
+    /// Simulated time over wall time.
+    pub real_time_factor: f64,
+    /// Imbalance of the energies at the end, as a fraction of the largest.
+    pub energy_balance: f64,
+    /// Force [N] of each constraint at the end.
+    pub reactions: Map<String, Json>,
+    /// Files written, as paths.
+    pub files: Vec<String>,
+}
+
+/// One body.
+#[derive(Clone, Debug, Serialize)]
+pub struct BodySummary {
+    /// Its name.
+    pub name: String,
+    /// Its nodes.
+    pub nodes: usize,
+    /// Its elements.
+    pub elements: usize,
+    /// Its volume at rest [m³].
+    pub volume: f64,
+    /// Its mass [kg].
+    pub mass: f64,
+}
+
+/// Why a run failed or an input was refused.
+#[derive(Clone, Debug, Serialize)]
+pub struct FailureSummary {
+    /// `not-finite`, `inverted`, `unbalanced`, `output` or `input`.
+    pub kind: &'static str,
+    /// The body, where it is about one.
+    pub body: Option<String>,
+    /// The element, counted from 0.
+    pub element: Option<u32>,
+    /// The node, counted from 0.
+    pub node: Option<u32>,
+    /// Time [s].
+    pub time: Option<f64>,
+    /// What happened and what to try.
+    pub message: String,
+}
+
+/// The JSON object of an input that was refused: the keys of [`Summary`], empty where nothing was built.
+pub fn failed_input(message: &str) -> Json {
+    empty("invalid", FailureSummary::about("input", message.into(), None))
+}
+
+/// The JSON object of a run whose outputs could not be opened or finished.
+pub fn failed_output(error: &OutputError) -> Json {
+    empty("failed", FailureSummary::about("output", error.to_string(), None))
+}
+
+fn empty(status: &str, error: FailureSummary) -> Json {
+    json!({
+        "status": status,
+        "error": error,
+        "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
+        "true_limit": null, "limiting_element": null, "steps": 0, "time": 0.0, "wall_seconds": 0.0, "real_time_factor": null,
+        "energy_balance": null, "reactions": {}, "files": [],
+    })
+}
+
+impl FailureSummary {
+    /// A failure that is about no body.
+    pub(crate) fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
+        Self { kind, body: None, element: None, node: None, time, message }
+    }
+}
+
+impl From<&StepError> for FailureSummary {
+    fn from(error: &StepError) -> Self {
+        let message = format!("{error}; {}", error.remedy());
+        let (kind, body, element, node, time) = match error {
+            StepError::NotFinite { body, node, time } => ("not-finite", body, None, *node, *time),
+            StepError::Inverted { body, element, node, time, .. } => {
+                ("inverted", body, Some(*element), *node, *time)
+            }
+            StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
+        };
+        Self { kind, body: Some(body.clone()), element, node: Some(node), time: Some(time), message }
+    }
+}
+
+/// The bodies of a model.
+pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
+    let of = |index: usize| {
+        let body = &built.model.bodies[index];
+        let solids = built.model.solids.iter().filter(|solid| solid.body == index);
+        let volume = |solid: &pliant_mechanics::model::Solid| -> f64 {
+            (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum()
+        };
+        let range = body.nodes.start as usize..body.nodes.end as usize;
+        BodySummary {
+            name: body.name.clone(),
+            nodes: range.len(),
+            elements: solids.clone().map(|solid| solid.cells.len()).sum(),
+            volume: solids.map(volume).sum(),
+            mass: built.model.mass[range].iter().sum(),
+        }
+    };
+    (0..built.model.bodies.len()).map(of).collect()
+}
+
+/// Puts together what a run came to.
+pub(crate) fn summarise(built: &Built, plan: &Plan, outcome: &Outcome) -> Summary {
+    let reactions = built.model.constraints.iter().zip(&outcome.reactions);
+    Summary {
+        status: if outcome.failure.is_none() { "done" } else { "failed" },
+        error: outcome.failure.clone(),
+        bodies: bodies(built),
+        nodes: built.model.node_count(),
+        elements: built.model.cell_count(),
+        mass: built.model.mass.iter().sum(),
+        step: plan.step,
+        element_bound: plan.bound.step,
+        true_limit: plan.limit.step,
+        limiting_element: plan.limiting.clone(),
+        steps: outcome.steps,
+        time: outcome.time,
+        wall_seconds: outcome.wall_seconds,
+        real_time_factor: outcome.time / outcome.wall_seconds.max(f64::MIN_POSITIVE),
+        energy_balance: outcome.energies.balance,
+        reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), json!(force))).collect(),
+        files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
+    }
+}
+
+/// The page to read.
+pub(crate) fn markdown(
+    scene: &Scene,
+    built: &Built,
+    plan: &Plan,
+    outcome: &Outcome,
+    summary: &Summary,
+) -> String {
+    let mut page = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_page(&mut page, scene, built, plan, outcome, summary);
+    page
+}
+
+fn write_page(
+    page: &mut String,
+    scene: &Scene,
+    built: &Built,
+    plan: &Plan,
+    outcome: &Outcome,
+    summary: &Summary,
+) -> std::fmt::Result {
+    let title = if scene.scene.title.is_empty() { "Untitled scene" } else { &scene.scene.title };
+    writeln!(page, "# {title}\n")?;
+    match &outcome.failure {
+        None => writeln!(page, "Done: {} s simulated in {} steps.\n", number(outcome.time), outcome.steps)?,
+        Some(failure) => writeln!(page, "**Failed** ({}): {}\n", failure.kind, failure.message)?,
+    }
+    writeln!(page, "![forces and energies over time](plot.svg)\n")?;
+    writeln!(page, "## Model\n")?;
+    writeln!(
+        page,
+        "| body | mesh | nodes | elements | volume [m³] | mass [kg] |\n|---|---|---|---|---|---|"
+    )?;
+    for (body, built) in summary.bodies.iter().zip(&built.bodies) {
+        let BodySummary { name, nodes, elements, volume, mass } = body;
+        writeln!(
+            page,
+            "| {name} | {} | {nodes} | {elements} | {} | {} |",
+            built.origin,
+            number(*volume),
+            number(*mass)
+        )?;
+    }
+    writeln!(page, "\n## Time step\n")?;
+    writeln!(page, "| | |\n|---|---|")?;
+    writeln!(page, "| step | {} s |", number(plan.step))?;
+    writeln!(page, "| element bound | {} s, set by {} |", number(plan.bound.step), plan.limiting)?;
+    writeln!(page, "| true limit (assembled operator) | {} s |", number(plan.limit.step))?;
+    if let Some(note) = &plan.note {
+        writeln!(page, "\n{note}.")?;
+    }
+    write_energies(page, outcome)?;
+    write_reactions(page, built, outcome)?;
+    writeln!(page, "\n## Cost\n\n| | |\n|---|---|")?;
+    writeln!(page, "| wall time | {} s |", number(summary.wall_seconds))?;
+    writeln!(page, "| real-time factor | {} |", number(summary.real_time_factor))?;
+    let work = outcome.steps as f64 * summary.elements as f64;
+    writeln!(page, "| per element and step | {} ns |", number(summary.wall_seconds / work.max(1.0) * 1e9))?;
+    writeln!(page, "| threads | {} |", outcome.threads)?;
+    writeln!(page, "| precision | {} |", outcome.precision)?;
+    let remarks: Vec<String> =
+        built.warnings.iter().map(ToString::to_string).chain(built.notes.iter().cloned()).collect();
+    if !remarks.is_empty() {
+        writeln!(page, "\n## Remarks\n")?;
+        remarks.iter().try_for_each(|remark| writeln!(page, "* {remark}"))?;
+    }
+    writeln!(page, "\n## Files\n")?;
+    outcome.files.iter().try_for_each(|file| writeln!(page, "* `{}`", short(file)))
+}
+
+fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
+    let Energies { kinetic, internal, damping, hourglass, external, balance } = outcome.energies;
+    writeln!(page, "\n## Energy at the end\n\n| | J |\n|---|---|")?;
+    for (name, value) in [
+        ("external work", external),
+        ("internal (stored and viscous)", internal),
+        ("kinetic", kinetic),
+        ("taken by damping", damping),
+        ("hourglass control", hourglass),
+    ] {
+        writeln!(page, "| {name} | {} |", number(value))?;
+    }
+    writeln!(
+        page,
+        "\nBalance: {:.3} % of the largest energy at the end, {:.3} % at worst (judged above {} J).",
+        balance * 100.0,
+        outcome.worst_balance * 100.0,
+        number(outcome.balance_floor)
+    )
+}
+
+fn write_reactions(page: &mut String, built: &Built, outcome: &Outcome) -> std::fmt::Result {
+    if built.model.constraints.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        page,
+        "\n## Reactions\n\n| constraint | nodes | at the end [N] | largest [N] |\n|---|---|---|---|"
+    )?;
+    for (index, (constraint, force)) in built.model.constraints.iter().zip(&outcome.reactions).enumerate() {
+        let [x, y, z] = force.map(number);
+        let nodes = constraint.nodes.len();
+        let largest = number(outcome.history.largest_reaction(index));
+        writeln!(page, "| {} | {nodes} | ({x}, {y}, {z}) | {largest} |", constraint.name)?;
+    }
+    Ok(())
+}
+
+fn short(file: &Path) -> String {
+    file.file_name().map_or_else(|| file.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Four significant digits.
+pub(crate) fn number(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-3..1e5).contains(&size) {
+        return format!("{value:.3e}");
+    }
+    let digits = if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 6) };
+    format!("{value:.*}", digits as usize)
+}
+
+impl History {
+    /// Largest magnitude of a constraint's reaction in the samples [N].
+    fn largest_reaction(&self, constraint: usize) -> f64 {
+        self.reactions.iter().map(|row| row[constraint]).fold(0.0, f64::max)
+    }
+}

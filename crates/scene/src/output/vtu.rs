@@ -1,0 +1,258 @@
+//! A ParaView series: `X/000000.vtu`, … and `X.pvd`, rewritten after each frame, so that a killed run leaves a series
+//! that can be read. Points are at rest; `displacement` warps them.
+
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::marker::PhantomData;
+use std::path::{Path, PathBuf};
+
+use pliant_geometry::io::{VtuOptions, write_pvd, write_vtu};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
+use pliant_mechanics::Real;
+use rayon::prelude::*;
+
+use super::{Frame, Observer, OutputError, fields};
+use crate::build::Built;
+use crate::format::{At, FieldName, VtuTable};
+
+pub(super) struct Series<R> {
+    folder: PathBuf,
+    index: PathBuf,
+    name: String,
+    times: Vec<(f64, String)>,
+    fields: Vec<FieldName>,
+    at: At,
+    mesh: Mesh,
+    content: Content,
+    number: PhantomData<R>,
+}
+
+/// What the points and cells of the file are in the model.
+enum Content {
+    /// A carried surface.
+    Surface(usize),
+    /// Bodies: the model's node of each point, and (solid, cell) of each cell of each block.
+    Bodies { nodes: Vec<u32>, cells: Vec<Vec<(u32, u32)>> },
+}
+
+impl<R: Real> Series<R> {
+    pub(super) fn new(
+        built: &Built,
+        table: &VtuTable,
+        folder: &Path,
+        name: &str,
+    ) -> Result<Self, OutputError> {
+        let on = table.on.as_deref();
+        let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
+        let (mesh, content) = match surface {
+            Some(index) => (bare(&built.surfaces[index]), Content::Surface(index)),
+            None => merged_bodies(built, on),
+        };
+        let own = folder.join(name);
+        fs::create_dir_all(&own).map_err(|error| OutputError::new(&own, error))?;
+        Ok(Self {
+            folder: own,
+            index: folder.join(format!("{name}.pvd")),
+            name: name.into(),
+            times: Vec::new(),
+            fields: table.data.clone(),
+            at: table.at,
+            mesh,
+            content,
+            number: PhantomData,
+        })
+    }
+
+    /// The `.pvd` file.
+    pub(super) fn index(&self) -> &Path {
+        &self.index
+    }
+
+    fn fill(&mut self, frame: &Frame<'_, R>) {
+        match &self.content {
+            Content::Surface(index) => {
+                let mapping = &frame.built.model.surfaces[*index].mapping;
+                for &field in &self.fields {
+                    let parent: Vec<[f64; 3]> = (0..frame.built.model.node_count())
+                        .map(|node| {
+                            let value = fields::nodal(frame, field, node);
+                            [value[0], value[1], value[2]]
+                        })
+                        .collect();
+                    let values = mapping.apply(&parent).into_iter().flatten().collect();
+                    self.mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
+                }
+            }
+            Content::Bodies { nodes, cells } => {
+                fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
+                fill_cells(&mut self.mesh, frame, &self.fields, self.at, cells);
+            }
+        }
+    }
+}
+
+impl<R: Real> Observer<R> for Series<R> {
+    fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
+        self.fill(frame);
+        let file = format!("{:06}.vtu", self.times.len());
+        let (path, temporary) = (self.folder.join(&file), self.folder.join(format!("{file}.tmp")));
+        let options =
+            VtuOptions { compress: true, single: R::PRECISION == "single", time: Some(frame.time()) };
+        let written = || -> Result<(), Box<dyn std::error::Error>> {
+            let mut writer = BufWriter::new(fs::File::create(&temporary)?);
+            write_vtu(&mut writer, &self.mesh, &options)?;
+            writer.flush()?;
+            fs::rename(&temporary, &path)?;
+            Ok(())
+        };
+        if let Err(error) = written() {
+            // What is half written is not left behind.
+            let _ = fs::remove_file(&temporary);
+            return Err(OutputError::new(&path, error));
+        }
+        self.times.push((frame.time(), format!("{}/{file}", self.name)));
+        write_pvd(&self.index, &self.times).map_err(|error| OutputError::new(&self.index, error))
+    }
+}
+
+/// Points and cells without data and sets.
+fn bare(mesh: &Mesh) -> Mesh {
+    let blocks = mesh.blocks.iter().map(|block| CellBlock::new(block.kind, block.nodes.clone())).collect();
+    Mesh { points: mesh.points.clone(), blocks, ..Mesh::default() }
+}
+
+/// The volume cells of one body or of all, with `label` and, for several bodies, the number of the `body`.
+fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
+    let chosen = |body: usize| on.is_none_or(|name| built.bodies[body].name == name);
+    let mut mesh = Mesh::default();
+    let mut nodes = Vec::new();
+    let mut offsets = vec![0; built.bodies.len()];
+    for (body, offset) in offsets.iter_mut().enumerate().filter(|(body, _)| chosen(*body)) {
+        *offset = mesh.points.len() as u32;
+        mesh.points.extend_from_slice(&built.bodies[body].mesh.points);
+        nodes.extend(built.model.bodies[body].nodes.clone());
+    }
+    let labelled =
+        built.bodies.iter().any(|b| b.mesh.volume_blocks().any(|block| block.data.contains_key("label")));
+    let mut cells = Vec::new();
+    for kind in [CellKind::Tet, CellKind::Hex] {
+        let mut block = CellBlock::new(kind, Vec::new());
+        let mut places = Vec::new();
+        let (mut body_of, mut labels) = (Vec::new(), Vec::new());
+        for (body, &offset) in offsets.iter().enumerate().filter(|(body, _)| chosen(*body)) {
+            let Some(own) = built.bodies[body].mesh.block(kind) else { continue };
+            block.nodes.extend(own.nodes.iter().map(|node| node + offset));
+            body_of.resize(body_of.len() + own.len(), body as f64);
+            match own.data.get("label") {
+                Some(label) => labels.extend_from_slice(&label.values),
+                None => labels.resize(labels.len() + own.len(), 0.0),
+            }
+            let first = places.len();
+            places.resize(first + own.len(), (0, 0));
+            for (index, solid) in built.model.solids.iter().enumerate() {
+                let fits = solid.body == body && solid.cells.nodes_per_cell() == kind.node_count();
+                for (cell, &original) in solid.original.iter().enumerate().filter(|_| fits) {
+                    places[first + original as usize] = (index as u32, cell as u32);
+                }
+            }
+        }
+        if block.is_empty() {
+            continue;
+        }
+        if built.bodies.len() > 1 {
+            block.data.insert("body".into(), DataArray::scalar(body_of));
+        }
+        if labelled {
+            block.data.insert("label".into(), DataArray::scalar(labels));
+        }
+        mesh.blocks.push(block);
+        cells.push(places);
+    }
+    (mesh, Content::Bodies { nodes, cells })
+}
+
+fn fill_nodal<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], nodes: &[u32]) {
+    for &field in wanted.iter().filter(|field| field.is_nodal()) {
+        let value = |&node: &u32| {
+            let value = fields::nodal(frame, field, node as usize);
+            [value[0], value[1], value[2]]
+        };
+        let values = nodes.iter().flat_map(value).collect();
+        mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
+    }
+}
+
+fn fill_cells<R: Real>(
+    mesh: &mut Mesh,
+    frame: &Frame<'_, R>,
+    wanted: &[FieldName],
+    at: At,
+    cells: &[Vec<(u32, u32)>],
+) {
+    let wanted: Vec<FieldName> = wanted.iter().copied().filter(|field| !field.is_nodal()).collect();
+    if wanted.is_empty() {
+        return;
+    }
+    let model = &frame.built.model;
+    let mut averages = Averages::new(mesh.points.len(), &wanted);
+    for (block, places) in mesh.blocks.iter_mut().zip(cells) {
+        let recovered: Vec<_> = (places.par_iter())
+            .map(|&(solid, cell)| fields::recovered(model, frame, solid as usize, cell as usize))
+            .collect();
+        for (slot, &field) in wanted.iter().enumerate() {
+            let components = field.components();
+            if at == At::Cells {
+                let value = |cell| fields::of_cell(cell, field).into_iter().take(components);
+                let values = recovered.iter().flat_map(value).collect();
+                block.data.insert(field.name().into(), DataArray { components, values });
+                continue;
+            }
+            for (index, (cell, &(solid, own))) in recovered.iter().zip(places).enumerate() {
+                let volume = model.solids[solid as usize].cells.volume(own as usize);
+                averages.add(slot, block.cell(index), &fields::of_cell(cell, field)[..components], volume);
+            }
+        }
+    }
+    if at == At::Points {
+        averages.write(&mut mesh.point_data, &wanted);
+    }
+}
+
+/// Volume-weighted means of cell values at the points.
+struct Averages {
+    /// For each field: sums of value × volume, and of volume, at each point. Cells without a value don't count.
+    sums: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+impl Averages {
+    fn new(points: usize, wanted: &[FieldName]) -> Self {
+        let zeros = |field: &FieldName| (vec![0.0; points * field.components()], vec![0.0; points]);
+        Self { sums: wanted.iter().map(zeros).collect() }
+    }
+
+    fn add(&mut self, slot: usize, nodes: &[u32], value: &[f64], volume: f64) {
+        if value.iter().any(|v| v.is_nan()) {
+            return;
+        }
+        let (sums, volumes) = &mut self.sums[slot];
+        for &node in nodes {
+            let own = node as usize * value.len();
+            for (sum, v) in sums[own..].iter_mut().zip(value) {
+                *sum += v * volume;
+            }
+            volumes[node as usize] += volume;
+        }
+    }
+
+    fn write(self, data: &mut std::collections::BTreeMap<String, DataArray>, wanted: &[FieldName]) {
+        for (&field, (sums, volumes)) in wanted.iter().zip(self.sums) {
+            let components = field.components();
+            let values = sums
+                .chunks(components)
+                .zip(volumes)
+                .flat_map(|(s, v)| s.iter().map(move |s| s / v))
+                .collect();
+            data.insert(field.name().into(), DataArray { components, values });
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! What `pliant check` prints: the model before it runs.
+
+use std::fmt::{self, Write};
+
+use pliant_geometry::QualityReport;
+
+use crate::build::Built;
+use crate::output::{bodies, number};
+use crate::plan::Plan;
+use crate::scene::Scene;
+
+/// The model in words: bodies, quality, constraints, loads, critical step, expected cost.
+pub fn overview(scene: &Scene, built: &Built, plan: &Plan) -> String {
+    let mut page = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_overview(&mut page, scene, built, plan);
+    page
+}
+
+fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> fmt::Result {
+    if !scene.scene.title.is_empty() {
+        writeln!(page, "{}\n", scene.scene.title)?;
+    }
+    for (summary, body) in bodies(built).iter().zip(&built.bodies) {
+        let quality = QualityReport::new(&body.mesh);
+        writeln!(page, "body `{}`: {}", body.name, body.origin)?;
+        writeln!(page, "  {} nodes, {} elements", summary.nodes, summary.elements)?;
+        writeln!(page, "  volume {} m³, mass {} kg", number(summary.volume), number(summary.mass))?;
+        for solid in
+            built.model.solids.iter().filter(|solid| built.model.bodies[solid.body].name == body.name)
+        {
+            let moduli = solid.material.law.small_strain();
+            writeln!(
+                page,
+                "  {} {} with law {}: shear modulus {} Pa, bulk modulus {} Pa, {} relaxing terms",
+                solid.cells.len(),
+                solid.cells.element(),
+                solid.material.law.name(),
+                number(moduli.shear),
+                number(moduli.bulk),
+                solid.material.prony.isochoric.len() + solid.material.prony.volumetric.len(),
+            )?;
+        }
+        if let Some([least, most]) = quality.dihedral {
+            writeln!(page, "  dihedral angles {least:.1}° to {most:.1}°")?;
+        }
+        if let Some(jacobian) = quality.scaled_jacobian {
+            writeln!(page, "  smallest scaled Jacobian {jacobian:.3}")?;
+        }
+        if let Some(edge) = quality.edge_length {
+            let [min, median, max] = [edge.min, edge.median, edge.max].map(number);
+            writeln!(page, "  edges {min} to {max} m, median {median} m")?;
+        }
+        writeln!(page, "  quality (acoustic length relative to the ideal cell of the same volume):")?;
+        quality.histogram_lines().iter().try_for_each(|line| writeln!(page, "    {line}"))?;
+        writeln!(page)?;
+    }
+    for (surface, mesh) in built.model.surfaces.iter().zip(&built.surfaces) {
+        let body = &built.model.bodies[surface.body].name;
+        let faces: usize = mesh.blocks.iter().map(|block| block.len()).sum();
+        writeln!(
+            page,
+            "surface `{}` on `{body}`: {} points, {faces} faces",
+            surface.name,
+            surface.rest.len()
+        )?;
+    }
+    for constraint in &built.model.constraints {
+        let axes: String =
+            "xyz".chars().zip(constraint.components).filter(|(_, on)| *on).map(|(c, _)| c).collect();
+        writeln!(
+            page,
+            "constraint `{}`: {} nodes, components {axes}",
+            constraint.name,
+            constraint.nodes.len()
+        )?;
+    }
+    for load in &built.model.loads {
+        writeln!(page, "load `{}`", load.name)?;
+    }
+    for (name, _) in &scene.outputs {
+        writeln!(page, "output `{name}`")?;
+    }
+    write_step(page, scene, plan)?;
+    for remark in built.warnings.iter().map(ToString::to_string).chain(built.notes.iter().cloned()) {
+        writeln!(page, "note: {remark}")?;
+    }
+    Ok(())
+}
+
+fn write_step(page: &mut String, scene: &Scene, plan: &Plan) -> fmt::Result {
+    let seconds = plan.steps as f64 * plan.limit.seconds_per_call;
+    writeln!(page, "\ncritical step:")?;
+    writeln!(page, "  element bound {} s, set by {}", number(plan.bound.step), plan.limiting)?;
+    let calls = plan.limit.force_calls;
+    writeln!(
+        page,
+        "  true limit    {} s (assembled operator, {calls} force calls)",
+        number(plan.limit.step)
+    )?;
+    writeln!(
+        page,
+        "  step          {} s, {} steps for {} s",
+        number(plan.step),
+        plan.steps,
+        number(scene.scene.until)
+    )?;
+    if let Some(note) = &plan.note {
+        writeln!(page, "  {note}")?;
+    }
+    writeln!(
+        page,
+        "expected cost: about {} s of wall time, real-time factor {} (from one thread's force evaluations, without outputs)",
+        number(seconds),
+        number(scene.scene.until / seconds.max(f64::MIN_POSITIVE))
+    )
+}

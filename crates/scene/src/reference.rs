@@ -1,0 +1,223 @@
+//! The reference of a table's parameters, written from the same schema that checks them.
+
+use schemars::Schema;
+use serde_json::Value as Json;
+
+use crate::checker::{Form, Forms, Kind, one_line, unit};
+use crate::registry::Section;
+
+/// Tables within tables are described down to this depth.
+const DEEPEST: usize = 4;
+
+/// What the reference says of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its key in the table.
+    pub key: String,
+    /// What it takes, in words: `a number`, `3 numbers`, `one of "cpu", "gpu"`.
+    pub kind: String,
+    /// Its unit, such as `Pa`; empty without one.
+    pub unit: String,
+    /// Whether the table must have it. One of several keys of which a table must have exactly one is not required.
+    pub required: bool,
+    /// What it is where the table lacks it, if it is anything.
+    pub default: Option<Json>,
+    /// The range of a number in words, `greater than 0`; empty without one.
+    pub range: String,
+    /// Its doc comment, all paragraphs.
+    pub description: String,
+    /// The parameters of the table, or of each of the tables, that it is.
+    pub parts: Vec<Parameter>,
+}
+
+/// The page of all tables of a scene, as Markdown.
+pub fn page(sections: &[Section]) -> String {
+    let mut page = String::from(
+        "# Scene reference\n\nWritten by `pliant schema --markdown` from the parameter structs; do not edit.\n\n\
+         SI units throughout: m, kg, s, Pa, N. A scene is a TOML file of these tables; NAME is yours to choose.\n",
+    );
+    let mut header = "";
+    for section in sections {
+        if section.header != header {
+            header = section.header;
+            page.push_str(&format!("\n## `{header}`\n"));
+        }
+        if let Some(name) = section.name {
+            page.push_str(&format!("\n### `type = \"{name}\"`\n"));
+        }
+        if let Some(doc) = section.schema.get("description").and_then(Json::as_str) {
+            page.push_str(&format!("\n{doc}\n"));
+        }
+        page.push_str(&format!("\n{}", markdown(&describe(&section.schema))));
+    }
+    page
+}
+
+/// The parameters of a table, in the order of their declaration.
+pub fn describe(schema: &Schema) -> Vec<Parameter> {
+    let root = schema.as_value();
+    let forms = Forms { root };
+    describe_forms(forms, &forms.of(root), 0)
+}
+
+fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<Parameter> {
+    let mut parameters: Vec<Parameter> = Vec::new();
+    for form in forms {
+        for (key, schema) in &form.properties {
+            let of_all = forms.iter().all(|form| form.required.contains(key));
+            if parameters.iter().all(|known| known.key != *key) {
+                parameters.push(parameter(schemas, key, schema, of_all, depth));
+            }
+        }
+    }
+    parameters
+}
+
+fn parameter(schemas: Forms<'_>, key: &str, schema: &Json, required: bool, depth: usize) -> Parameter {
+    let doc = schemas.doc(schema);
+    let forms = schemas.of(schema);
+    let full = schema.get("description").and_then(Json::as_str).or(doc).unwrap_or_default();
+    let mut inner = forms.clone();
+    // Of an array, or an array of arrays, the tables in it are described.
+    for _ in 0..2 {
+        let items = inner.iter().filter(|form| form.kind == Some(Kind::Array)).filter_map(|form| form.items);
+        let items: Vec<Form<'_>> = items.flat_map(|items| schemas.of(items)).collect();
+        inner.retain(|form| form.kind == Some(Kind::Table));
+        inner.extend(items);
+    }
+    inner.retain(|form| form.kind == Some(Kind::Table));
+    let parts = if depth < DEEPEST { describe_forms(schemas, &inner, depth + 1) } else { Vec::new() };
+    let ranges = forms.iter().map(Form::range).filter(|range| !range.is_empty());
+    Parameter {
+        key: key.to_owned(),
+        kind: schemas.phrase(&forms, ""),
+        unit: unit(doc).to_owned(),
+        required,
+        default: schema.get("default").filter(|value| !value.is_null()).cloned(),
+        range: ranges.collect::<Vec<_>>().join(" or "),
+        description: full.to_owned(),
+        parts,
+    }
+}
+
+/// A Markdown table of parameters; those within tables follow theirs as `fibre.cell-data`.
+pub fn markdown(parameters: &[Parameter]) -> String {
+    let mut page = "| key | takes | unit | default | meaning |\n|---|---|---|---|---|\n".to_owned();
+    rows(parameters, "", &mut page);
+    page
+}
+
+fn rows(parameters: &[Parameter], within: &str, page: &mut String) {
+    for parameter in parameters {
+        let cell = |text: &str| one_line(text).replace('|', "\\|");
+        let path = format!("{within}{}", parameter.key);
+        let range = if parameter.range.is_empty() { String::new() } else { format!(", {}", parameter.range) };
+        let default = match &parameter.default {
+            Some(value) => format!("`{}`", cell(&value.to_string())),
+            None if parameter.required => "required".to_owned(),
+            None => String::new(),
+        };
+        let (takes, meaning) = (cell(&parameter.kind) + &range, cell(&parameter.description));
+        page.push_str(&format!(
+            "| `{path}` | {takes} | {} | {default} | {meaning} |\n",
+            cell(&parameter.unit)
+        ));
+        rows(&parameter.parts, &format!("{path}."), page);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use schemars::{JsonSchema, schema_for};
+    use serde::{Deserialize, Serialize};
+
+    use super::*;
+
+    /// A law.
+    #[derive(Deserialize, JsonSchema)]
+    #[serde(rename_all = "kebab-case")]
+    #[allow(dead_code)]
+    struct Law {
+        /// Shear modulus [Pa].
+        ///
+        /// Of the matrix.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        shear_modulus: f64,
+        /// Poisson's ratio.
+        #[serde(default = "poisson")]
+        #[schemars(range(min = 0.0, max = 0.5))]
+        poisson_ratio: f64,
+        /// Gravity [m/s²].
+        gravity: Option<[f64; 3]>,
+        /// Relaxation.
+        prony: Vec<Term>,
+        /// Where it runs.
+        #[serde(default)]
+        device: Device,
+    }
+
+    fn poisson() -> f64 {
+        0.45
+    }
+
+    #[derive(Deserialize, JsonSchema)]
+    #[allow(dead_code)]
+    struct Term {
+        /// Time constant [s].
+        time: f64,
+        /// Terms within.
+        within: Vec<Term>,
+    }
+
+    #[derive(Default, Deserialize, Serialize, JsonSchema)]
+    #[serde(rename_all = "kebab-case")]
+    #[allow(dead_code)]
+    enum Device {
+        #[default]
+        Cpu,
+        Gpu,
+        Auto,
+    }
+
+    #[test]
+    fn parameters_are_described_in_the_order_of_their_declaration() {
+        let law = describe(&schema_for!(Law));
+        let keys: Vec<&str> = law.iter().map(|parameter| parameter.key.as_str()).collect();
+        assert_eq!(keys, ["shear-modulus", "poisson-ratio", "gravity", "prony", "device"]);
+        assert_eq!(
+            law[0],
+            Parameter {
+                key: "shear-modulus".into(),
+                kind: "a number".into(),
+                unit: "Pa".into(),
+                required: true,
+                default: None,
+                range: "greater than 0".into(),
+                description: "Shear modulus [Pa].\n\nOf the matrix.".into(),
+                parts: vec![],
+            }
+        );
+        assert_eq!((law[1].required, &law[1].default), (false, &Some(Json::from(0.45))));
+        assert_eq!(law[1].range, "at least 0 and at most 0.5");
+        assert_eq!((law[2].kind.as_str(), law[2].unit.as_str()), ("3 numbers", "m/s²"));
+        assert_eq!(law[3].kind, "an array of tables");
+        assert_eq!(law[3].parts[0].unit, "s");
+        assert_eq!(law[4].kind, "one of \"cpu\", \"gpu\", \"auto\"");
+        assert_eq!(law[4].default, Some(Json::from("cpu")));
+    }
+
+    #[test]
+    fn the_markdown_has_one_row_a_parameter() {
+        let page = markdown(&describe(&schema_for!(Law)));
+        let rows: Vec<&str> = page.lines().collect();
+        assert_eq!(
+            rows[2],
+            "| `shear-modulus` | a number, greater than 0 | Pa | required | Shear modulus [Pa]. Of the matrix. |"
+        );
+        assert_eq!(
+            rows[3],
+            "| `poisson-ratio` | a number, at least 0 and at most 0.5 |  | `0.45` | Poisson's ratio. |"
+        );
+        assert_eq!(rows[6], "| `prony.time` | a number | s | required | Time constant [s]. |");
+    }
+}

@@ -1,0 +1,254 @@
+//! The one place where a `type` of a scene file meets a parameter struct. Laws have their own registry beside the
+//! laws, in `pliant_mechanics::law`.
+
+use std::collections::BTreeMap;
+
+use pliant_mechanics::law::AnyLaw;
+use schemars::{JsonSchema, Schema, schema_for};
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value as Json, json};
+
+use crate::checker::{check_skipping, nearest, read_table};
+use crate::diagnostic::Diagnostic;
+use crate::format::{
+    BodyTable, CsvTable, FixTable, ForceTable, GravityTable, LawExtras, MoveTable, PressureTable, RunTable,
+    SceneTable, SurfaceTable, TractionTable, VtuTable,
+};
+use crate::source::{Source, Value};
+
+/// A kind of table whose parameters depend on its `type`.
+pub trait Typed: Sized {
+    /// The words for `type`.
+    const NAMES: &'static [&'static str];
+    /// What the table is, in messages: `constraint`, `load`, `output`.
+    const WHAT: &'static str;
+
+    /// The schema of a type's parameters.
+    fn schema(name: &str) -> Option<Schema>;
+
+    /// Reads the table at a path as the type of that name.
+    fn read_as(name: &str, source: &Source, path: &[&str], out: &mut Vec<Diagnostic>) -> Option<Self>;
+}
+
+macro_rules! typed {
+    ($(#[$doc:meta])* $enum:ident, $what:literal: $($name:literal => $variant:ident($table:ty),)*) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug)]
+        pub enum $enum {
+            $(#[doc = concat!("`", $name, "`")] $variant($table),)*
+        }
+
+        impl Typed for $enum {
+            const NAMES: &'static [&'static str] = &[$($name),*];
+            const WHAT: &'static str = $what;
+
+            fn schema(name: &str) -> Option<Schema> {
+                match name {
+                    $($name => Some(schema_for!($table)),)*
+                    _ => None,
+                }
+            }
+
+            fn read_as(name: &str, source: &Source, path: &[&str], out: &mut Vec<Diagnostic>) -> Option<Self> {
+                match name {
+                    $($name => read_table::<$table>(source, path, &["type"], out).map(Self::$variant),)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+typed! {
+    /// A table `[constraint.NAME]`.
+    ConstraintTable, "constraint":
+    "fix" => Fix(FixTable),
+    "move" => Move(MoveTable),
+}
+
+typed! {
+    /// A table `[load.NAME]`.
+    LoadTable, "load":
+    "force" => Force(ForceTable),
+    "traction" => Traction(TractionTable),
+    "pressure" => Pressure(PressureTable),
+    "gravity" => Gravity(GravityTable),
+}
+
+typed! {
+    /// A table `[output.NAME]`.
+    OutputTable, "output":
+    "vtu" => Vtu(VtuTable),
+    "csv" => Csv(CsvTable),
+}
+
+/// The word of a table's `type`, if it is one of the known; else a diagnostic.
+fn type_of<'s>(
+    source: &'s Source,
+    path: &[&str],
+    what: &str,
+    known: &[&str],
+    out: &mut Vec<Diagnostic>,
+) -> Option<&'s str> {
+    let at = [path, &["type"]].concat();
+    let list = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let Some(node) = source.node(&at) else {
+        let message = format!("`{}` has no `type`", path.join("."));
+        let help = format!("add `type = \"…\"` with one of {list}");
+        out.push(Diagnostic::error(message).at(source.key_span(path), "`type` is missing").help(help));
+        return None;
+    };
+    let Value::String(word) = &node.value else {
+        let message = format!("the `type` of `{}` must be a text", path.join("."));
+        out.push(
+            Diagnostic::error(message).at(node.place.clone(), "not a text").help(format!("one of {list}")),
+        );
+        return None;
+    };
+    if known.contains(&word.as_str()) {
+        return Some(word);
+    }
+    let help = match nearest(word, known.iter().copied()) {
+        Some(name) => format!("did you mean `{name}`? Known types: {list}"),
+        None => format!("known types: {list}"),
+    };
+    let message = format!("there is no {what} of type `{word}`");
+    out.push(Diagnostic::error(message).at(node.place.clone(), "unknown type").help(help));
+    None
+}
+
+/// Reads a table whose parameters depend on its `type`.
+pub(crate) fn read_typed<T: Typed>(source: &Source, path: &[&str], out: &mut Vec<Diagnostic>) -> Option<T> {
+    let name = type_of(source, path, T::WHAT, T::NAMES, out)?;
+    T::read_as(name, source, path, out)
+}
+
+/// A law as the scene gives it.
+#[derive(Clone, Debug)]
+pub struct LawTable {
+    /// The elastic law.
+    pub law: AnyLaw,
+    /// Fibres and relaxation.
+    pub extras: LawExtras,
+}
+
+/// Reads a table `[law.NAME]`.
+pub(crate) fn read_law(source: &Source, path: &[&str], out: &mut Vec<Diagnostic>) -> Option<LawTable> {
+    let name = type_of(source, path, "law", AnyLaw::NAMES, out)?;
+    let own = AnyLaw::schema(name)?;
+    let before = out.len();
+    let written = check_skipping(source.node(path)?, &path.join("."), &law_schema(&own), &["type"], out);
+    if out[before..].iter().any(Diagnostic::is_error) {
+        return None;
+    }
+    let (own, extras) = divide(written, &own);
+    let law = AnyLaw::from_json(name, own).map_err(|error| {
+        let place = source.span(&[path, &[error.key]].concat());
+        out.push(Diagnostic::error(error.message).at(place, "here").help(error.help));
+    });
+    let extras = serde_json::from_value(extras).map_err(|error| {
+        out.push(Diagnostic::error(error.to_string()).at(source.span(path), "in this table"));
+    });
+    Some(LawTable { law: law.ok()?, extras: extras.ok()? })
+}
+
+/// The keys of a law's own parameters, and the rest.
+fn divide(table: Json, own: &Schema) -> (Json, Json) {
+    let Json::Object(entries) = table else { return (table, json!({})) };
+    let known = |key: &str| own.get("properties").and_then(|p| p.get(key)).is_some();
+    let (own, rest): (Map<_, _>, Map<_, _>) = entries.into_iter().partition(|(key, _)| known(key));
+    (Json::Object(own), Json::Object(rest))
+}
+
+/// The parameters of a law together with what every law can have.
+fn law_schema(own: &Schema) -> Schema {
+    let mut merged = own.clone();
+    let extras = schema_for!(LawExtras);
+    for part in ["properties", "$defs"] {
+        let Some(Json::Object(added)) = extras.get(part) else { continue };
+        let target = merged.ensure_object().entry(part).or_insert_with(|| json!({}));
+        if let Json::Object(target) = target {
+            target.extend(added.clone());
+        }
+    }
+    merged
+}
+
+/// One kind of table, for the schema and the reference page.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// The header in a scene file: `[scene]`, `[law.NAME]`.
+    pub header: &'static str,
+    /// The `type` it is for, if it has one.
+    pub name: Option<&'static str>,
+    /// Its parameters.
+    pub schema: Schema,
+}
+
+fn plain<T: JsonSchema + DeserializeOwned>(header: &'static str) -> Section {
+    Section { header, name: None, schema: schema_for!(T) }
+}
+
+fn typed<T: Typed>(header: &'static str) -> impl Iterator<Item = Section> {
+    T::NAMES
+        .iter()
+        .filter_map(move |name| Some(Section { header, name: Some(name), schema: T::schema(name)? }))
+}
+
+/// Every kind of table a scene can have, in the order of the reference page.
+pub fn sections() -> Vec<Section> {
+    let law = |name: &&'static str| {
+        Some(Section { header: "[law.NAME]", name: Some(name), schema: law_schema(&AnyLaw::schema(name)?) })
+    };
+    let mut all = vec![plain::<SceneTable>("[scene]"), plain::<RunTable>("[run]")];
+    all.extend(AnyLaw::NAMES.iter().filter_map(law));
+    all.extend([plain::<BodyTable>("[body.NAME]"), plain::<SurfaceTable>("[surface.NAME]")]);
+    all.extend(typed::<ConstraintTable>("[constraint.NAME]"));
+    all.extend(typed::<LoadTable>("[load.NAME]"));
+    all.extend(typed::<OutputTable>("[output.NAME]"));
+    all
+}
+
+/// The JSON schema of a whole scene file.
+pub fn scene_schema() -> Json {
+    let mut definitions = Map::new();
+    let mut kinds: BTreeMap<&str, Vec<Json>> = BTreeMap::new();
+    for Section { header, name, schema } in sections() {
+        let mut schema = schema.to_value();
+        if let Some(object) = schema.as_object_mut() {
+            object.remove("$schema");
+            if let Some(Json::Object(local)) = object.remove("$defs") {
+                definitions.extend(local);
+            }
+            if let (Some(name), Some(Json::Object(properties))) = (name, object.get_mut("properties")) {
+                properties.insert("type".into(), json!({ "const": name }));
+            }
+            if let Some(name) = name {
+                let required = object.entry("required").or_insert_with(|| json!([]));
+                if let Json::Array(required) = required {
+                    required.push(json!("type"));
+                }
+                object.insert("title".into(), json!(format!("{header} of type {name}")));
+            }
+        }
+        kinds.entry(header.trim_matches(['[', ']'])).or_default().push(schema);
+    }
+    let mut properties = Map::new();
+    for (header, mut schemas) in kinds {
+        let one = if schemas.len() == 1 { schemas.remove(0) } else { json!({ "oneOf": schemas }) };
+        let (key, schema) = match header.strip_suffix(".NAME") {
+            Some(key) => (key, json!({ "type": "object", "additionalProperties": one })),
+            None => (header, one),
+        };
+        properties.insert(key.into(), schema);
+    }
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Pliant scene",
+        "type": "object",
+        "properties": properties,
+        "required": ["scene", "body"],
+        "additionalProperties": false,
+        "$defs": definitions,
+    })
+}

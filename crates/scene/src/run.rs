@@ -1,0 +1,167 @@
+//! The run loop: step, look, write, until the end or a failure.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use pliant_mechanics::{CentralDifference, Energies, Real, State};
+
+use crate::build::Built;
+use crate::format::Precision;
+use crate::output::{
+    FailureSummary, Frame, OutputError, OutputFolder, Schedule, Scheduled, Summary, markdown, observers,
+    plot, summarise,
+};
+use crate::plan::Plan;
+use crate::scene::Scene;
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Simulated time [s].
+    pub time: f64,
+    /// Duration of the scene [s].
+    pub until: f64,
+    /// Wall time so far.
+    pub wall: Duration,
+}
+
+/// Samples of a run for plot and summary.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct History {
+    pub times: Vec<f64>,
+    pub energies: Vec<Energies>,
+    /// Size of each constraint's reaction [N].
+    pub reactions: Vec<Vec<f64>>,
+}
+
+/// What a run came to.
+#[derive(Clone, Debug)]
+pub(crate) struct Outcome {
+    pub failure: Option<FailureSummary>,
+    pub steps: u64,
+    pub time: f64,
+    pub wall_seconds: f64,
+    pub energies: Energies,
+    pub worst_balance: f64,
+    pub balance_floor: f64,
+    pub reactions: Vec<[f64; 3]>,
+    pub history: History,
+    pub files: Vec<PathBuf>,
+    pub threads: usize,
+    pub precision: &'static str,
+}
+
+/// Samples in the history.
+const SAMPLES: f64 = 1000.0;
+
+/// Wall time between two reports of progress.
+const REPORT: Duration = Duration::from_millis(100);
+
+/// Runs a scene and writes its outputs, `plot.svg` and `summary.md`. A failure of the run is in the summary; whatever
+/// was written before stays.
+///
+/// # Errors
+/// If the outputs can't be opened, or the summary can't be written.
+pub fn run(
+    scene: &Scene,
+    built: &Built,
+    plan: &Plan,
+    folder: &OutputFolder,
+    report: &mut (dyn FnMut(Progress) + Send),
+) -> Result<Summary, OutputError> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(scene.run.threads as usize)
+        .build()
+        .map_err(|error| OutputError::new(folder.path(), error))?;
+    let mut outcome = pool.install(|| match scene.run.precision {
+        Precision::Single => advance::<f32>(scene, built, plan, folder, report),
+        Precision::Double => advance::<f64>(scene, built, plan, folder, report),
+    })?;
+    match plot(built, &outcome.history) {
+        Ok(svg) => outcome.files.push(folder.write("plot.svg", &svg)?),
+        Err(reason) => return Err(OutputError::new(&folder.path().join("plot.svg"), reason)),
+    }
+    outcome.files.push(folder.path().join("summary.md"));
+    let summary = summarise(built, plan, &outcome);
+    folder.write("summary.md", &markdown(scene, built, plan, &outcome, &summary))?;
+    Ok(summary)
+}
+
+fn advance<R: Real>(
+    scene: &Scene,
+    built: &Built,
+    plan: &Plan,
+    folder: &OutputFolder,
+    report: &mut (dyn FnMut(Progress) + Send),
+) -> Result<Outcome, OutputError> {
+    let mut files = Vec::new();
+    let mut watching = observers::<R>(scene, built, folder.path(), &mut files)?;
+    let mut state = State::<R>::at_rest(&built.model);
+    // Contradicting constraints were refused when the model was built.
+    let mut stepper = CentralDifference::new(&built.model, plan.step)
+        .map_err(|error| OutputError::new(folder.path(), error))?;
+    let mut history = History::default();
+    let mut sampling = Schedule::new(scene.scene.until / SAMPLES);
+    let mut worst_balance = 0.0_f64;
+    let mut failure = None;
+    let started = Instant::now();
+    let mut reported = started;
+    loop {
+        if let Err(error) = stepper.evaluate(&mut state) {
+            failure = Some(FailureSummary::from(&error));
+            break;
+        }
+        if state.work.largest > stepper.balance_floor() {
+            worst_balance = worst_balance.max(stepper.energies().balance);
+        }
+        let last = state.steps >= plan.steps;
+        if sampling.is_due(state.time, plan.step, last) {
+            history.sample(built, &stepper, &state);
+        }
+        if let Err(error) = look(&mut watching, &Frame { built, state: &state, stepper: &stepper }, last) {
+            let message = format!("{error}; what was written before is complete");
+            failure = Some(FailureSummary::about("output", message, Some(state.time)));
+            break;
+        }
+        if reported.elapsed() >= REPORT || last {
+            reported = Instant::now();
+            report(Progress { time: state.time, until: scene.scene.until, wall: started.elapsed() });
+        }
+        if last {
+            break;
+        }
+        stepper.advance(&mut state);
+    }
+    Ok(Outcome {
+        failure,
+        steps: state.steps,
+        time: state.time,
+        wall_seconds: started.elapsed().as_secs_f64(),
+        energies: *stepper.energies(),
+        worst_balance,
+        balance_floor: stepper.balance_floor(),
+        reactions: (0..built.model.constraints.len()).map(|index| stepper.reaction(index)).collect(),
+        history,
+        files,
+        threads: rayon::current_num_threads(),
+        precision: R::PRECISION,
+    })
+}
+
+fn look<R: Real>(watching: &mut [Scheduled<R>], frame: &Frame<'_, R>, last: bool) -> Result<(), OutputError> {
+    for (schedule, observer) in watching {
+        if schedule.is_due(frame.time(), frame.stepper.step(), last) {
+            observer.see(frame)?;
+        }
+    }
+    Ok(())
+}
+
+impl History {
+    fn sample<R: Real>(&mut self, built: &Built, stepper: &CentralDifference<'_, R>, state: &State<R>) {
+        self.times.push(state.time);
+        self.energies.push(*stepper.energies());
+        let size = |constraint| stepper.reaction(constraint).iter().map(|f| f * f).sum::<f64>().sqrt();
+        self.reactions.push((0..built.model.constraints.len()).map(size).collect());
+    }
+}

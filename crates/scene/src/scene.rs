@@ -1,0 +1,162 @@
+//! A scene as read: its tables as plain data, each checked on its own, with the places they stand at.
+//! References between tables and everything that needs a mesh are checked when the model is built.
+
+use std::path::{Path, PathBuf};
+
+use crate::checker::{nearest, read_table};
+use crate::diagnostic::{Diagnostic, SceneErrors};
+use crate::format::{BodyTable, RunTable, SceneTable, SurfaceTable};
+use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
+use crate::source::Source;
+
+/// A scene file and what it says.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The text and the places in it.
+    pub source: Source,
+    /// The folder that file names in it are relative to.
+    pub folder: PathBuf,
+    /// `[scene]`
+    pub scene: SceneTable,
+    /// `[run]`
+    pub run: RunTable,
+    /// `[law.NAME]`, in the order of the file, as all below.
+    pub laws: Vec<(String, LawTable)>,
+    /// `[body.NAME]`
+    pub bodies: Vec<(String, BodyTable)>,
+    /// `[surface.NAME]`
+    pub surfaces: Vec<(String, SurfaceTable)>,
+    /// `[constraint.NAME]`
+    pub constraints: Vec<(String, ConstraintTable)>,
+    /// `[load.NAME]`
+    pub loads: Vec<(String, LoadTable)>,
+    /// `[output.NAME]`
+    pub outputs: Vec<(String, OutputTable)>,
+}
+
+/// The tables a scene file can have.
+const TABLES: [&str; 8] = ["scene", "run", "law", "body", "surface", "constraint", "load", "output"];
+
+/// Why a scene could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The file can't be opened.
+    #[error("the scene `{path}` cannot be read: {reason}")]
+    File {
+        /// Its path.
+        path: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
+    /// The file has mistakes.
+    #[error("{0}")]
+    Scene(SceneErrors),
+}
+
+/// The scene file meant by a path: a folder means its `scene.toml`.
+pub fn scene_file(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join("scene.toml") } else { path.to_owned() }
+}
+
+/// Reads the text of a scene file (or of the `scene.toml` of a folder).
+///
+/// # Errors
+/// If the file can't be read or is not TOML.
+pub fn open(path: &Path) -> Result<(Source, PathBuf), ReadError> {
+    let file = scene_file(path);
+    let failed = |reason: String| ReadError::File { path: file.clone(), reason };
+    let bytes = std::fs::read(&file).map_err(|error| failed(error.to_string()))?;
+    let text = String::from_utf8(bytes).map_err(|_| failed("it is not a text file (UTF-8)".into()))?;
+    let source = Source::parse(file.display().to_string(), text).map_err(ReadError::Scene)?;
+    Ok((source, file.parent().unwrap_or(Path::new("")).to_owned()))
+}
+
+impl Scene {
+    /// Reads a scene from its text; file names in it are relative to `folder`.
+    ///
+    /// # Errors
+    /// All mistakes of all tables together.
+    pub fn from_source(source: Source, folder: PathBuf) -> Result<Self, SceneErrors> {
+        let mut out = Vec::new();
+        check_top(&source, &mut out);
+        let scene = read_table::<SceneTable>(&source, &["scene"], &[], &mut out);
+        let run = read_table::<RunTable>(&source, &["run"], &[], &mut out);
+        let laws = read_all(&source, "law", read_law, &mut out);
+        let bodies =
+            read_all(&source, "body", |s, path, out| read_table::<BodyTable>(s, path, &[], out), &mut out);
+        let surfaces = read_all(
+            &source,
+            "surface",
+            |s, path, out| read_table::<SurfaceTable>(s, path, &[], out),
+            &mut out,
+        );
+        let constraints = read_all(&source, "constraint", read_typed::<ConstraintTable>, &mut out);
+        let loads = read_all(&source, "load", read_typed::<LoadTable>, &mut out);
+        let outputs = read_all(&source, "output", read_typed::<OutputTable>, &mut out);
+        if source.node(&["body"]).is_none_or(|node| node.entries().is_empty()) {
+            let help =
+                "add a table `[body.NAME]` with `mesh`, `law` and `density`; `pliant new` writes an example";
+            out.push(Diagnostic::error("the scene has no body").help(help));
+        }
+        match (scene, run) {
+            (Some(scene), Some(run)) if !out.iter().any(Diagnostic::is_error) => {
+                Ok(Self { source, folder, scene, run, laws, bodies, surfaces, constraints, loads, outputs })
+            }
+            _ => Err(source.errors(out)),
+        }
+    }
+}
+
+fn check_top(source: &Source, out: &mut Vec<Diagnostic>) {
+    for (key, node) in source.root().entries() {
+        if !TABLES.contains(&key.as_str()) {
+            let list = TABLES.map(|name| format!("`{name}`")).join(", ");
+            let help = match nearest(key, TABLES) {
+                Some(name) => format!("did you mean `{name}`? A scene has {list}"),
+                None => format!("a scene has {list}"),
+            };
+            let message = format!("unknown table `{key}`");
+            out.push(Diagnostic::error(message).at(node.key_place(), "unknown").help(help));
+        }
+    }
+}
+
+/// Reads all named tables of one kind. Names become names of files and columns, so that they must be plain words.
+fn read_all<T>(
+    source: &Source,
+    kind: &str,
+    read: impl Fn(&Source, &[&str], &mut Vec<Diagnostic>) -> Option<T>,
+    out: &mut Vec<Diagnostic>,
+) -> Vec<(String, T)> {
+    let Some(tables) = source.node(&[kind]) else { return Vec::new() };
+    if !matches!(tables.value, crate::source::Value::Table(_)) {
+        let help = format!("write it as a table: `[{kind}.NAME]`");
+        out.push(
+            Diagnostic::error(format!("`{kind}` must be a table of tables"))
+                .at(tables.place.clone(), "here")
+                .help(help),
+        );
+        return Vec::new();
+    }
+    let mut all = Vec::new();
+    for (name, node) in tables.entries() {
+        let plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
+        if name.is_empty() || !name.chars().all(plain) {
+            let help =
+                "names are made of letters, digits, `-` and `_`: files and columns are called after them";
+            let message = format!("`{name}` is not a name for a {kind}");
+            out.push(Diagnostic::error(message).at(node.key_place(), "this name").help(help));
+            continue;
+        }
+        if !matches!(node.value, crate::source::Value::Table(_)) {
+            let help = format!("write it as `[{kind}.{name}]`, or `{kind}.{name} = {{ … }}`");
+            let message = format!("`{kind}.{name}` must be a table");
+            out.push(Diagnostic::error(message).at(node.place.clone(), "not a table").help(help));
+            continue;
+        }
+        if let Some(table) = read(source, &[kind, name], out) {
+            all.push((name.clone(), table));
+        }
+    }
+    all
+}

@@ -1,0 +1,560 @@
+//! The text of a scene with the place of every key and value in it, so that a mistake is shown where it was made.
+//!
+//! TOML is read with the `toml` crate's spanned tree; the tree here owns its text, keeps the order of the file and
+//! takes values from the command line, which have no place in the file.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::diagnostic::{Diagnostic, Place, SceneErrors};
+
+/// Syntax errors shown of one file: what follows the first is often a consequence of it.
+const MOST_SYNTAX_ERRORS: usize = 5;
+
+/// A scene's text and the tree of its values.
+#[derive(Clone, Debug)]
+pub struct Source {
+    name: String,
+    text: Arc<str>,
+    root: Node,
+}
+
+/// A value and where it was given.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// Where the value stands: its own text, or the header `[law.liver]` of a table that has one.
+    pub place: Place,
+    /// Where its key stands; none for items of arrays, the root and what the command line gave.
+    pub key_span: Option<Range<usize>>,
+    /// The value.
+    pub value: Value,
+}
+
+/// A value of a scene.
+#[derive(Clone, Debug)]
+pub enum Value {
+    /// Keys with their values, in the order of the file.
+    Table(Vec<(String, Node)>),
+    /// Items in order.
+    Array(Vec<Node>),
+    /// A text.
+    String(String),
+    /// A whole number.
+    Integer(i64),
+    /// A number with a point or an exponent; may be `nan` or `inf`, which TOML has words for.
+    Float(f64),
+    /// `true` or `false`.
+    Boolean(bool),
+    /// A date or time, as written.
+    Datetime(String),
+}
+
+impl From<f64> for Value {
+    fn from(number: f64) -> Self {
+        Value::Float(number)
+    }
+}
+
+impl From<i64> for Value {
+    fn from(number: i64) -> Self {
+        Value::Integer(number)
+    }
+}
+
+impl From<bool> for Value {
+    fn from(truth: bool) -> Self {
+        Value::Boolean(truth)
+    }
+}
+
+impl From<&str> for Value {
+    fn from(text: &str) -> Self {
+        Value::String(text.to_owned())
+    }
+}
+
+impl From<String> for Value {
+    fn from(text: String) -> Self {
+        Value::String(text)
+    }
+}
+
+impl Node {
+    /// A value of the command line.
+    fn of_command_line(value: Value) -> Self {
+        let value = match value {
+            Value::Table(entries) => Value::Table(
+                entries.into_iter().map(|(key, node)| (key, Node::of_command_line(node.value))).collect(),
+            ),
+            Value::Array(items) => {
+                Value::Array(items.into_iter().map(|node| Node::of_command_line(node.value)).collect())
+            }
+            plain => plain,
+        };
+        Self { place: Place::CommandLine, key_span: None, value }
+    }
+
+    /// The entry of a table, or the item of an array whose index is `key` in decimal.
+    pub fn get(&self, key: &str) -> Option<&Node> {
+        match &self.value {
+            Value::Table(entries) => entries.iter().find(|(name, _)| name == key).map(|(_, node)| node),
+            Value::Array(items) => items.get(key.parse::<usize>().ok()?),
+            _ => None,
+        }
+    }
+
+    fn get_mut(&mut self, key: &str) -> Option<&mut Node> {
+        match &mut self.value {
+            Value::Table(entries) => entries.iter_mut().find(|(name, _)| name == key).map(|(_, node)| node),
+            Value::Array(items) => items.get_mut(key.parse::<usize>().ok()?),
+            _ => None,
+        }
+    }
+
+    /// The keys of a table with their values, in the order of the file; nothing for other values.
+    pub fn entries(&self) -> &[(String, Node)] {
+        match &self.value {
+            Value::Table(entries) => entries,
+            _ => &[],
+        }
+    }
+
+    /// The text, if the value is one.
+    pub fn as_str(&self) -> Option<&str> {
+        match &self.value {
+            Value::String(text) => Some(text),
+            _ => None,
+        }
+    }
+
+    /// Where the key stands, or the value where it has no key.
+    pub fn key_place(&self) -> Place {
+        match &self.key_span {
+            Some(span) => Place::File(span.clone()),
+            None => self.place.clone(),
+        }
+    }
+}
+
+impl Source {
+    /// Reads TOML; `name` is shown to the user, mostly the path of the file.
+    pub fn parse(name: impl Into<String>, text: impl Into<Arc<str>>) -> Result<Self, SceneErrors> {
+        let (name, text) = (name.into(), text.into());
+        let (table, errors) = DeTable::parse_recoverable(&text);
+        let mut diagnostics = Vec::new();
+        for error in &errors {
+            let diagnostic = syntax_error(error, &text);
+            let line = |span: &Option<Range<usize>>| {
+                span.as_ref().map(|span| text.bytes().take(span.start).filter(|&byte| byte == b'\n').count())
+            };
+            let known = |other: &Diagnostic| line(&other.span) == line(&diagnostic.span);
+            if diagnostics.len() < MOST_SYNTAX_ERRORS && !diagnostics.iter().any(known) {
+                diagnostics.push(diagnostic);
+            }
+        }
+        // The tree of a text with syntax errors is a guess, and so is what is wrong with its numbers.
+        let value = diagnostics.is_empty().then(|| table_value(table.get_ref(), &mut diagnostics));
+        drop(table);
+        match value {
+            Some(value) if diagnostics.is_empty() => {
+                Ok(Self { name, text, root: Node { place: Place::File(0..0), key_span: None, value } })
+            }
+            _ => Err(SceneErrors::new(name, text, diagnostics)),
+        }
+    }
+
+    /// The name that is shown to the user.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The text of the file.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The table of the whole file.
+    pub fn root(&self) -> &Node {
+        &self.root
+    }
+
+    /// The value at a path of keys; an item of an array has its index in decimal as its key.
+    pub fn node(&self, path: &[&str]) -> Option<&Node> {
+        path.iter().try_fold(&self.root, |node, key| node.get(key))
+    }
+
+    /// Where the value at a path stands; for a missing one the header or key of the nearest table around it.
+    pub fn span(&self, path: &[&str]) -> Place {
+        match self.node(path) {
+            Some(node) => node.place.clone(),
+            None => self.around(path),
+        }
+    }
+
+    /// Where the key at a path stands; for a missing one the header or key of the nearest table around it.
+    pub fn key_span(&self, path: &[&str]) -> Place {
+        match self.node(path) {
+            Some(node) => node.key_place(),
+            None => self.around(path),
+        }
+    }
+
+    fn around(&self, path: &[&str]) -> Place {
+        let mut node = &self.root;
+        for key in path {
+            match node.get(key) {
+                Some(child) => node = child,
+                None => break,
+            }
+        }
+        match &node.place {
+            Place::File(span) if self.text.get(span.clone()).is_some_and(|text| text.starts_with('[')) => {
+                if matches!(node.value, Value::Table(_)) { node.place.clone() } else { node.key_place() }
+            }
+            _ => node.key_place(),
+        }
+    }
+
+    /// Puts a value of the command line in the place of what the file says; tables on the way are made where missing.
+    ///
+    /// Diagnostics about it say that it was given on the command line. The error says why the path cannot be.
+    pub fn set(&mut self, path: &[&str], value: impl Into<Value>) -> Result<(), Box<Diagnostic>> {
+        let mut node = &mut self.root;
+        for (depth, key) in path.iter().enumerate() {
+            if node.get(key).is_none() {
+                match &mut node.value {
+                    Value::Table(entries) => {
+                        entries.push(((*key).to_owned(), Node::of_command_line(Value::Table(Vec::new()))));
+                    }
+                    Value::Array(items) => return Err(no_such_item(path, depth, items.len())),
+                    _ => return Err(no_table(path, depth)),
+                }
+            }
+            node = match node.get_mut(key) {
+                Some(child) => child,
+                None => return Err(no_table(path, depth)),
+            };
+        }
+        *node = Node::of_command_line(value.into());
+        Ok(())
+    }
+
+    /// Takes an assignment in TOML, as `--set "law.liver.shear-modulus = 2e3"` gives it; a single word on the right
+    /// needs no quotes.
+    pub fn assign(&mut self, assignment: &str) -> Result<(), Box<Diagnostic>> {
+        let quoted;
+        let table = match (DeTable::parse(assignment), assignment.split_once('=')) {
+            (Ok(table), _) => table,
+            (Err(error), None) => return Err(no_assignment(assignment, error.message())),
+            (Err(error), Some((path, word))) => {
+                quoted = format!("{path}= {}", serde_json::Value::from(word.trim()));
+                match DeTable::parse(&quoted) {
+                    Ok(table) if is_word(word.trim()) => table,
+                    _ => return Err(no_assignment(assignment, error.message())),
+                }
+            }
+        };
+        let mut diagnostics = Vec::new();
+        let Value::Table(entries) = table_value(table.get_ref(), &mut diagnostics) else { return Ok(()) };
+        if let Some(mut diagnostic) = diagnostics.pop() {
+            diagnostic.span = None;
+            return Err(Box::new(diagnostic.at(Place::CommandLine, "")));
+        }
+        let [(key, node)] = entries.as_slice() else {
+            return Err(no_assignment(assignment, "it must set one value"));
+        };
+        let (mut path, mut node) = (vec![key.as_str()], node);
+        // A dotted key is a chain of tables whose place is their own key; `{ a = 1 }` is a value.
+        while let (Value::Table(entries), true) =
+            (&node.value, Some(&node.place) == node.key_span.clone().map(Place::File).as_ref())
+        {
+            let [(key, child)] = entries.as_slice() else { break };
+            path.push(key);
+            node = child;
+        }
+        self.set(&path, node.value.clone())
+    }
+
+    /// Diagnostics about this scene together with its text, ready to print.
+    pub fn errors(&self, diagnostics: Vec<Diagnostic>) -> SceneErrors {
+        SceneErrors::new(self.name.clone(), self.text.clone(), diagnostics)
+    }
+}
+
+fn no_table(path: &[&str], depth: usize) -> Box<Diagnostic> {
+    let message = format!("`{}` cannot be set: `{}` is not a table", path.join("."), path[..depth].join("."));
+    Box::new(Diagnostic::error(message).at(Place::CommandLine, ""))
+}
+
+fn no_such_item(path: &[&str], depth: usize, len: usize) -> Box<Diagnostic> {
+    let (whole, array) = (path.join("."), path[..depth].join("."));
+    let message = format!("`{whole}` cannot be set: `{array}` is an array of {len}");
+    Box::new(Diagnostic::error(message).at(Place::CommandLine, "").help("items are counted from 0"))
+}
+
+fn no_assignment(assignment: &str, why: &str) -> Box<Diagnostic> {
+    let message = format!("`{assignment}` is not an assignment: {why}");
+    Box::new(
+        Diagnostic::error(message).at(Place::CommandLine, "").help("write key=value, such as run.until=2.5"),
+    )
+}
+
+/// Whether a text can stand without quotes in an assignment of the command line.
+fn is_word(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_alphabetic() || "/.~_".contains(c)) && !text.contains(['"', '\'', '\n'])
+}
+
+fn table_value(table: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Value {
+    let mut entries: Vec<(String, Node)> = table
+        .iter()
+        .map(|(key, value)| (key.get_ref().to_string(), node_of(value, Some(key.span()), diagnostics)))
+        .collect();
+    entries.sort_by_key(|(_, node)| node.key_span.as_ref().map(|span| span.start));
+    Value::Table(entries)
+}
+
+fn node_of(
+    value: &Spanned<DeValue<'_>>,
+    key_span: Option<Range<usize>>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Node {
+    let span = value.span();
+    let mut too_large = |what: &str, help: &str| {
+        diagnostics.push(Diagnostic::error(what).at(span.clone(), "this number").help(help));
+    };
+    let owned = match value.get_ref() {
+        DeValue::String(text) => Value::String(text.to_string()),
+        DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
+            Ok(number) => Value::Integer(number),
+            Err(_) => {
+                too_large(
+                    "this whole number has more digits than 64 bits hold",
+                    "write it with an exponent: 1e20",
+                );
+                Value::Integer(0)
+            }
+        },
+        DeValue::Float(float) => match float.as_str().parse::<f64>() {
+            Ok(number) if number.is_infinite() && !float.as_str().contains("inf") => {
+                too_large(
+                    "this number is larger than 64-bit floating point holds",
+                    "the largest is 1.797e308",
+                );
+                Value::Float(0.0)
+            }
+            Ok(number) => Value::Float(number),
+            Err(_) => {
+                too_large("this number cannot be read", "");
+                Value::Float(0.0)
+            }
+        },
+        DeValue::Boolean(truth) => Value::Boolean(*truth),
+        DeValue::Datetime(time) => Value::Datetime(time.to_string()),
+        DeValue::Array(items) => {
+            Value::Array(items.iter().map(|item| node_of(item, None, diagnostics)).collect())
+        }
+        DeValue::Table(table) => table_value(table, diagnostics),
+    };
+    Node { place: Place::File(span), key_span, value: owned }
+}
+
+fn syntax_error(error: &toml::de::Error, text: &str) -> Diagnostic {
+    let span = error.span().unwrap_or(text.len()..text.len());
+    let found = text.get(span.clone()).unwrap_or_default();
+    let before = text.get(..span.start).unwrap_or_default();
+    let after = text.get(span.end..).unwrap_or_default();
+    let message = error.message();
+    if message.starts_with("duplicate key") {
+        return Diagnostic::error(format!("`{found}` is given twice"))
+            .at(span, "given before")
+            .help("a key or table can be given once; remove one of the two");
+    }
+    let value_expected =
+        ["string values must be quoted", "invalid boolean"].iter().any(|m| message.starts_with(m));
+    if value_expected && found.is_empty() {
+        return Diagnostic::error("a value is missing").at(span, "expected a value here");
+    }
+    if value_expected && found.chars().all(|c| c.is_alphanumeric() || "-_./".contains(c)) {
+        return Diagnostic::error(format!("`{found}` is not a value"))
+            .at(span, "a text needs quotes")
+            .help(format!("write \"{found}\""));
+    }
+    let diagnostic = Diagnostic::error(format!("not valid TOML: {message}")).at(span, "here");
+    let (digit_before, digit_after) = (
+        before.ends_with(|c: char| c.is_ascii_digit()),
+        after.trim_start_matches('.').starts_with(|c: char| c.is_ascii_digit()),
+    );
+    if message.starts_with("unexpected key or value")
+        && digit_before
+        && format!("{found}{after}").starts_with(',')
+    {
+        diagnostic.help("decimals are written with a point: 3.5")
+    } else if message.starts_with("invalid mantissa") && digit_after {
+        diagnostic.help("write a digit before the point: 0.5")
+    } else if message.starts_with("invalid fraction") {
+        diagnostic.help("write a digit after the point: 5.0")
+    } else if value_expected {
+        diagnostic.help("a value is a number, true, false, a text in quotes, an [array] or a { table }")
+    } else {
+        diagnostic
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIVER: &str = r#"
+[scene]
+until = 5.0
+gravity = [0, 0, -9.81]
+
+[law.parenchyma]
+type = "neo-hookean"   # Gewebe
+shear-modulus = 3.0e3
+mesh.file = "liver.msh"
+mesh.scale = 0.01
+
+[[probe]]
+at = { node = 3 }
+[[probe]]
+at = { node = 4 }
+"#;
+
+    fn liver() -> Source {
+        Source::parse("liver.toml", LIVER).unwrap()
+    }
+
+    fn text(place: Place) -> &'static str {
+        match place {
+            Place::File(span) => &LIVER[span],
+            Place::CommandLine => "on the command line",
+        }
+    }
+
+    #[test]
+    fn every_value_and_key_has_its_place() {
+        let source = liver();
+        assert_eq!(text(source.span(&["scene", "until"])), "5.0");
+        assert_eq!(text(source.key_span(&["scene", "until"])), "until");
+        assert_eq!(text(source.span(&["scene", "gravity", "2"])), "-9.81");
+        assert_eq!(text(source.span(&["law", "parenchyma"])), "[law.parenchyma]");
+        assert_eq!(text(source.key_span(&["law", "parenchyma"])), "parenchyma");
+        assert_eq!(text(source.span(&["law", "parenchyma", "mesh", "file"])), "\"liver.msh\"");
+        assert_eq!(text(source.span(&["probe", "1", "at", "node"])), "4");
+        assert!(matches!(source.node(&["probe", "1", "at", "node"]).unwrap().value, Value::Integer(4)));
+    }
+
+    #[test]
+    fn the_place_of_what_is_missing_is_the_nearest_around_it() {
+        let source = liver();
+        assert_eq!(text(source.span(&["law", "parenchyma", "bulk-modulus"])), "[law.parenchyma]");
+        assert_eq!(text(source.key_span(&["law", "parenchyma", "bulk-modulus", "x"])), "[law.parenchyma]");
+        assert_eq!(text(source.span(&["law", "parenchyma", "mesh", "unit"])), "mesh");
+        assert_eq!(text(source.span(&["law", "capsule"])), "law");
+        assert_eq!(text(source.span(&["probe", "0", "body"])), "[[probe]]");
+        assert_eq!(text(source.span(&["probe", "7", "body"])), "probe");
+        assert_eq!(text(source.span(&["scene", "gravity", "3"])), "gravity");
+        assert_eq!(text(source.span(&["body"])), "");
+    }
+
+    #[test]
+    fn tables_keep_the_order_of_the_file() {
+        let source = liver();
+        let keys = |path: &[&str]| {
+            source.node(path).unwrap().entries().iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>()
+        };
+        assert_eq!(keys(&[]), ["scene", "law", "probe"]);
+        assert_eq!(keys(&["law", "parenchyma"]), ["type", "shear-modulus", "mesh"]);
+    }
+
+    #[test]
+    fn the_command_line_replaces_and_adds() {
+        let mut source = liver();
+        source.set(&["scene", "until"], 2.0).unwrap();
+        source.set(&["run", "device"], "gpu").unwrap();
+        source.set(&["scene", "gravity", "3"], 0).unwrap_err();
+        assert_eq!(source.span(&["scene", "until"]), Place::CommandLine);
+        assert_eq!(text(source.span(&["scene", "gravity"])), "[0, 0, -9.81]");
+        assert_eq!(source.node(&["run", "device"]).unwrap().as_str(), Some("gpu"));
+        let error = source.set(&["scene", "until", "x"], 1.0).unwrap_err();
+        assert_eq!(
+            error.message,
+            "`scene.until.x` cannot be set: `scene.until` is not a table (given on the command line)"
+        );
+    }
+
+    #[test]
+    fn assignments_are_toml_or_a_single_word() {
+        let mut source = liver();
+        source.assign("law.parenchyma.shear-modulus = 2e3").unwrap();
+        source.assign("run.device=gpu").unwrap();
+        source.assign("body.liver = { law = \"parenchyma\" }").unwrap();
+        source.assign("scene.gravity.2 = 0").unwrap();
+        let value = |path: &[&str]| &source.node(path).unwrap().value;
+        assert!(matches!(value(&["law", "parenchyma", "shear-modulus"]), Value::Float(x) if *x == 2e3));
+        assert!(matches!(value(&["law", "parenchyma", "type"]), Value::String(_)));
+        assert!(matches!(value(&["run", "device"]), Value::String(word) if word == "gpu"));
+        assert!(matches!(value(&["body", "liver", "law"]), Value::String(word) if word == "parenchyma"));
+        assert!(matches!(value(&["scene", "gravity", "2"]), Value::Integer(0)));
+        for bad in ["", "run.device", "a = 1\nb = 2", "a = 3 4", "a = 99999999999999999999", "x = \"a", "= 3"]
+        {
+            assert!(source.assign(bad).is_err(), "{bad}");
+        }
+    }
+
+    fn mistake(text: &str) -> (String, String, String) {
+        let errors = Source::parse("x.toml", text).unwrap_err();
+        let first = &errors.diagnostics()[0];
+        let found = text[first.span.clone().unwrap()].to_owned();
+        (first.message.clone(), found, first.help.clone().unwrap_or_default())
+    }
+
+    #[test]
+    fn syntax_errors_have_a_place_and_advice() {
+        let expect = |text: &str, message: &str, found: &str, help: &str| {
+            let (m, f, h) = mistake(text);
+            assert!(m.contains(message) && f == found && h.contains(help), "{text:?}: {m:?} {f:?} {h:?}");
+        };
+        expect("a = 1\na = 2\n", "`a` is given twice", "a", "remove one");
+        expect("element = tet4\n", "`tet4` is not a value", "tet4", "write \"tet4\"");
+        expect("element = hex8\n", "`hex8` is not a value", "hex8", "write \"hex8\"");
+        expect("a = \nb = 2\n", "a value is missing", "", "");
+        expect("a = 3,5\n", "not valid TOML", "", "with a point");
+        expect("a = .5\n", "not valid TOML", "", "0.5");
+        expect("a = 5.\n", "not valid TOML", "", "5.0");
+        expect("[law\na = 1\n", "unclosed table", "", "");
+        expect("a = 99999999999999999999\n", "64 bits", "99999999999999999999", "exponent");
+        expect("a = 1e999\n", "64-bit floating point", "1e999", "");
+    }
+
+    #[test]
+    fn several_syntax_errors_are_all_reported() {
+        let errors = Source::parse("x.toml", "a = tet4\nb = 3\nc = 1 2\nd = \n").unwrap_err();
+        let lines: Vec<_> =
+            errors.diagnostics().iter().map(|d| errors.line_and_column(d).unwrap().0).collect();
+        assert_eq!(lines, [1, 3, 4]);
+    }
+
+    #[test]
+    fn deep_nesting_is_an_error_or_a_tree_but_no_overflow() {
+        for text in [
+            format!("a = {}", "[".repeat(50_000)),
+            format!("a = {}{}", "[".repeat(50_000), "]".repeat(50_000)),
+            format!("a = {}", "{a=".repeat(50_000)),
+            format!("{}a = 1", "a.".repeat(50_000)),
+            format!("[{}a]", "a.".repeat(50_000)),
+        ] {
+            let _ = Source::parse("deep.toml", text);
+        }
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_mistake() {
+        let source = Source::parse("x.toml", "\u{feff}a = 1\r\nb = 2\r\n").unwrap();
+        assert_eq!(source.span(&["b"]), Place::File(14..15));
+    }
+}
