@@ -112,7 +112,11 @@ impl<R: Real, L: Law, const N: usize> SolidForces<R, L, N> {
     fn relative_displacements(&self, cell: usize, displacement: &[Vector<R>]) -> [Vector<R>; N] {
         let nodes = &self.nodes[cell];
         let origin = displacement[nodes[0] as usize];
-        nodes.map(|node| sub(displacement[node as usize], origin))
+        let mut relative = [[R::ZERO; 3]; N];
+        for (u, &node) in relative.iter_mut().zip(nodes) {
+            *u = sub(displacement[node as usize], origin);
+        }
+        relative
     }
 
     /// f_a = V P B_a; the first node takes what makes the sum zero.

@@ -204,6 +204,18 @@ impl Motion {
             Self::Velocity(velocity, curve) => velocity.map(|v| v * curve.integral(time)),
         }
     }
+
+    /// Whether two motions move a component alike at all times.
+    fn agrees_with(&self, other: &Self, component: usize) -> bool {
+        let course = |motion: &Self| match motion {
+            Self::Displacement(by, curve) if by[component] != 0.0 => {
+                Some((by[component], false, curve.clone()))
+            }
+            Self::Velocity(by, curve) if by[component] != 0.0 => Some((by[component], true, curve.clone())),
+            _ => None,
+        };
+        course(self) == course(other)
+    }
 }
 
 /// A surface carried by a body.
@@ -267,8 +279,8 @@ impl Model {
         (body, node - self.bodies[body].nodes.start)
     }
 
-    /// The constraint on each component of each node, [`FREE`] where there is none. Fixing a component twice is
-    /// allowed (the first keeps the reaction).
+    /// The constraint on each component of each node, [`FREE`] where there is none. Two constraints may prescribe the
+    /// same motion of a component (the first keeps the reaction).
     ///
     /// # Errors
     /// If two constraints prescribe different motions for one component of a node.
@@ -283,7 +295,7 @@ impl Model {
                         continue;
                     }
                     let first = &self.constraints[*owner as usize];
-                    if !matches!((&first.motion, &constraint.motion), (Motion::Fixed, Motion::Fixed)) {
+                    if !first.motion.agrees_with(&constraint.motion, component) {
                         let (body, local) = self.locate_node(node);
                         return Err(Contradiction {
                             first: first.name.clone(),

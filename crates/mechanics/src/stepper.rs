@@ -320,7 +320,8 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     fn applied(&self, node: usize) -> Vector<R> {
         let gravity = self.gravity[self.body_of[node] as usize];
         let mass = self.model.mass[node];
-        [0, 1, 2].map(|c| R::of(self.load[node][c] + mass * gravity[c]))
+        let force = |c: usize| R::of(self.load[node][c] + mass * gravity[c]);
+        [force(0), force(1), force(2)]
     }
 
     fn pass_over_nodes(&mut self, state: &State<R>) {
@@ -383,14 +384,10 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     ) -> Result<(), StepError> {
         let finite =
             sums.kinetic.is_finite() && sums.internal_after.is_finite() && sums.external_after.is_finite();
-        if !finite {
-            let lost = |u: &Vector<R>| u.iter().any(|x| !x.to_f64().is_finite());
-            let node = (state.displacement.iter().position(lost)).or_else(|| self.next.iter().position(lost));
-            let (body, node) = self.model.locate_node(node.unwrap_or(0) as u32);
-            let body = self.model.bodies[body].name.clone();
-            return Err(StepError::NotFinite { body, node, time: state.time });
-        }
-        if let Some((solid, cell, determinant)) = inverted {
+        // An inverted cell comes first: its forces are meaningless, often not finite, so that it is the cause.
+        if let Some((solid, cell, determinant)) = inverted
+            && (finite || determinant.is_finite())
+        {
             let solid = &self.model.solids[solid];
             return Err(StepError::Inverted {
                 body: self.model.bodies[solid.body].name.clone(),
@@ -399,6 +396,13 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 determinant,
                 time: state.time,
             });
+        }
+        if !finite {
+            let lost = |u: &Vector<R>| u.iter().any(|x| !x.to_f64().is_finite());
+            let node = (state.displacement.iter().position(lost)).or_else(|| self.next.iter().position(lost));
+            let (body, node) = self.model.locate_node(node.unwrap_or(0) as u32);
+            let body = self.model.bodies[body].name.clone();
+            return Err(StepError::NotFinite { body, node, time: state.time });
         }
         Ok(())
     }

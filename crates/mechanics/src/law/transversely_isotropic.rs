@@ -3,7 +3,7 @@
 //! parameters published with it are half as stiff and are read with `convention = "taylor"`.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::neo_hookean::NeoHookean;
 use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
@@ -20,7 +20,7 @@ pub struct TransverselyIsotropic {
 }
 
 /// Which formula a published fibre modulus belongs to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FibreConvention {
     /// The modulus of the energy η/2 (Ī₄ − 1)²; stress and energy agree.

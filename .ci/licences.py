@@ -1,0 +1,58 @@
+"""Fails if a dependency has a licence that is not permissive (see docs/dependencies.md)."""
+
+import json
+import re
+import subprocess
+import sys
+
+ALLOWED = {
+    "MIT", "MIT-0", "Apache-2.0", "Apache-2.0 WITH LLVM-exception", "BSD-2-Clause", "BSD-3-Clause", "ISC", "Zlib",
+    "0BSD", "BSL-1.0", "CC0-1.0", "Unlicense", "Unicode-3.0",
+    "MPL-2.0",  # file-level copyleft: fine for crates used unchanged
+}
+
+
+def allowed(expression):
+    """True if some choice that an SPDX expression leaves is made of allowed licences only."""
+    tokens = re.findall(r"\(|\)|[^\s()]+(?: WITH [^\s()]+)?", expression.replace("/", " OR "))
+
+    def either():
+        result = both()
+        while tokens and tokens[0] == "OR":
+            tokens.pop(0)
+            result = both() or result
+        return result
+
+    def both():
+        result = one()
+        while tokens and tokens[0] == "AND":
+            tokens.pop(0)
+            result = one() and result
+        return result
+
+    def one():
+        token = tokens.pop(0)
+        if token == "(":
+            result = either()
+            tokens.pop(0)
+            return result
+        return token in ALLOWED
+
+    return either()
+
+
+def main():
+    # A check that cannot fail is a defect.
+    assert allowed("MIT OR GPL-3.0") and allowed("(MIT OR Apache-2.0) AND Unicode-3.0")
+    assert not allowed("GPL-3.0-only") and not allowed("MIT AND AGPL-3.0") and not allowed("LGPL-2.1")
+    metadata = json.loads(subprocess.check_output(["cargo", "metadata", "--format-version", "1", "--locked"]))
+    packages = metadata["packages"]
+    bad = [p for p in packages if not (p["license"] and allowed(p["license"]))]
+    for package in bad:
+        print(f"{package['name']} {package['version']}: {package['license'] or 'no licence given'}")
+    if bad:
+        sys.exit(1)
+    print(f"{len(packages)} packages, all under permissive licences.")
+
+
+main()

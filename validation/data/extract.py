@@ -1,0 +1,44 @@
+"""Extracts what the tests read from the project's reference data: python3 extract.py SOURCE, where SOURCE is the
+folder shared/reference/solid. Needs numpy. The extracted files are kept beside this script."""
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy
+
+source, here = Path(sys.argv[1]), Path(__file__).parent
+read = lambda name: json.loads((source / name).read_text())
+
+
+def write(name, value):
+    (here / name).write_text(json.dumps(value) + "\n")
+
+
+points = read("material_points.json")
+points["models"] = {name: points["models"][name] for name in ("nh_iso", "nh_thesis", "ti")}
+write("material_points.json", points)
+
+shear = read("shear_curves.json")
+every = 5  # of the 101 shears: steps of 0.05
+thin = lambda curves: {k: {s: v[::every] for s, v in c.items() if s in ("S11", "S22", "S33", "S12")} for k, c in curves.items()}
+write("shear_curves.json", {
+    "parameters": shear["parameters"],
+    "gamma": shear["cases"]["A_fig_6_3"]["gamma"][::every],
+    "A": {kind: thin(shear["cases"]["A_fig_6_3"][kind]) for kind in ("energy", "taylor", "isotropic")},
+    "B": {"energy": thin(shear["cases"]["B_null_test"]["energy"])},
+})
+
+relaxation = read("relaxation.json")
+for model in relaxation["models"].values():
+    del model["samples_m"], model["F_over_Fhalfsec"]
+write("relaxation.json", relaxation)
+
+for name in ("homogeneous_uniaxial.json", "timestep.json", "meshes/cube_tet4.msh"):
+    shutil.copyfile(source / name, here / Path(name).name)
+
+solutions = numpy.load(source / "cube_tet4_solutions.npz")
+write("cube_tet4_solutions.json", {
+    law: {"displacement": solutions[law].round(12).tolist(), "reaction": solutions[law + "_F"].tolist()}
+    for law in ("NH_T4", "TIy_T4")
+})
