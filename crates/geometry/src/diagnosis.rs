@@ -46,7 +46,7 @@ pub struct Diagnosis {
     pub degenerate_cells: Vec<CellId>,
     /// Pairs of cells with the same nodes: the first one and the one that repeats it.
     pub duplicate_cells: Vec<[CellId; 2]>,
-    /// Nodes that no cell uses.
+    /// Nodes that no cell uses; in a mesh with volume cells: that none of these uses.
     pub unused_nodes: Vec<u32>,
     /// Pairs of nodes closer than 1e-9 of the bounding box's diagonal: the first and the one that repeats it.
     pub duplicate_nodes: Vec<[u32; 2]>,
@@ -133,13 +133,7 @@ fn fault_of(kind: CellKind, nodes: &[u32], points: &[Vector3]) -> Option<Fault> 
 }
 
 fn inspect_nodes(mesh: &Mesh, found: &mut Diagnosis) {
-    let mut used = vec![false; mesh.points.len()];
-    for node in mesh.blocks.iter().flat_map(|block| &block.nodes) {
-        if let Some(used) = used.get_mut(*node as usize) {
-            *used = true;
-        }
-    }
-    for (node, (point, used)) in (0u32..).zip(mesh.points.iter().zip(used)) {
+    for (node, (point, used)) in (0u32..).zip(mesh.points.iter().zip(mesh.used_points())) {
         if !is_finite(point) {
             found.non_finite_nodes.push(node);
         }
@@ -379,6 +373,7 @@ fn line<T>(title: &str, items: &[T], name: impl Fn(&T) -> String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::DataArray;
     use crate::testing::{Noise, UNIT_CUBE, block_of_hexes, block_of_tets, points};
 
     const TET: CellKind = CellKind::Tet;
@@ -436,6 +431,23 @@ mod tests {
         assert!(!found.crowded_faces.is_empty());
         assert!(!found.is_clean() && !found.is_usable());
         assert!(found.to_string().contains("inverted cells: 1 (tet 0)"), "{found}");
+    }
+
+    #[test]
+    fn a_node_of_surface_cells_only_is_unused_in_a_mesh_with_volume_cells() {
+        let mut mesh = block_of_tets([1, 1, 1]);
+        mesh.points.push(Vector3::new(2.0, 0.0, 0.0));
+        let triangles = mesh.block_mut(CellKind::Triangle);
+        triangles.nodes = vec![0, 1, 8, 0, 1, 3];
+        triangles.data.insert("label".into(), DataArray::scalar(vec![7.0, 9.0]));
+        triangles.sets.insert("rim".into(), vec![0, 1]);
+        assert_eq!(diagnose(&mesh).unused_nodes, [8]);
+        assert_eq!(mesh.drop_unused_points(), 1);
+        let triangles = mesh.block(CellKind::Triangle).unwrap();
+        assert_eq!(triangles.nodes, [0, 1, 3]);
+        assert_eq!(triangles.data["label"].values, [9.0]);
+        assert_eq!(triangles.sets["rim"], [0]);
+        assert!(diagnose(&mesh).unused_nodes.is_empty());
     }
 
     #[test]

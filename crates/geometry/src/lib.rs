@@ -35,8 +35,8 @@
 
 mod cell;
 mod diagnosis;
-mod locate;
 pub mod io;
+mod locate;
 mod mesh;
 mod quality;
 mod selection;

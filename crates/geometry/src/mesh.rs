@@ -122,6 +122,26 @@ impl CellBlock {
         &self.nodes[index * n..(index + 1) * n]
     }
 
+    /// Removes the cells whose nodes `keep` refuses, with their data and places in sets.
+    fn retain(&mut self, keep: impl Fn(&[u32]) -> bool) {
+        let kept: Vec<bool> = self.cells().map(keep).collect();
+        if kept.iter().all(|&kept| kept) {
+            return;
+        }
+        self.nodes = kept_items(&self.nodes, self.kind.node_count(), &kept);
+        for array in self.data.values_mut() {
+            array.values = kept_items(&array.values, array.components, &kept);
+        }
+        let numbers = numbers_of(&kept);
+        for set in self.sets.values_mut() {
+            set.retain_mut(|cell| {
+                let old = *cell as usize;
+                *cell = numbers[old];
+                kept[old]
+            });
+        }
+    }
+
     /// All cells in order.
     pub fn cells(&self) -> std::slice::ChunksExact<'_, u32> {
         self.nodes.chunks_exact(self.kind.node_count())
@@ -200,13 +220,25 @@ impl Mesh {
         found.then_some(points)
     }
 
-    /// Removes the points that no cell uses, with their data; returns how many.
-    pub fn drop_unused_points(&mut self) -> usize {
+    /// Whether each point is used: by a volume cell, or by any cell where the mesh has no volume cells.
+    pub(crate) fn used_points(&self) -> Vec<bool> {
         let mut used = vec![false; self.points.len()];
-        for &node in self.blocks.iter().flat_map(|block| &block.nodes) {
+        let solid = self.volume_blocks().any(|block| !block.is_empty());
+        let using = self.blocks.iter().filter(|block| !solid || block.kind.dimension() == 3);
+        for &node in using.flat_map(|block| &block.nodes) {
             if let Some(used) = used.get_mut(node as usize) {
                 *used = true;
             }
+        }
+        used
+    }
+
+    /// Removes the points that no cell uses (where there are volume cells: none of these), with their data and the
+    /// surface cells that hang on them; returns how many points.
+    pub fn drop_unused_points(&mut self) -> usize {
+        let used = self.used_points();
+        for block in &mut self.blocks {
+            block.retain(|nodes| nodes.iter().all(|&node| used.get(node as usize) != Some(&false)));
         }
         let target: Vec<u32> = (0..self.points.len() as u32).collect();
         self.renumber(&target, &used)
@@ -224,13 +256,7 @@ impl Mesh {
 
     /// Moves every reference to a point to its target, then removes the points that are not kept.
     fn renumber(&mut self, target: &[u32], kept: &[bool]) -> usize {
-        let mut next = 0;
-        let numbers: Vec<u32> = (kept.iter())
-            .map(|&kept| {
-                next += u32::from(kept);
-                next.wrapping_sub(1)
-            })
-            .collect();
+        let numbers = numbers_of(kept);
         for node in self.blocks.iter_mut().flat_map(|block| &mut block.nodes) {
             if let Some(&target) = target.get(*node as usize) {
                 *node = numbers[target as usize];
@@ -246,12 +272,27 @@ impl Mesh {
             set.dedup();
         }
         for array in self.point_data.values_mut() {
-            let items = array.values.chunks(array.components.max(1)).zip(kept);
-            array.values = items.filter(|(_, kept)| **kept).flat_map(|(item, _)| item.iter().copied()).collect();
+            array.values = kept_items(&array.values, array.components, kept);
         }
         let before = self.points.len();
         let mut keep = kept.iter();
         self.points.retain(|_| keep.next().copied().unwrap_or(true));
         before - self.points.len()
     }
+}
+
+/// The new number of each item once those that are not kept are gone.
+fn numbers_of(kept: &[bool]) -> Vec<u32> {
+    let mut next = 0_u32;
+    let number = |&kept: &bool| {
+        next += u32::from(kept);
+        next.wrapping_sub(1)
+    };
+    kept.iter().map(number).collect()
+}
+
+/// The values of the items that are kept, `size` values an item.
+fn kept_items<T: Copy>(values: &[T], size: usize, kept: &[bool]) -> Vec<T> {
+    let items = values.chunks(size.max(1)).zip(kept);
+    items.filter(|(_, kept)| **kept).flat_map(|(item, _)| item.iter().copied()).collect()
 }

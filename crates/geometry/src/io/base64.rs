@@ -1,4 +1,18 @@
-//! Reads base64 as VTK writes it: several padded pieces may follow each other, with white space anywhere.
+//! Base64 in VTK's XML files, where several padded pieces may follow each other, with white space anywhere.
+//! (Decoders of crates take one piece whose end is known; here its length stands inside it.)
+
+const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+/// Values of characters; 255 for those that have none.
+const VALUES: [u8; 256] = {
+    let mut values = [255; 256];
+    let mut value = 0;
+    while value < 64 {
+        values[ALPHABET[value] as usize] = value as u8;
+        value += 1;
+    }
+    values
+};
 
 /// Reads bytes from base64 text, piece by piece.
 pub(super) struct Base64<'a> {
@@ -20,15 +34,31 @@ impl<'a> Base64<'a> {
 
     /// The next `count` bytes; `None` if the text ends before or holds other characters.
     pub fn take(&mut self, count: usize) -> Option<Vec<u8>> {
-        if count > self.text.len() {
+        if count > self.text.len() + self.pending_len {
             return None;
         }
         let mut bytes = Vec::with_capacity(count + 2);
         bytes.extend_from_slice(&self.pending[..self.pending_len]);
         self.pending_len = 0;
         while bytes.len() < count {
-            let (group, len) = self.group()?;
-            bytes.extend_from_slice(&group[..len]);
+            // Groups of four plain characters, which is nearly all of any text.
+            let wanted = (count - bytes.len()).div_ceil(3);
+            let mut plain = 0;
+            for group in self.text.as_slice().chunks_exact(4).take(wanted) {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|i| VALUES[usize::from(group[i])]);
+                if a | b | c | d >= 64 {
+                    break;
+                }
+                let bits = u32::from(a) << 18 | u32::from(b) << 12 | u32::from(c) << 6 | u32::from(d);
+                bytes.extend_from_slice(&bits.to_be_bytes()[1..]);
+                plain += 1;
+            }
+            if plain > 0 {
+                self.text.nth(4 * plain - 1);
+            } else {
+                let (group, len) = self.group()?;
+                bytes.extend_from_slice(&group[..len]);
+            }
         }
         let extra = &bytes[count..];
         self.pending[..extra.len()].copy_from_slice(extra);
@@ -44,13 +74,9 @@ impl<'a> Base64<'a> {
         let mut padding = 0;
         while characters < 4 {
             let character = *self.text.next()?;
-            let value = match character {
-                b'A'..=b'Z' => character - b'A',
-                b'a'..=b'z' => character - b'a' + 26,
-                b'0'..=b'9' => character - b'0' + 52,
-                b'+' => 62,
-                b'/' => 63,
-                b'=' => {
+            let value = match VALUES[usize::from(character)] {
+                value @ ..64 => value,
+                _ if character == b'=' => {
                     padding += 1;
                     0
                 }
@@ -68,9 +94,34 @@ impl<'a> Base64<'a> {
     }
 }
 
+/// Appends bytes as one padded piece.
+pub(super) fn encode(bytes: &[u8], text: &mut Vec<u8>) {
+    let group = |a: u8, b: u8, c: u8| {
+        let bits = u32::from_be_bytes([0, a, b, c]);
+        [18, 12, 6, 0].map(|shift| ALPHABET[(bits >> shift) as usize & 63])
+    };
+    text.reserve(bytes.len().div_ceil(3) * 4);
+    let groups = bytes.chunks_exact(3);
+    let rest = groups.remainder();
+    for three in groups {
+        text.extend_from_slice(&group(three[0], three[1], three[2]));
+    }
+    match rest {
+        [a, b] => {
+            let [first, second, third, _] = group(*a, *b, 0);
+            text.extend_from_slice(&[first, second, third, b'=']);
+        }
+        [a] => {
+            let [first, second, ..] = group(*a, 0, 0);
+            text.extend_from_slice(&[first, second, b'=', b'=']);
+        }
+        _ => {}
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Base64;
+    use super::{Base64, encode};
 
     #[test]
     fn rfc_4648_test_vectors() {
@@ -79,6 +130,9 @@ mod tests {
         for (text, bytes) in vectors {
             assert_eq!(Base64::new(text.as_bytes()).take(bytes.len()).as_deref(), Some(bytes.as_bytes()));
             assert_eq!(Base64::new(text.as_bytes()).take(bytes.len() + 1), None);
+            let mut encoded = Vec::new();
+            encode(bytes.as_bytes(), &mut encoded);
+            assert_eq!(encoded, text.as_bytes());
         }
     }
 
@@ -88,5 +142,10 @@ mod tests {
         assert_eq!(text.take(4).as_deref(), Some(b"foob".as_slice()));
         assert_eq!(text.take(2).as_deref(), Some(b"fo".as_slice()));
         assert_eq!(Base64::new(b"Zm9?").take(1), None);
+        // The last bytes of a piece whose characters were all used before.
+        let mut text = Base64::new(b"Zm9v");
+        assert_eq!(text.take(2).as_deref(), Some(b"fo".as_slice()));
+        assert_eq!(text.take(1).as_deref(), Some(b"o".as_slice()));
+        assert_eq!(text.take(1), None);
     }
 }

@@ -184,6 +184,20 @@ impl Cells {
     }
 }
 
+/// How many bytes of arrays a file may fill: files that give a few numbers each for many arrays of the whole
+/// mesh, share bytes between arrays or compress well must not multiply without end.
+pub(super) fn array_limit(file_size: usize) -> usize {
+    file_size.saturating_mul(128).saturating_add(64 << 20)
+}
+
+/// Whether arrays of so many numbers may be filled from a file of that size.
+pub(super) fn check_filled(numbers: usize, file_size: usize) -> Result<(), Fault> {
+    if numbers.saturating_mul(size_of::<f64>()) <= array_limit(file_size) {
+        return Ok(());
+    }
+    Err(Fault::malformed(Place::File, "the arrays would be far larger than the file"))
+}
+
 /// A point of a file, which must be finite. `number` is its number in the file.
 pub(super) fn finite(x: f64, y: f64, z: f64, number: u64, place: Place) -> Result<Vector3, Fault> {
     if x.is_finite() && y.is_finite() && z.is_finite() {

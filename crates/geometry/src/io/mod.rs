@@ -95,7 +95,7 @@ impl Format {
 
     /// The format that the first bytes of a file tell, for formats that begin with a word of their own.
     fn of_bytes(bytes: &[u8]) -> Option<Self> {
-        let bytes = bytes.trim_ascii_start();
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
         let begins: [(&[u8], Self); 8] = [
             (b"$MeshFormat", Self::Gmsh),
             (b"$NOD", Self::Gmsh),
@@ -153,6 +153,7 @@ pub fn read_bytes(bytes: &[u8], format: Format) -> Result<MeshFile, MeshFileErro
 }
 
 fn read_of(path: &Path, bytes: &[u8], format: Format) -> Result<MeshFile, MeshFileError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes); // a byte order mark of UTF-8
     let result = match format {
         Format::Gmsh => gmsh::read(bytes),
         Format::Vtk => vtk::read(bytes),

@@ -13,7 +13,7 @@ use super::{Format, MeshFile};
 use crate::{CellKind, Vector3};
 
 /// More groups on one `g` line than any file has; keeps hostile files from multiplying.
-const MOST_GROUPS: usize = 256;
+const MOST_GROUPS: usize = 64;
 
 #[derive(Default)]
 struct Reader {

@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
-use super::cells::{Cells, SET_PREFIX, finite, index_limit, node};
+use super::cells::{Cells, SET_PREFIX, check_filled, finite, index_limit, node};
 use super::cursor::{Cursor, Order, Scalar, name, shown};
 use super::error::Fault;
 use super::surface_out::SurfaceOut;
@@ -35,6 +35,7 @@ enum Encoding {
 
 struct Reader<'a> {
     cursor: Cursor<'a>,
+    file_size: usize,
     encoding: Encoding,
     points: Vec<Vector3>,
     cells: Cells,
@@ -49,6 +50,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     let (encoding, elements) = read_head(&mut cursor)?;
     let mut reader = Reader {
         cursor,
+        file_size: bytes.len(),
         encoding,
         points: Vec::new(),
         cells: Cells::default(),
@@ -69,6 +71,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         Encoding::Binary(Order::Big) => "binary big-endian",
     };
     let Reader { points, mut cells, point_data, mut cell_data, mut notes, .. } = reader;
+    check_filled(cell_data.len().saturating_mul(cells.len()), bytes.len())?;
     for values in cell_data.values_mut() {
         values.resize(cells.len(), f64::NAN);
     }
@@ -102,6 +105,9 @@ fn read_head(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault>
                 let name = name(words.need_word("the name of an element")?);
                 let word = words.need_word("a count")?;
                 let count = words.parse(word, "a count", format_args!("the number of `{name}`"))?;
+                if elements.iter().any(|element| element.name == name) {
+                    return Err(words.malformed(format!("there are two lists of `{name}`")));
+                }
                 elements.push(Element { name, count, properties: Vec::new() });
             }
             Some(b"property") => {
@@ -229,9 +235,6 @@ impl Reader<'_> {
     }
 
     fn read_points(&mut self, element: &Element) -> Result<(), Fault> {
-        if !self.points.is_empty() {
-            return Err(self.cursor.malformed("there are two lists of vertices"));
-        }
         self.room(element)?;
         index_limit(element.count, self.cursor.place())?;
         let at = |wanted: &str| element.properties.iter().position(|property| property.name == wanted);
@@ -285,6 +288,7 @@ impl Reader<'_> {
             property.length.is_none() && ends.is_none_or(|(a, b)| i != a && i != b)
         };
         let first = self.cells.len();
+        check_filled((first + element.count).saturating_mul(element.properties.len()), self.file_size)?;
         let mut columns = vec![Vec::new(); element.properties.len()];
         let mut row = vec![0.0; element.properties.len()];
         let (mut list, mut indices, mut corners) = (Vec::new(), Vec::new(), Vec::new());

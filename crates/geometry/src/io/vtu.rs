@@ -8,7 +8,7 @@ use std::io::Read;
 use roxmltree::{Document, Node};
 
 use super::base64::Base64;
-use super::cells::{Cells, finite_points};
+use super::cells::{Cells, array_limit, finite_points, index_limit};
 use super::cursor::{Cursor, Order, Scalar};
 use super::error::{Fault, Place};
 use super::vtk_cells::{Connectivity, PolyList, add_grid, add_poly};
@@ -18,13 +18,10 @@ use crate::{DataArray, Vector3};
 /// Zlib makes at most 1032 bytes of one; more is announced by no honest file.
 const MOST_INFLATION: usize = 1040;
 
-/// Arrays may share their appended bytes and compress well, but not multiply the file without end: at most so
-/// many decoded bytes per byte of the file, beyond a first 64 MiB.
-const MOST_DECODED: usize = 128;
-
 /// What the whole file says about its arrays.
 struct Storage<'a> {
-    document: &'a Document<'a>,
+    /// Where the lines of the XML end.
+    line_ends: Vec<usize>,
     order: Order,
     header: Scalar,
     compressed: bool,
@@ -43,7 +40,11 @@ type Appended<'a> = (&'a [u8], usize);
 /// Reads a `.vtu` or `.vtp` file.
 pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     let (xml, appended) = split_appended(bytes)?;
-    let text = String::from_utf8_lossy(&xml);
+    // The check alone is faster than the repair, which few files need.
+    let text = match std::str::from_utf8(&xml) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => String::from_utf8_lossy(&xml),
+    };
     let document = Document::parse(&text).map_err(|error| {
         let place = Place::Line(error.pos().row as usize);
         Fault::malformed(place, format!("the XML is broken or cut off: {error}"))
@@ -66,7 +67,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
             ));
         }
     };
-    let mut storage = Storage::new(&document, root, appended, bytes.len())?;
+    let mut storage = Storage::new(&text, root, appended, bytes.len())?;
     let mut file = storage.read_set(root, kind, poly)?;
     let name = if poly { Format::Vtp.name() } else { Format::Vtu.name() };
     file.format = format!("{name} {}", root.attribute("version").unwrap_or("0.1"));
@@ -77,7 +78,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
 /// where they begin.
 fn split_appended(bytes: &[u8]) -> Result<(Bytes<'_>, Option<Appended<'_>>), Fault> {
     const TAG: &[u8] = b"<AppendedData";
-    let Some(tag) = bytes.windows(TAG.len()).position(|window| window == TAG) else {
+    let mut opened = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'<').map(|(at, _)| at);
+    let Some(tag) = opened.find(|&at| bytes[at..].starts_with(TAG)) else {
         return Ok((Cow::Borrowed(bytes), None));
     };
     let truncated = || Fault::truncated(Place::Byte(tag), "the appended data");
@@ -86,10 +88,6 @@ fn split_appended(bytes: &[u8]) -> Result<(Bytes<'_>, Option<Appended<'_>>), Fau
     let mut xml = bytes[..open].to_vec();
     xml.extend_from_slice(b"</AppendedData></VTKFile>");
     Ok((Cow::Owned(xml), Some((&bytes[start..], start))))
-}
-
-fn line(document: &Document<'_>, node: Node<'_, '_>) -> Place {
-    Place::Line(document.text_pos_at(node.range().start).row as usize)
 }
 
 fn children<'a, 'd>(node: Node<'a, 'd>, name: &'static str) -> impl Iterator<Item = Node<'a, 'd>> {
@@ -110,6 +108,9 @@ struct Joined {
 impl Joined {
     /// Adds a piece of `items` items; NaN where an array is missing in a piece.
     fn add(&mut self, arrays: Vec<(String, DataArray)>, items: usize) {
+        if arrays.is_empty() && items == 0 {
+            return;
+        }
         for (name, array) in arrays {
             let joined = self.arrays.entry(name).or_insert_with(|| DataArray {
                 components: array.components,
@@ -133,11 +134,12 @@ impl Joined {
 
 impl<'a> Storage<'a> {
     fn new(
-        document: &'a Document<'a>,
+        text: &str,
         root: Node<'a, 'a>,
         appended: Option<Appended<'a>>,
         file_size: usize,
     ) -> Result<Self, Fault> {
+        let line_ends: Vec<usize> = text.match_indices('\n').map(|(at, _)| at).collect();
         let order = match root.attribute("byte_order") {
             Some("BigEndian") => Order::Big,
             _ => Order::Little,
@@ -166,13 +168,13 @@ impl<'a> Storage<'a> {
                 Some("base64") | None => Some((bytes, true, start)),
                 Some(other) => {
                     let what = format!("the encoding `{other}` of appended data is");
-                    return Err(Fault::unsupported(line(document, node), what, "use raw or base64"));
+                    return Err(Fault::unsupported(Place::File, what, "use raw or base64"));
                 }
             },
             _ => None,
         };
-        let budget = file_size.saturating_mul(MOST_DECODED).saturating_add(64 << 20);
-        Ok(Self { document, order, header, compressed, appended, budget })
+        let budget = array_limit(file_size);
+        Ok(Self { line_ends, order, header, compressed, appended, budget })
     }
 
     fn read_set(&mut self, root: Node<'a, 'a>, kind: &'static str, poly: bool) -> Result<MeshFile, Fault> {
@@ -196,7 +198,7 @@ impl<'a> Storage<'a> {
             let new = self.read_points(piece)?;
             let count = new.len();
             points.extend(new);
-            super::cells::index_limit(points.len(), line(self.document, piece))?;
+            index_limit(points.len(), self.line(piece))?;
             let before = cells.len();
             if poly {
                 self.read_lists(piece, &mut cells, first, count)?;
@@ -209,10 +211,7 @@ impl<'a> Storage<'a> {
             // Filling arrays that only some pieces have must not multiply the file either.
             let filled = point_data.filled().saturating_add(cell_data.filled());
             if filled > limit {
-                return Err(Fault::malformed(
-                    line(self.document, piece),
-                    "the arrays are far larger than the file",
-                ));
+                return Err(Fault::malformed(self.line(piece), "the arrays are far larger than the file"));
             }
         }
         for (name, array) in &cell_data.arrays {
@@ -222,15 +221,24 @@ impl<'a> Storage<'a> {
         Ok(MeshFile { mesh, format: String::new(), notes, time })
     }
 
+    /// The line, from 1, of a byte of the XML.
+    fn line_at(&self, byte: usize) -> usize {
+        self.line_ends.partition_point(|&end| end < byte) + 1
+    }
+
+    /// The line where an element begins.
+    fn line(&self, node: Node<'_, '_>) -> Place {
+        Place::Line(self.line_at(node.range().start))
+    }
+
     /// A count that a piece announces; `None` without.
     fn announced(&self, piece: Node<'a, 'a>, attribute: &str) -> Result<Option<usize>, Fault> {
         let Some(text) = piece.attribute(attribute) else { return Ok(None) };
         match text.trim().parse() {
             Ok(count) => Ok(Some(count)),
-            Err(_) => Err(Fault::malformed(
-                line(self.document, piece),
-                format!("{attribute} is `{text}`, not a count"),
-            )),
+            Err(_) => {
+                Err(Fault::malformed(self.line(piece), format!("{attribute} is `{text}`, not a count")))
+            }
         }
     }
 
@@ -239,10 +247,10 @@ impl<'a> Storage<'a> {
         let Some(array) = child(piece, "Points").and_then(|points| child(points, "DataArray")) else {
             return match announced {
                 Some(0) => Ok(Vec::new()),
-                _ => Err(Fault::malformed(line(self.document, piece), "the piece has no `Points`")),
+                _ => Err(Fault::malformed(self.line(piece), "the piece has no `Points`")),
             };
         };
-        let place = line(self.document, array);
+        let place = self.line(array);
         let coordinates = self.reals(array)?;
         if coordinates.len() % 3 != 0 || announced.is_some_and(|count| count != coordinates.len() / 3) {
             let what = format!(
@@ -279,7 +287,7 @@ impl<'a> Storage<'a> {
         let connectivity = self.read_connectivity(list)?;
         let types = children(list, "DataArray").find(|array| array.attribute("Name") == Some("types"));
         let types = types.map(|array| self.integers(array)).transpose()?.unwrap_or_default();
-        let place = line(self.document, list);
+        let place = self.line(list);
         self.check_cells(piece, "NumberOfCells", connectivity.len())?;
         add_grid(cells, &types, &connectivity, first, points, place)
     }
@@ -288,7 +296,7 @@ impl<'a> Storage<'a> {
         match self.announced(piece, attribute)? {
             Some(count) if count != found => {
                 let what = format!("{attribute} is {count}, but {found} were found");
-                Err(Fault::malformed(line(self.document, piece), what))
+                Err(Fault::malformed(self.line(piece), what))
             }
             _ => Ok(()),
         }
@@ -311,7 +319,7 @@ impl<'a> Storage<'a> {
             let Some(node) = child(piece, element) else { continue };
             let connectivity = self.read_connectivity(node)?;
             self.check_cells(piece, attribute, connectivity.len())?;
-            add_poly(cells, list, &connectivity, first, points, line(self.document, node))?;
+            add_poly(cells, list, &connectivity, first, points, self.line(node))?;
         }
         Ok(())
     }
@@ -339,7 +347,7 @@ impl<'a> Storage<'a> {
                     "array `{name}` has {} numbers, not {components} for each of {items} items",
                     values.len()
                 );
-                return Err(Fault::malformed(line(self.document, array), what));
+                return Err(Fault::malformed(self.line(array), what));
             }
             arrays.push((name, DataArray { components, values }));
         }
@@ -360,7 +368,7 @@ impl<'a> Storage<'a> {
             "Float64" => Scalar::F64,
             other => {
                 let what = format!("`{other}` is no type of numbers");
-                return Err(Fault::malformed(line(self.document, array), what));
+                return Err(Fault::malformed(self.line(array), what));
             }
         })
     }
@@ -394,7 +402,7 @@ impl<'a> Storage<'a> {
         while cursor.peek().is_some() {
             numbers.push(next(&mut cursor, &what).map_err(|fault| {
                 // Lines are counted from the text's own first line.
-                let first = self.document.text_pos_at(start).row as usize;
+                let first = self.line_at(start);
                 match fault.place {
                     Place::Line(line) => Fault { place: Place::Line(first + line - 1), ..fault },
                     _ => fault,
@@ -410,7 +418,7 @@ impl<'a> Storage<'a> {
         let what = format!("array `{name}`");
         match array.attribute("format") {
             Some("binary") => {
-                let place = line(self.document, array);
+                let place = self.line(array);
                 let text = content(array).0.trim_ascii().as_bytes();
                 if text.is_empty() {
                     return Ok(Cow::Borrowed(&[]));
@@ -418,7 +426,7 @@ impl<'a> Storage<'a> {
                 self.decode_base64(text, place, &what)
             }
             Some("appended") => {
-                let place = line(self.document, array);
+                let place = self.line(array);
                 let offset = self.announced(array, "offset")?.unwrap_or_default();
                 let Some((bytes, base64, start)) = self.appended else {
                     return Err(Fault::truncated(place, format!("{what}: there are no appended data")));
@@ -433,7 +441,7 @@ impl<'a> Storage<'a> {
             }
             other => {
                 let what = format!("the format `{}` of {what}", other.unwrap_or_default());
-                Err(Fault::malformed(line(self.document, array), format!("{what} is not known")))
+                Err(Fault::malformed(self.line(array), format!("{what} is not known")))
             }
         }
     }

@@ -1,17 +1,17 @@
 //! Reads Gmsh files: section after section into a model, then the mesh from the model.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::element_type;
 use super::numbers::{Encoding, Numbers};
-use crate::io::cells::{Cells, finite, index_limit};
+use crate::io::cells::{Cells, check_filled, finite, index_limit};
 use crate::io::cursor::{Cursor, Order, Scalar, name, shown};
 use crate::io::error::{Fault, MeshFileProblem};
 use crate::io::{Format, MeshFile};
 use crate::{CellKind, DataArray, Vector3};
 
 /// More physical groups on one entity than any mesh has; keeps hostile files from multiplying.
-const MOST_GROUPS: usize = 256;
+const MOST_GROUPS: usize = 64;
 
 /// Numbers of the items of a file and their indices, for numbers that need not be contiguous.
 #[derive(Default)]
@@ -85,6 +85,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     let mut notes = Vec::new();
     let mut version = "1".to_owned();
     let mut time = None;
+    let mut unused = BTreeSet::new();
     while let Some(word) = numbers.cursor.word() {
         let Some(section) = word.strip_prefix(b"$") else {
             return Err(numbers
@@ -105,28 +106,15 @@ pub(crate) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
             b"Entities" if four => read_entities(&mut numbers, &mut model, false)?,
             b"PartitionedEntities" if four => read_entities(&mut numbers, &mut model, true)?,
             b"NodeData" => {
-                read_field(
-                    &mut numbers,
-                    &mut model.point_fields,
-                    "node",
-                    bytes.len(),
-                    &mut time,
-                    &mut notes,
-                )?;
+                read_field(&mut numbers, &mut model.point_fields, "node", &mut time, &mut notes)?;
             }
             b"ElementData" => {
-                read_field(
-                    &mut numbers,
-                    &mut model.cell_fields,
-                    "element",
-                    bytes.len(),
-                    &mut time,
-                    &mut notes,
-                )?;
+                read_field(&mut numbers, &mut model.cell_fields, "element", &mut time, &mut notes)?;
             }
             other => {
-                if other != b"Comments" {
-                    notes.push(format!("section `${}` was not used", shown(other)));
+                // Comments say nothing of the mesh, and linear elements need no scheme of interpolation.
+                if other != b"Comments" && other != b"InterpolationScheme" {
+                    unused.insert(shown(other));
                 }
                 skip_section(&mut numbers.cursor, other)?;
                 continue;
@@ -134,8 +122,9 @@ pub(crate) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         }
         read_end(&mut numbers.cursor, section)?;
     }
+    notes.extend(unused.into_iter().map(|section| format!("section `${section}` was not used")));
     let encoding = if numbers.is_binary() { "binary" } else { "ASCII" };
-    let mut file = model.into_file(notes)?;
+    let mut file = model.into_file(notes, bytes.len())?;
     file.format = format!("{} {version} {encoding}", Format::Gmsh.name());
     file.time = time;
     Ok(file)
@@ -530,7 +519,6 @@ fn read_field(
     numbers: &mut Numbers<'_>,
     fields: &mut BTreeMap<String, Field>,
     item: &str,
-    file_size: usize,
     time: &mut Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<(), Fault> {
@@ -574,12 +562,6 @@ fn read_field(
         for _ in 0..components {
             field.values.push(numbers.real(what)?);
         }
-    }
-    // A file of n bytes may make arrays of the whole mesh from a few numbers each: keep that in bounds.
-    if fields.len() > 64 + file_size / 10_000 {
-        return Err(numbers
-            .cursor
-            .malformed(format!("more {item} data arrays than a file of this size can fill")));
     }
     if fields.insert(title.clone(), field).is_some() {
         notes.push(format!("{item} data `{title}` occur several times (time steps?): the last are kept"));
@@ -627,13 +609,18 @@ impl Model {
         self.elements.sort();
     }
 
-    fn into_file(mut self, mut notes: Vec<String>) -> Result<MeshFile, Fault> {
+    fn into_file(mut self, mut notes: Vec<String>, file_size: usize) -> Result<MeshFile, Fault> {
         if self.repeated > 0 {
             notes.push(format!(
                 "{} cells were given once per physical group; each is kept once",
                 self.repeated
             ));
         }
+        let components =
+            |fields: &BTreeMap<String, Field>| fields.values().map(|field| field.components).sum();
+        let of_cells = self.cells.len().saturating_mul(components(&self.cell_fields));
+        let of_points = self.points.len().saturating_mul(components(&self.point_fields));
+        check_filled(of_cells.saturating_add(of_points), file_size)?;
         let mut label = self.label;
         if label.iter().all(|&label| label == 0.0) && self.entity.iter().any(|&entity| entity != 0.0) {
             notes

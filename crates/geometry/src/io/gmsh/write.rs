@@ -56,7 +56,7 @@ pub(crate) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     write_nodes(out, mesh, &entities)?;
     write_elements(out, &entities)?;
     write_point_data(out, mesh)?;
-    write_cell_data(out, mesh)
+    write_cell_data(out, mesh, &entities)
 }
 
 /// The label of a cell if it can be the number of a physical group.
@@ -100,8 +100,10 @@ impl Physical {
                 let block = blocks.iter().find(|block| block.kind == kind)?;
                 group_of_label(*block.data.get("label")?.values.get(cell as usize)?)
             });
+            let of_points = mesh.point_sets.get(name).filter(|_| dimension == 0);
             let same = label.filter(|label| {
-                members.get(label) == Some(&cells) && !(dimension == 0 && mesh.point_sets.contains_key(name))
+                members.get(label) == Some(&cells)
+                    && of_points.is_none_or(|set| *set == points_of(mesh, &cells))
             });
             let taken = match same {
                 Some(label) if !number.values().any(|&taken| taken == label) => label,
@@ -114,6 +116,15 @@ impl Physical {
         }
         Self { number }
     }
+}
+
+/// The points of vertex cells, increasing, each once.
+fn points_of(mesh: &Mesh, cells: &[(CellKind, u32)]) -> Vec<u32> {
+    let vertices = mesh.block(CellKind::Vertex).map(|block| block.nodes.as_slice()).unwrap_or_default();
+    let mut points: Vec<u32> = cells.iter().map(|&(_, cell)| vertices[cell as usize]).collect();
+    points.sort_unstable();
+    points.dedup();
+    points
 }
 
 /// Physical groups per cell.
@@ -248,17 +259,10 @@ fn write_item(out: &mut dyn Write, number: usize, values: &[f64]) -> io::Result<
     writeln!(out)
 }
 
-/// Items without any number are left out; readers take them as missing.
-fn is_missing(values: &[f64]) -> bool {
-    values.iter().all(|value| value.is_nan())
-}
-
 fn write_point_data(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     for (name, array) in &mesh.point_data {
-        let items: Vec<(usize, &[f64])> =
-            (1..).zip(array.values.chunks_exact(array.components)).filter(|(_, v)| !is_missing(v)).collect();
-        write_head(out, "NodeData", name, array.components, items.len())?;
-        for (number, values) in items {
+        write_head(out, "NodeData", name, array.components, array.len())?;
+        for (number, values) in (1..).zip(array.values.chunks_exact(array.components)) {
             write_item(out, number, values)?;
         }
         writeln!(out, "$EndNodeData")?;
@@ -266,29 +270,33 @@ fn write_point_data(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     Ok(())
 }
 
-/// Cell data; the `label` only where it says more than the physical groups.
-fn write_cell_data(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
+/// Cell data; the `label` only where it says more than the physical groups. The items are those of all
+/// elements in the order of `$Elements`, NaN where there are none, because meshio goes by the order and
+/// not by the numbers.
+fn write_cell_data(out: &mut dyn Write, mesh: &Mesh, entities: &Entities<'_>) -> io::Result<()> {
     let names: BTreeSet<&String> = mesh.blocks.iter().flat_map(|block| block.data.keys()).collect();
+    let order: Vec<usize> =
+        entities.iter().flat_map(BTreeMap::values).flatten().map(|element| element.number).collect();
     for name in names {
-        let mut first = 1;
-        let mut items: Vec<(usize, &[f64])> = Vec::new();
+        let is_said = |block: &CellBlock| name == "label" && labels(block).iter().all(Option::is_some);
+        let mut items: Vec<Option<&[f64]>> = Vec::with_capacity(order.len());
         let mut components = 1;
         for block in &mesh.blocks {
-            let said = name == "label" && labels(block).iter().all(Option::is_some);
-            if let Some(array) = block.data.get(name)
-                && !said
-            {
-                components = array.components;
-                let numbered = (first..).zip(array.values.chunks_exact(array.components));
-                items.extend(numbered.filter(|(_, values)| !is_missing(values)));
+            match block.data.get(name).filter(|_| !is_said(block)) {
+                Some(array) => {
+                    components = array.components;
+                    items.extend(array.values.chunks_exact(components).map(Some));
+                }
+                None => items.resize(items.len() + block.len(), None),
             }
-            first += block.len();
         }
-        if items.is_empty() {
+        if items.iter().all(Option::is_none) {
             continue;
         }
-        write_head(out, "ElementData", name, components, items.len())?;
-        for (number, values) in items {
+        let missing = vec![f64::NAN; components];
+        write_head(out, "ElementData", name, components, order.len())?;
+        for &number in &order {
+            let values = items.get(number - 1).copied().flatten().unwrap_or(&missing);
             write_item(out, number, values)?;
         }
         writeln!(out, "$EndElementData")?;
