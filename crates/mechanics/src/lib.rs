@@ -35,6 +35,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod applied;
 pub mod critical_step;
 pub mod curve;
 pub mod element;

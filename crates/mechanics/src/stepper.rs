@@ -9,11 +9,11 @@
 use rayon::prelude::*;
 
 use crate::Real;
+use crate::applied::AppliedForces;
 use crate::forces::InternalForces;
-use crate::load::LoadKind;
 use crate::model::{Contradiction, FREE, Model};
 use crate::state::State;
-use crate::tensor::{Vector, add, cast};
+use crate::tensor::{Vector, add};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -141,11 +141,7 @@ pub struct CentralDifference<'m, R> {
     mass: Vec<R>,
     /// α of each node [1/s].
     damping: Vec<R>,
-    /// Acceleration [m/s²] by gravity of each body at the current time.
-    gravity: Vec<Vector<f64>>,
-    body_of: Vec<u16>,
-    /// Forces of loads [N].
-    load: Vec<Vector<f64>>,
+    applied: AppliedForces<'m>,
     /// Prescribed displacement [m] of each constraint now and after the step.
     target: Vec<[Vector<f64>; 2]>,
     next: Vec<Vector<R>>,
@@ -163,11 +159,8 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     pub fn new(model: &'m Model, step: f64) -> Result<Self, Contradiction> {
         let nodes = model.node_count();
         let mut damping = vec![R::ZERO; nodes];
-        let mut body_of = vec![0; nodes];
-        for (index, body) in model.bodies.iter().enumerate() {
-            let range = body.nodes.start as usize..body.nodes.end as usize;
-            damping[range.clone()].fill(R::of(body.damping));
-            body_of[range].fill(index as u16);
+        for body in &model.bodies {
+            damping[body.nodes.start as usize..body.nodes.end as usize].fill(R::of(body.damping));
         }
         let stiffness: f64 = (model.solids.iter())
             .map(|solid| {
@@ -182,9 +175,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             owners: model.constrained_components()?,
             mass: model.mass.iter().map(|&m| R::of(m)).collect(),
             damping,
-            gravity: vec![[0.0; 3]; model.bodies.len()],
-            body_of,
-            load: vec![[0.0; 3]; nodes],
+            applied: AppliedForces::new(model),
             target: vec![[[0.0; 3]; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
             reaction: vec![[R::ZERO; 3]; nodes],
@@ -205,7 +196,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// If the state is not finite, a cell is inverted, or the energies do not balance.
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
         let (hourglass, inverted) = self.forces.evaluate(&state.displacement, &mut state.history);
-        self.apply_loads(state);
+        self.applied.update(state.time, &state.displacement);
         if state.steps == 0 {
             self.start(state);
         }
@@ -263,33 +254,6 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         [0, 1, 2].map(|c| (before[c].to_f64() + after[c].to_f64()) / (2.0 * self.step))
     }
 
-    fn apply_loads(&mut self, state: &State<R>) {
-        if self.model.loads.is_empty() {
-            return;
-        }
-        self.load.fill([0.0; 3]);
-        self.gravity.fill([0.0; 3]);
-        let (model, u) = (self.model, &state.displacement);
-        for load in &model.loads {
-            if let LoadKind::Gravity { body, acceleration } = load.kind {
-                let factor = load.curve.value(state.time);
-                self.gravity[body] = add(self.gravity[body], acceleration.map(|a| a * factor));
-            }
-            match load.surface.map(|index| &model.surfaces[index]) {
-                Some(surface) => {
-                    let place = |point: u32| {
-                        add(surface.rest[point as usize], surface.mapping.apply_row(point as usize, u))
-                    };
-                    load.add_forces(state.time, Some(&surface.mapping), place, &mut self.load);
-                }
-                None => {
-                    let place = |node: u32| add(model.rest[node as usize], cast(u[node as usize]));
-                    load.add_forces(state.time, None, place, &mut self.load);
-                }
-            }
-        }
-    }
-
     fn set_targets(&mut self, time: f64) {
         for (target, constraint) in self.target.iter_mut().zip(&self.model.constraints) {
             *target = [time, time + self.step].map(|t| constraint.motion.displacement(t));
@@ -300,7 +264,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     fn start(&self, state: &mut State<R>) {
         let half = 0.5 * self.step * self.step;
         for (node, increment) in state.increment.iter_mut().enumerate() {
-            let applied = self.applied(node);
+            let applied: Vector<R> = self.applied.at(node);
             let internal = self.forces.at(node);
             for component in 0..3 {
                 increment[component] = if self.owners[node][component] == FREE {
@@ -313,15 +277,6 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 };
             }
         }
-    }
-
-    /// The force [N] of loads and gravity on a node.
-    #[inline(always)]
-    fn applied(&self, node: usize) -> Vector<R> {
-        let gravity = self.gravity[self.body_of[node] as usize];
-        let mass = self.model.mass[node];
-        let force = |c: usize| R::of(self.load[node][c] + mass * gravity[c]);
-        [force(0), force(1), force(2)]
     }
 
     fn pass_over_nodes(&mut self, state: &State<R>) {
@@ -346,7 +301,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         let (m, alpha, dt) = (self.mass[node], self.damping[node], R::of(self.step));
         let half = R::of(0.5);
         let internal = self.forces.at(node);
-        let applied = self.applied(node);
+        let applied: Vector<R> = self.applied.at(node);
         let owner = self.owners[node];
         let a = half * alpha * dt;
         let mut next = [R::ZERO; 3];

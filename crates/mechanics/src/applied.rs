@@ -1,0 +1,70 @@
+//! The forces of loads and gravity on the nodes of a model at one instant.
+
+use crate::Real;
+use crate::load::LoadKind;
+use crate::model::Model;
+use crate::tensor::{Vector, add, cast};
+
+/// Forces applied to the nodes, found anew for each instant.
+pub(crate) struct AppliedForces<'m> {
+    model: &'m Model,
+    /// Forces of loads [N], one per node.
+    nodal: Vec<Vector<f64>>,
+    /// Acceleration [m/s²] by gravity, one per body.
+    gravity: Vec<Vector<f64>>,
+    body_of: Vec<u16>,
+}
+
+impl<'m> AppliedForces<'m> {
+    pub(crate) fn new(model: &'m Model) -> Self {
+        let mut body_of = vec![0; model.node_count()];
+        for (index, body) in model.bodies.iter().enumerate() {
+            body_of[body.nodes.start as usize..body.nodes.end as usize].fill(index as u16);
+        }
+        Self {
+            model,
+            nodal: vec![[0.0; 3]; model.node_count()],
+            gravity: vec![[0.0; 3]; model.bodies.len()],
+            body_of,
+        }
+    }
+
+    /// Finds the forces at a time [s] and in a deformed place.
+    pub(crate) fn update<R: Real>(&mut self, time: f64, displacement: &[Vector<R>]) {
+        if self.model.loads.is_empty() {
+            return;
+        }
+        self.nodal.fill([0.0; 3]);
+        self.gravity.fill([0.0; 3]);
+        let model = self.model;
+        for load in &model.loads {
+            if let LoadKind::Gravity { body, acceleration } = load.kind {
+                let factor = load.curve.value(time);
+                self.gravity[body] = add(self.gravity[body], acceleration.map(|a| a * factor));
+            }
+            match load.surface.map(|index| &model.surfaces[index]) {
+                Some(surface) => {
+                    let place = |point: u32| {
+                        let moved = surface.mapping.apply_row(point as usize, displacement);
+                        add(surface.rest[point as usize], moved)
+                    };
+                    load.add_forces(time, Some(&surface.mapping), place, &mut self.nodal);
+                }
+                None => {
+                    let place =
+                        |node: u32| add(model.rest[node as usize], cast(displacement[node as usize]));
+                    load.add_forces(time, None, place, &mut self.nodal);
+                }
+            }
+        }
+    }
+
+    /// The force [N] on a node.
+    #[inline(always)]
+    pub(crate) fn at<R: Real>(&self, node: usize) -> Vector<R> {
+        let gravity = self.gravity[self.body_of[node] as usize];
+        let mass = self.model.mass[node];
+        let force = |c: usize| R::of(self.nodal[node][c] + mass * gravity[c]);
+        [force(0), force(1), force(2)]
+    }
+}
