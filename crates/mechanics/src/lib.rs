@@ -38,6 +38,7 @@
 mod applied;
 pub mod critical_step;
 pub mod curve;
+mod dynamic_relaxation;
 pub mod element;
 mod forces;
 pub mod law;
@@ -51,6 +52,7 @@ mod state;
 mod stepper;
 pub mod tensor;
 
+pub use dynamic_relaxation::{Convergence, DynamicRelaxation, RelaxationError, RelaxationSettings};
 pub use model::Model;
 pub use real::Real;
 pub use state::{State, Work};
