@@ -34,11 +34,27 @@ for model in relaxation["models"].values():
     del model["samples_m"], model["F_over_Fhalfsec"]
 write("relaxation.json", relaxation)
 
-for name in ("homogeneous_uniaxial.json", "timestep.json", "meshes/cube_tet4.msh"):
+for name in (
+    "homogeneous_uniaxial.json", "timestep.json", "meshes/cube_tet4.msh", "meshes/cantilever_half_tet4.msh",
+    "meshes/cube_eighth_tet4.msh",
+):
     shutil.copyfile(source / name, here / Path(name).name)
 
 solutions = numpy.load(source / "cube_tet4_solutions.npz")
 write("cube_tet4_solutions.json", {
     law: {"displacement": solutions[law].round(12).tolist(), "reaction": solutions[law + "_F"].tolist()}
     for law in ("NH_T4", "TIy_T4")
+})
+write("cube_tet4_anp_solutions.json", {
+    law: {"displacement": solutions[law].round(9).tolist(), "reaction": solutions[law + "_F"].tolist()}
+    for law in ("NH_ANP_BonetBurton", "TIy_ANP_BonetBurton")
+})
+
+solutions = numpy.load(source / "cube_hex8_10_solutions.npz")
+write("cube_hex8_10_solutions.json", {
+    "points": solutions["points"].round(12).tolist(),
+    **{
+        key: {"displacement": solutions[key].round(9).tolist(), "reaction": solutions[key + "_F"].tolist()}
+        for key in ("NH_hg0.05", "NH_hg0.1", "NH_meandil")
+    },
 })

@@ -2,7 +2,9 @@
 
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::tensor::{Vector, dot};
-use pliant_mechanics::{CentralDifference, Model, Real, State, StepError};
+use pliant_mechanics::{
+    CentralDifference, DynamicRelaxation, Model, Real, RelaxationSettings, State, StepError,
+};
 
 /// Steps a model from rest to a time [s], both ends included. `observe` sees every instant once its forces, reactions
 /// and energies are known. Returns the last instant.
@@ -55,6 +57,19 @@ pub fn settle(model: &Model, step: f64, until: f64) -> Equilibrium<'_> {
     let creep = 0.1 * speed / largest;
     assert!(creep < 1e-7, "not at rest after {until} s: creeps by {creep:.1e} of its displacement in 0.1 s");
     Equilibrium { stepper, state, largest }
+}
+
+/// The equilibrium at 1 s, found in one load step by dynamic relaxation to a residual of 1e-8 of the largest force.
+///
+/// # Panics
+/// If there is none.
+pub fn relax(model: &Model) -> (DynamicRelaxation<'_, f64>, State<f64>) {
+    let settings = RelaxationSettings { tolerance: 1e-8, ..RelaxationSettings::default() };
+    let mut solver = DynamicRelaxation::new(model, settings).unwrap_or_else(|error| panic!("{error}"));
+    let mut state = State::at_rest(model);
+    let convergence = solver.solve(&mut state, 1.0).unwrap_or_else(|error| panic!("{error}"));
+    println!("{convergence:?}");
+    (solver, state)
 }
 
 /// From 0 at the start to 1 at a time [s], with a continuous velocity.

@@ -5,12 +5,30 @@ use pliant_geometry::{CellKind, Mesh, Selection, boundary};
 use pliant_mechanics::critical_step;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
-use pliant_mechanics::model::{Body, Cells, Constraint, Material, Model, Motion, Solid};
+use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};
 use pliant_mechanics::tensor::Vector;
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 
 /// The hourglass coefficient of all hexahedra, the default of a scene.
 pub const HOURGLASS: f64 = 0.2;
+
+/// The element that tetrahedra become.
+#[derive(Clone, Copy, Debug)]
+pub enum Tets {
+    /// `tet4`
+    Plain,
+    /// `tet4-anp` and its kin.
+    Averaged(Averaging),
+}
+
+/// The element that hexahedra become.
+#[derive(Clone, Copy, Debug)]
+pub enum Hexes {
+    /// `hex8` with an hourglass coefficient.
+    UniformStrain(f64),
+    /// `hex8-full`
+    Full,
+}
 
 /// A body under test.
 #[derive(Clone, Debug)]
@@ -22,8 +40,20 @@ pub struct Specimen {
 }
 
 impl Specimen {
-    /// The volume cells of a mesh, with the fibre direction of every cell for a law that has one.
+    /// The volume cells of a mesh as plain `tet4` and `hex8`, with the fibre direction of every cell for a law that has
+    /// one.
     pub fn new(mesh: Mesh, material: &Material, fibre: Vector<f64>) -> Self {
+        Self::of_elements(mesh, Tets::Plain, Hexes::UniformStrain(HOURGLASS), material, fibre)
+    }
+
+    /// The volume cells of a mesh as certain elements.
+    pub fn of_elements(
+        mesh: Mesh,
+        tets: Tets,
+        hexes: Hexes,
+        material: &Material,
+        fibre: Vector<f64>,
+    ) -> Self {
         let nodes = mesh.points.len();
         let mut model = Model {
             rest: mesh.points.iter().map(|p| [p.x, p.y, p.z]).collect(),
@@ -33,10 +63,21 @@ impl Specimen {
         model.bodies.push(Body { name: "specimen".into(), nodes: 0..nodes as u32, damping: 0.0 });
         for block in mesh.volume_blocks() {
             let cells = match block.kind {
-                CellKind::Tet => Cells::tet4(block.cells().map(nodes_of).collect(), &model.rest),
+                CellKind::Tet => {
+                    let nodes = block.cells().map(nodes_of).collect();
+                    match tets {
+                        Tets::Plain => Cells::tet4(nodes, &model.rest),
+                        Tets::Averaged(averaging) => Cells::averaged_tet4(nodes, &model.rest, averaging),
+                    }
+                }
                 _ => {
-                    let shear = material.law.small_strain().shear;
-                    Cells::hex8(block.cells().map(nodes_of).collect(), &model.rest, HOURGLASS, shear)
+                    let nodes = block.cells().map(nodes_of).collect();
+                    match hexes {
+                        Hexes::UniformStrain(hourglass) => {
+                            Cells::hex8(nodes, &model.rest, hourglass, material.law.small_strain().shear)
+                        }
+                        Hexes::Full => Cells::full_hex8(nodes, &model.rest),
+                    }
                 }
             };
             let count = if material.law.needs_fibre() { cells.len() } else { 0 };

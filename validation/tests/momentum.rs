@@ -3,7 +3,7 @@
 use pliant_mechanics::State;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::LoadKind;
-use pliant_mechanics::recover::cell_fields;
+use pliant_mechanics::recover::Recovery;
 use pliant_mechanics::tensor::{Vector, add, cross, dot, scale, sub};
 use pliant_meshing::VolumeCell;
 use pliant_validation::{Specimen, claim, elastic, largest, run, soft_tissue};
@@ -77,7 +77,8 @@ fn body_in_free_fall_moves_by_half_g_t_squared_without_strain() {
             let worst = largest(state.displacement.iter().map(|&u| length(sub(u, fallen))));
             off = largest([off, worst / length(fallen).max(1e-6)]);
             let cells = 0..block.model.solids[0].cells.len();
-            let fields = cells.map(|cell| cell_fields(&block.model, state, 0, cell).green_strain.0);
+            let recovery = Recovery::new(&block.model, state);
+            let fields = cells.map(|cell| recovery.cell(0, cell).green_strain.0);
             strain = largest(fields.flatten().map(f64::abs).chain([strain]));
         })
         .unwrap();

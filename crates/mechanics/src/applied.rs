@@ -51,8 +51,7 @@ impl<'m> AppliedForces<'m> {
                     load.add_forces(time, Some(&surface.mapping), place, &mut self.nodal);
                 }
                 None => {
-                    let place =
-                        |node: u32| add(model.rest[node as usize], cast(displacement[node as usize]));
+                    let place = |node: u32| add(model.rest[node as usize], cast(displacement[node as usize]));
                     load.add_forces(time, None, place, &mut self.nodal);
                 }
             }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::forces::InternalForces;
 use crate::model::{Contradiction, FREE, Model, Solid};
+use crate::state::History;
 use crate::tensor::Vector;
 
 /// The smallest element bound of a model.
@@ -75,7 +76,7 @@ pub fn true_limit(model: &Model) -> Result<TrueLimit, Contradiction> {
 /// The symmetric operator M^(−1/2) K M^(−1/2) on the free components.
 struct Operator {
     forces: InternalForces<f64>,
-    history: Vec<Vec<crate::tensor::Symmetric<f64>>>,
+    history: Vec<History<f64>>,
     /// M^(−1/2), zero on held components.
     inverse_root_mass: Vec<Vector<f64>>,
     displacement: Vec<Vector<f64>>,
@@ -96,7 +97,7 @@ impl Operator {
             .fold(f64::INFINITY, f64::min);
         Self {
             forces: InternalForces::new(model, 1.0),
-            history: vec![Vec::new(); model.solids.len()],
+            history: vec![History::default(); model.solids.len()],
             inverse_root_mass,
             displacement: vec![[0.0; 3]; model.node_count()],
             amplitude: 1e-6 * smallest,

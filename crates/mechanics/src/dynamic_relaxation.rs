@@ -5,7 +5,7 @@
 //! over the cells at a node, n nodes per cell, s = 1.25.
 //!
 //! Time is that of loads, motions and relaxing laws; inertia and damping of the bodies play no part. A load step that
-//! fails is tried again in halves. History is committed at convergence only: inside a step every trial starts from the
+//! fails is tried again in halves, with twice the masses. History is committed at convergence only: inside a step every trial starts from the
 //! history of the step before.
 
 use rayon::prelude::*;
@@ -14,13 +14,14 @@ use crate::Real;
 use crate::applied::AppliedForces;
 use crate::forces::InternalForces;
 use crate::model::{Contradiction, FREE, Model};
-use crate::state::State;
+use crate::state::{History, State};
 use crate::stepper::Energies;
-use crate::tensor::{Symmetric, Vector, sub};
+use crate::tensor::{Vector, sub};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
-/// s: margin of the fictitious masses against stiffening.
+/// s: margin of the fictitious masses against stiffening. Doubled when a load step fails: cells at a glued edge stiffen
+/// many times over in compression, and a motion too fast for them turns them inside out.
 const MASS_MARGIN: f64 = 1.25;
 /// A_m.
 const HIGHEST: f64 = 4.0;
@@ -73,7 +74,9 @@ pub enum RelaxationError {
         time: f64,
     },
     /// A cell turns inside out however small the load step.
-    #[error("element {element} of `{body}` is inverted (det F = {determinant:.3e}) on the way to t = {time:.6} s")]
+    #[error(
+        "element {element} of `{body}` is inverted (det F = {determinant:.3e}) on the way to t = {time:.6} s"
+    )]
     Inverted {
         /// The body.
         body: String,
@@ -145,8 +148,10 @@ pub struct DynamicRelaxation<'m, R> {
     owners: Vec<[u32; 3]>,
     /// Fictitious masses.
     mass: Vec<R>,
+    /// Factor on them.
+    slowness: f64,
     applied: AppliedForces<'m>,
-    trial_history: Vec<Vec<Symmetric<R>>>,
+    trial_history: Vec<History<R>>,
     /// u − u one iteration before.
     increment: Vec<Vector<R>>,
     /// Internal minus applied force now and one iteration before.
@@ -168,8 +173,9 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             settings,
             owners: model.constrained_components()?,
             mass: fictitious_masses(model).into_iter().map(R::of).collect(),
+            slowness: 1.0,
             applied: AppliedForces::new(model),
-            trial_history: vec![Vec::new(); model.solids.len()],
+            trial_history: vec![History::default(); model.solids.len()],
             increment: vec![[R::ZERO; 3]; nodes],
             residual: vec![[R::ZERO; 3]; nodes],
             residual_before: vec![[R::ZERO; 3]; nodes],
@@ -187,6 +193,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         let mut size = whole;
         let least = whole / f64::from(1_u32 << self.settings.halvings.min(30));
         let mut convergence = Convergence::default();
+        self.slowness = 1.0;
         while state.time < time {
             let left = time - state.time;
             let end = if size >= left * (1.0 - 1e-9) { time } else { state.time + size };
@@ -195,6 +202,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                 Ok(()) => convergence.parts += 1,
                 Err(error) => {
                     state.displacement = before;
+                    self.slowness *= 2.0;
                     size = 0.5 * (end - state.time);
                     if size < least * (1.0 - 1e-9) {
                         return Err(error);
@@ -305,36 +313,42 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         self.applied.update(time, &state.displacement);
         std::mem::swap(&mut self.residual, &mut self.residual_before);
         let (residual, before) = (&mut self.residual, &self.residual_before);
-        let (increment, owners, mass) = (&self.increment, &self.owners, &self.mass);
+        let (increment, owners, mass, slowness) = (&self.increment, &self.owners, &self.mass, self.slowness);
         let (applied, forces) = (&self.applied, &*forces);
-        (residual.par_chunks_mut(CHUNK).zip(&mut self.sums)).enumerate().for_each(|(task, (residual, sums))| {
-            *sums = Sums { finite: true, ..Sums::default() };
-            for (offset, r) in residual.iter_mut().enumerate() {
-                let node = task * CHUNK + offset;
-                let internal = forces.at(node);
-                *r = sub(internal, applied.at(node));
-                for c in 0..3 {
-                    let (force, out) = (internal[c].to_f64().abs(), r[c].to_f64().abs());
-                    sums.finite &= force.is_finite() && out.is_finite();
-                    sums.largest_force = sums.largest_force.max(force);
-                    if owners[node][c] != FREE {
-                        continue;
+        (residual.par_chunks_mut(CHUNK).zip(&mut self.sums)).enumerate().for_each(
+            |(task, (residual, sums))| {
+                *sums = Sums { finite: true, ..Sums::default() };
+                for (offset, r) in residual.iter_mut().enumerate() {
+                    let node = task * CHUNK + offset;
+                    let internal = forces.at(node);
+                    *r = sub(internal, applied.at(node));
+                    for c in 0..3 {
+                        let (force, out) = (internal[c].to_f64().abs(), r[c].to_f64().abs());
+                        sums.finite &= force.is_finite() && out.is_finite();
+                        sums.largest_force = sums.largest_force.max(force);
+                        if owners[node][c] != FREE {
+                            continue;
+                        }
+                        if out > sums.largest_residual {
+                            (sums.largest_residual, sums.residual_node) = (out, node);
+                        }
+                        let du = increment[node][c].to_f64();
+                        sums.stiffness += du * (r[c] - before[node][c]).to_f64();
+                        sums.mass += du * du * slowness * mass[node].to_f64();
                     }
-                    if out > sums.largest_residual {
-                        (sums.largest_residual, sums.residual_node) = (out, node);
-                    }
-                    let du = increment[node][c].to_f64();
-                    sums.stiffness += du * (r[c] - before[node][c]).to_f64();
-                    sums.mass += du * du * mass[node].to_f64();
                 }
-            }
-        });
+            },
+        );
         let total = self.total();
         if !total.finite {
             let lost = |u: &Vector<R>| u.iter().any(|x| !x.to_f64().is_finite());
             let node = self.residual.iter().position(lost).unwrap_or(0);
             let (body, node) = self.model.locate_node(node as u32);
-            return Err(RelaxationError::NotFinite { body: self.model.bodies[body].name.clone(), node, time });
+            return Err(RelaxationError::NotFinite {
+                body: self.model.bodies[body].name.clone(),
+                node,
+                time,
+            });
         }
         Ok(total)
     }
@@ -344,19 +358,20 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
     }
 
     fn advance(&mut self, state: &mut State<R>, damping: f64) {
-        let alpha = R::of(2.0 / (2.0 + damping));
+        let alpha = R::of(2.0 / (2.0 + damping) / self.slowness);
         let beta = R::of((2.0 - damping) / (2.0 + damping));
         let (residual, mass, owners) = (&self.residual, &self.mass, &self.owners);
-        (state.displacement.par_iter_mut().zip(&mut self.increment)).enumerate().with_min_len(CHUNK).for_each(
-            |(node, (u, du))| {
+        (state.displacement.par_iter_mut().zip(&mut self.increment))
+            .enumerate()
+            .with_min_len(CHUNK)
+            .for_each(|(node, (u, du))| {
                 for c in 0..3 {
                     if owners[node][c] == FREE {
                         du[c] = beta * du[c] - alpha * residual[node][c] / mass[node];
                         u[c] += du[c];
                     }
                 }
-            },
-        );
+            });
     }
 
     /// Takes a converged trial as the new state. Work is that of the mean of the forces before and after.

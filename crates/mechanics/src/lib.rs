@@ -55,5 +55,5 @@ pub mod tensor;
 pub use dynamic_relaxation::{Convergence, DynamicRelaxation, RelaxationError, RelaxationSettings};
 pub use model::Model;
 pub use real::Real;
-pub use state::{State, Work};
+pub use state::{History, State, Work};
 pub use stepper::{BALANCE_LIMIT, BALANCE_STEPS, CentralDifference, Energies, StepError, balance_floor};

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::curve::Curve;
-use crate::element::{Hex8, Rest, hex8, tet4};
+use crate::element::{GaussPoints, Hex8, Rest, gauss_points, hex8, tet4};
 use crate::law::AnyLaw;
 use crate::load::Load;
 use crate::mapping::Mapping;
@@ -72,16 +72,31 @@ pub struct Solid {
 pub enum Cells {
     /// Linear tetrahedra.
     Tet4(CellBlock<4>),
+    /// Linear tetrahedra with averaged pressure.
+    AveragedTet4(CellBlock<4>, Averaging),
     /// Uniform-strain hexahedra.
     Hex8(CellBlock<8>),
+    /// Hexahedra with eight Gauss points and one mean dilatation.
+    FullHex8(CellBlock<8>, Vec<GaussPoints>),
+}
+
+/// How tetrahedra average their pressure over nodes; see `forces/averaged.rs`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Averaging {
+    /// Average nodal pressure (Bonet and Burton 1998): the recommended tetrahedron.
+    Nodal,
+    /// Improved average nodal pressure in a variational form.
+    Variational,
+    /// Improved average nodal pressure as in NiftySim; not the gradient of an energy.
+    NiftySim,
 }
 
 /// Runs `$body` with `$bound` the concrete [`CellBlock`].
 macro_rules! with_cells {
     ($cells:expr, $bound:ident => $body:expr) => {
         match $cells {
-            $crate::model::Cells::Tet4($bound) => $body,
-            $crate::model::Cells::Hex8($bound) => $body,
+            $crate::model::Cells::Tet4($bound) | $crate::model::Cells::AveragedTet4($bound, _) => $body,
+            $crate::model::Cells::Hex8($bound) | $crate::model::Cells::FullHex8($bound, _) => $body,
         }
     };
 }
@@ -129,6 +144,35 @@ impl Cells {
         })
     }
 
+    /// Tetrahedra with averaged pressure from their nodes.
+    pub fn averaged_tet4(nodes: Vec<[u32; 4]>, rest: &[Vector<f64>], averaging: Averaging) -> Self {
+        let quantities = nodes.iter().map(|cell| tet4(&cell.map(|n| rest[n as usize]))).collect();
+        Self::AveragedTet4(CellBlock { nodes, rest: quantities, hourglass: None }, averaging)
+    }
+
+    /// Hexahedra with eight Gauss points from their nodes.
+    pub fn full_hex8(nodes: Vec<[u32; 8]>, rest: &[Vector<f64>]) -> Self {
+        let corners = |cell: &[u32; 8]| cell.map(|n| rest[n as usize]);
+        let quantities = nodes.iter().map(|cell| hex8(&corners(cell)).rest).collect();
+        let points = nodes.iter().map(|cell| gauss_points(&corners(cell))).collect();
+        Self::FullHex8(CellBlock { nodes, rest: quantities, hourglass: None }, points)
+    }
+
+    /// Points of a cell at which the law is evaluated.
+    pub fn points(&self) -> usize {
+        if matches!(self, Self::FullHex8(..)) { 8 } else { 1 }
+    }
+
+    /// Number of averaged pressures; `None` where each point has its own.
+    pub fn averaged_pressures(&self) -> Option<usize> {
+        match self {
+            Self::AveragedTet4(block, Averaging::Nodal) => Some(LocalNodes::new(block).len()),
+            Self::AveragedTet4(block, Averaging::Variational) => Some(block.nodes.len()),
+            Self::FullHex8(block, _) => Some(block.nodes.len()),
+            Self::Tet4(_) | Self::Hex8(_) | Self::AveragedTet4(_, Averaging::NiftySim) => None,
+        }
+    }
+
     /// Number of cells.
     pub fn len(&self) -> usize {
         with_cells!(self, block => block.nodes.len())
@@ -142,8 +186,8 @@ impl Cells {
     /// Nodes per cell.
     pub fn nodes_per_cell(&self) -> usize {
         match self {
-            Self::Tet4(_) => 4,
-            Self::Hex8(_) => 8,
+            Self::Tet4(_) | Self::AveragedTet4(..) => 4,
+            Self::Hex8(_) | Self::FullHex8(..) => 8,
         }
     }
 
@@ -166,8 +210,65 @@ impl Cells {
     pub fn element(&self) -> &'static str {
         match self {
             Self::Tet4(_) => "tet4",
+            Self::AveragedTet4(_, Averaging::Nodal) => "tet4-anp",
+            Self::AveragedTet4(_, Averaging::Variational) => "tet4-ianp",
+            Self::AveragedTet4(_, Averaging::NiftySim) => "tet4-ianp-niftysim",
             Self::Hex8(_) => "hex8",
+            Self::FullHex8(..) => "hex8-full",
         }
+    }
+}
+
+/// The nodes of some cells, numbered among themselves in increasing order, and the cells at each of them.
+#[derive(Clone, Debug)]
+pub struct LocalNodes {
+    /// Local nodes of each cell.
+    pub nodes: Vec<[u32; 4]>,
+    /// First entry of `incident` of each local node, one more than there are nodes.
+    offsets: Vec<u32>,
+    /// Cells at each local node, increasing.
+    incident: Vec<u32>,
+}
+
+impl LocalNodes {
+    /// From the cells.
+    pub fn new(cells: &CellBlock<4>) -> Self {
+        let mut global: Vec<u32> = cells.nodes.iter().flatten().copied().collect();
+        global.sort_unstable();
+        global.dedup();
+        let local = |node: u32| global.partition_point(|&known| known < node) as u32;
+        let nodes: Vec<[u32; 4]> = cells.nodes.iter().map(|cell| cell.map(local)).collect();
+        let mut offsets = vec![0; global.len() + 1];
+        nodes.iter().flatten().for_each(|&node| offsets[node as usize + 1] += 1);
+        for node in 0..global.len() {
+            offsets[node + 1] += offsets[node];
+        }
+        let mut next = offsets.clone();
+        let mut incident = vec![0; 4 * nodes.len()];
+        for (cell, node) in
+            nodes.iter().enumerate().flat_map(|(cell, nodes)| nodes.iter().map(move |n| (cell, n)))
+        {
+            incident[next[*node as usize] as usize] = cell as u32;
+            next[*node as usize] += 1;
+        }
+        Self { nodes, offsets, incident }
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// True without any node.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The cells at a node.
+    pub fn cells_at(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+        self.incident[self.offsets[node] as usize..self.offsets[node + 1] as usize]
+            .iter()
+            .map(|&cell| cell as usize)
     }
 }
 
@@ -261,6 +362,31 @@ impl Model {
             }
         }
         self.solids.push(solid);
+    }
+
+    /// A number that tells one model's bodies from another's: nodes, cells, laws, densities and damping, bit for bit.
+    /// Constraints and loads don't count.
+    pub fn fingerprint(&self) -> u64 {
+        // FNV-1a, 64 bits: the same on every machine and in every version of the language.
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let mut take = |bytes: &[u8]| {
+            for &byte in bytes {
+                hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+            }
+        };
+        self.rest.iter().flatten().chain(&self.mass).for_each(|x| take(&x.to_bits().to_le_bytes()));
+        for body in &self.bodies {
+            take(&body.nodes.end.to_le_bytes());
+            take(&body.damping.to_bits().to_le_bytes());
+        }
+        for solid in &self.solids {
+            take(format!("{:?}", solid.material).as_bytes());
+            (0..solid.cells.len())
+                .flat_map(|cell| solid.cells.nodes(cell))
+                .for_each(|n| take(&n.to_le_bytes()));
+            solid.fibre.iter().flatten().for_each(|x| take(&x.to_bits().to_le_bytes()));
+        }
+        hash
     }
 
     /// Number of nodes.

@@ -6,6 +6,8 @@
 //! *backward Euler* (thesis 5.57–5.61, there written with a − h): d = τ/(Δt + τ), g = a d.
 //! Leaves out: a thermodynamic derivation; for anisotropic finite strain the dissipation may be non-monotone.
 
+use std::ops::{Add, Mul, Sub};
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -119,15 +121,30 @@ impl Prony {
             let remaining = 1.0 - series.iter().map(|(weight, _)| weight).sum::<f64>();
             history.iter().skip(1).fold(elastic * remaining, |sum, h| sum + *h)
         };
-        let slots = if self.isochoric.is_empty() { 0 } else { 1 + self.isochoric.len() };
-        let (isochoric, volumetric) = history.split_at(slots);
+        let (isochoric, volumetric) = history.split_at(self.isochoric_slots());
         part(elastic.isochoric, &self.isochoric, isochoric)
             + part(elastic.volumetric, &self.volumetric, volumetric)
     }
 
+    /// The averaged pressure [Pa] at the instant the history belongs to.
+    pub fn pressure(&self, elastic: f64, history: &[f64]) -> f64 {
+        let remaining = 1.0 - self.volumetric.iter().map(|(weight, _)| weight).sum::<f64>();
+        history.iter().skip(1).fold(elastic * remaining, |sum, h| sum + h)
+    }
+
     /// Symmetric tensors of history per cell: for each part that relaxes, Φⁿ⁻¹ and one h per term.
     pub fn slots(&self) -> usize {
-        [&self.isochoric, &self.volumetric].iter().filter(|s| !s.is_empty()).map(|s| 1 + s.len()).sum()
+        self.isochoric_slots() + self.volumetric_slots()
+    }
+
+    /// Those of the isochoric part.
+    pub fn isochoric_slots(&self) -> usize {
+        if self.isochoric.is_empty() { 0 } else { 1 + self.isochoric.len() }
+    }
+
+    /// Those of the volumetric part.
+    pub fn volumetric_slots(&self) -> usize {
+        if self.volumetric.is_empty() { 0 } else { 1 + self.volumetric.len() }
     }
 }
 
@@ -137,6 +154,12 @@ pub struct Relaxation<R> {
     isochoric: Series<R>,
     volumetric: Series<R>,
 }
+
+/// What a series can relax: tensors, or the pressure of a node.
+trait Relaxes<R>: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<R, Output = Self> {}
+
+impl<R: Real> Relaxes<R> for Symmetric<R> {}
+impl<R: Real> Relaxes<R> for R {}
 
 #[derive(Clone, Debug)]
 struct Series<R> {
@@ -166,7 +189,7 @@ impl<R: Real> Series<R> {
 
     /// S of one part, and its history advanced in place; `history` is Φⁿ⁻¹ followed by one h per term.
     #[inline(always)]
-    fn advance(&self, elastic: Symmetric<R>, history: &mut [Symmetric<R>]) -> Symmetric<R> {
+    fn advance<T: Relaxes<R>>(&self, elastic: T, history: &mut [T]) -> T {
         let Some((previous, terms)) = history.split_first_mut() else {
             return elastic;
         };
@@ -192,6 +215,18 @@ impl<R: Real> Relaxation<R> {
             isochoric: Series::new(&prony.isochoric, prony.update, step),
             volumetric: Series::new(&prony.volumetric, prony.update, step),
         }
+    }
+
+    /// The isochoric stress [Pa] at the end of the step; `history` has [`Prony::isochoric_slots`] tensors.
+    #[inline(always)]
+    pub fn advance_isochoric(&self, elastic: Symmetric<R>, history: &mut [Symmetric<R>]) -> Symmetric<R> {
+        self.isochoric.advance(elastic, history)
+    }
+
+    /// The pressure [Pa] at the end of the step; `history` has [`Prony::volumetric_slots`] numbers.
+    #[inline(always)]
+    pub fn advance_pressure(&self, elastic: R, history: &mut [R]) -> R {
+        self.volumetric.advance(elastic, history)
     }
 
     /// The total stress [Pa] at the end of the step from the elastic one, and the history advanced to it.

@@ -1,9 +1,10 @@
 //! Fields recovered from a state: strains, stresses and energies of the cells, in double precision.
 
 use crate::Real;
-use crate::law::{Deformation, Split};
-use crate::model::{Model, Solid, with_cells};
-use crate::state::State;
+use crate::forces::pressure;
+use crate::law::{Deformation, Split, with_law};
+use crate::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
+use crate::state::{History, State};
 use crate::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale, sub};
 
 /// The state of one cell.
@@ -39,21 +40,97 @@ impl CellFields {
     }
 }
 
-/// The fields of one cell of a solid. The history of a relaxing law belongs to the last evaluated instant: ask between
+/// Fields of the cells of a state. The history of a relaxing law belongs to the last evaluated instant: ask between
 /// [`evaluate`](crate::CentralDifference::evaluate) and [`advance`](crate::CentralDifference::advance).
-pub fn cell_fields<R: Real>(model: &Model, state: &State<R>, solid: usize, cell: usize) -> CellFields {
-    let part = &model.solids[solid];
-    let h = displacement_gradient(part, cell, &state.displacement);
-    let deformation = Deformation::from_displacement_gradient(&h);
-    let fibre = part.fibre.get(cell).copied();
+pub struct Recovery<'a, R> {
+    model: &'a Model,
+    state: &'a State<R>,
+    averages: Vec<Averages>,
+}
+
+/// What the cells of a solid take from averages.
+enum Averages {
+    /// Nothing.
+    None,
+    /// Their pressure U' [Pa].
+    Pressure(Vec<f64>),
+    /// Their volume ratio J̄, minus 1.
+    VolumeChange(Vec<f64>),
+}
+
+impl<'a, R: Real> Recovery<'a, R> {
+    /// Finds the averages that the elements take; the rest is found cell by cell.
+    pub fn new(model: &'a Model, state: &'a State<R>) -> Self {
+        let averages =
+            model.solids.iter().zip(&state.history).map(|(s, h)| averages(s, h, &state.displacement));
+        Self { model, state, averages: averages.collect() }
+    }
+
+    /// The fields of one cell of a solid, means over its points.
+    pub fn cell(&self, solid: usize, cell: usize) -> CellFields {
+        let part = &self.model.solids[solid];
+        let nodes = part.cells.nodes(cell);
+        let origin: Vector<f64> = cast(self.state.displacement[nodes[0] as usize]);
+        let u: Vec<Vector<f64>> =
+            nodes.iter().map(|&node| sub(cast(self.state.displacement[node as usize]), origin)).collect();
+        let per_cell = History::<R>::slots(part);
+        let own = &self.state.history[solid].cells[cell * per_cell..(cell + 1) * per_cell];
+        let history: Vec<Symmetric<f64>> = own.iter().map(|h| Symmetric(h.0.map(R::to_f64))).collect();
+        let fibre = part.fibre.get(cell).copied();
+        let averages = &self.averages[solid];
+        match &part.cells {
+            Cells::FullHex8(_, points) => {
+                let slots = history.len() / 8;
+                let at = |point: usize| {
+                    let h = gradient(&u, &points[cell].gradient[point]);
+                    let own = &history[point * slots..(point + 1) * slots];
+                    (point_fields(part, &h, fibre, averages, cell, own), points[cell].weight[point])
+                };
+                mean((0..8).map(at), part.cells.volume(cell))
+            }
+            cells => {
+                let h = with_cells!(cells, block => gradient(&u, &block.rest[cell].gradient));
+                point_fields(part, &h, fibre, averages, cell, &history)
+            }
+        }
+    }
+}
+
+/// ∂u/∂X.
+fn gradient(u: &[Vector<f64>], shape: &[Vector<f64>]) -> Tensor<f64> {
+    let mut h = Tensor::ZERO;
+    for (&u, &b) in u.iter().zip(shape) {
+        h.add_outer(u, b);
+    }
+    h
+}
+
+fn point_fields(
+    solid: &Solid,
+    h: &Tensor<f64>,
+    fibre: Option<Vector<f64>>,
+    averages: &Averages,
+    cell: usize,
+    history: &[Symmetric<f64>],
+) -> CellFields {
+    let Material { law, prony, .. } = &solid.material;
+    let deformation = match averages {
+        Averages::VolumeChange(changes) => {
+            Deformation::from_displacement_gradient(&dilated(h, changes[cell]))
+        }
+        Averages::None | Averages::Pressure(_) => Deformation::from_displacement_gradient(h),
+    };
     let a = fibre.unwrap_or([0.0; 3]);
-    let Split { isochoric, volumetric } = part.material.law.energy(&deformation, a);
-    let elastic = part.material.law.stress(&deformation, a);
-    let slots = part.material.prony.slots();
-    let own = &state.history[solid][cell * slots..(cell + 1) * slots];
-    let history: Vec<Symmetric<f64>> = own.iter().map(|h| Symmetric(h.0.map(R::to_f64))).collect();
-    let pk2_stress = part.material.prony.stress(elastic, &history);
-    let cauchy = pk2_stress.push_forward(&deformation.gradient) * (1.0 / deformation.volume_ratio);
+    let Split { isochoric, volumetric } = law.energy(&deformation, a);
+    let elastic = law.stress(&deformation, a);
+    let pk2_stress = match averages {
+        Averages::Pressure(pressures) => {
+            let volumetric = deformation.inverse_cauchy_green * (deformation.volume_ratio * pressures[cell]);
+            prony.stress(Split { isochoric: elastic.isochoric, volumetric: Symmetric::ZERO }, history)
+                + volumetric
+        }
+        Averages::None | Averages::VolumeChange(_) => prony.stress(elastic, history),
+    };
     let stretch = |a: Vector<f64>| {
         let deformed = deformation.gradient.apply(a);
         dot(deformed, deformed).sqrt()
@@ -63,22 +140,96 @@ pub fn cell_fields<R: Real>(model: &Model, state: &State<R>, solid: usize, cell:
         volume_ratio: deformation.volume_ratio,
         green_strain: deformation.strain_twice * 0.5,
         pk2_stress,
-        cauchy_stress: cauchy,
+        cauchy_stress: pk2_stress.push_forward(&deformation.gradient) * (1.0 / deformation.volume_ratio),
         energy_density: isochoric + volumetric,
         fibre_stretch: fibre.map(stretch),
     }
 }
 
-fn displacement_gradient<R: Real>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
-    let mut h = Tensor::ZERO;
-    with_cells!(&solid.cells, block => {
-        let nodes = &block.nodes[cell];
+/// H of F̄ = (J̄/J)^(1/3) F.
+fn dilated(h: &Tensor<f64>, change: f64) -> Tensor<f64> {
+    let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
+    let ratio = ((1.0 + change) / j).cbrt();
+    let mut scaled = Tensor(h.0.map(|row| row.map(|x| ratio * x)));
+    (0..3).for_each(|i| scaled.0[i][i] += ratio - 1.0);
+    scaled
+}
+
+/// The mean of fields at points, weighted by volume.
+fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFields {
+    let weighted = points.map(|(fields, weight)| (fields, weight / volume));
+    let add_up = |sum: CellFields, (point, w): (CellFields, f64)| CellFields {
+        gradient: Tensor([0, 1, 2].map(|i| add(sum.gradient.0[i], scale(point.gradient.0[i], w)))),
+        volume_ratio: sum.volume_ratio + w * point.volume_ratio,
+        green_strain: sum.green_strain + point.green_strain * w,
+        pk2_stress: sum.pk2_stress + point.pk2_stress * w,
+        cauchy_stress: sum.cauchy_stress + point.cauchy_stress * w,
+        energy_density: sum.energy_density + w * point.energy_density,
+        fibre_stretch: point.fibre_stretch.map(|stretch| sum.fibre_stretch.unwrap_or(0.0) + w * stretch),
+    };
+    let nothing = CellFields {
+        gradient: Tensor::ZERO,
+        volume_ratio: 0.0,
+        green_strain: Symmetric::ZERO,
+        pk2_stress: Symmetric::ZERO,
+        cauchy_stress: Symmetric::ZERO,
+        energy_density: 0.0,
+        fibre_stretch: None,
+    };
+    weighted.fold(nothing, add_up)
+}
+
+fn averages<R: Real>(solid: &Solid, history: &History<R>, displacement: &[Vector<R>]) -> Averages {
+    let pressures: Vec<f64> = history.pressures.iter().map(|&p| p.to_f64()).collect();
+    let slots = solid.material.prony.volumetric_slots();
+    let own = |index: usize| &pressures[index * slots..(index + 1) * slots];
+    let relaxed = |index: usize, change: f64| {
+        let elastic = with_law!(&solid.material.law, law => pressure(law, change));
+        solid.material.prony.pressure(elastic, own(index))
+    };
+    let change = |cell: usize, gradients: &[Vector<f64>]| {
+        let nodes = solid.cells.nodes(cell);
         let origin: Vector<f64> = cast(displacement[nodes[0] as usize]);
-        for (&node, &b) in nodes.iter().zip(&block.rest[cell].gradient) {
-            h.add_outer(sub(cast(displacement[node as usize]), origin), b);
+        let u: Vec<_> = nodes.iter().map(|&node| sub(cast(displacement[node as usize]), origin)).collect();
+        let h = gradient(&u, gradients);
+        h.trace() + h.second_invariant() + h.determinant()
+    };
+    match &solid.cells {
+        Cells::Tet4(_) | Cells::Hex8(_) => Averages::None,
+        Cells::FullHex8(block, points) => {
+            let mean_change = |cell: usize| {
+                let at =
+                    |point: usize| points[cell].weight[point] * change(cell, &points[cell].gradient[point]);
+                (0..8).map(at).sum::<f64>() / block.rest[cell].volume
+            };
+            Averages::Pressure((0..block.nodes.len()).map(|cell| relaxed(cell, mean_change(cell))).collect())
         }
-    });
-    h
+        Cells::AveragedTet4(block, averaging) => {
+            let local = LocalNodes::new(block);
+            let to_nodes = |values: &[f64]| -> Vec<f64> {
+                let at = |node: usize| {
+                    let volume = |cell: usize| block.rest[cell].volume;
+                    let total: f64 = local.cells_at(node).map(volume).sum();
+                    local.cells_at(node).map(|cell| volume(cell) * values[cell]).sum::<f64>() / total
+                };
+                (0..local.len()).map(at).collect()
+            };
+            let to_cells = |values: &[f64]| -> Vec<f64> {
+                local.nodes.iter().map(|cell| cell.iter().map(|&n| 0.25 * values[n as usize]).sum()).collect()
+            };
+            let changes: Vec<f64> =
+                (0..block.nodes.len()).map(|cell| change(cell, &block.rest[cell].gradient)).collect();
+            let nodal = to_nodes(&changes);
+            let relax = |values: Vec<f64>| -> Vec<f64> {
+                values.into_iter().enumerate().map(|(index, change)| relaxed(index, change)).collect()
+            };
+            match averaging {
+                Averaging::Nodal => Averages::Pressure(to_cells(&relax(nodal))),
+                Averaging::Variational => Averages::Pressure(to_cells(&to_nodes(&relax(to_cells(&nodal))))),
+                Averaging::NiftySim => Averages::VolumeChange(to_cells(&nodal)),
+            }
+        }
+    }
 }
 
 /// The centre of a cell in its current place [m].

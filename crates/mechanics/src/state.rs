@@ -1,11 +1,13 @@
 //! The state: everything that changes in a run. `Clone` is a snapshot.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Real;
-use crate::model::{FREE, Model};
+use crate::model::{FREE, Model, Solid};
 use crate::tensor::{Symmetric, Vector};
 
 /// What a stepper advances.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State<R> {
     /// Time [s].
     pub time: f64,
@@ -15,14 +17,43 @@ pub struct State<R> {
     pub displacement: Vec<Vector<R>>,
     /// The last increments, u − u one step before [m].
     pub increment: Vec<Vector<R>>,
-    /// History of each solid: [`Prony::slots`](crate::prony::Prony::slots) tensors per cell, cell after cell.
-    pub history: Vec<Vec<Symmetric<R>>>,
+    /// History of each solid.
+    pub history: Vec<History<R>>,
     /// Energies so far.
     pub work: Work,
 }
 
+/// What a relaxing law remembers of a solid.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct History<R> {
+    /// [`History::slots`] tensors per cell, cell after cell.
+    pub cells: Vec<Symmetric<R>>,
+    /// Where pressures are averaged: Φⁿ⁻¹ and one h per volumetric term, one averaged pressure after the other.
+    pub pressures: Vec<R>,
+}
+
+impl<R: Real> History<R> {
+    /// At rest.
+    fn at_rest(solid: &Solid) -> Self {
+        let pressures =
+            solid.cells.averaged_pressures().unwrap_or(0) * solid.material.prony.volumetric_slots();
+        Self {
+            cells: vec![Symmetric::ZERO; solid.cells.len() * Self::slots(solid)],
+            pressures: vec![R::ZERO; pressures],
+        }
+    }
+
+    /// Tensors of history per cell.
+    pub fn slots(solid: &Solid) -> usize {
+        let prony = &solid.material.prony;
+        let point =
+            if solid.cells.averaged_pressures().is_some() { prony.isochoric_slots() } else { prony.slots() };
+        solid.cells.points() * point
+    }
+}
+
 /// Work accumulated over the steps [J].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Work {
     /// ∫ f_int · du, stored and viscous part and hourglass together, to the current time.
     pub internal: f64,
@@ -54,15 +85,12 @@ impl<R: Real> State<R> {
                 }
             }
         }
-        let history = |solid: &crate::model::Solid| {
-            vec![Symmetric::ZERO; solid.cells.len() * solid.material.prony.slots()]
-        };
         Self {
             time: 0.0,
             steps: 0,
             increment: vec![[R::ZERO; 3]; model.node_count()],
             displacement,
-            history: model.solids.iter().map(history).collect(),
+            history: model.solids.iter().map(History::at_rest).collect(),
             work: Work::default(),
         }
     }

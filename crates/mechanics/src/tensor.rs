@@ -4,6 +4,8 @@
 
 use std::ops::{Add, Mul, Sub};
 
+use serde::{Deserialize, Serialize};
+
 use crate::Real;
 
 /// A vector in space.
@@ -114,7 +116,7 @@ impl<R: Real> Tensor<R> {
 }
 
 /// A symmetric tensor in the order 11, 22, 33, 12, 23, 13.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Symmetric<R>(pub [R; 6]);
 
 impl<R: Real> Symmetric<R> {

@@ -53,6 +53,22 @@ pub fn hex8(x: &[Vector<f64>; 8]) -> Hex8 {
     }
 }
 
+/// The eight Gauss points of a hexahedron at rest.
+#[derive(Clone, Copy, Debug)]
+pub struct GaussPoints {
+    /// Gradients of the shape functions at each point [1/m].
+    pub gradient: [[Vector<f64>; 8]; 8],
+    /// Volume that belongs to each point [m³].
+    pub weight: [f64; 8],
+}
+
+/// The Gauss points of a hexahedron from its nodes [m].
+pub fn gauss_points(x: &[Vector<f64>; 8]) -> GaussPoints {
+    let gauss = 1.0 / 3.0_f64.sqrt();
+    let points = HEX_CORNERS.map(|corner| shape_derivatives(x, corner.map(|c| c * gauss)));
+    GaussPoints { gradient: points.map(|(_, gradient)| gradient), weight: points.map(|(weight, _)| weight) }
+}
+
 /// det ∂X/∂ξ and ∂N_a/∂X at a point of the reference cube.
 fn shape_derivatives(x: &[Vector<f64>; 8], at: Vector<f64>) -> (f64, [Vector<f64>; 8]) {
     let local = HEX_CORNERS.map(|c| {

@@ -1,10 +1,14 @@
-//! The battery every element runs through: patch test, rigid motion, f = dE/du, Σf = 0, Στ = 0.
+//! The battery every element runs through: patch test, rigid motion, f = dE/du, Σf = 0, Στ = 0. A new element is one
+//! line in [`ELEMENTS`] and its energy in [`energy`].
 
 use super::*;
-use crate::law::{AnyLaw, NeoHookean, Split, TransverselyIsotropic};
-use crate::model::{Body, Cells, Material};
+use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic};
+use crate::model::{Averaging, Body, Cells, LocalNodes, Material};
 use crate::prony::Prony;
-use crate::tensor::cross;
+use crate::tensor::{cast, cross, dot};
+
+/// Every element whose force is the gradient of an energy.
+const ELEMENTS: [&str; 5] = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"];
 
 struct Random(u64);
 
@@ -22,8 +26,8 @@ impl Random {
 
 const CELLS: u32 = 3;
 
-/// A cube of 3×3×3 cells of edge 0.1, interior nodes moved by up to 12 % of an edge, as hexes or tets.
-fn distorted_cube(hexes: bool, law: AnyLaw) -> Model {
+/// A cube of 3×3×3 cells of edge 0.1, interior nodes moved by up to 12 % of an edge.
+fn distorted_cube(element: &str, law: AnyLaw) -> Model {
     let mut random = Random(7);
     let n = CELLS + 1;
     let mut rest = Vec::new();
@@ -51,8 +55,14 @@ fn distorted_cube(hexes: bool, law: AnyLaw) -> Model {
     const KUHN: [[usize; 4]; 6] =
         [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
     let tets = || hex_nodes.iter().flat_map(|hex| KUHN.map(|tet| tet.map(|corner| hex[corner]))).collect();
-    let cells =
-        if hexes { Cells::hex8(hex_nodes.clone(), &rest, 0.2, 700.0) } else { Cells::tet4(tets(), &rest) };
+    let cells = match element {
+        "tet4" => Cells::tet4(tets(), &rest),
+        "tet4-anp" => Cells::averaged_tet4(tets(), &rest, Averaging::Nodal),
+        "tet4-ianp" => Cells::averaged_tet4(tets(), &rest, Averaging::Variational),
+        "hex8" => Cells::hex8(hex_nodes.clone(), &rest, 0.2, 700.0),
+        _ => Cells::full_hex8(hex_nodes.clone(), &rest),
+    };
+    assert_eq!(cells.element(), element);
     let mut model = Model { mass: vec![0.0; rest.len()], rest, ..Model::default() };
     model.bodies.push(Body { name: "cube".into(), nodes: 0..n.pow(3), damping: 0.0 });
     let material = Material { law, prony: Prony::default(), density: 1000.0 };
@@ -72,23 +82,78 @@ fn laws() -> [AnyLaw; 2] {
 
 fn forces(model: &Model, displacement: &[Vector<f64>]) -> (Vec<Vector<f64>>, f64) {
     let mut internal = InternalForces::new(model, 1.0);
-    let (hourglass, _) = internal.evaluate(displacement, &mut vec![Vec::new(); model.solids.len()]);
+    let (hourglass, _) = internal.evaluate(displacement, &mut vec![History::default(); model.solids.len()]);
     ((0..model.node_count()).map(|node| internal.at(node)).collect(), hourglass)
 }
 
+/// The energy [J] that an element's force is the gradient of.
 fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
-    let state = crate::State { displacement: displacement.to_vec(), ..crate::State::at_rest(model) };
-    let stored: f64 = (0..model.solids[0].cells.len())
-        .map(|cell| {
-            let fields = crate::recover::cell_fields(model, &state, 0, cell);
-            fields.energy_density * model.solids[0].cells.volume(cell)
-        })
-        .sum();
-    stored + forces(model, displacement).1
+    let solid = &model.solids[0];
+    let law = &solid.material.law;
+    let fibre = solid.fibre.first().copied().unwrap_or([0.0; 3]);
+    let gradient = |cell: usize, shape: &[Vector<f64>]| {
+        let mut h = Tensor::ZERO;
+        for (&node, &b) in solid.cells.nodes(cell).iter().zip(shape) {
+            h.add_outer(displacement[node as usize], b);
+        }
+        h
+    };
+    let split = |h: &Tensor<f64>| law.energy(&Deformation::from_displacement_gradient(h), fibre);
+    let change = |h: &Tensor<f64>| h.determinant() + h.second_invariant() + h.trace();
+    // U(J) from a pure dilation.
+    let dilation = |x: f64| {
+        let stretch = (1.0 + x).cbrt() - 1.0;
+        let h = Tensor([[stretch, 0.0, 0.0], [0.0, stretch, 0.0], [0.0, 0.0, stretch]]);
+        law.energy(&Deformation::from_displacement_gradient(&h), fibre).volumetric
+    };
+    match &solid.cells {
+        Cells::FullHex8(block, points) => (0..block.nodes.len())
+            .map(|cell| {
+                let (mut shape, mut v) = (0.0, 0.0);
+                for (gradients, w) in points[cell].gradient.iter().zip(points[cell].weight) {
+                    let h = gradient(cell, gradients);
+                    shape += w * split(&h).isochoric;
+                    v += w * change(&h);
+                }
+                let volume = block.rest[cell].volume;
+                shape + volume * dilation(v / volume)
+            })
+            .sum(),
+        Cells::AveragedTet4(block, averaging) => {
+            let local = LocalNodes::new(block);
+            let volume = |cell: usize| block.rest[cell].volume;
+            let h: Vec<_> =
+                (0..block.nodes.len()).map(|cell| gradient(cell, &block.rest[cell].gradient)).collect();
+            let shape: f64 = h.iter().enumerate().map(|(cell, h)| volume(cell) * split(h).isochoric).sum();
+            let nodal = |node: usize| {
+                let own: f64 = local.cells_at(node).map(volume).sum();
+                (own, local.cells_at(node).map(|cell| volume(cell) * change(&h[cell])).sum::<f64>() / own)
+            };
+            let averaged: Vec<(f64, f64)> = (0..local.len()).map(nodal).collect();
+            shape
+                + match averaging {
+                    Averaging::Nodal => averaged.iter().map(|(v, x)| 0.25 * v * dilation(*x)).sum::<f64>(),
+                    _ => (0..h.len())
+                        .map(|cell| {
+                            let mean = local.nodes[cell].iter().map(|&n| 0.25 * averaged[n as usize].1).sum();
+                            volume(cell) * dilation(mean)
+                        })
+                        .sum(),
+                }
+        }
+        cells => {
+            let stored = |cell: usize| {
+                let h = crate::model::with_cells!(cells, block => gradient(cell, &block.rest[cell].gradient));
+                let Split { isochoric, volumetric } = split(&h);
+                cells.volume(cell) * (isochoric + volumetric)
+            };
+            (0..cells.len()).map(stored).sum::<f64>() + forces(model, displacement).1
+        }
+    }
 }
 
-fn both_elements() -> impl Iterator<Item = Model> {
-    laws().into_iter().flat_map(|law| [true, false].map(|hexes| distorted_cube(hexes, law)))
+fn every_element() -> impl Iterator<Item = Model> {
+    laws().into_iter().flat_map(|law| ELEMENTS.map(|element| distorted_cube(element, law)))
 }
 
 fn largest(forces: impl IntoIterator<Item = Vector<f64>>) -> f64 {
@@ -99,7 +164,7 @@ fn largest(forces: impl IntoIterator<Item = Vector<f64>>) -> f64 {
 fn patch_test_on_distorted_cells() {
     // A homogeneous deformation must leave every interior node in balance, to round-off.
     let h = Tensor([[0.12, 0.2, -0.05], [0.03, -0.1, 0.1], [-0.08, 0.07, 0.15]]);
-    for model in both_elements() {
+    for model in every_element() {
         let displacement: Vec<_> = model.rest.iter().map(|&x| h.apply(x)).collect();
         let (forces, hourglass) = forces(&model, &displacement);
         let scale = largest(forces.iter().copied());
@@ -119,7 +184,7 @@ fn rigid_motion_costs_no_force_and_no_energy() {
         let along = scale(k, dot(k, x) * (1.0 - c));
         add(add(scale(x, c), scale(cross(k, x), s)), along)
     };
-    for model in both_elements() {
+    for model in every_element() {
         let displacement: Vec<_> =
             model.rest.iter().map(|&x| add(sub(turn(x), x), [2.0, -1.0, 0.5])).collect();
         // Against the force of 1 % strain on a face of a cell: 50 Pa × 0.01 m².
@@ -131,7 +196,7 @@ fn rigid_motion_costs_no_force_and_no_energy() {
 #[test]
 fn force_is_the_derivative_of_energy() {
     let mut random = Random(3);
-    for model in both_elements() {
+    for model in every_element() {
         let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.008)).collect();
         let (forces, _) = forces(&model, &displacement);
         let scale = largest(forces.iter().copied());
@@ -152,7 +217,7 @@ fn force_is_the_derivative_of_energy() {
 #[test]
 fn forces_and_torques_sum_to_zero() {
     let mut random = Random(5);
-    for model in both_elements() {
+    for model in every_element() {
         let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
         let (forces, _) = forces(&model, &displacement);
         let scale = largest(forces.iter().copied());
@@ -168,7 +233,7 @@ fn forces_and_torques_sum_to_zero() {
 
 #[test]
 fn a_lumped_mass_is_the_whole_mass() {
-    for model in both_elements() {
+    for model in every_element() {
         let total: f64 = model.mass.iter().sum();
         assert!((total - 1000.0 * 0.027).abs() < 1e-12 * total);
     }
@@ -177,12 +242,12 @@ fn a_lumped_mass_is_the_whole_mass() {
 #[test]
 fn single_precision_follows_double() {
     let mut random = Random(11);
-    for model in both_elements() {
+    for model in every_element() {
         let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
         let (fine, _) = forces(&model, &displacement);
         let coarse_displacement: Vec<Vector<f32>> = displacement.iter().map(|&u| cast(u)).collect();
         let mut coarse = InternalForces::<f32>::new(&model, 1.0);
-        coarse.evaluate(&coarse_displacement, &mut [Vec::new()]);
+        coarse.evaluate(&coarse_displacement, &mut [History::default()]);
         let scale = largest(fine.iter().copied());
         for (node, f) in fine.iter().enumerate() {
             for (a, b) in f.iter().zip(coarse.at(node)) {
@@ -194,10 +259,10 @@ fn single_precision_follows_double() {
 
 #[test]
 fn an_inverted_cell_is_found() {
-    let model = distorted_cube(false, laws()[0]);
+    let model = distorted_cube("tet4", laws()[0]);
     let mut displacement = vec![[0.0; 3]; model.node_count()];
     displacement[21] = [0.3, 0.0, 0.0];
-    let (_, inverted) = InternalForces::new(&model, 1.0).evaluate(&displacement, &mut [Vec::new()]);
+    let (_, inverted) = InternalForces::new(&model, 1.0).evaluate(&displacement, &mut [History::default()]);
     let (solid, cell, determinant) = inverted.unwrap();
     assert_eq!(solid, 0);
     assert!(determinant < 0.0);

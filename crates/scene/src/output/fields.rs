@@ -1,6 +1,6 @@
 //! Values of the fields a user can ask for, at nodes and cells.
 
-use pliant_mechanics::recover::{CellFields, cell_fields};
+use pliant_mechanics::recover::{CellFields, Recovery};
 use pliant_mechanics::tensor::Symmetric;
 use pliant_mechanics::{Model, Real};
 
@@ -41,7 +41,7 @@ pub(super) fn recovered<R: Real>(
     solid: usize,
     cell: usize,
 ) -> CellFields {
-    cell_fields(model, frame.state, solid, cell)
+    Recovery::new(model, frame.state).cell(solid, cell)
 }
 
 fn padded(values: &[f64]) -> Value {

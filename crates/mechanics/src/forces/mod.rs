@@ -1,0 +1,197 @@
+//! Internal forces of solids: f_a = V F S B_a per cell, plus hourglass control, in first Piola–Kirchhoff form without
+//! Voigt matrices. Each cell writes its nodal contributions into slots of its own; nodes gather them in a fixed order,
+//! so that the number of threads never changes a bit.
+//!
+//! Cost of a tet with the split neo-Hookean law: about 260 operations; 96 B of constants, 48 B gathered, 48 B written
+//! in double precision. Runs on the current rayon pool.
+
+mod averaged;
+mod full_hex;
+mod plain;
+#[cfg(test)]
+mod tests;
+
+use averaged::AveragedTets;
+pub(crate) use averaged::pressure;
+use full_hex::FullHexes;
+use plain::SolidForces;
+
+use crate::Real;
+use crate::law::with_law;
+use crate::model::{Cells, Model, Solid};
+use crate::state::History;
+use crate::tensor::{Tensor, Vector, add, scale, sub};
+
+/// Cells per parallel task; the sums of a task are added up in order.
+const CHUNK: usize = 256;
+
+/// What a pass over some cells found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Findings {
+    /// Energy held by hourglass patterns [J].
+    pub hourglass: f64,
+    /// The first cell of the pass with det F ≤ 0 or not a number, and its det F.
+    pub inverted: Option<(usize, f64)>,
+}
+
+/// Internal forces of one solid, compiled for its element, law and number type.
+pub(crate) trait ForceField<R>: Send + Sync {
+    /// Contributions [N] of each cell to its nodes, written cell by cell into `slots`. With `history` the stress
+    /// relaxes and the history advances to this state; an empty `history` gives the instantaneous elastic
+    /// response.
+    /// `findings` has one entry per [`CHUNK`] cells.
+    fn evaluate(
+        &mut self,
+        displacement: &[Vector<R>],
+        history: &mut History<R>,
+        slots: &mut [Vector<R>],
+        findings: &mut [Findings],
+    );
+}
+
+impl Findings {
+    /// Notes a cell whose det F is not above zero, the first one.
+    #[inline(always)]
+    fn note_volume_ratio<R: Real>(&mut self, cell: usize, j: R) {
+        if self.inverted.is_none() && (j <= R::ZERO || j.partial_cmp(&R::ZERO).is_none()) {
+            self.inverted = Some((cell, j.to_f64()));
+        }
+    }
+}
+
+/// u_a − u_0: keeps the digits of small strains in cells that have moved far.
+#[inline(always)]
+fn relative_displacements<R: Real, const N: usize>(
+    nodes: &[u32; N],
+    displacement: &[Vector<R>],
+) -> [Vector<R>; N] {
+    let origin = displacement[nodes[0] as usize];
+    let mut relative = [[R::ZERO; 3]; N];
+    for (u, &node) in relative.iter_mut().zip(nodes) {
+        *u = sub(displacement[node as usize], origin);
+    }
+    relative
+}
+
+/// ∂u/∂X from the displacements relative to the first node.
+#[inline(always)]
+fn displacement_gradient<R: Real, const N: usize>(
+    u: &[Vector<R>; N],
+    gradient: &[Vector<R>; N],
+) -> Tensor<R> {
+    let mut h = Tensor::ZERO;
+    for (ua, ba) in u.iter().zip(gradient).skip(1) {
+        h.add_outer(*ua, *ba);
+    }
+    h
+}
+
+/// f_a = V P B_a; the first node takes what makes the sum zero.
+#[inline(always)]
+fn scatter<R: Real, const N: usize>(
+    piola: &Tensor<R>,
+    gradient: &[Vector<R>; N],
+    volume: R,
+    forces: &mut [Vector<R>],
+) {
+    let mut sum = [R::ZERO; 3];
+    for (force, &b) in forces.iter_mut().zip(gradient).skip(1) {
+        *force = scale(piola.apply(b), volume);
+        sum = add(sum, *force);
+    }
+    forces[0] = scale(sum, -R::ONE);
+}
+
+/// The force field of a solid for steps of `step` seconds.
+fn force_field<R: Real>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
+    with_law!(&solid.material.law, law => match &solid.cells {
+        Cells::Tet4(cells) => Box::new(SolidForces::new(solid, cells, *law, step)),
+        Cells::AveragedTet4(cells, averaging) => Box::new(AveragedTets::new(solid, cells, *averaging, *law, step)),
+        Cells::Hex8(cells) => Box::new(SolidForces::new(solid, cells, *law, step)),
+        Cells::FullHex8(cells, points) => Box::new(FullHexes::new(solid, cells, points, *law, step)),
+    })
+}
+
+/// All force fields of a model, their contribution slots, and the order in which nodes gather them.
+pub(crate) struct InternalForces<R> {
+    fields: Vec<Box<dyn ForceField<R>>>,
+    /// First slot of each field, one more than there are fields.
+    field_offsets: Vec<usize>,
+    slots: Vec<Vector<R>>,
+    /// What each task of each field found.
+    findings: Vec<Vec<Findings>>,
+    /// First entry of `incident` of each node, one more than there are nodes.
+    node_offsets: Vec<u32>,
+    /// Slots of each node, in the order of fields and cells.
+    incident: Vec<u32>,
+}
+
+impl<R: Real> InternalForces<R> {
+    pub(crate) fn new(model: &Model, step: f64) -> Self {
+        let mut field_offsets = vec![0];
+        let mut counts = vec![0_u32; model.node_count() + 1];
+        for solid in &model.solids {
+            for cell in 0..solid.cells.len() {
+                for &node in solid.cells.nodes(cell) {
+                    counts[node as usize + 1] += 1;
+                }
+            }
+            field_offsets.push(
+                field_offsets[field_offsets.len() - 1] + solid.cells.len() * solid.cells.nodes_per_cell(),
+            );
+        }
+        for node in 0..model.node_count() {
+            counts[node + 1] += counts[node];
+        }
+        let mut next = counts.clone();
+        let slot_count = field_offsets[field_offsets.len() - 1];
+        let mut incident = vec![0; slot_count];
+        let mut slot = 0;
+        for solid in &model.solids {
+            for cell in 0..solid.cells.len() {
+                for &node in solid.cells.nodes(cell) {
+                    incident[next[node as usize] as usize] = slot;
+                    next[node as usize] += 1;
+                    slot += 1;
+                }
+            }
+        }
+        Self {
+            fields: model.solids.iter().map(|solid| force_field(solid, step)).collect(),
+            field_offsets,
+            slots: vec![[R::ZERO; 3]; slot_count],
+            findings: (model.solids.iter())
+                .map(|solid| vec![Findings::default(); solid.cells.len().div_ceil(CHUNK)])
+                .collect(),
+            node_offsets: counts,
+            incident,
+        }
+    }
+
+    /// Evaluates all cells. `history` has one entry per solid, each empty for the instantaneous elastic response.
+    /// Returns the hourglass energy [J] and the first inverted cell as (solid, cell, det F).
+    pub(crate) fn evaluate(
+        &mut self,
+        displacement: &[Vector<R>],
+        history: &mut [History<R>],
+    ) -> (f64, Option<(usize, usize, f64)>) {
+        let mut hourglass = 0.0;
+        let mut inverted = None;
+        for (index, field) in self.fields.iter_mut().enumerate() {
+            let slots = &mut self.slots[self.field_offsets[index]..self.field_offsets[index + 1]];
+            field.evaluate(displacement, &mut history[index], slots, &mut self.findings[index]);
+            for findings in &self.findings[index] {
+                hourglass += findings.hourglass;
+                inverted = inverted.or(findings.inverted.map(|(cell, j)| (index, cell, j)));
+            }
+        }
+        (hourglass, inverted)
+    }
+
+    /// The internal force [N] on a node from the last evaluation.
+    #[inline(always)]
+    pub(crate) fn at(&self, node: usize) -> Vector<R> {
+        let slots = &self.incident[self.node_offsets[node] as usize..self.node_offsets[node + 1] as usize];
+        slots.iter().fold([R::ZERO; 3], |sum, &slot| add(sum, self.slots[slot as usize]))
+    }
+}

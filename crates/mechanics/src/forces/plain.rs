@@ -1,0 +1,127 @@
+//! One evaluation point a cell: linear tetrahedra, and uniform-strain hexahedra with hourglass control.
+
+use rayon::prelude::*;
+
+use super::{CHUNK, Findings, ForceField, relative_displacements, scatter};
+use crate::Real;
+use crate::law::{Deformation, Law};
+use crate::model::{CellBlock, Hourglass, Solid};
+use crate::prony::Relaxation;
+use crate::state::History;
+use crate::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale};
+
+/// Cells with one evaluation point.
+pub(super) struct SolidForces<R, L, const N: usize> {
+    law: L,
+    nodes: Vec<[u32; N]>,
+    gradient: Vec<[Vector<R>; N]>,
+    volume: Vec<R>,
+    fibre: Vec<Vector<R>>,
+    hourglass: Option<Hourglass<R, N>>,
+    relaxation: Relaxation<R>,
+    history_slots: usize,
+}
+
+impl<R: Real, L: Law, const N: usize> SolidForces<R, L, N> {
+    pub(super) fn new(solid: &Solid, cells: &CellBlock<N>, law: L, step: f64) -> Self {
+        let hourglass = cells.hourglass.as_ref().map(|control| Hourglass {
+            patterns: control.patterns.iter().map(|cell| cell.map(|gamma| gamma.map(R::of))).collect(),
+            stiffness: control.stiffness.iter().map(|&k| R::of(k)).collect(),
+        });
+        Self {
+            law,
+            nodes: cells.nodes.clone(),
+            gradient: cells.rest.iter().map(|rest| rest.gradient.map(cast)).collect(),
+            volume: cells.rest.iter().map(|rest| R::of(rest.volume)).collect(),
+            fibre: solid.fibre.iter().map(|&a| cast(a)).collect(),
+            hourglass,
+            relaxation: Relaxation::new(&solid.material.prony, step),
+            history_slots: solid.material.prony.slots(),
+        }
+    }
+
+    /// The cells from `first` on, as many as `slots` has room for.
+    fn pass(
+        &self,
+        first: usize,
+        displacement: &[Vector<R>],
+        history: &mut [Symmetric<R>],
+        slots: &mut [Vector<R>],
+    ) -> Findings {
+        let mut findings = Findings::default();
+        for (offset, forces) in slots.chunks_exact_mut(N).enumerate() {
+            let cell = first + offset;
+            let u = relative_displacements(&self.nodes[cell], displacement);
+            let mut h = Tensor::ZERO;
+            for (ua, ba) in u.iter().zip(&self.gradient[cell]).skip(1) {
+                h.add_outer(*ua, *ba);
+            }
+            let deformation = Deformation::from_displacement_gradient(&h);
+            let j = deformation.volume_ratio;
+            findings.note_volume_ratio(cell, j);
+            let fibre = if L::FIBRE { self.fibre[cell] } else { [R::ZERO; 3] };
+            let elastic = self.law.stress(&deformation, fibre);
+            let stress = if history.is_empty() {
+                elastic.isochoric + elastic.volumetric
+            } else {
+                let own = offset * self.history_slots..(offset + 1) * self.history_slots;
+                self.relaxation.advance(elastic, &mut history[own])
+            };
+            let piola = deformation.gradient.times_symmetric(&stress);
+            scatter(&piola, &self.gradient[cell], self.volume[cell], forces);
+            if let Some(control) = &self.hourglass {
+                findings.hourglass +=
+                    resist_hourglass(&control.patterns[cell], control.stiffness[cell], &u, forces);
+            }
+        }
+        findings
+    }
+}
+
+/// f_a += k Σ_c γ_ca q_c with q_c = Σ_b γ_cb u_b; returns the energy ½ k Σ |q_c|² [J].
+#[inline(always)]
+fn resist_hourglass<R: Real, const N: usize>(
+    patterns: &[[R; N]; 4],
+    stiffness: R,
+    u: &[Vector<R>; N],
+    forces: &mut [Vector<R>],
+) -> f64 {
+    let mut energy = R::ZERO;
+    for gamma in patterns {
+        let mut q = [R::ZERO; 3];
+        for (&g, &ua) in gamma.iter().zip(u) {
+            q = add(q, scale(ua, g));
+        }
+        energy += dot(q, q);
+        let kq = scale(q, stiffness);
+        for (force, &g) in forces.iter_mut().zip(gamma) {
+            *force = add(*force, scale(kq, g));
+        }
+    }
+    0.5 * (stiffness * energy).to_f64()
+}
+
+impl<R: Real, L: Law, const N: usize> ForceField<R> for SolidForces<R, L, N> {
+    fn evaluate(
+        &mut self,
+        displacement: &[Vector<R>],
+        history: &mut History<R>,
+        slots: &mut [Vector<R>],
+        findings: &mut [Findings],
+    ) {
+        let this = &*self;
+        let history = &mut history.cells;
+        let tasks = slots.par_chunks_mut(CHUNK * N).zip(findings).enumerate();
+        if history.is_empty() {
+            tasks.for_each(|(task, (slots, findings))| {
+                *findings = this.pass(task * CHUNK, displacement, &mut [], slots);
+            });
+        } else {
+            tasks.zip(history.par_chunks_mut(CHUNK * this.history_slots)).for_each(
+                |((task, (slots, findings)), history)| {
+                    *findings = this.pass(task * CHUNK, displacement, history, slots);
+                },
+            );
+        }
+    }
+}
