@@ -6,7 +6,10 @@ use clap::{Parser, Subcommand, ValueEnum};
 
 /// Real-time simulation of soft organs.
 #[derive(Debug, Parser)]
-#[command(version, after_help = "Exit codes: 0 done, 1 the run failed, 2 the input is wrong.")]
+#[command(
+    version,
+    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong."
+)]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Command,
@@ -44,14 +47,14 @@ pub enum Command {
 #[derive(Debug, clap::Args)]
 pub struct Overrides {
     /// Simulated time [s], instead of the scene's.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub until: Option<f64>,
     /// Time step [s], instead of the scene's.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub step: Option<f64>,
     /// Threads; 0: one per core.
-    #[arg(long, value_name = "N")]
-    pub threads: Option<u32>,
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub threads: Option<i64>,
     /// Number type of the solver.
     #[arg(long)]
     pub precision: Option<Precision>,
@@ -67,7 +70,7 @@ pub enum Precision {
 pub struct Run {
     /// A scene file, or a folder with a scene.toml.
     pub scene: PathBuf,
-    /// Folder for the outputs [default: out/<scene folder>].
+    /// Folder for the outputs; if not given, out/NAME after the folder of the scene.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Write into a folder that is not empty.
@@ -93,7 +96,7 @@ pub struct Info {
     /// A mesh file.
     pub mesh: PathBuf,
     /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     pub scale: f64,
     /// Write the mesh in another format, by the ending of the name.
     #[arg(long, value_name = "FILE")]

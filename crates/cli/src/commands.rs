@@ -5,14 +5,14 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use pliant_geometry::io::{self, MeshFile};
-use pliant_geometry::{QualityReport, diagnose};
+use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::Value;
-use pliant_scene::{Built, OutputFolder, Plan, Scene, reference, registry};
-use serde_json::json;
+use pliant_scene::{Built, OutputFolder, Plan, Scene, number, reference, registry};
+use serde_json::{Map, Value as Json, json};
 
 use crate::arguments::{Check, Command, Info, Overrides, Precision, Run};
-use crate::report::{self, Bar, Failure};
+use crate::report::{self, Bar, Failure, say};
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
@@ -21,9 +21,9 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::New { name } => new(&name),
         Command::Schema { markdown } => {
             if markdown {
-                print!("{}", reference::page(&registry::sections()));
+                say(reference::page(&registry::sections()).trim_end())?;
             } else {
-                println!("{:#}", registry::scene_schema());
+                say(format_args!("{:#}", registry::scene_schema()))?;
             }
             Ok(ExitCode::SUCCESS)
         }
@@ -42,7 +42,7 @@ fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), F
     let settings = [
         (["scene", "until"], overrides.until.map(Value::from)),
         (["run", "step"], overrides.step.map(Value::from)),
-        (["run", "threads"], overrides.threads.map(|n| Value::from(i64::from(n)))),
+        (["run", "threads"], overrides.threads.map(Value::from)),
         (["run", "precision"], precision.map(Value::from)),
     ];
     for (path, value) in settings {
@@ -78,38 +78,38 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     let (scene, built, plan) = prepare(&arguments.scene, &arguments.overrides)?;
     let file = pliant_scene::scene_file(&arguments.scene);
     let path = arguments.out.clone().unwrap_or_else(|| OutputFolder::default_for(&file));
-    let folder =
-        OutputFolder::prepare(path, &scene, arguments.force).map_err(|error| Failure::plain(error, ""))?;
+    let folder = OutputFolder::prepare(path, &scene, arguments.force)
+        .map_err(|error| Failure::plain(&error, error.remedy))?;
     for note in built.notes.iter().chain(&plan.note) {
         eprintln!("note: {note}");
     }
     let bar = Bar::new();
     let result = pliant_scene::run(&scene, &built, &plan, &folder, &mut |progress| bar.update(progress));
     bar.finish();
-    let summary = match result {
-        Ok(summary) => summary,
-        Err(error) => {
-            eprintln!("error: {error}");
-            if arguments.json {
-                println!("{}", pliant_scene::failed_output(&error));
+    let (failure, json) = match result {
+        Ok(summary) => {
+            if !arguments.json {
+                say(report::result(&summary))?;
             }
-            return Ok(ExitCode::from(1));
+            (summary.error.as_ref().map(|error| error.message.clone()), json!(summary))
         }
+        Err(error) => (Some(format!("{error}; {}", error.remedy)), pliant_scene::failed_output(&error)),
     };
-    if let Some(failure) = &summary.error {
-        eprintln!("error: {}", failure.message);
-    }
     if arguments.json {
-        println!("{}", json!(summary));
-    } else {
-        report::result(&summary);
+        say(json)?;
     }
-    Ok(if summary.error.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    match failure {
+        None => Ok(ExitCode::SUCCESS),
+        Some(message) => {
+            eprintln!("error: {message}");
+            Ok(ExitCode::from(1))
+        }
+    }
 }
 
 fn check(arguments: &Check) -> Result<ExitCode, Failure> {
     let (scene, built, plan) = prepare(&arguments.scene, &arguments.overrides)?;
-    print!("{}", pliant_scene::overview(&scene, &built, &plan));
+    say(pliant_scene::overview(&scene, &built, &plan).trim_end())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -119,10 +119,13 @@ fn new(name: &Path) -> Result<ExitCode, Failure> {
         return Err(Failure::plain(format!("`{}` exists already", file.display()), "choose another name"));
     }
     let title = name.file_name().unwrap_or(name.as_os_str()).to_string_lossy();
-    fs::create_dir_all(name)
-        .and_then(|()| fs::write(&file, pliant_scene::starter(&title)))
-        .map_err(|error| Failure::plain(format!("`{}` cannot be written: {error}", file.display()), ""))?;
-    println!("wrote {}; try: pliant run {}", file.display(), name.display());
+    fs::create_dir_all(name).and_then(|()| fs::write(&file, pliant_scene::starter(&title))).map_err(
+        |error| {
+            let help = "check the folder, its permissions and the free space, or choose another name";
+            Failure::plain(format!("`{}` cannot be written: {error}", file.display()), help)
+        },
+    )?;
+    say(format_args!("wrote {}; try: pliant run {}", file.display(), name.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -131,62 +134,62 @@ fn info(arguments: &Info) -> Result<ExitCode, Failure> {
         let message = format!("`--scale` must be greater than 0, found {}", arguments.scale);
         return Err(Failure::plain(message, "0.001 for millimetres"));
     }
-    let read = io::read(&arguments.mesh).map_err(|error| Failure::plain(error, ""))?;
-    let MeshFile { mut mesh, format, notes, .. } = read;
-    mesh.points.iter_mut().for_each(|point| *point *= arguments.scale);
-    let (quality, found) = (QualityReport::new(&mesh), diagnose(&mesh));
-    let sets: Vec<(&str, usize)> = mesh
-        .set_names()
-        .into_iter()
-        .map(|name| (name, mesh.set_points(name).map_or(0, |set| set.len())))
-        .collect();
+    let mut file = io::read(&arguments.mesh).map_err(|error| Failure::plain(error, ""))?;
+    file.mesh.points.iter_mut().for_each(|point| *point *= arguments.scale);
     if arguments.json {
-        let cells: serde_json::Map<_, _> =
-            quality.cells.iter().map(|(kind, count)| (kind.name().to_owned(), json!(count))).collect();
-        let spread = |s: pliant_geometry::Spread| json!({ "min": s.min, "median": s.median, "max": s.max });
-        println!(
-            "{}",
-            json!({
-                "format": format,
-                "nodes": quality.nodes,
-                "cells": cells,
-                "bounds": mesh.bounds().map(|(low, high)| [<[f64; 3]>::from(low), <[f64; 3]>::from(high)]),
-                "volume": quality.volume,
-                "acoustic_length": quality.acoustic_length.map(spread),
-                "edge_length": quality.edge_length.map(spread),
-                "dihedral": quality.dihedral,
-                "scaled_jacobian": quality.scaled_jacobian,
-                "sets": sets.iter().map(|(name, count)| (name.to_string(), json!(count))).collect::<serde_json::Map<_, _>>(),
-                "usable": found.is_usable(),
-                "problems": found.to_string(),
-                "notes": notes,
-            })
-        );
+        say(info_object(&file))?;
     } else {
-        println!("{}: {format}", arguments.mesh.display());
-        if let Some((low, high)) = mesh.bounds() {
-            println!("from ({}, {}, {}) to ({}, {}, {}) m", low.x, low.y, low.z, high.x, high.y, high.z);
-        }
-        println!("{quality}");
-        for (name, count) in sets {
-            println!("set `{name}`: {count} nodes");
-        }
-        for name in mesh.point_data.keys() {
-            println!("point data `{name}`");
-        }
-        for block in &mesh.blocks {
-            for name in block.data.keys() {
-                println!("cell data `{name}` of {} cells", block.kind.name());
-            }
-        }
-        for note in notes {
-            println!("note: {note}");
-        }
-        println!("{found}");
+        say(format_args!("{}: {}", arguments.mesh.display(), info_page(&file)))?;
     }
     if let Some(target) = &arguments.convert {
-        io::write(target, &mesh).map_err(|error| Failure::plain(error, ""))?;
+        io::write(target, &file.mesh).map_err(|error| Failure::plain(error, ""))?;
         eprintln!("wrote {}", target.display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The named sets of a mesh with their numbers of nodes.
+fn sets(mesh: &Mesh) -> impl Iterator<Item = (&str, usize)> {
+    mesh.set_names().into_iter().map(|name| (name, mesh.set_points(name).map_or(0, |set| set.len())))
+}
+
+fn info_object(MeshFile { mesh, format, notes, .. }: &MeshFile) -> Json {
+    let (quality, found) = (QualityReport::new(mesh), diagnose(mesh));
+    let cells: Map<_, _> =
+        quality.cells.iter().map(|(kind, count)| (kind.name().to_owned(), json!(count))).collect();
+    let sets: Map<_, _> = sets(mesh).map(|(name, count)| (name.to_owned(), json!(count))).collect();
+    let spread = |s: Spread| json!({ "min": s.min, "median": s.median, "max": s.max });
+    json!({
+        "format": format,
+        "nodes": quality.nodes,
+        "cells": cells,
+        "bounds": mesh.bounds().map(|(low, high)| [<[f64; 3]>::from(low), <[f64; 3]>::from(high)]),
+        "volume": quality.volume,
+        "acoustic_length": quality.acoustic_length.map(spread),
+        "edge_length": quality.edge_length.map(spread),
+        "dihedral": quality.dihedral,
+        "scaled_jacobian": quality.scaled_jacobian,
+        "sets": sets,
+        "usable": found.is_usable(),
+        "problems": found.to_string(),
+        "notes": notes,
+    })
+}
+
+fn info_page(MeshFile { mesh, format, notes, .. }: &MeshFile) -> String {
+    let mut lines = vec![format.clone()];
+    if let Some((low, high)) = mesh.bounds() {
+        let at = |p: Vector3| format!("({}, {}, {})", number(p.x), number(p.y), number(p.z));
+        lines.push(format!("from {} to {} m", at(low), at(high)));
+    }
+    lines.push(QualityReport::new(mesh).to_string().trim_end().to_owned());
+    lines.extend(sets(mesh).map(|(name, count)| format!("set `{name}`: {count} nodes")));
+    lines.extend(mesh.point_data.keys().map(|name| format!("point data `{name}`")));
+    for block in &mesh.blocks {
+        let kind = block.kind.name();
+        lines.extend(block.data.keys().map(|name| format!("cell data `{name}` of {kind} cells")));
+    }
+    lines.extend(notes.iter().map(|note| format!("note: {note}")));
+    lines.push(diagnose(mesh).to_string().trim_end().to_owned());
+    lines.join("\n")
 }

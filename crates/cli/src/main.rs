@@ -9,10 +9,23 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
-    let arguments = arguments::Arguments::parse();
+    let arguments = match arguments::Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return mistyped(&error),
+    };
     let json = arguments.command.wants_json();
     match commands::execute(arguments.command) {
         Ok(code) => code,
         Err(failure) => report::failure(&failure, json),
     }
+}
+
+/// What was typed cannot be read, or asks for help.
+fn mistyped(error: &clap::Error) -> ExitCode {
+    if error.use_stderr() && std::env::args().any(|argument| argument == "--json") {
+        report::refused(error.to_string().trim_end());
+    }
+    // A terminal that has gone away is no mistake.
+    let _ = error.print();
+    ExitCode::from(error.exit_code() as u8)
 }

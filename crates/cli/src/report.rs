@@ -1,13 +1,14 @@
 //! What goes to the user: mistakes with the line they are in, progress, results.
 
-use std::io::IsTerminal;
+use std::fmt::Display;
+use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
 use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::{Progress, ReadError, Summary, failed_input};
+use pliant_scene::{Progress, ReadError, Summary, failed_input, number};
 
 /// The input is wrong (exit code 2).
 #[derive(Debug)]
@@ -58,9 +59,15 @@ pub fn failure(failure: &Failure, json: bool) -> ExitCode {
         }
     };
     if json {
-        println!("{}", failed_input(text.trim_end()));
+        refused(text.trim_end());
     }
     ExitCode::from(2)
+}
+
+/// Prints the JSON object of an input that is wrong.
+pub fn refused(message: &str) {
+    // Where standard output can't be written, the exit code still tells.
+    let _ = say(failed_input(message));
 }
 
 /// Prints mistakes or doubts with the user's own lines underlined.
@@ -103,19 +110,32 @@ impl Bar {
     }
 }
 
-/// The result of a run in a few lines.
-pub fn result(summary: &Summary) {
+/// The result of a run in a few lines; of a failed one, whose energies and forces mean nothing, what was written.
+pub fn result(summary: &Summary) -> String {
     let Summary { nodes, elements, step, steps, wall_seconds, real_time_factor, energy_balance, .. } =
         summary;
-    println!("{nodes} nodes, {elements} elements; step {step:.3e} s, {steps} steps");
-    println!(
-        "wall time {wall_seconds:.2} s, {real_time_factor:.2} × real time; energies balance to {:.2} %",
-        energy_balance * 100.0
-    );
-    for (name, force) in &summary.reactions {
-        println!("reaction of `{name}`: {force} N");
+    let mut lines =
+        vec![format!("{nodes} nodes, {elements} elements; step {} s, {steps} steps", number(*step))];
+    if summary.error.is_none() {
+        let [wall, factor] = [*wall_seconds, *real_time_factor].map(number);
+        let balance = energy_balance * 100.0;
+        lines.push(format!("wall time {wall} s, {factor} × real time; energies balance to {balance:.2} %"));
+        lines.extend(summary.reactions.iter().map(|(name, force)| {
+            let [x, y, z] = force.map(number);
+            format!("reaction of `{name}`: ({x}, {y}, {z}) N")
+        }));
     }
-    for file in &summary.files {
-        println!("wrote {file}");
+    lines.extend(summary.files.iter().map(|file| format!("wrote {file}")));
+    lines.join("\n")
+}
+
+/// Prints a line on standard output. A reader that has gone away (`pliant schema | head`) is no mistake.
+pub fn say(text: impl Display) -> Result<(), Failure> {
+    let written = writeln!(io::stdout(), "{text}").and_then(|()| io::stdout().flush());
+    match written {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::plain(format!("standard output cannot be written: {error}"), "check the free space"))
+        }
+        _ => Ok(()),
     }
 }

@@ -155,11 +155,14 @@ pub(crate) struct Form<'s> {
     letters_range: (Option<u64>, Option<u64>),
     pub(crate) lower: Option<Bound>,
     pub(crate) upper: Option<Bound>,
+    /// What is said of this form, such as one word of several or one key of which a table has exactly one.
+    pub(crate) doc: Option<&'s str>,
 }
 
 impl<'s> Form<'s> {
     /// Takes in what a schema says itself, beside its references and alternatives.
     fn absorb(&mut self, schema: &'s Map<String, Json>) {
+        self.doc = schema.get("description").and_then(Json::as_str).or(self.doc);
         let types = match schema.get("type") {
             Some(Json::String(one)) => Some(Kind::named(one).into_iter().collect::<Vec<_>>()),
             Some(Json::Array(many)) => {

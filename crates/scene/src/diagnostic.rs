@@ -9,6 +9,11 @@ use std::sync::Arc;
 
 use miette::{LabeledSpan, NamedSource, SourceCode};
 
+/// "1 element", "2 elements".
+pub(crate) fn counted(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
 /// How grave a [`Diagnostic`] is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
@@ -231,17 +236,11 @@ impl fmt::Display for SceneErrors {
         }
         let errors = self.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count();
         let warnings = self.diagnostics.len() - errors;
-        let count = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
+        let (mistakes, doubts) = (counted(errors, "mistake"), counted(warnings, "warning"));
         match (errors, warnings) {
-            (_, 0) => write!(f, "{} in {}", count(errors, "mistake"), self.name()),
-            (0, _) => write!(f, "{} about {}", count(warnings, "warning"), self.name()),
-            _ => write!(
-                f,
-                "{} and {} in {}",
-                count(errors, "mistake"),
-                count(warnings, "warning"),
-                self.name()
-            ),
+            (_, 0) => write!(f, "{mistakes} in {}", self.name()),
+            (0, _) => write!(f, "{doubts} about {}", self.name()),
+            _ => write!(f, "{mistakes} and {doubts} in {}", self.name()),
         }
     }
 }

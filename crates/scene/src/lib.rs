@@ -35,6 +35,7 @@ mod build;
 pub mod checker;
 pub mod diagnostic;
 pub mod format;
+pub mod niftysim;
 mod output;
 mod overview;
 mod plan;
@@ -44,10 +45,12 @@ mod run;
 mod scene;
 pub mod source;
 mod starter;
+#[cfg(test)]
+mod testing;
 
 pub use build::{Built, BuiltBody, build};
 pub use output::{
-    BodySummary, FailureSummary, OutputError, OutputFolder, Summary, failed_input, failed_output,
+    BodySummary, FailureSummary, OutputError, OutputFolder, Summary, failed_input, failed_output, number,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Plan, SAFETY, plan};

@@ -3,10 +3,14 @@
 use std::fmt::{self, Write};
 
 use pliant_geometry::QualityReport;
+use pliant_mechanics::load::{Load, LoadKind};
+use pliant_mechanics::model::Motion;
 
 use crate::build::Built;
+use crate::diagnostic::counted;
 use crate::output::{bodies, number};
 use crate::plan::Plan;
+use crate::registry::OutputTable;
 use crate::scene::Scene;
 
 /// The model in words: bodies, quality, constraints, loads, critical step, expected cost.
@@ -32,13 +36,16 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
             let moduli = solid.material.law.small_strain();
             writeln!(
                 page,
-                "  {} {} with law {}: shear modulus {} Pa, bulk modulus {} Pa, {} relaxing terms",
+                "  {} {} with law {}: shear modulus {} Pa, bulk modulus {} Pa, {}",
                 solid.cells.len(),
                 solid.cells.element(),
                 solid.material.law.name(),
                 number(moduli.shear),
                 number(moduli.bulk),
-                solid.material.prony.isochoric.len() + solid.material.prony.volumetric.len(),
+                counted(
+                    solid.material.prony.isochoric.len() + solid.material.prony.volumetric.len(),
+                    "relaxing term"
+                ),
             )?;
         }
         if let Some([least, most]) = quality.dihedral {
@@ -68,24 +75,51 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
     for constraint in &built.model.constraints {
         let axes: String =
             "xyz".chars().zip(constraint.components).filter(|(_, on)| *on).map(|(c, _)| c).collect();
-        writeln!(
-            page,
-            "constraint `{}`: {} nodes, components {axes}",
-            constraint.name,
-            constraint.nodes.len()
-        )?;
+        let what = match constraint.motion {
+            Motion::Fixed => "fixes",
+            Motion::Displacement(..) | Motion::Velocity(..) => "moves",
+        };
+        let nodes = counted(constraint.nodes.len(), "node");
+        writeln!(page, "constraint `{}`: {what} {axes} of {nodes}", constraint.name)?;
     }
     for load in &built.model.loads {
-        writeln!(page, "load `{}`", load.name)?;
+        writeln!(page, "load `{}`: {}", load.name, describe_load(built, load))?;
     }
-    for (name, _) in &scene.outputs {
-        writeln!(page, "output `{name}`")?;
+    for (name, table) in &scene.outputs {
+        match table {
+            OutputTable::Vtu(vtu) => {
+                writeln!(page, "output `{name}`: {name}.pvd, a frame every {} s", number(vtu.every))
+            }
+            OutputTable::Csv(csv) => {
+                writeln!(page, "output `{name}`: {name}.csv, a row every {} s", number(csv.every))
+            }
+        }?;
     }
     write_step(page, scene, plan)?;
     for remark in built.warnings.iter().map(ToString::to_string).chain(built.notes.iter().cloned()) {
         writeln!(page, "note: {remark}")?;
     }
     Ok(())
+}
+
+/// What a load does at its full size.
+fn describe_load(built: &Built, load: &Load) -> String {
+    let vector = |v: [f64; 3]| format!("({})", v.map(number).join(", "));
+    match &load.kind {
+        LoadKind::Forces(forces) => {
+            let sum = forces.iter().fold([0.0; 3], |sum, (_, f)| [0, 1, 2].map(|c| sum[c] + f[c]));
+            let mut nodes: Vec<u32> = forces.iter().map(|&(node, _)| node).collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            format!("{} N in all on {}", vector(sum), counted(nodes.len(), "node"))
+        }
+        LoadKind::Pressure { faces, pressure } => {
+            format!("{} Pa on {}", number(*pressure), counted(faces.len(), "face"))
+        }
+        LoadKind::Gravity { body, acceleration } => {
+            format!("{} m/s² on `{}`", vector(*acceleration), built.model.bodies[*body].name)
+        }
+    }
 }
 
 fn write_step(page: &mut String, scene: &Scene, plan: &Plan) -> fmt::Result {

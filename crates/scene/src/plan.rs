@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::build::Built;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::StepChoice;
+use crate::output::number;
 use crate::scene::Scene;
 
 /// Part of the element bound that an automatic step takes.
@@ -44,7 +45,11 @@ pub struct LimitingElement {
 impl std::fmt::Display for LimitingElement {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [x, y, z] = self.centre;
-        write!(f, "{} {} of `{}` at ({x:.4}, {y:.4}, {z:.4}) m", self.element, self.number, self.body)
+        write!(
+            f,
+            "element {} ({}) of `{}` at ({x:.4}, {y:.4}, {z:.4}) m",
+            self.number, self.element, self.body
+        )
     }
 }
 
@@ -66,15 +71,16 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         StepChoice::Auto(_) => (SAFETY * bound.step, None),
         StepChoice::Seconds(step) if step > limit.step => {
             let message = format!(
-                "the step {step:.4e} s is above the true limit {:.4e} s of the model: it would be unstable",
-                limit.step
+                "the step {} s is above the true limit {} s of the model: it would be unstable",
+                number(step),
+                number(limit.step)
             );
             let help = format!(
-                "the element bound {:.4e} s is set by {limiting}; take `step = \"auto\"` ({:.4e} s), a step below \
-                 {:.4e} s, or a mesh without small cells there",
-                bound.step,
-                SAFETY * bound.step,
-                SAFETY * limit.step
+                "the element bound {} s is set by {limiting}; take `step = \"auto\"` ({} s), a step below {} s, or a \
+                 mesh without small cells there",
+                number(bound.step),
+                number(SAFETY * bound.step),
+                number(SAFETY * limit.step)
             );
             let place = scene.source.span(&["run", "step"]);
             return fail(Diagnostic::error(message).at(place, "too large").help(help));
@@ -88,8 +94,11 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
 fn note_on_step(step: f64, bound: f64, limit: f64) -> Option<String> {
     (step > bound).then(|| {
         format!(
-            "the step {step:.4e} s lies between the element bound {bound:.4e} s and the true limit {limit:.4e} s: \
-             stable at rest, with little reserve for deformation"
+            "the step {} s lies between the element bound {} s and the true limit {} s: stable at rest, with little \
+             reserve for deformation",
+            number(step),
+            number(bound),
+            number(limit)
         )
     })
 }
@@ -108,5 +117,53 @@ fn limiting_element(built: &Built, bound: ElementBound) -> LimitingElement {
         element: solid.cells.element().into(),
         number: solid.original[bound.cell],
         centre,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{built, scene};
+
+    fn planned(more: &str) -> Result<Plan, SceneErrors> {
+        plan(&scene(more), &built(more))
+    }
+
+    #[test]
+    fn an_automatic_step_is_a_whole_part_of_the_duration_below_the_element_bound() {
+        let plan = planned("").unwrap();
+        assert!(plan.step <= SAFETY * plan.bound.step && plan.bound.step <= plan.limit.step);
+        assert!((plan.step * plan.steps as f64 - 0.1).abs() < 1e-15);
+        assert!(
+            0.1 / (plan.steps - 1) as f64 > SAFETY * plan.bound.step,
+            "one step fewer would be too large"
+        );
+        assert_eq!((plan.limiting.body.as_str(), plan.limiting.element.as_str()), ("cube", "hex8"));
+        assert!(plan.note.is_none());
+    }
+
+    #[test]
+    fn a_step_is_held_against_bound_and_true_limit() {
+        let automatic = planned("").unwrap();
+        let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
+        let between = asked(0.5 * (automatic.bound.step + automatic.limit.step)).unwrap();
+        assert!(between.note.is_some_and(|note| note.contains("between the element bound")));
+        assert!(asked(0.5 * automatic.bound.step).unwrap().note.is_none());
+        let refused = asked(1.001 * automatic.limit.step).unwrap_err().plain().to_string();
+        for piece in [
+            "cube.toml:",
+            "above the true limit",
+            "is set by element 0 (hex8) of `cube`",
+            "`step = \"auto\"`",
+        ] {
+            assert!(refused.contains(piece), "no `{piece}` in {refused}");
+        }
+    }
+
+    #[test]
+    fn a_duration_below_one_step_takes_one() {
+        let scene = crate::testing::read(&crate::testing::CUBE.replace("until = 0.1", "until = 1e-6"));
+        let plan = plan(&scene, &built("")).unwrap();
+        assert_eq!((plan.steps, plan.step), (1, 1e-6));
     }
 }

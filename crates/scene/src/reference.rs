@@ -26,18 +26,24 @@ pub struct Parameter {
     pub range: String,
     /// Its doc comment, all paragraphs.
     pub description: String,
+    /// The name of the definition that its value (or an item of it) is of; empty for none.
+    pub table: String,
     /// The parameters of the table, or of each of the tables, that it is.
     pub parts: Vec<Parameter>,
 }
 
-/// The page of all tables of a scene, as Markdown.
+/// The page of all tables of a scene, as Markdown. Kinds of values that several tables take, or that hold themselves,
+/// have a section of their own at the end.
 pub fn page(sections: &[Section]) -> String {
     let mut page = String::from(
         "# Scene reference\n\nWritten by `pliant schema --markdown` from the parameter structs; do not edit.\n\n\
          SI units throughout: m, kg, s, Pa, N. A scene is a TOML file of these tables; NAME is yours to choose.\n",
     );
+    let described: Vec<Vec<Parameter>> = sections.iter().map(|section| describe(&section.schema)).collect();
+    let shared = shared_tables(&described);
+    let names: Vec<&str> = shared.iter().map(|table| table.table.as_str()).collect();
     let mut header = "";
-    for section in sections {
+    for (section, parameters) in sections.iter().zip(&described) {
         if section.header != header {
             header = section.header;
             page.push_str(&format!("\n## `{header}`\n"));
@@ -48,9 +54,48 @@ pub fn page(sections: &[Section]) -> String {
         if let Some(doc) = section.schema.get("description").and_then(Json::as_str) {
             page.push_str(&format!("\n{doc}\n"));
         }
-        page.push_str(&format!("\n{}", markdown(&describe(&section.schema))));
+        page.push_str(&format!("\n{}", table(parameters, &names)));
+    }
+    for parameter in &shared {
+        let doc = definition(sections, &parameter.table);
+        page.push_str(&format!("\n## {}\n\n{doc}\n\n{}", parameter.table, table(&parameter.parts, &names)));
     }
     page
+}
+
+/// One parameter for each table that several places take, in order of appearance.
+fn shared_tables(described: &[Vec<Parameter>]) -> Vec<&Parameter> {
+    fn collect<'p>(parameters: &'p [Parameter], found: &mut Vec<(&'p Parameter, usize)>) {
+        for parameter in parameters {
+            if !parameter.parts.is_empty() && !parameter.table.is_empty() {
+                match found.iter_mut().find(|(known, _)| known.table == parameter.table) {
+                    Some((_, count)) => *count += 1,
+                    None => found.push((parameter, 1)),
+                }
+            }
+            collect(&parameter.parts, found);
+        }
+    }
+    let mut found = Vec::new();
+    described.iter().for_each(|parameters| collect(parameters, &mut found));
+    found.into_iter().filter(|(_, count)| *count > 1).map(|(parameter, _)| parameter).collect()
+}
+
+/// The doc comment of a definition.
+fn definition<'s>(sections: &'s [Section], name: &str) -> &'s str {
+    let find = |section: &'s Section| section.schema.get("$defs")?.get(name)?.get("description")?.as_str();
+    sections.iter().find_map(find).unwrap_or_default()
+}
+
+/// The name of the definition that a value, or an item of an array of them, is of; empty for none.
+fn definition_name(schema: &Json) -> &str {
+    if let Some(name) = schema.get("$ref").and_then(Json::as_str) {
+        return name.rsplit('/').next().unwrap_or_default();
+    }
+    let within = ["items", "anyOf", "oneOf"].into_iter().filter_map(|key| schema.get(key));
+    let alternatives =
+        within.flat_map(|value| value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice));
+    alternatives.map(definition_name).find(|name| !name.is_empty()).unwrap_or_default()
 }
 
 /// The parameters of a table, in the order of their declaration.
@@ -66,7 +111,11 @@ fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<P
         for (key, schema) in &form.properties {
             let of_all = forms.iter().all(|form| form.required.contains(key));
             if parameters.iter().all(|known| known.key != *key) {
-                parameters.push(parameter(schemas, key, schema, of_all, depth));
+                let mut found = parameter(schemas, key, schema, of_all, depth);
+                if found.description.is_empty() && form.properties.len() == 1 {
+                    found.description = form.doc.unwrap_or_default().to_owned();
+                }
+                parameters.push(found);
             }
         }
     }
@@ -85,8 +134,11 @@ fn parameter(schemas: Forms<'_>, key: &str, schema: &Json, required: bool, depth
         inner.retain(|form| form.kind == Some(Kind::Table));
         inner.extend(items);
     }
+    let mut parts: Vec<Parameter> = forms.iter().filter_map(word).collect();
     inner.retain(|form| form.kind == Some(Kind::Table));
-    let parts = if depth < DEEPEST { describe_forms(schemas, &inner, depth + 1) } else { Vec::new() };
+    if depth < DEEPEST {
+        parts.extend(describe_forms(schemas, &inner, depth + 1));
+    }
     let ranges = forms.iter().map(Form::range).filter(|range| !range.is_empty());
     Parameter {
         key: key.to_owned(),
@@ -96,33 +148,66 @@ fn parameter(schemas: Forms<'_>, key: &str, schema: &Json, required: bool, depth
         default: schema.get("default").filter(|value| !value.is_null()).cloned(),
         range: ranges.collect::<Vec<_>>().join(" or "),
         description: full.to_owned(),
+        table: definition_name(schema).to_owned(),
         parts,
     }
 }
 
+/// One word of several that a value may be, if something is said of it.
+fn word(form: &Form<'_>) -> Option<Parameter> {
+    let [word] = form.words.as_deref()? else { return None };
+    Some(Parameter {
+        key: format!("= \"{word}\""),
+        kind: String::new(),
+        unit: String::new(),
+        required: false,
+        default: None,
+        range: String::new(),
+        description: form.doc?.to_owned(),
+        table: String::new(),
+        parts: Vec::new(),
+    })
+}
+
 /// A Markdown table of parameters; those within tables follow theirs as `fibre.cell-data`.
 pub fn markdown(parameters: &[Parameter]) -> String {
+    table(parameters, &[])
+}
+
+/// The table with links to the sections of shared tables in the place of their parameters.
+fn table(parameters: &[Parameter], shared: &[&str]) -> String {
     let mut page = "| key | takes | unit | default | meaning |\n|---|---|---|---|---|\n".to_owned();
-    rows(parameters, "", &mut page);
+    rows(parameters, "", shared, &mut page);
     page
 }
 
-fn rows(parameters: &[Parameter], within: &str, page: &mut String) {
+fn rows(parameters: &[Parameter], within: &str, shared: &[&str], page: &mut String) {
     for parameter in parameters {
         let cell = |text: &str| one_line(text).replace('|', "\\|");
-        let path = format!("{within}{}", parameter.key);
+        let path = match parameter.key.strip_prefix("= ") {
+            Some(word) if within.is_empty() => word.to_owned(),
+            Some(_) => format!("{} {}", within.trim_end_matches('.'), parameter.key),
+            None => format!("{within}{}", parameter.key),
+        };
         let range = if parameter.range.is_empty() { String::new() } else { format!(", {}", parameter.range) };
         let default = match &parameter.default {
             Some(value) => format!("`{}`", cell(&value.to_string())),
             None if parameter.required => "required".to_owned(),
             None => String::new(),
         };
-        let (takes, meaning) = (cell(&parameter.kind) + &range, cell(&parameter.description));
+        let elsewhere = shared.contains(&parameter.table.as_str());
+        let takes = match parameter.table.as_str() {
+            name if elsewhere => format!("[{name}](#{})", name.to_lowercase()),
+            _ => cell(&parameter.kind) + &range,
+        };
+        let meaning = cell(&parameter.description);
         page.push_str(&format!(
             "| `{path}` | {takes} | {} | {default} | {meaning} |\n",
             cell(&parameter.unit)
         ));
-        rows(&parameter.parts, &format!("{path}."), page);
+        if !elsewhere {
+            rows(&parameter.parts, &format!("{path}."), shared, page);
+        }
     }
 }
 
@@ -194,6 +279,7 @@ mod tests {
                 default: None,
                 range: "greater than 0".into(),
                 description: "Shear modulus [Pa].\n\nOf the matrix.".into(),
+                table: String::new(),
                 parts: vec![],
             }
         );

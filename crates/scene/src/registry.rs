@@ -230,6 +230,8 @@ pub fn scene_schema() -> Json {
                 }
                 object.insert("title".into(), json!(format!("{header} of type {name}")));
             }
+            // A struct with flattened parts cannot deny unknown keys; the checker does, and so does this schema.
+            object.insert("additionalProperties".into(), json!(false));
         }
         kinds.entry(header.trim_matches(['[', ']'])).or_default().push(schema);
     }
@@ -251,4 +253,58 @@ pub fn scene_schema() -> Json {
         "additionalProperties": false,
         "$defs": definitions,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::describe;
+
+    #[test]
+    fn every_parameter_of_every_table_has_a_meaning() {
+        let sections = sections();
+        assert_eq!(sections.len(), 4 + AnyLaw::NAMES.len() + 2 + 4 + 2);
+        for Section { header, name, schema } in sections {
+            for parameter in describe(&schema) {
+                assert!(!parameter.description.is_empty(), "{header} {name:?}: {}", parameter.key);
+            }
+        }
+    }
+
+    #[test]
+    fn every_name_leads_to_a_schema() {
+        fn all<T: Typed>() {
+            assert!(T::NAMES.iter().all(|name| T::schema(name).is_some()), "{}", T::WHAT);
+            assert!(T::schema("nonsense").is_none());
+        }
+        all::<ConstraintTable>();
+        all::<LoadTable>();
+        all::<OutputTable>();
+    }
+
+    #[test]
+    fn the_schema_of_a_scene_takes_no_unknown_keys() {
+        let schema = scene_schema();
+        let properties = schema["properties"].as_object().unwrap();
+        assert_eq!(properties.len(), 8);
+        for (table, schema) in properties {
+            let named = schema.get("additionalProperties").filter(|inner| inner.is_object());
+            let one = named.unwrap_or(schema);
+            let kinds =
+                one.get("oneOf").and_then(Json::as_array).cloned().unwrap_or_else(|| vec![one.clone()]);
+            assert!(kinds.iter().all(|kind| kind["additionalProperties"] == false), "{table}");
+        }
+    }
+
+    #[test]
+    fn a_law_is_read_with_its_own_parameters_and_what_every_law_can_have() {
+        let text = "[law.a]\ntype = 'neo-hookean'\nshear-modulus = 1\nbulk-modulus = 2\nfibre = [0, 0, 1]\n\
+                    prony = [{ part = 'volumetric', weight = 0.2, time = 3 }]\n";
+        let source = Source::parse("law.toml", text).unwrap();
+        let mut out = Vec::new();
+        let law = read_law(&source, &["law", "a"], &mut out).unwrap();
+        assert!(out.is_empty());
+        assert_eq!((law.law.name(), law.law.small_strain().bulk), ("neo-hookean", 2.0));
+        assert_eq!((law.extras.prony.len(), law.extras.fibre.is_some()), (1, true));
+    }
 }

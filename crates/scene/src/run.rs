@@ -8,8 +8,8 @@ use pliant_mechanics::{CentralDifference, Energies, Real, State};
 use crate::build::Built;
 use crate::format::Precision;
 use crate::output::{
-    FailureSummary, Frame, OutputError, OutputFolder, Schedule, Scheduled, Summary, markdown, observers,
-    plot, summarise,
+    FailureSummary, Frame, OutputError, OutputFolder, PLOT, SUMMARY, Schedule, Scheduled, Summary, markdown,
+    observers, plot, summarise,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -57,11 +57,11 @@ const SAMPLES: f64 = 1000.0;
 /// Wall time between two reports of progress.
 const REPORT: Duration = Duration::from_millis(100);
 
-/// Runs a scene and writes its outputs, `plot.svg` and `summary.md`. A failure of the run is in the summary; whatever
-/// was written before stays.
+/// Runs a scene and writes its outputs, `plot.svg` and `summary.md`. A failure of the run, or of writing while it runs,
+/// is in the summary; whatever was written before stays.
 ///
 /// # Errors
-/// If the outputs can't be opened, or the summary can't be written.
+/// If the outputs can't be opened.
 pub fn run(
     scene: &Scene,
     built: &Built,
@@ -77,14 +77,32 @@ pub fn run(
         Precision::Single => advance::<f32>(scene, built, plan, folder, report),
         Precision::Double => advance::<f64>(scene, built, plan, folder, report),
     })?;
-    match plot(built, &outcome.history) {
-        Ok(svg) => outcome.files.push(folder.write("plot.svg", &svg)?),
-        Err(reason) => return Err(OutputError::new(&folder.path().join("plot.svg"), reason)),
+    if let Err(error) = write_pages(scene, built, plan, folder, &mut outcome) {
+        let time = Some(outcome.time);
+        outcome.failure.get_or_insert_with(|| FailureSummary::output(&error, time));
     }
-    outcome.files.push(folder.path().join("summary.md"));
-    let summary = summarise(built, plan, &outcome);
-    folder.write("summary.md", &markdown(scene, built, plan, &outcome, &summary))?;
-    Ok(summary)
+    Ok(summarise(built, plan, &outcome))
+}
+
+/// Writes the plot and the page that shows it.
+fn write_pages(
+    scene: &Scene,
+    built: &Built,
+    plan: &Plan,
+    folder: &OutputFolder,
+    outcome: &mut Outcome,
+) -> Result<(), OutputError> {
+    let page = folder.path().join(SUMMARY);
+    let svg = plot(built, &outcome.history)
+        .map_err(|reason| OutputError::new(&folder.path().join(PLOT), reason))?;
+    outcome.files.push(folder.write(PLOT, &svg)?);
+    outcome.files.push(page);
+    let text = markdown(scene, built, plan, outcome, &summarise(built, plan, outcome));
+    let written = folder.write(SUMMARY, &text);
+    if written.is_err() {
+        outcome.files.pop();
+    }
+    written.map(|_| ())
 }
 
 fn advance<R: Real>(
@@ -119,8 +137,7 @@ fn advance<R: Real>(
             history.sample(built, &stepper, &state);
         }
         if let Err(error) = look(&mut watching, &Frame { built, state: &state, stepper: &stepper }, last) {
-            let message = format!("{error}; what was written before is complete");
-            failure = Some(FailureSummary::about("output", message, Some(state.time)));
+            failure = Some(FailureSummary::output(&error, Some(state.time)));
             break;
         }
         if reported.elapsed() >= REPORT || last {

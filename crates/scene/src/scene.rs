@@ -7,7 +7,7 @@ use crate::checker::{nearest, read_table};
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{BodyTable, RunTable, SceneTable, SurfaceTable};
 use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
-use crate::source::Source;
+use crate::source::{Node, Source, Value};
 
 /// A scene file and what it says.
 #[derive(Clone, Debug)]
@@ -79,7 +79,7 @@ impl Scene {
     pub fn from_source(source: Source, folder: PathBuf) -> Result<Self, SceneErrors> {
         let mut out = Vec::new();
         check_top(&source, &mut out);
-        let scene = read_table::<SceneTable>(&source, &["scene"], &[], &mut out);
+        let scene = read_scene_table(&source, &mut out);
         let run = read_table::<RunTable>(&source, &["run"], &[], &mut out);
         let laws = read_all(&source, "law", read_law, &mut out);
         let bodies =
@@ -93,6 +93,7 @@ impl Scene {
         let constraints = read_all(&source, "constraint", read_typed::<ConstraintTable>, &mut out);
         let loads = read_all(&source, "load", read_typed::<LoadTable>, &mut out);
         let outputs = read_all(&source, "output", read_typed::<OutputTable>, &mut out);
+        check_probe_names(&source, &mut out);
         if source.node(&["body"]).is_none_or(|node| node.entries().is_empty()) {
             let help =
                 "add a table `[body.NAME]` with `mesh`, `law` and `density`; `pliant new` writes an example";
@@ -121,7 +122,17 @@ fn check_top(source: &Source, out: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Reads all named tables of one kind. Names become names of files and columns, so that they must be plain words.
+/// Reads `[scene]`, which no scene can do without.
+fn read_scene_table(source: &Source, out: &mut Vec<Diagnostic>) -> Option<SceneTable> {
+    if source.node(&["scene"]).is_none() {
+        let help = "add `[scene]` with `until = 1.0`, the simulated time in seconds";
+        out.push(Diagnostic::error("the scene has no table `[scene]`").help(help));
+        return None;
+    }
+    read_table::<SceneTable>(source, &["scene"], &[], out)
+}
+
+/// Reads all named tables of one kind.
 fn read_all<T>(
     source: &Source,
     kind: &str,
@@ -129,7 +140,7 @@ fn read_all<T>(
     out: &mut Vec<Diagnostic>,
 ) -> Vec<(String, T)> {
     let Some(tables) = source.node(&[kind]) else { return Vec::new() };
-    if !matches!(tables.value, crate::source::Value::Table(_)) {
+    if !matches!(tables.value, Value::Table(_)) {
         let help = format!("write it as a table: `[{kind}.NAME]`");
         out.push(
             Diagnostic::error(format!("`{kind}` must be a table of tables"))
@@ -140,15 +151,10 @@ fn read_all<T>(
     }
     let mut all = Vec::new();
     for (name, node) in tables.entries() {
-        let plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
-        if name.is_empty() || !name.chars().all(plain) {
-            let help =
-                "names are made of letters, digits, `-` and `_`: files and columns are called after them";
-            let message = format!("`{name}` is not a name for a {kind}");
-            out.push(Diagnostic::error(message).at(node.key_place(), "this name").help(help));
+        if !check_name(&format!("`[{kind}.NAME]`"), name, node, out) {
             continue;
         }
-        if !matches!(node.value, crate::source::Value::Table(_)) {
+        if !matches!(node.value, Value::Table(_)) {
             let help = format!("write it as `[{kind}.{name}]`, or `{kind}.{name} = {{ … }}`");
             let message = format!("`{kind}.{name}` must be a table");
             out.push(Diagnostic::error(message).at(node.place.clone(), "not a table").help(help));
@@ -159,4 +165,25 @@ fn read_all<T>(
         }
     }
     all
+}
+
+/// Files and columns are called after names: whether this is a plain word; a diagnostic if not.
+fn check_name(of: &str, name: &str, node: &Node, out: &mut Vec<Diagnostic>) -> bool {
+    let plain = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_');
+    if !plain {
+        let help = "take letters, digits, `-` and `_`: files and columns are called after it";
+        let message = format!("`{name}` cannot be the name of {of}");
+        out.push(Diagnostic::error(message).at(node.key_place(), "this name").help(help));
+    }
+    plain
+}
+
+/// Names of probes become names of columns.
+fn check_probe_names(source: &Source, out: &mut Vec<Diagnostic>) {
+    let outputs = source.node(&["output"]).map_or(&[][..], Node::entries);
+    for (_, output) in outputs {
+        for (name, probe) in output.get("probes").map_or(&[][..], Node::entries) {
+            check_name("a probe", name, probe, out);
+        }
+    }
 }

@@ -13,6 +13,8 @@ use crate::diagnostic::{Diagnostic, Place, SceneErrors};
 
 /// Syntax errors shown of one file: what follows the first is often a consequence of it.
 const MOST_SYNTAX_ERRORS: usize = 5;
+/// The end of the message about a key that stands twice in the file.
+const GIVEN_TWICE: &str = "is given twice";
 
 /// A scene's text and the tree of its values.
 #[derive(Clone, Debug)]
@@ -150,7 +152,9 @@ impl Source {
             let line = |span: &Option<Range<usize>>| {
                 span.as_ref().map(|span| text.bytes().take(span.start).filter(|&byte| byte == b'\n').count())
             };
-            let known = |other: &Diagnostic| line(&other.span) == line(&diagnostic.span);
+            let known = |other: &Diagnostic| {
+                line(&other.span) == line(&diagnostic.span) || repeats_table(other, &diagnostic, &text)
+            };
             if diagnostics.len() < MOST_SYNTAX_ERRORS && !diagnostics.iter().any(known) {
                 diagnostics.push(diagnostic);
             }
@@ -361,6 +365,16 @@ fn node_of(
     Node { place: Place::File(span), key_span, value: owned }
 }
 
+/// Whether a key is given twice only because the table it stands in is.
+fn repeats_table(table: &Diagnostic, key: &Diagnostic, text: &str) -> bool {
+    let twice = |diagnostic: &Diagnostic| diagnostic.message.ends_with(GIVEN_TWICE);
+    let (Some(header), Some(own)) = (&table.span, &key.span) else { return false };
+    let line_start = text[..header.start].rfind('\n').map_or(0, |at| at + 1);
+    let within = text.get(line_start..own.start).unwrap_or_default();
+    let headers = within.lines().filter(|line| line.trim_start().starts_with('[')).count();
+    twice(table) && twice(key) && within.trim_start().starts_with('[') && headers == 1
+}
+
 fn syntax_error(error: &toml::de::Error, text: &str) -> Diagnostic {
     let span = error.span().unwrap_or(text.len()..text.len());
     let found = text.get(span.clone()).unwrap_or_default();
@@ -368,9 +382,9 @@ fn syntax_error(error: &toml::de::Error, text: &str) -> Diagnostic {
     let after = text.get(span.end..).unwrap_or_default();
     let message = error.message();
     if message.starts_with("duplicate key") {
-        return Diagnostic::error(format!("`{found}` is given twice"))
-            .at(span, "given before")
-            .help("a key or table can be given once; remove one of the two");
+        return Diagnostic::error(format!("`{found}` {GIVEN_TWICE}"))
+            .at(span, "given a second time")
+            .help("a key or table can be given once; rename or remove one of the two");
     }
     let value_expected =
         ["string values must be quoted", "invalid boolean"].iter().any(|m| message.starts_with(m));
@@ -520,6 +534,7 @@ at = { node = 4 }
             assert!(m.contains(message) && f == found && h.contains(help), "{text:?}: {m:?} {f:?} {h:?}");
         };
         expect("a = 1\na = 2\n", "`a` is given twice", "a", "remove one");
+        expect("[a]\nx = 1\n[a]\nx = 1\ny = 1\n", "`a` is given twice", "a", "remove one");
         expect("element = tet4\n", "`tet4` is not a value", "tet4", "write \"tet4\"");
         expect("element = hex8\n", "`hex8` is not a value", "hex8", "write \"hex8\"");
         expect("a = \nb = 2\n", "a value is missing", "", "");

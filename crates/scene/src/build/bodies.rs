@@ -2,15 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, boundary};
+use pliant_geometry::{CellBlock, CellId, CellKind, DataArray, Mesh, boundary};
 use pliant_mechanics::model::{Body, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
 
-use super::{Builder, BuiltBody, suggestion};
+use super::meshes::list_cells;
+use super::{Builder, BuiltBody, SCENE, suggestion};
+use crate::diagnostic::counted;
 use crate::format::{BodyTable, Element, Fibre, LawChoice};
 use crate::registry::LawTable;
 
-/// Longest element of a mesh over its shortest before a note is made of nothing; fibres shorter than this are zero.
+/// Fibres shorter than this are zero.
 const ZERO_FIBRE: f64 = 1e-12;
 
 impl Builder<'_> {
@@ -42,11 +44,12 @@ impl Builder<'_> {
         self.model.mass.resize(self.model.rest.len(), 0.0);
         let nodes = first..self.model.rest.len() as u32;
         self.model.bodies.push(Body { name: name.into(), nodes, damping: table.damping });
+        self.check_labels(name, table, mesh);
         for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
             if !self.check_element(name, table, block.kind) {
                 return;
             }
-            for (law_name, cells) in self.cells_by_law(name, table, block) {
+            for (law_name, cells) in cells_by_law(&table.law, block) {
                 self.add_solid(name, table, body, block, &law_name, cells);
             }
         }
@@ -67,48 +70,35 @@ impl Builder<'_> {
         fits
     }
 
-    /// The cells of a block that each law of the body takes, by law name.
-    fn cells_by_law(
-        &mut self,
-        name: &str,
-        table: &BodyTable,
-        block: &CellBlock,
-    ) -> BTreeMap<String, Vec<u32>> {
-        let mut cells: BTreeMap<String, Vec<u32>> = BTreeMap::new();
-        let all = 0..block.len() as u32;
-        let map = match &table.law {
-            LawChoice::One(law) => {
-                cells.insert(law.clone(), all.collect());
-                return cells;
-            }
-            LawChoice::ByLabel(map) => map,
-        };
+    /// Where laws go by label: whether each cell's label has a law, and each law's label a cell.
+    fn check_labels(&mut self, name: &str, table: &BodyTable, mesh: &Mesh) {
+        let LawChoice::ByLabel(map) = &table.law else { return };
         let path = ["body", name, "law"];
-        let Some(labels) = block.data.get("label") else {
-            let help = "name one law for the whole body, or use a mesh with labels";
-            self.error(&path, "the mesh has no cell labels", "laws by label", help);
-            return cells;
-        };
-        let mut missing: BTreeMap<i64, usize> = BTreeMap::new();
-        for cell in all {
-            let label = labels.item(cell as usize)[0];
-            match map.get(&format!("{label}")) {
-                Some(law) => cells.entry(law.clone()).or_default().push(cell),
-                None => *missing.entry(label as i64).or_default() += 1,
+        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+        for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
+            let Some(labels) = block.data.get("label") else {
+                let message = format!("the {} cells of `{name}` have no labels", block.kind.name());
+                let help = "name one law for the whole body, or use a mesh whose cell data `label` numbers its regions";
+                self.error(&path, message, "laws by label", help);
+                return;
+            };
+            for label in &labels.values {
+                *counts.entry(label.to_string()).or_default() += 1;
             }
         }
+        let list = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
+        let missing = counts.iter().filter(|(label, _)| !map.contains_key(*label));
+        let missing = list(&mut missing.map(|(label, n)| format!("{label} ({})", counted(*n, "cell"))));
         if !missing.is_empty() {
-            let list = missing.iter().map(|(l, n)| format!("{l} ({n} cells)")).collect::<Vec<_>>().join(", ");
-            let message = format!("cells of `{name}` have labels without a law: {list}");
+            let message = format!("cells of `{name}` have labels without a law: {missing}");
             self.error(&path, message, "no law for these", "add `LABEL = \"law\"` for each of them");
         }
-        for label in map.keys() {
-            if !labels.values.iter().any(|value| format!("{value}") == *label) {
-                let message = format!("no cell of `{name}` has label `{label}`");
-                self.error(&[path[0], path[1], path[2], label], message, "no such label", "remove it");
-            }
+        let known = list(&mut counts.keys().cloned());
+        for label in map.keys().filter(|label| !counts.contains_key(*label)) {
+            let message = format!("no cell of `{name}` has label `{label}`");
+            let help = format!("remove it; labels of the mesh: {known}");
+            self.error(&[path[0], path[1], path[2], label], message, "no such label", help);
         }
-        cells
     }
 
     fn add_solid(
@@ -121,11 +111,11 @@ impl Builder<'_> {
         cells: Vec<u32>,
     ) {
         let scene = self.scene;
-        let path = ["body", name, "law"];
         let Some((_, law)) = scene.laws.iter().find(|(known, _)| known == law_name) else {
             let known: Vec<&str> = scene.laws.iter().map(|(name, _)| name.as_str()).collect();
             let message = format!("there is no law `{law_name}`");
-            self.error(&path, message, "no such law", suggestion(law_name, &known, "laws"));
+            let help = suggestion(law_name, &known, SCENE, "laws");
+            self.error(&law_path(name, &table.law, law_name), message, "no such law", help);
             return;
         };
         let Some(prony) = self.prony(law_name, law) else { return };
@@ -203,7 +193,7 @@ impl Builder<'_> {
         };
         let Some(data) = block.data.get(field) else {
             let known: Vec<&str> = block.data.keys().map(String::as_str).collect();
-            let help = suggestion(field, &known, "cell data of the mesh");
+            let help = suggestion(field, &known, "the mesh", "cell data");
             self.error(
                 &path,
                 format!("the mesh of `{name}` has no cell data `{field}`"),
@@ -212,7 +202,7 @@ impl Builder<'_> {
             );
             return None;
         };
-        self.fibres_from(name, field, data, cells, &path)
+        self.fibres_from(name, field, data, block.kind, cells, &path)
     }
 
     fn fibres_from(
@@ -220,6 +210,7 @@ impl Builder<'_> {
         name: &str,
         field: &str,
         data: &DataArray,
+        kind: CellKind,
         cells: &[u32],
         path: &[&str],
     ) -> Option<Vec<[f64; 3]>> {
@@ -229,14 +220,14 @@ impl Builder<'_> {
             self.error(path, message, "not directions", "name an array of vectors");
             return None;
         }
-        let mut directions = Vec::with_capacity(cells.len());
-        for &cell in cells {
-            let Some(unit) = unit(data.item(cell as usize)) else {
-                let message = format!("the fibre of cell {cell} of `{name}` is zero or not finite");
-                self.error(path, message, "from this data", "every cell needs a direction");
-                return None;
-            };
-            directions.push(unit);
+        let directions: Vec<_> = cells.iter().filter_map(|&cell| unit(data.item(cell as usize))).collect();
+        if directions.len() < cells.len() {
+            let without = cells.iter().filter(|&&cell| unit(data.item(cell as usize)).is_none());
+            let without: Vec<CellId> = without.map(|&index| CellId { kind, index }).collect();
+            let message =
+                format!("cells of `{name}` whose fibre is zero or not finite: {}", list_cells(&without));
+            self.error(path, message, "from this data", "give every cell a direction in the mesh file");
+            return None;
         }
         Some(directions)
     }
@@ -255,6 +246,32 @@ impl Builder<'_> {
     }
 }
 
+/// The cells of a block that each law takes, by law name.
+fn cells_by_law(choice: &LawChoice, block: &CellBlock) -> BTreeMap<String, Vec<u32>> {
+    let mut cells: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+    for cell in 0..block.len() as u32 {
+        let law = match choice {
+            LawChoice::One(law) => Some(law),
+            LawChoice::ByLabel(map) => {
+                block.data.get("label").and_then(|labels| map.get(&labels.item(cell as usize)[0].to_string()))
+            }
+        };
+        if let Some(law) = law {
+            cells.entry(law.clone()).or_default().push(cell);
+        }
+    }
+    cells
+}
+
+/// Where a body names a law: its `law`, or the label in it.
+fn law_path<'a>(body: &'a str, choice: &'a LawChoice, law: &str) -> Vec<&'a str> {
+    let label = match choice {
+        LawChoice::One(_) => None,
+        LawChoice::ByLabel(map) => map.iter().find(|(_, known)| *known == law).map(|(label, _)| label),
+    };
+    ["body", body, "law"].into_iter().chain(label.map(String::as_str)).collect()
+}
+
 fn nodes<const N: usize>(block: &CellBlock, cell: u32, first: u32) -> [u32; N] {
     let mut nodes = [0; N];
     for (own, node) in nodes.iter_mut().zip(block.cell(cell as usize)) {
@@ -266,4 +283,47 @@ fn nodes<const N: usize>(block: &CellBlock, cell: u32, first: u32) -> [u32; N] {
 fn unit(direction: &[f64]) -> Option<[f64; 3]> {
     let norm = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
     (norm.is_finite() && norm > ZERO_FIBRE).then(|| [0, 1, 2].map(|c| direction[c] / norm))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::built;
+
+    fn labelled() -> CellBlock {
+        let mut block = CellBlock::new(CellKind::Tet, (0..12).collect());
+        block.data.insert("label".into(), DataArray::scalar(vec![2.0, 1.0, 2.0]));
+        block
+    }
+
+    #[test]
+    fn cells_go_to_the_law_of_their_label() {
+        let map = [("1", "soft"), ("2", "hard")].map(|(label, law)| (label.to_owned(), law.to_owned()));
+        let cells = cells_by_law(&LawChoice::ByLabel(map.into()), &labelled());
+        assert_eq!((&cells["soft"], &cells["hard"]), (&vec![1], &vec![0, 2]));
+        let cells = cells_by_law(&LawChoice::One("soft".into()), &labelled());
+        assert_eq!(cells["soft"], [0, 1, 2]);
+    }
+
+    #[test]
+    fn an_unknown_law_is_shown_at_its_label() {
+        let map = [("7".to_owned(), "soft".to_owned())];
+        assert_eq!(law_path("liver", &LawChoice::ByLabel(map.into()), "soft"), ["body", "liver", "law", "7"]);
+        assert_eq!(law_path("liver", &LawChoice::One("soft".into()), "soft"), ["body", "liver", "law"]);
+    }
+
+    #[test]
+    fn a_direction_has_length_one_or_is_none() {
+        assert_eq!(unit(&[0.0, -3.0, 4.0]), Some([0.0, -0.6, 0.8]));
+        for none in [[0.0; 3], [1e-13, 0.0, 0.0], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
+            assert_eq!(unit(&none), None);
+        }
+    }
+
+    #[test]
+    fn mass_is_density_times_volume_and_shared_among_the_nodes() {
+        let model = built("").model;
+        assert!((model.mass.iter().sum::<f64>() - 2.0).abs() < 1e-12);
+        assert!(model.mass.iter().all(|&mass| mass > 0.0));
+    }
 }

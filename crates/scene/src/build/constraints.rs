@@ -33,8 +33,8 @@ impl Builder<'_> {
             let second = self.source().key_span(&["constraint", &contradiction.second]);
             let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
             let diagnostic = Diagnostic::error(contradiction.to_string())
-                .at(second, "contradicts …")
-                .also(first, "… this one")
+                .at(second, "contradicts the other")
+                .also(first, "contradicts the other")
                 .help(help);
             self.out.push(diagnostic);
         }
@@ -117,5 +117,45 @@ impl Builder<'_> {
             };
             self.notes.push(format!("`{name}` is held by no constraint: {fate}"));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_mechanics::model::Motion;
+
+    use crate::testing::{built, mistakes};
+
+    fn top(what: &str) -> String {
+        format!("[constraint.top]\nbody = 'cube'\nnodes = {{ set = 'z-max' }}\n{what}\n")
+    }
+
+    #[test]
+    fn components_and_motions_are_as_written() {
+        let model = built(&top("type = 'move'\nvelocity = [1, 2, 3]\ncomponents = ['z', 'x']")).model;
+        let top = &model.constraints[1];
+        assert_eq!((top.nodes.len(), top.components), (9, [true, false, true]));
+        assert!(matches!(top.motion, Motion::Velocity([1.0, 2.0, 3.0], _)));
+        assert_eq!(model.constraints[0].components, [true; 3]);
+    }
+
+    #[test]
+    fn a_motion_has_one_of_two_forms_and_some_components() {
+        for (what, says) in [
+            ("type = 'move'", "exactly one of `by` and `velocity`, found neither"),
+            ("type = 'move'\nby = [0, 0, 1]\nvelocity = [0, 0, 1]", "found both"),
+            ("type = 'fix'\ncomponents = []", "`components` is empty"),
+        ] {
+            let told = mistakes(&top(what)).plain().to_string();
+            assert!(told.contains(says), "{told}");
+        }
+    }
+
+    #[test]
+    fn two_constraints_may_hold_the_same_node_but_not_move_it_apart() {
+        let edge = "[constraint.edge]\nbody = 'cube'\nnodes = { set = 'x-min' }\n";
+        built(&format!("{edge}type = 'fix'\n"));
+        let told = mistakes(&format!("{edge}type = 'move'\nby = [0, 0, 1]\n")).plain().to_string();
+        assert!(told.contains("`base` and `edge` both prescribe z of node 0 of `cube`"), "{told}");
     }
 }

@@ -1,11 +1,11 @@
 //! Loads: forces on nodes, tractions and pressures on faces, gravity. And the references of outputs.
 
-use pliant_geometry::{Mesh, Selection, Surface, Vector3, boundary};
+use pliant_geometry::{Locator, Mesh, Selection, Surface, Vector3, boundary};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
-use super::{Builder, Target, suggestion};
-use crate::format::{CsvTable, FieldName, ForceTable, VtuTable};
+use super::{Builder, SCENE, Target, suggestion};
+use crate::format::{CsvTable, FieldName, ForceTable, ProbeTable, VtuTable};
 use crate::registry::{LoadTable, OutputTable};
 
 impl Builder<'_> {
@@ -149,17 +149,9 @@ impl Builder<'_> {
     fn check_vtu(&mut self, table: &VtuTable, path: &[&str]) {
         let at = |key| [path, &[key]].concat();
         let Some(on) = &table.on else { return };
-        if let Some(Target::Surface(_)) = self.find_target(on, &at("on"))
-            && let Some(field) = table.data.iter().find(|field| !field.is_nodal())
-        {
-            let message =
-                format!("`{}` belongs to cells; a carried surface has none of its body's", field.name());
-            self.error(
-                &at("data"),
-                message,
-                "here",
-                "write displacement and velocity on surfaces, stresses on the body",
-            );
+        if let Some(Target::Surface(_)) = self.find_target(on, &at("on")) {
+            let help = "write displacement and velocity on surfaces, stresses on the body";
+            self.refuse_cell_fields(&table.data, &at("data"), help);
         }
     }
 
@@ -169,19 +161,37 @@ impl Builder<'_> {
             if !known.contains(&wanted.as_str()) {
                 let index = index.to_string();
                 let at = [path, &["reactions", &index]].concat();
-                let help = suggestion(wanted, &known, "constraints");
+                let help = suggestion(wanted, &known, SCENE, "constraints");
                 self.error(&at, format!("there is no constraint `{wanted}`"), "no such constraint", help);
             }
         }
         for (name, probe) in &table.probes {
-            let at = |key| [path, &["probes", name.as_str(), key]].concat();
-            if let Some(Target::Surface(_)) = self.find_target(&probe.on, &at("on"))
-                && let Some(field) = probe.data.iter().copied().find(|field| !FieldName::is_nodal(*field))
-            {
-                let message =
-                    format!("`{}` belongs to cells; a carried surface has none of its body's", field.name());
-                self.error(&at("data"), message, "here", "probe the body for stresses");
+            self.check_probe(name, probe, &[path, &["probes", name.as_str()]].concat());
+        }
+    }
+
+    fn check_probe(&mut self, name: &str, probe: &ProbeTable, path: &[&str]) {
+        let at = |key| [path, &[key]].concat();
+        match self.find_target(&probe.on, &at("on")) {
+            Some(Target::Surface(_)) => {
+                self.refuse_cell_fields(&probe.data, &at("data"), "probe the body for stresses");
             }
+            Some(Target::Body(body)) => {
+                let found = Locator::new(&self.bodies[body].mesh).locate(Vector3::from(probe.at));
+                let distance = found.map_or(0.0, |location| location.distance);
+                let help = "give its place at rest in metres; the nearest cell carries it";
+                self.doubt_place(&format!("probe `{name}`"), distance, body, &at("at"), help);
+            }
+            None => {}
+        }
+    }
+
+    /// A carried surface has no cells whose stress could be told.
+    fn refuse_cell_fields(&mut self, fields: &[FieldName], path: &[&str], help: &str) {
+        if let Some(field) = fields.iter().find(|field| !field.is_nodal()) {
+            let message =
+                format!("`{}` belongs to cells; a carried surface has none of its body's", field.name());
+            self.error(path, message, "not on a surface", help);
         }
     }
 }
@@ -201,4 +211,51 @@ fn select_faces(
     };
     let selected = selection.faces(mesh, boundary).map_err(|error| error.to_string())?;
     Ok(selected.into_iter().map(face).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_mechanics::load::LoadKind;
+
+    use crate::build::Built;
+    use crate::testing::built;
+
+    /// The sum of the forces of the only load [N], and how many nodes it acts on.
+    fn sum(built: &Built) -> ([f64; 3], usize) {
+        let [load] = &built.model.loads[..] else { panic!("one load") };
+        let LoadKind::Forces(forces) = &load.kind else { panic!("forces") };
+        let sum = forces.iter().fold([0.0; 3], |sum, (_, f)| [0, 1, 2].map(|c| sum[c] + f[c]));
+        (sum, forces.len())
+    }
+
+    #[test]
+    fn total_is_shared_and_each_is_repeated() {
+        let load = |force: &str| {
+            built(&format!("[load.a]\ntype = 'force'\non = 'cube'\nnodes = {{ set = 'z-max' }}\n{force}\n"))
+        };
+        let ([x, y, z], nodes) = sum(&load("total = [9, 0, -18]"));
+        assert!((x - 9.0).abs() < 1e-12 && y == 0.0 && (z + 18.0).abs() < 1e-12 && nodes == 9);
+        assert_eq!(sum(&load("each = [1, 0, 0]")), ([9.0, 0.0, 0.0], 9));
+    }
+
+    #[test]
+    fn a_traction_adds_up_to_itself_times_the_area() {
+        let load = built(
+            "[load.a]\ntype = 'traction'\non = 'cube'\nfaces = { set = 'z-max' }\ntraction = [0, 3, 0]\n",
+        );
+        let ([x, y, z], _) = sum(&load);
+        assert!(x == 0.0 && (y - 3.0 * 0.02).abs() < 1e-12 && z == 0.0, "{y}");
+    }
+
+    #[test]
+    fn pressure_takes_the_faces_and_gravity_every_body() {
+        let load =
+            built("[load.a]\ntype = 'pressure'\non = 'cube'\nfaces = { set = 'x-max' }\npressure = 5\n");
+        let LoadKind::Pressure { faces, pressure } = &load.model.loads[0].kind else { panic!("pressure") };
+        assert_eq!((faces.len(), *pressure), (4, 5.0));
+        let other =
+            "[body.other]\nmesh = { block = { size = [1, 1, 1] }, edge = 1 }\nlaw = 'tissue'\ndensity = 1\n";
+        let load = built(&format!("{other}[load.a]\ntype = 'gravity'\nacceleration = [0, 0, -1]\n"));
+        assert_eq!(load.model.loads.len(), 2);
+    }
 }

@@ -2,15 +2,17 @@
 
 use std::path::PathBuf;
 
-use pliant_geometry::{CellKind, DataArray, Mesh, Vector3, boundary, diagnose, io, reorder};
+use pliant_geometry::io::{self, MeshFileError};
+use pliant_geometry::{CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose, reorder};
 use pliant_meshing::{
     Block, DEFAULT_CELL_LIMIT, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Phantom, Resolution,
     Stuffing, Tube, VolumeCell, Voxels, brain_label,
 };
 
 use super::Builder;
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, counted};
 use crate::format::{Cells, Fix, MeshTable, Organ};
+use crate::output::number;
 
 /// A mesh and where it comes from.
 pub(crate) struct MeshOrigin {
@@ -38,10 +40,6 @@ impl Builder<'_> {
             self.error(path, message, "this mesh", help);
             return None;
         };
-        if let Some((&low, _)) = table.at.iter().zip(0..).find(|(x, _)| !x.is_finite()) {
-            self.error(path, format!("`at` must be finite, found {low}"), "this mesh", "");
-            return None;
-        }
         let mut made = match &table.file {
             Some(file) => self.file(file.clone(), table, path)?,
             None => self.shape(source, table, path)?,
@@ -69,7 +67,10 @@ impl Builder<'_> {
                 Some(MeshOrigin { mesh: read.mesh, origin: format!("{name} ({})", read.format) })
             }
             Err(error) => {
-                let help = "file names are relative to the scene file";
+                let help = match error {
+                    MeshFileError::Open { .. } => "file names are relative to the scene file",
+                    _ => "`pliant info` reads a mesh file on its own",
+                };
                 self.error(&at("file"), error.to_string(), "this file", help);
                 None
             }
@@ -133,79 +134,25 @@ impl Builder<'_> {
         let fixes: &[Fix] = table.fix.as_ref().map_or(&[], |fixes| fixes.as_slice());
         for fix in fixes {
             let what = match fix {
-                Fix::Reorder => format!("{} inverted cells reordered", reorder(mesh)),
-                Fix::DropUnused => format!("{} unused nodes dropped", mesh.drop_unused_points()),
+                Fix::Reorder => format!("{} reordered", counted(reorder(mesh), "inverted element")),
+                Fix::DropUnused => format!("{} dropped", counted(mesh.drop_unused_points(), "unused node")),
                 Fix::Merge => {
-                    format!("{} duplicate nodes merged", mesh.merge_points(&diagnose(mesh).duplicate_nodes))
+                    let pairs = diagnose(mesh).duplicate_nodes;
+                    format!("{} merged", counted(mesh.merge_points(&pairs), "duplicate node"))
                 }
             };
             self.notes.push(format!("`{}`: {what}", path[1]));
         }
-        let found = diagnose(mesh);
-        let key = [path, &[if table.file.is_some() { "file" } else { "organ" }]].concat();
+        let place = if table.file.is_some() { [path, &["file"]].concat() } else { path.to_vec() };
         if mesh.volume_blocks().all(|block| block.is_empty()) {
             let help = "a solid body needs tets or hexes; this mesh has only surface cells or none";
-            self.error(&key, format!("`{}` has no volume elements", path[1]), "this mesh", help);
+            self.error(&place, format!("`{}` has no volume elements", path[1]), "this mesh", help);
             return false;
         }
-        let problems: Vec<(String, &str)> = [
-            (!found.non_finite_nodes.is_empty()).then(|| {
-                (
-                    format!("nodes with coordinates that are not finite: {}", list(&found.non_finite_nodes)),
-                    "repair the mesh file",
-                )
-            }),
-            (!found.out_of_range_cells.is_empty()).then(|| {
-                (
-                    format!(
-                        "elements that name nodes which do not exist: {}",
-                        list_cells(&found.out_of_range_cells)
-                    ),
-                    "repair the mesh file",
-                )
-            }),
-            (!found.inverted_cells.is_empty()).then(|| {
-                (
-                    format!("inverted elements at rest: {}", list_cells(&found.inverted_cells)),
-                    "add `fix = [\"reorder\"]` to the mesh to swap their nodes",
-                )
-            }),
-            (!found.degenerate_cells.is_empty()).then(|| {
-                (
-                    format!("elements without volume at rest: {}", list_cells(&found.degenerate_cells)),
-                    "remesh there: their stable time step is zero",
-                )
-            }),
-            (!found.unused_nodes.is_empty()).then(|| {
-                (
-                    format!("nodes that no element uses: {}", list(&found.unused_nodes)),
-                    "add `fix = [\"drop-unused\"]` to the mesh",
-                )
-            }),
-            (!found.duplicate_nodes.is_empty()).then(|| {
-                (
-                    format!("nodes at the same place: {}", list_pairs(&found.duplicate_nodes)),
-                    "add `fix = [\"merge\"]` to the mesh to join them",
-                )
-            }),
-            (!found.duplicate_cells.is_empty()).then(|| {
-                (
-                    format!("{} elements are there twice", found.duplicate_cells.len()),
-                    "remove them from the mesh file",
-                )
-            }),
-            (!found.crowded_faces.is_empty()).then(|| {
-                (
-                    format!("{} faces belong to more than two elements", found.crowded_faces.len()),
-                    "elements overlap: remesh",
-                )
-            }),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
+        let found = diagnose(mesh);
+        let problems = problems(&found, fixes);
         for (message, help) in &problems {
-            self.error(&key, format!("`{}`: {message}", path[1]), "this mesh", *help);
+            self.error(&place, format!("`{}` has {message}", path[1]), "this mesh", *help);
         }
         if problems.is_empty() {
             self.doubt_size(mesh, path);
@@ -216,18 +163,65 @@ impl Builder<'_> {
         problems.is_empty()
     }
 
+    /// Warns of a size that no organ has.
     fn doubt_size(&mut self, mesh: &Mesh, path: &[&str]) {
         let Some((low, high)) = mesh.bounds() else { return };
         let size = (high - low).norm();
-        if !(PLAUSIBLE_SIZE[0]..=PLAUSIBLE_SIZE[1]).contains(&size) {
-            let factor =
-                if size > PLAUSIBLE_SIZE[1] { "0.001 if the mesh is in millimetres" } else { "1000 or 1" };
-            let place = self.source().span(path);
-            let message = format!("`{}` measures {size:.3e} m across: is that its size in metres?", path[1]);
-            let help = format!("`scale` brings the mesh to metres: {factor}");
-            self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(help));
-        }
+        let help = if size > PLAUSIBLE_SIZE[1] {
+            "`scale` brings a mesh to metres: 0.001 for one in millimetres, 0.01 for centimetres"
+        } else if size < PLAUSIBLE_SIZE[0] {
+            "is `scale` too small? It is the size of one unit of the mesh in metres"
+        } else {
+            return;
+        };
+        let message = format!("`{}` measures {} m across: is that so?", path[1], number(size));
+        let place = self.source().span(path);
+        self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(help));
     }
+}
+
+/// What keeps a mesh of volume cells from being simulated, with what to do about it. Surface cells may be as they are.
+fn problems(found: &Diagnosis, fixes: &[Fix]) -> Vec<(String, &'static str)> {
+    let solid = |cells: &[CellId]| -> Vec<CellId> {
+        cells.iter().filter(|cell| cell.kind.dimension() == 3).copied().collect()
+    };
+    let (lost, inverted, flat) =
+        (solid(&found.out_of_range_cells), solid(&found.inverted_cells), solid(&found.degenerate_cells));
+    let repeats: Vec<CellId> = found.duplicate_cells.iter().map(|&[_, repeat]| repeat).collect();
+    let repeats = solid(&repeats);
+    let reorder = match fixes.contains(&Fix::Reorder) {
+        false => "add `fix = \"reorder\"` to the mesh to swap their nodes",
+        true => "swapping their nodes does not help: remesh there",
+    };
+    let crowded: Vec<String> = found.crowded_faces.iter().map(|face| join(&face.nodes, "–")).collect();
+    let all = [
+        ("nodes with coordinates that are not finite", list(&found.non_finite_nodes), "repair the mesh file"),
+        ("elements that name nodes which do not exist", list_cells(&lost), "repair the mesh file"),
+        ("inverted elements at rest", list_cells(&inverted), reorder),
+        (
+            "elements without volume at rest",
+            list_cells(&flat),
+            "remesh there, or take them out of the mesh: their stable time step is zero",
+        ),
+        (
+            "nodes that no element uses",
+            list(&found.unused_nodes),
+            "add `fix = \"drop-unused\"` to the mesh to drop them",
+        ),
+        (
+            "nodes at the same place",
+            list_pairs(&found.duplicate_nodes),
+            "add `fix = \"merge\"` to the mesh to join them",
+        ),
+        ("elements that repeat another", list_cells(&repeats), "remove them from the mesh file"),
+        (
+            "faces of more than two elements, by their nodes",
+            shorten(crowded.into_iter()),
+            "elements overlap there: remesh",
+        ),
+    ];
+    let present = all.into_iter().filter(|(_, which, _)| !which.is_empty());
+    present.map(|(what, which, help)| (format!("{what}: {which}"), help)).collect()
 }
 
 fn make_shape(table: &MeshTable, edge: f64) -> Result<FieldMesh, MeshingError> {
@@ -307,15 +301,17 @@ pub(super) fn surface_of(mesh: Mesh) -> Mesh {
     surface
 }
 
+/// Items shown of a list.
 const SHOWN: usize = 10;
 
+/// The first items of a list, numbered from 0; empty for none.
 fn shorten(items: impl ExactSizeIterator<Item = String>) -> String {
     let count = items.len();
     let shown = items.take(SHOWN).collect::<Vec<_>>().join(", ");
-    if count > SHOWN {
-        format!("{shown}, … ({count} in all; counted from 0)")
-    } else {
-        format!("{shown} (counted from 0)")
+    match count {
+        0 => shown,
+        _ if count > SHOWN => format!("{shown}, … ({count} in all; counted from 0)"),
+        _ => format!("{shown} (counted from 0)"),
     }
 }
 
@@ -324,9 +320,72 @@ fn list(nodes: &[u32]) -> String {
 }
 
 fn list_pairs(pairs: &[[u32; 2]]) -> String {
-    shorten(pairs.iter().map(|[a, b]| format!("{a} and {b}")))
+    shorten(pairs.iter().map(|pair| join(pair, " and ")))
 }
 
-fn list_cells(cells: &[pliant_geometry::CellId]) -> String {
+/// Cells by kind and number, for a message.
+pub(super) fn list_cells(cells: &[CellId]) -> String {
     shorten(cells.iter().map(|cell| format!("{} {}", cell.kind.name(), cell.index)))
+}
+
+fn join(nodes: &[u32], with: &str) -> String {
+    nodes.iter().map(u32::to_string).collect::<Vec<_>>().join(with)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{CUBE, read};
+
+    fn tet(index: u32) -> CellId {
+        CellId { kind: CellKind::Tet, index }
+    }
+
+    #[test]
+    fn long_lists_are_cut_and_counted() {
+        assert_eq!(list(&[]), "");
+        assert_eq!(list(&[3]), "3 (counted from 0)");
+        let many: Vec<u32> = (0..12).collect();
+        assert_eq!(list(&many), "0, 1, 2, 3, 4, 5, 6, 7, 8, 9, … (12 in all; counted from 0)");
+        assert_eq!(list_pairs(&[[1, 2]]), "1 and 2 (counted from 0)");
+        assert_eq!(list_cells(&[tet(4)]), "tet 4 (counted from 0)");
+    }
+
+    #[test]
+    fn faults_of_surface_cells_keep_no_solid_from_running() {
+        let triangle = CellId { kind: CellKind::Triangle, index: 0 };
+        let found = Diagnosis {
+            degenerate_cells: vec![triangle],
+            duplicate_cells: vec![[triangle, triangle]],
+            ..Diagnosis::default()
+        };
+        assert!(problems(&found, &[]).is_empty());
+    }
+
+    #[test]
+    fn reordering_is_offered_once() {
+        let found = Diagnosis { inverted_cells: vec![tet(1)], ..Diagnosis::default() };
+        assert!(problems(&found, &[])[0].1.contains("fix = \"reorder\""));
+        assert!(problems(&found, &[Fix::Reorder])[0].1.contains("remesh"));
+    }
+
+    #[test]
+    fn what_does_not_go_with_a_shape_or_a_file_is_refused() {
+        for (mesh, says) in [
+            ("{ organ = 'liver' }", "`organ` needs `edge`"),
+            (
+                "{ block = { size = [1, 1, 1], cells = [1, 1, 1] }, edge = 1 }",
+                "`edge` and `cells` are both given",
+            ),
+            ("{ block = { size = [1, 1, 1] }, edge = 1, fix = 'merge' }", "`fix` repairs mesh files"),
+            ("{ block = { size = [1, 1, 1] }, edge = 1, scale = 2 }", "`scale` does not go with `block`"),
+            ("{ file = 'a.msh', edge = 1 }", "`edge` is for built-in shapes"),
+            ("{ edge = 1 }", "exactly one source, found 0"),
+        ] {
+            let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
+            let scene = read(&CUBE.replace(own, &format!("mesh = {mesh}")));
+            let told = crate::build(&scene).unwrap_err().plain().to_string();
+            assert!(told.contains(says), "{told}");
+        }
+    }
 }

@@ -113,7 +113,7 @@ impl<'s> Builder<'s> {
         let found = self.bodies.iter().position(|body| body.name == name);
         if found.is_none() {
             let known: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
-            let help = suggestion(name, &known, "bodies");
+            let help = suggestion(name, &known, SCENE, "bodies");
             self.error(path, format!("there is no body `{name}`"), "no such body", help);
         }
         found
@@ -129,7 +129,7 @@ impl<'s> Builder<'s> {
         }
         let bodies = self.bodies.iter().map(|body| body.name.as_str());
         let known: Vec<&str> = bodies.chain(self.model.surfaces.iter().map(|s| s.name.as_str())).collect();
-        let help = suggestion(name, &known, "bodies and surfaces");
+        let help = suggestion(name, &known, SCENE, "bodies and surfaces");
         self.error(path, format!("there is no body or surface `{name}`"), "no such body or surface", help);
         None
     }
@@ -164,18 +164,94 @@ impl<'s> Builder<'s> {
             self.error(&at(key), message, "here", "`to` is the end of the scene unless it is given");
             return None;
         }
+        self.note_timing(&shape, [timing.from, to], path);
         Some(Curve { shape, from: timing.from, to })
+    }
+
+    /// Says what the end of the scene cuts off.
+    fn note_timing(&mut self, shape: &Shape, [from, to]: [f64; 2], path: &[&str]) {
+        let (name, until) = (path.join("."), self.scene.scene.until);
+        let (begins, ends) = match shape {
+            Shape::Table(points) => (points.first().map_or(0.0, |first| first.0), until),
+            Shape::Hold => (from, from),
+            _ => (from, to),
+        };
+        if begins >= until && begins > 0.0 {
+            let message = format!("`{name}` begins at {begins} s, but the scene ends at {until} s");
+            let place = self.source().key_span(path);
+            let help = "let it begin earlier, or the scene last longer (`until`)";
+            self.out.push(Diagnostic::warning(message).at(place, "never begins").help(help));
+        } else if ends > until {
+            self.notes.push(format!("`{name}` is complete at {ends} s, but the scene ends at {until} s"));
+        }
     }
 }
 
-/// "did you mean …?" or a list of what there is.
-fn suggestion(word: &str, known: &[&str], what: &str) -> String {
+/// Whose names are meant, in suggestions.
+const SCENE: &str = "the scene";
+
+/// "did you mean …?" or a list of what there is; `owner` is `the scene` or another that has such names.
+fn suggestion(word: &str, known: &[&str], owner: &str, what: &str) -> String {
     match nearest(word, known.iter().copied()) {
         Some(name) => format!("did you mean `{name}`?"),
-        None if known.is_empty() => format!("the scene has no {what}"),
-        None => format!(
-            "{what} of the scene: {}",
-            known.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
-        ),
+        None if known.is_empty() => format!("{owner} has no {what}"),
+        None => {
+            let list = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+            format!("{what} of {owner}: {list}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{CUBE, built, mistakes, read};
+
+    #[test]
+    fn mistakes_of_several_tables_are_told_together() {
+        let told = mistakes(
+            "[load.a]\ntype = 'force'\non = 'cub'\nnodes = 'all'\ntotal = [0, 0, 1]\n\
+             [output.h]\ntype = 'csv'\nevery = 1\nreactions = ['bse']\n",
+        );
+        let told = told.plain().to_string();
+        assert!(told.contains("there is no body or surface `cub` (help: did you mean `cube`?)"), "{told}");
+        assert!(told.contains("there is no constraint `bse` (help: did you mean `base`?)"), "{told}");
+    }
+
+    #[test]
+    fn names_without_a_near_one_are_listed() {
+        assert_eq!(
+            suggestion("x", &["tissue", "bone"], SCENE, "laws"),
+            "laws of the scene: `tissue`, `bone`"
+        );
+        assert_eq!(suggestion("x", &[], "the mesh", "cell data"), "the mesh has no cell data");
+    }
+
+    #[test]
+    fn a_motion_that_the_end_cuts_off_is_noted() {
+        let moved = |timing: &str| {
+            built(&format!(
+                "[constraint.top]\ntype = 'move'\nbody = 'cube'\nnodes = {{ set = 'z-max' }}\nby = [0, 0, 1e-3]\n{timing}\n"
+            ))
+        };
+        assert!(moved("").notes.is_empty() && moved("to = 0.1").notes.is_empty());
+        assert_eq!(
+            moved("to = 0.5").notes,
+            ["`constraint.top` is complete at 0.5 s, but the scene ends at 0.1 s"]
+        );
+        let late = moved("from = 0.2\nto = 0.5");
+        assert!(late.warnings[0].message.contains("begins at 0.2 s"), "{:?}", late.warnings);
+    }
+
+    #[test]
+    fn what_no_body_uses_and_nothing_holds_is_noted() {
+        let free = &CUBE[..CUBE.find("[constraint").unwrap()];
+        let scene =
+            read(&format!("{free}[law.spare]\ntype = 'neo-hookean'\nyoung-modulus = 1\npoisson-ratio = 0\n"));
+        let notes = build(&scene).unwrap().notes;
+        assert_eq!(
+            notes,
+            ["law `spare` is used by no body", "`cube` is held by no constraint: and nothing moves it"]
+        );
     }
 }

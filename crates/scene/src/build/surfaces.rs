@@ -7,8 +7,9 @@ use pliant_mechanics::model::Surface;
 use super::meshes::surface_of;
 use super::{Builder, MeshOrigin};
 use crate::diagnostic::Diagnostic;
+use crate::output::number;
 
-/// A surface point further from its body than this part of the body's size is doubted.
+/// A point further from its body than this part of the body's size is doubted.
 const FAR: f64 = 0.05;
 
 impl Builder<'_> {
@@ -63,16 +64,51 @@ impl Builder<'_> {
             }
             rows.push(row.clone());
         }
-        let size = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
-        if farthest > FAR * size {
-            let message = format!(
-                "points of surface `{name}` lie up to {farthest:.3e} m outside `{}`",
-                self.bodies[body].name
-            );
-            let place = self.source().span(&["surface", name, "mesh"]);
-            let help = "is it in the same units and place as the body? `scale` and `at` move it";
-            self.out.push(Diagnostic::warning(message).at(place, "this surface").help(help));
-        }
+        let help = "is it in the same units and place as the body? `scale` and `at` move it";
+        self.doubt_place(&format!("surface `{name}`"), farthest, body, &["surface", name, "mesh"], help);
         Mapping::from_rows(rows.iter().map(Vec::as_slice))
+    }
+
+    /// Warns of what a body carries far outside of itself.
+    pub(super) fn doubt_place(&mut self, what: &str, distance: f64, body: usize, path: &[&str], help: &str) {
+        let built = &self.bodies[body];
+        let size = built.mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
+        if distance > FAR * size {
+            let message = format!(
+                "{what} reaches {} m outside `{}`, which measures {} m across",
+                number(distance),
+                built.name,
+                number(size)
+            );
+            let place = self.source().span(path);
+            self.out.push(Diagnostic::warning(message).at(place, "far outside").help(help));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::{built, mistakes};
+
+    #[test]
+    fn a_carried_surface_moves_rigidly_and_linearly_with_its_body() {
+        let built = built(
+            "[surface.skin]\non = 'cube'\nmesh = { block = { size = [0.2, 0.1, 0.1] }, edge = 0.03 }\n",
+        );
+        let surface = &built.model.surfaces[0];
+        assert!(surface.rest.len() > 50 && built.warnings.is_empty());
+        let carried = surface.mapping.apply(&built.model.rest);
+        for (point, rest) in carried.iter().zip(&surface.rest) {
+            assert!(point.iter().zip(rest).all(|(a, b)| (a - b).abs() < 1e-12), "{point:?} {rest:?}");
+        }
+    }
+
+    #[test]
+    fn a_surface_needs_a_body_and_a_name_of_its_own() {
+        let mesh = "mesh = { block = { size = [0.2, 0.1, 0.1] }, edge = 0.1 }\n";
+        let told = mistakes(&format!("[surface.skin]\non = 'cubes'\n{mesh}")).plain().to_string();
+        assert!(told.contains("there is no body `cubes` (help: did you mean `cube`?)"), "{told}");
+        let told = mistakes(&format!("[surface.cube]\non = 'cube'\n{mesh}")).plain().to_string();
+        assert!(told.contains("`cube` is the name of a body and of a surface"), "{told}");
     }
 }

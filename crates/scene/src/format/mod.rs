@@ -16,7 +16,7 @@ pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 
 use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// What the scene is and how long it lasts.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -45,11 +45,12 @@ pub struct RunTable {
     pub step: StepChoice,
     /// Threads; 0: one per core. The number never changes a result.
     #[serde(default)]
+    #[schemars(range(max = 1024))]
     pub threads: u32,
 }
 
 /// Number type of the solver.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Precision {
     /// 32-bit numbers: faster, about six digits.
@@ -60,7 +61,7 @@ pub enum Precision {
 }
 
 /// A time step.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum StepChoice {
     /// Chosen from the mesh and the laws.
@@ -70,7 +71,7 @@ pub enum StepChoice {
 }
 
 /// The word `auto`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Auto {
     /// Let Pliant choose.

@@ -14,6 +14,8 @@ use crate::format::{CsvTable, FieldName, ProbeTable};
 pub(super) struct Rows {
     path: PathBuf,
     file: File,
+    /// Bytes of the whole rows in it.
+    length: u64,
     reactions: Vec<usize>,
     energy: bool,
     probes: Vec<Probe>,
@@ -63,8 +65,8 @@ impl Rows {
             probes.push(Probe::new(built, probe));
         }
         let file = File::create(&path).map_err(|error| OutputError::new(&path, error))?;
-        let mut rows = Self { path, file, reactions, energy: table.energy, probes };
-        rows.write(&header.join(","))?;
+        let mut rows = Self { path, file, length: 0, reactions, energy: table.energy, probes };
+        rows.write(header.join(","))?;
         Ok(rows)
     }
 
@@ -73,8 +75,17 @@ impl Rows {
         &self.path
     }
 
-    fn write(&mut self, row: &str) -> Result<(), OutputError> {
-        writeln!(self.file, "{row}").map_err(|error| OutputError::new(&self.path, error))
+    /// Writes a row in one go; of one that does not fit on the disk nothing stays.
+    fn write(&mut self, mut row: String) -> Result<(), OutputError> {
+        row.push('\n');
+        match self.file.write_all(row.as_bytes()) {
+            Ok(()) => self.length += row.len() as u64,
+            Err(error) => {
+                let _ = self.file.set_len(self.length);
+                return Err(OutputError::new(&self.path, error));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -92,7 +103,7 @@ impl<R: Real> Observer<R> for Rows {
             probe.read(frame, &mut row);
         }
         let row: Vec<String> = row.iter().map(|value| format!("{value:e}")).collect();
-        self.write(&row.join(","))
+        self.write(row.join(","))
     }
 }
 

@@ -4,7 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::OutputError;
+use crate::registry::OutputTable;
 use crate::scene::Scene;
+
+/// The page to read after a run.
+pub(crate) const SUMMARY: &str = "summary.md";
+/// The plot in it.
+pub(crate) const PLOT: &str = "plot.svg";
 
 /// Where a run writes.
 #[derive(Clone, Debug)]
@@ -32,20 +38,18 @@ impl OutputFolder {
     /// If the folder holds something, or can't be written to.
     pub fn prepare(path: PathBuf, scene: &Scene, force: bool) -> Result<Self, OutputError> {
         let failed = |error: std::io::Error| OutputError::new(&path, error);
+        let refused =
+            |reason: &str, remedy| OutputError { path: path.clone(), reason: reason.into(), remedy };
         if path.exists() && !path.is_dir() {
-            return Err(OutputError::new(&path, "it is a file, not a folder"));
+            return Err(refused("it is a file, not a folder", "choose another name with `--out DIR`"));
         }
         if path.is_dir() {
             let filled = fs::read_dir(&path).map_err(failed)?.next().is_some();
             if filled && !force {
-                return Err(OutputError::new(
-                    &path,
-                    "it is not empty; add --force to overwrite it, or --out DIR",
-                ));
+                let remedy = "add `--force` to replace what an earlier run left there, or choose another with `--out DIR`";
+                return Err(refused("it is not empty", remedy));
             }
-            for (name, _) in &scene.outputs {
-                remove_series(&path.join(name)).map_err(failed)?;
-            }
+            remove_earlier(&path, scene).map_err(failed)?;
         } else {
             fs::create_dir_all(&path).map_err(failed)?;
         }
@@ -63,25 +67,63 @@ impl OutputFolder {
     /// Writes a whole file in one go: under a temporary name first, so that a failure leaves the old one.
     pub(crate) fn write(&self, name: &str, content: &str) -> Result<PathBuf, OutputError> {
         let (path, temporary) = (self.path.join(name), self.path.join(format!("{name}.tmp")));
-        fs::write(&temporary, content)
-            .and_then(|()| fs::rename(&temporary, &path))
-            .map_err(|error| OutputError::new(&path, error))?;
+        let written = fs::write(&temporary, content).and_then(|()| fs::rename(&temporary, &path));
+        written.map_err(|error| {
+            // What is half written is not left behind.
+            let _ = fs::remove_file(&temporary);
+            OutputError::new(&path, error)
+        })?;
         Ok(path)
     }
 }
 
-/// Removes the frames of an earlier run, so that a series never mixes two.
-fn remove_series(folder: &Path) -> std::io::Result<()> {
+/// Removes what an earlier run of the same outputs left, so that no file tells of another run than its neighbours.
+/// A CSV file stays until it is written anew.
+fn remove_earlier(folder: &Path, scene: &Scene) -> std::io::Result<()> {
+    for page in [SUMMARY, PLOT] {
+        remove(&folder.join(page))?;
+    }
+    for (name, table) in &scene.outputs {
+        if let OutputTable::Vtu(_) = table {
+            remove(&folder.join(format!("{name}.pvd")))?;
+            remove_frames(&folder.join(name))?;
+        }
+    }
+    Ok(())
+}
+
+/// Removes `000000.vtu`, … and one that a killed run left unfinished.
+fn remove_frames(folder: &Path) -> std::io::Result<()> {
     if !folder.is_dir() {
         return Ok(());
     }
     for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        let frame =
-            path.file_stem().is_some_and(|stem| stem.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
-        if frame && path.extension().is_some_and(|extension| extension == "vtu") {
-            fs::remove_file(path)?;
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        let stem = name.strip_suffix(".tmp").unwrap_or(&name).strip_suffix(".vtu");
+        if stem.is_some_and(|stem| !stem.is_empty() && stem.bytes().all(|byte| byte.is_ascii_digit())) {
+            remove(&folder.join(name))?;
         }
     }
     Ok(())
+}
+
+/// Removes a regular file, if there is one.
+fn remove(path: &Path) -> std::io::Result<()> {
+    match fs::symlink_metadata(path) {
+        Ok(found) if found.is_file() => fs::remove_file(path),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_are_called_after_the_folder_of_the_scene() {
+        assert_eq!(OutputFolder::default_for(Path::new("nowhere/liver.toml")), Path::new("out/liver"));
+        let here = OutputFolder::default_for(Path::new("src/scene.toml"));
+        // A scene.toml that does not exist has no folder to be called after.
+        assert_eq!(here, Path::new("out/scene"));
+    }
 }

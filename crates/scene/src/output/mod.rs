@@ -12,10 +12,11 @@ use std::path::{Path, PathBuf};
 use pliant_mechanics::{CentralDifference, Real, State};
 
 pub use folder::OutputFolder;
-pub use summary::{BodySummary, FailureSummary, Summary, failed_input, failed_output};
+pub(crate) use folder::{PLOT, SUMMARY};
+pub use summary::{BodySummary, FailureSummary, Summary, failed_input, failed_output, number};
 
 pub(crate) use plot::plot;
-pub(crate) use summary::{bodies, markdown, number, summarise};
+pub(crate) use summary::{bodies, markdown, summarise};
 
 use crate::build::Built;
 use crate::registry::OutputTable;
@@ -29,11 +30,15 @@ pub struct OutputError {
     pub path: PathBuf,
     /// What the system says.
     pub reason: String,
+    /// What to try.
+    pub remedy: &'static str,
 }
 
 impl OutputError {
     pub(crate) fn new(path: &Path, reason: impl ToString) -> Self {
-        Self { path: path.to_owned(), reason: reason.to_string() }
+        let remedy =
+            "check the folder, its permissions and the free space, or choose another with `--out DIR`";
+        Self { path: path.to_owned(), reason: reason.to_string(), remedy }
     }
 }
 
@@ -72,7 +77,7 @@ impl Schedule {
     pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
         let due = last || time + 0.5 * step >= self.seen as f64 * self.every;
         if due {
-            self.seen = ((time + 0.5 * step) / self.every).floor() as u64 + 1;
+            self.seen = (((time + 0.5 * step) / self.every).floor() as u64).saturating_add(1);
         }
         due
     }
@@ -123,6 +128,9 @@ mod tests {
     #[test]
     fn an_interval_below_the_step_sees_every_instant_once() {
         let mut schedule = Schedule::new(0.01);
+        assert!((0..20).all(|n| schedule.is_due(f64::from(n) * 0.05, 0.05, false)));
+        // More intervals than an integer counts.
+        let mut schedule = Schedule::new(1e-300);
         assert!((0..20).all(|n| schedule.is_due(f64::from(n) * 0.05, 0.05, false)));
     }
 }

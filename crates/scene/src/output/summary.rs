@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use pliant_mechanics::{Energies, StepError};
-use serde::Serialize;
-use serde_json::{Map, Value as Json, json};
+use serde::{Serialize, Serializer};
+use serde_json::{Value as Json, json};
 
 use super::OutputError;
 use crate::build::Built;
@@ -38,16 +38,15 @@ pub struct Summary {
     pub limiting_element: LimitingElement,
     /// Steps taken.
     pub steps: u64,
-    /// Simulated time [s].
-    pub time: f64,
     /// Wall time of the steps and their outputs [s].
     pub wall_seconds: f64,
     /// Simulated time over wall time.
     pub real_time_factor: f64,
     /// Imbalance of the energies at the end, as a fraction of the largest.
     pub energy_balance: f64,
-    /// Force [N] of each constraint at the end.
-    pub reactions: Map<String, Json>,
+    /// Force [N] of each constraint at the end, by name.
+    #[serde(serialize_with = "as_map")]
+    pub reactions: Vec<(String, [f64; 3])>,
     /// Files written, as paths.
     pub files: Vec<String>,
 }
@@ -84,6 +83,10 @@ pub struct FailureSummary {
     pub message: String,
 }
 
+fn as_map<S: Serializer>(pairs: &[(String, [f64; 3])], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().map(|(name, force)| (name, force)))
+}
+
 /// The JSON object of an input that was refused: the keys of [`Summary`], empty where nothing was built.
 pub fn failed_input(message: &str) -> Json {
     empty("invalid", FailureSummary::about("input", message.into(), None))
@@ -91,7 +94,7 @@ pub fn failed_input(message: &str) -> Json {
 
 /// The JSON object of a run whose outputs could not be opened or finished.
 pub fn failed_output(error: &OutputError) -> Json {
-    empty("failed", FailureSummary::about("output", error.to_string(), None))
+    empty("failed", FailureSummary::output(error, None))
 }
 
 fn empty(status: &str, error: FailureSummary) -> Json {
@@ -99,14 +102,19 @@ fn empty(status: &str, error: FailureSummary) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "true_limit": null, "limiting_element": null, "steps": 0, "time": 0.0, "wall_seconds": 0.0, "real_time_factor": null,
+        "true_limit": null, "limiting_element": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "energy_balance": null, "reactions": {}, "files": [],
     })
 }
 
 impl FailureSummary {
-    /// A failure that is about no body.
-    pub(crate) fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
+    /// An output that could not be written, at a time of the run.
+    pub(crate) fn output(error: &OutputError, time: Option<f64>) -> Self {
+        let message = format!("{error}; what was written before stays readable; {}", error.remedy);
+        Self::about("output", message, time)
+    }
+
+    fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
         Self { kind, body: None, element: None, node: None, time, message }
     }
 }
@@ -160,11 +168,10 @@ pub(crate) fn summarise(built: &Built, plan: &Plan, outcome: &Outcome) -> Summar
         true_limit: plan.limit.step,
         limiting_element: plan.limiting.clone(),
         steps: outcome.steps,
-        time: outcome.time,
         wall_seconds: outcome.wall_seconds,
         real_time_factor: outcome.time / outcome.wall_seconds.max(f64::MIN_POSITIVE),
         energy_balance: outcome.energies.balance,
-        reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), json!(force))).collect(),
+        reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
     }
 }
@@ -282,8 +289,8 @@ fn short(file: &Path) -> String {
     file.file_name().map_or_else(|| file.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Four significant digits.
-pub(crate) fn number(value: f64) -> String {
+/// A number for people: four significant digits.
+pub fn number(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
         return format!("{value:.3e}");

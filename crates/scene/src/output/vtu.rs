@@ -6,7 +6,7 @@ use std::io::{BufWriter, Write};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::{VtuOptions, write_pvd, write_vtu};
+use pliant_geometry::io::{MeshFileError, VtuOptions, write_pvd, write_vtu};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 use pliant_mechanics::Real;
 use rayon::prelude::*;
@@ -111,7 +111,10 @@ impl<R: Real> Observer<R> for Series<R> {
             return Err(OutputError::new(&path, error));
         }
         self.times.push((frame.time(), format!("{}/{file}", self.name)));
-        write_pvd(&self.index, &self.times).map_err(|error| OutputError::new(&self.index, error))
+        write_pvd(&self.index, &self.times).map_err(|error| match error {
+            MeshFileError::Write { path, source } => OutputError::new(&path, source),
+            other => OutputError::new(&self.index, other),
+        })
     }
 }
 

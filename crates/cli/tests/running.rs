@@ -1,0 +1,892 @@
+//! What a run leaves and tells, through the real binary: files, names and numbers as the project promises them.
+
+mod support;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use pliant_geometry::{CellKind, Mesh};
+use serde_json::Value;
+use support::{BLOCK, CUBE, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
+
+/// The repository.
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+#[track_caller]
+fn assert_close(found: f64, expected: f64, tolerance: f64, what: &str) {
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{what}: found {found}, expected {expected} ± {tolerance}"
+    );
+}
+
+fn keys(object: &Value) -> Vec<&str> {
+    object.as_object().expect("an object").keys().map(String::as_str).collect()
+}
+
+/// The keys of `--json`, in their order.
+const KEYS: [&str; 16] = [
+    "status",
+    "error",
+    "bodies",
+    "nodes",
+    "elements",
+    "mass",
+    "step",
+    "element_bound",
+    "true_limit",
+    "limiting_element",
+    "steps",
+    "wall_seconds",
+    "real_time_factor",
+    "energy_balance",
+    "reactions",
+    "files",
+];
+
+#[test]
+fn json_has_exactly_the_promised_keys() {
+    let workshop = Workshop::new(BLOCK);
+    let done = workshop.run(&[]).done();
+    assert_eq!(keys(&done), KEYS);
+    assert!(done["error"].is_null());
+    assert_eq!((done["nodes"].as_u64(), done["elements"].as_u64()), (Some(27), Some(48)));
+    assert_close(done["mass"].as_f64().unwrap(), 1.0, 1e-12, "mass [kg]");
+    assert_eq!(done["bodies"][0]["name"], "block");
+    assert_eq!(keys(&done["reactions"]), ["base", "hand"]);
+    assert_eq!(done["reactions"]["base"].as_array().unwrap().len(), 3);
+    assert_eq!(done["limiting_element"]["body"], "block");
+    assert!(done["energy_balance"].as_f64().unwrap() < 0.01);
+    let files: Vec<&str> = done["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    let expected_files = ["fields.pvd", "history.csv", "plot.svg", "summary.md"];
+    assert_eq!(files, expected_files.map(|file| format!("out/case/{file}")));
+    assert!(files.iter().all(|file| workshop.path(file).is_file()));
+
+    let refused = Workshop::block("density = 1000", "density = 0").run(&[]).json();
+    assert_eq!(keys(&refused), KEYS);
+    assert_eq!(keys(&refused["error"]), ["kind", "body", "element", "node", "time", "message"]);
+}
+
+#[test]
+fn csv_columns_are_named_as_promised() {
+    let fields = "probes.middle = { on = \"block\", at = [0.05, 0.05, 0.05], data = [\"displacement\", \"cauchy-stress\", \"J\"] }\n\
+                  probes.outside = { on = \"skin\", at = [0.1, 0.1, 0.1], data = [\"velocity\"] }";
+    let good = BLOCK.lines().find(|line| line.starts_with("probes")).unwrap();
+    let workshop = Workshop::block(good, fields);
+    workshop.run(&[]).done();
+    let (header, rows) = workshop.table("out/case/history.csv");
+    let mut expected = vec!["time".to_owned()];
+    for constraint in ["base", "hand"] {
+        expected.extend(["x", "y", "z"].map(|axis| format!("reaction.{constraint}.{axis}")));
+    }
+    for energy in ["kinetic", "internal", "damping", "external", "hourglass", "balance"] {
+        expected.push(format!("energy.{energy}"));
+    }
+    expected.extend(["x", "y", "z"].map(|axis| format!("probe.middle.displacement.{axis}")));
+    for entry in ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"] {
+        expected.push(format!("probe.middle.cauchy-stress.{entry}"));
+    }
+    expected.push("probe.middle.J".to_owned());
+    expected.extend(["x", "y", "z"].map(|axis| format!("probe.outside.velocity.{axis}")));
+    assert_eq!(header, expected);
+    assert_eq!(rows[0][0], 0.0);
+    assert_close(rows.last().unwrap()[0], 0.02, 1e-12, "last instant");
+    assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]), "times increase");
+
+    let some = Workshop::block(good, "reactions = [\"hand\"]\nenergy = false");
+    some.run(&[]).done();
+    let (header, _) = some.table("out/case/history.csv");
+    assert_eq!(header, ["time", "reaction.hand.x", "reaction.hand.y", "reaction.hand.z"]);
+}
+
+/// Numbers per item of every field that can be asked for.
+const FIELDS: [(&str, usize); 10] = [
+    ("displacement", 3),
+    ("velocity", 3),
+    ("cauchy-stress", 9),
+    ("pk2-stress", 9),
+    ("von-mises", 1),
+    ("green-strain", 9),
+    ("fibre-stretch", 1),
+    ("pressure", 1),
+    ("J", 1),
+    ("energy-density", 1),
+];
+
+#[test]
+fn vtu_arrays_are_named_as_promised_and_tensors_have_nine_components() {
+    let all = FIELDS.map(|(name, _)| format!("\"{name}\"")).join(", ");
+    let data = format!("data = [{all}]");
+    let workshop = Workshop::block("data = [\"displacement\", \"von-mises\"]", &data);
+    workshop.run(&[]).done();
+    let frames = workshop.series("out/case/fields.pvd");
+    assert_eq!(frames[0].0, 0.0, "frame 0");
+    assert!((5..=7).contains(&frames.len()), "{}", frames.len());
+    let mesh = &frames.last().unwrap().1.mesh;
+    let tets = mesh.block(CellKind::Tet).unwrap();
+    for (name, components) in FIELDS {
+        let array = mesh.point_data.get(name).or_else(|| tets.data.get(name)).expect(name);
+        assert_eq!(array.components, components, "{name}");
+        assert!(array.values.iter().all(|value| value.is_finite()), "{name}");
+    }
+    // Symmetric, row-major.
+    let stress = tets.data["cauchy-stress"].item(7);
+    assert_eq!((stress[1], stress[2], stress[5]), (stress[3], stress[6], stress[7]));
+    let trace = (stress[0] + stress[4] + stress[8]) / 3.0;
+    assert_close(tets.data["pressure"].item(7)[0], -trace, 1e-6 * trace.abs(), "pressure");
+    // Points stay at rest, the displacement warps them.
+    assert_eq!(frames[0].1.mesh.points, mesh.points);
+
+    let on_points =
+        Workshop::block("data = [\"displacement\", \"von-mises\"]", &format!("at = \"points\"\n{data}"));
+    on_points.run(&[]).done();
+    let frames = on_points.series("out/case/fields.pvd");
+    let mesh = &frames.last().unwrap().1.mesh;
+    assert!(FIELDS.iter().all(|(name, _)| mesh.point_data.contains_key(*name)));
+}
+
+#[test]
+fn options_take_the_place_of_what_the_scene_says() {
+    let workshop = Workshop::new(BLOCK);
+    let done = workshop.run(&["--until", "0.004", "--step", "0.001", "--out", "elsewhere/deep"]).done();
+    assert_eq!(done["steps"], 4);
+    assert_close(done["step"].as_f64().unwrap(), 0.001, 1e-15, "step [s]");
+    assert!(workshop.path("elsewhere/deep/summary.md").exists() && !workshop.path("out").exists());
+
+    let history = |arguments: &[&str]| {
+        workshop.run(&[&["--force"], arguments].concat()).done();
+        (workshop.read("out/case/history.csv"), workshop.read("out/case/summary.md"))
+    };
+    let (one, page) = history(&["--threads", "1"]);
+    assert!(page.contains("| threads | 1 |") && page.contains("| precision | double |"), "{page}");
+    let (three, page) = history(&["--threads", "3"]);
+    assert!(page.contains("| threads | 3 |"), "{page}");
+    assert_eq!(one, three, "the number of threads changed a bit");
+    let (single, page) = history(&["--precision", "single"]);
+    assert!(page.contains("| precision | single |"), "{page}");
+    assert_ne!(one, single);
+}
+
+#[test]
+fn a_folder_means_its_scene_and_names_the_outputs() {
+    let workshop = Workshop::new(BLOCK);
+    workshop.write("case/other.toml", BLOCK);
+    for (scene, out) in [("case", "out/case"), ("case/other.toml", "out/other")] {
+        let told = workshop.pliant(&["run", scene, "--json", "--until", "0.002"]);
+        told.done();
+        assert!(workshop.path(out).join("summary.md").exists(), "{out}");
+    }
+    let told = workshop.pliant(&["run", "case/scene.toml", "--until", "0.002"]);
+    assert_eq!(told.code, 2, "the folder of the scene holds a run already: {}", told.out);
+    let mut inside = workshop.command(&["run", ".", "--until", "0.002"]);
+    let told = Told::from(inside.current_dir(workshop.path("case")).output().unwrap());
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(workshop.path("case/out/case/summary.md").exists());
+}
+
+#[test]
+fn a_run_tells_its_result_in_words() {
+    let workshop = Workshop::new(BLOCK);
+    let told = workshop.pliant(&["run", "case"]);
+    assert_eq!(told.code, 0);
+    for piece in [
+        "27 nodes, 48 elements; step ",
+        "real time; energies balance to",
+        "reaction of `hand`: (",
+        "wrote out/case/summary.md",
+    ] {
+        assert!(told.out.contains(piece), "no `{piece}` in {}", told.out);
+    }
+    let page = workshop.read("out/case/summary.md");
+    for piece in [
+        "| block |",
+        "element bound",
+        "true limit",
+        "Balance:",
+        "| base |",
+        "wall time",
+        "real-time factor",
+        "plot.svg",
+    ] {
+        assert!(page.contains(piece), "no `{piece}` in {page}");
+    }
+    let plot = workshop.read("out/case/plot.svg");
+    assert!(
+        plot.starts_with("<svg") && plot.contains("Reaction [N]") && plot.contains("external work"),
+        "{plot}"
+    );
+}
+
+#[test]
+fn a_failed_run_says_where_and_leaves_what_it_wrote() {
+    let scene =
+        changed(BLOCK, "by = [0, 0, 0.001]", "by = [0, 0, -0.2]").replace("until = 0.02", "until = 0.1");
+    let workshop = Workshop::new(&scene);
+    let told = workshop.run(&[]);
+    assert_eq!(told.code, 1);
+    let json = told.json();
+    assert_eq!((&json["status"], &json["error"]["kind"]), (&"failed".into(), &"inverted".into()));
+    assert_eq!(json["error"]["body"], "block");
+    let element = json["error"]["element"].as_u64().unwrap();
+    assert!(element < 48 && json["error"]["node"].as_u64().unwrap() < 27, "{json}");
+    let time = json["error"]["time"].as_f64().unwrap();
+    assert!(time > 0.0 && time < 0.1, "{json}");
+    let message = json["error"]["message"].as_str().unwrap();
+    for piece in [&format!("element {element} of `block` is inverted"), "det F", "t = ", "finer mesh"] {
+        assert!(message.contains(piece) && told.err.contains(piece), "no `{piece}` in {message}");
+    }
+    let frames = workshop.series("out/case/fields.pvd");
+    assert!(frames.len() > 1 && frames.iter().all(|(written, _)| *written < time));
+    let (_, rows) = workshop.table("out/case/history.csv");
+    assert!(rows.last().unwrap()[0] <= time);
+    let page = workshop.read("out/case/summary.md");
+    assert!(page.contains("**Failed** (inverted)") && page.contains(message), "{page}");
+}
+
+#[test]
+fn a_state_that_is_no_longer_finite_ends_the_run() {
+    let told = Workshop::block("acceleration = [1, 0, 0]", "acceleration = [1e308, 0, 0]").run(&[]);
+    assert_eq!(told.code, 1, "{}", told.err);
+    let error = &told.json()["error"];
+    assert_eq!(error["kind"], "not-finite");
+    assert_eq!(error["body"], "block");
+    assert!(error["node"].is_u64() && error["time"].is_f64() && error["element"].is_null(), "{error}");
+}
+
+#[test]
+fn a_killed_run_leaves_a_series_that_can_be_read() {
+    let workshop = Workshop::block("until = 0.02", "until = 100");
+    let mut child =
+        workshop.command(&["run", "case"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let index = workshop.path("out/case/fields.pvd");
+    let patience = Instant::now();
+    while fs::read_to_string(&index).map_or(0, |text| text.matches("<DataSet").count()) < 5 {
+        assert!(patience.elapsed() < Duration::from_secs(30), "no frames came");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let frames = series(&index);
+    assert!(frames.len() >= 5 && frames[0].0 == 0.0);
+    assert!(!workshop.path("out/case/summary.md").exists());
+    let (_, rows) = workshop.table("out/case/history.csv");
+    assert!(!rows.is_empty());
+    // The next run in the same folder leaves nothing of it.
+    workshop.run(&["--force", "--until", "0.004"]).done();
+    assert_eq!(workshop.series("out/case/fields.pvd").len(), 2);
+    assert_eq!(fs::read_dir(workshop.path("out/case/fields")).unwrap().count(), 2);
+}
+
+/// A heavily damped block, fixed below, that is at rest when the scene ends.
+fn resting(load: &str) -> String {
+    format!(
+        r#"[scene]
+until = 1.5
+[run]
+threads = 1
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 10e3
+poisson-ratio = 0.3
+[body.block]
+mesh = {{ block = {{ size = [0.1, 0.1, 0.1] }}, edge = 0.05, as = "hexes" }}
+law = "tissue"
+density = 1000
+damping = 60
+[surface.skin]
+on = "block"
+mesh = {{ block = {{ size = [0.1, 0.1, 0.1] }}, edge = 0.04 }}
+[constraint.base]
+type = "fix"
+body = "block"
+nodes = {{ set = "z-min" }}
+[output.skin]
+type = "vtu"
+on = "skin"
+every = 0.5
+data = ["displacement", "velocity"]
+{load}"#
+    )
+}
+
+#[test]
+fn at_rest_the_reaction_equals_the_load_for_every_kind_of_load() {
+    let force = |on: &str, what: &str| {
+        format!(
+            "[load.one]\ntype = \"force\"\non = \"{on}\"\nnodes = {{ set = \"z-max\" }}\n{what}\nto = 0.1\n"
+        )
+    };
+    let faces = |kind: &str, on: &str, what: &str| {
+        let up = "{ normal = { direction = [0, 0, 1], within = 5 } }";
+        format!("[load.one]\ntype = \"{kind}\"\non = \"{on}\"\nfaces = {up}\n{what}\nto = 0.1\n")
+    };
+    let top = "{ plane = { point = [0, 0, 0.1], normal = [0, 0, 1] } }";
+    let on_skin = |text: String| text.replace("{ set = \"z-max\" }", top);
+    let cases = [
+        ("force, total", force("block", "total = [0.2, 0, -0.3]"), [0.2, 0.0, -0.3]),
+        ("force, each of nine", force("block", "each = [0, 0.01, 0]"), [0.0, 0.09, 0.0]),
+        ("force on the skin", on_skin(force("skin", "total = [0.2, 0, -0.3]")), [0.2, 0.0, -0.3]),
+        ("traction", faces("traction", "block", "traction = [10, 0, -20]"), [0.1, 0.0, -0.2]),
+        ("traction on the skin", faces("traction", "skin", "traction = [10, 0, -20]"), [0.1, 0.0, -0.2]),
+        ("pressure", faces("pressure", "block", "pressure = 20"), [0.0, 0.0, -0.2]),
+        ("pressure on the skin", faces("pressure", "skin", "pressure = 20"), [0.0, 0.0, -0.2]),
+        (
+            "gravity",
+            "[load.one]\ntype = \"gravity\"\nacceleration = [0, 1, -2]\nto = 0.1\n".into(),
+            [0.0, 1.0, -2.0],
+        ),
+    ];
+    for (what, load, expected) in cases {
+        let done = Workshop::new(&resting(&load)).run(&[]).done();
+        let reaction = &done["reactions"]["base"];
+        for (axis, expected) in expected.into_iter().enumerate() {
+            // Damped to 1e-5; the loaded faces shrink by less than 1 %, which matters to a pressure alone.
+            let tolerance = if what.starts_with("pressure") { 3e-3 } else { 1e-4 };
+            assert_close(
+                reaction[axis].as_f64().unwrap(),
+                -expected,
+                tolerance,
+                &format!("{what}, axis {axis}"),
+            );
+        }
+    }
+}
+
+#[test]
+fn a_carried_surface_is_written_and_follows_its_body() {
+    let load =
+        "[load.one]\ntype = \"force\"\non = \"block\"\nnodes = { set = \"z-max\" }\ntotal = [0, 0, 1]\n";
+    let workshop = Workshop::new(&(resting(load) + "[output.body]\ntype = \"vtu\"\nevery = 0.5\n"));
+    workshop.run(&[]).done();
+    let skin = workshop.series("out/case/skin.pvd").pop().unwrap().1.mesh;
+    let body = workshop.series("out/case/body.pvd").pop().unwrap().1.mesh;
+    assert!(skin.block(CellKind::Triangle).is_some() && skin.point_data.contains_key("velocity"));
+    let lift = |mesh: &Mesh| {
+        let corner =
+            mesh.points.iter().position(|p| (p - pliant_geometry::Vector3::repeat(0.1)).norm() < 1e-9);
+        mesh.point_data["displacement"].item(corner.expect("the corner is a point of both"))[2]
+    };
+    assert!(lift(&skin) > 1e-4);
+    assert_close(lift(&skin), lift(&body), 1e-9, "lift of the corner [m]");
+}
+
+#[test]
+fn several_bodies_run_side_by_side() {
+    let other = r#"[law.stiff]
+type = "coupled-neo-hookean"
+shear-modulus = 20e3
+bulk-modulus = 50e3
+[body.other]
+mesh = { block = { size = [0.05, 0.05, 0.05] }, edge = 0.025, as = "hexes", at = [1, 0, 0] }
+law = "stiff"
+element = "hex8"
+hourglass = 0.1
+density = 2000
+[constraint.far]
+type = "fix"
+body = "other"
+nodes = { set = "z-min" }
+"#;
+    let workshop =
+        Workshop::new(&format!("{BLOCK}{other}[output.alone]\ntype = \"vtu\"\non = \"other\"\nevery = 1\n"));
+    let done = workshop.run(&[]).done();
+    let names: Vec<&str> =
+        done["bodies"].as_array().unwrap().iter().filter_map(|b| b["name"].as_str()).collect();
+    assert_eq!(names, ["block", "other"]);
+    assert_close(done["mass"].as_f64().unwrap(), 1.25, 1e-12, "mass [kg]");
+    assert_eq!(done["elements"], 48 + 8);
+    let both = workshop.series("out/case/fields.pvd").pop().unwrap().1.mesh;
+    assert_eq!(both.block(CellKind::Tet).unwrap().data["body"].values, [0.0; 48]);
+    assert_eq!(both.block(CellKind::Hex).unwrap().data["body"].values, [1.0; 8]);
+    let alone = workshop.series("out/case/alone.pvd").pop().unwrap().1.mesh;
+    assert_eq!(alone.points.len(), 27);
+}
+
+#[test]
+fn laws_go_by_label_in_the_built_in_brain() {
+    let law = |name: &str, young: f64| {
+        format!("[law.{name}]\ntype = \"neo-hookean\"\nyoung-modulus = {young}\npoisson-ratio = 0.45\n")
+    };
+    let scene = format!(
+        "[scene]\nuntil = 0.002\ngravity = [0, 0, -9.81]\n{}{}{}\
+         [body.brain]\nmesh = {{ organ = \"brain\", edge = 0.02 }}\ndensity = 1040\n\
+         law = {{ 1 = \"tissue\", 2 = \"ventricle\", 3 = \"tumour\" }}\n\
+         [constraint.stem]\ntype = \"fix\"\nbody = \"brain\"\nnodes = {{ label-boundary = [1, 3] }}\n\
+         [output.fields]\ntype = \"vtu\"\nevery = 1\n",
+        law("tissue", 3000.0),
+        law("ventricle", 500.0),
+        law("tumour", 9000.0),
+    );
+    let workshop = Workshop::new(&scene);
+    workshop.run(&[]).done();
+    let check = workshop.pliant(&["check", "case"]).out;
+    assert_eq!(check.matches("tet4 with law neo-hookean").count(), 3, "{check}");
+    assert!(check.contains("shear modulus 172.4 Pa") && check.contains("shear modulus 3103 Pa"), "{check}");
+    let mesh = workshop.series("out/case/fields.pvd").pop().unwrap().1.mesh;
+    let labels: BTreeSet<i64> =
+        mesh.block(CellKind::Tet).unwrap().data["label"].values.iter().map(|&label| label as i64).collect();
+    assert_eq!(labels, BTreeSet::from([1, 2, 3]));
+}
+
+#[test]
+fn laws_go_by_label_over_tets_and_hexes_of_one_body() {
+    let hex = CUBE.map(|[x, y, z]| [x + 0.3, y, z]);
+    let points: Vec<[f64; 3]> = CUBE.into_iter().chain(hex).collect();
+    let hex: &[u32] = &[8, 9, 11, 10, 12, 13, 15, 14];
+    let cells: Vec<&[u32]> = TETS.into_iter().chain([hex]).collect();
+    let scene =
+        changed(FROM_FILE, "law = \"tissue\"", "law = { 1 = \"tissue\", 2 = \"tissue\", 3 = \"tissue\" }");
+    let workshop = Workshop::new(&scene);
+    workshop.write("case/organ.vtk", vtk(&points, &cells, &labels(&[1, 1, 1, 2, 2, 2, 3])));
+    let told = workshop.run(&[]);
+    assert_eq!(told.done()["elements"], 7);
+    assert!(told.err.contains("`organ` is made of 2 separate parts"), "{}", told.err);
+}
+
+#[test]
+fn each_cell_can_have_its_own_fibre() {
+    // All nodes are prescribed, so that every cell is stretched by 1.1 along z.
+    let scene = r#"[scene]
+until = 0.1
+[law.tissue]
+type = "transversely-isotropic"
+young-modulus = 10e3
+poisson-ratio = 0.3
+fibre-modulus = 5e3
+[body.organ]
+mesh = { file = "organ.vtk" }
+law = "tissue"
+density = 1000
+fibre = { cell-data = "fibre" }
+[constraint.low]
+type = "fix"
+body = "organ"
+nodes = { plane = { point = [0, 0, 0], normal = [0, 0, 1] } }
+[constraint.high]
+type = "move"
+body = "organ"
+nodes = { plane = { point = [0, 0, 0.1], normal = [0, 0, 1] } }
+by = [0, 0, 0.01]
+[output.fields]
+type = "vtu"
+every = 1
+data = ["fibre-stretch", "J"]
+"#;
+    let workshop = Workshop::new(scene);
+    let directions = ["1 0 0", "0 0 2", "0 -3 0", "0 0 -1", "1 0 1", "0 1 0"];
+    workshop.write("case/organ.vtk", vtk(&CUBE, &TETS, &fibres(&directions)));
+    workshop.run(&[]).done();
+    let mesh = workshop.series("out/case/fields.pvd").pop().unwrap().1.mesh;
+    let tets = mesh.block(CellKind::Tet).unwrap();
+    let slanted = (0.5 * (1.0 + 1.1_f64 * 1.1)).sqrt();
+    for (cell, expected) in [1.0, 1.1, 1.0, 1.1, slanted, 1.0].into_iter().enumerate() {
+        // Written in double precision by a run in double precision.
+        assert_close(tets.data["fibre-stretch"].item(cell)[0], expected, 1e-9, "stretch");
+        assert_close(tets.data["J"].item(cell)[0], 1.1, 1e-9, "J");
+    }
+}
+
+#[test]
+fn every_selection_finds_its_nodes_in_a_scene() {
+    let mesh = vtk(&CUBE, &TETS, &labels(&[1, 1, 1, 2, 2, 2]));
+    let block = Workshop::new(BLOCK);
+    let organ = Workshop::new(FROM_FILE);
+    organ.write("case/organ.vtk", mesh);
+    let of_organ = FROM_FILE.lines().find(|line| line.starts_with("nodes")).unwrap();
+    let cases = [
+        ("\"all\"", 27),
+        ("\"boundary\"", 26),
+        ("{ box = [[0, 0, 0], [0.05, 0.1, 0]] }", 6),
+        ("{ sphere = { centre = [0.05, 0.05, 0.05], radius = 0.05 } }", 7),
+        ("{ half-space = { point = [0.05, 0, 0], normal = [1, 0, 0] } }", 18),
+        ("{ plane = { point = [0, 0, 0.05], normal = [0, 0, 3] } }", 9),
+        ("{ plane = { point = [0, 0, 0.02], normal = [0, 0, 1], tolerance = 0.03 } }", 18),
+        ("{ normal = { direction = [0, 0, -1], within = 1 } }", 9),
+        ("{ nearest = { point = [0, 0, 0] } }", 1),
+        ("{ nearest = { point = [0, 0, 0], count = 4 } }", 4),
+        ("{ set = \"z-min\" }", 9),
+        ("{ ids = [0, 5, 17] }", 3),
+        ("{ union = [{ set = \"z-min\" }, { ids = [0, 26] }] }", 10),
+        ("{ intersection = [{ set = \"z-min\" }, { set = \"x-min\" }] }", 3),
+        ("{ difference = [\"all\", \"boundary\"] }", 1),
+    ];
+    let count = |workshop: &Workshop, base: &str, from: &str, to: &str| {
+        workshop.write("case/scene.toml", changed(base, from, &format!("nodes = {to}")));
+        let told = workshop.pliant(&["check", "case"]);
+        assert_eq!(told.code, 0, "{to}: {}", told.err);
+        let line = told.out.lines().find(|line| line.starts_with("constraint `base`")).unwrap().to_owned();
+        line.split_whitespace().rev().nth(1).unwrap().parse::<usize>().unwrap()
+    };
+    // The other constraint would contradict most of them.
+    let hand = BLOCK.find("[constraint.hand]").unwrap();
+    let free = format!("{}{}", &BLOCK[..hand], &BLOCK[BLOCK.find("[load.push]").unwrap()..]);
+    for (selection, expected) in cases {
+        assert_eq!(count(&block, &free, "nodes = { set = \"z-min\" }", selection), expected, "{selection}");
+    }
+    for (selection, expected) in [("{ label = 1 }", 6), ("{ label-boundary = [1, 2] }", 4)] {
+        assert_eq!(count(&organ, FROM_FILE, of_organ, selection), expected, "{selection}");
+    }
+}
+
+/// The displacement along z of the top of [`BLOCK`] over time, with this motion.
+fn motion(motion: &str) -> Vec<(f64, f64)> {
+    let scene = changed(BLOCK, "by = [0, 0, 0.001]\ncurve = \"smooth-step\"", motion);
+    let probe = "probes.top = { on = \"block\", at = [0.05, 0.05, 0.1] }";
+    let workshop = Workshop::new(&(scene + probe + "\n"));
+    workshop.run(&["--step", "1e-3"]).done();
+    let (header, rows) = workshop.table("out/case/history.csv");
+    let column = header.iter().position(|name| name == "probe.top.displacement.z").unwrap();
+    rows.iter().map(|row| (row[0], row[column])).collect()
+}
+
+#[test]
+fn every_curve_leads_the_motion() {
+    let smooth = |s: f64| s * s * (3.0 - 2.0 * s);
+    let polynomial = |s: f64| s * s * s * (10.0 + s * (6.0 * s - 15.0));
+    let part = |t: f64, from: f64, to: f64| ((t - from) / (to - from)).clamp(0.0, 1.0);
+    type Expected<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
+    let cases: [(&str, Expected<'_>); 10] = [
+        ("by = [0, 0, 1e-3]", Box::new(|t| 1e-3 * smooth(t / 0.02))),
+        ("by = [0, 0, 1e-3]\ncurve = \"ramp\"\nto = 0.01", Box::new(|t| 1e-3 * part(t, 0.0, 0.01))),
+        (
+            "by = [0, 0, 1e-3]\ncurve = \"smooth-step\"\nfrom = 0.004\nto = 0.012",
+            Box::new(|t| 1e-3 * smooth(part(t, 0.004, 0.012))),
+        ),
+        ("by = [0, 0, 1e-3]\ncurve = \"polynomial-10-15-6\"", Box::new(|t| 1e-3 * polynomial(t / 0.02))),
+        (
+            "by = [0, 0, 1e-3]\ncurve = { table = [[0, 0], [0.01, 1], [0.02, 0.5]] }",
+            Box::new(|t| 1e-3 * (100.0 * t).min(1.5 - 50.0 * t)),
+        ),
+        (
+            "by = [0, 0, 1e-5]\ncurve = \"hold\"\nfrom = 0.01",
+            Box::new(|t| 1e-5 * f64::from(u8::from(t > 0.0099))),
+        ),
+        // From the start: the run begins with the nodes already there.
+        ("by = [0, 0, 1e-5]\ncurve = \"hold\"", Box::new(|_| 1e-5)),
+        ("velocity = [0, 0, 0.05]\ncurve = \"hold\"", Box::new(|t| 0.05 * t)),
+        ("velocity = [0, 0, 0.05]\ncurve = \"ramp\"", Box::new(|t| 0.05 * t * t / 0.04)),
+        (
+            "velocity = [0, 0, 0.05]\ncurve = { table = [[0, 0], [0.01, 1], [0.02, 1]] }",
+            Box::new(|t| if t < 0.01 { 2.5 * t * t } else { 0.05 * (t - 0.005) }),
+        ),
+    ];
+    for (given, expected) in cases {
+        let rows = motion(given);
+        assert_eq!(rows.len(), 6, "{given}");
+        for (time, z) in rows {
+            assert_close(z, expected(time), 1e-12, &format!("{given} at {time} s"));
+        }
+    }
+}
+
+#[test]
+fn a_load_follows_its_curve() {
+    let load = "[load.one]\ntype = \"force\"\non = \"block\"\nnodes = { set = \"z-max\" }\ntotal = [0, 0, 1]\n\
+                curve = { table = [[0, 0], [0.2, 1], [0.7, 1], [0.71, -0.5]] }\n\
+                [output.history]\ntype = \"csv\"\nevery = 0.05\n";
+    let workshop = Workshop::new(&resting(load));
+    workshop.run(&[]).done();
+    let (header, rows) = workshop.table("out/case/history.csv");
+    let column = header.iter().position(|name| name == "reaction.base.z").unwrap();
+    let at = |time: f64| {
+        rows.iter().min_by(|a, b| (a[0] - time).abs().total_cmp(&(b[0] - time).abs())).unwrap()[column]
+    };
+    assert_close(at(0.7), -1.0, 1e-3, "reaction while the load is held [N]");
+    assert_close(at(1.5), 0.5, 1e-3, "reaction to the load turned round [N]");
+}
+
+#[test]
+fn built_in_shapes_fill_their_volume_with_tets_and_hexes() {
+    // The volume [m³] and how far a coarse mesh may be off: voxels and flat facets miss part of a curved surface.
+    let pi = std::f64::consts::PI;
+    for (shape, volume, of_tets, of_hexes) in [
+        ("block = { size = [0.1, 0.06, 0.04] }, edge = 0.02", 2.4e-4, 1e-12, 1e-12),
+        ("block = { size = [0.1, 0.06, 0.04], cells = [3, 2, 1] }", 2.4e-4, 1e-12, 1e-12),
+        ("ellipsoid = { radii = [0.05, 0.04, 0.03] }, edge = 0.01", 4.0 / 3.0 * pi * 6e-5, 0.05, 0.1),
+        (
+            "tube = { inner-radius = 0.02, outer-radius = 0.03, length = 0.05 }, edge = 0.01",
+            pi * 5e-4 * 0.05,
+            0.06,
+            0.06,
+        ),
+        ("organ = \"liver\", edge = 0.015", 7.7e-4, 0.1, 0.1),
+        ("organ = \"liver\", edge = 0.02, scale = 1.25", 1.5e-3, 0.1, 0.1),
+        ("organ = \"brain\", edge = 0.015", 1.3e-3, 0.1, 0.1),
+    ] {
+        for (cells, element, tolerance) in [("tets", "tet4", of_tets), ("hexes", "hex8", of_hexes)] {
+            let scene = format!(
+                "[scene]\nuntil = 1e-4\n[law.tissue]\ntype = \"neo-hookean\"\nyoung-modulus = 3e3\npoisson-ratio = 0.4\n\
+                 [body.shape]\nmesh = {{ {shape}, as = \"{cells}\" }}\nelement = \"{element}\"\nlaw = \"tissue\"\ndensity = 1000\n"
+            );
+            let done = Workshop::new(&scene).run(&[]).done();
+            let found = done["bodies"][0]["volume"].as_f64().unwrap();
+            assert_close(found, volume, tolerance * volume, &format!("{shape} as {cells}"));
+        }
+    }
+}
+
+#[test]
+fn mesh_files_of_every_volume_format_become_bodies() {
+    let data = Path::new(ROOT).join("crates/geometry/tests/data");
+    let files = ["gmsh1.msh", "gmsh22.msh", "gmsh22-binary.msh", "gmsh41.msh", "gmsh41-binary.msh"];
+    for file in files {
+        let workshop = Workshop::new(&FROM_FILE.replace("organ.vtk", "organ.msh"));
+        fs::copy(data.join(file), workshop.path("case/organ.msh")).unwrap();
+        let done = workshop.run(&["--until", "1e-4"]).done();
+        assert_eq!(done["elements"], 48, "{file}");
+    }
+    // Converted, a mesh is the same body in every format.
+    let workshop = Workshop::new(FROM_FILE);
+    workshop.write("case/organ.vtk", vtk(&CUBE, &TETS, &labels(&[1, 1, 1, 2, 2, 2])));
+    let reaction = workshop.run(&[]).done()["reactions"]["base"].clone();
+    for ending in ["msh", "vtu"] {
+        let told = workshop.pliant(&["info", "case/organ.vtk", "--convert", &format!("case/organ.{ending}")]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        workshop.write("case/scene.toml", FROM_FILE.replace("organ.vtk", &format!("organ.{ending}")));
+        assert_eq!(workshop.run(&["--force"]).done()["reactions"]["base"], reaction, "{ending}");
+    }
+}
+
+#[test]
+fn mesh_files_of_every_surface_format_become_surfaces() {
+    let workshop = Workshop::new(BLOCK);
+    let quads = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+    let corners: String = CUBE.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    workshop.write("case/skin.obj", corners + quads);
+    for ending in ["stl", "ply"] {
+        let told = workshop.pliant(&["info", "case/skin.obj", "--convert", &format!("case/skin.{ending}")]);
+        assert_eq!(told.code, 0, "{}", told.err);
+    }
+    let off = "OFF\n4 2 0\n0 0 0.1\n0.1 0 0.1\n0.1 0.1 0.1\n0 0.1 0.1\n3 0 1 2\n3 0 2 3\n";
+    workshop.write("case/skin.off", off);
+    for ending in ["obj", "stl", "ply", "off"] {
+        let mesh = format!("mesh = {{ file = \"skin.{ending}\" }}");
+        let scene = changed(BLOCK, "mesh = { block = { size = [0.1, 0.1, 0.1] }, edge = 0.04 }", &mesh);
+        let scene = changed(&scene, "direction = [1, 0, 0]", "direction = [0, 0, 1]");
+        workshop.write("case/scene.toml", scene);
+        workshop.run(&["--force", "--until", "0.002"]).done();
+    }
+}
+
+#[test]
+fn scale_and_at_bring_a_mesh_to_metres_and_in_place() {
+    let millimetres = CUBE.map(|point| point.map(|x| 1000.0 * x));
+    let scene = changed(FROM_FILE, "\"organ.vtk\"", "\"organ.vtk\", scale = 0.001, at = [0.5, 0, 0]");
+    let workshop = Workshop::new(&scene);
+    workshop.write("case/organ.vtk", vtk(&millimetres, &TETS, ""));
+    let told = workshop.run(&[]);
+    assert_close(told.done()["mass"].as_f64().unwrap(), 1.0, 1e-12, "mass [kg]");
+    assert_eq!(told.err, "", "nothing to doubt");
+    let mesh = workshop.series("out/case/fields.pvd").remove(0).1.mesh;
+    let (low, high) = mesh.bounds().unwrap();
+    assert_close(low.x, 0.5, 1e-12, "left end [m]");
+    assert_close(high.x, 0.6, 1e-12, "right end [m]");
+}
+
+#[test]
+fn a_new_scene_runs_as_it_is() {
+    let workshop = Workshop::new(BLOCK);
+    for name in ["my-organ", "deep/er \"organ\""] {
+        let told = workshop.pliant(&["new", name]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        assert!(told.out.contains("try: pliant run"), "{}", told.out);
+        let told = workshop.pliant(&["run", name, "--json", "--until", "0.01"]);
+        told.done();
+    }
+    let check = workshop.pliant(&["check", "my-organ"]);
+    assert!(check.out.starts_with("my-organ\n"), "{}", check.out);
+    assert_eq!((check.code, check.err.as_str()), (0, ""), "a starter scene leaves no doubts");
+}
+
+#[test]
+fn check_prints_the_model_and_writes_nothing() {
+    let workshop = Workshop::new(BLOCK);
+    let told = workshop.pliant(&["check", "case"]);
+    assert_eq!((told.code, told.err.as_str()), (0, ""));
+    for piece in [
+        "body `block`",
+        "27 nodes, 48 elements",
+        "mass 1.000 kg",
+        "transversely-isotropic",
+        "1 relaxing term\n",
+        "quality",
+        "0.9–1.0",
+        "surface `skin` on `block`",
+        "constraint `base`: fixes xyz of 9 nodes",
+        "constraint `hand`: moves xyz of 9 nodes",
+        "load `push`: (0.1000, 0, 0) N in all on 1 node",
+        "load `wind`: (0, 0.1000, 0) N in all on",
+        "load `squeeze`: 20.00 Pa on 8 faces",
+        "load `tilt`: (1.000, 0, 0) m/s² on `block`",
+        "output `fields`: fields.pvd, a frame every 0.004000 s",
+        "element bound",
+        "set by element 0 (tet4) of `block`",
+        "true limit",
+        "expected cost",
+        "real-time factor",
+    ] {
+        assert!(told.out.contains(piece), "no `{piece}` in {}", told.out);
+    }
+    let left: Vec<_> =
+        fs::read_dir(workshop.path("")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["case"]);
+    assert_eq!(fs::read_dir(workshop.path("case")).unwrap().count(), 1);
+}
+
+#[test]
+fn info_tells_what_a_mesh_holds_and_what_is_wrong() {
+    let workshop = Workshop::new(BLOCK);
+    workshop.write("good.vtk", vtk(&CUBE, &TETS, &labels(&[1; 6])));
+    let told = workshop.pliant(&["info", "good.vtk", "--scale", "0.5"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    for piece in [
+        "legacy VTK 3.0 ASCII",
+        "from (0, 0, 0) to (0.05000",
+        "tet cells        6",
+        "1.250000e-4 m³",
+        "cell data `label`",
+        "no faults found",
+    ] {
+        assert!(told.out.contains(piece), "no `{piece}` in {}", told.out);
+    }
+    let mut tets = TETS;
+    tets[2] = &[0, 6, 2, 7];
+    workshop.write("bad.vtk", vtk(&CUBE, &tets, ""));
+    let told = workshop.pliant(&["info", "bad.vtk"]);
+    assert_eq!(told.code, 0);
+    assert!(told.out.contains("inverted cells: 1 (tet 2)"), "{}", told.out);
+    let object = workshop.pliant(&["info", "bad.vtk", "--json"]).json();
+    assert_eq!((&object["usable"], &object["cells"]["tet"]), (&false.into(), &6.into()), "{object}");
+    let open = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
+    workshop.write("open.off", open);
+    assert!(workshop.pliant(&["info", "open.off"]).out.contains("open edges: 4"));
+}
+
+#[test]
+fn every_subcommand_helps_with_an_example() {
+    let workshop = Workshop::new(BLOCK);
+    for subcommand in [&[][..], &["run"], &["check"], &["new"], &["schema"], &["info"]] {
+        let told = workshop.pliant(&[subcommand, &["--help"]].concat());
+        assert_eq!(told.code, 0);
+        let example =
+            told.out.split_once("Example").unwrap_or_else(|| panic!("{subcommand:?}: {}", told.out)).1;
+        assert!(example.contains(&format!("pliant {}", subcommand.first().unwrap_or(&"run"))), "{example}");
+    }
+    assert_eq!(workshop.pliant(&[]).code, 2);
+}
+
+/// The schema of `pliant schema`.
+fn schema() -> Value {
+    let told = Workshop::new(BLOCK).pliant(&["schema"]);
+    assert_eq!(told.code, 0);
+    told.json()
+}
+
+/// What a part of the schema refers to, and its alternatives.
+fn alternatives<'s>(schema: &'s Value, root: &'s Value) -> Vec<&'s Value> {
+    let target = schema["$ref"].as_str().and_then(|path| root.pointer(path.strip_prefix('#')?));
+    let parts = ["anyOf", "oneOf"].into_iter().filter_map(|key| schema[key].as_array()).flatten();
+    let deeper = target.into_iter().chain(parts).flat_map(|part| alternatives(part, root));
+    std::iter::once(schema).chain(deeper).collect()
+}
+
+/// Asserts that a schema knows every key of a value and of what is in it.
+fn assert_known(value: &toml::Value, schemas: &[&Value], root: &Value, path: &str) {
+    let all: Vec<&Value> = schemas.iter().flat_map(|schema| alternatives(schema, root)).collect();
+    match value {
+        toml::Value::Table(table) => {
+            for (key, child) in table {
+                let of = |schema: &&'_ Value| {
+                    let own = schema["properties"].get(key);
+                    let found =
+                        own.or_else(|| schema.get("additionalProperties").filter(|other| other.is_object()));
+                    found.cloned()
+                };
+                let known: Vec<Value> = all.iter().filter_map(of).collect();
+                assert!(!known.is_empty(), "the schema has no `{path}.{key}`");
+                assert_known(child, &known.iter().collect::<Vec<_>>(), root, &format!("{path}.{key}"));
+            }
+        }
+        toml::Value::Array(items) => {
+            let of_items: Vec<&Value> = all.iter().filter_map(|schema| schema.get("items")).collect();
+            items.iter().for_each(|item| assert_known(item, &of_items, root, path));
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn the_schema_knows_every_key_of_the_shipped_scenes() {
+    let schema = schema();
+    assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
+    let shipped = fs::read_dir(Path::new(ROOT).join("scenes")).unwrap();
+    let mut scenes: Vec<String> = shipped
+        .map(|folder| fs::read_to_string(folder.unwrap().path().join("scene.toml")).expect("a scene"))
+        .collect();
+    scenes.extend([BLOCK.to_owned(), pliant_scene::starter("a scene"), FROM_FILE.to_owned()]);
+    for text in scenes {
+        let scene: toml::Table = toml::from_str(&text).unwrap();
+        assert_known(&toml::Value::Table(scene), &[&schema], &schema, "");
+    }
+    for (table, section) in
+        [("constraint", "fix"), ("load", "pressure"), ("output", "csv"), ("law", "neo-hookean")]
+    {
+        let kinds = schema["properties"][table]["additionalProperties"]["oneOf"].as_array().unwrap();
+        assert!(kinds.iter().any(|kind| kind["properties"]["type"]["const"] == section), "{table} {section}");
+    }
+}
+
+#[test]
+fn the_reference_page_lists_every_kind_of_table() {
+    let page = Workshop::new(BLOCK).pliant(&["schema", "--markdown"]).out;
+    for piece in
+        ["## `[scene]`", "### `type = \"transversely-isotropic\"`", "| `edge` |", "| `weight` |", "kg/m³"]
+    {
+        assert!(page.contains(piece), "no `{piece}`");
+    }
+}
+
+#[test]
+fn the_shipped_scenes_pass_the_check() {
+    let workshop = Workshop::new(BLOCK);
+    for folder in fs::read_dir(Path::new(ROOT).join("scenes")).unwrap() {
+        let scene = folder.unwrap().path();
+        let told = workshop.pliant(&["check", scene.to_str().unwrap()]);
+        assert_eq!((told.code, told.err.as_str()), (0, ""), "{}", scene.display());
+    }
+    let liver = Path::new(ROOT).join("scenes/liver");
+    let told = workshop.pliant(&["run", liver.to_str().unwrap(), "--json", "--until", "0.01"]);
+    assert!(told.done()["elements"].as_u64().unwrap() >= 2400);
+    assert!(workshop.path("out/liver/summary.md").exists());
+}
+
+#[test]
+fn a_reader_that_leaves_early_is_no_mistake() {
+    let workshop = Workshop::new(BLOCK);
+    let mut child =
+        workshop.command(&["schema"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let told = Told::from(child.wait_with_output().unwrap());
+    assert_eq!((told.code, told.err.as_str()), (0, ""));
+}
+
+/// A real organ, read from the folder in PLIANT_DATA (the mesh is not ours to ship).
+#[test]
+fn the_liver_of_sofa_is_pulled_by_one_lobe() {
+    let Some(data) = std::env::var_os("PLIANT_DATA") else {
+        println!("skipped: set PLIANT_DATA to the folder that holds liver-sofa/liver2.msh");
+        return;
+    };
+    let workshop = Workshop::new(include_str!("support/liver2.toml"));
+    let mesh = Path::new(&data).join("liver-sofa/liver2.msh");
+    fs::copy(&mesh, workshop.path("case/liver2.msh"))
+        .unwrap_or_else(|error| panic!("{}: {error}", mesh.display()));
+    let done = workshop.run(&["--until", "0.4"]).done();
+    assert_eq!(done["elements"], 1493);
+    assert!(done["energy_balance"].as_f64().unwrap() < 0.01, "{done}");
+    let frames = workshop.series("out/case/fields.pvd");
+    assert_eq!(frames[0].1.mesh.points.len(), 507);
+}

@@ -1,0 +1,138 @@
+//! What can be wrong with a NiftySim model, where, and what to do about it.
+
+use std::path::PathBuf;
+
+use pliant_geometry::SelectionError;
+use pliant_geometry::io::MeshFileError;
+
+/// A NiftySim model that could not be imported.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The file could not be read.
+    #[error("the model `{}` cannot be read: {reason}; check the path and the permissions", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        reason: String,
+    },
+    /// The file is not XML.
+    #[error("`{}`, line {line}: the XML is broken or cut off: {reason}; correct it or copy the file again", path.display())]
+    Xml {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: u32,
+        /// What the XML reader says.
+        reason: String,
+    },
+    /// An element of the XML says what it cannot mean.
+    #[error("`{}`, line {line}, <{element}>: {problem}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// The line at which the element begins, from 1.
+        line: u32,
+        /// Its name.
+        element: String,
+        /// What is wrong with it.
+        problem: ImportProblem,
+    },
+}
+
+/// What is wrong with an element of the XML.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportProblem {
+    /// The file is XML of another kind.
+    #[error("a NiftySim model begins with <Model>; is this another file?")]
+    NotAModel,
+    /// A child that must be there is not.
+    #[error("<{wanted}> is missing; add {example}")]
+    MissingElement {
+        /// The child.
+        wanted: &'static str,
+        /// How it looks.
+        example: &'static str,
+    },
+    /// An attribute that must be there is not.
+    #[error("the attribute `{wanted}` is missing; add {example}")]
+    MissingAttribute {
+        /// The attribute.
+        wanted: &'static str,
+        /// How it looks.
+        example: &'static str,
+    },
+    /// A text where a number must be.
+    #[error("`{text}` is not {wanted}; correct it")]
+    NotANumber {
+        /// The text found.
+        text: String,
+        /// The kind of number needed.
+        wanted: &'static str,
+    },
+    /// A list is too long or too short.
+    #[error("found {found} {what}, expected {wanted}; correct the list or its count")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        wanted: String,
+    },
+    /// A number is out of its range.
+    #[error("{what} is {value}, but must be {range}; correct it")]
+    OutOfRange {
+        /// Which number.
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// What it has to be.
+        range: &'static str,
+    },
+    /// An index of something that does not exist.
+    #[error("there is no {of} {index}: there are {count}, counted from 0; correct the index")]
+    NoSuchIndex {
+        /// `node`, `element`.
+        of: &'static str,
+        /// The index found.
+        index: i64,
+        /// How many there are.
+        count: usize,
+    },
+    /// A word with no meaning here.
+    #[error("`{found}` is no {what}; known: {known}")]
+    Unknown {
+        /// What the word should be.
+        what: &'static str,
+        /// The word found.
+        found: String,
+        /// The words that are known.
+        known: &'static str,
+    },
+    /// Two statements that do not go together.
+    #[error("{what}; {remedy}")]
+    Contradiction {
+        /// Both, with their numbers.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// Nodes chosen by their normals could not be.
+    #[error("{0}; correct the normal, its tolerance or the restriction")]
+    Selection(SelectionError),
+    /// The mesh file could not be read.
+    #[error("{0}")]
+    Mesh(Box<MeshFileError>),
+    /// There is nothing to simulate.
+    #[error("the model has no solid elements; models of shells alone can't be imported yet")]
+    NothingSolid,
+}
+
+/// A problem and its place, before the path is known.
+#[derive(Debug)]
+pub(super) struct Fault {
+    pub line: u32,
+    pub element: String,
+    pub problem: ImportProblem,
+}

@@ -1,0 +1,370 @@
+//! A NiftySim model as plain data: parts with their materials and conditions, the system's parameters, the outputs.
+
+use std::path::Path;
+
+use pliant_geometry::{CellKind, Mesh};
+
+use super::conditions::{self, Action, Condition, Remarks, settle, sorted};
+use super::error::{Fault, ImportProblem};
+use super::geometry::{self, Geometry, join, positive};
+use super::material::Material;
+use super::xml::{
+    Element, attribute, child, children, count, fault, indices, line, needed, number, run_of_indices, text,
+};
+
+/// A model.
+#[derive(Debug)]
+pub(super) struct Model {
+    /// What becomes bodies: submodels, or one for all.
+    pub parts: Vec<Part>,
+    pub materials: Vec<Material>,
+    pub system: System,
+    pub output: Option<Output>,
+    pub remarks: Remarks,
+}
+
+/// A mesh with its materials and conditions.
+#[derive(Debug)]
+pub(super) struct Part {
+    pub geometry: Geometry,
+    /// Material of each cell.
+    pub material: Vec<u32>,
+    /// Density of each cell [kg/m³].
+    pub density: Vec<f64>,
+    pub conditions: Vec<Condition>,
+}
+
+/// `<SystemParams>`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct System {
+    /// Time step [s].
+    pub step: f64,
+    /// Total time [s], on which load shapes are stretched.
+    pub total: f64,
+    /// Damping [1/s].
+    pub damping: f64,
+    /// Density of materials without one [kg/m³].
+    pub density: Option<f64>,
+    /// Hourglass stiffness as a multiple of λ + 2μ.
+    pub hourglass: Option<f64>,
+}
+
+/// `<Output>`.
+#[derive(Clone, Debug)]
+pub(super) struct Output {
+    /// Steps between two outputs.
+    pub every: usize,
+    /// U, F, S, E, EKin, EStrain.
+    pub variables: Vec<String>,
+}
+
+/// Reads a model.
+pub(super) fn read(root: Element<'_>, folder: &Path) -> Result<Model, Fault> {
+    if !root.has_tag_name("Model") {
+        return Err(fault(root, ImportProblem::NotAModel));
+    }
+    let mut model = Model {
+        parts: Vec::new(),
+        materials: Vec::new(),
+        system: System::read(root)?,
+        output: Output::read(root)?,
+        remarks: Remarks::default(),
+    };
+    if child(root, "SubModel").is_some() {
+        model.read_submodels(root, folder)?;
+    } else {
+        model.read_whole(root, folder)?;
+    }
+    if model.parts.iter().any(|part| part.geometry.solid == geometry::Solid::H8)
+        && model.system.hourglass.is_none()
+    {
+        needed(needed(root, "SystemParams", SYSTEM)?, "HGKappa", "<HGKappa>0.075</HGKappa> (elements H8)")?;
+    }
+    for part in &mut model.parts {
+        part.conditions = settle(std::mem::take(&mut part.conditions))?;
+    }
+    model.name_what_is_missing(root);
+    Ok(model)
+}
+
+impl Model {
+    fn read_whole(&mut self, root: Element<'_>, folder: &Path) -> Result<(), Fault> {
+        let geometry = geometry::read(root, folder, &mut self.remarks.notes)?;
+        let mut sets = Sets::new(&geometry);
+        sets.read(root, self)?;
+        let (material, density) = sets.finish(root)?;
+        let conditions = conditions::read(root, &geometry, &mut self.remarks)?;
+        self.parts.push(Part { geometry, material, density, conditions });
+        Ok(())
+    }
+
+    /// Submodels stay bodies of their own, unless nodes merge or the model itself has constraints or materials.
+    fn read_submodels(&mut self, root: Element<'_>, folder: &Path) -> Result<(), Fault> {
+        let distance = child(root, "SubModelNodeMergerDistance").map(number).transpose()?;
+        let whole = distance.is_some_and(|d| d >= 0.0)
+            || ["Constraint", "ElementSet"].iter().any(|name| child(root, name).is_some());
+        if !whole {
+            for submodel in children(root, "SubModel") {
+                self.read_whole(submodel, folder)?;
+                self.check_solid(submodel)?;
+            }
+            return Ok(());
+        }
+        let mut geometries: Vec<Geometry> = Vec::new();
+        let mut assigned = Vec::new();
+        let mut apart = Vec::new();
+        for submodel in children(root, "SubModel") {
+            let geometry = geometry::read(submodel, folder, &mut self.remarks.notes)?;
+            if let Some(first) = geometries.first().filter(|first| first.solid != geometry.solid) {
+                return Err(mixed(submodel, first.solid, geometry.solid));
+            }
+            let mut sets = Sets::new(&geometry);
+            sets.read(submodel, self)?;
+            assigned.extend(sets.0);
+            apart.push(conditions::read(submodel, &geometry, &mut self.remarks)?);
+            geometries.push(geometry);
+        }
+        let (geometry, maps) = self.weld(root, &geometries, distance)?;
+        let mut sets = Sets(assigned);
+        sets.read(root, self)?;
+        let (material, density) = sets.finish(root)?;
+        let parts = apart.into_iter().zip(&maps);
+        let mut conditions: Vec<Condition> =
+            parts.flat_map(|(part, map)| part.into_iter().map(|c| renumbered(c, map))).collect();
+        // Gravity on all of some submodels is gravity on a part of the whole.
+        let part_only =
+            |c: &Condition| matches!(c.action, Action::Gravity(_)) && c.nodes.len() < geometry.node_count();
+        for condition in conditions.iter().filter(|&c| part_only(c)) {
+            let missing = format!("the Gravity of line {} (gravity on some submodels only)", condition.line);
+            self.remarks.missing.push(missing);
+        }
+        conditions.retain(|condition| !part_only(condition));
+        conditions.extend(conditions::read(root, &geometry, &mut self.remarks)?);
+        self.parts.push(Part { geometry, material, density, conditions });
+        Ok(())
+    }
+
+    fn check_solid(&self, of: Element<'_>) -> Result<(), Fault> {
+        let solids: Vec<_> = self.parts.iter().map(|part| part.geometry.solid).collect();
+        match solids.iter().find(|&&solid| solid != solids[0]) {
+            Some(&other) => Err(mixed(of, solids[0], other)),
+            None => Ok(()),
+        }
+    }
+
+    fn weld(
+        &mut self,
+        root: Element<'_>,
+        parts: &[Geometry],
+        distance: Option<f64>,
+    ) -> Result<(Geometry, Vec<Vec<u32>>), Fault> {
+        let solid = parts[0].solid;
+        let (points, nodes, maps) = join(parts, distance);
+        let each = solid.cell().node_count();
+        let collapsed = nodes.chunks_exact(each).position(|cell| sorted(cell.to_vec()).len() < each);
+        if let Some(cell) = collapsed {
+            let what = format!(
+                "nodes closer than {} merge, which takes two nodes of element {cell} together",
+                distance.unwrap_or(0.0)
+            );
+            let problem = ImportProblem::Contradiction { what, remedy: "give a smaller distance" };
+            return Err(fault(child(root, "SubModelNodeMergerDistance").unwrap_or(root), problem));
+        }
+        let before: usize = parts.iter().map(Geometry::node_count).sum();
+        let merged = before - points.len();
+        self.remarks.notes.push(format!(
+            "{} submodels became one body; {merged} nodes merged with nodes of an earlier submodel",
+            parts.len()
+        ));
+        let mut mesh = Mesh { points, ..Mesh::default() };
+        mesh.block_mut(solid.cell()).nodes = nodes;
+        Ok((Geometry { solid, mesh }, maps))
+    }
+
+    /// What of the model a scene has no words for yet.
+    fn name_what_is_missing(&mut self, root: Element<'_>) {
+        let within = |name: &str| root.descendants().filter(|e| e.has_tag_name(name)).count();
+        let missing = &mut self.remarks.missing;
+        let shells = within("ShellElementSet").max(within("ShellElements"));
+        if shells > 0 {
+            missing.push("shells and membranes (they come later)".into());
+        }
+        let contact =
+            ["ContactPlate", "ContactCylinder", "ContactUSProbe", "KinematicContact", "ContactSurface"];
+        let system = child(root, "SystemParams");
+        let is_on = |name: &'static str| {
+            let switch = system.and_then(|system| child(system, name));
+            switch.is_some_and(|switch| !matches!(text(switch).as_str(), "" | "0"))
+        };
+        let mut found: Vec<&str> = contact.into_iter().filter(|name| within(name) > 0).collect();
+        found.extend(["DoDeformableCollision", "DoSelfCollision"].into_iter().filter(|name| is_on(name)));
+        if !found.is_empty() {
+            missing.push(format!("contact ({}; it comes later)", found.join(", ")));
+        }
+        if is_on("ROM") {
+            missing.push("the reduced basis (ROM): the full model is computed".into());
+        }
+        let known = [
+            "Nodes",
+            "Elements",
+            "MSHMesh",
+            "VTKMesh",
+            "SubModel",
+            "SubModelNodeMergerDistance",
+            "ElementSet",
+            "Constraint",
+            "ShellElements",
+            "ShellElementSet",
+            "SystemParams",
+            "ReducedBasis",
+            "Output",
+        ];
+        for element in root.children().filter(|child| child.is_element()) {
+            let name = element.tag_name().name();
+            if !known.contains(&name) && !contact.contains(&name) {
+                missing.push(format!("<{name}> of line {} (unknown)", line(element)));
+            }
+        }
+    }
+}
+
+fn mixed(of: Element<'_>, first: geometry::Solid, other: geometry::Solid) -> Fault {
+    let what = format!("this submodel has elements {}, an earlier one {}", other.name(), first.name());
+    let problem = ImportProblem::Contradiction { what, remedy: "NiftySim takes one type for all" };
+    fault(of, problem)
+}
+
+fn renumbered(mut condition: Condition, map: &[u32]) -> Condition {
+    let new = |node: &u32| map[*node as usize];
+    condition.nodes = sorted(condition.nodes.iter().map(new).collect());
+    for face in &mut condition.faces {
+        *face = face.iter().map(new).collect();
+    }
+    condition
+}
+
+/// Material and density of each cell, as far as they are known.
+struct Sets(Vec<Option<(u32, f64)>>);
+
+impl Sets {
+    fn new(geometry: &Geometry) -> Self {
+        Self(vec![None; geometry.cell_count()])
+    }
+
+    /// Reads all `<ElementSet>` of a model or submodel.
+    fn read(&mut self, of: Element<'_>, model: &mut Model) -> Result<(), Fault> {
+        let limit = self.0.len();
+        for set in children(of, "ElementSet") {
+            let members = match attribute(set, "Size", "Size=\"all\" or a number")? {
+                "all" => (0..limit as u32).collect(),
+                word => {
+                    let size = count(set, word)?;
+                    let listed = indices(set, "element", limit)?;
+                    run_of_indices(set, listed, size, "element", "elements", limit)?
+                }
+            };
+            let of = needed(set, "Material", "<Material Type=\"NH\">…</Material>")?;
+            let (material, own) = Material::read(of)?;
+            let density = match own.or(model.system.density) {
+                Some(density) => density,
+                None => {
+                    let (wanted, example) = ("Density", "<Density>1000</Density> here or in <SystemParams>");
+                    return Err(fault(of, ImportProblem::MissingElement { wanted, example }));
+                }
+            };
+            let known = model.materials.iter().position(|known| *known == material);
+            let index = known.unwrap_or_else(|| {
+                model.materials.push(material);
+                model.materials.len() - 1
+            });
+            for member in members {
+                if self.0[member as usize].replace((index as u32, density)).is_some() {
+                    let what = format!("element {member} is in two sets");
+                    let problem = ImportProblem::Contradiction { what, remedy: "leave it in one of them" };
+                    return Err(fault(set, problem));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(self, of: Element<'_>) -> Result<(Vec<u32>, Vec<f64>), Fault> {
+        let without = self.0.iter().filter(|cell| cell.is_none()).count();
+        if let Some(first) = self.0.iter().position(Option::is_none) {
+            let what =
+                format!("{without} elements are in no <ElementSet>, the first of them element {first}");
+            let remedy = "give every element a material";
+            return Err(fault(of, ImportProblem::Contradiction { what, remedy }));
+        }
+        Ok(self.0.into_iter().flatten().unzip())
+    }
+}
+
+/// More steps than anyone takes.
+const MOST_STEPS: f64 = 1e12;
+const SYSTEM: &str = "<SystemParams> with <TimeStep>, <TotalTime> and <DampingCoeff>";
+
+impl System {
+    fn read(root: Element<'_>) -> Result<Self, Fault> {
+        let of = needed(root, "SystemParams", SYSTEM)?;
+        let at_least_0 = |element, what| {
+            let value = number(element)?;
+            let problem = ImportProblem::OutOfRange { what, value, range: "at least 0" };
+            if value >= 0.0 { Ok(value) } else { Err(fault(element, problem)) }
+        };
+        let step = needed(of, "TimeStep", "<TimeStep>1e-4</TimeStep> (seconds)")?;
+        let until = needed(of, "TotalTime", "<TotalTime>1</TotalTime> (seconds)")?;
+        let damping = needed(of, "DampingCoeff", "<DampingCoeff>0.5</DampingCoeff>")?;
+        let steps = positive(until, "the total time")? / positive(step, "the time step")?;
+        if steps > MOST_STEPS {
+            let (what, range) = ("the total time over the time step", "1e12 at the most");
+            return Err(fault(of, ImportProblem::OutOfRange { what, value: steps, range }));
+        }
+        Ok(Self {
+            step: number(step)?,
+            total: number(until)?,
+            damping: at_least_0(damping, "the damping")?,
+            density: child(of, "Density").map(|of| positive(of, "the density")).transpose()?,
+            hourglass: child(of, "HGKappa")
+                .map(|of| at_least_0(of, "the hourglass stiffness"))
+                .transpose()?,
+        })
+    }
+}
+
+impl System {
+    /// The end of NiftySim's last step [s]: it takes one more than the total time holds, and its outputs come after it.
+    pub fn end(&self) -> f64 {
+        let end = ((self.total / self.step).round() + 1.0) * self.step;
+        // Rid of the product's round-off, which would be read as intention.
+        format!("{end:.12e}").parse().unwrap_or(end)
+    }
+}
+
+impl Output {
+    fn read(root: Element<'_>) -> Result<Option<Self>, Fault> {
+        let Some(of) = child(root, "Output") else { return Ok(None) };
+        let every = count(of, attribute(of, "Freq", "Freq=\"100\" (steps)")?)?;
+        let variables: Vec<String> = children(of, "Variable").map(text).collect();
+        for (variable, element) in variables.iter().zip(children(of, "Variable")) {
+            if !["U", "F", "S", "E", "EKin", "EStrain"].contains(&variable.as_str()) {
+                let (what, known) = ("output", "U, F, S, E, EKin, EStrain");
+                return Err(fault(element, ImportProblem::Unknown { what, found: variable.clone(), known }));
+            }
+        }
+        Ok((every > 0).then_some(Self { every, variables }))
+    }
+}
+
+impl Part {
+    /// Volume of each cell [m³].
+    pub fn volumes(&self) -> Vec<f64> {
+        let kind: CellKind = self.geometry.solid.cell();
+        let points = &self.geometry.mesh.points;
+        let volume = |cell: &[u32]| {
+            let corners: Vec<_> = cell.iter().map(|&node| points[node as usize]).collect();
+            pliant_geometry::volume(kind, &corners)
+        };
+        self.geometry.cells().chunks_exact(kind.node_count()).map(volume).collect()
+    }
+}

@@ -1,0 +1,416 @@
+//! The scene and its meshes, as a user could have written them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+
+use pliant_geometry::{DataArray, Mesh, boundary};
+
+use super::Imported;
+use super::conditions::{Action, Condition, Shape, sorted};
+use super::error::Fault;
+use super::geometry::Solid;
+use super::material::{Elastic, Material};
+use super::parts::{Model, Output, Part, System};
+
+/// Greatest multiple of the shear modulus that a scene takes as hourglass stiffness.
+const MOST_HOURGLASS: f64 = 1.0;
+/// Pairs by which the curve HILLY is written; the straight lines between them are off by 1e-4 at the most.
+const HILLY_POINTS: u32 = 500;
+/// Frames of a model that asks for no output.
+const FRAMES: f64 = 20.0;
+
+/// Writes a model read from the file `stem`.xml.
+pub(super) fn write(model: Model, stem: &str) -> Result<Imported, Fault> {
+    let Model { parts, materials, system, output, remarks } = model;
+    let mut writer = Writer {
+        system,
+        laws: materials,
+        tables: String::new(),
+        notes: remarks.notes,
+        missing: remarks.missing,
+        numbers: BTreeMap::new(),
+    };
+    let stem = plain(stem);
+    let mut meshes = Vec::new();
+    let several = parts.len() > 1;
+    for (index, part) in parts.into_iter().enumerate() {
+        let (body, file) = match several {
+            true => (format!("part-{index}"), format!("{stem}-part-{index}.vtu")),
+            false => ("model".to_owned(), format!("{stem}.vtu")),
+        };
+        meshes.push((file.clone(), writer.part(part, &body, &file)));
+    }
+    writer.note_laws();
+    writer.outputs(output.as_ref());
+    Ok(writer.finish(&stem, meshes))
+}
+
+struct Writer {
+    system: System,
+    laws: Vec<Material>,
+    /// Tables of bodies and what acts on them.
+    tables: String,
+    notes: Vec<String>,
+    missing: Vec<String>,
+    /// How many tables of each name there are.
+    numbers: BTreeMap<&'static str, usize>,
+}
+
+impl Writer {
+    /// The mesh of a part; its tables are written.
+    fn part(&mut self, part: Part, body: &str, file: &str) -> Mesh {
+        let used: BTreeSet<u32> = part.material.iter().copied().collect();
+        let density = self.density(&part, body);
+        let hourglass = self.hourglass(&part, &used, body);
+        let mut mesh = part.geometry.mesh;
+        let solid = part.geometry.solid;
+        if used.len() > 1 {
+            let labels = part.material.iter().map(|&law| f64::from(law)).collect();
+            mesh.block_mut(solid.cell()).data.insert("label".into(), DataArray::scalar(labels));
+        }
+        self.line(format!("[body.{body}]"));
+        self.line(format!("mesh = {{ file = \"{file}\" }}"));
+        self.line(format!("element = \"{}\"", solid.element()));
+        match used.first() {
+            Some(law) if used.len() == 1 => self.line(format!("law = \"material-{law}\"")),
+            _ => {
+                let laws: Vec<String> =
+                    used.iter().map(|law| format!("{law} = \"material-{law}\"")).collect();
+                self.line(format!("law = {{ {} }}", laws.join(", ")));
+            }
+        }
+        self.line(format!("density = {density:?}"));
+        self.line(format!("damping = {:?}", self.system.damping));
+        if let Some(hourglass) = hourglass {
+            self.line(format!("hourglass = {hourglass:?}"));
+        }
+        self.line(String::new());
+        if solid == Solid::T4Anp {
+            self.note(
+                "T4ANP: NiftySim's own average of nodal pressures is kept; `tet4-anp` is the better element",
+            );
+        }
+        let whole = mesh.points.len();
+        for condition in part.conditions {
+            self.condition(condition, body, solid, whole, &mut mesh);
+        }
+        let dropped = mesh.drop_unused_points();
+        if dropped > 0 {
+            self.notes.push(format!(
+                "`{body}`: {dropped} nodes that no element uses were dropped; later ones move up"
+            ));
+        }
+        mesh
+    }
+
+    /// The density of a part [kg/m³]: one for a whole body.
+    fn density(&mut self, part: &Part, body: &str) -> f64 {
+        let first = part.density[0];
+        if part.density.iter().all(|&density| density == first) {
+            return first;
+        }
+        let volumes = part.volumes();
+        let mass: f64 = volumes.iter().zip(&part.density).map(|(volume, density)| volume * density).sum();
+        let mean = mass / volumes.iter().sum::<f64>();
+        let mean = if mean.is_finite() && mean > 0.0 { mean } else { first };
+        self.missing
+            .push(format!("the different densities of the materials of `{body}` (their mean is taken)"));
+        mean
+    }
+
+    /// The multiple of the shear modulus by which hexahedra resist hourglass patterns.
+    fn hourglass(&mut self, part: &Part, used: &BTreeSet<u32>, body: &str) -> Option<f64> {
+        let coefficient = self.system.hourglass.filter(|_| part.geometry.solid == Solid::H8)?;
+        let of = |law: &u32| self.laws[*law as usize].elastic.hourglass(coefficient);
+        let values: Vec<f64> = used.iter().map(of).collect();
+        let hourglass = values.iter().copied().fold(0.0, f64::max);
+        self.notes.push(format!(
+            "`{body}`: NiftySim's hourglass stiffness is {coefficient} (λ + 2μ), which is {hourglass:.4} μ; 0.2 μ \
+             bends more truly"
+        ));
+        if values.iter().any(|&value| (value - hourglass).abs() > 1e-9 * hourglass) {
+            self.missing.push(format!(
+                "the different hourglass stiffness of the materials of `{body}` (the largest is taken)"
+            ));
+        }
+        if hourglass > MOST_HOURGLASS {
+            self.notes.push(format!(
+                "`{body}`: hourglass = {hourglass:.4} is above {MOST_HOURGLASS}, the greatest that a scene takes"
+            ));
+        }
+        Some(hourglass)
+    }
+
+    fn condition(&mut self, condition: Condition, body: &str, solid: Solid, whole: usize, mesh: &mut Mesh) {
+        let (kind, name) = match condition.action {
+            Action::Fix(_) => ("constraint", "fix"),
+            Action::Move(_) => ("constraint", "move"),
+            Action::Force(_) => ("load", "force"),
+            Action::Gravity(_) => ("load", "gravity"),
+            Action::Pressure(_) => ("load", "pressure"),
+            Action::Traction(_) => ("load", "traction"),
+        };
+        let number = self.numbers.entry(name).or_insert(0);
+        let set = format!("{name}-{number}");
+        *number += 1;
+        let on_faces = !condition.faces.is_empty();
+        let selection = match on_faces {
+            true => match add_faces(mesh, solid, &set, condition.faces) {
+                Faces::All => "\"boundary\"".to_owned(),
+                Faces::Some { inside } => {
+                    if inside > 0 {
+                        self.missing.push(format!(
+                            "{inside} faces of line {} that became inner ones",
+                            condition.line
+                        ));
+                    }
+                    format!("{{ set = \"{set}\" }}")
+                }
+                Faces::None => {
+                    self.missing
+                        .push(format!("the faces of line {}, which became inner ones", condition.line));
+                    return;
+                }
+            },
+            false if condition.nodes.len() == whole => "\"all\"".to_owned(),
+            false if matches!(condition.action, Action::Gravity(_)) => String::new(),
+            false => {
+                mesh.point_sets.insert(set.clone(), condition.nodes);
+                format!("{{ set = \"{set}\" }}")
+            }
+        };
+        self.line(format!("[{kind}.{set}]"));
+        self.line(format!("type = \"{name}\""));
+        let key = if kind == "constraint" { "body" } else { "on" };
+        self.line(format!("{key} = \"{body}\""));
+        match condition.action {
+            Action::Gravity(_) => {}
+            _ => self.line(format!("{} = {selection}", if on_faces { "faces" } else { "nodes" })),
+        }
+        self.action(condition.action);
+        if !matches!(condition.action, Action::Fix(_)) {
+            self.curve(condition.shape, &condition.action);
+        }
+        self.line(String::new());
+    }
+
+    fn action(&mut self, action: Action) {
+        let vector = |v: [f64; 3]| format!("{v:?}");
+        match action {
+            Action::Fix(held) => self.components(held),
+            Action::Move(by) => {
+                self.components(by.map(|by| by.is_some()));
+                self.line(format!("by = {}", vector(by.map(|by| by.unwrap_or(0.0)))));
+            }
+            Action::Force(force) => self.line(format!("each = {}", vector(force))),
+            Action::Gravity(acceleration) => self.line(format!("acceleration = {}", vector(acceleration))),
+            Action::Pressure(pressure) => self.line(format!("pressure = {pressure:?}")),
+            Action::Traction(traction) => {
+                self.note(
+                    "Traction: NiftySim pulls against the vector that it is given, and so does the scene",
+                );
+                self.note(
+                    "Traction: NiftySim's grows with the area of the deformed faces, the scene's does not",
+                );
+                self.line(format!("traction = {}", vector(traction)));
+            }
+        }
+    }
+
+    fn components(&mut self, components: [bool; 3]) {
+        if components != [true; 3] {
+            let names = ["\"x\"", "\"y\"", "\"z\""].into_iter().zip(components);
+            let names: Vec<&str> = names.filter(|(_, held)| *held).map(|(name, _)| name).collect();
+            self.line(format!("components = [{}]", names.join(", ")));
+        }
+    }
+
+    fn curve(&mut self, shape: Shape, action: &Action) {
+        let total = self.system.total;
+        match shape {
+            Shape::Polynomial => {
+                self.line("curve = \"polynomial-10-15-6\"".into());
+                self.line(format!("to = {total:?}"));
+            }
+            Shape::Ramp => {
+                self.note(
+                    "RAMP: NiftySim's load grows on in the one step after the total time, the scene's holds",
+                );
+                self.line("curve = \"ramp\"".into());
+                self.line(format!("to = {total:?}"));
+            }
+            Shape::RampHold => {
+                self.line("curve = \"ramp\"".into());
+                self.line(format!("to = {:?}  # a tenth of the total time", 0.1 * total));
+            }
+            Shape::Step => {
+                if !matches!(action, Action::Move(_)) {
+                    self.note(
+                        "STEP: NiftySim's load acts from the second step on, the scene's from the start",
+                    );
+                }
+                self.line("curve = \"hold\"".into());
+            }
+            Shape::Hilly => self.hilly(),
+        }
+    }
+
+    fn hilly(&mut self) {
+        let System { total, .. } = self.system;
+        self.line(format!("# s exp(cos 4πs − 1), s = t / {total:?} s"));
+        self.line("curve = { table = [".into());
+        let point = |i: u32| {
+            let time = self.system.end() * f64::from(i) / f64::from(HILLY_POINTS);
+            let s = time / total;
+            let factor = s * ((4.0 * std::f64::consts::PI * s).cos() - 1.0).exp();
+            format!("[{time:?}, {factor:.9}]")
+        };
+        let points: Vec<String> = (0..=HILLY_POINTS).map(point).collect();
+        for row in points.chunks(4) {
+            self.line(format!("    {},", row.join(", ")));
+        }
+        self.line("] }".into());
+    }
+
+    fn note_laws(&mut self) {
+        if self.laws.iter().any(|law| matches!(law.elastic, Elastic::TransverselyIsotropic(..))) {
+            self.note("TI, TIV: η is the published modulus, half of which is in the energy: `convention = \"taylor\"`");
+        }
+        if self.laws.iter().any(Material::relaxes) {
+            self.note(
+                "NHV, TIV: relaxation advances by backward Euler, as in NiftySim; `exact` is more exact",
+            );
+        }
+    }
+
+    fn outputs(&mut self, output: Option<&Output>) {
+        let has = |name: &str| output.is_some_and(|output| output.variables.iter().any(|v| v == name));
+        let every = match output {
+            Some(output) => {
+                self.note("NiftySim's outputs are those of one step later than their number says: its last is the scene's last");
+                output.every as f64 * self.system.step
+            }
+            None => {
+                self.note("the model asks for no output: displacements are written twenty times");
+                self.system.end() / FRAMES
+            }
+        };
+        let mut fields = Vec::new();
+        if output.is_none() || has("U") {
+            fields.push("\"displacement\"");
+        }
+        if has("S") {
+            fields.push("\"pk2-stress\"");
+        }
+        if has("E") {
+            fields.push("\"green-strain\"");
+        }
+        if !fields.is_empty() {
+            self.line("[output.fields]".into());
+            self.line("type = \"vtu\"".into());
+            self.line(format!("every = {every:?}"));
+            self.line(format!("data = [{}]", fields.join(", ")));
+            self.line(String::new());
+        }
+        if has("F") || has("EKin") || has("EStrain") {
+            if has("F") {
+                self.note(
+                    "F: the forces that hold constraints are written, not the forces inside of every node",
+                );
+            }
+            self.line("[output.table]".into());
+            self.line("type = \"csv\"".into());
+            self.line(format!("every = {every:?}"));
+            self.line(format!("energy = {}", has("EKin") || has("EStrain")));
+            self.line(String::new());
+        }
+    }
+
+    fn line(&mut self, line: String) {
+        self.tables.push_str(&line);
+        self.tables.push('\n');
+    }
+
+    /// Notes something once.
+    fn note(&mut self, note: &str) {
+        if !self.notes.iter().any(|known| known == note) {
+            self.notes.push(note.to_owned());
+        }
+    }
+
+    fn finish(mut self, stem: &str, meshes: Vec<(String, Mesh)>) -> Imported {
+        if !self.missing.is_empty() {
+            self.notes.push(format!("left out, as it is not supported: {}", self.missing.join("; ")));
+        }
+        let mut scene = format!("# The NiftySim model {stem}.xml.\n");
+        for note in &self.notes {
+            wrap(&mut scene, &note.replace(char::is_control, " "));
+        }
+        let (step, total, until) = (self.system.step, self.system.total, self.system.end());
+        // Writing to a string does not fail.
+        let _ = write!(
+            scene,
+            "\n[scene]\ntitle = \"{stem}\"\nuntil = {until:?}  # the total time {total:?} s and NiftySim's last step\n\n\
+             [run]\nprecision = \"single\"  # as NiftySim\nstep = {step:?}\n\n"
+        );
+        for (index, law) in self.laws.iter().enumerate() {
+            let _ = writeln!(scene, "[law.material-{index}]\n{}\n", law.lines().join("\n"));
+        }
+        scene.push_str(self.tables.trim_end());
+        scene.push('\n');
+        Imported { scene, meshes, notes: self.notes }
+    }
+}
+
+/// How faces became a set of a mesh.
+enum Faces {
+    All,
+    Some { inside: usize },
+    None,
+}
+
+/// Adds faces as cells of a named set; those that are not on the boundary stay out.
+fn add_faces(mesh: &mut Mesh, solid: Solid, set: &str, faces: Vec<Vec<u32>>) -> Faces {
+    let surface = boundary(mesh);
+    let key = |nodes: &[u32]| sorted(nodes.to_vec());
+    let outer: BTreeSet<Vec<u32>> = surface.faces.iter().map(|face| key(face.nodes())).collect();
+    let given: BTreeMap<Vec<u32>, Vec<u32>> = faces.into_iter().map(|face| (key(&face), face)).collect();
+    let (on, off): (Vec<_>, Vec<_>) = given.into_iter().partition(|(key, _)| outer.contains(key));
+    if on.is_empty() {
+        return Faces::None;
+    }
+    if on.len() == outer.len() {
+        return Faces::All;
+    }
+    let block = mesh.block_mut(solid.face());
+    let first = block.len() as u32;
+    block.nodes.extend(on.iter().flat_map(|(_, face)| face));
+    block.sets.insert(set.to_owned(), (first..first + on.len() as u32).collect());
+    Faces::Some { inside: off.len() }
+}
+
+/// A file name's stem as letters, digits, `-` and `_`.
+fn plain(stem: &str) -> String {
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    let plain: String = stem.chars().map(|c| if fits(c) { c } else { '-' }).collect();
+    if plain.is_empty() { "model".to_owned() } else { plain }
+}
+
+/// A comment in lines of at most 100 characters.
+fn wrap(text: &mut String, note: &str) {
+    let mut length = 0;
+    for (index, word) in note.split_whitespace().enumerate() {
+        let (space, begin) = if index == 0 { ("# * ", true) } else { (" ", false) };
+        let width = word.chars().count() + 1;
+        if !begin && length + width > 100 {
+            text.push_str("\n#   ");
+            length = 4;
+        } else {
+            text.push_str(space);
+            length += if begin { 4 } else { 1 };
+        }
+        text.push_str(word);
+        length += width - 1;
+    }
+    text.push('\n');
+}

@@ -1,0 +1,45 @@
+//! Small scenes for the tests of this crate.
+
+use crate::build::{Built, build};
+use crate::diagnostic::SceneErrors;
+use crate::scene::Scene;
+use crate::source::Source;
+
+/// A cube of eight hexes, held below.
+pub(crate) const CUBE: &str = r#"
+[scene]
+until = 0.1
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 10e3
+poisson-ratio = 0.3
+[body.cube]
+mesh = { block = { size = [0.2, 0.1, 0.1], cells = [2, 2, 2] }, as = "hexes" }
+law = "tissue"
+density = 1000
+[constraint.base]
+type = "fix"
+body = "cube"
+nodes = { set = "z-min" }
+"#;
+
+/// The scene of [`CUBE`] with more tables.
+pub(crate) fn scene(more: &str) -> Scene {
+    read(&format!("{CUBE}{more}"))
+}
+
+/// The scene of a text.
+pub(crate) fn read(text: &str) -> Scene {
+    let source = Source::parse("cube.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
+    Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()))
+}
+
+/// What is built from [`CUBE`] with more tables.
+pub(crate) fn built(more: &str) -> Built {
+    build(&scene(more)).unwrap_or_else(|error| panic!("{}", error.plain()))
+}
+
+/// What is wrong with [`CUBE`] and more tables.
+pub(crate) fn mistakes(more: &str) -> SceneErrors {
+    build(&scene(more)).expect_err("a mistake")
+}
