@@ -3,7 +3,7 @@
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::tensor::{Vector, dot};
 use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Model, Real, RelaxationSettings, State, StepError,
+    CentralDifference, DynamicRelaxation, Model, Observable, Real, RelaxationSettings, State, StepError,
 };
 
 /// Steps a model from rest to a time [s], both ends included. `observe` sees every instant once its forces, reactions

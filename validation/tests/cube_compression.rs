@@ -3,6 +3,7 @@
 //! and folds over the platen), so that only solutions on one and the same mesh compare.
 
 use pliant_geometry::io;
+use pliant_mechanics::Observable;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::tensor::{dot, sub};
 use pliant_meshing::VolumeCell;

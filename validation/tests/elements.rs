@@ -5,6 +5,7 @@
 //! 34.85 ± 0.15 mm. Cube of 0.1 m, an eighth of it modelled, E = 3 kPa: F = 9.15 ± 0.15 N, bulge 7.57 ± 0.08 mm.
 
 use pliant_geometry::{Mesh, io};
+use pliant_mechanics::Observable;
 use pliant_mechanics::law::{AnyLaw, NeoHookean};
 use pliant_mechanics::model::Averaging;
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};

@@ -78,7 +78,7 @@ fn niftysim_hexahedra_arruda_boyce() {
 
 /// NiftySim's pressure average is no gradient of an energy, and `tet4-ianp-niftysim` computes it in another order.
 #[test]
-#[ignore = "needs the law `polynomial` and the element `tet4-ianp-niftysim`"]
+#[ignore = "needs the law `polynomial`"]
 fn niftysim_tets_with_averaged_pressure_polynomial() {
     meets_niftysim("T4ANP_PY", 5e-3);
 }

@@ -2,6 +2,7 @@
 //! [0, 0.1 m]³ compressed by 30 %.
 
 use pliant_geometry::{Mesh, io};
+use pliant_mechanics::Observable;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Averaging;
 use pliant_mechanics::tensor::{dot, sub};

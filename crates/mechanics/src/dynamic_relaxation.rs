@@ -15,7 +15,7 @@ use crate::applied::AppliedForces;
 use crate::forces::InternalForces;
 use crate::model::{Contradiction, FREE, Model};
 use crate::state::{History, State};
-use crate::stepper::Energies;
+use crate::stepper::{Energies, Observable, sum_owned};
 use crate::tensor::{Vector, sub};
 
 /// Nodes per parallel task.
@@ -101,6 +101,19 @@ pub enum RelaxationError {
     },
 }
 
+impl RelaxationError {
+    /// What to try.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::NotConverged { .. } => {
+                "try more load steps or a looser tolerance; a body that nothing holds has no equilibrium"
+            }
+            Self::Inverted { .. } => "try more load steps, a smaller motion, or a finer mesh there",
+            Self::NotFinite { .. } => "try more load steps; a body that nothing holds has no equilibrium",
+        }
+    }
+}
+
 /// How a load step went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Convergence {
@@ -161,6 +174,21 @@ pub struct DynamicRelaxation<'m, R> {
     energies: Energies,
 }
 
+/// At the last equilibrium. Work is by the trapezoid between equilibria; kinetic energy, damping and velocities are none.
+impl<R: Real> Observable<R> for DynamicRelaxation<'_, R> {
+    fn energies(&self) -> &Energies {
+        &self.energies
+    }
+
+    fn reaction(&self, constraint: usize) -> Vector<f64> {
+        sum_owned(self.model, &self.owners, constraint, &self.residual)
+    }
+
+    fn velocity(&self, _state: &State<R>, _node: usize) -> Vector<f64> {
+        [0.0; 3]
+    }
+}
+
 impl<'m, R: Real> DynamicRelaxation<'m, R> {
     /// A solver for a model.
     ///
@@ -211,24 +239,6 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             }
         }
         Ok(convergence)
-    }
-
-    /// Work at the last equilibrium, by the trapezoid between equilibria; kinetic energy and damping are none.
-    pub fn energies(&self) -> &Energies {
-        &self.energies
-    }
-
-    /// Force [N] that holds or moves the nodes of a constraint, summed, at the last equilibrium.
-    pub fn reaction(&self, constraint: usize) -> Vector<f64> {
-        let mut sum = [0.0; 3];
-        for &node in &self.model.constraints[constraint].nodes {
-            for (component, sum) in sum.iter_mut().enumerate() {
-                if self.owners[node as usize][component] == constraint as u32 {
-                    *sum += self.residual[node as usize][component].to_f64();
-                }
-            }
-        }
-        sum
     }
 
     fn load_step(

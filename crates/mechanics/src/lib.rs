@@ -56,4 +56,6 @@ pub use dynamic_relaxation::{Convergence, DynamicRelaxation, RelaxationError, Re
 pub use model::Model;
 pub use real::Real;
 pub use state::{History, State, Work};
-pub use stepper::{BALANCE_LIMIT, BALANCE_STEPS, CentralDifference, Energies, StepError, balance_floor};
+pub use stepper::{
+    BALANCE_LIMIT, BALANCE_STEPS, CentralDifference, Energies, Observable, StepError, balance_floor,
+};

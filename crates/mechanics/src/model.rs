@@ -163,13 +163,17 @@ impl Cells {
         if matches!(self, Self::FullHex8(..)) { 8 } else { 1 }
     }
 
-    /// Number of averaged pressures; `None` where each point has its own.
-    pub fn averaged_pressures(&self) -> Option<usize> {
+    /// True where pressures are averaged, so that a point has none of its own.
+    pub fn averages_pressure(&self) -> bool {
+        matches!(self, Self::AveragedTet4(_, Averaging::Nodal | Averaging::Variational) | Self::FullHex8(..))
+    }
+
+    /// Number of averaged pressures.
+    pub(crate) fn averaged_pressures(&self) -> usize {
         match self {
-            Self::AveragedTet4(block, Averaging::Nodal) => Some(LocalNodes::new(block).len()),
-            Self::AveragedTet4(block, Averaging::Variational) => Some(block.nodes.len()),
-            Self::FullHex8(block, _) => Some(block.nodes.len()),
-            Self::Tet4(_) | Self::Hex8(_) | Self::AveragedTet4(_, Averaging::NiftySim) => None,
+            Self::AveragedTet4(block, Averaging::Nodal) => LocalNodes::new(block).len(),
+            Self::AveragedTet4(..) | Self::FullHex8(..) if self.averages_pressure() => self.len(),
+            _ => 0,
         }
     }
 

@@ -25,6 +25,15 @@ pub enum Part {
     Volumetric,
 }
 
+impl std::fmt::Display for Part {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Isochoric => "isochoric",
+            Self::Volumetric => "volumetric",
+        })
+    }
+}
+
 /// One term of a Prony series.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]

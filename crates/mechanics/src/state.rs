@@ -35,8 +35,7 @@ pub struct History<R> {
 impl<R: Real> History<R> {
     /// At rest.
     fn at_rest(solid: &Solid) -> Self {
-        let pressures =
-            solid.cells.averaged_pressures().unwrap_or(0) * solid.material.prony.volumetric_slots();
+        let pressures = solid.cells.averaged_pressures() * solid.material.prony.volumetric_slots();
         Self {
             cells: vec![Symmetric::ZERO; solid.cells.len() * Self::slots(solid)],
             pressures: vec![R::ZERO; pressures],
@@ -46,8 +45,7 @@ impl<R: Real> History<R> {
     /// Tensors of history per cell.
     pub fn slots(solid: &Solid) -> usize {
         let prony = &solid.material.prony;
-        let point =
-            if solid.cells.averaged_pressures().is_some() { prony.isochoric_slots() } else { prony.slots() };
+        let point = if solid.cells.averages_pressure() { prony.isochoric_slots() } else { prony.slots() };
         solid.cells.points() * point
     }
 }

@@ -49,6 +49,18 @@ pub struct Energies {
     pub balance: f64,
 }
 
+/// What can be asked about the instant a state stands at, of whatever brought it there.
+pub trait Observable<R> {
+    /// Energies [J].
+    fn energies(&self) -> &Energies;
+
+    /// Force [N] that holds or moves the nodes of a constraint, summed.
+    fn reaction(&self, constraint: usize) -> Vector<f64>;
+
+    /// Velocity [m/s] of a node.
+    fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64>;
+}
+
 /// Why a step could not be taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
@@ -151,6 +163,41 @@ pub struct CentralDifference<'m, R> {
     balance_floor: f64,
 }
 
+/// At the last evaluation.
+impl<R: Real> Observable<R> for CentralDifference<'_, R> {
+    fn energies(&self) -> &Energies {
+        &self.energies
+    }
+
+    fn reaction(&self, constraint: usize) -> Vector<f64> {
+        sum_owned(self.model, &self.owners, constraint, &self.reaction)
+    }
+
+    /// The mean of the increments before and after.
+    fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
+        let (before, after) = (state.increment[node], self.next[node]);
+        [0, 1, 2].map(|c| (before[c].to_f64() + after[c].to_f64()) / (2.0 * self.step))
+    }
+}
+
+/// The sum of forces over the components that a constraint owns.
+pub(crate) fn sum_owned<R: Real>(
+    model: &Model,
+    owners: &[[u32; 3]],
+    constraint: usize,
+    forces: &[Vector<R>],
+) -> Vector<f64> {
+    let mut sum = [0.0; 3];
+    for &node in &model.constraints[constraint].nodes {
+        for (component, sum) in sum.iter_mut().enumerate() {
+            if owners[node as usize][component] == constraint as u32 {
+                *sum += forces[node as usize][component].to_f64();
+            }
+        }
+    }
+    sum
+}
+
 impl<'m, R: Real> CentralDifference<'m, R> {
     /// A stepper for steps of `step` seconds.
     ///
@@ -225,33 +272,9 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         state.time = state.steps as f64 * self.step;
     }
 
-    /// Energies at the last evaluation.
-    pub fn energies(&self) -> &Energies {
-        &self.energies
-    }
-
     /// Energy [J] above which the balance is judged.
     pub fn balance_floor(&self) -> f64 {
         self.balance_floor
-    }
-
-    /// Force [N] that holds or moves the nodes of a constraint, summed, at the last evaluation.
-    pub fn reaction(&self, constraint: usize) -> Vector<f64> {
-        let mut sum = [0.0; 3];
-        for &node in &self.model.constraints[constraint].nodes {
-            for (component, sum) in sum.iter_mut().enumerate() {
-                if self.owners[node as usize][component] == constraint as u32 {
-                    *sum += self.reaction[node as usize][component].to_f64();
-                }
-            }
-        }
-        sum
-    }
-
-    /// Velocity [m/s] of a node at the last evaluation: the mean of the increments before and after.
-    pub fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
-        let (before, after) = (state.increment[node], self.next[node]);
-        [0, 1, 2].map(|c| (before[c].to_f64() + after[c].to_f64()) / (2.0 * self.step))
     }
 
     fn set_targets(&mut self, time: f64) {

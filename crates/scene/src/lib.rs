@@ -43,6 +43,7 @@ pub mod reference;
 pub mod registry;
 mod run;
 mod scene;
+mod solver;
 pub mod source;
 mod starter;
 #[cfg(test)]

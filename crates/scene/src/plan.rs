@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::build::Built;
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::StepChoice;
+use crate::format::{SolverName, StepChoice};
 use crate::output::number;
 use crate::scene::Scene;
 
@@ -67,7 +67,10 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         Err(contradiction) => return fail(Diagnostic::error(contradiction.to_string())),
     };
     let limiting = limiting_element(built, bound);
+    let quasi_static = scene.run.solver == SolverName::QuasiStatic;
     let (asked, note) = match scene.run.step {
+        StepChoice::Auto(_) if quasi_static => (scene.scene.until / f64::from(scene.run.load_steps), None),
+        StepChoice::Seconds(step) if quasi_static => (step, None),
         StepChoice::Auto(_) => (SAFETY * bound.step, None),
         StepChoice::Seconds(step) if step > limit.step => {
             let message = format!(

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use pliant_mechanics::{CentralDifference, Energies, Real, State};
+use pliant_mechanics::{Energies, Observable, Real, State};
 
 use crate::build::Built;
 use crate::format::Precision;
@@ -13,6 +13,7 @@ use crate::output::{
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::solver::solver;
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -116,8 +117,8 @@ fn advance<R: Real>(
     let mut watching = observers::<R>(scene, built, folder.path(), &mut files)?;
     let mut state = State::<R>::at_rest(&built.model);
     // Contradicting constraints were refused when the model was built.
-    let mut stepper = CentralDifference::new(&built.model, plan.step)
-        .map_err(|error| OutputError::new(folder.path(), error))?;
+    let mut solver =
+        solver::<R>(&scene.run, built, plan).map_err(|error| OutputError::new(folder.path(), error))?;
     let mut history = History::default();
     let mut sampling = Schedule::new(scene.scene.until / SAMPLES);
     let mut worst_balance = 0.0_f64;
@@ -125,18 +126,19 @@ fn advance<R: Real>(
     let started = Instant::now();
     let mut reported = started;
     loop {
-        if let Err(error) = stepper.evaluate(&mut state) {
-            failure = Some(FailureSummary::from(&error));
+        if let Err(error) = solver.evaluate(&mut state) {
+            failure = Some(error);
             break;
         }
-        if state.work.largest > stepper.balance_floor() {
-            worst_balance = worst_balance.max(stepper.energies().balance);
+        if state.work.largest > solver.balance_floor() {
+            worst_balance = worst_balance.max(solver.energies().balance);
         }
-        let last = state.steps >= plan.steps;
+        let last = state.time + 0.5 * plan.step >= scene.scene.until;
         if sampling.is_due(state.time, plan.step, last) {
-            history.sample(built, &stepper, &state);
+            history.sample(built, solver.observable(), &state);
         }
-        if let Err(error) = look(&mut watching, &Frame { built, state: &state, stepper: &stepper }, last) {
+        let frame = Frame { built, state: &state, stepper: solver.observable() };
+        if let Err(error) = look(&mut watching, &frame, plan.step, last) {
             failure = Some(FailureSummary::output(&error, Some(state.time)));
             break;
         }
@@ -147,17 +149,20 @@ fn advance<R: Real>(
         if last {
             break;
         }
-        stepper.advance(&mut state);
+        if let Err(error) = solver.advance(&mut state) {
+            failure = Some(error);
+            break;
+        }
     }
     Ok(Outcome {
         failure,
         steps: state.steps,
         time: state.time,
         wall_seconds: started.elapsed().as_secs_f64(),
-        energies: *stepper.energies(),
+        energies: *solver.energies(),
         worst_balance,
-        balance_floor: stepper.balance_floor(),
-        reactions: (0..built.model.constraints.len()).map(|index| stepper.reaction(index)).collect(),
+        balance_floor: solver.balance_floor(),
+        reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
         history,
         files,
         threads: rayon::current_num_threads(),
@@ -165,9 +170,14 @@ fn advance<R: Real>(
     })
 }
 
-fn look<R: Real>(watching: &mut [Scheduled<R>], frame: &Frame<'_, R>, last: bool) -> Result<(), OutputError> {
+fn look<R: Real>(
+    watching: &mut [Scheduled<R>],
+    frame: &Frame<'_, R>,
+    step: f64,
+    last: bool,
+) -> Result<(), OutputError> {
     for (schedule, observer) in watching {
-        if schedule.is_due(frame.time(), frame.stepper.step(), last) {
+        if schedule.is_due(frame.time(), step, last) {
             observer.see(frame)?;
         }
     }
@@ -175,7 +185,7 @@ fn look<R: Real>(watching: &mut [Scheduled<R>], frame: &Frame<'_, R>, last: bool
 }
 
 impl History {
-    fn sample<R: Real>(&mut self, built: &Built, stepper: &CentralDifference<'_, R>, state: &State<R>) {
+    fn sample<R: Real>(&mut self, built: &Built, stepper: &dyn Observable<R>, state: &State<R>) {
         self.times.push(state.time);
         self.energies.push(*stepper.energies());
         let size = |constraint| stepper.reaction(constraint).iter().map(|f| f * f).sum::<f64>().sqrt();

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::{CellBlock, CellId, CellKind, DataArray, Mesh, boundary};
-use pliant_mechanics::model::{Body, Cells, Material, Solid};
+use pliant_mechanics::model::{Averaging, Body, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
 
 use super::meshes::list_cells;
@@ -56,15 +56,11 @@ impl Builder<'_> {
     }
 
     fn check_element(&mut self, name: &str, table: &BodyTable, kind: CellKind) -> bool {
-        let fits = match table.element {
-            None => true,
-            Some(Element::Tet4) => kind == CellKind::Tet,
-            Some(Element::Hex8) => kind == CellKind::Hex,
-        };
+        let fits = table.element.is_none_or(|element| element.is_tet() == (kind == CellKind::Tet));
         if !fits {
             let cells = if kind == CellKind::Tet { "tets" } else { "hexes" };
             let message = format!("the mesh of `{name}` has {cells}, which this element is not for");
-            let help = "tets: `tet4`; hexes: `hex8`; leave `element` out to let the mesh decide";
+            let help = "tets: `tet4`, `tet4-anp`, `tet4-ianp`; hexes: `hex8`, `hex8-full`; leave `element` out to let the mesh decide";
             self.error(&["body", name, "element"], message, "does not fit the mesh", help);
         }
         fits
@@ -124,14 +120,19 @@ impl Builder<'_> {
         let first = self.model.bodies[body].nodes.start;
         let rest = &self.model.rest;
         let shear = law.law.small_strain().shear;
-        let cells_of = match block.kind {
-            CellKind::Tet => Cells::tet4(cells.iter().map(|&c| nodes(block, c, first)).collect(), rest),
-            _ => Cells::hex8(
-                cells.iter().map(|&c| nodes(block, c, first)).collect(),
-                rest,
-                table.hourglass,
-                shear,
-            ),
+        let tets = || cells.iter().map(|&c| nodes(block, c, first)).collect();
+        let hexes = || cells.iter().map(|&c| nodes(block, c, first)).collect();
+        let cells_of = match (block.kind, table.element) {
+            (CellKind::Tet, Some(Element::Tet4Anp)) => Cells::averaged_tet4(tets(), rest, Averaging::Nodal),
+            (CellKind::Tet, Some(Element::Tet4Ianp)) => {
+                Cells::averaged_tet4(tets(), rest, Averaging::Variational)
+            }
+            (CellKind::Tet, Some(Element::Tet4IanpNiftysim)) => {
+                Cells::averaged_tet4(tets(), rest, Averaging::NiftySim)
+            }
+            (CellKind::Tet, _) => Cells::tet4(tets(), rest),
+            (_, Some(Element::Hex8Full)) => Cells::full_hex8(hexes(), rest),
+            _ => Cells::hex8(hexes(), rest, table.hourglass, shear),
         };
         self.model.add_solid(Solid { body, material, cells: cells_of, fibre, original: cells });
     }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct BodyTable {
     /// Its mesh, from a file or a built-in shape.
     pub mesh: MeshTable,
-    /// The element; if not given, `tet4` for tets and `hex8` for hexes.
+    /// The element; if not given, `tet4` for tets and `hex8` for hexes. For soft tissue prefer `tet4-anp` to `tet4`.
     #[serde(default)]
     pub element: Option<Element>,
     /// The name of its law, or a law for each cell label: `{ 1 = "parenchyma", 2 = "tumour" }`.
@@ -71,8 +71,23 @@ pub struct FibreField {
 pub enum Element {
     /// Linear tetrahedron; locks for nearly incompressible tissue (Poisson's ratio above 0.4).
     Tet4,
+    /// Linear tetrahedron with average nodal pressure (Bonet and Burton 1998): the recommended tetrahedron.
+    Tet4Anp,
+    /// Linear tetrahedron with improved average nodal pressure, variational: softer still; watch for pressure modes.
+    Tet4Ianp,
+    /// Linear tetrahedron with improved average nodal pressure as in NiftySim; not the gradient of an energy.
+    Tet4IanpNiftysim,
     /// Uniform-strain hexahedron with hourglass control.
     Hex8,
+    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight times the cost.
+    Hex8Full,
+}
+
+impl Element {
+    /// True for tetrahedra.
+    pub fn is_tet(self) -> bool {
+        matches!(self, Self::Tet4 | Self::Tet4Anp | Self::Tet4Ianp | Self::Tet4IanpNiftysim)
+    }
 }
 
 /// A mesh: exactly one of `file`, `block`, `ellipsoid`, `tube`, `organ`.

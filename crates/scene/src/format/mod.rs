@@ -34,19 +34,47 @@ pub struct SceneTable {
 }
 
 /// How the scene is run.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RunTable {
     /// Number type of the solver.
     #[serde(default)]
     pub precision: Precision,
-    /// Time step [s]; `auto`: 0.9 × the element bound of the critical step.
+    /// How the state goes from instant to instant.
+    #[serde(default)]
+    pub solver: SolverName,
+    /// Time step [s]; `auto`: 0.9 × the element bound of the critical step, or one of `load-steps` equal ones where
+    /// the solver is `quasi-static`.
     #[serde(default)]
     pub step: StepChoice,
+    /// Load steps of a quasi-static run with `step = "auto"`.
+    #[serde(default = "ten")]
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub load_steps: u32,
+    /// Largest residual force of a quasi-static equilibrium over the largest internal force; if not given, 1e-6 in
+    /// double and 1e-4 in single precision.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub tolerance: Option<f64>,
     /// Threads; 0: one per core. The number never changes a result.
     #[serde(default)]
     #[schemars(range(max = 1024))]
     pub threads: u32,
+}
+
+fn ten() -> u32 {
+    10
+}
+
+/// How the state goes from instant to instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverName {
+    /// Dynamics with inertia, by central differences.
+    #[default]
+    Explicit,
+    /// Equilibria without inertia, by dynamic relaxation.
+    QuasiStatic,
 }
 
 /// Number type of the solver.

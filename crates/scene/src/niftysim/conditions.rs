@@ -257,7 +257,7 @@ impl Reader<'_> {
                 selection = Selection::Intersection(vec![selection, region(restriction)?]);
             }
             let nodes = selection.nodes(&self.geometry.mesh, &self.surface);
-            return nodes.map_err(|error| fault(of, ImportProblem::Selection(error)));
+            return nodes.map_err(|error| fault(of, ImportProblem::Selection(Box::new(error))));
         }
         let size = match of.attribute("NumNodes").map(str::trim) {
             Some("all") => return Ok((0..limit as u32).collect()),
@@ -288,7 +288,7 @@ impl Reader<'_> {
         };
         if of.attribute("SpecType").map(str::trim) == Some("NORMAL") {
             let chosen = self.normal(of)?.faces(&self.geometry.mesh, &self.surface);
-            let chosen = chosen.map_err(|error| fault(of, ImportProblem::Selection(error)))?;
+            let chosen = chosen.map_err(|error| fault(of, ImportProblem::Selection(Box::new(error))))?;
             let faces = all(&mut chosen.iter().map(|&face| face as usize));
             if child(of, "RestrictTo").is_some() {
                 let note = format!(

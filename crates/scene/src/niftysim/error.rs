@@ -17,7 +17,10 @@ pub enum ImportError {
         reason: String,
     },
     /// The file is not XML.
-    #[error("`{}`, line {line}: the XML is broken or cut off: {reason}; correct it or copy the file again", path.display())]
+    #[error(
+        "`{}`, line {line}: the XML is broken or cut off: {reason}; correct it or copy the file again",
+        path.display()
+    )]
     Xml {
         /// The file.
         path: PathBuf,
@@ -120,7 +123,7 @@ pub enum ImportProblem {
     },
     /// Nodes chosen by their normals could not be.
     #[error("{0}; correct the normal, its tolerance or the restriction")]
-    Selection(SelectionError),
+    Selection(Box<SelectionError>),
     /// The mesh file could not be read.
     #[error("{0}")]
     Mesh(Box<MeshFileError>),

@@ -151,7 +151,9 @@ fn from_file(of: Element<'_>, folder: &Path, notes: &mut Vec<String>) -> Result<
         _ => beside,
     };
     let file = read.map_err(|error| fault(of, ImportProblem::Mesh(Box::new(error))))?;
-    notes.extend(file.notes.iter().map(|note| format!("{name}: {note}")));
+    // Labels are not taken over: materials go by <ElementSet>.
+    let told = file.notes.iter().filter(|note| !note.contains("`label`"));
+    notes.extend(told.map(|note| format!("{name}: {note}")));
     let cells = file.mesh.block(solid.cell()).map(|block| block.nodes.clone()).unwrap_or_default();
     let mut geometry = Geometry::new(solid, file.mesh.points, cells);
     place(of, &mut geometry.mesh.points)?;

@@ -153,45 +153,49 @@ impl Writer {
         let number = self.numbers.entry(name).or_insert(0);
         let set = format!("{name}-{number}");
         *number += 1;
-        let on_faces = !condition.faces.is_empty();
-        let selection = match on_faces {
-            true => match add_faces(mesh, solid, &set, condition.faces) {
-                Faces::All => "\"boundary\"".to_owned(),
-                Faces::Some { inside } => {
-                    if inside > 0 {
-                        self.missing.push(format!(
-                            "{inside} faces of line {} that became inner ones",
-                            condition.line
-                        ));
-                    }
-                    format!("{{ set = \"{set}\" }}")
-                }
-                Faces::None => {
-                    self.missing
-                        .push(format!("the faces of line {}, which became inner ones", condition.line));
-                    return;
-                }
-            },
-            false if condition.nodes.len() == whole => "\"all\"".to_owned(),
-            false if matches!(condition.action, Action::Gravity(_)) => String::new(),
-            false => {
-                mesh.point_sets.insert(set.clone(), condition.nodes);
-                format!("{{ set = \"{set}\" }}")
-            }
-        };
+        let Some(selection) = self.selection(&condition, &set, solid, whole, mesh) else { return };
         self.line(format!("[{kind}.{set}]"));
         self.line(format!("type = \"{name}\""));
-        let key = if kind == "constraint" { "body" } else { "on" };
-        self.line(format!("{key} = \"{body}\""));
-        match condition.action {
-            Action::Gravity(_) => {}
-            _ => self.line(format!("{} = {selection}", if on_faces { "faces" } else { "nodes" })),
+        self.line(format!("{} = \"{body}\"", if kind == "constraint" { "body" } else { "on" }));
+        if !selection.is_empty() {
+            self.line(selection);
         }
         self.action(condition.action);
         if !matches!(condition.action, Action::Fix(_)) {
             self.curve(condition.shape, &condition.action);
         }
         self.line(String::new());
+    }
+
+    /// The line that says where a condition acts, empty for all of a body; `None` if it acts nowhere.
+    fn selection(
+        &mut self,
+        condition: &Condition,
+        set: &str,
+        solid: Solid,
+        whole: usize,
+        mesh: &mut Mesh,
+    ) -> Option<String> {
+        if matches!(condition.action, Action::Gravity(_)) {
+            return Some(String::new());
+        }
+        if condition.faces.is_empty() {
+            if condition.nodes.len() == whole {
+                return Some("nodes = \"all\"".into());
+            }
+            mesh.point_sets.insert(set.to_owned(), condition.nodes.clone());
+            return Some(format!("nodes = {{ set = \"{set}\" }}"));
+        }
+        let found = add_faces(mesh, solid, set, &condition.faces);
+        if found.inside > 0 {
+            let (inside, line) = (found.inside, condition.line);
+            self.missing.push(format!("{inside} faces of line {line}, which became inner ones"));
+        }
+        match found {
+            Faces { outside: 0, .. } => None,
+            Faces { all: true, .. } => Some("faces = \"boundary\"".into()),
+            _ => Some(format!("faces = {{ set = \"{set}\" }}")),
+        }
     }
 
     fn action(&mut self, action: Action) {
@@ -207,7 +211,7 @@ impl Writer {
             Action::Pressure(pressure) => self.line(format!("pressure = {pressure:?}")),
             Action::Traction(traction) => {
                 self.note(
-                    "Traction: NiftySim pulls against the vector that it is given, and so does the scene",
+                    "Traction: NiftySim pulls against the vector that it is given; the scene's has the other sign",
                 );
                 self.note(
                     "Traction: NiftySim's grows with the area of the deformed faces, the scene's does not",
@@ -363,30 +367,30 @@ impl Writer {
 }
 
 /// How faces became a set of a mesh.
-enum Faces {
-    All,
-    Some { inside: usize },
-    None,
+struct Faces {
+    /// How many of them are on the boundary.
+    outside: usize,
+    /// How many are not.
+    inside: usize,
+    /// True if they are the whole boundary, which needs no set.
+    all: bool,
 }
 
 /// Adds faces as cells of a named set; those that are not on the boundary stay out.
-fn add_faces(mesh: &mut Mesh, solid: Solid, set: &str, faces: Vec<Vec<u32>>) -> Faces {
+fn add_faces(mesh: &mut Mesh, solid: Solid, set: &str, faces: &[Vec<u32>]) -> Faces {
     let surface = boundary(mesh);
     let key = |nodes: &[u32]| sorted(nodes.to_vec());
     let outer: BTreeSet<Vec<u32>> = surface.faces.iter().map(|face| key(face.nodes())).collect();
-    let given: BTreeMap<Vec<u32>, Vec<u32>> = faces.into_iter().map(|face| (key(&face), face)).collect();
+    let given: BTreeMap<Vec<u32>, &Vec<u32>> = faces.iter().map(|face| (key(face), face)).collect();
     let (on, off): (Vec<_>, Vec<_>) = given.into_iter().partition(|(key, _)| outer.contains(key));
-    if on.is_empty() {
-        return Faces::None;
+    let all = on.len() == outer.len();
+    if !all && !on.is_empty() {
+        let block = mesh.block_mut(solid.face());
+        let first = block.len() as u32;
+        block.nodes.extend(on.iter().flat_map(|(_, face)| face.iter()));
+        block.sets.insert(set.to_owned(), (first..first + on.len() as u32).collect());
     }
-    if on.len() == outer.len() {
-        return Faces::All;
-    }
-    let block = mesh.block_mut(solid.face());
-    let first = block.len() as u32;
-    block.nodes.extend(on.iter().flat_map(|(_, face)| face));
-    block.sets.insert(set.to_owned(), (first..first + on.len() as u32).collect());
-    Faces::Some { inside: off.len() }
+    Faces { outside: on.len(), inside: off.len(), all }
 }
 
 /// A file name's stem as letters, digits, `-` and `_`.

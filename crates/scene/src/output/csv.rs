@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::{Locator, Vector3};
 use pliant_mechanics::Real;
+use pliant_mechanics::recover::Recovery;
 
 use super::{Frame, Observer, OutputError, fields};
 use crate::build::Built;
@@ -99,8 +100,10 @@ impl<R: Real> Observer<R> for Rows {
             let e = frame.stepper.energies();
             row.extend([e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]);
         }
+        let cells_wanted = self.probes.iter().any(|probe| probe.fields.iter().any(|field| !field.is_nodal()));
+        let recovery = cells_wanted.then(|| Recovery::new(&frame.built.model, frame.state));
         for probe in &self.probes {
-            probe.read(frame, &mut row);
+            probe.read(frame, recovery.as_ref(), &mut row);
         }
         let row: Vec<String> = row.iter().map(|value| format!("{value:e}")).collect();
         self.write(row.join(","))
@@ -141,9 +144,8 @@ impl Probe {
         Self { weights, cell, fields }
     }
 
-    fn read<R: Real>(&self, frame: &Frame<'_, R>, row: &mut Vec<f64>) {
-        let recovered =
-            self.cell.map(|(solid, cell)| fields::recovered(&frame.built.model, frame, solid, cell));
+    fn read<R: Real>(&self, frame: &Frame<'_, R>, recovery: Option<&Recovery<'_, R>>, row: &mut Vec<f64>) {
+        let recovered = recovery.zip(self.cell).map(|(recovery, (solid, cell))| recovery.cell(solid, cell));
         for &field in &self.fields {
             let mut value = [0.0; 9];
             if field.is_nodal() {

@@ -1,8 +1,8 @@
 //! Values of the fields a user can ask for, at nodes and cells.
 
-use pliant_mechanics::recover::{CellFields, Recovery};
+use pliant_mechanics::Real;
+use pliant_mechanics::recover::CellFields;
 use pliant_mechanics::tensor::Symmetric;
-use pliant_mechanics::{Model, Real};
 
 use super::Frame;
 use crate::format::FieldName;
@@ -32,16 +32,6 @@ pub(super) fn of_cell(fields: &CellFields, field: FieldName) -> Value {
         FieldName::EnergyDensity => padded(&[fields.energy_density]),
         FieldName::Displacement | FieldName::Velocity => [f64::NAN; 9],
     }
-}
-
-/// The recovered fields of a cell.
-pub(super) fn recovered<R: Real>(
-    model: &Model,
-    frame: &Frame<'_, R>,
-    solid: usize,
-    cell: usize,
-) -> CellFields {
-    Recovery::new(model, frame.state).cell(solid, cell)
 }
 
 fn padded(values: &[f64]) -> Value {

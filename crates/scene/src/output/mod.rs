@@ -9,7 +9,7 @@ mod vtu;
 
 use std::path::{Path, PathBuf};
 
-use pliant_mechanics::{CentralDifference, Real, State};
+use pliant_mechanics::{Observable, Real, State};
 
 pub use folder::OutputFolder;
 pub(crate) use folder::{PLOT, SUMMARY};
@@ -46,7 +46,7 @@ impl OutputError {
 pub(crate) struct Frame<'a, R> {
     pub built: &'a Built,
     pub state: &'a State<R>,
-    pub stepper: &'a CentralDifference<'a, R>,
+    pub stepper: &'a dyn Observable<R>,
 }
 
 impl<R: Real> Frame<'_, R> {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use pliant_mechanics::{Energies, StepError};
+use pliant_mechanics::{Energies, RelaxationError, StepError};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
@@ -69,7 +69,7 @@ pub struct BodySummary {
 /// Why a run failed or an input was refused.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureSummary {
-    /// `not-finite`, `inverted`, `unbalanced`, `output` or `input`.
+    /// `not-finite`, `inverted`, `unbalanced`, `not-converged`, `output` or `input`.
     pub kind: &'static str,
     /// The body, where it is about one.
     pub body: Option<String>,
@@ -116,6 +116,22 @@ impl FailureSummary {
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
         Self { kind, body: None, element: None, node: None, time, message }
+    }
+}
+
+impl From<&RelaxationError> for FailureSummary {
+    fn from(error: &RelaxationError) -> Self {
+        let message = format!("{error}; {}", error.remedy());
+        let (kind, body, element, node, time) = match error {
+            RelaxationError::NotFinite { body, node, time } => ("not-finite", body, None, *node, *time),
+            RelaxationError::Inverted { body, element, node, time, .. } => {
+                ("inverted", body, Some(*element), *node, *time)
+            }
+            RelaxationError::NotConverged { body, node, time, .. } => {
+                ("not-converged", body, None, *node, *time)
+            }
+        };
+        Self { kind, body: Some(body.clone()), element, node: Some(node), time: Some(time), message }
     }
 }
 

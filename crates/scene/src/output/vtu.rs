@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::io::{MeshFileError, VtuOptions, write_pvd, write_vtu};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 use pliant_mechanics::Real;
+use pliant_mechanics::recover::Recovery;
 use rayon::prelude::*;
 
 use super::{Frame, Observer, OutputError, fields};
@@ -197,11 +198,11 @@ fn fill_cells<R: Real>(
         return;
     }
     let model = &frame.built.model;
+    let recovery = Recovery::new(model, frame.state);
     let mut averages = Averages::new(mesh.points.len(), &wanted);
     for (block, places) in mesh.blocks.iter_mut().zip(cells) {
-        let recovered: Vec<_> = (places.par_iter())
-            .map(|&(solid, cell)| fields::recovered(model, frame, solid as usize, cell as usize))
-            .collect();
+        let recovered: Vec<_> =
+            (places.par_iter()).map(|&(solid, cell)| recovery.cell(solid as usize, cell as usize)).collect();
         for (slot, &field) in wanted.iter().enumerate() {
             let components = field.components();
             if at == At::Cells {

@@ -1,0 +1,108 @@
+//! The solvers of a scene behind one face, so that one run loop serves them all.
+
+use pliant_mechanics::{CentralDifference, DynamicRelaxation, Observable, Real, RelaxationSettings, State};
+
+use crate::build::Built;
+use crate::format::{RunTable, SolverName};
+use crate::output::FailureSummary;
+use crate::plan::Plan;
+
+/// Brings a state from instant to instant.
+pub(crate) trait Solver<R>: Observable<R> {
+    /// Makes all that can be asked belong to the state's instant.
+    fn evaluate(&mut self, state: &mut State<R>) -> Result<(), FailureSummary>;
+
+    /// Goes on to the next instant.
+    fn advance(&mut self, state: &mut State<R>) -> Result<(), FailureSummary>;
+
+    /// Energy [J] above which the balance is judged.
+    fn balance_floor(&self) -> f64;
+
+    /// As what an observer may ask.
+    fn observable(&self) -> &dyn Observable<R>;
+}
+
+/// The solver that a scene asks for.
+pub(crate) fn solver<'m, R: Real>(
+    run: &RunTable,
+    built: &'m Built,
+    plan: &Plan,
+) -> Result<Box<dyn Solver<R> + 'm>, pliant_mechanics::model::Contradiction> {
+    Ok(match run.solver {
+        SolverName::Explicit => Box::new(CentralDifference::new(&built.model, plan.step)?),
+        SolverName::QuasiStatic => {
+            let precise = RelaxationSettings::default().tolerance;
+            let tolerance =
+                run.tolerance.unwrap_or(if R::EPSILON > 1e-10 { 100.0 * precise } else { precise });
+            let settings = RelaxationSettings { tolerance, ..RelaxationSettings::default() };
+            Box::new(LoadSteps {
+                relaxation: DynamicRelaxation::new(&built.model, settings)?,
+                plan: plan.clone(),
+            })
+        }
+    })
+}
+
+impl<R: Real> Solver<R> for CentralDifference<'_, R> {
+    fn evaluate(&mut self, state: &mut State<R>) -> Result<(), FailureSummary> {
+        CentralDifference::evaluate(self, state).map_err(|error| FailureSummary::from(&error))
+    }
+
+    fn advance(&mut self, state: &mut State<R>) -> Result<(), FailureSummary> {
+        CentralDifference::advance(self, state);
+        Ok(())
+    }
+
+    fn balance_floor(&self) -> f64 {
+        CentralDifference::balance_floor(self)
+    }
+
+    fn observable(&self) -> &dyn Observable<R> {
+        self
+    }
+}
+
+/// Equilibria at the ends of equal load steps.
+struct LoadSteps<'m, R> {
+    relaxation: DynamicRelaxation<'m, R>,
+    plan: Plan,
+}
+
+impl<R: Real> Solver<R> for LoadSteps<'_, R> {
+    fn evaluate(&mut self, _state: &mut State<R>) -> Result<(), FailureSummary> {
+        Ok(())
+    }
+
+    fn advance(&mut self, state: &mut State<R>) -> Result<(), FailureSummary> {
+        let next = (state.time / self.plan.step).round() + 1.0;
+        self.relaxation
+            .solve(state, next * self.plan.step)
+            .map(|_| ())
+            .map_err(|error| FailureSummary::from(&error))
+    }
+
+    fn balance_floor(&self) -> f64 {
+        0.0
+    }
+
+    fn observable(&self) -> &dyn Observable<R> {
+        &self.relaxation
+    }
+}
+
+impl<R> Observable<R> for LoadSteps<'_, R>
+where
+    R: Real,
+{
+    fn energies(&self) -> &pliant_mechanics::Energies {
+        self.relaxation.energies()
+    }
+
+    fn reaction(&self, constraint: usize) -> [f64; 3] {
+        self.relaxation.reaction(constraint)
+    }
+
+    fn velocity(&self, state: &State<R>, node: usize) -> [f64; 3] {
+        self.relaxation.velocity(state, node)
+    }
+}
