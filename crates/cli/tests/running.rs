@@ -598,6 +598,80 @@ fn a_load_follows_its_curve() {
     assert_close(at(1.5), 0.5, 1e-3, "reaction to the load turned round [N]");
 }
 
+/// A block of nearly incompressible tissue whose end is moved sideways, of an element, by a solver.
+fn bent(element: &str, run: &str) -> String {
+    let cells = if element.starts_with("tet") { "tets" } else { "hexes" };
+    format!(
+        r#"
+[scene]
+until = 1.0
+[run]
+{run}
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 10e3
+poisson-ratio = 0.45
+[body.block]
+mesh = {{ block = {{ size = [0.1, 0.05, 0.05] }}, edge = 0.025, as = "{cells}" }}
+element = "{element}"
+law = "tissue"
+density = 1000
+damping = 60
+[constraint.wall]
+type = "fix"
+body = "block"
+nodes = {{ set = "x-min" }}
+[constraint.hand]
+type = "move"
+body = "block"
+nodes = {{ set = "x-max" }}
+by = [0, 0, 0.01]
+to = 0.4
+[output.fields]
+type = "vtu"
+every = 1.0
+data = ["displacement", "von-mises", "pressure"]
+"#
+    )
+}
+
+fn hand(text: &str) -> f64 {
+    Workshop::new(text).run(&[]).done()["reactions"]["hand"][2].as_f64().unwrap()
+}
+
+#[test]
+fn every_element_reaches_the_same_rest_by_dynamics_and_without() {
+    let mut forces = Vec::new();
+    for element in ["tet4", "tet4-anp", "tet4-ianp", "tet4-ianp-niftysim", "hex8", "hex8-full"] {
+        let [dynamic, still] =
+            ["", "solver = \"quasi-static\"\nload-steps = 2"].map(|run| hand(&bent(element, run)));
+        // The explicit run still moves a little after 0.6 s of hold.
+        assert_close(dynamic, still, 2e-3 * still, element);
+        forces.push(still);
+    }
+    // Averaging the pressure loosens tets.
+    assert!(forces[1] < 0.98 * forces[0], "{forces:?}");
+}
+
+#[test]
+fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
+    let free = bent("hex8", "solver = \"quasi-static\"\ntolerance = 1e-9")
+        .replace("[constraint.wall]", "[constraint.unused]")
+        .replace("until = 1.0", "until = 1.0\ngravity = [0, 0, -9.81]")
+        .replace("nodes = { set = \"x-min\" }", "nodes = { set = \"x-min\" }\ncomponents = [\"y\"]")
+        .replace("by = [0, 0, 0.01]", "by = [0, 0, 0.01]\ncomponents = [\"y\"]");
+    let told = Workshop::new(&free).run(&[]);
+    assert_eq!(told.code, 1, "{}", told.err);
+    assert!(told.err.contains("no equilibrium"), "{}", told.err);
+}
+
+#[test]
+fn the_scene_in_the_readme_runs() {
+    let readme = fs::read_to_string(Path::new(ROOT).join("README.md")).unwrap();
+    let text = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    Workshop::new(text).run(&["--until", "0.05"]).done();
+}
+
 #[test]
 fn built_in_shapes_fill_their_volume_with_tets_and_hexes() {
     // The volume [m³] and how far a coarse mesh may be off: voxels and flat facets miss part of a curved surface.
