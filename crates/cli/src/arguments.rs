@@ -39,6 +39,15 @@ pub enum Command {
         #[arg(long)]
         markdown: bool,
     },
+    /// Translate a NiftySim model into a scene.
+    #[command(after_help = "Example:\n  pliant import model.xml -o model && pliant run model")]
+    Import {
+        /// A NiftySim model (XML).
+        model: PathBuf,
+        /// Folder to make for the scene and its meshes.
+        #[arg(short, long, value_name = "DIR")]
+        out: PathBuf,
+    },
     /// Say what a mesh file holds, how good it is, and what is wrong with it.
     #[command(after_help = "Examples:\n  pliant info liver.msh\n  pliant info liver.msh --convert liver.vtu")]
     Info(Info),
@@ -111,7 +120,7 @@ impl Command {
         match self {
             Self::Run(run) => run.json,
             Self::Info(info) => info.json,
-            Self::Check(_) | Self::New { .. } | Self::Schema { .. } => false,
+            Self::Check(_) | Self::New { .. } | Self::Schema { .. } | Self::Import { .. } => false,
         }
     }
 }

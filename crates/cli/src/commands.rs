@@ -8,7 +8,7 @@ use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::Value;
-use pliant_scene::{Built, OutputFolder, Plan, Scene, number, reference, registry};
+use pliant_scene::{Built, OutputFolder, Plan, Scene, niftysim, number, reference, registry};
 use serde_json::{Map, Value as Json, json};
 
 use crate::arguments::{Check, Command, Info, Overrides, Precision, Run};
@@ -28,6 +28,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Info(arguments) => info(&arguments),
+        Command::Import { model, out } => import(&model, &out),
     }
 }
 
@@ -126,6 +127,28 @@ fn new(name: &Path) -> Result<ExitCode, Failure> {
         },
     )?;
     say(format_args!("wrote {}; try: pliant run {}", file.display(), name.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn import(model: &Path, out: &Path) -> Result<ExitCode, Failure> {
+    let imported = niftysim::import(model).map_err(|error| Failure::plain(error, ""))?;
+    let file = out.join("scene.toml");
+    if file.exists() {
+        return Err(Failure::plain(format!("`{}` exists already", file.display()), "choose another folder"));
+    }
+    let unwritable = |error: &dyn std::fmt::Display| {
+        let help = "check the folder, its permissions and the free space, or choose another name";
+        Failure::plain(format!("`{}` cannot be written: {error}", out.display()), help)
+    };
+    fs::create_dir_all(out).map_err(|error| unwritable(&error))?;
+    for (name, mesh) in &imported.meshes {
+        io::write(&out.join(name), mesh).map_err(|error| unwritable(&error))?;
+    }
+    fs::write(&file, &imported.scene).map_err(|error| unwritable(&error))?;
+    for note in &imported.notes {
+        eprintln!("note: {note}");
+    }
+    say(format_args!("wrote {}; try: pliant run {}", file.display(), out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -25,7 +25,9 @@ pub struct ElementBound {
 
 /// The bound [s] of one cell.
 pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
-    let wave = solid.material.law.longitudinal_modulus() / solid.material.density;
+    // Hourglass patterns are as fast as a wave of modulus c μ: slower than the law's own for any usual coefficient c.
+    let modulus = solid.material.law.longitudinal_modulus().max(solid.cells.hourglass_modulus(cell));
+    let wave = modulus / solid.material.density;
     let n = solid.cells.nodes_per_cell() as f64;
     2.0 / (n * wave * solid.cells.gradient_square_sum(cell)).sqrt()
 }

@@ -210,6 +210,18 @@ impl Cells {
         with_cells!(self, block => block.rest[cell].gradient_square_sum())
     }
 
+    /// c μ [Pa] of a cell's hourglass control; 0 without.
+    pub(crate) fn hourglass_modulus(&self, cell: usize) -> f64 {
+        let of_block = |block: &CellBlock<8>| {
+            let stiffness = block.hourglass.as_ref().map_or(0.0, |control| control.stiffness[cell]);
+            8.0 * stiffness / (block.rest[cell].volume * block.rest[cell].gradient_square_sum())
+        };
+        match self {
+            Self::Hex8(block) => of_block(block),
+            _ => 0.0,
+        }
+    }
+
     /// The name of the element in a scene file.
     pub fn element(&self) -> &'static str {
         match self {

@@ -24,9 +24,10 @@ pub struct BodyTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub damping: f64,
-    /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus.
+    /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus; above about 0.5 it stiffens
+    /// bending.
     #[serde(default = "default_hourglass")]
-    #[schemars(range(min = 0.0, max = 1.0))]
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub hourglass: f64,
     /// Fibre direction at rest; overrides that of the law.
     #[serde(default)]

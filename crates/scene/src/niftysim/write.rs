@@ -13,7 +13,7 @@ use super::material::{Elastic, Material};
 use super::parts::{Model, Output, Part, System};
 
 /// Greatest multiple of the shear modulus that a scene takes as hourglass stiffness.
-const MOST_HOURGLASS: f64 = 1.0;
+const MOST_HOURGLASS: f64 = 10.0;
 /// Pairs by which the curve HILLY is written; the straight lines between them are off by 1e-4 at the most.
 const HILLY_POINTS: u32 = 500;
 /// Frames of a model that asks for no output.
