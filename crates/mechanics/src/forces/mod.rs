@@ -27,7 +27,7 @@ const CHUNK: usize = 256;
 
 /// What a pass over some cells found.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Findings {
+pub(crate) struct Findings {
     /// Energy held by hourglass patterns [J].
     pub hourglass: f64,
     /// The first cell of the pass with det F ≤ 0 or not a number, and its det F.
@@ -35,7 +35,7 @@ pub struct Findings {
 }
 
 /// Internal forces of one solid, compiled for its element, law and number type.
-pub trait ForceField<R>: Send + Sync {
+pub(crate) trait ForceField<R>: Send + Sync {
     /// Contributions [N] of each cell to its nodes, written cell by cell into `slots`. With `history` the stress
     /// relaxes and the history advances to this state; an empty `history` gives the instantaneous elastic
     /// response.
@@ -103,7 +103,7 @@ fn scatter<R: Real, const N: usize>(
 }
 
 /// The force field of a solid for steps of `step` seconds.
-pub(crate) fn force_field<R: Real>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
+fn force_field<R: Real>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
     with_law!(&solid.material.law, law => match &solid.cells {
         Cells::Tet4(cells) => Box::new(SolidForces::new(solid, cells, *law, step)),
         Cells::AveragedTet4(cells, averaging) => Box::new(AveragedTets::new(solid, cells, *averaging, *law, step)),
@@ -157,7 +157,7 @@ impl<R: Real> InternalForces<R> {
             }
         }
         Self {
-            fields: model.solids.iter().map(|solid| R::force_field(solid, step)).collect(),
+            fields: model.solids.iter().map(|solid| force_field(solid, step)).collect(),
             field_offsets,
             slots: vec![[R::ZERO; 3]; slot_count],
             findings: (model.solids.iter())
