@@ -131,7 +131,7 @@ fn advance<R: Real>(
             break;
         }
         if state.work.largest > solver.balance_floor() {
-            worst_balance = worst_balance.max(solver.energies().balance);
+            worst_balance = worst_balance.max(solver.observable().energies().balance);
         }
         let last = state.time + 0.5 * plan.step >= scene.scene.until;
         if sampling.is_due(state.time, plan.step, last) {
@@ -159,10 +159,12 @@ fn advance<R: Real>(
         steps: state.steps,
         time: state.time,
         wall_seconds: started.elapsed().as_secs_f64(),
-        energies: *solver.energies(),
+        energies: *solver.observable().energies(),
         worst_balance,
         balance_floor: solver.balance_floor(),
-        reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
+        reactions: (0..built.model.constraints.len())
+            .map(|index| solver.observable().reaction(index))
+            .collect(),
         history,
         files,
         threads: rayon::current_num_threads(),

@@ -8,7 +8,7 @@ use crate::output::FailureSummary;
 use crate::plan::Plan;
 
 /// Brings a state from instant to instant.
-pub(crate) trait Solver<R>: Observable<R> {
+pub(crate) trait Solver<R> {
     /// Makes all that can be asked belong to the state's instant.
     fn evaluate(&mut self, state: &mut State<R>) -> Result<(), FailureSummary>;
 
@@ -37,7 +37,7 @@ pub(crate) fn solver<'m, R: Real>(
             let settings = RelaxationSettings { tolerance, ..RelaxationSettings::default() };
             Box::new(LoadSteps {
                 relaxation: DynamicRelaxation::new(&built.model, settings)?,
-                plan: plan.clone(),
+                step: plan.step,
             })
         }
     })
@@ -65,7 +65,8 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
 /// Equilibria at the ends of equal load steps.
 struct LoadSteps<'m, R> {
     relaxation: DynamicRelaxation<'m, R>,
-    plan: Plan,
+    /// Time between equilibria [s].
+    step: f64,
 }
 
 impl<R: Real> Solver<R> for LoadSteps<'_, R> {
@@ -74,9 +75,9 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
     }
 
     fn advance(&mut self, state: &mut State<R>) -> Result<(), FailureSummary> {
-        let next = (state.time / self.plan.step).round() + 1.0;
+        let next = (state.time / self.step).round() + 1.0;
         self.relaxation
-            .solve(state, next * self.plan.step)
+            .solve(state, next * self.step)
             .map(|_| ())
             .map_err(|error| FailureSummary::from(&error))
     }
@@ -87,22 +88,5 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
 
     fn observable(&self) -> &dyn Observable<R> {
         &self.relaxation
-    }
-}
-
-impl<R> Observable<R> for LoadSteps<'_, R>
-where
-    R: Real,
-{
-    fn energies(&self) -> &pliant_mechanics::Energies {
-        self.relaxation.energies()
-    }
-
-    fn reaction(&self, constraint: usize) -> [f64; 3] {
-        self.relaxation.reaction(constraint)
-    }
-
-    fn velocity(&self, state: &State<R>, node: usize) -> [f64; 3] {
-        self.relaxation.velocity(state, node)
     }
 }
