@@ -662,7 +662,15 @@ fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
         .replace("by = [0, 0, 0.01]", "by = [0, 0, 0.01]\ncomponents = [\"y\"]");
     let told = Workshop::new(&free).run(&[]);
     assert_eq!(told.code, 1, "{}", told.err);
-    assert!(told.err.contains("no equilibrium"), "{}", told.err);
+    let error = &told.json()["error"];
+    for key in ["load_step", "iterations", "residual", "node", "time"] {
+        assert!(error[key].is_number(), "{key}: {error}");
+    }
+    assert_eq!((error["kind"].as_str(), error["load_step"].as_u64()), (Some("not-converged"), Some(1)));
+    for piece in ["load step 1 of 10: no equilibrium", "largest at node", "iterations", "try more load steps"]
+    {
+        assert!(told.err.contains(piece), "{}", told.err);
+    }
 }
 
 #[test]

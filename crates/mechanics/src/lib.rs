@@ -52,7 +52,9 @@ mod state;
 mod stepper;
 pub mod tensor;
 
-pub use dynamic_relaxation::{Convergence, DynamicRelaxation, RelaxationError, RelaxationSettings};
+pub use dynamic_relaxation::{
+    Convergence, DynamicRelaxation, Iteration, RelaxationError, RelaxationSettings,
+};
 pub use model::Model;
 pub use real::Real;
 pub use state::{History, State, Work};

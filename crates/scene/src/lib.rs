@@ -57,4 +57,5 @@ pub use overview::overview;
 pub use plan::{LimitingElement, Plan, SAFETY, plan};
 pub use run::{Progress, run};
 pub use scene::{ReadError, Scene, open, scene_file};
+pub use solver::LoadStepProgress;
 pub use starter::starter;

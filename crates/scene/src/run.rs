@@ -13,7 +13,7 @@ use crate::output::{
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::solver;
+use crate::solver::{LoadStepProgress, solver};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +24,8 @@ pub struct Progress {
     pub until: f64,
     /// Wall time so far.
     pub wall: Duration,
+    /// Where a quasi-static run is within a load step.
+    pub load_step: Option<LoadStepProgress>,
 }
 
 /// Samples of a run for plot and summary.
@@ -144,12 +146,22 @@ fn advance<R: Real>(
         }
         if reported.elapsed() >= REPORT || last {
             reported = Instant::now();
-            report(Progress { time: state.time, until: scene.scene.until, wall: started.elapsed() });
+            let (until, wall) = (scene.scene.until, started.elapsed());
+            report(Progress { time: state.time, until, wall, load_step: None });
         }
         if last {
             break;
         }
-        if let Err(error) = solver.advance(&mut state) {
+        let mut watch = |step: LoadStepProgress| {
+            if reported.elapsed() >= REPORT {
+                reported = Instant::now();
+                let [from, to] = step.iteration.span;
+                let time = from + step.iteration.fraction * (to - from);
+                let (until, wall) = (scene.scene.until, started.elapsed());
+                report(Progress { time, until, wall, load_step: Some(step) });
+            }
+        };
+        if let Err(error) = solver.advance(&mut state, &mut watch) {
             failure = Some(error);
             break;
         }

@@ -79,6 +79,12 @@ pub struct FailureSummary {
     pub node: Option<u32>,
     /// Time [s].
     pub time: Option<f64>,
+    /// The load step of a quasi-static run, counted from 1.
+    pub load_step: Option<u64>,
+    /// Iterations spent on the last try of that load step.
+    pub iterations: Option<usize>,
+    /// The relative residual that was reached.
+    pub residual: Option<f64>,
     /// What happened and what to try.
     pub message: String,
 }
@@ -115,23 +121,42 @@ impl FailureSummary {
     }
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
-        Self { kind, body: None, element: None, node: None, time, message }
+        Self {
+            kind,
+            body: None,
+            element: None,
+            node: None,
+            time,
+            load_step: None,
+            iterations: None,
+            residual: None,
+            message,
+        }
     }
 }
 
-impl From<&RelaxationError> for FailureSummary {
-    fn from(error: &RelaxationError) -> Self {
-        let message = format!("{error}; {}", error.remedy());
-        let (kind, body, element, node, time) = match error {
-            RelaxationError::NotFinite { body, node, time } => ("not-finite", body, None, *node, *time),
-            RelaxationError::Inverted { body, element, node, time, .. } => {
-                ("inverted", body, Some(*element), *node, *time)
+impl FailureSummary {
+    /// A load step, counted from 1, of so many that came to no equilibrium.
+    pub(crate) fn load_step(error: &RelaxationError, number: u64, of: u64) -> Self {
+        let message = format!("load step {number} of {of}: {error}; {}", error.remedy());
+        let (kind, body, element, node, time, iterations, residual) = match error {
+            RelaxationError::NotFinite { body, node, iterations, time } => {
+                ("not-finite", body, None, *node, *time, *iterations, None)
             }
-            RelaxationError::NotConverged { body, node, time, .. } => {
-                ("not-converged", body, None, *node, *time)
+            RelaxationError::Inverted { body, element, node, iterations, time, .. } => {
+                ("inverted", body, Some(*element), *node, *time, *iterations, None)
+            }
+            RelaxationError::NotConverged { body, node, residual, iterations, time, .. } => {
+                ("not-converged", body, None, *node, *time, *iterations, Some(*residual))
             }
         };
-        Self { kind, body: Some(body.clone()), element, node: Some(node), time: Some(time), message }
+        let of_body = Self {
+            body: Some(body.clone()),
+            element,
+            node: Some(node),
+            ..Self::about(kind, message, Some(time))
+        };
+        Self { load_step: Some(number), iterations: Some(iterations), residual, ..of_body }
     }
 }
 
@@ -145,7 +170,7 @@ impl From<&StepError> for FailureSummary {
             }
             StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
         };
-        Self { kind, body: Some(body.clone()), element, node: Some(node), time: Some(time), message }
+        Self { body: Some(body.clone()), element, node: Some(node), ..Self::about(kind, message, Some(time)) }
     }
 }
 
