@@ -41,6 +41,7 @@ pub mod curve;
 mod dynamic_relaxation;
 pub mod element;
 mod forces;
+pub mod harmonic;
 pub mod law;
 pub mod load;
 pub mod mapping;
