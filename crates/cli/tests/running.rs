@@ -1007,3 +1007,31 @@ fn the_liver_of_sofa_is_pulled_by_one_lobe() {
     let frames = workshop.series("out/case/fields.pvd");
     assert_eq!(frames[0].1.mesh.points.len(), 507);
 }
+
+#[test]
+fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
+    let model = r#"<Model>
+        <Nodes DOF="3" NumNodes="4">0 0 0  0.1 0 0  0 0.1 0  0 0 0.1</Nodes>
+        <Elements NumEls="1" Type="T4">0 1 2 3</Elements>
+        <ElementSet Size="all"><Material Type="AB">
+            <ElasticParams NumParams="3">1000 3 10000</ElasticParams></Material></ElementSet>
+        <Constraint Type="Fix" DOF="all" NumNodes="3"><Nodes>0 1 2</Nodes></Constraint>
+        <Constraint Type="Disp" DOF="2" NumNodes="1" LoadShape="RAMP">
+            <Nodes>3</Nodes><Magnitudes Type="UNIFORM">0.01</Magnitudes></Constraint>
+        <SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>1</DampingCoeff>
+            <Density>1000</Density></SystemParams></Model>"#;
+    let workshop = Workshop::new("");
+    workshop.write("model.xml", model);
+    let told = workshop.pliant(&["run", "model.xml", "--json"]);
+    let direct = told.done();
+    assert!(told.err.contains("note: "), "{}", told.err);
+    assert!(workshop.path("out/model/fields.pvd").is_file());
+    workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]).words();
+    let scene = workshop.pliant(&["run", "translated.toml", "--json"]).done();
+    assert_eq!(direct["reactions"], scene["reactions"]);
+    let again = workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]);
+    assert!(again.code == 2 && again.err.contains("exists already"), "{}", again.err);
+    workshop.write("broken.xml", &model[..200]);
+    let told = workshop.pliant(&["run", "broken.xml"]);
+    assert!(told.code == 2 && told.err.contains("broken.xml"), "{}", told.err);
+}
