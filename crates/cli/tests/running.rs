@@ -67,7 +67,8 @@ fn json_has_exactly_the_promised_keys() {
 
     let refused = Workshop::block("density = 1000", "density = 0").run(&[]).json();
     assert_eq!(keys(&refused), KEYS);
-    assert_eq!(keys(&refused["error"]), ["kind", "body", "element", "node", "time", "message"]);
+    let error = ["kind", "body", "element", "node", "time", "load_step", "iterations", "residual", "message"];
+    assert_eq!(keys(&refused["error"]), error);
 }
 
 #[test]

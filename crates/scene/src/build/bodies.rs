@@ -62,9 +62,9 @@ impl Builder<'_> {
         self.set_velocity(name, table, first as usize);
         let nodes = first..self.model.rest.len() as u32;
         self.model.bodies.push(Body { name: name.into(), nodes, damping: table.damping });
-        self.check_labels(name, "law", &table.law, mesh);
-        self.check_labels(name, "density", &table.density, mesh);
-        self.check_labels(name, "hourglass", &table.hourglass, mesh);
+        self.check_labels(name, ["law", "\"law\""], &table.law, mesh);
+        self.check_labels(name, ["density", "1000"], &table.density, mesh);
+        self.check_labels(name, ["hourglass", "0.2"], &table.hourglass, mesh);
         for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
             if !self.check_element(name, table, block.kind) {
                 return;
@@ -98,8 +98,9 @@ impl Builder<'_> {
         fits
     }
 
-    /// Where values (law, density, …) go by label: whether each cell's label has one, and each label of theirs a cell.
-    fn check_labels<T>(&mut self, name: &str, key: &str, values: &ByLabel<T>, mesh: &Mesh) {
+    /// Where values (law, density, …) go by label: whether each cell's label has one, and each label of theirs a cell. The
+    /// key comes with an example of a value.
+    fn check_labels<T>(&mut self, name: &str, [key, example]: [&str; 2], values: &ByLabel<T>, mesh: &Mesh) {
         let ByLabel::Each(map) = values else { return };
         let path = ["body", name, key];
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
@@ -120,8 +121,8 @@ impl Builder<'_> {
         let missing = counts.iter().filter(|(label, _)| !map.contains_key(*label));
         let missing = list(&mut missing.map(|(label, n)| format!("{label} ({})", counted(*n, "cell"))));
         if !missing.is_empty() {
-            let message = format!("cells of `{name}` have labels without a {key}: {missing}");
-            let help = format!("add `LABEL = {key}` for each of them");
+            let message = format!("cells of `{name}` have labels without {key}: {missing}");
+            let help = format!("add `LABEL = {example}` for each of them");
             self.error(&path, message, "not for these", help);
         }
         let known = list(&mut counts.keys().cloned());
