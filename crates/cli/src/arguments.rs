@@ -8,7 +8,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong."
+    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong, 130 interrupted (Ctrl-C)."
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -20,7 +20,9 @@ pub enum Command {
     /// Run a scene and write its outputs.
     #[command(
         after_help = "Examples:\n  pliant run scenes/liver\n  pliant run scene.toml --until 0.5 --out out/short --force\n  \
-                            pliant run scene.toml --precision single --threads 4 --json > result.json"
+                            pliant run scene.toml --precision single --threads 4 --json > result.json\n  \
+                            pliant run scene.toml --resume out/scene               # from the last checkpoint there\n  \
+                            pliant run scene.toml --resume out/scene --until 20    # and go on for longer"
     )]
     Run(Run),
     /// Check a scene and print its model; runs nothing, writes nothing.
@@ -85,6 +87,12 @@ pub struct Run {
     /// Write into a folder that is not empty.
     #[arg(long)]
     pub force: bool,
+    /// Go on from a checkpoint (a file, or the last one in a folder) in the folder it lies in, or in `--out`.
+    ///
+    /// A scene writes checkpoints with `checkpoint = { every = 1.0 }` in `[run]`. The resumed run ends in the same
+    /// bits as one that was never interrupted; its outputs go on where the checkpoint was. Only `until` may differ.
+    #[arg(long, value_name = "CHECKPOINT", conflicts_with = "force")]
+    pub resume: Option<PathBuf>,
     #[command(flatten)]
     pub overrides: Overrides,
     /// Print one JSON object with the results on standard output.

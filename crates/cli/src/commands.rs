@@ -3,12 +3,15 @@
 use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::Value;
-use pliant_scene::{Built, OutputFolder, Plan, Scene, niftysim, number, reference, registry};
+use pliant_scene::{
+    Built, Checkpoint, Options, OutputFolder, Plan, Scene, niftysim, number, reference, registry,
+};
 use serde_json::{Map, Value as Json, json};
 
 use crate::arguments::{Check, Command, Info, Overrides, Precision, Run};
@@ -75,18 +78,50 @@ fn in_pool<T: Send>(
     Ok(pool.install(work)?)
 }
 
-fn run(arguments: &Run) -> Result<ExitCode, Failure> {
-    let (scene, built, plan) = prepare(&arguments.scene, &arguments.overrides)?;
+/// The exit code of a process that Ctrl-C ended.
+const INTERRUPTED: u8 = 130;
+
+/// Set by Ctrl-C; pressed again, it ends the process at once.
+fn stopped_by_ctrl_c() -> &'static AtomicBool {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let handler = || {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(INTERRUPTED.into());
+        }
+    };
+    // Where no handler can be set, Ctrl-C ends the process as ever, and what was written stays readable.
+    let _ = ctrlc::set_handler(handler);
+    &STOP
+}
+
+/// The folder of a run that starts at rest.
+fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure> {
     let file = pliant_scene::scene_file(&arguments.scene);
     let path = arguments.out.clone().unwrap_or_else(|| OutputFolder::default_for(&file));
-    let folder = OutputFolder::prepare(path, &scene, arguments.force)
-        .map_err(|error| Failure::plain(&error, error.remedy))?;
+    OutputFolder::prepare(path, scene, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))
+}
+
+fn run(arguments: &Run) -> Result<ExitCode, Failure> {
+    let checkpoint = arguments.resume.as_deref().map(Checkpoint::read).transpose()?;
+    let (scene, built, mut plan) = prepare(&arguments.scene, &arguments.overrides)?;
+    let folder = match &checkpoint {
+        Some(checkpoint) => {
+            plan = checkpoint.continues(&scene, &built, &plan)?;
+            let own = checkpoint.path().parent().unwrap_or(Path::new(""));
+            let path = arguments.out.clone().unwrap_or_else(|| own.to_owned());
+            OutputFolder::reopen(path, &scene, checkpoint)?
+        }
+        None => fresh_folder(arguments, &scene)?,
+    };
     for note in built.notes.iter().chain(&plan.note) {
         eprintln!("note: {note}");
     }
     let bar = Bar::new();
-    let result = pliant_scene::run(&scene, &built, &plan, &folder, &mut |progress| bar.update(progress));
+    let options = Options { resume: checkpoint.as_ref(), stop: Some(stopped_by_ctrl_c()) };
+    let mut report = |progress| bar.update(progress);
+    let result = pliant_scene::run_with(&scene, &built, &plan, &folder, options, &mut report);
     bar.finish();
+    let interrupted = matches!(&result, Ok(summary) if summary.status == "interrupted");
     let (failure, json) = match result {
         Ok(summary) => {
             if !arguments.json {
@@ -103,7 +138,7 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
         None => Ok(ExitCode::SUCCESS),
         Some(message) => {
             eprintln!("error: {message}");
-            Ok(ExitCode::from(1))
+            Ok(ExitCode::from(if interrupted { INTERRUPTED } else { 1 }))
         }
     }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
 use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::{Progress, ReadError, Summary, failed_input, number};
+use pliant_scene::{Progress, ReadError, ResumeError, Summary, failed_input, number};
 
 /// The input is wrong (exit code 2).
 #[derive(Debug)]
@@ -40,6 +40,12 @@ impl From<ReadError> for Failure {
                 "give a scene file, or a folder with a scene.toml; `pliant new NAME` writes one",
             ),
         }
+    }
+}
+
+impl From<ResumeError> for Failure {
+    fn from(error: ResumeError) -> Self {
+        Self::plain(&error, error.remedy())
     }
 }
 

@@ -5,6 +5,9 @@ use std::fmt::Debug;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 /// A real number that the kernels can run in.
 pub trait Real:
     Copy
@@ -13,6 +16,8 @@ pub trait Real:
     + PartialOrd
     + Send
     + Sync
+    + Serialize
+    + DeserializeOwned
     + 'static
     + Add<Output = Self>
     + AddAssign
