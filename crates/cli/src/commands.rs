@@ -10,16 +10,18 @@ use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::Value;
 use pliant_scene::{
-    Built, Checkpoint, Options, OutputFolder, Plan, Scene, niftysim, number, reference, registry,
+    Built, Checkpoint, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim, number, reference,
+    registry,
 };
 use serde_json::{Map, Value as Json, json};
 
-use crate::arguments::{Check, Command, Info, Overrides, Precision, Run};
+use crate::arguments::{self, Check, Command, Info, Overrides, Precision, Run};
 use crate::report::{self, Bar, Failure, say};
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Run(arguments) => run(&arguments),
+        Command::Sweep(arguments) => sweep(&arguments),
         Command::Check(arguments) => check(&arguments),
         Command::New { name } => new(&name),
         Command::Schema { markdown } => {
@@ -38,7 +40,8 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
 /// Reads, builds and plans a scene; doubts go to standard error.
 fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), Failure> {
     let (mut source, folder) = pliant_scene::open(path)?;
-    let mut mistakes = Vec::new();
+    let mut mistakes: Vec<_> =
+        overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
     let precision = overrides.precision.map(|precision| match precision {
         Precision::Single => "single",
         Precision::Double => "double",
@@ -141,6 +144,69 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
             Ok(ExitCode::from(if interrupted { INTERRUPTED } else { 1 }))
         }
     }
+}
+
+fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
+    let (source, folder) = pliant_scene::open(&arguments.scene)?;
+    let sweep = Sweep::new(source, folder, &arguments.set)?;
+    let (runs, threads) = (sweep.runs(), arguments.threads.into());
+    refuse_mistakes(&sweep, threads)?;
+    if arguments.dry_run {
+        let lines: Vec<String> = (0..runs).map(|run| format!("run-{run:04}  {}", sweep.title(run))).collect();
+        say(lines.join("\n"))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let path = arguments.out.clone().unwrap_or_else(|| {
+        let mut path = OutputFolder::default_for(&pliant_scene::scene_file(&arguments.scene));
+        path.as_mut_os_string().push("-sweep");
+        path
+    });
+    let folder =
+        sweep.open_folder(path, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))?;
+    let bar = Bar::new();
+    let options =
+        SweepOptions { threads, keep_fields: arguments.keep_fields, stop: Some(stopped_by_ctrl_c()) };
+    let result = sweep.run(&folder, options, &|progress| bar.update_sweep(progress, runs));
+    bar.finish();
+    let summary = match result {
+        Ok(summary) => summary,
+        Err(error) => {
+            eprintln!("error: {error}; {}", error.remedy);
+            return Ok(ExitCode::from(1));
+        }
+    };
+    say(summary.words())?;
+    for (run, message) in &summary.failures {
+        eprintln!("error: run-{run:04} ({}): {message}", sweep.title(*run));
+    }
+    if summary.interrupted {
+        eprintln!("error: the sweep was interrupted; the runs that had ended are in the table");
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
+    if summary.failures.is_empty() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    eprintln!("error: {} of {runs} runs failed", summary.failures.len());
+    Ok(ExitCode::from(1))
+}
+
+/// Refuses a sweep some of whose combinations are no scene; mistakes that several share are told once.
+fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
+    let mistakes = sweep.check(threads);
+    let mut told = Vec::<String>::new();
+    for (run, errors) in &mistakes {
+        let text = errors.plain().to_string();
+        if !told.contains(&text) {
+            eprintln!("run-{run:04} ({}):", sweep.title(*run));
+            report::show(errors);
+            told.push(text);
+        }
+    }
+    if mistakes.is_empty() {
+        return Ok(());
+    }
+    let message = format!("{} of {} combinations are wrong; nothing was run", mistakes.len(), sweep.runs());
+    Err(Failure::plain(message, "correct the values above, or sweep without them"))
 }
 
 fn check(arguments: &Check) -> Result<ExitCode, Failure> {

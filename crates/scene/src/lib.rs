@@ -47,6 +47,7 @@ mod scene;
 mod solver;
 pub mod source;
 mod starter;
+mod sweep;
 #[cfg(test)]
 mod testing;
 
@@ -60,3 +61,4 @@ pub use plan::{LimitingElement, Plan, SAFETY, plan};
 pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, scene_file};
 pub use starter::starter;
+pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};

@@ -35,8 +35,8 @@ struct Probe {
     fields: Vec<FieldName>,
 }
 
-const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "external", "hourglass", "balance"];
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(crate) const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "external", "hourglass", "balance"];
+pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
 impl Rows {

@@ -82,6 +82,18 @@ impl OutputFolder {
         Ok(Self { path })
     }
 
+    /// Removes a folder with the outputs of an earlier run of a scene; what is not of it stays.
+    pub(crate) fn clear(path: &Path, scene: &Scene) -> std::io::Result<()> {
+        remove_earlier(path, scene)?;
+        for (name, table) in &scene.outputs {
+            match table {
+                OutputTable::Csv(_) => remove(&path.join(format!("{name}.csv")))?,
+                OutputTable::Vtu(_) => remove_empty(&path.join(name))?,
+            }
+        }
+        remove_empty(path)
+    }
+
     /// Its path.
     pub fn path(&self) -> &Path {
         &self.path
@@ -141,6 +153,12 @@ fn remove_frames(folder: &Path) -> std::io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Removes a folder that holds nothing, if there is one.
+fn remove_empty(path: &Path) -> std::io::Result<()> {
+    let empty = path.is_dir() && fs::read_dir(path)?.next().is_none();
+    if empty { fs::remove_dir(path) } else { Ok(()) }
 }
 
 /// Removes a regular file, if there is one.

@@ -16,6 +16,7 @@ pub use folder::OutputFolder;
 pub(crate) use folder::{PLOT, SUMMARY};
 pub use summary::{BodySummary, FailureSummary, Summary, failed_input, failed_output, number};
 
+pub(crate) use csv::{AXES, ENERGIES};
 pub(crate) use plot::plot;
 pub(crate) use summary::{bodies, markdown, summarise};
 

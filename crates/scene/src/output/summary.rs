@@ -52,6 +52,12 @@ pub struct Summary {
     pub reactions: Vec<(String, [f64; 3])>,
     /// Files written, as paths.
     pub files: Vec<String>,
+    /// Simulated time at the end [s].
+    #[serde(skip)]
+    pub time: f64,
+    /// Energies at the end [J].
+    #[serde(skip)]
+    pub energies: Energies,
 }
 
 /// One body.
@@ -208,6 +214,8 @@ pub(crate) fn summarise(built: &Built, plan: &Plan, outcome: &Outcome) -> Summar
         energy_balance: outcome.energies.balance,
         reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
+        time: outcome.time,
+        energies: outcome.energies,
     }
 }
 
@@ -244,6 +252,11 @@ fn write_page(
     }
     if let Some((checkpoint, time)) = &outcome.resumed {
         writeln!(page, "Resumed at t = {} s from `{}`.\n", number(*time), short(checkpoint))?;
+    }
+    if !scene.source.assignments().is_empty() {
+        writeln!(page, "Set on the command line:\n")?;
+        scene.source.assignments().iter().try_for_each(|set| writeln!(page, "* `{set}`"))?;
+        writeln!(page)?;
     }
     writeln!(page, "![forces and energies over time](plot.svg)\n")?;
     writeln!(page, "## Model\n")?;
