@@ -147,6 +147,7 @@ fn go<R: Real>(
     let mut course = Course::<R>::new(scene, built, plan, folder, options)?;
     let before = options.resume.map_or(0.0, |checkpoint| checkpoint.progressed.wall_seconds);
     let started = Instant::now();
+    let wall_seconds = || before + started.elapsed().as_secs_f64();
     let mut reported = started;
     let failure = loop {
         match course.see() {
@@ -156,7 +157,7 @@ fn go<R: Real>(
                     report(Progress {
                         time: course.state.time,
                         until: scene.scene.until,
-                        wall: started.elapsed(),
+                        wall: Duration::try_from_secs_f64(wall_seconds()).unwrap_or_default(),
                     });
                 }
                 if last {
@@ -165,9 +166,8 @@ fn go<R: Real>(
             }
             Err(failure) => break Some(failure),
         }
-        let wall_seconds = before + started.elapsed().as_secs_f64();
         let stop = options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
-        if let Err(failure) = course.step(wall_seconds, stop) {
+        if let Err(failure) = course.step(wall_seconds(), stop) {
             break Some(failure);
         }
     };
@@ -176,7 +176,7 @@ fn go<R: Real>(
         failure,
         steps: course.state.steps,
         time: course.state.time,
-        wall_seconds: before + started.elapsed().as_secs_f64(),
+        wall_seconds: wall_seconds(),
         energies: *solver.energies(),
         worst_balance: course.worst_balance,
         balance_floor: course.solver.balance_floor(),
