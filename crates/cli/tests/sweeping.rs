@@ -3,6 +3,8 @@
 mod support;
 
 use std::fs;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use support::{BLOCK, Told, Workshop};
 
@@ -168,4 +170,29 @@ fn a_filled_folder_needs_force_and_loses_the_runs_of_an_earlier_sweep() {
         .collect();
     assert_eq!(left, ["notes.txt"]);
     assert_eq!(table(&workshop, "out/case-sweep/sweep.csv").len(), 2);
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_ends_a_sweep_with_what_it_has() {
+    let workshop = Workshop::new(BLOCK);
+    let child = workshop
+        .command(&["sweep", "case", "--threads", "1", "--set", "scene.until=0.001,100,0.002"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let patience = Instant::now();
+    while !workshop.path("out/case-sweep/run-0001/history.csv").exists() {
+        assert!(patience.elapsed() < Duration::from_secs(60), "the second run did not begin");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(killed.unwrap().success());
+    let told = Told::from(child.wait_with_output().unwrap());
+    assert_eq!(told.code, 130, "{}", told.err);
+    assert!(told.words().contains("the runs that had ended are in the table"), "{}", told.err);
+    let rows = table(&workshop, "out/case-sweep/sweep.csv");
+    let states: Vec<&str> = rows[1..].iter().map(|row| row[2].as_str()).collect();
+    assert_eq!(states, ["done", "interrupted"]);
 }

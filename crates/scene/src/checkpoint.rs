@@ -204,7 +204,11 @@ impl ResumeError {
                      from the start{course}"
                 )
             }
-            Self::AtTheEnd { .. } => "to go on, let the scene last longer with `--until`".into(),
+            Self::AtTheEnd { .. } => {
+                "to go on, let the scene last longer with `--until`; where its last instant is \
+                                      missing, resume from the checkpoint before this one"
+                    .into()
+            }
             Self::OtherOutputs { .. } => {
                 "name the folder of the interrupted run with `--out DIR`, or run the scene from the start"
                     .into()

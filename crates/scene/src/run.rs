@@ -287,7 +287,8 @@ impl<'a, R: Real> Course<'a, R> {
             let written = checkpoints.write(&progressed, &self.state, self.solver.equilibrium());
             self.kept = Some(written.map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?);
         }
-        if stop {
+        // What is left of the last instant is quickly done.
+        if stop && !last {
             return Err(FailureSummary::interrupted(
                 self.state.time,
                 due.then_some(self.kept.as_deref()).flatten(),

@@ -262,7 +262,7 @@ impl Sweep {
             scene.outputs.retain(|(_, table)| !matches!(table, OutputTable::Vtu(_)));
         }
         let path = folder.path().join(format!("run-{run:04}"));
-        // What foreign files are in it stay.
+        // Files in it that are not of a run stay.
         let folder = match OutputFolder::prepare(path, &scene, true) {
             Ok(folder) => folder,
             Err(error) => return Row::failed(error),
