@@ -41,6 +41,7 @@ pub mod critical_step;
 pub mod curve;
 mod dynamic_relaxation;
 pub mod element;
+mod fingerprint;
 mod forces;
 pub mod harmonic;
 pub mod law;
@@ -55,8 +56,9 @@ mod stepper;
 pub mod tensor;
 
 pub use dynamic_relaxation::{
-    Convergence, DynamicRelaxation, Iteration, RelaxationError, RelaxationSettings,
+    Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings,
 };
+pub use fingerprint::fingerprint;
 pub use model::Model;
 pub use real::Real;
 pub use state::{History, State, Work};
