@@ -54,7 +54,8 @@ mod testing;
 pub use build::{Built, BuiltBody, build};
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use output::{
-    BodySummary, FailureSummary, OutputError, OutputFolder, Summary, failed_input, failed_output, number,
+    BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, Summary, failed_input,
+    failed_output, number,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Plan, SAFETY, plan};

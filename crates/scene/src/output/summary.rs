@@ -75,6 +75,19 @@ pub struct BodySummary {
     pub mass: f64,
 }
 
+/// A load step that came to no equilibrium.
+#[derive(Clone, Debug, Serialize)]
+pub struct LoadStepSummary {
+    /// Its number, counted from 1.
+    pub number: u64,
+    /// How many there are.
+    pub of: u64,
+    /// Iterations spent on the last try.
+    pub iterations: usize,
+    /// The relative residual that was reached; none if an element or a displacement was lost on the way.
+    pub residual: Option<f64>,
+}
+
 /// Why a run failed or an input was refused.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureSummary {
@@ -88,12 +101,8 @@ pub struct FailureSummary {
     pub node: Option<u32>,
     /// Time [s].
     pub time: Option<f64>,
-    /// The load step of a quasi-static run, counted from 1.
-    pub load_step: Option<u64>,
-    /// Iterations spent on the last try of that load step.
-    pub iterations: Option<usize>,
-    /// The relative residual that was reached.
-    pub residual: Option<f64>,
+    /// The load step of a quasi-static run.
+    pub load_step: Option<Box<LoadStepSummary>>,
     /// What happened and what to try.
     pub message: String,
 }
@@ -142,17 +151,7 @@ impl FailureSummary {
     }
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
-        Self {
-            kind,
-            body: None,
-            element: None,
-            node: None,
-            time,
-            load_step: None,
-            iterations: None,
-            residual: None,
-            message,
-        }
+        Self { kind, body: None, element: None, node: None, time, load_step: None, message }
     }
 }
 
@@ -177,7 +176,7 @@ impl FailureSummary {
             node: Some(node),
             ..Self::about(kind, message, Some(time))
         };
-        Self { load_step: Some(number), iterations: Some(iterations), residual, ..of_body }
+        Self { load_step: Some(Box::new(LoadStepSummary { number, of, iterations, residual })), ..of_body }
     }
 }
 
