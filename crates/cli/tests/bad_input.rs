@@ -788,7 +788,7 @@ fn a_motion_from_point_data_needs_an_array_of_finite_vectors() {
     assert_refused(
         &of(&format!("SCALARS shift double 1\nLOOKUP_TABLE default\n{}", numbers(8))),
         &[line],
-        &["point data `shift` has 1 component, a displacement has 3", "name an array of vectors"],
+        &["point data `shift` has 1 component, a vector has 3", "name an array of vectors"],
     );
     assert_refused(
         &of(&format!("VECTORS shift double\n0 0 0 0 nan 0 {}", numbers(18))),

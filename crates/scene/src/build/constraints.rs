@@ -5,7 +5,7 @@ use pliant_mechanics::model::{Constraint, Motion};
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
-use crate::format::{Axis, Displacement, MoveTable};
+use crate::format::{Axis, MoveTable, Vectors};
 use crate::registry::{ConstraintTable, LoadTable};
 
 impl Builder<'_> {
@@ -44,8 +44,8 @@ impl Builder<'_> {
     fn motion(&mut self, table: &MoveTable, nodes: Option<(usize, &[u32])>, path: &[&str]) -> Option<Motion> {
         let curve = self.curve(&table.timing, path);
         match (&table.by, table.velocity) {
-            (Some(Displacement::Uniform(by)), None) => Some(Motion::Displacement(*by, curve?)),
-            (Some(Displacement::PerNode(by)), None) => {
+            (Some(Vectors::Uniform(by)), None) => Some(Motion::Displacement(*by, curve?)),
+            (Some(Vectors::PerNode(by)), None) => {
                 let (body, nodes) = nodes?;
                 let by = self.node_vectors(by, body, nodes, &[path, &["by"]].concat());
                 Some(Motion::Displacements(by?, curve?))

@@ -21,7 +21,7 @@ fn fault(message: String, help: impl Into<String>) -> Fault {
 }
 
 impl Builder<'_> {
-    /// The vector of each of some nodes (numbered in the model) of a body, in metres.
+    /// The vector of each of some nodes (numbered in the model) of a body [m or N].
     pub(super) fn node_vectors(
         &mut self,
         table: &NodeVectors,
@@ -63,11 +63,9 @@ fn point_data<'m>(name: &str, body: &str, mesh: &'m Mesh) -> Result<&'m DataArra
 
 fn of_data(name: &str, data: &DataArray, nodes: &[u32]) -> Result<Vec<[f64; 3]>, Fault> {
     if data.components != 3 {
-        let message = format!(
-            "point data `{name}` has {}, a displacement has 3",
-            counted(data.components, "component")
-        );
-        return Err(fault(message, "name an array of vectors; pad a plane motion with zeros"));
+        let message =
+            format!("point data `{name}` has {}, a vector has 3", counted(data.components, "component"));
+        return Err(fault(message, "name an array of vectors; pad plane vectors with zeros"));
     }
     let vector = |&node: &u32| {
         let item = data.item(node as usize);
@@ -83,7 +81,8 @@ fn of_data(name: &str, data: &DataArray, nodes: &[u32]) -> Result<Vec<[f64; 3]>,
 
 /// The rows of a table by node; `count` nodes are in the mesh file. Empty lines and what follows a # are passed over.
 fn read_rows(path: &Path, count: usize) -> Result<BTreeMap<u32, [f64; 3]>, Fault> {
-    const FORM: &str = "each row is `node,x,y,z`: a node counted from 0 and three numbers in metres";
+    const FORM: &str =
+        "each row is `node,x,y,z`: a node counted from 0 and three numbers in metres (or newtons)";
     let text = std::fs::read_to_string(path).map_err(|error| {
         let help = "it must be a text file; file names are relative to the scene file";
         fault(format!("`{}` cannot be read: {error}", path.display()), help)

@@ -74,7 +74,7 @@ pub struct MoveTable {
     pub nodes: Selection,
     /// Displacement [m], reached along the curve: one for all nodes, or one for each node from a file.
     #[serde(default)]
-    pub by: Option<Displacement>,
+    pub by: Option<Vectors>,
     /// Velocity [m/s], multiplied by the curve.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
@@ -86,24 +86,24 @@ pub struct MoveTable {
     pub timing: Timing,
 }
 
-/// A displacement of nodes.
+/// Displacements [m] or forces [N] of nodes.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
-pub enum Displacement {
-    /// The same for all nodes [m].
+pub enum Vectors {
+    /// The same for all nodes.
     Uniform([f64; 3]),
     /// One for each node.
     PerNode(NodeVectors),
 }
 
-/// Displacements node by node: `{ point-data = "shift" }` or `{ csv = "motion.csv" }`.
+/// Vectors node by node: `{ point-data = "shift" }` or `{ csv = "motion.csv" }`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct NodeVectors {
     /// Where they come from.
     #[serde(flatten)]
     pub from: NodeVectorSource,
-    /// Factor on them: the size of one unit of the data in metres (0.001 for millimetres).
+    /// Factor on them: the size of one unit of the data in metres (0.001 for millimetres) or newtons.
     #[serde(default = "one")]
     pub scale: f64,
 }
@@ -118,7 +118,7 @@ fn one() -> f64 {
 pub enum NodeVectorSource {
     /// The name of a point-data array of three components in the body's mesh file.
     PointData(String),
-    /// A file beside the scene with a row `node,x,y,z` for each node that moves, with or without a header; nodes counted
+    /// A file beside the scene with a row `node,x,y,z` for each of the nodes, with or without a header; nodes counted
     /// from 0 in the order of the mesh file.
     Csv(PathBuf),
 }
@@ -131,9 +131,9 @@ pub struct ForceTable {
     pub on: String,
     /// Which nodes.
     pub nodes: Selection,
-    /// Force on each node [N].
+    /// Force on each node [N]: the same for all, or one for each node of a body from a file.
     #[serde(default)]
-    pub each: Option<[f64; 3]>,
+    pub each: Option<Vectors>,
     /// Force [N] shared equally among the nodes.
     #[serde(default)]
     pub total: Option<[f64; 3]>,
@@ -179,6 +179,9 @@ pub struct GravityTable {
     /// The body; if not given, all.
     #[serde(default)]
     pub on: Option<String>,
+    /// Which nodes of the body; if not given, all.
+    #[serde(default)]
+    pub nodes: Option<Selection>,
     /// Acceleration [m/s²].
     pub acceleration: [f64; 3],
     /// Its course.

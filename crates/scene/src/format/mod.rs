@@ -11,8 +11,8 @@ pub use body::{
 };
 pub use body::{SurfaceTable, TubeShape};
 pub use load::{
-    Axis, CurveShape, Displacement, FixTable, ForceTable, GravityTable, MoveTable, NodeVectorSource,
-    NodeVectors, PressureTable, Timing, TractionTable,
+    Axis, CurveShape, FixTable, ForceTable, GravityTable, MoveTable, NodeVectorSource, NodeVectors,
+    PressureTable, Timing, TractionTable, Vectors,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 

@@ -184,7 +184,14 @@ impl Writer {
         if !selection.is_empty() {
             self.line(selection);
         }
-        self.action(condition.action);
+        if !condition.values.is_empty() {
+            let mut data = vec![[0.0; 3]; whole];
+            for (&node, value) in condition.nodes.iter().zip(&condition.values) {
+                data[node as usize] = *value;
+            }
+            mesh.point_data.insert(set.clone(), DataArray { components: 3, values: data.concat() });
+        }
+        self.action(&condition, &set);
         if !matches!(condition.action, Action::Fix(_)) {
             self.curve(condition.shape, &condition.action);
         }
@@ -200,7 +207,7 @@ impl Writer {
         whole: usize,
         mesh: &mut Mesh,
     ) -> Option<String> {
-        if matches!(condition.action, Action::Gravity(_)) {
+        if matches!(condition.action, Action::Gravity(_)) && condition.nodes.len() == whole {
             return Some(String::new());
         }
         if condition.faces.is_empty() {
@@ -222,9 +229,12 @@ impl Writer {
         }
     }
 
-    fn action(&mut self, action: Action) {
-        let vector = |v: [f64; 3]| format!("{v:?}");
-        match action {
+    fn action(&mut self, condition: &Condition, set: &str) {
+        let vector = |v: [f64; 3]| match condition.values.is_empty() {
+            true => format!("{v:?}"),
+            false => format!("{{ point-data = \"{set}\" }}"),
+        };
+        match condition.action {
             Action::Fix(held) => self.components(held),
             Action::Move(by) => {
                 self.components(by.map(|by| by.is_some()));
