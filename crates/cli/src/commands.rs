@@ -13,6 +13,7 @@ use serde_json::{Map, Value as Json, json};
 
 use crate::arguments::{Check, Command, Info, Overrides, Precision, Run};
 use crate::report::{self, Bar, Failure, say};
+use crate::reproduce::reproduce;
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
@@ -29,6 +30,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         }
         Command::Info(arguments) => info(&arguments),
         Command::Import { model, out } => import(&model, &out),
+        Command::Reproduce(arguments) => reproduce(&arguments),
     }
 }
 
