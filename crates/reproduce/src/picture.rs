@@ -3,10 +3,11 @@
 
 use std::fmt::Write;
 
-use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use pliant_geometry::io::encode_base64;
 use pliant_geometry::{Face, Mesh, Vector3, boundary};
 use pliant_mechanics::tensor::Vector;
+use plotters::style::RGBColor;
+use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 
 use crate::CaseError;
 use crate::case::Figure;
@@ -18,6 +19,8 @@ const BAR: f64 = 62.0;
 /// Pixels of the image per unit of the SVG, and samples per pixel and direction.
 const DENSITY: usize = 2;
 const SAMPLES: usize = 2;
+/// Samples per unit of the SVG.
+const FINE: f64 = (DENSITY * SAMPLES) as f64;
 /// Where light comes from, seen by the camera: right, up, towards it.
 const LIGHT: [f64; 3] = [-0.35, 0.65, 0.67];
 
@@ -26,8 +29,8 @@ pub(crate) struct Body<'a> {
     pub label: String,
     pub mesh: &'a Mesh,
     pub displacement: Vec<Vector<f64>>,
-    /// What the colour tells, at the nodes.
-    pub value: Vec<f64>,
+    /// What the colour tells, at the nodes; grey without.
+    pub value: Option<Vec<f64>>,
 }
 
 /// How bodies are looked at.
@@ -106,65 +109,77 @@ pub(crate) fn figure(
     let surfaces: Vec<Vec<Face>> = bodies.iter().map(|body| boundary(body.mesh).faces).collect();
     let shown = || {
         let faces = bodies.iter().zip(&surfaces);
-        faces.flat_map(|(body, faces)| faces.iter().flat_map(|f| f.nodes()).map(|&n| body.value[n as usize]))
+        faces.flat_map(|(body, faces)| {
+            let nodes = faces.iter().flat_map(|face| face.nodes());
+            nodes.filter_map(|&node| body.value.as_ref().map(|value| value[node as usize]))
+        })
     };
     let scale = [shown().fold(f64::INFINITY, f64::min), shown().fold(f64::NEG_INFINITY, f64::max)];
     let columns = view.columns.min(bodies.len());
     let cell = camera.height + LABEL;
-    let (width, height) =
-        (WIDTH * columns as f64, cell * bodies.len().div_ceil(columns) as f64 + BAR);
+    let rows = bodies.len().div_ceil(columns);
+    // A place that no body takes is that of the bar.
+    let free = rows * columns > bodies.len();
+    let (width, height) = (WIDTH * columns as f64, cell * rows as f64 + if free { 0.0 } else { BAR });
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" \
          font-family=\"sans-serif\" font-size=\"16\" fill=\"#222\">\n"
     );
     for (index, (body, [rest, now])) in bodies.iter().zip(&places).enumerate() {
         let (x, y) = ((index % columns) as f64 * WIDTH, (index / columns) as f64 * cell);
-        let image = paint(&surfaces[index], now, &body.value, scale, &camera, view.edges)?;
+        let (faces, value) = (&surfaces[index], body.value.as_deref());
+        let image = png(&paint(faces, now, value, scale, &camera, view.edges))?;
+        let cover = paint(faces, rest, None, scale, &camera, false);
         let (middle, base) = (0.5 * WIDTH, camera.height + 20.0);
         // Writing to a string cannot fail.
         let _ = write!(
             svg,
             "<g transform=\"translate({x:.1} {y:.1})\"><image width=\"{WIDTH}\" height=\"{:.1}\" href=\"{image}\"/>\
-             <path d=\"{}\" fill=\"none\" stroke=\"#555\" stroke-width=\"1.2\" stroke-dasharray=\"5 4\"/>\
+             <path d=\"{}\" fill=\"none\" stroke=\"#d1495b\" stroke-width=\"1.3\" stroke-linecap=\"round\"/>\
              <text x=\"{middle}\" y=\"{base:.1}\" text-anchor=\"middle\">{}</text></g>\n",
             camera.height,
-            outline(&surfaces[index], rest, &camera),
+            outline(faces, rest, &camera, &cover),
             body.label,
         );
     }
-    svg.push_str(&bar(view, scale.map(|value| value * view.factor), width, height - BAR));
+    let scale = scale.map(|value| value * view.factor);
+    if free {
+        svg.push_str(&bar(view, scale, [width - WIDTH, height - 0.5 * (cell + BAR), WIDTH]));
+    } else {
+        svg.push_str(&bar(view, scale, [0.0, height - BAR, width]));
+    }
     svg.push_str("</svg>\n");
     Ok(Figure { svg, caption: caption.into() })
 }
 
-/// The edges at which a surface turns away from the camera, and its creases, as an SVG path.
-fn outline(faces: &[Face], points: &[Vector3], camera: &Camera) -> String {
-    let mut edges: Vec<([u32; 2], Vector3)> = Vec::new();
+/// The edges at which a surface turns away from the camera with nothing of it on one side, as an SVG path.
+fn outline(faces: &[Face], points: &[Vector3], camera: &Camera, cover: &Samples) -> String {
+    let mut edges: Vec<([u32; 2], bool)> = Vec::new();
     for face in faces {
-        let (nodes, normal) = (face.nodes(), camera.turn(&face.normal(points)));
+        let (nodes, seen) = (face.nodes(), camera.turn(&face.vector_area(points)).z > 0.0);
         for (at, &a) in nodes.iter().enumerate() {
             let b = nodes[(at + 1) % nodes.len()];
-            edges.push(([a.min(b), a.max(b)], normal));
+            edges.push(([a.min(b), a.max(b)], seen));
         }
     }
-    edges.sort_unstable_by_key(|(edge, _)| *edge);
+    edges.sort_unstable();
     let mut path = String::new();
     for pair in edges.chunk_by(|a, b| a.0 == b.0) {
-        let [(edge, n), (_, m)] = pair else { continue };
-        if (n.z > 0.0) != (m.z > 0.0) {
-            let [a, b] = edge.map(|node| camera.place(&points[node as usize]));
+        let [(edge, false), (_, true)] = pair else { continue };
+        let [a, b] = edge.map(|node| camera.place(&points[node as usize]));
+        if cover.ends_near(0.5 * (a + b)) {
             let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y);
         }
     }
     path
 }
 
-/// A bar of colours with its ends and its middle.
-fn bar(view: &View<'_>, [low, high]: [f64; 2], width: f64, top: f64) -> String {
-    let (left, length) = (0.2 * width, 0.6 * width);
+/// A bar of colours with its ends and its middle, from a corner on and as wide as told.
+fn bar(view: &View<'_>, [low, high]: [f64; 2], [corner, top, width]: [f64; 3]) -> String {
+    let (left, length) = (corner + 0.15 * width, 0.7 * width);
     let mut svg = String::from("<defs><linearGradient id=\"viridis\">");
     for stop in 0..=10 {
-        let RGB(r, g, b) = colour(f64::from(stop) / 10.0);
+        let [r, g, b] = colour(f64::from(stop) / 10.0);
         let _ = write!(svg, "<stop offset=\"{}%\" stop-color=\"rgb({r},{g},{b})\"/>", 10 * stop);
     }
     let _ = write!(
@@ -179,7 +194,7 @@ fn bar(view: &View<'_>, [low, high]: [f64; 2], width: f64, top: f64) -> String {
     for part in [0.0, 0.5, 1.0] {
         text(left + part * length, top + 37.0, &short(low + part * (high - low)));
     }
-    text(0.5 * width, top + 56.0, view.quantity);
+    text(corner + 0.5 * width, top + 56.0, view.quantity);
     svg
 }
 
@@ -189,12 +204,10 @@ fn short(value: f64) -> String {
     if value.abs() < 1e-9 { "0".into() } else { format!("{value:.digits$}") }
 }
 
-struct RGB(u8, u8, u8);
-
-/// Viridis from 0 to 1.
-fn colour(part: f64) -> RGB {
-    let plotters::style::RGBColor(r, g, b) = ViridisRGB.get_color(part.clamp(0.0, 1.0));
-    RGB(r, g, b)
+/// Viridis from 0 to 1: red, green and blue up to 255.
+fn colour(part: f64) -> [f64; 3] {
+    let RGBColor(r, g, b) = ViridisRGB.get_color(part.clamp(0.0, 1.0));
+    [r, g, b].map(f64::from)
 }
 
 /// What one sample sees.
@@ -204,50 +217,77 @@ struct Sample {
     colour: [f64; 3],
 }
 
-/// The surface as a data URI of a PNG.
+/// An image before it is reduced to pixels.
+struct Samples {
+    columns: usize,
+    rows: usize,
+    all: Vec<Sample>,
+}
+
+impl Samples {
+    fn new(camera: &Camera) -> Self {
+        let count = |length: f64| (length * DENSITY as f64).ceil() as usize * SAMPLES;
+        let (columns, rows) = (count(WIDTH), count(camera.height));
+        let nothing = Sample { depth: f64::NEG_INFINITY, colour: [255.0; 3] };
+        Self { columns, rows, all: vec![nothing; columns * rows] }
+    }
+
+    /// Whether nothing is painted close to a place of the SVG.
+    fn ends_near(&self, place: Vector3) -> bool {
+        let near = 2.0 * FINE;
+        let (x, y) = (place.x * FINE, place.y * FINE);
+        [(-near, 0.0), (near, 0.0), (0.0, -near), (0.0, near)].into_iter().any(|(dx, dy)| {
+            let (column, row) = ((x + dx).max(0.0) as usize, (y + dy).max(0.0) as usize);
+            let at = row.min(self.rows - 1) * self.columns + column.min(self.columns - 1);
+            self.all[at].depth == f64::NEG_INFINITY
+        })
+    }
+}
+
+/// The surface; grey without a value.
 fn paint(
     faces: &[Face],
     points: &[Vector3],
-    value: &[f64],
+    value: Option<&[f64]>,
     scale: [f64; 2],
     camera: &Camera,
     edges: bool,
-) -> Result<String, CaseError> {
-    let finest = (DENSITY * SAMPLES) as f64;
-    let size = [WIDTH, camera.height].map(|length| (length * DENSITY as f64).ceil() as usize);
-    let (columns, rows) = (size[0] * SAMPLES, size[1] * SAMPLES);
-    let mut samples = vec![Sample { depth: f64::NEG_INFINITY, colour: [255.0; 3] }; columns * rows];
-    let normals = node_normals(faces, points);
-    for (face, corners) in faces.iter().zip(&normals) {
+) -> Samples {
+    let mut samples = Samples::new(camera);
+    let normals = corner_normals(faces, points);
+    for (face, normals) in faces.iter().zip(&normals) {
         let nodes = face.nodes();
         let at = |k: usize| {
             let place = camera.place(&points[nodes[k] as usize]);
-            Vector3::new(place.x * finest, place.y * finest, place.z)
+            Vector3::new(place.x * FINE, place.y * FINE, place.z)
         };
-        let part = |k: usize| (value[nodes[k] as usize] - scale[0]) / (scale[1] - scale[0]);
+        let colour = |k: usize| match value {
+            Some(value) => colour((value[nodes[k] as usize] - scale[0]) / (scale[1] - scale[0])),
+            None => [205.0, 208.0, 212.0],
+        };
         let light = |k: usize| {
-            let normal = camera.turn(&corners[k]);
-            0.45 + 0.55 * normal.dot(&Vector3::from(LIGHT)).max(0.0)
+            let normal = camera.turn(&normals[k]);
+            0.55 + 0.45 * normal.dot(&Vector3::from(LIGHT)).max(0.0)
         };
         for k in 1..nodes.len() - 1 {
-            // Sides of the triangle that are edges of the face, each opposite to a corner.
+            // Which sides of the triangle, each opposite to a corner, are edges of the face.
             let drawn = [true, k + 2 == nodes.len(), k == 1];
             let corners = [0, k, k + 1];
             let triangle = Triangle {
                 corners: corners.map(at),
-                part: corners.map(part),
+                colour: corners.map(colour),
                 light: corners.map(light),
                 edges: drawn.map(|side| side && edges),
             };
-            triangle.paint(&mut samples, columns, rows, finest);
+            triangle.paint(&mut samples);
         }
     }
-    png(&samples, size)
+    samples
 }
 
 /// A normal for every corner of every face: the mean of those of the faces around the node that are not across a
-/// crease of more than forty degrees.
-fn node_normals(faces: &[Face], points: &[Vector3]) -> Vec<Vec<Vector3>> {
+/// crease of more than sixty degrees.
+fn corner_normals(faces: &[Face], points: &[Vector3]) -> Vec<Vec<Vector3>> {
     let mut around = vec![Vec::new(); points.len()];
     for face in faces {
         for &node in face.nodes() {
@@ -255,7 +295,7 @@ fn node_normals(faces: &[Face], points: &[Vector3]) -> Vec<Vec<Vector3>> {
         }
     }
     let corner = |own: &Vector3, node: u32| {
-        let smooth = around[node as usize].iter().filter(|area| area.normalize().dot(own) > 0.77);
+        let smooth = around[node as usize].iter().filter(|area| area.normalize().dot(own) > 0.5);
         smooth.sum::<Vector3>().try_normalize(0.0).unwrap_or(*own)
     };
     (faces.iter())
@@ -269,13 +309,13 @@ fn node_normals(faces: &[Face], points: &[Vector3]) -> Vec<Vec<Vector3>> {
 /// A triangle in samples of the image.
 struct Triangle {
     corners: [Vector3; 3],
-    part: [f64; 3],
+    colour: [[f64; 3]; 3],
     light: [f64; 3],
     edges: [bool; 3],
 }
 
 impl Triangle {
-    fn paint(&self, samples: &mut [Sample], columns: usize, rows: usize, finest: f64) {
+    fn paint(&self, samples: &mut Samples) {
         let [a, b, c] = self.corners;
         let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
         // Turned away: down is positive in an image.
@@ -288,41 +328,46 @@ impl Triangle {
             let high = ends.into_iter().fold(0.0, f64::max).ceil().min(count as f64);
             low as usize..high as usize
         };
+        let sides = [[b, c], [c, a], [a, b]];
         // Height of the triangle over each side, to measure the distance from the side in samples.
-        let height = [[b, c], [c, a], [a, b]].map(|[p, q]| area.abs() / (q - p).xy().norm());
-        let columns_in = span(|p| p.x, columns);
-        for row in span(|p| p.y, rows) {
-            for column in columns_in.clone() {
+        let height = sides.map(|[p, q]| area.abs() / (q - p).xy().norm());
+        let columns = span(|p| p.x, samples.columns);
+        for row in span(|p| p.y, samples.rows) {
+            for column in columns.clone() {
                 let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
-                let weight = [[b, c], [c, a], [a, b]]
-                    .map(|[p, q]| ((q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x)) / area);
+                let weight =
+                    sides.map(|[p, q]| ((q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x)) / area);
                 if weight.iter().any(|&w| w < 0.0) {
                     continue;
                 }
                 let mix = |values: [f64; 3]| (0..3).map(|k| weight[k] * values[k]).sum::<f64>();
                 let depth = mix([a.z, b.z, c.z]);
-                let sample = &mut samples[row * columns + column];
+                let sample = &mut samples.all[row * samples.columns + column];
                 if depth <= sample.depth {
                     continue;
                 }
-                let near = (0..3).any(|k| self.edges[k] && weight[k] * height[k] < 0.35 * finest / 2.0);
-                let light = mix(self.light) * if near { 0.55 } else { 1.0 };
-                let RGB(r, g, b) = colour(mix(self.part));
-                *sample = Sample { depth, colour: [r, g, b].map(|c| f64::from(c) * light) };
+                let near = (0..3).any(|k| self.edges[k] && weight[k] * height[k] < 0.2 * FINE);
+                let light = mix(self.light);
+                let colour = [0, 1, 2].map(|channel| {
+                    let shaded = light * mix(self.colour.map(|colour| colour[channel]));
+                    // Edges show on bright and on dark faces alike.
+                    if near { 0.65 * shaded + 0.35 * 100.0 } else { shaded }
+                });
+                *sample = Sample { depth, colour };
             }
         }
     }
 }
 
 /// The mean of the samples of each pixel, as a data URI.
-fn png(samples: &[Sample], [width, height]: [usize; 2]) -> Result<String, CaseError> {
-    let columns = width * SAMPLES;
+fn png(samples: &Samples) -> Result<String, CaseError> {
+    let (width, height) = (samples.columns / SAMPLES, samples.rows / SAMPLES);
     let mut pixels = Vec::with_capacity(3 * width * height);
     for row in 0..height {
         for column in 0..width {
             let inside = (0..SAMPLES * SAMPLES).map(|k| {
                 let (i, j) = (row * SAMPLES + k / SAMPLES, column * SAMPLES + k % SAMPLES);
-                samples[i * columns + j].colour
+                samples.all[i * samples.columns + j].colour
             });
             let sum = inside.fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
             pixels.extend(sum.map(|c| (c / (SAMPLES * SAMPLES) as f64).round().clamp(0.0, 255.0) as u8));

@@ -10,9 +10,11 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use crate::CaseError;
 use crate::case::Figure;
 
+/// Units of the drawing per unit on the page: the drawing library rounds to whole ones, which would make curves rough.
+const FINE: i32 = 8;
 /// Size of a plot. Two stand side by side on a page, one over the other on a telephone.
-const SIZE: (u32, u32) = (560, 420);
-const FONT: (&str, u32) = ("sans-serif", 16);
+const SIZE: (u32, u32) = (560 * FINE as u32, 420 * FINE as u32);
+const FONT: (&str, i32) = ("sans-serif", 16 * FINE);
 /// Colours that colour-blind eyes tell apart (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
@@ -97,7 +99,9 @@ impl Plot<'_> {
         chart
             .configure_mesh()
             .light_line_style(WHITE)
-            .bold_line_style(BLACK.mix(0.08))
+            .bold_line_style(BLACK.mix(0.12).stroke_width(FINE as u32))
+            .axis_style(BLACK.stroke_width(FINE as u32))
+            .set_all_tick_mark_size(5 * FINE)
             .x_desc(self.axes[0])
             .y_desc(self.axes[1])
             .x_label_formatter(&label)
@@ -108,12 +112,12 @@ impl Plot<'_> {
             .draw()
             .map_err(|error| error.to_string())?;
         for curve in self.curves {
-            let colour = COLOURS[curve.colour % COLOURS.len()];
+            let style = COLOURS[curve.colour % COLOURS.len()].stroke_width(2 * FINE as u32);
             let points = curve.points.iter().copied();
             let drawn = match curve.pen {
-                Pen::Markers => chart.draw_series(points.map(|p| Circle::new(p, 4, colour.stroke_width(2)))),
-                Pen::Line => chart.draw_series(LineSeries::new(points, colour.stroke_width(2))),
-                Pen::Dashes => chart.draw_series(DashedLineSeries::new(points, 6, 5, colour.stroke_width(2))),
+                Pen::Markers => chart.draw_series(points.map(|p| Circle::new(p, 4 * FINE, style))),
+                Pen::Line => chart.draw_series(LineSeries::new(points, style)),
+                Pen::Dashes => chart.draw_series(DashedLineSeries::new(points, 6 * FINE, 5 * FINE, style)),
             };
             let drawn = drawn.map_err(|error| error.to_string())?;
             if curve.name.is_empty() {
@@ -121,9 +125,9 @@ impl Plot<'_> {
             }
             let pen = curve.pen;
             drawn.label(&curve.name).legend(move |(x, y)| match pen {
-                Pen::Markers => Circle::new((x + 10, y), 4, colour.stroke_width(2)).into_dyn(),
+                Pen::Markers => Circle::new((x + 10 * FINE, y), 4 * FINE, style).into_dyn(),
                 Pen::Line | Pen::Dashes => {
-                    PathElement::new([(x, y), (x + 20, y)], colour.stroke_width(2)).into_dyn()
+                    PathElement::new([(x, y), (x + 20 * FINE, y)], style).into_dyn()
                 }
             });
         }
@@ -133,6 +137,8 @@ impl Plot<'_> {
                 .position(self.key.clone())
                 .background_style(WHITE.mix(0.85))
                 .border_style(TRANSPARENT)
+                .legend_area_size(28 * FINE)
+                .margin(6 * FINE)
                 .label_font(FONT)
                 .draw()
                 .map_err(|error| error.to_string())?;
@@ -155,8 +161,8 @@ pub(crate) fn bars(
         let mut chart = ChartBuilder::on(area);
         layout(&mut chart, title);
         let mut chart = chart
-            .y_label_area_size(100)
-            .build_cartesian_2d(range.start - margin..range.end + margin, (0..count).into_segmented())?;
+            .y_label_area_size(100 * FINE)
+            .build_cartesian_2d(range.start - margin..range.end + margin, (0..count - 1).into_segmented())?;
         let name = |row: &SegmentValue<usize>| match row {
             SegmentValue::CenterOf(row) if *row < count => bars[count - 1 - row].0.to_owned(),
             _ => String::new(),
@@ -165,10 +171,12 @@ pub(crate) fn bars(
             .configure_mesh()
             .disable_y_mesh()
             .light_line_style(WHITE)
-            .bold_line_style(BLACK.mix(0.08))
+            .bold_line_style(BLACK.mix(0.12).stroke_width(FINE as u32))
+            .axis_style(BLACK.stroke_width(FINE as u32))
+            .set_all_tick_mark_size(5 * FINE)
             .x_desc(axis)
             .y_label_formatter(&name)
-            .y_labels(count + 1)
+            .y_labels(count)
             .x_label_formatter(&label)
             .label_style(FONT)
             .axis_desc_style(FONT)
@@ -176,18 +184,18 @@ pub(crate) fn bars(
         for (row, &(_, value)) in bars.iter().rev().enumerate() {
             let ends = [(0.0, SegmentValue::Exact(row)), (value, SegmentValue::Exact(row + 1))];
             let mut bar = Rectangle::new(ends, COLOURS[0].filled());
-            bar.set_margin(7, 7, 0, 0);
+            bar.set_margin(9 * FINE as u32, 9 * FINE as u32, 0, 0);
             chart.draw_series([bar])?;
             let side = if value < 0.0 { HPos::Right } else { HPos::Left };
             let style = TextStyle::from(FONT.into_font()).pos(Pos::new(side, VPos::Center));
-            let gap = if value < 0.0 { -6 } else { 6 };
+            let gap = if value < 0.0 { -6 * FINE } else { 6 * FINE };
             let place = EmptyElement::at((value, SegmentValue::CenterOf(row)))
-                + Text::new(format!("{value:+.1}"), (gap, 0), style);
+                + Text::new(format!("{value:+.1}").replace('-', "−"), (gap, 0), style);
             chart.draw_series([place])?;
         }
         chart.draw_series([PathElement::new(
             [(0.0, SegmentValue::Exact(0)), (0.0, SegmentValue::Exact(count))],
-            BLACK,
+            BLACK.stroke_width(FINE as u32),
         )])?;
         Ok(())
     })?;
@@ -215,7 +223,7 @@ fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
 }
 
 fn layout(chart: &mut ChartBuilder<'_, '_, SVGBackend<'_>>, title: &str) {
-    chart.caption(title, ("sans-serif", 19)).margin(10).x_label_area_size(46).y_label_area_size(72);
+    chart.caption(title, ("sans-serif", 19 * FINE)).margin(10 * FINE).x_label_area_size(46 * FINE).y_label_area_size(72 * FINE);
 }
 
 fn drawn(

@@ -113,6 +113,15 @@ fn compute() -> Result<Findings, CaseError> {
     };
     let caption = "Median of nine repeats, interleaved; single precision, all cores.";
     findings.figures.push(plot("Time of a step", "time [ms]", &curves).figure(caption)?);
+    let ratios = [("TIE / NHE", 1, 0), ("TIV / TIE", 3, 1), ("TIV / NHE", 3, 0)].iter().enumerate().flat_map(
+        |(colour, &(name, above, below))| {
+            let points = pairs(&|t| t[above] / t[below]);
+            [Curve::new(name, colour, Pen::Line, points.clone()), Curve::new("", colour, Pen::Markers, points)]
+        },
+    );
+    let ratios: Vec<Curve> = ratios.collect();
+    let figure = Plot { logarithmic: false, ..plot("Ratio of times", "ratio", &ratios) };
+    findings.figures.push(figure.figure("The same times, models against each other.")?);
 
     let [nhe, tie, nhv, tiv] = times.last().copied().unwrap_or([f64::NAN; 4]);
     let per_step = |name: &str| format!("{name}: a step of {} hexahedra", elements[3]);

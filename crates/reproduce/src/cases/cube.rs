@@ -81,7 +81,6 @@ fn compute() -> Result<Findings, CaseError> {
     let (cube, isotropic) = compressed(liver_matrix(), [0.0; 3])?;
     let (_, across) = compressed(liver(), [0.0, 1.0, 0.0])?;
     let (_, oblique) = compressed(liver(), [0.0, diagonal, diagonal])?;
-    let rest = vec![[0.0; 3]; isotropic.len()];
 
     let at = |u: &[Vector<f64>], point: Vector<f64>| u[cube.node_at(point)].map(|u| 1e3 * u);
     let (y_face, z_face) = ([0.05, 0.1, 0.05], [0.05, 0.05, 0.1]);
@@ -109,26 +108,26 @@ fn compute() -> Result<Findings, CaseError> {
 
     let lateral = |u: &[Vector<f64>]| u.iter().map(|u| (u[1] * u[1] + u[2] * u[2]).sqrt()).collect();
     let bodies = [
-        ("(a) at rest", rest),
-        ("(b) no fibres", isotropic),
-        ("(c) fibres along y", across),
-        ("(d) fibres along y = z", oblique),
+        ("(a) at rest", None),
+        ("(b) no fibres", Some(isotropic)),
+        ("(c) fibres along y", Some(across)),
+        ("(d) fibres along y = z", Some(oblique)),
     ]
     .map(|(label, displacement)| Body {
         label: label.into(),
         mesh: &cube.mesh,
-        value: lateral(&displacement),
-        displacement,
+        value: displacement.as_deref().map(lateral),
+        displacement: displacement.unwrap_or_else(|| vec![[0.0; 3]; cube.mesh.points.len()]),
     });
     let view = View {
-        from: [1.0, 0.55, 0.9],
+        from: [0.55, 0.45, 1.0],
         up: [0.0, 1.0, 0.0],
         edges: true,
-        quantity: "lateral displacement √(u_y² + u_z²) [mm]",
+        quantity: "lateral displacement [mm]",
         factor: 1e3,
         columns: 2,
     };
-    let caption = format!("{CELLS}³ hexahedra; y upwards, x to the right and front. Dashed: the outline at rest.");
+    let caption = format!("{CELLS}³ hexahedra; x to the right, y upwards; the platen at the right moved to the left. Red: the outline at rest.");
     findings.figures.push(figure(&bodies, &view, caption)?);
     Ok(findings)
 }

@@ -119,13 +119,13 @@ fn compute() -> Result<Findings, CaseError> {
     findings.rows.push(Row::shown("mean von Mises stress, relaxed over elastic", "", ratio, ""));
 
     let nodes = built.model.node_count();
-    let rest = Stretched { displacement: vec![[0.0; 3]; nodes], stress: vec![0.0; cells.len()], force: 0.0 };
-    let bodies = [("(a) at rest", rest), ("(b) TI", elastic), ("(c) TI + visco at 5 s", relaxed)]
-        .map(|(label, state)| Body {
+    let mesh = &built.bodies[0].mesh;
+    let bodies = [("(a) at rest", None), ("(b) TI", Some(elastic)), ("(c) TI + visco at 5 s", Some(relaxed))]
+        .map(|(label, stretched)| Body {
             label: label.into(),
-            mesh: &built.bodies[0].mesh,
-            displacement: state.displacement,
-            value: at_nodes(cells, nodes, &state.stress),
+            mesh,
+            value: stretched.as_ref().map(|stretched| at_nodes(cells, nodes, &stretched.stress)),
+            displacement: stretched.map_or_else(|| vec![[0.0; 3]; nodes], |stretched| stretched.displacement),
         });
     let view = View {
         from: [0.15, -1.0, 0.35],
@@ -135,7 +135,8 @@ fn compute() -> Result<Findings, CaseError> {
         factor: 1e-3,
         columns: 2,
     };
-    let caption = "Pliant's own liver, 2,516 tetrahedra, pulled by its left lobe. Dashed: the outline at rest.";
+    let caption = "Pliant's own liver, 2,516 tetrahedra, pulled by its left lobe. Red: the outline at rest. \
+                   Stresses of the elements, averaged at the nodes.";
     findings.figures.push(figure(&bodies, &view, caption)?);
     Ok(findings)
 }

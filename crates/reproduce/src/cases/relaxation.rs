@@ -125,6 +125,11 @@ impl Relaxed {
     }
 }
 
+/// Points of a curve that begins at rest.
+fn from_rest(times: &[f64], forces: &[f64]) -> Vec<(f64, f64)> {
+    std::iter::once((0.0, 0.0)).chain(times.iter().copied().zip(forces.iter().copied())).collect()
+}
+
 fn viscoelastic(law: AnyLaw) -> Material {
     Material { law, prony: liver_relaxation(PronyUpdate::Exact), density: 1000.0 }
 }
@@ -135,7 +140,7 @@ fn compute() -> Result<Findings, CaseError> {
     let mut isotropic = f64::NAN;
     for (colour, (model, name)) in [("iso", "no fibres"), ("tiy", "fibres along y")].into_iter().enumerate() {
         let relaxed = Relaxed::new(model)?;
-        let pairs = |force: &[f64]| relaxed.times.iter().copied().zip(force.iter().copied()).collect();
+        let pairs = |force: &[f64]| from_rest(&relaxed.times, force);
         forces.push(Curve::new(name, colour, Pen::Line, pairs(&relaxed.found)));
         forces.push(Curve::new("", colour, Pen::Dashes, pairs(&relaxed.expected)));
         let late = || relaxed.ratios().filter(|(time, ..)| *time >= 0.5);
@@ -158,7 +163,7 @@ fn compute() -> Result<Findings, CaseError> {
     let [times, _] = curve("iso");
     let oblique = force_at(&times, half(&viscoelastic(liver())))?;
     let last = oblique.last().copied().unwrap_or(f64::NAN);
-    forces.push(Curve::new("fibres along y = z", 2, Pen::Line, times.into_iter().zip(oblique).collect()));
+    forces.push(Curve::new("fibres along y = z", 2, Pen::Line, from_rest(&times, &oblique)));
     findings.rows.push(Row::shown("fibres along y = z: F(5 s)", "N", last, "no reference"));
     let quantity = "fibres along y = z: F(5 s) over that without fibres";
     findings.rows.push(Row::shown(quantity, "", last / isotropic, "thesis: larger than 1"));
