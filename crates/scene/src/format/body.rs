@@ -80,7 +80,7 @@ pub enum Element {
     Tet4IanpNiftysim,
     /// Uniform-strain hexahedron with hourglass control.
     Hex8,
-    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight times the cost.
+    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell.
     Hex8Full,
 }
 
@@ -88,6 +88,11 @@ impl Element {
     /// True for tetrahedra.
     pub fn is_tet(self) -> bool {
         matches!(self, Self::Tet4 | Self::Tet4Anp | Self::Tet4Ianp | Self::Tet4IanpNiftysim)
+    }
+
+    /// True if the pressure is an average, so that the law must have a volumetric energy.
+    pub fn averages_pressure(self) -> bool {
+        matches!(self, Self::Tet4Anp | Self::Tet4Ianp | Self::Hex8Full)
     }
 }
 
