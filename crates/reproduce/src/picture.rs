@@ -234,7 +234,7 @@ impl Samples {
 
     /// Whether nothing is painted close to a place of the SVG.
     fn ends_near(&self, place: Vector3) -> bool {
-        let near = 2.0 * FINE;
+        let near = 1.2 * FINE;
         let (x, y) = (place.x * FINE, place.y * FINE);
         [(-near, 0.0), (near, 0.0), (0.0, -near), (0.0, near)].into_iter().any(|(dx, dy)| {
             let (column, row) = ((x + dx).max(0.0) as usize, (y + dy).max(0.0) as usize);
@@ -348,11 +348,14 @@ impl Triangle {
                 }
                 let near = (0..3).any(|k| self.edges[k] && weight[k] * height[k] < 0.2 * FINE);
                 let light = mix(self.light);
-                let colour = [0, 1, 2].map(|channel| {
-                    let shaded = light * mix(self.colour.map(|colour| colour[channel]));
-                    // Edges show on bright and on dark faces alike.
-                    if near { 0.65 * shaded + 0.35 * 100.0 } else { shaded }
-                });
+                let face = [0, 1, 2].map(|channel| light * mix(self.colour.map(|colour| colour[channel])));
+                // Edges show on bright and on dark faces alike.
+                let dark = face.iter().sum::<f64>() < 180.0;
+                let colour = match near {
+                    true if dark => face.map(|c| c + 38.0),
+                    true => face.map(|c| 0.72 * c),
+                    false => face,
+                };
                 *sample = Sample { depth, colour };
             }
         }
