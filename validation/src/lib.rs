@@ -6,6 +6,7 @@ mod random;
 mod reference;
 mod run;
 
+pub use pliant_reproduce::cases::brain_shift;
 pub use pliant_reproduce::{
     Equilibrium, HOURGLASS, Hexes, Specimen, Tets, deformation, elastic, largest, law, liver, liver_relaxation,
     numbers, smooth_step, soft_tissue,

@@ -759,3 +759,76 @@ fn new_does_not_overwrite() {
     assert_eq!(told.code, 2);
     assert!(told.err.contains("cannot be written"), "{}", told.err);
 }
+
+/// [`FROM_FILE`] with nodes moved node by node.
+fn moved_scene(by: &str) -> String {
+    changed(FROM_FILE, "type = \"fix\"", &format!("type = \"move\"\nby = {by}"))
+}
+
+#[test]
+fn a_motion_from_point_data_needs_an_array_of_finite_vectors() {
+    let line = "by = { point-data = \"shift\" }";
+    let scene = moved_scene("{ point-data = \"shift\" }");
+    let of = |data: &str| with_mesh(vtk(&CUBE, &TETS, &format!("POINT_DATA 8\n{data}\n")), &scene);
+    let numbers = |n: usize| "0 ".repeat(n);
+    assert_refused(
+        &with_mesh(vtk(&CUBE, &TETS, ""), &scene),
+        &[line],
+        &["the mesh of `organ` has no point data `shift`", "the mesh has no point data"],
+    );
+    assert_refused(
+        &of(&format!("VECTORS shifts double\n{}", numbers(24))),
+        &[line],
+        &["no point data `shift`", "did you mean `shifts`?"],
+    );
+    assert_refused(
+        &of(&format!("SCALARS shift double 1\nLOOKUP_TABLE default\n{}", numbers(8))),
+        &[line],
+        &["point data `shift` has 1 component, a displacement has 3", "name an array of vectors"],
+    );
+    assert_refused(
+        &of(&format!("VECTORS shift double\n0 0 0 0 nan 0 {}", numbers(18))),
+        &[line],
+        &["point data `shift` is [0.0, NaN, 0.0] at node 1 (counted from 0)", "or select fewer nodes"],
+    );
+    // A built-in shape carries none.
+    let told = Workshop::block("by = [0, 0, 0.001]", line).run(&[]);
+    assert_invalid(&told, &["the mesh of `block` has no point data `shift`"]);
+}
+
+#[test]
+fn a_table_of_motions_is_refused_with_its_line() {
+    let line = "by = { csv = \"motion.csv\" }";
+    let mesh = vtk(&CUBE, &TETS, "");
+    let refused = |table: Option<&str>, says: &[&str]| {
+        let workshop = with_mesh(&mesh, &moved_scene("{ csv = \"motion.csv\" }"));
+        if let Some(table) = table {
+            workshop.write("case/motion.csv", table);
+        }
+        assert_refused(&workshop, &[line], says);
+    };
+    refused(None, &["motion.csv` cannot be read", "relative to the scene file"]);
+    refused(
+        Some("node,x,y,z\n0,0,0\n"),
+        &["motion.csv:2: a row has 4 columns, this one 3", "each row is `node,x,y,z`"],
+    );
+    refused(Some("0,0,inf,0\n"), &["motion.csv:1: `inf` is not a finite number"]);
+    refused(Some("8,0,0,0\n"), &["motion.csv:1: there is no node 8: the mesh has 8 nodes", "subtract 1"]);
+    refused(
+        Some("0,0,0,0\n1,0,0,0\n"),
+        &["no row for node 2 (counted from 0) and for 1 node more", "add a row"],
+    );
+    let both = moved_scene("{ csv = \"motion.csv\", point-data = \"shift\" }");
+    let says = ["`csv`, `point-data` cannot be given together"];
+    assert_refused(
+        &with_mesh(&mesh, &both),
+        &["by = { csv = \"motion.csv\", point-data = \"shift\" }"],
+        &says,
+    );
+    let says = ["`cvs`", "did you mean `csv`?"];
+    assert_refused(
+        &with_mesh(&mesh, &moved_scene("{ cvs = \"m.csv\" }")),
+        &["by = { cvs = \"m.csv\" }"],
+        &says,
+    );
+}

@@ -290,10 +290,11 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
     /// Moves the prescribed components to their places at a time.
     fn prescribe(&self, state: &mut State<R>, time: f64) {
         for (index, constraint) in self.model.constraints.iter().enumerate() {
-            let place = constraint.motion.displacement(time);
-            for &node in &constraint.nodes {
+            let factor = constraint.motion.factor(time);
+            for (at, &node) in constraint.nodes.iter().enumerate() {
+                let amplitude = constraint.motion.amplitude(at);
                 for c in (0..3).filter(|&c| self.owners[node as usize][c] == index as u32) {
-                    state.displacement[node as usize][c] = R::of(place[c]);
+                    state.displacement[node as usize][c] = R::of(amplitude[c] * factor);
                 }
             }
         }

@@ -43,7 +43,7 @@ pub struct Energies {
     pub damping: f64,
     /// Held by hourglass control.
     pub hourglass: f64,
-    /// Work of loads and prescribed motions.
+    /// Work of loads and prescribed motions, and the kinetic energy given at the start.
     pub external: f64,
     /// |kinetic + internal + damping + hourglass − external| over the largest of them so far.
     pub balance: f64,
@@ -154,8 +154,10 @@ pub struct CentralDifference<'m, R> {
     /// α of each node [1/s].
     damping: Vec<R>,
     applied: AppliedForces<'m>,
-    /// Prescribed displacement [m] of each constraint now and after the step.
-    target: Vec<[Vector<f64>; 2]>,
+    /// Amplitude of each prescribed component.
+    amplitude: Vec<Vector<f64>>,
+    /// Factor on the amplitudes of each constraint now and after the step.
+    factor: Vec<[f64; 2]>,
     next: Vec<Vector<R>>,
     reaction: Vec<Vector<R>>,
     sums: Vec<Sums>,
@@ -215,15 +217,17 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 volume * solid.material.law.longitudinal_modulus()
             })
             .sum();
+        let owners = model.constrained_components()?;
         Ok(Self {
             model,
             step,
             forces: InternalForces::new(model, step),
-            owners: model.constrained_components()?,
+            amplitude: model.amplitudes(&owners),
+            owners,
             mass: model.mass.iter().map(|&m| R::of(m)).collect(),
             damping,
             applied: AppliedForces::new(model),
-            target: vec![[[0.0; 3]; 2]; model.constraints.len()],
+            factor: vec![[0.0; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
             reaction: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
@@ -247,7 +251,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         if state.steps == 0 {
             self.start(state);
         }
-        self.set_targets(state.time);
+        self.set_factors(state.time);
         self.pass_over_nodes(state);
         let sums = self.sums.iter().fold(Sums::default(), Sums::merge);
         self.check_state(state, &sums, inverted)?;
@@ -257,15 +261,15 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// Moves to the next instant; [`evaluate`](Self::evaluate) has gone before.
     pub fn advance(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
-        let (owners, target) = (&self.owners, &self.target);
-        (state.displacement.par_iter_mut().zip(&state.increment).zip(owners)).with_min_len(CHUNK).for_each(
-            |((u, du), owner)| {
+        let (owners, amplitude, factor) = (&self.owners, &self.amplitude, &self.factor);
+        (state.displacement.par_iter_mut().zip(&state.increment).zip(owners).zip(amplitude))
+            .with_min_len(CHUNK)
+            .for_each(|(((u, du), owner), amplitude)| {
                 *u = add(*u, *du);
                 for component in (0..3).filter(|&c| owner[c] != FREE) {
-                    u[component] = R::of(target[owner[component] as usize][1][component]);
+                    u[component] = R::of(amplitude[component] * factor[owner[component] as usize][1]);
                 }
-            },
-        );
+            });
         state.work.internal += state.work.pending_internal;
         state.work.external += state.work.pending_external;
         state.steps += 1;
@@ -277,27 +281,30 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         self.balance_floor
     }
 
-    fn set_targets(&mut self, time: f64) {
-        for (target, constraint) in self.target.iter_mut().zip(&self.model.constraints) {
-            *target = [time, time + self.step].map(|t| constraint.motion.displacement(t));
+    fn set_factors(&mut self, time: f64) {
+        for (factor, constraint) in self.factor.iter_mut().zip(&self.model.constraints) {
+            *factor = [time, time + self.step].map(|t| constraint.motion.factor(t));
         }
     }
 
-    /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with v⁰ = 0: the increment before the first step.
+    /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with a⁰ = (R − f)/m − α v⁰: the increment before the first step. A prescribed
+    /// component has no velocity of its own.
     fn start(&self, state: &mut State<R>) {
-        let half = 0.5 * self.step * self.step;
+        let (dt, half) = (self.step, 0.5 * self.step * self.step);
+        state.work.external = 0.0;
         for (node, increment) in state.increment.iter_mut().enumerate() {
             let applied: Vector<R> = self.applied.at(node);
             let internal = self.forces.at(node);
-            for component in 0..3 {
-                increment[component] = if self.owners[node][component] == FREE {
-                    R::of(
-                        -half * (applied[component] - internal[component]).to_f64()
-                            / self.mass[node].to_f64(),
-                    )
-                } else {
-                    R::ZERO
-                };
+            let (m, alpha) = (self.mass[node].to_f64(), self.damping[node].to_f64());
+            let velocity = self.model.initial_velocity.get(node).copied().unwrap_or_default();
+            for c in 0..3 {
+                if self.owners[node][c] != FREE {
+                    increment[c] = R::ZERO;
+                    continue;
+                }
+                let acceleration = (applied[c] - internal[c]).to_f64() / m - alpha * velocity[c];
+                increment[c] = R::of(dt * velocity[c] - half * acceleration);
+                state.work.external += 0.5 * m * velocity[c] * velocity[c];
             }
         }
     }
@@ -335,8 +342,8 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 next[c] =
                     ((R::ONE - a) * before[c] + dt * dt / m * (applied[c] - internal[c])) / (R::ONE + a);
             } else {
-                let [now, then] = self.target[owner[c] as usize];
-                next[c] = R::of(then[c] - now[c]);
+                let [now, then] = self.factor[owner[c] as usize];
+                next[c] = R::of(self.amplitude[node][c] * then - self.amplitude[node][c] * now);
                 let velocity = (before[c] + next[c]) / (R::of(2.0) * dt);
                 let inertia = m * ((next[c] - before[c]) / (dt * dt) + alpha * velocity);
                 reaction[c] = inertia + internal[c] - applied[c];

@@ -1,5 +1,6 @@
 //! The cases, in the order of the page.
 
+pub mod brain_shift;
 pub mod cost;
 pub mod cube;
 pub mod elements;
@@ -18,6 +19,7 @@ pub const CASES: &[Case] = &[
     cost::CASE,
     liver::CASE,
     elements::CASE,
+    brain_shift::CASE,
 ];
 
 /// The thesis's factor 2, which every case with fibres meets.

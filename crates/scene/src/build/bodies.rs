@@ -22,7 +22,9 @@ impl Builder<'_> {
             let path = ["body", name.as_str()];
             let mesh_path = [path[0], path[1], "mesh"];
             let Some(mut made) = self.mesh(&table.mesh, &mesh_path) else { continue };
-            if !self.repair_and_check(&mut made.mesh, &table.mesh, &mesh_path) {
+            let file_nodes = made.mesh.points.len();
+            let file_numbers = self.repair(&mut made.mesh, &table.mesh, &mesh_path);
+            if !self.check_mesh(&made.mesh, &table.mesh, &mesh_path) {
                 continue;
             }
             self.add_body(name, table, &made.mesh);
@@ -32,6 +34,8 @@ impl Builder<'_> {
                 mesh: made.mesh,
                 origin: made.origin,
                 boundary,
+                file_nodes,
+                file_numbers,
             });
         }
         self.check_unused_laws();

@@ -5,7 +5,7 @@ use pliant_mechanics::model::{Constraint, Motion};
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
-use crate::format::{Axis, MoveTable};
+use crate::format::{Axis, Displacement, MoveTable};
 use crate::registry::{ConstraintTable, LoadTable};
 
 impl Builder<'_> {
@@ -17,13 +17,13 @@ impl Builder<'_> {
                 ConstraintTable::Fix(fix) => (&fix.body, &fix.nodes, &fix.components),
                 ConstraintTable::Move(moved) => (&moved.body, &moved.nodes, &moved.components),
             };
-            let motion = match table {
-                ConstraintTable::Fix(_) => Some(Motion::Fixed),
-                ConstraintTable::Move(moved) => self.motion(moved, &path),
-            };
             let components = self.components(axes.as_deref(), &path);
             let body = self.find_body(body, &[path[0], path[1], "body"]);
             let nodes = body.and_then(|body| self.body_nodes(body, selection, &[path[0], path[1], "nodes"]));
+            let motion = match table {
+                ConstraintTable::Fix(_) => Some(Motion::Fixed),
+                ConstraintTable::Move(moved) => self.motion(moved, body.zip(nodes.as_deref()), &path),
+            };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
                 self.model.constraints.push(Constraint { name: name.clone(), nodes, components, motion });
             }
@@ -40,10 +40,16 @@ impl Builder<'_> {
         }
     }
 
-    fn motion(&mut self, table: &MoveTable, path: &[&str]) -> Option<Motion> {
+    /// The motion of some nodes of a body (`None`: they are not known, which has been told).
+    fn motion(&mut self, table: &MoveTable, nodes: Option<(usize, &[u32])>, path: &[&str]) -> Option<Motion> {
         let curve = self.curve(&table.timing, path);
-        match (table.by, table.velocity) {
-            (Some(by), None) => Some(Motion::Displacement(by, curve?)),
+        match (&table.by, table.velocity) {
+            (Some(Displacement::Uniform(by)), None) => Some(Motion::Displacement(*by, curve?)),
+            (Some(Displacement::PerNode(by)), None) => {
+                let (body, nodes) = nodes?;
+                let by = self.node_vectors(by, body, nodes, &[path, &["by"]].concat());
+                Some(Motion::Displacements(by?, curve?))
+            }
             (None, Some(velocity)) => Some(Motion::Velocity(velocity, curve?)),
             (by, _) => {
                 let found = if by.is_some() { "both" } else { "neither" };

@@ -1,5 +1,7 @@
 //! Constraints and loads.
 
+use std::path::PathBuf;
+
 use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -70,9 +72,9 @@ pub struct MoveTable {
     pub body: String,
     /// Which nodes.
     pub nodes: Selection,
-    /// Displacement [m], reached along the curve.
+    /// Displacement [m], reached along the curve: one for all nodes, or one for each node from a file.
     #[serde(default)]
-    pub by: Option<[f64; 3]>,
+    pub by: Option<Displacement>,
     /// Velocity [m/s], multiplied by the curve.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
@@ -82,6 +84,43 @@ pub struct MoveTable {
     /// Its course.
     #[serde(flatten)]
     pub timing: Timing,
+}
+
+/// A displacement of nodes.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Displacement {
+    /// The same for all nodes [m].
+    Uniform([f64; 3]),
+    /// One for each node.
+    PerNode(NodeVectors),
+}
+
+/// Displacements node by node: `{ point-data = "shift" }` or `{ csv = "motion.csv" }`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct NodeVectors {
+    /// Where they come from.
+    #[serde(flatten)]
+    pub from: NodeVectorSource,
+    /// Factor on them: the size of one unit of the data in metres (0.001 for millimetres).
+    #[serde(default = "one")]
+    pub scale: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Where vectors on nodes come from.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NodeVectorSource {
+    /// The name of a point-data array of three components in the body's mesh file.
+    PointData(String),
+    /// A file beside the scene with a row `node,x,y,z` for each node that moves, with or without a header; nodes counted
+    /// from 0 in the order of the mesh file.
+    Csv(PathBuf),
 }
 
 /// Forces on nodes: exactly one of `each` and `total`. Curve: `smooth-step` if not given.

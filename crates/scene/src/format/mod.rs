@@ -10,7 +10,8 @@ pub use body::{
 };
 pub use body::{SurfaceTable, TubeShape};
 pub use load::{
-    Axis, CurveShape, FixTable, ForceTable, GravityTable, MoveTable, PressureTable, Timing, TractionTable,
+    Axis, CurveShape, Displacement, FixTable, ForceTable, GravityTable, MoveTable, NodeVectorSource,
+    NodeVectors, PressureTable, Timing, TractionTable,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 
