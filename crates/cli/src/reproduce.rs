@@ -61,11 +61,17 @@ fn list() -> String {
 /// A Markdown file with the two marks in it.
 fn read_page(path: &Path) -> Result<String, Failure> {
     let page = fs::read_to_string(path).map_err(|error| {
-        Failure::plain(format!("`{}` cannot be read: {error}", path.display()), "check the name after `--table`")
+        Failure::plain(
+            format!("`{}` cannot be read: {error}", path.display()),
+            "check the name after `--table`",
+        )
     })?;
     if replace_table(&page, "").is_none() {
         let message = format!("`{}` has no place for the table", path.display());
-        return Err(Failure::plain(message, format!("put the lines {START} and {END} where it should stand")));
+        return Err(Failure::plain(
+            message,
+            format!("put the lines {START} and {END} where it should stand"),
+        ));
     }
     Ok(page)
 }
@@ -95,7 +101,8 @@ fn compute(cases: &[&'static Case]) -> Report {
 fn verdict(report: &Report) -> String {
     let mut lines: Vec<String> = (report.rows().filter(|row| row.pass == Some(false)))
         .map(|row| {
-            let number = |value: Option<f64>| value.map_or_else(|| "nothing".to_owned(), |v| format!("{v:.6e}"));
+            let number =
+                |value: Option<f64>| value.map_or_else(|| "nothing".to_owned(), |v| format!("{v:.6e}"));
             format!(
                 "failed: {}, {}: {} {} instead of {} ± {}",
                 row.id,

@@ -24,8 +24,7 @@ fn a_case_leaves_a_page_and_its_numbers() {
     assert_eq!((rows.len(), results["failed"].as_u64()), (16, Some(0)));
     for row in rows {
         let keys: Vec<&str> = row.as_object().unwrap().keys().map(String::as_str).collect();
-        let promised =
-            ["id", "quantity", "unit", "reference", "computed", "tolerance", "pass", "source"];
+        let promised = ["id", "quantity", "unit", "reference", "computed", "tolerance", "pass", "source"];
         assert_eq!(keys, promised);
         assert_eq!(row["pass"], true, "{row}");
         let number = |key: &str| row[key].as_f64().unwrap();

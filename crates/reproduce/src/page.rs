@@ -1,7 +1,7 @@
 //! The page of a reproduction: one HTML file that needs nothing else.
 
 use crate::case::{Case, Correction, Figure, Findings, Row};
-use crate::report::{Report, commit, shown};
+use crate::report::{Report, commit, reference, tolerance};
 
 const STYLE: &str = include_str!("page.css");
 
@@ -13,7 +13,9 @@ pub(crate) fn page(report: &Report) -> String {
     let verdict = if failed == 0 {
         format!("<p class=\"verdict pass\">All {judged} judged numbers are within their tolerance.</p>")
     } else {
-        format!("<p class=\"verdict fail\">{failed} of {judged} judged numbers are outside their tolerance.</p>")
+        format!(
+            "<p class=\"verdict fail\">{failed} of {judged} judged numbers are outside their tolerance.</p>"
+        )
     };
     let machine = &report.machine;
     let built = commit().map_or_else(String::new, |commit| format!(" ({commit})"));
@@ -72,55 +74,46 @@ fn section(case: &Case, findings: &Findings, wall: f64) -> String {
     let rows: String = findings.rows.iter().map(row).collect();
     format!(
         "<section id=\"{}\">\n<h2>{}</h2>\n<p>{}</p>\n{corrected}\
-         <div class=\"figures\">{figures}</div>\n\
-         <div class=\"wide\"><table>\n<thead><tr><th>quantity</th><th>reference</th><th>tolerance</th><th>computed</th><th></th></tr></thead>\n\
-         <tbody>\n{rows}</tbody></table></div>\n\
-         <p class=\"meta\"><code>pliant reproduce --only {}</code>, {wall:.1} s</p>\n</section>\n",
+         <div class=\"pair\"><div class=\"figures\">{figures}</div>\n\
+         <div><table>\n<thead><tr><th>quantity</th><th>reference</th><th>tolerance</th><th>computed</th><th></th></tr></thead>\n\
+         <tbody>\n{rows}</tbody></table>\n\
+         <p class=\"meta\"><code>pliant reproduce --only {}</code>, {wall:.1} s</p></div></div>\n</section>\n",
         case.id,
         escape(case.title),
-        escape(case.shows),
+        prose(case.shows),
         case.id,
     )
 }
 
 fn figure(figure: &Figure) -> String {
-    // Of a plain size, a picture would not follow the width of the page.
     let svg = figure.svg.replacen("<svg ", "<svg role=\"img\" ", 1);
     format!("<figure>{svg}<figcaption>{}</figcaption></figure>\n", escape(&figure.caption))
 }
 
 fn correction(correction: &Correction) -> String {
     let Correction { printed, correct, why } = correction;
-    format!(
-        "<dt>{}</dt><dd><b>{}</b> {}</dd>\n",
-        escape(printed),
-        escape(correct),
-        escape(why)
-    )
+    format!("<dt>{}</dt><dd><b>{}</b> {}</dd>\n", prose(printed), prose(correct), prose(why))
 }
 
 fn row(row: &Row) -> String {
     let unit = if row.unit.is_empty() { String::new() } else { format!(" {}", row.unit) };
     let with_unit = |text: String| if text == "–" { text } else { typeset(&text) + &unit };
-    let source = if row.source.is_empty() {
-        String::new()
-    } else {
-        format!("<small>{}</small>", escape(row.source))
-    };
+    let source =
+        if row.source.is_empty() { String::new() } else { format!("<small>{}</small>", escape(row.source)) };
     let (class, verdict) = match row.pass {
         Some(true) => ("pass", "✓ pass"),
         Some(false) => ("fail", "✗ fail"),
         None => ("none", ""),
     };
     let tolerance = match row.tolerance {
-        Some(_) => format!("± {}", with_unit(shown(row.tolerance))),
+        Some(_) => format!("± {}", with_unit(tolerance(row))),
         None => "–".into(),
     };
     format!(
-        "<tr class=\"{class}\"><td>{}{source}</td><td class=\"number\">{}</td><td class=\"number\">{tolerance}</td>\
-         <td class=\"number\">{}</td><td class=\"verdict\">{verdict}</td></tr>\n",
+        "<tr class=\"{class}\"><td>{}{source}</td><td class=\"number\" data-is=\"reference\">{}</td>\
+         <td class=\"number\" data-is=\"tolerance\">{tolerance}</td><td class=\"number\" data-is=\"computed\">{}</td><td class=\"verdict\">{verdict}</td></tr>\n",
         escape(&row.quantity),
-        with_unit(shown(row.reference)),
+        with_unit(reference(row)),
         with_unit(row.computed_digits()),
     )
 }
@@ -136,6 +129,15 @@ fn typeset(number: &str) -> String {
     }
 }
 
+/// A text with what stands between backticks as code.
+fn prose(text: &str) -> String {
+    let parts = text.split('`').enumerate();
+    let set = |(at, part): (usize, &str)| {
+        if at % 2 == 1 { format!("<code>{}</code>", escape(part)) } else { escape(part) }
+    };
+    parts.map(set).collect()
+}
+
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
@@ -148,6 +150,6 @@ mod tests {
     fn numbers_and_texts_are_set_as_html() {
         assert_eq!(typeset("-2.4e-5"), "−2.4 · 10<sup>−5</sup>");
         assert_eq!(typeset("1e-9"), "10<sup>−9</sup>");
-        assert_eq!(escape("a < b & c"), "a &lt; b &amp; c");
+        assert_eq!(prose("`a < b` & c"), "<code>a &lt; b</code> &amp; c");
     }
 }

@@ -11,6 +11,7 @@ use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 
 use crate::CaseError;
 use crate::case::Figure;
+use crate::report::significant;
 
 /// Width of a picture in the SVG, and height of what stands under it.
 const WIDTH: f64 = 340.0;
@@ -80,11 +81,7 @@ impl Camera {
     /// Right and down in the SVG, and towards the camera in metres.
     fn place(&self, point: &Vector3) -> Vector3 {
         let [x, y, z] = [0, 1, 2].map(|c| self.axes[c].dot(point));
-        Vector3::new(
-            (x - self.corner[0]) * self.scale,
-            self.height - (y - self.corner[1]) * self.scale,
-            z,
-        )
+        Vector3::new((x - self.corner[0]) * self.scale, self.height - (y - self.corner[1]) * self.scale, z)
     }
 
     /// A direction as the camera sees it: right, up, towards it.
@@ -192,16 +189,10 @@ fn bar(view: &View<'_>, [low, high]: [f64; 2], [corner, top, width]: [f64; 3]) -
         let _ = write!(svg, "<text x=\"{x:.0}\" y=\"{y:.0}\" text-anchor=\"middle\">{words}</text>");
     };
     for part in [0.0, 0.5, 1.0] {
-        text(left + part * length, top + 37.0, &short(low + part * (high - low)));
+        text(left + part * length, top + 37.0, &significant(low + part * (high - low), 3));
     }
     text(corner + 0.5 * width, top + 56.0, view.quantity);
     svg
-}
-
-/// Three digits, or a plain 0.
-fn short(value: f64) -> String {
-    let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
-    if value.abs() < 1e-9 { "0".into() } else { format!("{value:.digits$}") }
 }
 
 /// Viridis from 0 to 1: red, green and blue up to 255.
@@ -335,8 +326,7 @@ impl Triangle {
         for row in span(|p| p.y, samples.rows) {
             for column in columns.clone() {
                 let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
-                let weight =
-                    sides.map(|[p, q]| ((q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x)) / area);
+                let weight = sides.map(|[p, q]| ((q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x)) / area);
                 if weight.iter().any(|&w| w < 0.0) {
                     continue;
                 }

@@ -126,9 +126,7 @@ impl Plot<'_> {
             let pen = curve.pen;
             drawn.label(&curve.name).legend(move |(x, y)| match pen {
                 Pen::Markers => Circle::new((x + 10 * FINE, y), 4 * FINE, style).into_dyn(),
-                Pen::Line | Pen::Dashes => {
-                    PathElement::new([(x, y), (x + 20 * FINE, y)], style).into_dyn()
-                }
+                Pen::Line | Pen::Dashes => PathElement::new([(x, y), (x + 20 * FINE, y)], style).into_dyn(),
             });
         }
         if self.curves.iter().any(|curve| !curve.name.is_empty()) {
@@ -223,7 +221,11 @@ fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
 }
 
 fn layout(chart: &mut ChartBuilder<'_, '_, SVGBackend<'_>>, title: &str) {
-    chart.caption(title, ("sans-serif", 19 * FINE)).margin(10 * FINE).x_label_area_size(46 * FINE).y_label_area_size(72 * FINE);
+    chart
+        .caption(title, ("sans-serif", 19 * FINE))
+        .margin(10 * FINE)
+        .x_label_area_size(46 * FINE)
+        .y_label_area_size(72 * FINE);
 }
 
 fn drawn(

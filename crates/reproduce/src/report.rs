@@ -86,8 +86,8 @@ impl Report {
                 "| `{}` | {} | {} | {} | {} | {} |",
                 row.id,
                 quantity.replace('|', "\\|"),
-                shown(row.reference),
-                shown(row.tolerance),
+                reference(row),
+                tolerance(row),
                 row.computed_digits(),
                 verdict(row.pass)
             )
@@ -109,9 +109,23 @@ pub(crate) fn commit() -> Option<&'static str> {
     option_env!("PLIANT_COMMIT")
 }
 
-/// A number as it was given.
-pub(crate) fn shown(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| significant(value, 7))
+/// A reference as it was given.
+pub(crate) fn reference(row: &Row) -> String {
+    shown(row.reference, 7)
+}
+
+/// A tolerance, to three digits.
+pub(crate) fn tolerance(row: &Row) -> String {
+    shown(row.tolerance, 3)
+}
+
+fn shown(value: Option<f64>, digits: usize) -> String {
+    let Some(value) = value else { return "–".to_owned() };
+    let text = significant(value, digits);
+    if text.contains('.') && !text.contains('e') {
+        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    text
 }
 
 /// Yes, no, or nothing to judge by.
@@ -123,19 +137,16 @@ pub(crate) fn verdict(pass: Option<bool>) -> &'static str {
     }
 }
 
-/// A number with a count of significant digits; very small and very large ones with an exponent.
-fn significant(value: f64, digits: usize) -> String {
+/// A number with a count of significant digits, but whole up to a million; beyond, and below a thousandth, with an
+/// exponent.
+pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
     let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
     if (1e-3..1e6).contains(&rounded.abs()) {
         let decimals = digits as i32 - 1 - rounded.abs().log10().floor() as i32;
-        let text = format!("{rounded:.*}", decimals.max(0) as usize);
-        if digits > 4 && text.contains('.') {
-            return text.trim_end_matches('0').trim_end_matches('.').to_owned();
-        }
-        text
+        format!("{value:.*}", decimals.max(0) as usize)
     } else {
         format!("{rounded:e}")
     }
@@ -160,9 +171,10 @@ mod tests {
     #[test]
     fn numbers_have_the_digits_they_deserve() {
         let four = [8.8109, 0.0234, 123456.7, 2.4276e-5, -34.85, 9.99996].map(|x| significant(x, 4));
-        assert_eq!(four, ["8.811", "0.02340", "123500", "2.428e-5", "-34.85", "10.00"]);
-        let given = [8.75, 0.1, 1e-9, 30.0, 2.12].map(|x| shown(Some(x)));
+        assert_eq!(four, ["8.811", "0.02340", "123457", "2.428e-5", "-34.85", "10.00"]);
+        let given = [8.75, 0.1, 1e-9, 30.0, 2.12].map(|x| shown(Some(x), 7));
         assert_eq!(given, ["8.75", "0.1", "1e-9", "30", "2.12"]);
+        assert_eq!(shown(Some(5.272704), 3), "5.27");
     }
 
     #[test]

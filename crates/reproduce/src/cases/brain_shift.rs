@@ -18,11 +18,12 @@ use crate::{Hexes, Specimen, Tets, elastic, largest, law, mesh as read_mesh, num
 pub const CASE: Case = Case {
     id: "brain-shift",
     title: "Brain shift on an ellipsoid",
-    shows: "Not in the thesis, which asks for it (chapter 10: brain needs ν = 0.49, and plain tetrahedra cannot give it). A \
-            brain-sized ellipsoid, held by the skull below, sinks by up to 10 mm where it was opened; what comes out is \
-            where its inside has gone, at 52 points, against a converged solution of quadratic tetrahedra.",
+    shows: "Not in the thesis, which names it as what accuracy is needed for: when a skull is opened, the brain moves before \
+            the surgeon can reach the tumour. A brain-sized ellipsoid at ν = 0.49, held by the skull below, sinks by up to \
+            10 mm where it was opened; what comes out is where its inside has gone, at 52 points, against a converged \
+            solution of quadratic tetrahedra. Plain tetrahedra lock: they are three to six times further off.",
     corrections: &[],
-    seconds: 10.0,
+    seconds: 5.0,
     compute,
 };
 
@@ -245,7 +246,8 @@ fn compute() -> Result<Findings, CaseError> {
     let nodes = averaged.brain.model.node_count();
     let [rms, most] = averaged.off().map(|off| 1e3 * off);
     // 0.09 and 0.26 mm of the prototype at 2041 nodes, and the error of the reference.
-    let quantity = |element: &str, what: &str| format!("{nodes} nodes, {element}: shift inside, {what} deviation");
+    let quantity =
+        |element: &str, what: &str| format!("{nodes} nodes, {element}: shift inside, {what} deviation");
     findings.rows.push(Row::judged(quantity("tet4-anp", "rms"), "mm", [0.0, 0.12], rms, converged));
     findings.rows.push(Row::judged(quantity("tet4-anp", "largest"), "mm", [0.0, 0.35], most, converged));
     let [rms, most] = plain.off().map(|off| 1e3 * off);
@@ -260,13 +262,22 @@ fn compute() -> Result<Findings, CaseError> {
     let pairs = |shifted: &Shifted| {
         shifted.at_points().iter().map(|[u, v]| (1e3 * length(*v), 1e3 * length(*u))).collect()
     };
+    let found: [Vec<(f64, f64)>; 2] = [pairs(&averaged), pairs(&plain)];
+    let end = largest(found.iter().flatten().map(|point| point.0.max(point.1)));
+    let [averaged_points, plain_points] = found;
     let curves = [
-        Curve::new("", 2, Pen::Dashes, vec![(0.0, 0.0), (6.0, 6.0)]),
-        Curve::new("tet4-anp", 0, Pen::Markers, pairs(&averaged)),
-        Curve::new("tet4", 1, Pen::Markers, pairs(&plain)),
+        Curve::new("", 2, Pen::Dashes, vec![(0.0, 0.0), (end, end)]),
+        Curve::new("tet4-anp", 0, Pen::Markers, averaged_points),
+        Curve::new("tet4", 1, Pen::Markers, plain_points),
     ];
     let axes = ["converged |u| [mm]", "here |u| [mm]"];
-    let plot = Plot { title: "Shift at 52 points inside", axes, logarithmic: false, key: Key::UpperLeft, curves: &curves };
+    let plot = Plot {
+        title: "Shift at 52 points inside",
+        axes,
+        logarithmic: false,
+        key: Key::UpperLeft,
+        curves: &curves,
+    };
     findings.figures.push(plot.figure(format!("On the dashed line they are equal. {nodes} nodes."))?);
     let rest = vec![[0.0; 3]; nodes];
     let size = averaged.displacement.iter().map(|&u| length(u)).collect();
@@ -288,6 +299,6 @@ fn compute() -> Result<Findings, CaseError> {
         factor: 1e3,
         columns: 2,
     };
-    findings.figures.push(figure(&bodies, &view, "`tet4-anp`. Red: the outline at rest.")?);
+    findings.figures.push(figure(&bodies, &view, "tet4-anp. Red: the outline at rest.")?);
     Ok(findings)
 }

@@ -38,7 +38,7 @@ pub const DEFORMED: Case = Case {
             why: "1006.71 = 3000/(2 · 1.49) belongs to ν = 0.49. The cube at 20 % below has E = 3000 Pa, ν = 0.45.",
         },
     ],
-    seconds: 20.0,
+    seconds: 10.0,
     compute,
 };
 
@@ -127,7 +127,9 @@ fn compute() -> Result<Findings, CaseError> {
         factor: 1e3,
         columns: 2,
     };
-    let caption = format!("{CELLS}³ hexahedra; x to the right, y upwards; the platen at the right moved to the left. Red: the outline at rest.");
+    let caption = format!(
+        "{CELLS}³ hexahedra; x to the right, y upwards; the platen at the right moved to the left. Red: the outline at rest."
+    );
     findings.figures.push(figure(&bodies, &view, caption)?);
     Ok(findings)
 }

@@ -224,7 +224,8 @@ fn viscoelastic() -> Result<Findings, CaseError> {
         findings.rows.push(Row::deviation(quantity, limit, (found / expected - 1.0).abs(), SOURCE));
     }
     let axes = ["shear γ", "stress S₁₁ [kPa]"];
-    let plot = Plot { title: "S₁₁, rates in 1/s", axes, logarithmic: false, key: Key::UpperLeft, curves: &all };
+    let plot =
+        Plot { title: "S₁₁, rates in 1/s", axes, logarithmic: false, key: Key::UpperLeft, curves: &all };
     findings.figures.push(plot.figure("Lines: analytic. Circles: one element, steps of 0.01 s.")?);
     Ok(findings)
 }

@@ -56,7 +56,8 @@ impl OutputFolder {
         }
         if path.is_dir() {
             let mut entries = fs::read_dir(&path).map_err(failed)?;
-            let filled = entries.any(|entry| !entry.is_ok_and(|entry| own(&entry.file_name().to_string_lossy())));
+            let filled =
+                entries.any(|entry| !entry.is_ok_and(|entry| own(&entry.file_name().to_string_lossy())));
             if filled && !force {
                 let remedy = "add `--force` to replace what an earlier run left there, or choose another with `--out DIR`";
                 return Err(refused("it is not empty", remedy));
