@@ -97,10 +97,18 @@ impl Report {
 }
 
 impl Row {
-    /// The computed number: a deviation with two digits, others with four.
+    /// The computed number: a deviation with two digits, others to a tenth of the tolerance or with four.
     pub(crate) fn computed_digits(&self) -> String {
-        let digits = if self.reference == Some(0.0) { 2 } else { 4 };
-        self.computed.map_or_else(|| "–".to_owned(), |value| significant(value, digits))
+        let Some(value) = self.computed else { return "–".to_owned() };
+        let digits = match (self.reference, self.tolerance) {
+            (Some(0.0), _) => 2,
+            (Some(_), Some(tolerance)) => {
+                let place = |x: f64| x.abs().log10().floor();
+                (place(value) - place(tolerance) + 2.0).clamp(2.0, 7.0) as usize
+            }
+            _ => 4,
+        };
+        significant(value, digits)
     }
 }
 
@@ -175,6 +183,17 @@ mod tests {
         let given = [8.75, 0.1, 1e-9, 30.0, 2.12].map(|x| shown(Some(x), 7));
         assert_eq!(given, ["8.75", "0.1", "1e-9", "30", "2.12"]);
         assert_eq!(shown(Some(5.272704), 3), "5.27");
+    }
+
+    #[test]
+    fn a_computed_number_has_the_digits_by_which_it_is_judged() {
+        let digits = |reference, tolerance, computed| {
+            Row::judged("", "", [reference, tolerance], computed, "").computed_digits()
+        };
+        assert_eq!(digits(8.75, 0.1, 8.83044), "8.83");
+        assert_eq!(digits(-2189.3333333, 2.2e-6, -2189.3333333), "-2189.333");
+        assert_eq!(digits(52.7, 5.27, 50.4834), "50.5");
+        assert_eq!(digits(0.0, 1e-5, 4.6512e-7), "4.7e-7");
     }
 
     #[test]
