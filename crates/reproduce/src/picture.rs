@@ -129,11 +129,11 @@ pub(crate) fn figure(
         let cover = paint(faces, rest, None, scale, &camera, false);
         let (middle, base) = (0.5 * WIDTH, camera.height + 20.0);
         // Writing to a string cannot fail.
-        let _ = write!(
+        let _ = writeln!(
             svg,
             "<g transform=\"translate({x:.1} {y:.1})\"><image width=\"{WIDTH}\" height=\"{:.1}\" href=\"{image}\"/>\
              <path d=\"{}\" fill=\"none\" stroke=\"#d1495b\" stroke-width=\"1.3\" stroke-linecap=\"round\"/>\
-             <text x=\"{middle}\" y=\"{base:.1}\" text-anchor=\"middle\">{}</text></g>\n",
+             <text x=\"{middle}\" y=\"{base:.1}\" text-anchor=\"middle\">{}</text></g>",
             camera.height,
             outline(faces, rest, &camera, &cover),
             body.label,
@@ -374,4 +374,48 @@ fn png(samples: &Samples) -> Result<String, CaseError> {
     let mut uri = b"data:image/png;base64,".to_vec();
     encode_base64(&bytes, &mut uri);
     Ok(uri.into_iter().map(char::from).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
+
+    use super::*;
+
+    fn cube() -> (Mesh, Vec<Face>, Camera) {
+        let block = Block::new([1.0; 3]);
+        let mesh = block.mesh(Resolution::Counts([2; 3]), VolumeCell::Hex, DEFAULT_CELL_LIMIT).unwrap();
+        let view =
+            View { from: [1.0; 3], up: [0.0, 0.0, 1.0], edges: false, quantity: "", factor: 1.0, columns: 1 };
+        let camera = Camera::new(&view, mesh.points.iter().copied());
+        let faces = boundary(&mesh).faces;
+        (mesh, faces, camera)
+    }
+
+    #[test]
+    fn the_nearer_face_hides_the_farther_whatever_their_order() {
+        let (mesh, mut faces, camera) = cube();
+        let value: Vec<f64> = mesh.points.iter().map(|point| point.x + point.y + point.z).collect();
+        let colours = |faces: &[Face]| -> Vec<[f64; 3]> {
+            let samples = paint(faces, &mesh.points, Some(&value), [0.0, 3.0], &camera, false);
+            samples.all.iter().map(|sample| sample.colour).collect()
+        };
+        let seen = colours(&faces);
+        faces.reverse();
+        assert_eq!(seen, colours(&faces));
+        let samples = paint(&faces, &mesh.points, None, [0.0, 1.0], &camera, false);
+        let middle = camera.place(&Vector3::repeat(0.5)) * FINE;
+        let sample = samples.all[middle.y as usize * samples.columns + middle.x as usize];
+        // The corner (1, 1, 1) stands before the centre, at √3 along the view.
+        assert!((sample.depth - 3.0_f64.sqrt()).abs() < 0.01, "{}", sample.depth);
+        assert_eq!(samples.all[0].colour, [255.0; 3], "a corner of the image is empty");
+    }
+
+    #[test]
+    fn a_cube_seen_along_its_diagonal_has_an_outline_of_six_edges() {
+        let (mesh, faces, camera) = cube();
+        let cover = paint(&faces, &mesh.points, None, [0.0, 1.0], &camera, false);
+        // Each of two elements.
+        assert_eq!(outline(&faces, &mesh.points, &camera, &cover).matches('M').count(), 12);
+    }
 }

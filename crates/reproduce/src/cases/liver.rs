@@ -105,13 +105,14 @@ fn compute() -> Result<Findings, CaseError> {
     // 1 %: three seconds after the pull e^(−3/0.58) = 0.6 % of what relaxes is left.
     let source = "elastic equilibrium with half of μ and η, by dynamic relaxation";
     let most = |stretched: &Stretched| largest(stretched.stress.iter().copied());
-    let quantities: [(&str, &str, &dyn Fn(&Stretched) -> f64); 3] = [
-        ("largest von Mises stress", "Pa", &most),
-        ("mean von Mises stress", "Pa", &|stretched| mean(&stretched.stress)),
-        ("force on the lobe", "N", &|stretched| stretched.force),
-    ];
-    for (name, unit, of) in quantities {
-        let [before, after, limit] = [&elastic, &relaxed, &long_after].map(of);
+    let told = |stretched: &Stretched| [most(stretched), mean(&stretched.stress), stretched.force];
+    let [before, after, limit] = [&elastic, &relaxed, &long_after].map(told);
+    for (which, (name, unit)) in
+        [("largest von Mises stress", "Pa"), ("mean von Mises stress", "Pa"), ("force on the lobe", "N")]
+            .into_iter()
+            .enumerate()
+    {
+        let [before, after, limit] = [before, after, limit].map(|numbers| numbers[which]);
         findings.rows.push(Row::shown(format!("TI: {name}"), unit, before, ""));
         findings.rows.push(Row::shown(format!("TI + visco at 5 s: {name}"), unit, after, ""));
         findings.rows.push(Row::shown(format!("{name}, TI + visco over TI"), "", after / before, ""));
