@@ -7,6 +7,7 @@
 //! Runs on the current rayon pool; sums go in the order of the nodes for any number of threads.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::applied::AppliedForces;
@@ -33,7 +34,7 @@ pub const BALANCE_LIMIT: f64 = 0.05;
 pub const BALANCE_STEPS: u32 = 20;
 
 /// Energies at one instant [J].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energies {
     /// ½ Σ m v².
     pub kinetic: f64,

@@ -61,6 +61,18 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(range(max = 1024))]
     pub threads: u32,
+    /// Checkpoints to resume an interrupted run from (`pliant run --resume`); the last two are kept.
+    #[serde(default)]
+    pub checkpoint: Option<CheckpointTable>,
+}
+
+/// When checkpoints are written.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CheckpointTable {
+    /// Simulated time between them [s]; there is one at the end, too.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub every: f64,
 }
 
 fn ten() -> u32 {
