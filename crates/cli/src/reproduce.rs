@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use pliant_reproduce::{CASES, Case, END, Report, START, find, is_own_file, replace_table};
@@ -85,8 +86,9 @@ fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
 fn compute(cases: &[&'static Case]) -> Report {
     let all: f64 = cases.iter().map(|case| case.seconds).sum();
     let bar = ProgressBar::new((10.0 * all).max(1.0) as u64);
-    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}");
+    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {elapsed}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(200));
     let mut before = 0.0;
     let report = Report::new(cases, |case| {
         bar.set_message(format!("{}, about {:.0} s", case.id, case.seconds.max(1.0)));

@@ -83,9 +83,13 @@ fn at_nodes(cells: &Cells, nodes: usize, values: &[f64]) -> Vec<f64> {
     sums.into_iter().map(|[sum, volume]| if volume > 0.0 { sum / volume } else { 0.0 }).collect()
 }
 
-fn compute() -> Result<Findings, CaseError> {
+fn scene() -> Result<Scene, CaseError> {
     let text = include_str!("../../../../scenes/liver/scene.toml");
-    let scene = Scene::from_source(Source::parse("scenes/liver/scene.toml", text)?, ".".into())?;
+    Ok(Scene::from_source(Source::parse("scenes/liver/scene.toml", text)?, ".".into())?)
+}
+
+fn compute() -> Result<Findings, CaseError> {
+    let scene = scene()?;
     let built = pliant_scene::build(&scene)?;
     let plan = pliant_scene::plan(&scene, &built)?;
     let until = scene.scene.until;
@@ -137,8 +141,26 @@ fn compute() -> Result<Findings, CaseError> {
         factor: 1e-3,
         columns: 2,
     };
-    let caption = "Pliant's own liver, 2,516 tetrahedra, pulled by its left lobe. Red: the outline at rest. \
-                   Stresses of the elements, averaged at the nodes.";
+    let caption = format!(
+        "Pliant's own liver, {} tetrahedra, pulled by its left lobe. Red: the outline at rest. Stresses of the elements, \
+         averaged at the nodes.",
+        cells.len()
+    );
     findings.figures.push(figure(&bodies, &view, caption)?);
     Ok(findings)
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_mechanics::prony::PronyUpdate;
+
+    use super::*;
+    use crate::liver_relaxation;
+
+    #[test]
+    fn the_tissue_is_that_of_the_scene_and_half_of_it_relaxes() {
+        let material = pliant_scene::build(&scene().unwrap()).unwrap().model.solids[0].material.clone();
+        assert_eq!(material.law, tissue(1.0));
+        assert_eq!(material.prony, liver_relaxation(PronyUpdate::Exact));
+    }
 }
