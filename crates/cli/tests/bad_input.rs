@@ -144,7 +144,11 @@ fn unknown_types_and_words_get_the_nearest_name() {
 
 #[test]
 fn wrong_types_tell_what_was_expected_and_what_was_found() {
-    spoilt("density = 1000", "density = \"heavy\"", &["expected a number [kg/m³], found the text \"heavy\""]);
+    spoilt(
+        "density = 1000",
+        "density = \"heavy\"",
+        &["expected a number [kg/m³] or a table of numbers, found the text \"heavy\""],
+    );
     spoilt("density = 1000", "density = \"1000\"", &["remove the quotes: 1000"]);
     spoilt("[0, 0, -9.81]", "-9.81", &["expected 3 numbers [m/s²], found -9.81"]);
     spoilt("[0, 0, -9.81]", "[0, -9.81]", &["expected 3 numbers [m/s²], found 2"]);
@@ -341,7 +345,7 @@ fn a_zero_or_not_finite_fibre_of_a_cell_is_told_by_its_number() {
     assert_refused(
         &with_mesh(mesh, &fibre_scene()),
         &[line],
-        &["`fibre` has 1 components, a direction has 3"],
+        &["`fibre` has 1 component, a direction has 3"],
     );
 }
 
@@ -434,7 +438,7 @@ fn laws_by_label_must_fit_the_labels_of_the_mesh() {
     let with_law = |law: &str| changed(FROM_FILE, "law = \"tissue\"", law);
     let two = labels(&[1, 1, 1, 2, 2, 2]);
     let law = "law = { 1 = \"tissue\" }";
-    let missing = "labels without a law: 2 (3 cells)";
+    let missing = "labels without law: 2 (3 cells)";
     assert_refused(&with_mesh(mesh(&two), &with_law(law)), &[law], &[missing, "add `LABEL = \"law\"`"]);
     assert_refused(
         &with_mesh(mesh(""), &with_law(law)),
@@ -831,4 +835,52 @@ fn a_table_of_motions_is_refused_with_its_line() {
         &["by = { cvs = \"m.csv\" }"],
         &says,
     );
+}
+
+#[test]
+fn a_velocity_at_the_start_needs_inertia() {
+    let line = "velocity = [0, 0, 1]";
+    let scene = changed(BLOCK, "damping = 5", line).replace("step = \"auto\"", "solver = \"quasi-static\"");
+    assert_refused(
+        &Workshop::new(&scene),
+        &[line],
+        &["`block` has a velocity, but a quasi-static run has no inertia", "solver = \"explicit\""],
+    );
+    spoilt("damping = 5", "velocity = [0, 1]", &["expected 3 numbers [m/s], found 2"]);
+}
+
+#[test]
+fn densities_by_label_must_fit_the_mesh_and_be_positive() {
+    let mesh = vtk(&CUBE, &TETS, &labels(&[1, 1, 1, 2, 2, 2]));
+    for (key, says) in [
+        ("density = { 1 = 900 }", "labels without density: 2 (3 cells)"),
+        ("density = { 1 = 900, 2 = 900, 3 = 900 }", "no cell of `organ` has label `3`"),
+        ("density = { 1 = 900, 2 = 0 }", "must be greater than 0, found 0"),
+        ("density = 1000\nhourglass = { 1 = 0.1 }", "labels without hourglass: 2 (3 cells)"),
+        ("density = 1000\nhourglass = { 1 = 0.1, 2 = 11 }", "found 11"),
+    ] {
+        let scene = changed(FROM_FILE, "density = 1000", key);
+        assert_refused(&with_mesh(&mesh, &scene), &[key.lines().last().unwrap()], &[says]);
+    }
+}
+
+#[test]
+fn a_rule_for_fibres_that_fails_is_shown_where_it_is_written() {
+    for (rule, says) in [
+        ("{ along = [0, 0, 0] }", "the fibre direction is zero"),
+        ("{ toward = [0, 0] }", "expected 3 numbers"),
+        ("{ around = { point = [0, 0, 0] } }", "missing key `axis`"),
+        (
+            "{ tangential = { surface = { set = \"z-max\" }, closest-to = [0, 0, 1] } }",
+            "where `closest-to` is perpendicular to the surface: tet",
+        ),
+        (
+            "{ tangential = { surface = { set = \"skin\" }, closest-to = [0, 0, 1] } }",
+            "no set is named `skin`",
+        ),
+        ("{ laplace = { from = { set = \"x-min\" }, to = \"all\" } }", "is in `from` and in `to`"),
+        ("{ laplce = 1 }", "unknown key `laplce`"),
+    ] {
+        spoilt("fibre = [0, 1, 0]", &format!("fibre = {rule}"), &[says]);
+    }
 }

@@ -67,7 +67,8 @@ fn json_has_exactly_the_promised_keys() {
 
     let refused = Workshop::block("density = 1000", "density = 0").run(&[]).json();
     assert_eq!(keys(&refused), KEYS);
-    assert_eq!(keys(&refused["error"]), ["kind", "body", "element", "node", "time", "message"]);
+    let error = ["kind", "body", "element", "node", "time", "load_step", "message"];
+    assert_eq!(keys(&refused["error"]), error);
 }
 
 #[test]
@@ -705,7 +706,18 @@ fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
         .replace("by = [0, 0, 0.01]", "by = [0, 0, 0.01]\ncomponents = [\"y\"]");
     let told = Workshop::new(&free).run(&[]);
     assert_eq!(told.code, 1, "{}", told.err);
-    assert!(told.err.contains("no equilibrium"), "{}", told.err);
+    let error = &told.json()["error"];
+    assert_eq!(error["kind"], "not-converged");
+    assert_eq!(keys(&error["load_step"]), ["number", "of", "iterations", "residual"]);
+    assert_eq!(
+        (error["load_step"]["number"].as_u64(), error["load_step"]["of"].as_u64()),
+        (Some(1), Some(10))
+    );
+    assert!(error["load_step"]["residual"].as_f64().unwrap() > 1e-9 && error["node"].is_number(), "{error}");
+    for piece in ["load step 1 of 10: no equilibrium", "largest at node", "iterations", "try more load steps"]
+    {
+        assert!(told.err.contains(piece), "{}", told.err);
+    }
 }
 
 #[test]
@@ -1008,34 +1020,6 @@ fn the_liver_of_sofa_is_pulled_by_one_lobe() {
     assert_eq!(frames[0].1.mesh.points.len(), 507);
 }
 
-#[test]
-fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
-    let model = r#"<Model>
-        <Nodes DOF="3" NumNodes="4">0 0 0  0.1 0 0  0 0.1 0  0 0 0.1</Nodes>
-        <Elements NumEls="1" Type="T4">0 1 2 3</Elements>
-        <ElementSet Size="all"><Material Type="AB">
-            <ElasticParams NumParams="3">1000 3 10000</ElasticParams></Material></ElementSet>
-        <Constraint Type="Fix" DOF="all" NumNodes="3"><Nodes>0 1 2</Nodes></Constraint>
-        <Constraint Type="Disp" DOF="2" NumNodes="1" LoadShape="RAMP">
-            <Nodes>3</Nodes><Magnitudes Type="UNIFORM">0.01</Magnitudes></Constraint>
-        <SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>1</DampingCoeff>
-            <Density>1000</Density></SystemParams></Model>"#;
-    let workshop = Workshop::new("");
-    workshop.write("model.xml", model);
-    let told = workshop.pliant(&["run", "model.xml", "--json"]);
-    let direct = told.done();
-    assert!(told.err.contains("note: "), "{}", told.err);
-    assert!(workshop.path("out/model/fields.pvd").is_file());
-    workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]).words();
-    let scene = workshop.pliant(&["run", "translated.toml", "--json"]).done();
-    assert_eq!(direct["reactions"], scene["reactions"]);
-    let again = workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]);
-    assert!(again.code == 2 && again.err.contains("exists already"), "{}", again.err);
-    workshop.write("broken.xml", &model[..200]);
-    let told = workshop.pliant(&["run", "broken.xml"]);
-    assert!(told.code == 2 && told.err.contains("broken.xml"), "{}", told.err);
-}
-
 /// [`FROM_FILE`] with the upper nodes of the cube moved as `by` says.
 fn moved_node_by_node(by: &str) -> String {
     let nodes = "nodes = { nearest = { point = [0, 0, 0], count = 4 } }";
@@ -1122,4 +1106,147 @@ fn the_brain_below_an_opening_shifts_as_the_reference_says() {
             assert!((last[column] - u).abs() < 0.25e-3, "{probe} {axis}: {} {u}", last[column]);
         }
     }
+}
+
+/// Without damping and loads: u = v t, and the kinetic energy ½ m v² from the first row on.
+#[test]
+fn a_block_that_starts_with_a_velocity_flies_on_with_its_energy() {
+    for precision in ["double", "single"] {
+        let scene = format!(
+            r#"[scene]
+until = 0.05
+[run]
+precision = "{precision}"
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 3e3
+poisson-ratio = 0.4
+[body.block]
+mesh = {{ block = {{ size = [0.1, 0.1, 0.1] }}, edge = 0.05 }}
+law = "tissue"
+density = 1000
+velocity = [1, -2, 0.5]
+[output.history]
+type = "csv"
+every = 0.01
+probes.middle = {{ on = "block", at = [0.05, 0.05, 0.05], data = ["displacement", "velocity"] }}
+"#
+        );
+        let workshop = Workshop::new(&scene);
+        let told = workshop.run(&[]);
+        told.done();
+        assert!(told.err.contains("held by no constraint: it flies on as it started"), "{}", told.err);
+        let (header, rows) = workshop.table("out/case/history.csv");
+        let column = |name: &str| header.iter().position(|own| own == name).unwrap();
+        let slack = if precision == "double" { 1e-12 } else { 1e-5 };
+        assert!(rows.len() >= 6);
+        for row in &rows {
+            for (axis, v) in ["x", "y", "z"].iter().zip([1.0, -2.0, 0.5]) {
+                let at = |what: &str| row[column(&format!("probe.middle.{what}.{axis}"))];
+                assert_close(at("velocity"), v, slack, "velocity");
+                assert_close(at("displacement"), v * row[0], slack, "displacement");
+            }
+            assert_close(row[column("energy.kinetic")], 0.5 * 5.25, 10.0 * slack, "kinetic energy");
+            assert_close(row[column("energy.balance")], 0.0, 10.0 * slack, "balance");
+        }
+    }
+}
+
+/// Under gravity and damping α: v' = g − α v, so that the first steps are right to second order.
+#[test]
+fn damping_slows_what_started_with_a_velocity() {
+    let scene = changed(BLOCK, "damping = 5", "damping = 5\nvelocity = [2, 0, 0]");
+    let free = &scene[..scene.find("[constraint.base]").unwrap()];
+    let output = "[output.history]\ntype = \"csv\"\nevery = 0.001\nprobes.middle = { on = \"block\", at = [0.05, 0.05, \
+                  0.05], data = [\"velocity\"] }\n";
+    let workshop = Workshop::new(&format!("{free}{output}"));
+    workshop.run(&[]).done();
+    let (header, rows) = workshop.table("out/case/history.csv");
+    let column =
+        |axis: &str| header.iter().position(|own| *own == format!("probe.middle.velocity.{axis}")).unwrap();
+    for row in &rows {
+        let decay = (-5.0 * row[0]).exp();
+        // (α Δt)²/12 of a step of a millisecond.
+        assert_close(row[column("x")], 2.0 * decay, 1e-5, "across");
+        assert_close(row[column("z")], -9.81 / 5.0 * (1.0 - decay), 1e-5, "down");
+    }
+}
+
+#[test]
+fn fibres_by_rule_are_written_for_paraview() {
+    let rules = [
+        ("{ toward = [0.05, 0.05, 1] }", [0.0, 0.0, 1.0]),
+        ("{ along = [0, 3, 0] }", [0.0, 1.0, 0.0]),
+        ("{ around = { point = [-9, 0.05, 0.05], axis = [0, 0, 1] } }", [0.0, 1.0, 0.0]),
+        ("{ tangential = { surface = { set = \"z-max\" }, closest-to = [1, 0, 1] } }", [1.0, 0.0, 0.0]),
+        ("{ laplace = { from = { set = \"x-min\" }, to = { set = \"x-max\" } } }", [1.0, 0.0, 0.0]),
+    ];
+    for (rule, expected) in rules {
+        let scene = changed(BLOCK, "fibre = [0, 1, 0]", &format!("fibre = {rule}"))
+            .replace("\"von-mises\"", "\"fibre\", \"fibre-stretch\"");
+        let workshop = Workshop::new(&scene);
+        workshop.run(&["--until", "0.001"]).done();
+        let mesh = workshop.series("out/case/fields.pvd").pop().unwrap().1.mesh;
+        let block = mesh.block(CellKind::Tet).unwrap();
+        for cell in 0..block.len() {
+            let fibre = block.data["fibre"].item(cell);
+            // The rules about a point turn by the size of the block over the distance to the point.
+            assert!((0..3).all(|c| (fibre[c] - expected[c]).abs() < 0.1), "{rule}: {fibre:?}");
+        }
+    }
+}
+
+#[test]
+fn density_and_hourglass_go_by_label() {
+    let brain = r#"[scene]
+until = 1e-3
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 3e3
+poisson-ratio = 0.4
+[body.brain]
+mesh = { organ = "brain", edge = 0.015, as = "hexes" }
+law = "tissue"
+density = 1000
+"#;
+    let mass = |density: &str| {
+        let scene = changed(brain, "density = 1000", density);
+        Workshop::new(&scene).run(&[]).done()["mass"].as_f64().unwrap()
+    };
+    let by_label = "hourglass = { 1 = 0.1, 2 = 0, 3 = 0.3 }\ndensity = { 1 = A, 2 = B, 3 = C }";
+    let of = |a: &str, b: &str, c: &str| mass(&by_label.replace('A', a).replace('B', b).replace('C', c));
+    let whole = mass("density = 1000");
+    let parts = [of("1000", "1", "1"), of("1", "1000", "1"), of("1", "1", "1000")];
+    // Each part weighs its thousand, the rest a thousandth of it.
+    assert_close(of("1000", "1000", "1000"), whole, 1e-9, "mass");
+    assert_close(parts.iter().sum::<f64>(), whole * 1.002, 1e-9, "mass");
+    assert!(parts.iter().all(|part| *part > 0.003), "{parts:?}");
+}
+
+#[test]
+fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
+    let model = r#"<Model>
+        <Nodes DOF="3" NumNodes="4">0 0 0  0.1 0 0  0 0.1 0  0 0 0.1</Nodes>
+        <Elements NumEls="1" Type="T4">0 1 2 3</Elements>
+        <ElementSet Size="all"><Material Type="AB">
+            <ElasticParams NumParams="3">1000 3 10000</ElasticParams></Material></ElementSet>
+        <Constraint Type="Fix" DOF="all" NumNodes="3"><Nodes>0 1 2</Nodes></Constraint>
+        <Constraint Type="Disp" DOF="2" NumNodes="1" LoadShape="RAMP">
+            <Nodes>3</Nodes><Magnitudes Type="UNIFORM">0.01</Magnitudes></Constraint>
+        <SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>1</DampingCoeff>
+            <Density>1000</Density></SystemParams></Model>"#;
+    let workshop = Workshop::new("");
+    workshop.write("model.xml", model);
+    let told = workshop.pliant(&["run", "model.xml", "--json"]);
+    let direct = told.done();
+    assert!(told.err.contains("note: "), "{}", told.err);
+    assert!(workshop.path("out/model/fields.pvd").is_file());
+    workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]).words();
+    let scene = workshop.pliant(&["run", "translated.toml", "--json"]).done();
+    assert_eq!(direct["reactions"], scene["reactions"]);
+    let again = workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]);
+    assert!(again.code == 2 && again.err.contains("exists already"), "{}", again.err);
+    workshop.write("broken.xml", &model[..200]);
+    let told = workshop.pliant(&["run", "broken.xml"]);
+    assert!(told.code == 2 && told.err.contains("broken.xml"), "{}", told.err);
 }

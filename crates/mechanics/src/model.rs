@@ -28,7 +28,7 @@ pub struct Model {
     pub loads: Vec<Load>,
     /// Surfaces carried by bodies.
     pub surfaces: Vec<Surface>,
-    /// Velocities [m/s] of the nodes at time 0, for dynamics; empty if all are at rest.
+    /// Velocities [m/s] of the nodes at time 0, for dynamics; nodes beyond its end are at rest.
     pub initial_velocity: Vec<Vector<f64>>,
 }
 

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::{CellKind, io};
+use pliant_scene::format::{ByLabel, Hourglass};
 use pliant_scene::niftysim::{ImportError, Imported, import};
 use pliant_scene::registry::LoadTable;
 use pliant_scene::source::Source;
@@ -133,7 +134,9 @@ fn hourglass_stiffness_is_scaled_as_niftysim_scales_it() {
     let (scene, _) = build(&imported);
     let (mu, kappa) = (1034.48276, 10_000.0);
     let expected = 0.075 * (kappa + 4.0 / 3.0 * mu) / mu;
-    assert!((scene.bodies[0].1.hourglass - expected).abs() < 1e-12);
+    assert!(
+        matches!(scene.bodies[0].1.hourglass, ByLabel::One(Hourglass(c)) if (c - expected).abs() < 1e-12)
+    );
     assert_note(&imported, "0.075 (λ + 2μ), which is 0.8250 μ");
 }
 
@@ -360,15 +363,21 @@ fn each_label_has_its_law() {
 }
 
 #[test]
-fn different_densities_keep_the_mass_and_are_named() {
+fn each_label_has_its_density_also_within_one_law() {
+    let set = |material: &str, member| format!("<ElementSet Size=\"1\">{material} {member}</ElementSet>");
     let heavy = NEO_HOOKEAN.replace("</Material>", "<Density>3000</Density></Material>");
-    let sets = format!(
-        "<ElementSet Size=\"1\">{NEO_HOOKEAN} 0</ElementSet><ElementSet Size=\"1\">{heavy} 1</ElementSet>"
-    );
-    let imported = imported(&format!("<Model>{MESH}{sets}{SYSTEM}</Model>"));
-    let (scene, _) = build(&imported);
-    assert!((scene.bodies[0].1.density - 2000.0).abs() < 1e-9);
-    assert_note(&imported, "different densities");
+    let other = heavy.replace("1000 ", "2000 ");
+    for (second, law) in
+        [(heavy, "law = \"material-0\""), (other, "law = { 0 = \"material-0\", 1 = \"material-1\" }")]
+    {
+        let sets = set(NEO_HOOKEAN, 0) + &set(&second, 1);
+        let imported = imported(&format!("<Model>{MESH}{sets}{SYSTEM}</Model>"));
+        assert_lines(&imported, &[law, "density = { 0 = 1000.0, 1 = 3000.0 }"]);
+        let (_, built) = build(&imported);
+        let densities: Vec<f64> = built.model.solids.iter().map(|solid| solid.material.density).collect();
+        assert_eq!(densities, [1000.0, 3000.0]);
+        assert_eq!(built.model.solids.iter().map(|solid| solid.original[0]).collect::<Vec<_>>(), [0, 1]);
+    }
 }
 
 /// The mesh of a file is turned about its centre, then scaled, then shifted.

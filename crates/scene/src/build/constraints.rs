@@ -98,6 +98,8 @@ impl Builder<'_> {
     /// Says which bodies nothing holds.
     pub(super) fn check_free_bodies(&mut self) {
         let scene = self.scene;
+        let flies =
+            |name: &str| scene.bodies.iter().any(|(own, body)| own == name && body.velocity.is_some());
         for (index, body) in self.model.bodies.iter().enumerate() {
             let held =
                 self.model.constraints.iter().any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)));
@@ -119,6 +121,7 @@ impl Builder<'_> {
                 (true, false) => "gravity makes it fall",
                 (false, true) => "its loads push it away",
                 (true, true) => "gravity and its loads carry it away",
+                (false, false) if flies(name) => "it flies on as it started",
                 (false, false) => "and nothing moves it",
             };
             self.notes.push(format!("`{name}` is held by no constraint: {fate}"));

@@ -3,6 +3,7 @@
 
 mod bodies;
 mod constraints;
+mod fibres;
 mod loads;
 mod meshes;
 mod node_vectors;

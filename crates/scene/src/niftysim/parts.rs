@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pliant_geometry::{CellKind, Mesh};
+use pliant_geometry::Mesh;
 
 use super::conditions::{self, Action, Condition, Remarks, settle, sorted};
 use super::error::{Fault, ImportProblem};
@@ -353,18 +353,5 @@ impl Output {
             }
         }
         Ok((every > 0).then_some(Self { every, variables }))
-    }
-}
-
-impl Part {
-    /// Volume of each cell [m³].
-    pub fn volumes(&self) -> Vec<f64> {
-        let kind: CellKind = self.geometry.solid.cell();
-        let points = &self.geometry.mesh.points;
-        let volume = |cell: &[u32]| {
-            let corners: Vec<_> = cell.iter().map(|&node| points[node as usize]).collect();
-            pliant_geometry::volume(kind, &corners)
-        };
-        self.geometry.cells().chunks_exact(kind.node_count()).map(volume).collect()
     }
 }
