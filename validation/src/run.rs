@@ -1,13 +1,9 @@
-//! Running a model from rest, through its history or to its equilibrium.
+//! Running a model, as a test does it: what fails, panics.
 
-use pliant_mechanics::curve::{Curve, Shape};
-use pliant_mechanics::tensor::{Vector, dot};
-use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Model, Observable, Real, RelaxationSettings, State, StepError,
-};
+use pliant_mechanics::{CentralDifference, DynamicRelaxation, Model, Real, State, StepError};
+use pliant_reproduce::{CaseError, Equilibrium};
 
-/// Steps a model from rest to a time [s], both ends included. `observe` sees every instant once its forces, reactions
-/// and energies are known. Returns the last instant.
+/// See [`pliant_reproduce::run`].
 ///
 /// # Errors
 /// If a step fails.
@@ -18,61 +14,26 @@ pub fn run<R: Real>(
     model: &Model,
     step: f64,
     until: f64,
-    mut observe: impl FnMut(&CentralDifference<R>, &State<R>),
+    observe: impl FnMut(&CentralDifference<R>, &State<R>),
 ) -> Result<(CentralDifference<'_, R>, State<R>), StepError> {
-    let mut stepper = CentralDifference::new(model, step).unwrap_or_else(|error| panic!("{error}"));
-    let mut state = State::at_rest(model);
-    loop {
-        stepper.evaluate(&mut state)?;
-        observe(&stepper, &state);
-        if state.time >= until {
-            return Ok((stepper, state));
-        }
-        stepper.advance(&mut state);
-    }
+    pliant_reproduce::run(model, step, until, observe).map_err(|error| match error {
+        CaseError::Step(error) => error,
+        other => panic!("{other}"),
+    })
 }
 
-/// A state that has come to rest.
-pub struct Equilibrium<'m> {
-    /// The stepper, for its reactions.
-    pub stepper: CentralDifference<'m, f64>,
-    /// The state.
-    pub state: State<f64>,
-    /// The largest displacement of a node [m].
-    pub largest: f64,
-}
-
-/// Applies what a damped model asks for within `until` seconds and checks that it has come to rest: going on at its
-/// largest speed, no node would move by more than 1e-7 of the largest displacement in a tenth of a second, the time in
-/// which the slowest of the overdamped vibrations of these models decays by e at the least.
+/// See [`pliant_reproduce::settle`].
 ///
 /// # Panics
 /// If a step fails or the model still moves.
 pub fn settle(model: &Model, step: f64, until: f64) -> Equilibrium<'_> {
-    let (stepper, state) = run(model, step, until, |_, _| ()).unwrap_or_else(|error| panic!("{error}"));
-    let length = |v: Vector<f64>| dot(v, v).sqrt();
-    let largest = state.displacement.iter().map(|&u| length(u)).fold(0.0, f64::max);
-    let speed =
-        (0..model.node_count()).map(|node| length(stepper.velocity(&state, node))).fold(0.0, f64::max);
-    let creep = 0.1 * speed / largest;
-    assert!(creep < 1e-7, "not at rest after {until} s: creeps by {creep:.1e} of its displacement in 0.1 s");
-    Equilibrium { stepper, state, largest }
+    pliant_reproduce::settle(model, step, until).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The equilibrium at 1 s, found in one load step by dynamic relaxation to a residual of 1e-8 of the largest force.
+/// See [`pliant_reproduce::relax`].
 ///
 /// # Panics
-/// If there is none.
+/// If there is no equilibrium.
 pub fn relax(model: &Model) -> (DynamicRelaxation<'_, f64>, State<f64>) {
-    let settings = RelaxationSettings { tolerance: 1e-8, ..RelaxationSettings::default() };
-    let mut solver = DynamicRelaxation::new(model, settings).unwrap_or_else(|error| panic!("{error}"));
-    let mut state = State::at_rest(model);
-    let convergence = solver.solve(&mut state, 1.0).unwrap_or_else(|error| panic!("{error}"));
-    println!("{convergence:?}");
-    (solver, state)
-}
-
-/// From 0 at the start to 1 at a time [s], with a continuous velocity.
-pub fn smooth_step(to: f64) -> Curve {
-    Curve { shape: Shape::SmoothStep, from: 0.0, to }
+    pliant_reproduce::relax(model).unwrap_or_else(|error| panic!("{error}"))
 }

@@ -144,6 +144,12 @@ impl Specimen {
         self.constrain("move", face, [true, false, false], Motion::Displacement([along_x, 0.0, 0.0], curve))
     }
 
+    /// With a face displaced as a whole: the constraint `move x-max` and so on.
+    #[must_use]
+    pub fn carry(self, face: &str, by: Vector<f64>, curve: Curve) -> Self {
+        self.constrain("move", face, [true; 3], Motion::Displacement(by, curve))
+    }
+
     fn constrain(mut self, verb: &str, face: &str, components: [bool; 3], motion: Motion) -> Self {
         let (name, nodes) = (format!("{verb} {face}"), self.face(face));
         self.model.constraints.push(Constraint { name, nodes, components, motion });
