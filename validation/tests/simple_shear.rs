@@ -28,8 +28,8 @@ impl Case {
     /// The elastic stress [Pa] at a shear, fibres along e₁.
     fn elastic(&self, shear: f64) -> Split<Symmetric<f64>> {
         let (a, b) = if self.geometry == "A" { (0.0, shear) } else { (shear, 0.0) };
-        law_of(self.fibres)
-            .stress(&deformation([[1.0, a, 0.0], [b, 1.0, 0.0], [0.0, 0.0, 1.0]]), [1.0, 0.0, 0.0])
+        let (law, fibres) = (law_of(self.fibres), [[1.0, 0.0, 0.0]]);
+        law.stress(&deformation([[1.0, a, 0.0], [b, 1.0, 0.0], [0.0, 0.0, 1.0]]), &fibres[..law.families()])
     }
 
     /// The stress [Pa] at shears, from rest, at a rate [1/s] and with a step [s].

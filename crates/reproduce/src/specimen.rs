@@ -80,7 +80,7 @@ impl Specimen {
                     }
                 }
             };
-            let count = if material.law.needs_fibre() { cells.len() } else { 0 };
+            let count = cells.len() * material.law.families();
             let original = (0..cells.len() as u32).collect();
             let (fibre, material) = (vec![fibre; count], material.clone());
             model.add_solid(Solid { body: 0, material, cells, fibre, original });
