@@ -10,6 +10,6 @@ mod tissue;
 
 pub use random::Random;
 pub use reference::{claim, data_file, largest, numbers, reference};
-pub use run::{Equilibrium, relax, run, settle, smooth_step};
+pub use run::{Equilibrium, relax, run, run_on, run_watched, settle, smooth_step, watched};
 pub use specimen::{HOURGLASS, Hexes, Specimen, Tets};
 pub use tissue::{deformation, elastic, law, liver, liver_relaxation, soft_tissue};

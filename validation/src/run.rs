@@ -1,6 +1,8 @@
 //! Running a model from rest, through its history or to its equilibrium.
 
+use pliant_mechanics::critical_step::true_limit;
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::stability::{Monitor, OnUnstable};
 use pliant_mechanics::tensor::{Vector, dot};
 use pliant_mechanics::{
     CentralDifference, DynamicRelaxation, Model, Observable, Real, RelaxationSettings, State, StepError,
@@ -18,10 +20,49 @@ pub fn run<R: Real>(
     model: &Model,
     step: f64,
     until: f64,
-    mut observe: impl FnMut(&CentralDifference<R>, &State<R>),
+    observe: impl FnMut(&CentralDifference<R>, &State<R>),
 ) -> Result<(CentralDifference<'_, R>, State<R>), StepError> {
-    let mut stepper = CentralDifference::new(model, step).unwrap_or_else(|error| panic!("{error}"));
-    let mut state = State::at_rest(model);
+    let stepper = CentralDifference::new(model, step).unwrap_or_else(|error| panic!("{error}"));
+    run_on(stepper, State::at_rest(model), until, observe)
+}
+
+/// The same with a monitor of the stable step, whose limit at rest is the true one.
+///
+/// # Errors
+/// If a step fails.
+///
+/// # Panics
+/// If constraints contradict each other.
+pub fn run_watched<R: Real>(
+    model: &Model,
+    step: f64,
+    on_unstable: OnUnstable,
+    until: f64,
+    observe: impl FnMut(&CentralDifference<R>, &State<R>),
+) -> Result<(CentralDifference<'_, R>, State<R>), StepError> {
+    run_on(watched(model, step, on_unstable), State::at_rest(model), until, observe)
+}
+
+/// A stepper with a monitor whose limit at rest is the true one.
+///
+/// # Panics
+/// If constraints contradict each other.
+pub fn watched<R: Real>(model: &Model, step: f64, on_unstable: OnUnstable) -> CentralDifference<'_, R> {
+    let limit = true_limit(model).unwrap_or_else(|error| panic!("{error}")).step;
+    let stepper = CentralDifference::new(model, step).unwrap_or_else(|error| panic!("{error}"));
+    stepper.watched(Monitor::new(model, limit, on_unstable))
+}
+
+/// Steps a state to a time [s], both ends included.
+///
+/// # Errors
+/// If a step fails.
+pub fn run_on<'m, R: Real>(
+    mut stepper: CentralDifference<'m, R>,
+    mut state: State<R>,
+    until: f64,
+    mut observe: impl FnMut(&CentralDifference<R>, &State<R>),
+) -> Result<(CentralDifference<'m, R>, State<R>), StepError> {
     loop {
         stepper.evaluate(&mut state)?;
         observe(&stepper, &state);

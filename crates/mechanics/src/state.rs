@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::model::{FREE, Model, Solid};
+use crate::stability::Stability;
 use crate::tensor::{Symmetric, Vector};
 
 /// What a stepper advances.
@@ -11,7 +12,7 @@ use crate::tensor::{Symmetric, Vector};
 pub struct State<R> {
     /// Time [s].
     pub time: f64,
-    /// Steps done.
+    /// Whole steps done.
     pub steps: u64,
     /// Displacements u of the nodes [m].
     pub displacement: Vec<Vector<R>>,
@@ -21,6 +22,8 @@ pub struct State<R> {
     pub history: Vec<History<R>>,
     /// Energies so far.
     pub work: Work,
+    /// How steps are cut, and what was seen of the largest stable one.
+    pub stability: Stability,
 }
 
 /// What a relaxing law remembers of a solid.
@@ -90,6 +93,17 @@ impl<R: Real> State<R> {
             displacement,
             history: model.solids.iter().map(History::at_rest).collect(),
             work: Work::default(),
+            stability: Stability::default(),
         }
+    }
+
+    /// True before the first step.
+    pub(crate) fn is_at_start(&self) -> bool {
+        self.steps == 0 && self.is_between_steps()
+    }
+
+    /// True at the end of a whole step, false between the parts of one.
+    pub fn is_between_steps(&self) -> bool {
+        self.stability.done == 0
     }
 }

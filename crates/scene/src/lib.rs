@@ -51,7 +51,8 @@ mod testing;
 
 pub use build::{Built, BuiltBody, build};
 pub use output::{
-    BodySummary, FailureSummary, OutputError, OutputFolder, Summary, failed_input, failed_output, number,
+    AddedMass, BodySummary, FailureSummary, OutputError, OutputFolder, StabilitySummary, Summary,
+    failed_input, failed_output, number,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Plan, SAFETY, plan};

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use pliant_mechanics::stability::Stability;
 use pliant_mechanics::{Energies, Observable, Real, State};
 
 use crate::build::Built;
-use crate::format::Precision;
+use crate::format::{Precision, SolverName};
 use crate::output::{
     FailureSummary, Frame, OutputError, OutputFolder, PLOT, SUMMARY, Schedule, Scheduled, Summary, markdown,
     observers, plot, summarise,
@@ -45,6 +46,10 @@ pub(crate) struct Outcome {
     pub energies: Energies,
     pub worst_balance: f64,
     pub balance_floor: f64,
+    /// The largest hourglass energy over the internal one, and its time [s].
+    pub worst_hourglass: (f64, f64),
+    /// What was seen of the largest stable step; `None` of a run without inertia.
+    pub stability: Option<Stability>,
     pub reactions: Vec<[f64; 3]>,
     pub history: History,
     pub files: Vec<PathBuf>,
@@ -82,7 +87,7 @@ pub fn run(
         let time = Some(outcome.time);
         outcome.failure.get_or_insert_with(|| FailureSummary::output(&error, time));
     }
-    Ok(summarise(built, plan, &outcome))
+    Ok(summarise(scene, built, plan, &outcome))
 }
 
 /// Writes the plot and the page that shows it.
@@ -98,7 +103,7 @@ fn write_pages(
         .map_err(|reason| OutputError::new(&folder.path().join(PLOT), reason))?;
     outcome.files.push(folder.write(PLOT, &svg)?);
     outcome.files.push(page);
-    let text = markdown(scene, built, plan, outcome, &summarise(built, plan, outcome));
+    let text = markdown(scene, built, plan, outcome, &summarise(scene, built, plan, outcome));
     let written = folder.write(SUMMARY, &text);
     if written.is_err() {
         outcome.files.pop();
@@ -122,6 +127,7 @@ fn advance<R: Real>(
     let mut history = History::default();
     let mut sampling = Schedule::new(scene.scene.until / SAMPLES);
     let mut worst_balance = 0.0_f64;
+    let mut worst_hourglass = (0.0, 0.0);
     let mut failure = None;
     let started = Instant::now();
     let mut reported = started;
@@ -132,6 +138,10 @@ fn advance<R: Real>(
         }
         if state.work.largest > solver.balance_floor() {
             worst_balance = worst_balance.max(solver.observable().energies().balance);
+        }
+        let share = hourglass_share(solver.observable().energies(), solver.balance_floor());
+        if share > worst_hourglass.0 {
+            worst_hourglass = (share, state.time);
         }
         let last = state.time + 0.5 * plan.step >= scene.scene.until;
         if sampling.is_due(state.time, plan.step, last) {
@@ -162,6 +172,8 @@ fn advance<R: Real>(
         energies: *solver.observable().energies(),
         worst_balance,
         balance_floor: solver.balance_floor(),
+        worst_hourglass,
+        stability: (scene.run.solver == SolverName::Explicit).then_some(state.stability),
         reactions: (0..built.model.constraints.len())
             .map(|index| solver.observable().reaction(index))
             .collect(),
@@ -170,6 +182,17 @@ fn advance<R: Real>(
         threads: rayon::current_num_threads(),
         precision: R::PRECISION,
     })
+}
+
+/// Hourglass energy over internal energy; 0 while both together are below the floor [J] from which on energies mean
+/// something.
+fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
+    let Energies { internal, hourglass, .. } = *energies;
+    if hourglass > 0.0 && internal + hourglass > floor {
+        hourglass / internal.max(f64::MIN_POSITIVE)
+    } else {
+        0.0
+    }
 }
 
 fn look<R: Real>(

@@ -15,7 +15,7 @@ use super::{CHUNK, Findings, ForceField, displacement_gradient, relative_displac
 use crate::Real;
 use crate::law::{Deformation, Law};
 use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
-use crate::prony::Relaxation;
+use crate::prony::{Prony, Relaxation};
 use crate::state::History;
 use crate::tensor::{Symmetric, Tensor, Vector, cast};
 
@@ -184,8 +184,9 @@ impl<R: Real, L: Law> AveragedTets<R, L> {
             } else {
                 &mut history[offset * per_cell..(offset + 1) * per_cell]
             };
-            let (gradient, stress, j) = self.stress(cell, &self.gradient_of(cell, displacement), own);
-            findings.note_volume_ratio(cell, j);
+            let h = self.gradient_of(cell, displacement);
+            let (gradient, stress, j) = self.stress(cell, &h, own);
+            findings.note(cell, j, &Symmetric::green_lagrange_twice(&h));
             scatter(&gradient.times_symmetric(&stress), &self.gradient[cell], self.volume[cell], forces);
         }
         findings
@@ -240,5 +241,8 @@ impl<R: Real, L: Law> ForceField<R> for AveragedTets<R, L> {
                 },
             );
         }
+    }
+    fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.relaxation.set_step(prony, step);
     }
 }

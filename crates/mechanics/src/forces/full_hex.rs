@@ -8,7 +8,7 @@ use crate::Real;
 use crate::element::GaussPoints;
 use crate::law::{Deformation, Law};
 use crate::model::{CellBlock, Solid};
-use crate::prony::Relaxation;
+use crate::prony::{Prony, Relaxation};
 use crate::state::History;
 use crate::tensor::{Symmetric, Vector, add, cast, scale};
 
@@ -110,7 +110,7 @@ impl<R: Real, L: Law> FullHexes<R, L> {
         forces.fill([R::ZERO; 3]);
         for (point, (gradient, &weight)) in self.gradient[cell].iter().zip(&self.weight[cell]).enumerate() {
             let deformation = Deformation::from_displacement_gradient(&displacement_gradient(&u, gradient));
-            findings.note_volume_ratio(cell, deformation.volume_ratio);
+            findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
             let mut stress = self.law.stress(&deformation, fibre).isochoric;
             if !history.is_empty() {
                 let own = point * self.isochoric_slots..(point + 1) * self.isochoric_slots;
@@ -148,5 +148,8 @@ impl<R: Real, L: Law> ForceField<R> for FullHexes<R, L> {
                 },
             );
         }
+    }
+    fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.relaxation.set_step(prony, step);
     }
 }

@@ -6,7 +6,7 @@ use super::{CHUNK, Findings, ForceField, relative_displacements, scatter};
 use crate::Real;
 use crate::law::{Deformation, Law};
 use crate::model::{CellBlock, Hourglass, Solid};
-use crate::prony::Relaxation;
+use crate::prony::{Prony, Relaxation};
 use crate::state::History;
 use crate::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale};
 
@@ -57,8 +57,7 @@ impl<R: Real, L: Law, const N: usize> SolidForces<R, L, N> {
                 h.add_outer(*ua, *ba);
             }
             let deformation = Deformation::from_displacement_gradient(&h);
-            let j = deformation.volume_ratio;
-            findings.note_volume_ratio(cell, j);
+            findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
             let fibre = if L::FIBRE { self.fibre[cell] } else { [R::ZERO; 3] };
             let elastic = self.law.stress(&deformation, fibre);
             let stress = if history.is_empty() {
@@ -123,5 +122,8 @@ impl<R: Real, L: Law, const N: usize> ForceField<R> for SolidForces<R, L, N> {
                 },
             );
         }
+    }
+    fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.relaxation.set_step(prony, step);
     }
 }

@@ -4,6 +4,7 @@ mod csv;
 mod fields;
 mod folder;
 mod plot;
+mod stability;
 mod summary;
 mod vtu;
 
@@ -13,6 +14,7 @@ use pliant_mechanics::{Observable, Real, State};
 
 pub use folder::OutputFolder;
 pub(crate) use folder::{PLOT, SUMMARY};
+pub use stability::{AddedMass, StabilitySummary};
 pub use summary::{BodySummary, FailureSummary, Summary, failed_input, failed_output, number};
 
 pub(crate) use plot::plot;
