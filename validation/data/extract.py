@@ -15,10 +15,6 @@ def write(name, value):
     (here / name).write_text(json.dumps(value) + "\n")
 
 
-points = read("material_points.json")
-points["models"] = {name: points["models"][name] for name in ("nh_iso", "nh_thesis", "ti")}
-write("material_points.json", points)
-
 shear = read("shear_curves.json")
 every = 5  # of the 101 shears: steps of 0.05
 thin = lambda curves: {k: {s: v[::every] for s, v in c.items() if s in ("S11", "S22", "S33", "S12")} for k, c in curves.items()}
@@ -35,8 +31,8 @@ for model in relaxation["models"].values():
 write("relaxation.json", relaxation)
 
 for name in (
-    "homogeneous_uniaxial.json", "timestep.json", "meshes/cube_tet4.msh", "meshes/cantilever_half_tet4.msh",
-    "meshes/cube_eighth_tet4.msh",
+    "material_points.json", "homogeneous_uniaxial.json", "timestep.json", "meshes/cube_tet4.msh",
+    "meshes/cantilever_half_tet4.msh", "meshes/cube_eighth_tet4.msh",
 ):
     shutil.copyfile(source / name, here / Path(name).name)
 

@@ -6,7 +6,7 @@
 
 use pliant_geometry::{Mesh, io};
 use pliant_mechanics::Observable;
-use pliant_mechanics::law::{AnyLaw, NeoHookean};
+use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::model::Averaging;
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 use pliant_validation::{Hexes, Specimen, Tets, claim, data_file, elastic, relax, smooth_step};
@@ -17,7 +17,7 @@ const ANP: Tets = Tets::Averaged(Averaging::Nodal);
 const IANP: Tets = Tets::Averaged(Averaging::Variational);
 
 fn nearly_incompressible(young: f64) -> AnyLaw {
-    AnyLaw::NeoHookean(NeoHookean { shear: young / 2.98, bulk: young / 0.06 })
+    AnyLaw::NeoHookean(NeoHookean { shear: young / 2.98, volumetric: Volumetric::quadratic(young / 0.06) })
 }
 
 fn tets(file: &str) -> Mesh {

@@ -69,3 +69,14 @@ fn niftysim_tets_transversely_isotropic_and_viscous() {
 fn niftysim_hexahedra_neo_hookean() {
     meets_niftysim("H8_NH", 2e-5);
 }
+
+#[test]
+fn niftysim_hexahedra_arruda_boyce() {
+    meets_niftysim("H8_AB", 2e-5);
+}
+
+/// NiftySim's pressure average is no gradient of an energy, and `tet4-ianp-niftysim` computes it in another order.
+#[test]
+fn niftysim_tets_with_averaged_pressure_polynomial() {
+    meets_niftysim("T4ANP_PY", 5e-3);
+}

@@ -9,8 +9,8 @@ use pliant_mechanics::tensor::Tensor;
 use pliant_mechanics::{CentralDifference, Model, Observable, State, StepError};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 use pliant_validation::{
-    HOURGLASS, Hexes, Random, Specimen, Tets, claim, elastic, largest, law, liver, run, run_watched, smooth_step,
-    soft_tissue,
+    HOURGLASS, Hexes, Random, Specimen, Tets, claim, elastic, largest, law, liver, run, run_watched,
+    smooth_step, soft_tissue,
 };
 use serde_json::json;
 

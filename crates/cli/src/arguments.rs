@@ -40,12 +40,14 @@ pub enum Command {
         markdown: bool,
     },
     /// Translate a NiftySim model into a scene.
-    #[command(after_help = "Example:\n  pliant import model.xml -o model && pliant run model")]
+    #[command(after_help = "Examples:\n  pliant import model.xml -o model && pliant run model\n  \
+                            pliant import model.xml -o scene.toml && pliant run scene.toml\n  \
+                            pliant run model.xml")]
     Import {
         /// A NiftySim model (XML).
         model: PathBuf,
-        /// Folder to make for the scene and its meshes.
-        #[arg(short, long, value_name = "DIR")]
+        /// Folder for the scene and its meshes, or name of the scene file (.toml) with the meshes beside it.
+        #[arg(short, long, value_name = "DIR|FILE")]
         out: PathBuf,
     },
     /// Say what a mesh file holds, how good it is, and what is wrong with it.
@@ -77,7 +79,7 @@ pub enum Precision {
 
 #[derive(Debug, clap::Args)]
 pub struct Run {
-    /// A scene file, or a folder with a scene.toml.
+    /// A scene file, a folder with a scene.toml, or a NiftySim model (.xml).
     pub scene: PathBuf,
     /// Folder for the outputs; if not given, out/NAME after the folder of the scene.
     #[arg(long, value_name = "DIR")]
@@ -94,7 +96,7 @@ pub struct Run {
 
 #[derive(Debug, clap::Args)]
 pub struct Check {
-    /// A scene file, or a folder with a scene.toml.
+    /// A scene file, a folder with a scene.toml, or a NiftySim model (.xml).
     pub scene: PathBuf,
     #[command(flatten)]
     pub overrides: Overrides,

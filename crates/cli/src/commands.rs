@@ -1,15 +1,16 @@
 //! What each subcommand does.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
 use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::source::Value;
+use pliant_scene::source::{Source, Value};
 use pliant_scene::{Built, OutputFolder, Plan, Scene, niftysim, number, reference, registry};
 use serde_json::{Map, Value as Json, json};
+use tempfile::TempDir;
 
 use crate::arguments::{Check, Command, Info, Overrides, Precision, Run};
 use crate::report::{self, Bar, Failure, say};
@@ -34,7 +35,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
 
 /// Reads, builds and plans a scene; doubts go to standard error.
 fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), Failure> {
-    let (mut source, folder) = pliant_scene::open(path)?;
+    let (mut source, folder, _translated) = open(path)?;
     let mut mistakes = Vec::new();
     let precision = overrides.precision.map(|precision| match precision {
         Precision::Single => "single",
@@ -63,6 +64,48 @@ fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), F
     }
     let plan = in_pool(&scene, || pliant_scene::plan(&scene, &built))?;
     Ok((scene, built, plan))
+}
+
+/// Reads the text of a scene. A NiftySim model is translated first, into a folder that lasts as long as the last value.
+fn open(path: &Path) -> Result<(Source, PathBuf, Option<TempDir>), Failure> {
+    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) {
+        let (source, folder) = pliant_scene::open(path)?;
+        return Ok((source, folder, None));
+    }
+    let folder = tempfile::tempdir().map_err(|error| {
+        Failure::plain(
+            format!("no temporary folder can be made: {error}"),
+            "check the free space, or set TMPDIR",
+        )
+    })?;
+    let notes = translate(path, &folder.path().join("scene.toml"))?;
+    notes.iter().for_each(|note| eprintln!("note: {note}"));
+    let (source, place) = pliant_scene::open(folder.path())?;
+    Ok((source, place, Some(folder)))
+}
+
+/// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing.
+fn translate(model: &Path, file: &Path) -> Result<Vec<String>, Failure> {
+    let imported = niftysim::import(model).map_err(|error| Failure::plain(error, ""))?;
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let meshes = imported.meshes.iter().map(|(name, mesh)| (folder.join(name), mesh));
+    if let Some(taken) =
+        meshes.clone().map(|(path, _)| path).chain([file.to_owned()]).find(|path| path.exists())
+    {
+        return Err(Failure::plain(format!("`{}` exists already", taken.display()), "choose another name"));
+    }
+    let unwritable = |error: &dyn std::fmt::Display| {
+        let help = "check the folder, its permissions and the free space, or choose another name";
+        Failure::plain(format!("`{}` cannot be written: {error}", folder.display()), help)
+    };
+    if !folder.as_os_str().is_empty() {
+        fs::create_dir_all(folder).map_err(|error| unwritable(&error))?;
+    }
+    for (path, mesh) in meshes {
+        io::write(&path, mesh).map_err(|error| unwritable(&error))?;
+    }
+    fs::write(file, &imported.scene).map_err(|error| unwritable(&error))?;
+    Ok(imported.notes)
 }
 
 /// Runs something on the scene's number of threads.
@@ -134,21 +177,9 @@ fn new(name: &Path) -> Result<ExitCode, Failure> {
 }
 
 fn import(model: &Path, out: &Path) -> Result<ExitCode, Failure> {
-    let imported = niftysim::import(model).map_err(|error| Failure::plain(error, ""))?;
-    let file = out.join("scene.toml");
-    if file.exists() {
-        return Err(Failure::plain(format!("`{}` exists already", file.display()), "choose another folder"));
-    }
-    let unwritable = |error: &dyn std::fmt::Display| {
-        let help = "check the folder, its permissions and the free space, or choose another name";
-        Failure::plain(format!("`{}` cannot be written: {error}", out.display()), help)
-    };
-    fs::create_dir_all(out).map_err(|error| unwritable(&error))?;
-    for (name, mesh) in &imported.meshes {
-        io::write(&out.join(name), mesh).map_err(|error| unwritable(&error))?;
-    }
-    fs::write(&file, &imported.scene).map_err(|error| unwritable(&error))?;
-    for note in &imported.notes {
+    let is_file = out.extension().is_some_and(|ending| ending == "toml");
+    let file = if is_file { out.to_owned() } else { out.join("scene.toml") };
+    for note in translate(model, &file)? {
         eprintln!("note: {note}");
     }
     say(format_args!("wrote {}; try: pliant run {}", file.display(), out.display()))?;

@@ -419,6 +419,16 @@ fn a_body_without_elements_is_refused() {
 }
 
 #[test]
+fn an_averaged_pressure_needs_an_energy_of_the_volume() {
+    let scene = changed(FROM_FILE, "density", "element = \"tet4-anp\"\ndensity");
+    let scene = changed(&scene, "\"neo-hookean\"", "\"st-venant-kirchhoff\"");
+    let told = ["`st-venant-kirchhoff` has no energy of the volume alone", "take `tet4` or `hex8`"];
+    assert_refused(&with_mesh(vtk(&CUBE, &TETS, ""), &scene), &["element = \"tet4-anp\""], &told);
+    let plain = changed(&scene, "tet4-anp", "tet4");
+    assert_eq!(with_mesh(vtk(&CUBE, &TETS, ""), &plain).run(&[]).code, 0);
+}
+
+#[test]
 fn laws_by_label_must_fit_the_labels_of_the_mesh() {
     let mesh = |data: &str| vtk(&CUBE, &TETS, data);
     let with_law = |law: &str| changed(FROM_FILE, "law = \"tissue\"", law);

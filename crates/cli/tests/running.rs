@@ -257,6 +257,49 @@ fn a_state_that_is_no_longer_finite_ends_the_run() {
 }
 
 #[test]
+fn every_law_runs_by_its_name() {
+    let elastic = "young-modulus = 10e3\npoisson-ratio = 0.45\n";
+    let laws = [
+        ("coupled-neo-hookean", elastic, ""),
+        ("logarithmic-neo-hookean", elastic, ""),
+        ("st-venant-kirchhoff", elastic, ""),
+        ("mooney-rivlin", "", "c10 = 1e3\nc01 = 700\npoisson-ratio = 0.45"),
+        ("polynomial", "", "c10 = 1e3\nc01 = 700\nc20 = 100\npoisson-ratio = 0.45"),
+        ("yeoh", "", "c1 = 1.7e3\nc2 = 100\nc3 = 50\npoisson-ratio = 0.45"),
+        ("arruda-boyce", "shear-modulus = 3e3\nbulk-modulus = 30e3\n", "locking-stretch = 3"),
+        ("gent", elastic, "limit = 2"),
+        ("demiray", elastic, "exponent = 2"),
+        ("veronda-westmann", "", "c1 = 300\nc2 = 3\npoisson-ratio = 0.45"),
+        ("ogden", "", "terms = [{ shear-modulus = 3.4e3, exponent = 2 }]\npoisson-ratio = 0.45"),
+        ("orthotropic", elastic, "e4 = 5e3\ne6 = 2e3\nsecond-fibre = [1, 0, 0]"),
+        ("holzapfel-gasser-ogden", elastic, "fibre-modulus = 2e3\nfibre-exponent = 1\ndispersion = 0.1"),
+        (
+            "fung-orthotropic",
+            "bulk-modulus = 30e3\n",
+            "modulus = 3e3\nnormal = [[1, 0.2, 0.2], [0.2, 1, 0.2], [0.2, 0.2, 1]]\nshear = [1, 1, 1]",
+        ),
+    ];
+    for (name, matrix, own) in laws {
+        let mut scene = changed(BLOCK, "\"transversely-isotropic\"", &format!("\"{name}\""));
+        scene = scene.replace(elastic, matrix).replace("fibre-modulus = 5e3", own);
+        let workshop = Workshop::new(&scene);
+        let told = workshop.run(&[]);
+        assert_eq!(told.code, 0, "{name}: {}", told.err);
+    }
+}
+
+#[test]
+fn a_law_beyond_its_locking_strain_ends_the_run_with_an_error() {
+    let scene = changed(BLOCK, "\"transversely-isotropic\"", "\"gent\"")
+        .replace("fibre-modulus = 5e3", "limit = 0.05")
+        .replace("by = [0, 0, 0.001]", "by = [0, 0, 0.1]");
+    let told = Workshop::new(&scene).run(&[]);
+    assert_eq!(told.code, 1, "{}", told.err);
+    assert_eq!(told.json()["status"], "failed");
+    assert!(told.err.contains("of `block`") && told.err.contains("t = "), "{}", told.err);
+}
+
+#[test]
 fn a_killed_run_leaves_a_series_that_can_be_read() {
     let workshop = Workshop::block("until = 0.02", "until = 100");
     let mut child =
@@ -963,4 +1006,32 @@ fn the_liver_of_sofa_is_pulled_by_one_lobe() {
     assert!(done["energy_balance"].as_f64().unwrap() < 0.01, "{done}");
     let frames = workshop.series("out/case/fields.pvd");
     assert_eq!(frames[0].1.mesh.points.len(), 507);
+}
+
+#[test]
+fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
+    let model = r#"<Model>
+        <Nodes DOF="3" NumNodes="4">0 0 0  0.1 0 0  0 0.1 0  0 0 0.1</Nodes>
+        <Elements NumEls="1" Type="T4">0 1 2 3</Elements>
+        <ElementSet Size="all"><Material Type="AB">
+            <ElasticParams NumParams="3">1000 3 10000</ElasticParams></Material></ElementSet>
+        <Constraint Type="Fix" DOF="all" NumNodes="3"><Nodes>0 1 2</Nodes></Constraint>
+        <Constraint Type="Disp" DOF="2" NumNodes="1" LoadShape="RAMP">
+            <Nodes>3</Nodes><Magnitudes Type="UNIFORM">0.01</Magnitudes></Constraint>
+        <SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>1</DampingCoeff>
+            <Density>1000</Density></SystemParams></Model>"#;
+    let workshop = Workshop::new("");
+    workshop.write("model.xml", model);
+    let told = workshop.pliant(&["run", "model.xml", "--json"]);
+    let direct = told.done();
+    assert!(told.err.contains("note: "), "{}", told.err);
+    assert!(workshop.path("out/model/fields.pvd").is_file());
+    workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]).words();
+    let scene = workshop.pliant(&["run", "translated.toml", "--json"]).done();
+    assert_eq!(direct["reactions"], scene["reactions"]);
+    let again = workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]);
+    assert!(again.code == 2 && again.err.contains("exists already"), "{}", again.err);
+    workshop.write("broken.xml", &model[..200]);
+    let told = workshop.pliant(&["run", "broken.xml"]);
+    assert!(told.code == 2 && told.err.contains("broken.xml"), "{}", told.err);
 }

@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use pliant_mechanics::curve::{Curve, Shape};
-//! use pliant_mechanics::law::{AnyLaw, NeoHookean};
+//! use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 //! use pliant_mechanics::load::{Load, LoadKind};
 //! use pliant_mechanics::model::{Body, Cells, Constraint, Material, Model, Motion, Solid};
 //! use pliant_mechanics::{CentralDifference, State, critical_step};
@@ -14,7 +14,8 @@
 //! let rest = vec![[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
 //! let mut model = Model { mass: vec![0.0; 4], rest, ..Model::default() };
 //! model.bodies.push(Body { name: "block".into(), nodes: 0..4, damping: 0.0 });
-//! let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, bulk: 10_000.0 });
+//! let volumetric = Volumetric::quadratic(10_000.0);
+//! let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric });
 //! let material = Material { law, prony: Default::default(), density: 1000.0 };
 //! let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
 //! model.add_solid(Solid { body: 0, material, cells, fibre: vec![], original: vec![0] });

@@ -394,7 +394,12 @@ pub const FREE: u32 = u32::MAX;
 
 impl Model {
     /// Adds ρV/N of every cell of a solid to its nodes.
+    ///
+    /// # Panics
+    /// If the law has fibres and the cells have none.
     pub fn add_solid(&mut self, solid: Solid) {
+        let needed = if solid.material.law.needs_fibre() { solid.cells.len() } else { solid.fibre.len() };
+        assert_eq!(solid.fibre.len(), needed, "a law with fibres needs one direction per cell");
         for cell in 0..solid.cells.len() {
             let nodes = solid.cells.nodes(cell);
             let share = solid.material.density * solid.cells.volume(cell) / nodes.len() as f64;

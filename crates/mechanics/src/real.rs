@@ -5,6 +5,9 @@ use std::fmt::Debug;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+use crate::forces::ForceField;
+use crate::model::Solid;
+
 /// A real number that the kernels can run in.
 pub trait Real:
     Copy
@@ -39,6 +42,20 @@ pub trait Real:
     fn cbrt(self) -> Self;
     /// Natural logarithm of 1 + self, accurate near zero.
     fn ln_1p(self) -> Self;
+    /// Exponential function.
+    fn exp(self) -> Self;
+    /// Exponential function minus 1, accurate near zero.
+    fn exp_m1(self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// The larger of two numbers; the other one if one is not a number.
+    fn max(self, other: Self) -> Self;
+    /// The magnitude of self with the sign of `sign`.
+    fn copysign(self, sign: Self) -> Self;
+    /// The forces of a solid in this number type. A method, so that the kernels of all laws and elements are compiled
+    /// once, here, and not again in every crate that steps a model.
+    #[doc(hidden)]
+    fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>>;
 }
 
 macro_rules! real {
@@ -48,6 +65,9 @@ macro_rules! real {
             const ONE: Self = 1.0;
             const EPSILON: f64 = <$type>::EPSILON as f64;
             const PRECISION: &'static str = $precision;
+            fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>> {
+                crate::forces::force_field(solid, step)
+            }
             #[inline(always)]
             fn of(value: f64) -> Self {
                 value as Self
@@ -70,6 +90,26 @@ macro_rules! real {
             #[inline(always)]
             fn ln_1p(self) -> Self {
                 self.ln_1p()
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                self.exp()
+            }
+            #[inline(always)]
+            fn exp_m1(self) -> Self {
+                self.exp_m1()
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                self.sqrt()
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                self.max(other)
+            }
+            #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                self.copysign(sign)
             }
         }
     };

@@ -2,7 +2,7 @@
 
 use crate::Real;
 use crate::forces::pressure;
-use crate::law::{Deformation, Split, with_law};
+use crate::law::{Deformation, Split};
 use crate::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
 use crate::state::{History, State};
 use crate::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale, sub};
@@ -184,7 +184,7 @@ fn averages<R: Real>(solid: &Solid, history: &History<R>, displacement: &[Vector
     let slots = solid.material.prony.volumetric_slots();
     let own = |index: usize| &pressures[index * slots..(index + 1) * slots];
     let relaxed = |index: usize, change: f64| {
-        let elastic = with_law!(&solid.material.law, law => pressure(law, change));
+        let elastic = pressure(&solid.material.law, change);
         solid.material.prony.pressure(elastic, own(index))
     };
     let change = |cell: usize, gradients: &[Vector<f64>]| {

@@ -11,16 +11,17 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK, Findings, ForceField, displacement_gradient, relative_displacements, scatter};
+use super::batch::{Batch, pressure};
+use super::{BATCH, CHUNK, Findings, ForceField, displacement_gradient, relative_displacements, scatter};
 use crate::Real;
-use crate::law::{Deformation, Law};
+use crate::law::{AnyLaw, Deformation, Split};
 use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
 use crate::prony::{Prony, Relaxation};
 use crate::state::History;
 use crate::tensor::{Symmetric, Tensor, Vector, cast};
 
-pub(super) struct AveragedTets<R, L> {
-    law: L,
+pub(super) struct AveragedTets<R> {
+    law: AnyLaw,
     averaging: Averaging,
     nodes: Vec<[u32; 4]>,
     gradient: Vec<[Vector<R>; 4]>,
@@ -38,8 +39,8 @@ pub(super) struct AveragedTets<R, L> {
     node_value: Vec<R>,
 }
 
-impl<R: Real, L: Law> AveragedTets<R, L> {
-    pub(super) fn new(solid: &Solid, cells: &CellBlock<4>, averaging: Averaging, law: L, step: f64) -> Self {
+impl<R: Real> AveragedTets<R> {
+    pub(super) fn new(solid: &Solid, cells: &CellBlock<4>, averaging: Averaging, step: f64) -> Self {
         let local = LocalNodes::new(cells);
         let node_volume = (0..local.len())
             .map(|node| local.cells_at(node).map(|cell| 0.25 * cells.rest[cell].volume).sum::<f64>())
@@ -47,7 +48,7 @@ impl<R: Real, L: Law> AveragedTets<R, L> {
             .collect();
         let prony = &solid.material.prony;
         Self {
-            law,
+            law: solid.material.law,
             averaging,
             nodes: cells.nodes.clone(),
             gradient: cells.rest.iter().map(|rest| rest.gradient.map(cast)).collect(),
@@ -132,40 +133,55 @@ impl<R: Real, L: Law> AveragedTets<R, L> {
         self.average_to_nodes();
     }
 
-    /// The stress of a cell with the pressure its nodes give it, and the deformation gradient it goes with.
+    /// The deformation whose stress the law is asked for: the cell's own, or F̄ = (J̄/J)^(1/3) F.
+    #[inline(always)]
+    fn deformation(
+        &self,
+        cell: usize,
+        displacement: &[Vector<R>],
+        findings: &mut Findings,
+    ) -> Deformation<R> {
+        let h = self.gradient_of(cell, displacement);
+        let own = Deformation::from_displacement_gradient(&h);
+        findings.note(cell, own.volume_ratio, &own.strain_twice);
+        if self.averaging != Averaging::NiftySim {
+            return own;
+        }
+        let ratio = ((R::ONE + self.average_to_cell(cell)) / own.volume_ratio).cbrt();
+        let mut scaled = Tensor::ZERO;
+        for (i, row) in scaled.0.iter_mut().enumerate() {
+            for (k, entry) in row.iter_mut().enumerate() {
+                let unit = if i == k { R::ONE } else { R::ZERO };
+                *entry = ratio * h.0[i][k] + (ratio - R::ONE) * unit;
+            }
+        }
+        Deformation::from_displacement_gradient(&scaled)
+    }
+
+    /// The stress that goes with it: the law's where the deformation is averaged, else its isochoric part and the
+    /// pressure of the nodes.
     #[inline(always)]
     fn stress(
         &self,
         cell: usize,
-        h: &Tensor<R>,
+        deformation: &Deformation<R>,
+        elastic: Split<Symmetric<R>>,
         history: &mut [Symmetric<R>],
-    ) -> (Tensor<R>, Symmetric<R>, R) {
-        let deformation = Deformation::from_displacement_gradient(h);
-        let fibre = if L::FIBRE { self.fibre[cell] } else { [R::ZERO; 3] };
-        let j = deformation.volume_ratio;
+    ) -> Symmetric<R> {
         if self.averaging == Averaging::NiftySim {
-            let ratio = ((R::ONE + self.average_to_cell(cell)) / j).cbrt();
-            let mut scaled = Tensor::ZERO;
-            for (i, row) in scaled.0.iter_mut().enumerate() {
-                for (k, entry) in row.iter_mut().enumerate() {
-                    let unit = if i == k { R::ONE } else { R::ZERO };
-                    *entry = ratio * h.0[i][k] + (ratio - R::ONE) * unit;
-                }
-            }
-            let modified = Deformation::from_displacement_gradient(&scaled);
-            let elastic = self.law.stress(&modified, fibre);
-            let stress = if history.is_empty() {
+            return if history.is_empty() {
                 elastic.isochoric + elastic.volumetric
             } else {
                 self.relaxation.advance(elastic, history)
             };
-            return (modified.gradient, stress, j);
         }
-        let elastic = self.law.stress(&deformation, fibre).isochoric;
-        let isochoric =
-            if history.is_empty() { elastic } else { self.relaxation.advance_isochoric(elastic, history) };
-        let volumetric = deformation.inverse_cauchy_green * (j * self.average_to_cell(cell));
-        (deformation.gradient, isochoric + volumetric, j)
+        let isochoric = if history.is_empty() {
+            elastic.isochoric
+        } else {
+            self.relaxation.advance_isochoric(elastic.isochoric, history)
+        };
+        let pressure = deformation.volume_ratio * self.average_to_cell(cell);
+        isochoric + deformation.inverse_cauchy_green * pressure
     }
 
     fn pass(
@@ -176,18 +192,27 @@ impl<R: Real, L: Law> AveragedTets<R, L> {
         slots: &mut [Vector<R>],
     ) -> Findings {
         let mut findings = Findings::default();
+        let mut batch = Batch::new();
         let per_cell = self.cell_slots();
-        for (offset, forces) in slots.chunks_exact_mut(4).enumerate() {
-            let cell = first + offset;
-            let own = if history.is_empty() {
-                &mut []
-            } else {
-                &mut history[offset * per_cell..(offset + 1) * per_cell]
-            };
-            let h = self.gradient_of(cell, displacement);
-            let (gradient, stress, j) = self.stress(cell, &h, own);
-            findings.note(cell, j, &Symmetric::green_lagrange_twice(&h));
-            scatter(&gradient.times_symmetric(&stress), &self.gradient[cell], self.volume[cell], forces);
+        for (index, slots) in slots.chunks_mut(BATCH * 4).enumerate() {
+            let offset = index * BATCH;
+            let cells = first + offset..first + offset + slots.len() / 4;
+            for (point, cell) in cells.clone().enumerate() {
+                batch.deformation[point] = self.deformation(cell, displacement, &mut findings);
+            }
+            let fibres = if self.fibre.is_empty() { &[] } else { &self.fibre[cells.clone()] };
+            batch.evaluate(&self.law, cells.len(), fibres);
+            for (point, (cell, forces)) in cells.zip(slots.chunks_exact_mut(4)).enumerate() {
+                let own = if history.is_empty() {
+                    &mut []
+                } else {
+                    &mut history[(offset + point) * per_cell..(offset + point + 1) * per_cell]
+                };
+                let deformation = &batch.deformation[point];
+                let stress = self.stress(cell, deformation, batch.elastic[point], own);
+                let piola = deformation.gradient.times_symmetric(&stress);
+                scatter(&piola, &self.gradient[cell], self.volume[cell], forces);
+            }
         }
         findings
     }
@@ -197,23 +222,7 @@ impl<R: Real, L: Law> AveragedTets<R, L> {
     }
 }
 
-/// U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, from its stress in a pure dilation F = J^(1/3) I.
-#[inline(always)]
-pub(crate) fn pressure<R: Real, L: Law>(law: &L, volume_change: R) -> R {
-    let j = R::ONE + volume_change;
-    let c = j.cbrt();
-    // c − 1 = x/(c² + c + 1), without cancellation.
-    let stretch = volume_change / (c * c + c + R::ONE);
-    let mut h = Tensor::ZERO;
-    for i in 0..3 {
-        h.0[i][i] = stretch;
-    }
-    // S = J U' C⁻¹ with C⁻¹ = c⁻² I.
-    let deformation = Deformation::from_displacement_gradient(&h);
-    law.stress(&deformation, [R::ONE, R::ZERO, R::ZERO]).volumetric.0[0] * c * c / j
-}
-
-impl<R: Real, L: Law> ForceField<R> for AveragedTets<R, L> {
+impl<R: Real> ForceField<R> for AveragedTets<R> {
     fn evaluate(
         &mut self,
         displacement: &[Vector<R>],

@@ -3,17 +3,18 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK, Findings, ForceField, displacement_gradient, pressure, relative_displacements};
+use super::batch::{Batch, pressure};
+use super::{CHUNK, Findings, ForceField, displacement_gradient, relative_displacements};
 use crate::Real;
 use crate::element::GaussPoints;
-use crate::law::{Deformation, Law};
+use crate::law::{AnyLaw, Deformation};
 use crate::model::{CellBlock, Solid};
 use crate::prony::{Prony, Relaxation};
 use crate::state::History;
 use crate::tensor::{Symmetric, Vector, add, cast, scale};
 
-pub(super) struct FullHexes<R, L> {
-    law: L,
+pub(super) struct FullHexes<R> {
+    law: AnyLaw,
     nodes: Vec<[u32; 8]>,
     /// Gradients of the shape functions at the eight points [1/m].
     gradient: Vec<[[Vector<R>; 8]; 8]>,
@@ -28,17 +29,11 @@ pub(super) struct FullHexes<R, L> {
     pressure: Vec<R>,
 }
 
-impl<R: Real, L: Law> FullHexes<R, L> {
-    pub(super) fn new(
-        solid: &Solid,
-        cells: &CellBlock<8>,
-        points: &[GaussPoints],
-        law: L,
-        step: f64,
-    ) -> Self {
+impl<R: Real> FullHexes<R> {
+    pub(super) fn new(solid: &Solid, cells: &CellBlock<8>, points: &[GaussPoints], step: f64) -> Self {
         let prony = &solid.material.prony;
         Self {
-            law,
+            law: solid.material.law,
             nodes: cells.nodes.clone(),
             gradient: points.iter().map(|cell| cell.gradient.map(|point| point.map(cast))).collect(),
             weight: points.iter().map(|cell| cell.weight.map(R::of)).collect(),
@@ -86,13 +81,14 @@ impl<R: Real, L: Law> FullHexes<R, L> {
         slots: &mut [Vector<R>],
     ) -> Findings {
         let mut findings = Findings::default();
+        let mut batch = Batch::new();
         for (offset, forces) in slots.chunks_exact_mut(8).enumerate() {
             let own = if history.is_empty() {
                 &mut []
             } else {
                 &mut history[offset * self.slots()..(offset + 1) * self.slots()]
             };
-            self.cell(first + offset, displacement, own, forces, &mut findings);
+            self.cell(first + offset, displacement, own, forces, &mut batch, &mut findings);
         }
         findings
     }
@@ -103,15 +99,19 @@ impl<R: Real, L: Law> FullHexes<R, L> {
         displacement: &[Vector<R>],
         history: &mut [Symmetric<R>],
         forces: &mut [Vector<R>],
+        batch: &mut Batch<R>,
         findings: &mut Findings,
     ) {
         let u = relative_displacements(&self.nodes[cell], displacement);
-        let fibre = if L::FIBRE { self.fibre[cell] } else { [R::ZERO; 3] };
+        for (deformation, gradient) in batch.deformation.iter_mut().zip(&self.gradient[cell]) {
+            *deformation = Deformation::from_displacement_gradient(&displacement_gradient(&u, gradient));
+            findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
+        }
+        batch.evaluate(&self.law, 8, &[self.fibre.get(cell).copied().unwrap_or_default(); 8]);
         forces.fill([R::ZERO; 3]);
         for (point, (gradient, &weight)) in self.gradient[cell].iter().zip(&self.weight[cell]).enumerate() {
-            let deformation = Deformation::from_displacement_gradient(&displacement_gradient(&u, gradient));
-            findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
-            let mut stress = self.law.stress(&deformation, fibre).isochoric;
+            let deformation = &batch.deformation[point];
+            let mut stress = batch.elastic[point].isochoric;
             if !history.is_empty() {
                 let own = point * self.isochoric_slots..(point + 1) * self.isochoric_slots;
                 stress = self.relaxation.advance_isochoric(stress, &mut history[own]);
@@ -126,7 +126,7 @@ impl<R: Real, L: Law> FullHexes<R, L> {
     }
 }
 
-impl<R: Real, L: Law> ForceField<R> for FullHexes<R, L> {
+impl<R: Real> ForceField<R> for FullHexes<R> {
     fn evaluate(
         &mut self,
         displacement: &[Vector<R>],

@@ -6,20 +6,20 @@
 //! in double precision. Runs on the current rayon pool.
 
 mod averaged;
+mod batch;
 mod full_hex;
 mod plain;
 #[cfg(test)]
 mod tests;
 
 use averaged::AveragedTets;
-pub(crate) use averaged::pressure;
+pub(crate) use batch::pressure;
 use full_hex::FullHexes;
 use plain::SolidForces;
 
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
-use crate::law::with_law;
 use crate::model::{Cells, Model, Solid};
 use crate::prony::Prony;
 use crate::state::History;
@@ -28,15 +28,18 @@ use crate::tensor::{Symmetric, Tensor, Vector, add, scale, sub};
 /// Cells per parallel task; the sums of a task are added up in order.
 const CHUNK: usize = 256;
 
+/// Points whose stress is asked of the law at once: few enough for the first cache. Divides [`CHUNK`].
+const BATCH: usize = 32;
+
 /// What a pass over some cells found.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Findings {
+pub struct Findings {
     /// Energy held by hourglass patterns [J].
     pub hourglass: f64,
     /// The first cell of the pass with det F ≤ 0 or not a number, and its det F.
     pub inverted: Option<(usize, f64)>,
     /// How far the cells are deformed.
-    pub deformed: Deformed,
+    pub(crate) deformed: Deformed,
 }
 
 /// The extremes of deformation over some cells.
@@ -78,11 +81,11 @@ pub(crate) struct Found {
     /// The first inverted cell as (solid, cell, det F).
     pub inverted: Option<(usize, usize, f64)>,
     /// How far the cells are deformed.
-    pub deformed: Deformed,
+    pub(crate) deformed: Deformed,
 }
 
-/// Internal forces of one solid, compiled for its element, law and number type.
-pub(crate) trait ForceField<R>: Send + Sync {
+/// Internal forces of one solid, compiled for its element and number type.
+pub trait ForceField<R>: Send + Sync {
     /// Contributions [N] of each cell to its nodes, written cell by cell into `slots`. With `history` the stress
     /// relaxes and the history advances to this state; an empty `history` gives the instantaneous elastic
     /// response.
@@ -158,13 +161,13 @@ fn scatter<R: Real, const N: usize>(
 }
 
 /// The force field of a solid for steps of `step` seconds.
-fn force_field<R: Real>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
-    with_law!(&solid.material.law, law => match &solid.cells {
-        Cells::Tet4(cells) => Box::new(SolidForces::new(solid, cells, *law, step)),
-        Cells::AveragedTet4(cells, averaging) => Box::new(AveragedTets::new(solid, cells, *averaging, *law, step)),
-        Cells::Hex8(cells) => Box::new(SolidForces::new(solid, cells, *law, step)),
-        Cells::FullHex8(cells, points) => Box::new(FullHexes::new(solid, cells, points, *law, step)),
-    })
+pub(crate) fn force_field<R: Real>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
+    match &solid.cells {
+        Cells::Tet4(cells) => Box::new(SolidForces::new(solid, cells, step)),
+        Cells::AveragedTet4(cells, averaging) => Box::new(AveragedTets::new(solid, cells, *averaging, step)),
+        Cells::Hex8(cells) => Box::new(SolidForces::new(solid, cells, step)),
+        Cells::FullHex8(cells, points) => Box::new(FullHexes::new(solid, cells, points, step)),
+    }
 }
 
 /// All force fields of a model, their contribution slots, and the order in which nodes gather them.
@@ -212,7 +215,7 @@ impl<R: Real> InternalForces<R> {
             }
         }
         Self {
-            fields: model.solids.iter().map(|solid| force_field(solid, step)).collect(),
+            fields: model.solids.iter().map(|solid| R::force_field(solid, step)).collect(),
             field_offsets,
             slots: vec![[R::ZERO; 3]; slot_count],
             findings: (model.solids.iter())

@@ -2,17 +2,18 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK, Findings, ForceField, relative_displacements, scatter};
+use super::batch::Batch;
+use super::{BATCH, CHUNK, Findings, ForceField, displacement_gradient, relative_displacements, scatter};
 use crate::Real;
-use crate::law::{Deformation, Law};
+use crate::law::{AnyLaw, Deformation};
 use crate::model::{CellBlock, Hourglass, Solid};
 use crate::prony::{Prony, Relaxation};
 use crate::state::History;
-use crate::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale};
+use crate::tensor::{Symmetric, Vector, add, cast, dot, scale};
 
 /// Cells with one evaluation point.
-pub(super) struct SolidForces<R, L, const N: usize> {
-    law: L,
+pub(super) struct SolidForces<R, const N: usize> {
+    law: AnyLaw,
     nodes: Vec<[u32; N]>,
     gradient: Vec<[Vector<R>; N]>,
     volume: Vec<R>,
@@ -22,14 +23,14 @@ pub(super) struct SolidForces<R, L, const N: usize> {
     history_slots: usize,
 }
 
-impl<R: Real, L: Law, const N: usize> SolidForces<R, L, N> {
-    pub(super) fn new(solid: &Solid, cells: &CellBlock<N>, law: L, step: f64) -> Self {
+impl<R: Real, const N: usize> SolidForces<R, N> {
+    pub(super) fn new(solid: &Solid, cells: &CellBlock<N>, step: f64) -> Self {
         let hourglass = cells.hourglass.as_ref().map(|control| Hourglass {
             patterns: control.patterns.iter().map(|cell| cell.map(|gamma| gamma.map(R::of))).collect(),
             stiffness: control.stiffness.iter().map(|&k| R::of(k)).collect(),
         });
         Self {
-            law,
+            law: solid.material.law,
             nodes: cells.nodes.clone(),
             gradient: cells.rest.iter().map(|rest| rest.gradient.map(cast)).collect(),
             volume: cells.rest.iter().map(|rest| R::of(rest.volume)).collect(),
@@ -49,28 +50,35 @@ impl<R: Real, L: Law, const N: usize> SolidForces<R, L, N> {
         slots: &mut [Vector<R>],
     ) -> Findings {
         let mut findings = Findings::default();
-        for (offset, forces) in slots.chunks_exact_mut(N).enumerate() {
-            let cell = first + offset;
-            let u = relative_displacements(&self.nodes[cell], displacement);
-            let mut h = Tensor::ZERO;
-            for (ua, ba) in u.iter().zip(&self.gradient[cell]).skip(1) {
-                h.add_outer(*ua, *ba);
+        let mut batch = Batch::new();
+        for (index, slots) in slots.chunks_mut(BATCH * N).enumerate() {
+            let offset = index * BATCH;
+            let cells = first + offset..first + offset + slots.len() / N;
+            for (point, cell) in cells.clone().enumerate() {
+                let u = relative_displacements(&self.nodes[cell], displacement);
+                let h = displacement_gradient(&u, &self.gradient[cell]);
+                let deformation = Deformation::from_displacement_gradient(&h);
+                findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
+                batch.deformation[point] = deformation;
             }
-            let deformation = Deformation::from_displacement_gradient(&h);
-            findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
-            let fibre = if L::FIBRE { self.fibre[cell] } else { [R::ZERO; 3] };
-            let elastic = self.law.stress(&deformation, fibre);
-            let stress = if history.is_empty() {
-                elastic.isochoric + elastic.volumetric
-            } else {
-                let own = offset * self.history_slots..(offset + 1) * self.history_slots;
-                self.relaxation.advance(elastic, &mut history[own])
-            };
-            let piola = deformation.gradient.times_symmetric(&stress);
-            scatter(&piola, &self.gradient[cell], self.volume[cell], forces);
-            if let Some(control) = &self.hourglass {
-                findings.hourglass +=
-                    resist_hourglass(&control.patterns[cell], control.stiffness[cell], &u, forces);
+            let fibres = if self.fibre.is_empty() { &[] } else { &self.fibre[cells.clone()] };
+            batch.evaluate(&self.law, cells.len(), fibres);
+            for (point, (cell, forces)) in cells.zip(slots.chunks_exact_mut(N)).enumerate() {
+                let elastic = batch.elastic[point];
+                let stress = if history.is_empty() {
+                    elastic.isochoric + elastic.volumetric
+                } else {
+                    let cell = offset + point;
+                    let own = cell * self.history_slots..(cell + 1) * self.history_slots;
+                    self.relaxation.advance(elastic, &mut history[own])
+                };
+                let piola = batch.deformation[point].gradient.times_symmetric(&stress);
+                scatter(&piola, &self.gradient[cell], self.volume[cell], forces);
+                if let Some(control) = &self.hourglass {
+                    let u = relative_displacements(&self.nodes[cell], displacement);
+                    findings.hourglass +=
+                        resist_hourglass(&control.patterns[cell], control.stiffness[cell], &u, forces);
+                }
             }
         }
         findings
@@ -100,7 +108,7 @@ fn resist_hourglass<R: Real, const N: usize>(
     0.5 * (stiffness * energy).to_f64()
 }
 
-impl<R: Real, L: Law, const N: usize> ForceField<R> for SolidForces<R, L, N> {
+impl<R: Real, const N: usize> ForceField<R> for SolidForces<R, N> {
     fn evaluate(
         &mut self,
         displacement: &[Vector<R>],

@@ -2,7 +2,7 @@
 //! line in [`ELEMENTS`] and its energy in [`energy`].
 
 use super::*;
-use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic};
+use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
 use crate::model::{Averaging, Body, Cells, LocalNodes, Material};
 use crate::prony::Prony;
 use crate::tensor::{cast, cross, dot};
@@ -73,10 +73,10 @@ fn distorted_cube(element: &str, law: AnyLaw) -> Model {
 }
 
 fn laws() -> [AnyLaw; 2] {
-    let matrix = NeoHookean { shear: 700.0, bulk: 5000.0 };
+    let (shear, volumetric) = (700.0, Volumetric::quadratic(5000.0));
     [
-        AnyLaw::NeoHookean(matrix),
-        AnyLaw::TransverselyIsotropic(TransverselyIsotropic { matrix, fibre: 1100.0 }),
+        AnyLaw::NeoHookean(NeoHookean { shear, volumetric }),
+        AnyLaw::TransverselyIsotropic(TransverselyIsotropic { shear, fibre: 1100.0, volumetric }),
     ]
 }
 

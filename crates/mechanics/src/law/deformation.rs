@@ -1,8 +1,13 @@
 //! What the laws need of a deformation, computed from the displacement gradient H = F − I so that small strains
 //! keep their digits in single precision: J − 1 = tr H + II(H) + det H, C − I = H + Hᵀ + Hᵀ H.
+//!
+//! A bar is the isochoric measure: C̄ = q C, q = J^(−2/3); Ī₁ = tr C̄, Ī₂ = ½ (Ī₁² − tr C̄²), Ī₄ = a·C̄a, Ī₅ = a·C̄²a.
+//! An energy Ψ(Ī₁, Ī₂, Ī₄, Ī₅) with the derivatives Wₖ = ∂Ψ/∂Īₖ has the stress S = q (Φ − ⅓ (Φ:C) C⁻¹) with
+//! Φ = 2 (W₁ + Ī₁ W₂) I − 2 W₂ C̄ + 2 W₄ a⊗a + 2 W₅ (a⊗C̄a + C̄a⊗a). Here it is put together from terms that vanish at
+//! rest: the isotropic part is C⁻¹ dev M with M a polynomial of C − I.
 
 use crate::Real;
-use crate::tensor::{Symmetric, Tensor};
+use crate::tensor::{Symmetric, Tensor, Vector, dot};
 
 /// A deformation at one point and its measures.
 #[derive(Clone, Copy, Debug)]
@@ -57,14 +62,87 @@ impl<R: Real> Deformation<R> {
         R::of(3.0) * self.isochoric_change + self.isochoric_factor * self.strain_twice.trace()
     }
 
-    /// S of the isochoric energy ½ (I₁ − 3) (isochoric I₁): q (I − I₁/3 C⁻¹), written as
-    /// q (C⁻¹ (C − I) − tr(C − I)/3 C⁻¹).
+    /// C̄ − I.
     #[inline(always)]
-    pub fn deviatoric_identity(&self) -> Symmetric<R> {
-        let inverse = &self.inverse_cauchy_green;
-        let product = inverse.commuting_product(&self.strain_twice);
-        (product - *inverse * (self.strain_twice.trace() * R::of(1.0 / 3.0))) * self.isochoric_factor
+    pub fn isochoric_strain_twice(&self) -> Symmetric<R> {
+        self.strain_twice * self.isochoric_factor + Symmetric::IDENTITY * self.isochoric_change
     }
+
+    /// Ī₁ − 3 and Ī₂ − 3. With B = C̄ − I and t = tr B = Ī₁ − 3: Ī₂ − 3 = 2t + ½ (t² − B:B).
+    #[inline(always)]
+    pub fn isochoric_invariants_minus_3(&self) -> [R; 2] {
+        let t = self.isochoric_first_invariant_minus_3();
+        let b = self.isochoric_strain_twice();
+        [t, R::of(2.0) * t + R::of(0.5) * (t * t - b.commuting_product(&b).trace())]
+    }
+
+    /// Ī₄ − 1 of the unit fibre `a`.
+    #[inline(always)]
+    pub fn fibre_strain(&self, a: Vector<R>) -> R {
+        self.isochoric_change + self.isochoric_factor * self.strain_twice.quadratic(a)
+    }
+
+    /// Ī₄ − 1 and Ī₅ − 1 of the unit fibre `a`. With B = C̄ − I: Ī₅ − 1 = 2 a·Ba + |Ba|².
+    #[inline(always)]
+    pub fn fibre_strains(&self, a: Vector<R>) -> [R; 2] {
+        let ba = self.isochoric_strain_twice().apply(a);
+        let strain = dot(a, ba);
+        [strain, R::of(2.0) * strain + dot(ba, ba)]
+    }
+
+    /// S of an energy of Ī₁: 2 W₁ q (I − I₁/3 C⁻¹).
+    #[inline(always)]
+    pub fn first_invariant_stress(&self, w1: R) -> Symmetric<R> {
+        self.inverse_times_deviator(&self.strain_twice) * (R::of(2.0) * w1 * self.isochoric_factor)
+    }
+
+    /// S of an energy of Ī₁ and Ī₂: with X = C − I and C² − I = 2X + X²,
+    /// M = 2 (W₁ + Ī₁ W₂) q X − 2 W₂ q² (2X + X²).
+    #[inline(always)]
+    pub fn isotropic_stress(&self, w1: R, w2: R) -> Symmetric<R> {
+        let (q, x, two) = (self.isochoric_factor, &self.strain_twice, R::of(2.0));
+        let i1 = R::of(3.0) + self.isochoric_first_invariant_minus_3();
+        let m = *x * (w1 + (i1 - two * q) * w2) - x.commuting_product(x) * (q * w2);
+        self.inverse_times_deviator(&m) * (two * q)
+    }
+
+    /// S of an energy of Ī₄ of the unit fibre `a`: 2 W₄ q (a⊗a − I₄/3 C⁻¹).
+    #[inline(always)]
+    pub fn fibre_stress(&self, a: Vector<R>, w4: R) -> Symmetric<R> {
+        let i4 = R::ONE + self.strain_twice.quadratic(a);
+        let direction = Symmetric::dyad(a) - self.inverse_cauchy_green * (i4 * R::of(1.0 / 3.0));
+        direction * (R::of(2.0) * w4 * self.isochoric_factor)
+    }
+
+    /// S of an energy of Ī₄ and Ī₅ of the unit fibre `a`: that of Ī₄ and 2 W₅ q² (a⊗Ca + Ca⊗a − ⅔ |Ca|² C⁻¹).
+    #[inline(always)]
+    pub fn fibre_stresses(&self, a: Vector<R>, [w4, w5]: [R; 2]) -> Symmetric<R> {
+        let (q, x) = (self.isochoric_factor, self.strain_twice.apply(a));
+        let ca = [a[0] + x[0], a[1] + x[1], a[2] + x[2]];
+        let pull = self.inverse_cauchy_green * (dot(ca, ca) * R::of(2.0 / 3.0));
+        self.fibre_stress(a, w4) + (twice_symmetrised(a, ca) - pull) * (R::of(2.0) * w5 * q * q)
+    }
+
+    /// C⁻¹ (M − ⅓ tr M I) for a polynomial M of C.
+    #[inline(always)]
+    fn inverse_times_deviator(&self, m: &Symmetric<R>) -> Symmetric<R> {
+        let inverse = &self.inverse_cauchy_green;
+        inverse.commuting_product(m) - *inverse * (m.trace() * R::of(1.0 / 3.0))
+    }
+}
+
+/// a⊗b + b⊗a.
+#[inline(always)]
+fn twice_symmetrised<R: Real>(a: Vector<R>, b: Vector<R>) -> Symmetric<R> {
+    let two = R::of(2.0);
+    Symmetric([
+        two * a[0] * b[0],
+        two * a[1] * b[1],
+        two * a[2] * b[2],
+        a[0] * b[1] + a[1] * b[0],
+        a[1] * b[2] + a[2] * b[1],
+        a[0] * b[2] + a[2] * b[0],
+    ])
 }
 
 #[cfg(test)]
@@ -80,9 +158,19 @@ mod tests {
         let relative = |a: f64, b: f32| ((a - f64::from(b)) / a).abs();
         assert!(relative(fine.volume_change, coarse.volume_change) < 1e-6);
         assert!(relative(fine.isochoric_change, coarse.isochoric_change) < 1e-6);
-        let (a, b) = (fine.deviatoric_identity(), coarse.deviatoric_identity());
-        for k in 0..6 {
-            assert!((a.0[k] - f64::from(b.0[k])).abs() < 1e-6 * 1e-4, "component {k}");
+        let unit = [0.6, 0.0, 0.8];
+        let stresses = [
+            (fine.first_invariant_stress(0.5), coarse.first_invariant_stress(0.5)),
+            (fine.isotropic_stress(0.2, 0.3), coarse.isotropic_stress(0.2, 0.3)),
+            (
+                fine.fibre_stresses(unit, fine.fibre_strains(unit)),
+                coarse.fibre_stresses(unit.map(|x| x as f32), coarse.fibre_strains(unit.map(|x| x as f32))),
+            ),
+        ];
+        for (a, b) in stresses {
+            for k in 0..6 {
+                assert!((a.0[k] - f64::from(b.0[k])).abs() < 1e-6 * 1e-4, "component {k}");
+            }
         }
     }
 
@@ -100,5 +188,18 @@ mod tests {
                 assert!((entry - f64::from(u8::from(i == k))).abs() < 1e-14);
             }
         }
+        let bar = c.0.map(|row| row.map(|x| x * d.isochoric_factor));
+        let squared =
+            [0, 1, 2].map(|i| [0, 1, 2].map(|k| (0..3).map(|l| bar[i][l] * bar[l][k]).sum::<f64>()));
+        let trace = |t: &[[f64; 3]; 3]| t[0][0] + t[1][1] + t[2][2];
+        let i1 = trace(&bar);
+        let [first, second] = d.isochoric_invariants_minus_3();
+        assert!((first - (i1 - 3.0)).abs() < 1e-14);
+        assert!((second - (0.5 * (i1 * i1 - trace(&squared)) - 3.0)).abs() < 1e-14);
+        let a = [0.6, 0.0, 0.8];
+        let along = |t: [[f64; 3]; 3]| dot(a, Tensor(t).apply(a)) - 1.0;
+        let [fourth, fifth] = d.fibre_strains(a);
+        assert!((fourth - along(bar)).abs() < 1e-14 && (fourth - d.fibre_strain(a)).abs() < 1e-14);
+        assert!((fifth - along(squared)).abs() < 1e-14);
     }
 }

@@ -1,23 +1,56 @@
 //! Constitutive laws: energy and second Piola–Kirchhoff stress from the deformation gradient.
 //!
 //! A law is a small struct of parameters, its methods generic over the number type, so that the same lines
-//! run as reference and as fast path. The history of viscoelasticity wraps a law (see [`prony`](crate::prony));
+//! run as reference and as fast path. Most laws are a sum of an isochoric and a volumetric energy and implement
+//! [`SplitLaw`], the others [`Law`] itself. The history of viscoelasticity wraps a law (see [`prony`](crate::prony));
 //! it is not a law of its own. To add a law: its file here, its line in the registry below, its line in the battery.
 
+mod arruda_boyce;
+mod check;
 mod coupled_neo_hookean;
 mod deformation;
+mod demiray;
 mod elastic_constants;
+mod fung_orthotropic;
+mod gent;
+mod holzapfel_gasser_ogden;
+mod logarithmic_neo_hookean;
+mod mooney_rivlin;
 mod neo_hookean;
+mod ogden;
+mod orthotropic;
+mod polynomial;
+mod principal;
+mod split;
+mod st_venant_kirchhoff;
 mod transversely_isotropic;
+mod veronda_westmann;
+mod volumetric;
+mod yeoh;
 
 #[cfg(test)]
 mod battery;
 
+pub use arruda_boyce::ArrudaBoyce;
 pub use coupled_neo_hookean::CoupledNeoHookean;
 pub use deformation::Deformation;
+pub use demiray::Demiray;
 pub use elastic_constants::ElasticConstants;
+pub use fung_orthotropic::FungOrthotropic;
+pub use gent::Gent;
+pub use holzapfel_gasser_ogden::HolzapfelGasserOgden;
+pub use logarithmic_neo_hookean::LogarithmicNeoHookean;
+pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
+pub use ogden::{MOST_TERMS, Ogden, OgdenTerm};
+pub use orthotropic::Orthotropic;
+pub use polynomial::Polynomial;
+pub use split::{Compressibility, Matrix, SplitLaw};
+pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use transversely_isotropic::{FibreConvention, TransverselyIsotropic};
+pub use veronda_westmann::VerondaWestmann;
+pub use volumetric::{Volumetric, VolumetricEnergy};
+pub use yeoh::Yeoh;
 
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
@@ -63,6 +96,10 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// True if the law needs a fibre direction in every cell.
     const FIBRE: bool = false;
 
+    /// True if the volumetric stress is J U′(J) C⁻¹, of an energy of J alone. Elements that average the change of
+    /// volume stand on it: without it they compute another law.
+    const VOLUMETRIC_ENERGY: bool = true;
+
     /// Checks and converts the user's parameters.
     fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
 
@@ -72,10 +109,12 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Second Piola–Kirchhoff stress [Pa].
     fn stress<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Split<Symmetric<R>>;
 
-    /// Moduli at rest, without the fibres.
+    /// Moduli at rest, without the fibres; of a law without isotropic matrix the largest shear modulus.
     fn small_strain(&self) -> SmallStrainModuli;
 
-    /// An upper bound of ρc² over all directions at rest [Pa]: λ + 2μ, plus what fibres add.
+    /// An upper bound of ρc² over all directions at rest [Pa]: λ + 2μ, plus what fibres add. With it the element bound
+    /// of the critical step is rigorous: by Cauchy and Schwarz the nuclear norm of Σ v_a⊗B_a is at most |v| |B|, and a
+    /// positive form is largest over that ball at some n⊗m.
     fn longitudinal_modulus(&self) -> f64 {
         let SmallStrainModuli { shear, bulk } = self.small_strain();
         bulk + 4.0 / 3.0 * shear
@@ -130,6 +169,11 @@ macro_rules! registry {
             pub fn needs_fibre(&self) -> bool {
                 match self { $(Self::$law(_) => <$law as Law>::FIBRE,)* }
             }
+
+            /// True if an element may average the change of volume; see [`Law::VOLUMETRIC_ENERGY`].
+            pub fn has_volumetric_energy(&self) -> bool {
+                match self { $(Self::$law(_) => <$law as Law>::VOLUMETRIC_ENERGY,)* }
+            }
         }
 
         /// Runs `$body` with `$bound` the concrete law, so that a kernel is compiled for each.
@@ -147,8 +191,34 @@ registry! {
     "neo-hookean" => NeoHookean,
     /// Neo-Hookean with coupled shear and volume terms.
     "coupled-neo-hookean" => CoupledNeoHookean,
+    /// Neo-Hookean with ln J in both terms.
+    "logarithmic-neo-hookean" => LogarithmicNeoHookean,
+    /// Hooke's law in the Green–Lagrange strain.
+    "st-venant-kirchhoff" => StVenantKirchhoff,
+    /// Linear in both invariants.
+    "mooney-rivlin" => MooneyRivlin,
+    /// Quadratic in both invariants.
+    "polynomial" => Polynomial,
+    /// Cubic in the first invariant.
+    "yeoh" => Yeoh,
+    /// Chains that lock, as a series.
+    "arruda-boyce" => ArrudaBoyce,
+    /// A logarithm that locks.
+    "gent" => Gent,
+    /// Exponential in the first invariant.
+    "demiray" => Demiray,
+    /// Exponential in the first invariant, linear in the second.
+    "veronda-westmann" => VerondaWestmann,
+    /// Powers of the principal stretches.
+    "ogden" => Ogden,
     /// Neo-Hookean matrix with one family of fibres.
     "transversely-isotropic" => TransverselyIsotropic,
+    /// Neo-Hookean matrix with two families of fibres.
+    "orthotropic" => Orthotropic,
+    /// Neo-Hookean matrix with dispersed fibres that carry tension only.
+    "holzapfel-gasser-ogden" => HolzapfelGasserOgden,
+    /// Exponential of a quadratic form of the strain.
+    "fung-orthotropic" => FungOrthotropic,
 }
 
 impl AnyLaw {

@@ -1,10 +1,9 @@
-//! Split neo-Hookean law (thesis 6.4–6.5 without fibres): Ψ = μ/2 (Ī₁ − 3) + κ/2 (J − 1)².
-//! Finite at J → 0, hence weak against inversion.
+//! Split neo-Hookean law (thesis 6.4–6.5 without fibres): Ψ = μ/2 (Ī₁ − 3) + U(J).
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
+use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric};
 use crate::Real;
 use crate::tensor::{Symmetric, Vector};
 
@@ -13,47 +12,42 @@ use crate::tensor::{Symmetric, Vector};
 pub struct NeoHookean {
     /// Shear modulus μ [Pa].
     pub shear: f64,
-    /// Bulk modulus κ [Pa].
-    pub bulk: f64,
+    /// Volumetric energy.
+    pub volumetric: Volumetric,
 }
 
-/// Parameters of the split neo-Hookean law: Ψ = μ/2 (Ī₁ − 3) + κ/2 (J − 1)².
+/// Parameters of the split neo-Hookean law: Ψ = μ/2 (Ī₁ − 3) + U(J).
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct NeoHookeanParameters {
-    /// The two moduli.
+    /// The moduli.
     #[serde(flatten)]
-    pub elastic: ElasticConstants,
+    pub matrix: Matrix,
 }
 
-impl Law for NeoHookean {
+impl SplitLaw for NeoHookean {
     type Parameters = NeoHookeanParameters;
 
     fn new(parameters: &NeoHookeanParameters) -> Result<Self, ParameterError> {
-        let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
-        Ok(Self { shear, bulk })
+        let (shear, volumetric) = parameters.matrix.parts()?;
+        Ok(Self { shear, volumetric })
     }
 
     #[inline(always)]
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Split<R> {
-        let x = deformation.volume_change;
-        Split {
-            isochoric: R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3(),
-            volumetric: R::of(0.5 * self.bulk) * x * x,
-        }
+    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> R {
+        R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3()
     }
 
     #[inline(always)]
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Split<Symmetric<R>> {
-        // S_vol = J U'(J) C⁻¹ with U' = κ (J − 1).
-        let pressure = R::of(self.bulk) * deformation.volume_change;
-        Split {
-            isochoric: deformation.deviatoric_identity() * R::of(self.shear),
-            volumetric: deformation.inverse_cauchy_green * (deformation.volume_ratio * pressure),
-        }
+    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Symmetric<R> {
+        deformation.first_invariant_stress(R::of(0.5 * self.shear))
     }
 
-    fn small_strain(&self) -> SmallStrainModuli {
-        SmallStrainModuli { shear: self.shear, bulk: self.bulk }
+    fn volumetric(&self) -> Volumetric {
+        self.volumetric
+    }
+
+    fn shear(&self) -> f64 {
+        self.shear
     }
 }

@@ -114,6 +114,14 @@ impl Builder<'_> {
             self.error(&law_path(name, &table.law, law_name), message, "no such law", help);
             return;
         };
+        if table.element.is_some_and(Element::averages_pressure) && !law.law.has_volumetric_energy() {
+            let law = law.law.name();
+            let message =
+                format!("this element averages the pressure, and `{law}` has no energy of the volume alone");
+            let help = "take `tet4` or `hex8`, or a law with a volumetric energy such as `neo-hookean`";
+            self.error(&["body", name, "element"], message, "does not go with the law", help);
+            return;
+        }
         let Some(prony) = self.prony(law_name, law) else { return };
         let Some(fibre) = self.fibres(name, table, law_name, law, block, &cells) else { return };
         let material = Material { law: law.law, prony, density: table.density };

@@ -89,6 +89,11 @@ impl Element {
     pub fn is_tet(self) -> bool {
         matches!(self, Self::Tet4 | Self::Tet4Anp | Self::Tet4Ianp | Self::Tet4IanpNiftysim)
     }
+
+    /// True if the pressure is an average, so that the law must have a volumetric energy.
+    pub fn averages_pressure(self) -> bool {
+        matches!(self, Self::Tet4Anp | Self::Tet4Ianp | Self::Hex8Full)
+    }
 }
 
 /// A mesh: exactly one of `file`, `block`, `ellipsoid`, `tube`, `organ`.
