@@ -129,3 +129,93 @@ fn measure_soft() {
         println!("worst tip difference {worst:.3e} of {size:.3e}");
     }
 }
+
+#[test]
+fn measure_cube() {
+    let size = 10;
+    let law = soft_tissue();
+    let cube = Specimen::block([0.05; 3], [size; 3], VolumeCell::Hex, &elastic(law), [0.0; 3])
+        .fix("x-max", [true, false, false])
+        .fix("y-min", [false, true, false])
+        .fix("z-min", [false, false, true]);
+    let mut cube = cube.damped(60.0);
+    let nodes = cube.face("x-min");
+    let curve = pliant_mechanics::curve::Curve {
+        shape: pliant_mechanics::curve::Shape::Polynomial,
+        from: 0.0,
+        to: 1.0,
+    };
+    cube.model.constraints.push(pliant_mechanics::model::Constraint {
+        name: "press".into(),
+        nodes,
+        components: [true; 3],
+        motion: pliant_mechanics::model::Motion::Displacement([0.01, 0.0, 0.0], curve),
+    });
+    let rest = cube.true_limit();
+    let mut monitor = Monitor::new(&cube.model, rest, OnUnstable::Report);
+    let mut next = 0.0;
+    println!("rest {rest:.4e} bound {:.4e}", cube.element_bound());
+    let done = run::<f64>(&cube.model, 0.5 * cube.element_bound(), 1.0, |_, state| {
+        if state.time >= next {
+            next += 0.05;
+            let picked = monitor.limit(&cube.model, &state.displacement).unwrap();
+            let all = monitor.limit_of_all(&cube.model, &state.displacement).unwrap();
+            let truth = true_limit_at(&cube.model, &state.displacement).unwrap().step;
+            println!(
+                "t {:.3}: picked {:.4} all {:.4} truth {:.4}",
+                state.time,
+                picked.0 / rest,
+                all.0 / rest,
+                truth / rest
+            );
+        }
+    });
+    println!("{:?}", done.err());
+    for part in [0.9, 0.8, 0.7] {
+        let done = run_watched::<f64>(&cube.model, part * rest, OnUnstable::Report, 1.0, |_, _| ());
+        match done {
+            Ok((_, s)) => println!("{part} ok {:?}", s.stability),
+            Err(e) => println!("{part} {e}"),
+        }
+    }
+}
+
+#[test]
+fn measure_liver() {
+    let (source, folder) = pliant_scene::open(std::path::Path::new("../scenes/liver")).unwrap();
+    let scene = pliant_scene::Scene::from_source(source, folder).unwrap();
+    let built = pliant_scene::build(&scene).unwrap();
+    let model = &built.model;
+    let rest = pliant_mechanics::critical_step::true_limit(model).unwrap().step;
+    let mut monitor = Monitor::new(model, rest, OnUnstable::Report);
+    let mut next = 0.0;
+    let _ = run::<f32>(model, 0.4 * rest, 2.0, |_, state| {
+        if state.time >= next {
+            next += 0.2;
+            let u: Vec<[f64; 3]> = state.displacement.iter().map(|&u| u.map(f64::from)).collect();
+            let picked = monitor.limit(model, &u).unwrap();
+            let all = monitor.limit_of_all(model, &u).unwrap();
+            let truth = true_limit_at(model, &u).unwrap();
+            println!(
+                "t {:.3}: picked {:.4} all {:.4} truth {:.4} ({} calls)",
+                state.time,
+                picked.0 / rest,
+                all.0 / rest,
+                truth.step / rest,
+                truth.force_calls
+            );
+        }
+    });
+    let u = vec![[0.0f64; 3]; model.node_count()];
+    let n = 200;
+    let t = std::time::Instant::now();
+    for _ in 0..n {
+        std::hint::black_box(monitor.limit(model, &u));
+    }
+    println!("look {:.1} ns a cell", t.elapsed().as_secs_f64() / n as f64 / model.cell_count() as f64 * 1e9);
+    let t = std::time::Instant::now();
+    for _ in 0..20 {
+        std::hint::black_box(monitor.limit_of_all(model, &u));
+    }
+    println!("all {:.1} ns a cell", t.elapsed().as_secs_f64() / 20.0 / model.cell_count() as f64 * 1e9);
+}

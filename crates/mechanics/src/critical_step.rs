@@ -81,12 +81,16 @@ pub fn true_limit(model: &Model) -> Result<TrueLimit, Contradiction> {
 /// # Errors
 /// If constraints contradict each other.
 pub fn true_limit_at(model: &Model, displacement: &[Vector<f64>]) -> Result<TrueLimit, Contradiction> {
-    let owners = model.constrained_components()?;
-    let mut operator = Operator::new(model, &owners, displacement);
+    Ok(limit_about(model, &model.constrained_components()?, displacement))
+}
+
+/// The same where the owner of each component is known.
+pub(crate) fn limit_about(model: &Model, owners: &[[u32; 3]], displacement: &[Vector<f64>]) -> TrueLimit {
+    let mut operator = Operator::new(model, owners, displacement);
     let started = std::time::Instant::now();
     let (eigenvalue, error) = largest_eigenvalue(&mut operator, model.node_count());
     let seconds_per_call = started.elapsed().as_secs_f64() / operator.calls.max(1) as f64;
-    Ok(TrueLimit { step: 2.0 / eigenvalue.sqrt(), error, force_calls: operator.calls, seconds_per_call })
+    TrueLimit { step: 2.0 / eigenvalue.sqrt(), error, force_calls: operator.calls, seconds_per_call }
 }
 
 /// The symmetric operator M^(−1/2) K M^(−1/2) on the free components.

@@ -1,14 +1,19 @@
 //! The largest stable step of a deformed state, watched during a run.
 //!
-//! A cell's own limit is 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
-//! ([`tangent`](crate::tangent)); no cell of an assembly moves faster than its fastest cell alone (Irons and Treharne).
-//! The limit now is that at rest, L (the true limit), brought down cell by cell:
-//! Δt_cr ≈ min_e max(Δt_e⁰, L) Δt_e/Δt_e⁰, with Δt_e⁰ that of the cell at rest. So a cell that is slower than the
-//! assembly counts with its own limit, and a sliver, which the assembly holds back, with its change.
-//! This is never above L times the smallest Δt_e over the smallest Δt_e⁰.
+//! A cell's own limit is Δt_e = 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
+//! ([`tangent`](crate::tangent)); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the true
+//! limit L of a reference state, at first rest, the limit now is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e),
+//! where r_e² is the stiffness of the cell in the reference state over that now, the smaller one of the ratios for all
+//! modes and for plane waves. So a cell that is slower than the assembly counts with its own limit, and one that the
+//! assembly holds back, with its change. Measured on deformed bodies against the true limit about their state, it errs on
+//! the safe side, by 1 to 20 %: `validation/tests/stability.rs`.
 //!
-//! Eigenvalues are found for the cells that stand first in two cheap orders, one by an isotropic guess of their limit
-//! and one by stretch: 18 stresses and an eigenvalue problem a cell would cost as much as 30 steps for all.
+//! Where this estimate falls below the step it may be the cells in question that do not matter. Then the true limit
+//! of the current state is found, by as many force evaluations as some 50 to 100 steps take, and the current state becomes
+//! the reference.
+//!
+//! Stiffness is found for the cells that stand first in two cheap orders, one by an isotropic guess of their speed
+//! and one by stretch: 18 stresses and the eigenvalue problems cost as much as 50 steps of a cell.
 //! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control
 //! does not change with deformation. Loads that follow the surface do not count.
 
@@ -20,22 +25,22 @@ use crate::Real;
 use crate::critical_step::rest_limit;
 use crate::forces::Deformed;
 use crate::model::{Model, Solid, with_cells};
-use crate::tangent::{gradient_square, stiffest_mode};
+use crate::state::State;
+use crate::tangent::{Stiffness, gradient_square, stiffness};
 use crate::tensor::{Symmetric, Tensor, Vector, cast, dot, sub};
 
 /// Steps between two looks at the limit.
 pub const CHECK_EVERY: u64 = 50;
 /// A look is taken earlier where the least J or the largest stretch has changed by this factor.
 pub const CHANGE: f64 = 1.1;
-/// Substeps are chosen so that they reach this part of the limit at the most …
+/// Substeps are chosen so that they reach this part of the limit: some is left for what comes until the next look.
 pub const RESERVE: f64 = 0.95;
-/// … and kept up to this part: the estimate was found up to 0.5 % above the true limit of deformed blocks, and the limit
-/// may fall until the next look.
-pub const KEEP: f64 = 0.98;
+/// Steps between two true limits, except where a run would stop.
+pub const REFERENCE_EVERY: u64 = 1000;
 /// The most substeps a step is cut into.
 pub const MOST_SUBSTEPS: u32 = 100;
 /// One in this many cells is looked at closely, for each of the two orders …
-const SHARE: usize = 64;
+const SHARE: usize = 128;
 /// … and at least this many.
 const LEAST: usize = 16;
 
@@ -61,6 +66,8 @@ pub struct Stability {
     pub done: u32,
     /// Looks taken at the limit.
     pub checks: u64,
+    /// True limits found since the beginning.
+    pub true_limits: u32,
     /// The last look.
     pub last: Option<Look>,
     /// The look with the smallest limit.
@@ -77,6 +84,8 @@ pub struct Stability {
     pub most_substeps: u32,
     /// Substeps beyond one a step, in all.
     pub extra_steps: u64,
+    /// The last true limit and the steps done then; its state is [`State::reference`](crate::State::reference).
+    pub(crate) reference: Option<(f64, u64)>,
     /// Deformation at the last look.
     pub(crate) deformed: Deformed,
     /// Steps done at the last look.
@@ -89,6 +98,8 @@ impl Default for Stability {
             substeps: 1,
             done: 0,
             checks: 0,
+            true_limits: 0,
+            reference: None,
             last: None,
             smallest: None,
             steps_below: 0,
@@ -104,6 +115,15 @@ impl Default for Stability {
 }
 
 impl Stability {
+    /// Records a look and the deformation it was taken at.
+    pub(crate) fn note(&mut self, look: Look, deformed: Deformed, steps: u64) {
+        self.checks += 1;
+        (self.last, self.deformed, self.looked_at) = (Some(look), deformed, steps);
+        if self.smallest.is_none_or(|smallest| look.limit < smallest.limit) {
+            self.smallest = Some(look);
+        }
+    }
+
     /// Records into how many parts the step that begins now is cut.
     pub(crate) fn note_substeps(&mut self, substeps: u32, time: f64) {
         if substeps > 1 {
@@ -125,7 +145,7 @@ pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
         return None;
     }
     let enough = (enough as u32).max(1);
-    let stable = step / f64::from(now) <= KEEP * limit;
+    let stable = step / f64::from(now) <= limit;
     Some(if stable { now.min(enough) } else { enough })
 }
 
@@ -134,7 +154,7 @@ pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
 pub struct Look {
     /// Time [s].
     pub time: f64,
-    /// Estimate of the largest stable step [s].
+    /// The largest stable step [s], estimated or true.
     pub limit: f64,
     /// The solid of the cell that sets it.
     pub solid: usize,
@@ -142,20 +162,26 @@ pub struct Look {
     pub cell: usize,
 }
 
-/// Watches the largest stable step of a model. Holds constants and scratch only.
+/// Watches the largest stable step of a model. Holds constants and scratch, and what follows from the reference.
 pub struct Monitor {
     on_unstable: OnUnstable,
     solids: Vec<Watch>,
+    /// The reference of the state that the watch is made for.
+    reference: Option<(f64, u64)>,
 }
 
 /// The cells of a solid under watch.
 struct Watch {
-    /// λ of K/V at rest [Pa/m²], hourglass control included.
-    at_rest: Vec<f64>,
-    /// max(Δt_e⁰, L) [s].
-    limit: Vec<f64>,
+    /// L [s].
+    limit: f64,
+    /// Of each cell in the reference state.
+    reference: Vec<Stiffness>,
+    /// Δt_e in the reference state [s].
+    own_limit: Vec<f64>,
     /// λ of hourglass control alone, over V [Pa/m²].
     hourglass: Vec<f64>,
+    /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with that at rest: brings the guesses of all cells to one scale.
+    weight: Vec<f64>,
     /// What stands first in the two orders.
     rank: Vec<[f64; 2]>,
     order: [Vec<u32>; 2],
@@ -164,28 +190,36 @@ struct Watch {
 impl Monitor {
     /// A monitor of a model whose limit at rest is `limit` [s].
     pub fn new(model: &Model, limit: f64, on_unstable: OnUnstable) -> Self {
-        let watch = |solid: &Solid| {
-            let count = solid.cells.len();
-            let hourglass: Vec<f64> = (0..count).map(|cell| hourglass_modulus(solid, cell)).collect();
-            let at_rest: Vec<f64> = (0..count)
-                .into_par_iter()
-                .map(|cell| stiffest(solid, cell, &Tensor::ZERO).max(hourglass[cell]))
-                .collect();
-            let limit_of = |cell: usize| rest_limit(model, solid, cell, at_rest[cell]).max(limit);
-            Watch {
-                limit: (0..count).map(limit_of).collect(),
-                rank: vec![[0.0; 2]; count],
-                order: [(0..count as u32).collect(), (0..count as u32).collect()],
-                at_rest,
-                hourglass,
-            }
-        };
-        Self { on_unstable, solids: model.solids.iter().map(watch).collect() }
+        let at_rest = vec![[0.0; 3]; model.node_count()];
+        let solids = model.solids.iter().map(|solid| Watch::new(model, solid, limit, &at_rest)).collect();
+        Self { on_unstable, solids, reference: None }
     }
 
     /// What to do when the limit falls below the step.
     pub fn on_unstable(&self) -> OnUnstable {
         self.on_unstable
+    }
+
+    /// Takes on the reference of a state, where it has another one than before.
+    pub(crate) fn refer_to<R: Real>(&mut self, model: &Model, state: &State<R>) {
+        let reference = state.stability.reference;
+        if let (true, Some((limit, _))) = (self.reference != reference, reference) {
+            for (watch, solid) in self.solids.iter_mut().zip(&model.solids) {
+                watch.refer_to(model, solid, limit, &state.reference);
+            }
+        }
+        self.reference = reference;
+    }
+
+    /// Whether an estimate needs the true limit: it asks for other than whole steps, and the last one is long past.
+    pub(crate) fn doubts<R>(&self, state: &State<R>, limit: f64, step: f64, now: u32) -> bool {
+        let rested =
+            state.stability.reference.is_none_or(|(_, steps)| state.steps >= steps + REFERENCE_EVERY);
+        match self.on_unstable {
+            OnUnstable::Substep => rested && substeps(step, limit, now) != Some(1),
+            OnUnstable::Stop => limit < step,
+            OnUnstable::Report => rested && limit < step,
+        }
     }
 
     /// The limit of a deformed state: the estimate [s], the solid and the cell that set it; `None` without cells or
@@ -223,11 +257,45 @@ impl Monitor {
 }
 
 impl Watch {
+    fn new(model: &Model, solid: &Solid, limit: f64, at_rest: &[Vector<f64>]) -> Self {
+        let count = solid.cells.len();
+        let undeformed = Stiffness { mode: 0.0, wave: 0.0 };
+        let mut watch = Self {
+            limit,
+            reference: vec![undeformed; count],
+            own_limit: vec![0.0; count],
+            hourglass: (0..count).map(|cell| hourglass_modulus(solid, cell)).collect(),
+            weight: vec![0.0; count],
+            rank: vec![[0.0; 2]; count],
+            order: [(0..count as u32).collect(), (0..count as u32).collect()],
+        };
+        watch.refer_to(model, solid, limit, at_rest);
+        let modulus = solid.material.law.longitudinal_modulus();
+        for cell in 0..count {
+            let (_, square) = deformation(solid, cell, at_rest);
+            let slowest = watch.own_limit[cell].max(limit);
+            let size = product_square(&square, &Symmetric::IDENTITY).sqrt();
+            watch.weight[cell] = 1.0 / (size * modulus * slowest * slowest);
+        }
+        watch
+    }
+
+    fn refer_to<R: Real>(&mut self, model: &Model, solid: &Solid, limit: f64, displacement: &[Vector<R>]) {
+        self.limit = limit;
+        let hourglass = &self.hourglass;
+        let cells = self.reference.par_iter_mut().zip(&mut self.own_limit).enumerate().with_min_len(16);
+        cells.for_each(|(cell, (stiffness, own))| {
+            let (h, _) = deformation(solid, cell, displacement);
+            *stiffness = stiffness_of(solid, cell, &h, hourglass[cell]);
+            *own = rest_limit(model, solid, cell, stiffness.mode);
+        });
+    }
+
     /// Finds both ranks of every cell: the squared speed by an isotropic guess, and the squared stretch.
     fn rank<R: Real>(&mut self, solid: &Solid, displacement: &[Vector<R>]) {
         let bulk = solid.material.law.small_strain().bulk;
         let rest = solid.material.law.longitudinal_modulus();
-        let limit = &self.limit;
+        let weight = &self.weight;
         self.rank.par_iter_mut().enumerate().with_min_len(256).for_each(|(cell, rank)| {
             let (h, square) = deformation(solid, cell, displacement);
             let strain = Symmetric::green_lagrange_twice(&h);
@@ -239,9 +307,9 @@ impl Watch {
             };
             // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
             let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * c.trace() / 3.0;
-            let inverse = c.cofactor() * (1.0 / (j * j));
-            let current = contraction(&square, &inverse) / square.trace();
-            *rank = [current * modulus / (rest * limit[cell] * limit[cell]), stretch];
+            // |G C⁻¹| over |G|: how much closer the deformed faces lie, the closest pair counting most.
+            let closeness = product_square(&square, &(c.cofactor() * (1.0 / (j * j)))).sqrt();
+            *rank = [closeness * modulus * weight[cell], stretch];
         });
     }
 
@@ -279,8 +347,10 @@ impl Watch {
         let limit = |&cell: &u32| {
             let cell = cell as usize;
             let (h, _) = deformation(solid, cell, displacement);
-            let stiffness = stiffest(solid, cell, &h).max(self.hourglass[cell]);
-            let limit = self.limit[cell] * (self.at_rest[cell] / stiffness).sqrt();
+            let now = stiffness_of(solid, cell, &h, self.hourglass[cell]);
+            let before = &self.reference[cell];
+            let [mode, wave] = [before.mode / now.mode, before.wave / now.wave].map(f64::sqrt);
+            let limit = (self.own_limit[cell] * mode).max(self.limit * mode.min(wave));
             limit.is_finite().then_some((limit, cell))
         };
         cells.par_iter().with_min_len(16).map(limit).reduce(|| None, smaller)
@@ -295,10 +365,12 @@ fn smaller(a: Option<(f64, usize)>, b: Option<(f64, usize)>) -> Option<(f64, usi
     }
 }
 
-fn stiffest(solid: &Solid, cell: usize, h: &Tensor<f64>) -> f64 {
+/// The stiffness of a cell, that of its hourglass control included.
+fn stiffness_of(solid: &Solid, cell: usize, h: &Tensor<f64>, hourglass: f64) -> Stiffness {
     let square = with_cells!(&solid.cells, block => gradient_square(&block.rest[cell].gradient));
     let fibre = solid.fibre.get(cell).copied().unwrap_or_default();
-    stiffest_mode(&solid.material.law, fibre, h, &square)
+    let Stiffness { mode, wave } = stiffness(&solid.material.law, fibre, h, &square);
+    Stiffness { mode: mode.max(hourglass), wave }
 }
 
 /// c μ ΣB² [Pa/m²], see [`critical_step::cell_bound`](crate::critical_step::cell_bound).
@@ -323,8 +395,11 @@ fn deformation<R: Real>(
     })
 }
 
-/// A : B.
-fn contraction(a: &Symmetric<f64>, b: &Symmetric<f64>) -> f64 {
-    let ([xx, yy, zz, xy, yz, xz], b) = (a.0, b.0);
-    dot([xx, yy, zz], [b[0], b[1], b[2]]) + 2.0 * dot([xy, yz, xz], [b[3], b[4], b[5]])
+/// tr (A B A B).
+fn product_square(a: &Symmetric<f64>, b: &Symmetric<f64>) -> f64 {
+    let (product, transposed) = {
+        let product = a.full().times_symmetric(b);
+        (product, product.transpose())
+    };
+    (0..3).map(|i| dot(product.0[i], transposed.0[i])).sum()
 }

@@ -24,6 +24,8 @@ pub struct State<R> {
     pub work: Work,
     /// How steps are cut, and what was seen of the largest stable one.
     pub stability: Stability,
+    /// Displacements [m] of the state whose true limit is known, at first rest; see [`Monitor`](crate::stability::Monitor).
+    pub reference: Vec<Vector<R>>,
 }
 
 /// What a relaxing law remembers of a solid.
@@ -90,6 +92,7 @@ impl<R: Real> State<R> {
             time: 0.0,
             steps: 0,
             increment: vec![[R::ZERO; 3]; model.node_count()],
+            reference: vec![[R::ZERO; 3]; model.node_count()],
             displacement,
             history: model.solids.iter().map(History::at_rest).collect(),
             work: Work::default(),

@@ -12,11 +12,12 @@ use rayon::prelude::*;
 
 use crate::Real;
 use crate::applied::AppliedForces;
+use crate::critical_step::limit_about;
 use crate::forces::{Deformed, InternalForces};
 use crate::model::{Contradiction, FREE, Model};
 use crate::stability::{CHANGE, CHECK_EVERY, Look, Monitor, OnUnstable, substeps};
 use crate::state::State;
-use crate::tensor::{Vector, add};
+use crate::tensor::{Vector, add, cast};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -335,33 +336,46 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// Looks at the limit where one is due, and chooses the parts of the step to come.
     fn watch(&mut self, state: &mut State<R>, deformed: &Deformed) -> Result<(), StepError> {
         let Some(monitor) = &mut self.monitor else { return Ok(()) };
-        let seen = &mut state.stability;
+        let (step, now, on_unstable) = (self.step, self.substeps, monitor.on_unstable());
+        let seen = &state.stability;
         let due = seen.checks == 0
             || state.steps >= seen.looked_at + CHECK_EVERY
             || deformed.differs(&seen.deformed, CHANGE);
-        if due && let Some((limit, solid, cell)) = monitor.limit(self.model, &state.displacement) {
-            let look = Look { time: state.time, limit, solid, cell };
-            seen.checks += 1;
-            (seen.last, seen.deformed, seen.looked_at) = (Some(look), *deformed, state.steps);
-            if seen.smallest.is_none_or(|smallest| limit < smallest.limit) {
-                seen.smallest = Some(look);
+        if due {
+            monitor.refer_to(self.model, state);
+            if let Some((mut limit, solid, cell)) = monitor.limit(self.model, &state.displacement) {
+                if monitor.doubts(state, limit, step, now) {
+                    limit = self.take_as_reference(state);
+                }
+                let look = Look { time: state.time, limit, solid, cell };
+                state.stability.note(look, *deformed, state.steps);
             }
         }
-        let Some(look) = seen.last else { return Ok(()) };
-        seen.steps_below += u64::from(look.limit < self.step);
-        match monitor.on_unstable() {
+        let Some(look) = state.stability.last else { return Ok(()) };
+        state.stability.steps_below += u64::from(look.limit < step);
+        match on_unstable {
             OnUnstable::Report => Ok(()),
-            OnUnstable::Stop if look.limit < self.step => Err(self.below_limit(&look, state.time)),
+            OnUnstable::Stop if look.limit < step => Err(self.below_limit(&look, state.time)),
             OnUnstable::Stop => Ok(()),
-            OnUnstable::Substep => match substeps(self.step, look.limit, self.substeps) {
+            OnUnstable::Substep => match substeps(step, look.limit, now) {
                 Some(substeps) => {
                     self.substeps = substeps;
-                    seen.note_substeps(substeps, state.time);
+                    state.stability.note_substeps(substeps, state.time);
                     Ok(())
                 }
                 None => Err(self.below_limit(&look, state.time)),
             },
         }
+    }
+
+    /// Finds the true limit [s] of a state and makes it the reference of what follows.
+    fn take_as_reference(&self, state: &mut State<R>) -> f64 {
+        let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
+        let limit = limit_about(self.model, &self.owners, &displacement).step;
+        state.reference.clone_from(&state.displacement);
+        state.stability.reference = Some((limit, state.steps));
+        state.stability.true_limits += 1;
+        limit
     }
 
     fn below_limit(&self, look: &Look, time: f64) -> StepError {
