@@ -32,12 +32,17 @@ pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
     2.0 / (n * wave * solid.cells.gradient_square_sum(cell)).sqrt()
 }
 
+/// The bound [s] of one cell with what mass scaling adds to it.
+pub(crate) fn scaled_bound(model: &Model, solid: &Solid, cell: usize) -> f64 {
+    cell_bound(solid, cell) * model.mass_factor(solid, cell).sqrt()
+}
+
 /// The smallest bound over all cells; `None` without cells.
 pub fn element_bound(model: &Model) -> Option<ElementBound> {
     let mut worst: Option<ElementBound> = None;
     for (index, solid) in model.solids.iter().enumerate() {
         for cell in 0..solid.cells.len() {
-            let step = cell_bound(solid, cell) * model.mass_factor(solid, cell).sqrt();
+            let step = scaled_bound(model, solid, cell);
             if worst.is_none_or(|w| step < w.step) {
                 worst = Some(ElementBound { step, solid: index, cell });
             }
@@ -47,7 +52,7 @@ pub fn element_bound(model: &Model) -> Option<ElementBound> {
 }
 
 /// The limit [s] of a cell alone, from the largest eigenvalue of its stiffness over its volume [Pa/m²].
-pub(crate) fn rest_limit(model: &Model, solid: &Solid, cell: usize, stiffness: f64) -> f64 {
+pub(crate) fn limit_alone(model: &Model, solid: &Solid, cell: usize, stiffness: f64) -> f64 {
     let density = solid.material.density * model.mass_factor(solid, cell);
     2.0 / (solid.cells.nodes_per_cell() as f64 * stiffness / density).sqrt()
 }

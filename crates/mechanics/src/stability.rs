@@ -22,7 +22,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
-use crate::critical_step::rest_limit;
+use crate::critical_step::{limit_alone, scaled_bound};
 use crate::forces::Deformed;
 use crate::model::{Model, Solid, with_cells};
 use crate::state::State;
@@ -174,24 +174,23 @@ pub struct Monitor {
 struct Watch {
     /// L [s].
     limit: f64,
-    /// Of each cell in the reference state.
-    reference: Vec<Stiffness>,
-    /// Δt_e in the reference state [s].
-    own_limit: Vec<f64>,
+    /// Of each cell in the reference state, once it was needed.
+    reference: Vec<Option<Stiffness>>,
     /// λ of hourglass control alone, over V [Pa/m²].
     hourglass: Vec<f64>,
-    /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with that at rest: brings the guesses of all cells to one scale.
+    /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with the element bound Δt_e at rest: brings the guesses of all cells to one scale.
     weight: Vec<f64>,
     /// What stands first in the two orders.
     rank: Vec<[f64; 2]>,
     order: [Vec<u32>; 2],
+    /// Limit [s] and reference of the cells looked at closely.
+    found: Vec<(f64, Stiffness)>,
 }
 
 impl Monitor {
     /// A monitor of a model whose limit at rest is `limit` [s].
     pub fn new(model: &Model, limit: f64, on_unstable: OnUnstable) -> Self {
-        let at_rest = vec![[0.0; 3]; model.node_count()];
-        let solids = model.solids.iter().map(|solid| Watch::new(model, solid, limit, &at_rest)).collect();
+        let solids = model.solids.iter().map(|solid| Watch::new(model, solid, limit)).collect();
         Self { on_unstable, solids, reference: None }
     }
 
@@ -201,11 +200,12 @@ impl Monitor {
     }
 
     /// Takes on the reference of a state, where it has another one than before.
-    pub(crate) fn refer_to<R: Real>(&mut self, model: &Model, state: &State<R>) {
+    pub(crate) fn refer_to<R>(&mut self, state: &State<R>) {
         let reference = state.stability.reference;
         if let (true, Some((limit, _))) = (self.reference != reference, reference) {
-            for (watch, solid) in self.solids.iter_mut().zip(&model.solids) {
-                watch.refer_to(model, solid, limit, &state.reference);
+            for watch in &mut self.solids {
+                watch.limit = limit;
+                watch.reference.fill(None);
             }
         }
         self.reference = reference;
@@ -223,72 +223,60 @@ impl Monitor {
     }
 
     /// The limit of a deformed state: the estimate [s], the solid and the cell that set it; `None` without cells or
-    /// where no cell's stiffness is a number.
+    /// where no cell's stiffness is a number. `reference` is the state whose true limit is known.
     pub fn limit<R: Real>(
         &mut self,
         model: &Model,
         displacement: &[Vector<R>],
+        reference: &[Vector<R>],
     ) -> Option<(f64, usize, usize)> {
         let solids = self.solids.iter_mut().zip(&model.solids).enumerate();
         solids
             .filter_map(|(index, (watch, solid))| {
                 watch.rank(solid, displacement);
                 watch.pick();
-                let found = [0, 1].map(|by| watch.smallest(solid, displacement, watch.first(by)));
+                let found = [0, 1].map(|by| watch.smallest(model, solid, displacement, reference, by));
                 smaller(found[0], found[1]).map(|(limit, cell)| (limit, index, cell))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// The same from every cell, as a measure of what [`limit`](Self::limit) leaves out.
+    /// The same with every cell looked at closely, as a measure of what [`limit`](Self::limit) leaves out.
     pub fn limit_of_all<R: Real>(
         &self,
         model: &Model,
         displacement: &[Vector<R>],
+        reference: &[Vector<R>],
     ) -> Option<(f64, usize, usize)> {
         let solids = self.solids.iter().zip(&model.solids).enumerate();
         solids
             .filter_map(|(index, (watch, solid))| {
-                let all: Vec<u32> = (0..solid.cells.len() as u32).collect();
-                watch.smallest(solid, displacement, &all).map(|(limit, cell)| (limit, index, cell))
+                let limit = |cell: usize| (watch.look(model, solid, displacement, reference, cell).0, cell);
+                let all = (0..solid.cells.len()).into_par_iter().map(limit).map(finite);
+                all.reduce(|| None, smaller).map(|(limit, cell)| (limit, index, cell))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
 }
 
 impl Watch {
-    fn new(model: &Model, solid: &Solid, limit: f64, at_rest: &[Vector<f64>]) -> Self {
+    fn new(model: &Model, solid: &Solid, limit: f64) -> Self {
         let count = solid.cells.len();
-        let undeformed = Stiffness { mode: 0.0, wave: 0.0 };
-        let mut watch = Self {
+        let modulus = solid.material.law.longitudinal_modulus();
+        let weight = |cell: usize| {
+            let square = gradient_square_of(solid, cell);
+            let slowest = scaled_bound(model, solid, cell).max(limit);
+            1.0 / (product_square(&square, &Symmetric::IDENTITY).sqrt() * modulus * slowest * slowest)
+        };
+        Self {
             limit,
-            reference: vec![undeformed; count],
-            own_limit: vec![0.0; count],
+            reference: vec![None; count],
             hourglass: (0..count).map(|cell| hourglass_modulus(solid, cell)).collect(),
-            weight: vec![0.0; count],
+            weight: (0..count).map(weight).collect(),
             rank: vec![[0.0; 2]; count],
             order: [(0..count as u32).collect(), (0..count as u32).collect()],
-        };
-        watch.refer_to(model, solid, limit, at_rest);
-        let modulus = solid.material.law.longitudinal_modulus();
-        for cell in 0..count {
-            let (_, square) = deformation(solid, cell, at_rest);
-            let slowest = watch.own_limit[cell].max(limit);
-            let size = product_square(&square, &Symmetric::IDENTITY).sqrt();
-            watch.weight[cell] = 1.0 / (size * modulus * slowest * slowest);
+            found: vec![(0.0, Stiffness::default()); picked(count)],
         }
-        watch
-    }
-
-    fn refer_to<R: Real>(&mut self, model: &Model, solid: &Solid, limit: f64, displacement: &[Vector<R>]) {
-        self.limit = limit;
-        let hourglass = &self.hourglass;
-        let cells = self.reference.par_iter_mut().zip(&mut self.own_limit).enumerate().with_min_len(16);
-        cells.for_each(|(cell, (stiffness, own))| {
-            let (h, _) = deformation(solid, cell, displacement);
-            *stiffness = stiffness_of(solid, cell, &h, hourglass[cell]);
-            *own = rest_limit(model, solid, cell, stiffness.mode);
-        });
     }
 
     /// Finds both ranks of every cell: the squared speed by an isotropic guess, and the squared stretch.
@@ -297,7 +285,8 @@ impl Watch {
         let rest = solid.material.law.longitudinal_modulus();
         let weight = &self.weight;
         self.rank.par_iter_mut().enumerate().with_min_len(256).for_each(|(cell, rank)| {
-            let (h, square) = deformation(solid, cell, displacement);
+            let (h, square) =
+                (displacement_gradient(solid, cell, displacement), gradient_square_of(solid, cell));
             let strain = Symmetric::green_lagrange_twice(&h);
             let c = strain + Symmetric::IDENTITY;
             let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
@@ -313,20 +302,9 @@ impl Watch {
         });
     }
 
-    /// How many cells are looked at closely for each order.
-    fn picked(&self) -> usize {
-        let count = self.rank.len();
-        (count / SHARE).max(LEAST).min(count)
-    }
-
-    /// The cells that stand first in an order.
-    fn first(&self, by: usize) -> &[u32] {
-        &self.order[by][..self.picked()]
-    }
-
-    /// Brings those cells to the front of each order.
+    /// Brings the cells that stand first to the front of each order.
     fn pick(&mut self) {
-        let (rank, picked) = (&self.rank, self.picked());
+        let (rank, picked) = (&self.rank, self.found.len());
         for (by, order) in self.order.iter_mut().enumerate() {
             // Cells of equal rank go by number, so that the choice does not depend on what came before.
             let first =
@@ -337,24 +315,60 @@ impl Watch {
         }
     }
 
-    /// The smallest limit [s] of some cells, and its cell.
+    /// The smallest limit [s] of the cells that stand first in an order, and its cell.
     fn smallest<R: Real>(
-        &self,
+        &mut self,
+        model: &Model,
         solid: &Solid,
         displacement: &[Vector<R>],
-        cells: &[u32],
+        reference: &[Vector<R>],
+        by: usize,
     ) -> Option<(f64, usize)> {
-        let limit = |&cell: &u32| {
-            let cell = cell as usize;
-            let (h, _) = deformation(solid, cell, displacement);
-            let now = stiffness_of(solid, cell, &h, self.hourglass[cell]);
-            let before = &self.reference[cell];
-            let [mode, wave] = [before.mode / now.mode, before.wave / now.wave].map(f64::sqrt);
-            let limit = (self.own_limit[cell] * mode).max(self.limit * mode.min(wave));
-            limit.is_finite().then_some((limit, cell))
-        };
-        cells.par_iter().with_min_len(16).map(limit).reduce(|| None, smaller)
+        let mut found = std::mem::take(&mut self.found);
+        found.par_iter_mut().zip(&self.order[by]).with_min_len(8).for_each(|(found, &cell)| {
+            *found = self.look(model, solid, displacement, reference, cell as usize);
+        });
+        let mut least = None;
+        for (&(limit, before), &cell) in found.iter().zip(&self.order[by]) {
+            self.reference[cell as usize] = Some(before);
+            least = smaller(least, finite((limit, cell as usize)));
+        }
+        self.found = found;
+        least
     }
+
+    /// The limit [s] that a cell sets, and its stiffness in the reference state.
+    fn look<R: Real>(
+        &self,
+        model: &Model,
+        solid: &Solid,
+        displacement: &[Vector<R>],
+        reference: &[Vector<R>],
+        cell: usize,
+    ) -> (f64, Stiffness) {
+        let in_state = |displacement: &[Vector<R>]| {
+            let h = displacement_gradient(solid, cell, displacement);
+            let fibre = solid.fibre.get(cell).copied().unwrap_or_default();
+            let square = gradient_square_of(solid, cell);
+            let Stiffness { mode, wave } = stiffness(&solid.material.law, fibre, &h, &square);
+            Stiffness { mode: mode.max(self.hourglass[cell]), wave }
+        };
+        let now = in_state(displacement);
+        let before = self.reference[cell].unwrap_or_else(|| in_state(reference));
+        let [mode, wave] = [before.mode / now.mode, before.wave / now.wave].map(f64::sqrt);
+        let own = limit_alone(model, solid, cell, now.mode);
+        (own.max(self.limit * mode.min(wave)), before)
+    }
+}
+
+/// How many of some cells are looked at closely for each order.
+fn picked(count: usize) -> usize {
+    (count / SHARE).max(LEAST).min(count)
+}
+
+/// A limit that is a number, with its cell.
+fn finite((limit, cell): (f64, usize)) -> Option<(f64, usize)> {
+    limit.is_finite().then_some((limit, cell))
 }
 
 /// The smaller limit; of equal ones that of the first cell.
@@ -365,34 +379,27 @@ fn smaller(a: Option<(f64, usize)>, b: Option<(f64, usize)>) -> Option<(f64, usi
     }
 }
 
-/// The stiffness of a cell, that of its hourglass control included.
-fn stiffness_of(solid: &Solid, cell: usize, h: &Tensor<f64>, hourglass: f64) -> Stiffness {
-    let square = with_cells!(&solid.cells, block => gradient_square(&block.rest[cell].gradient));
-    let fibre = solid.fibre.get(cell).copied().unwrap_or_default();
-    let Stiffness { mode, wave } = stiffness(&solid.material.law, fibre, h, &square);
-    Stiffness { mode: mode.max(hourglass), wave }
-}
-
 /// c μ ΣB² [Pa/m²], see [`critical_step::cell_bound`](crate::critical_step::cell_bound).
 fn hourglass_modulus(solid: &Solid, cell: usize) -> f64 {
     solid.cells.hourglass_modulus(cell) * solid.cells.gradient_square_sum(cell)
 }
 
-/// ∂u/∂X (mean over the cell) and Σ B_a ⊗ B_a.
-fn deformation<R: Real>(
-    solid: &Solid,
-    cell: usize,
-    displacement: &[Vector<R>],
-) -> (Tensor<f64>, Symmetric<f64>) {
+/// Σ B_a ⊗ B_a [1/m²].
+fn gradient_square_of(solid: &Solid, cell: usize) -> Symmetric<f64> {
+    with_cells!(&solid.cells, block => gradient_square(&block.rest[cell].gradient))
+}
+
+/// ∂u/∂X, the mean over the cell.
+fn displacement_gradient<R: Real>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
+    let mut h = Tensor::ZERO;
     with_cells!(&solid.cells, block => {
         let (nodes, gradient) = (&block.nodes[cell], &block.rest[cell].gradient);
         let origin: Vector<f64> = cast(displacement[nodes[0] as usize]);
-        let mut h = Tensor::ZERO;
         for (&node, &b) in nodes.iter().zip(gradient).skip(1) {
             h.add_outer(sub(cast(displacement[node as usize]), origin), b);
         }
-        (h, gradient_square(gradient))
-    })
+    });
+    h
 }
 
 /// tr (A B A B).

@@ -342,8 +342,10 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             || state.steps >= seen.looked_at + CHECK_EVERY
             || deformed.differs(&seen.deformed, CHANGE);
         if due {
-            monitor.refer_to(self.model, state);
-            if let Some((mut limit, solid, cell)) = monitor.limit(self.model, &state.displacement) {
+            monitor.refer_to(state);
+            if let Some((mut limit, solid, cell)) =
+                monitor.limit(self.model, &state.displacement, &state.reference)
+            {
                 if monitor.doubts(state, limit, step, now) {
                     limit = self.take_as_reference(state);
                 }

@@ -17,7 +17,7 @@ pub(crate) fn gradient_square(gradient: &[Vector<f64>]) -> Symmetric<f64> {
 }
 
 /// How stiff a cell is, per volume [Pa/m²].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Stiffness {
     /// The largest eigenvalue of K/V, over all modes.
     pub mode: f64,
