@@ -40,7 +40,7 @@ pub const REFERENCE_EVERY: u64 = 1000;
 /// The most substeps a step is cut into.
 pub const MOST_SUBSTEPS: u32 = 100;
 /// One in this many cells is looked at closely, for each of the two orders …
-const SHARE: usize = 128;
+const SHARE: usize = 256;
 /// … and at least this many.
 const LEAST: usize = 16;
 
