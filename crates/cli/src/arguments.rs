@@ -8,7 +8,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong."
+    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong, 130 interrupted (Ctrl-C)."
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -20,11 +20,20 @@ pub enum Command {
     /// Run a scene and write its outputs.
     #[command(
         after_help = "Examples:\n  pliant run scenes/liver\n  pliant run scene.toml --until 0.5 --out out/short --force\n  \
-                            pliant run scene.toml --precision single --threads 4 --json > result.json"
+                            pliant run scene.toml --precision single --threads 4 --json > result.json\n  \
+                            pliant run scene.toml --set law.tissue.young-modulus=4e3 --set run.solver=quasi-static\n  \
+                            pliant run scene.toml --set scene.gravity.2=-1.62 --set 'load.push.total=[0, 0, 1]'\n  \
+                            pliant run scene.toml --resume out/scene               # from the last checkpoint there\n  \
+                            pliant run scene.toml --resume out/scene --until 20    # and go on for longer"
     )]
     Run(Run),
+    /// Run a scene for every combination of some values, and write one table of the results.
+    #[command(after_help = SWEEP_HELP)]
+    Sweep(Sweep),
     /// Check a scene and print its model; runs nothing, writes nothing.
-    #[command(after_help = "Example:\n  pliant check scenes/liver")]
+    #[command(
+        after_help = "Examples:\n  pliant check scenes/liver\n  pliant check scenes/liver --set body.liver.element=tet4-anp"
+    )]
     Check(Check),
     /// Write a commented starter scene.
     #[command(after_help = "Example:\n  pliant new my-organ && pliant run my-organ")]
@@ -57,6 +66,10 @@ pub enum Command {
 
 #[derive(Debug, clap::Args)]
 pub struct Overrides {
+    /// Set any value of the scene; may be given several times. KEY is its path, with items of arrays by their number
+    /// counted from 0; VALUE is TOML, a single word needs no quotes.
+    #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
+    pub set: Vec<String>,
     /// Simulated time [s], instead of the scene's.
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub until: Option<f64>,
@@ -87,11 +100,59 @@ pub struct Run {
     /// Write into a folder that is not empty.
     #[arg(long)]
     pub force: bool,
+    /// Go on from a checkpoint (a file, or the last one in a folder) in the folder it lies in, or in `--out`.
+    ///
+    /// A scene writes checkpoints with `checkpoint = { every = 1.0 }` in `[run]`. The resumed run ends in the same
+    /// bits as one that was never interrupted; its outputs go on where the checkpoint was. Only `until` may differ.
+    #[arg(long, value_name = "CHECKPOINT", conflicts_with = "force")]
+    pub resume: Option<PathBuf>,
     #[command(flatten)]
     pub overrides: Overrides,
     /// Print one JSON object with the results on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+const SWEEP_HELP: &str = "\
+Values:
+  law.tissue.young-modulus=1e3,2e3,5e3           these three
+  law.tissue.young-modulus=1e3..5e3/5            five from 1e3 to 5e3 in equal steps
+  body.liver.element=tet4,tet4-anp               words need no quotes
+  'scene.gravity=[0, 0, -9.81],[0, 0, 0]'        commas in brackets or quotes separate no values
+  scene.gravity.2=-9.81,0                        an item of an array, counted from 0
+
+Examples:
+  pliant sweep scene.toml --set law.tissue.young-modulus=1e3..5e3/5 --set body.block.density=900,1100
+  pliant sweep scene.toml --set run.load-steps=2,5,10 --dry-run
+
+Writes sweep.csv, a row for each run: its values, how it ended, energies, reactions and probes at the end. Each run
+leaves its summary, plot and tables in a folder run-NNNN. All combinations are checked before the first is run; a run
+that fails does not stop the others.
+
+Exit codes: 0 done, 1 some runs failed, 2 the input is wrong, 130 interrupted (Ctrl-C).";
+
+#[derive(Debug, clap::Args)]
+pub struct Sweep {
+    /// A scene file, or a folder with a scene.toml.
+    pub scene: PathBuf,
+    /// Values of a key of the scene, separated by commas; may be given several times. Every combination is run.
+    #[arg(long, value_name = "KEY=VALUES", allow_hyphen_values = true, required = true)]
+    pub set: Vec<String>,
+    /// Folder for the table and the runs; if not given, out/NAME-sweep after the folder of the scene.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Write into a folder that is not empty.
+    #[arg(long)]
+    pub force: bool,
+    /// Check and list the combinations; run nothing, write nothing.
+    #[arg(long, alias = "list")]
+    pub dry_run: bool,
+    /// Write the series of fields (VTU) of each run, too.
+    #[arg(long)]
+    pub keep_fields: bool,
+    /// Runs at a time, each on one thread; 0: one per core. The number never changes a result.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: u16,
 }
 
 #[derive(Debug, clap::Args)]
@@ -122,7 +183,11 @@ impl Command {
         match self {
             Self::Run(run) => run.json,
             Self::Info(info) => info.json,
-            Self::Check(_) | Self::New { .. } | Self::Schema { .. } | Self::Import { .. } => false,
+            Self::Sweep(_)
+            | Self::Check(_)
+            | Self::New { .. }
+            | Self::Schema { .. }
+            | Self::Import { .. } => false,
         }
     }
 }

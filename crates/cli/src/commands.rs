@@ -3,21 +3,26 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::{Source, Value};
-use pliant_scene::{Built, OutputFolder, Plan, Scene, niftysim, number, reference, registry};
+use pliant_scene::{
+    Built, Checkpoint, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim, number, reference,
+    registry,
+};
 use serde_json::{Map, Value as Json, json};
 use tempfile::TempDir;
 
-use crate::arguments::{Check, Command, Info, Overrides, Precision, Run};
+use crate::arguments::{self, Check, Command, Info, Overrides, Precision, Run};
 use crate::report::{self, Bar, Failure, say};
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Run(arguments) => run(&arguments),
+        Command::Sweep(arguments) => sweep(&arguments),
         Command::Check(arguments) => check(&arguments),
         Command::New { name } => new(&name),
         Command::Schema { markdown } => {
@@ -36,7 +41,8 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
 /// Reads, builds and plans a scene; doubts go to standard error.
 fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), Failure> {
     let (mut source, folder, _translated) = open(path)?;
-    let mut mistakes = Vec::new();
+    let mut mistakes: Vec<_> =
+        overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
     let precision = overrides.precision.map(|precision| match precision {
         Precision::Single => "single",
         Precision::Double => "double",
@@ -118,18 +124,50 @@ fn in_pool<T: Send>(
     Ok(pool.install(work)?)
 }
 
-fn run(arguments: &Run) -> Result<ExitCode, Failure> {
-    let (scene, built, plan) = prepare(&arguments.scene, &arguments.overrides)?;
+/// The exit code of a process that Ctrl-C ended.
+const INTERRUPTED: u8 = 130;
+
+/// Set by Ctrl-C; pressed again, it ends the process at once.
+fn stopped_by_ctrl_c() -> &'static AtomicBool {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let handler = || {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(INTERRUPTED.into());
+        }
+    };
+    // Where no handler can be set, Ctrl-C ends the process as ever, and what was written stays readable.
+    let _ = ctrlc::set_handler(handler);
+    &STOP
+}
+
+/// The folder of a run that starts at rest.
+fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure> {
     let file = pliant_scene::scene_file(&arguments.scene);
     let path = arguments.out.clone().unwrap_or_else(|| OutputFolder::default_for(&file));
-    let folder = OutputFolder::prepare(path, &scene, arguments.force)
-        .map_err(|error| Failure::plain(&error, error.remedy))?;
+    OutputFolder::prepare(path, scene, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))
+}
+
+fn run(arguments: &Run) -> Result<ExitCode, Failure> {
+    let checkpoint = arguments.resume.as_deref().map(Checkpoint::read).transpose()?;
+    let (scene, built, mut plan) = prepare(&arguments.scene, &arguments.overrides)?;
+    let folder = match &checkpoint {
+        Some(checkpoint) => {
+            plan = checkpoint.continues(&scene, &built, &plan)?;
+            let own = checkpoint.path().parent().unwrap_or(Path::new(""));
+            let path = arguments.out.clone().unwrap_or_else(|| own.to_owned());
+            OutputFolder::reopen(path, &scene, checkpoint)?
+        }
+        None => fresh_folder(arguments, &scene)?,
+    };
     for note in built.notes.iter().chain(&plan.note) {
         eprintln!("note: {note}");
     }
     let bar = Bar::new();
-    let result = pliant_scene::run(&scene, &built, &plan, &folder, &mut |progress| bar.update(progress));
+    let options = Options { resume: checkpoint.as_ref(), stop: Some(stopped_by_ctrl_c()) };
+    let mut report = |progress| bar.update(progress);
+    let result = pliant_scene::run_with(&scene, &built, &plan, &folder, options, &mut report);
     bar.finish();
+    let interrupted = matches!(&result, Ok(summary) if summary.status == "interrupted");
     let (failure, json) = match result {
         Ok(summary) => {
             if !arguments.json {
@@ -149,9 +187,72 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
         None => Ok(ExitCode::SUCCESS),
         Some(message) => {
             eprintln!("error: {message}");
-            Ok(ExitCode::from(1))
+            Ok(ExitCode::from(if interrupted { INTERRUPTED } else { 1 }))
         }
     }
+}
+
+fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
+    let (source, folder, _translated) = open(&arguments.scene)?;
+    let sweep = Sweep::new(source, folder, &arguments.set)?;
+    let (runs, threads) = (sweep.runs(), arguments.threads.into());
+    refuse_mistakes(&sweep, threads)?;
+    if arguments.dry_run {
+        let lines: Vec<String> = (0..runs).map(|run| format!("run-{run:04}  {}", sweep.title(run))).collect();
+        say(lines.join("\n"))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let path = arguments.out.clone().unwrap_or_else(|| {
+        let mut path = OutputFolder::default_for(&pliant_scene::scene_file(&arguments.scene));
+        path.as_mut_os_string().push("-sweep");
+        path
+    });
+    let folder =
+        sweep.open_folder(path, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))?;
+    let bar = Bar::new();
+    let options =
+        SweepOptions { threads, keep_fields: arguments.keep_fields, stop: Some(stopped_by_ctrl_c()) };
+    let result = sweep.run(&folder, options, &|progress| bar.update_sweep(progress, runs));
+    bar.finish();
+    let summary = match result {
+        Ok(summary) => summary,
+        Err(error) => {
+            eprintln!("error: {error}; {}", error.remedy);
+            return Ok(ExitCode::from(1));
+        }
+    };
+    say(summary.words())?;
+    for (run, message) in &summary.failures {
+        eprintln!("error: run-{run:04} ({}): {message}", sweep.title(*run));
+    }
+    if summary.interrupted {
+        eprintln!("error: the sweep was interrupted; the runs that had ended are in the table");
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
+    if summary.failures.is_empty() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    eprintln!("error: {} of {runs} runs failed", summary.failures.len());
+    Ok(ExitCode::from(1))
+}
+
+/// Refuses a sweep some of whose combinations are no scene; mistakes that several share are told once.
+fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
+    let mistakes = sweep.check(threads);
+    let mut told = Vec::<String>::new();
+    for (run, errors) in &mistakes {
+        let text = errors.plain().to_string();
+        if !told.contains(&text) {
+            eprintln!("run-{run:04} ({}):", sweep.title(*run));
+            report::show(errors);
+            told.push(text);
+        }
+    }
+    if mistakes.is_empty() {
+        return Ok(());
+    }
+    let message = format!("{} of {} combinations are wrong; nothing was run", mistakes.len(), sweep.runs());
+    Err(Failure::plain(message, "correct the values above, or sweep without them"))
 }
 
 fn check(arguments: &Check) -> Result<ExitCode, Failure> {

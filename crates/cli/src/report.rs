@@ -8,7 +8,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
 use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::{Progress, ReadError, Summary, failed_input, number};
+use pliant_scene::{Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, number};
 
 /// The input is wrong (exit code 2).
 #[derive(Debug)]
@@ -40,6 +40,12 @@ impl From<ReadError> for Failure {
                 "give a scene file, or a folder with a scene.toml; `pliant new NAME` writes one",
             ),
         }
+    }
+}
+
+impl From<ResumeError> for Failure {
+    fn from(error: ResumeError) -> Self {
+        Self::plain(&error, error.remedy())
     }
 }
 
@@ -103,6 +109,11 @@ impl Bar {
         self.0.set_position((1000.0 * time / until) as u64);
         let factor = time / wall.as_secs_f64().max(f64::MIN_POSITIVE);
         self.0.set_message(format!("{time:.3} of {until} s simulated, {factor:.2} × real time"));
+    }
+
+    pub fn update_sweep(&self, progress: SweepProgress, runs: usize) {
+        self.0.set_position((1000.0 * progress.part) as u64);
+        self.0.set_message(progress.words(runs));
     }
 
     pub fn finish(&self) {

@@ -1055,7 +1055,7 @@ fn info_tells_what_a_mesh_holds_and_what_is_wrong() {
 #[test]
 fn every_subcommand_helps_with_an_example() {
     let workshop = Workshop::new(BLOCK);
-    for subcommand in [&[][..], &["run"], &["check"], &["new"], &["schema"], &["info"]] {
+    for subcommand in [&[][..], &["run"], &["check"], &["sweep"], &["new"], &["schema"], &["info"]] {
         let told = workshop.pliant(&[subcommand, &["--help"]].concat());
         assert_eq!(told.code, 0);
         let example =

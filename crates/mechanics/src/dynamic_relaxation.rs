@@ -9,6 +9,7 @@
 //! history of the step before.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::applied::AppliedForces;
@@ -154,7 +155,17 @@ impl Sums {
     }
 }
 
-/// Finds equilibria of one model. Holds constants and scratch, nothing that a restart would lose.
+/// What is known of the equilibrium a state stands at, beside the state: what a restart needs to show it again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Equilibrium<R> {
+    /// Energies [J].
+    pub energies: Energies,
+    /// Internal minus applied force [N] of each node.
+    pub residual: Vec<Vector<R>>,
+}
+
+/// Finds equilibria of one model. Holds constants, scratch and the [`Equilibrium`] last found; the next one comes from
+/// the state alone.
 pub struct DynamicRelaxation<'m, R> {
     model: &'m Model,
     settings: RelaxationSettings,
@@ -210,6 +221,16 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
             energies: Energies::default(),
         })
+    }
+
+    /// What is known of the last equilibrium.
+    pub fn equilibrium(&self) -> Equilibrium<R> {
+        Equilibrium { energies: self.energies, residual: self.residual.clone() }
+    }
+
+    /// Takes up an equilibrium of the same model, so that all that can be asked belongs to it.
+    pub fn resume(&mut self, Equilibrium { energies, residual }: Equilibrium<R>) {
+        (self.energies, self.residual) = (energies, residual);
     }
 
     /// Brings a state to the equilibrium at a later time [s]. On failure the state is that of the last equilibrium.

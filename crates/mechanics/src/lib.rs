@@ -41,6 +41,7 @@ pub mod critical_step;
 pub mod curve;
 mod dynamic_relaxation;
 pub mod element;
+mod fingerprint;
 mod forces;
 pub mod law;
 pub mod load;
@@ -55,7 +56,10 @@ mod stepper;
 mod tangent;
 pub mod tensor;
 
-pub use dynamic_relaxation::{Convergence, DynamicRelaxation, RelaxationError, RelaxationSettings};
+pub use dynamic_relaxation::{
+    Convergence, DynamicRelaxation, Equilibrium, RelaxationError, RelaxationSettings,
+};
+pub use fingerprint::fingerprint;
 pub use model::Model;
 pub use real::Real;
 pub use state::{History, State, Work};

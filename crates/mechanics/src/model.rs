@@ -440,34 +440,6 @@ impl Model {
         self.mass[node] + self.mass_scaling.as_ref().map_or(0.0, |scaling| scaling.added[node])
     }
 
-    /// A number that tells one model's bodies from another's: nodes, cells, laws, densities and damping, bit for bit.
-    /// Constraints and loads don't count.
-    pub fn fingerprint(&self) -> u64 {
-        // FNV-1a, 64 bits: the same on every machine and in every version of the language.
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        let mut take = |bytes: &[u8]| {
-            for &byte in bytes {
-                hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-            }
-        };
-        self.rest.iter().flatten().chain(&self.mass).for_each(|x| take(&x.to_bits().to_le_bytes()));
-        for body in &self.bodies {
-            take(&body.nodes.end.to_le_bytes());
-            take(&body.damping.to_bits().to_le_bytes());
-        }
-        for solid in &self.solids {
-            take(format!("{:?}", solid.material).as_bytes());
-            (0..solid.cells.len())
-                .flat_map(|cell| solid.cells.nodes(cell))
-                .for_each(|n| take(&n.to_le_bytes()));
-            solid.fibre.iter().flatten().for_each(|x| take(&x.to_bits().to_le_bytes()));
-        }
-        for x in self.mass_scaling.iter().flat_map(|scaling| &scaling.added) {
-            take(&x.to_bits().to_le_bytes());
-        }
-        hash
-    }
-
     /// Number of nodes.
     pub fn node_count(&self) -> usize {
         self.rest.len()

@@ -7,6 +7,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use crate::forces::ForceField;
 use crate::model::Solid;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// A real number that the kernels can run in.
 pub trait Real:
@@ -16,6 +18,8 @@ pub trait Real:
     + PartialOrd
     + Send
     + Sync
+    + Serialize
+    + DeserializeOwned
     + 'static
     + Add<Output = Self>
     + AddAssign

@@ -115,6 +115,17 @@ impl Default for Stability {
 }
 
 impl Stability {
+    /// Whether it can be of a state between two steps of a model.
+    pub fn fits(&self, model: &Model) -> bool {
+        let known = |look: &Look| {
+            model.solids.get(look.solid).is_some_and(|solid| look.cell < solid.cells.len())
+                && look.limit > 0.0
+        };
+        self.done == 0
+            && (1..=MOST_SUBSTEPS).contains(&self.substeps)
+            && self.last.iter().chain(&self.smallest).all(known)
+    }
+
     /// Records a look and the deformation it was taken at.
     pub(crate) fn note(&mut self, look: Look, deformed: Deformed, steps: u64) {
         self.checks += 1;
@@ -213,8 +224,10 @@ impl Monitor {
 
     /// Whether an estimate needs the true limit: it asks for other than whole steps, and the last one is long past.
     pub(crate) fn doubts<R>(&self, state: &State<R>, limit: f64, step: f64, now: u32) -> bool {
-        let rested =
-            state.stability.reference.is_none_or(|(_, steps)| state.steps >= steps + REFERENCE_EVERY);
+        let rested = state
+            .stability
+            .reference
+            .is_none_or(|(_, steps)| state.steps >= steps.saturating_add(REFERENCE_EVERY));
         match self.on_unstable {
             OnUnstable::Substep => rested && substeps(step, limit, now) != Some(1),
             OnUnstable::Stop => limit < step,

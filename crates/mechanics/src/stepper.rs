@@ -9,6 +9,7 @@
 //! Runs on the current rayon pool; sums go in the order of the nodes for any number of threads.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::applied::AppliedForces;
@@ -37,7 +38,7 @@ pub const BALANCE_LIMIT: f64 = 0.05;
 pub const BALANCE_STEPS: u32 = 20;
 
 /// Energies at one instant [J].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energies {
     /// ½ Σ m v².
     pub kinetic: f64,
@@ -339,7 +340,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         let (step, now, on_unstable) = (self.step, self.substeps, monitor.on_unstable());
         let seen = &state.stability;
         let due = seen.checks == 0
-            || state.steps >= seen.looked_at + CHECK_EVERY
+            || state.steps >= seen.looked_at.saturating_add(CHECK_EVERY)
             || deformed.differs(&seen.deformed, CHANGE);
         if due {
             monitor.refer_to(state);

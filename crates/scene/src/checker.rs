@@ -12,7 +12,7 @@ use schemars::{JsonSchema, Schema, schema_for};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value as Json};
 
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, Place};
 use crate::source::{Node, Source, Value};
 
 /// Schemas refer to one another; deeper than this they refer to themselves.
@@ -936,7 +936,9 @@ impl<'s> Checker<'s, '_> {
         others: &[&'s str],
         trail: &Trail<'_>,
     ) -> Option<&'s str> {
-        let free = |name: &&str| !entries.iter().any(|(given, _)| given == name);
+        // What the file gives already can still be meant by an option that replaces it.
+        let replaces = matches!(child.place, Place::Option(..));
+        let free = |name: &&str| replaces || !entries.iter().any(|(given, _)| given == name);
         let known: Vec<&'s str> =
             form.properties.iter().map(|(key, _)| *key).chain(others.iter().copied()).collect();
         let guess = nearest(key, known.iter().copied().filter(free));

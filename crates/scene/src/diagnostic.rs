@@ -28,8 +28,10 @@ pub enum Severity {
 pub enum Place {
     /// In the scene file, these bytes of its text.
     File(Range<usize>),
-    /// As an option of the command; the file has no line to show.
+    /// As an option of the command with a meaning of its own, such as `--until`; there is no line to show.
     CommandLine,
+    /// In an option of the command that is shown as it was typed: these bytes of its text.
+    Option(Arc<str>, Range<usize>),
 }
 
 impl From<Range<usize>> for Place {
@@ -54,8 +56,10 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// What is wrong, with which number; makes sense without the label.
     pub message: String,
-    /// The bytes of the scene's text to underline; none where the file has no such place.
+    /// The bytes to underline in the scene's text, or in `option`; none where there is no such place.
     pub span: Option<Range<usize>>,
+    /// The option of the command that it is about, as typed; none for the scene's own text.
+    pub option: Option<Arc<str>>,
     /// What is written under the underlined text.
     pub label: String,
     /// What to try.
@@ -66,7 +70,15 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     fn new(severity: Severity, message: String) -> Self {
-        Self { severity, message, span: None, label: String::new(), help: None, also: Vec::new() }
+        Self {
+            severity,
+            message,
+            span: None,
+            option: None,
+            label: String::new(),
+            help: None,
+            also: Vec::new(),
+        }
     }
 
     /// A mistake that keeps the scene from running.
@@ -87,6 +99,11 @@ impl Diagnostic {
                 self.span = Some(span);
                 self.label = label.into();
             }
+            Place::Option(text, span) => {
+                self.option = Some(text);
+                self.span = Some(span);
+                self.label = label.into();
+            }
             Place::CommandLine => self.message.push_str(" (given on the command line)"),
         }
         self
@@ -95,12 +112,15 @@ impl Diagnostic {
     /// Underlines a further place.
     pub fn also(self, place: impl Into<Place>, label: impl Into<String>) -> Self {
         match place.into() {
+            // Lines of the file can't be shown in an option.
+            Place::File(_) if self.option.is_some() => self,
             Place::File(span) => {
                 let mut diagnostic = self;
                 diagnostic.also.push((span, label.into()));
                 diagnostic
             }
             Place::CommandLine => self.help(format!("{} (on the command line)", label.into())),
+            Place::Option(text, _) => self.help(format!("{} (`{text}`)", label.into())),
         }
     }
 
@@ -132,8 +152,12 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// The source text comes from the [`SceneErrors`] that the diagnostic is shown with.
+/// The source text comes from the [`SceneErrors`] that the diagnostic is shown with, unless it is about an option.
 impl miette::Diagnostic for Diagnostic {
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.option.as_ref().map(|text| text as &dyn SourceCode)
+    }
+
     fn severity(&self) -> Option<miette::Severity> {
         Some(match self.severity {
             Severity::Error => miette::Severity::Error,
@@ -176,12 +200,16 @@ impl SceneErrors {
     pub fn new(name: impl Into<String>, text: Arc<str>, mut diagnostics: Vec<Diagnostic>) -> Self {
         for diagnostic in &mut diagnostics {
             // A place outside the text would make miette show nothing of it.
-            diagnostic.span = diagnostic.span.take().map(|span| clamp(&text, span));
+            let own = diagnostic.option.clone().unwrap_or_else(|| text.clone());
+            diagnostic.span = diagnostic.span.take().map(|span| clamp(&own, span));
             for (span, _) in &mut diagnostic.also {
                 *span = clamp(&text, span.clone());
             }
         }
-        diagnostics.sort_by_key(|diagnostic| diagnostic.span.as_ref().map_or(usize::MAX, |span| span.start));
+        diagnostics.sort_by_key(|diagnostic| match (&diagnostic.option, &diagnostic.span) {
+            (None, Some(span)) => span.start,
+            _ => usize::MAX,
+        });
         Self { source: NamedSource::new(name.into(), text), diagnostics }
     }
 
@@ -202,6 +230,9 @@ impl SceneErrors {
 
     /// Line and column, both counted from 1, the column in characters, of a diagnostic's place.
     pub fn line_and_column(&self, diagnostic: &Diagnostic) -> Option<(usize, usize)> {
+        if diagnostic.option.is_some() {
+            return None;
+        }
         let before = self.text().get(..diagnostic.span.as_ref()?.start)?;
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
         Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
@@ -258,7 +289,8 @@ impl miette::Diagnostic for SceneErrors {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        Some(&self.source)
+        // A single finding stands for the whole.
+        self.single().and_then(miette::Diagnostic::source_code).or(Some(&self.source))
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
@@ -280,7 +312,7 @@ impl fmt::Display for Plain<'_> {
             if i > 0 {
                 f.write_str("\n")?;
             }
-            f.write_str(self.0.name())?;
+            f.write_str(diagnostic.option.as_deref().unwrap_or(self.0.name()))?;
             if let Some((line, column)) = self.0.line_and_column(diagnostic) {
                 write!(f, ":{line}:{column}")?;
             }

@@ -33,6 +33,7 @@
 
 mod build;
 pub mod checker;
+mod checkpoint;
 pub mod diagnostic;
 pub mod format;
 pub mod niftysim;
@@ -46,16 +47,19 @@ mod scene;
 mod solver;
 pub mod source;
 mod starter;
+mod sweep;
 #[cfg(test)]
 mod testing;
 
 pub use build::{Built, BuiltBody, build};
+pub use checkpoint::{Checkpoint, ResumeError};
 pub use output::{
     AddedMass, BodySummary, FailureSummary, OutputError, OutputFolder, StabilitySummary, Summary,
     failed_input, failed_output, number,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Plan, SAFETY, plan};
-pub use run::{Progress, run};
+pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, scene_file};
 pub use starter::starter;
+pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};

@@ -25,6 +25,9 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
     if !scene.scene.title.is_empty() {
         writeln!(page, "{}\n", scene.scene.title)?;
     }
+    for set in scene.source.assignments() {
+        writeln!(page, "set on the command line: {set}")?;
+    }
     for (summary, body) in bodies(built).iter().zip(&built.bodies) {
         let quality = QualityReport::new(&body.mesh);
         writeln!(page, "body `{}`: {}", body.name, body.origin)?;

@@ -67,31 +67,46 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         Err(contradiction) => return fail(Diagnostic::error(contradiction.to_string())),
     };
     let limiting = limiting_element(built, bound);
-    let quasi_static = scene.run.solver == SolverName::QuasiStatic;
-    let (asked, note) = match scene.run.step {
-        StepChoice::Auto(_) if quasi_static => (scene.scene.until / f64::from(scene.run.load_steps), None),
-        StepChoice::Seconds(step) if quasi_static => (step, None),
-        StepChoice::Auto(_) => (automatic(&bound, &limit), None),
-        StepChoice::Seconds(step) if step > limit.step => {
-            let message = format!(
-                "the step {} s is above the true limit {} s of the model: it would be unstable",
-                number(step),
-                number(limit.step)
-            );
-            let help = format!(
-                "the element bound {} s is set by {limiting}; take `step = \"auto\"` ({} s), a step below {} s, or a \
-                 mesh without small cells there",
-                number(bound.step),
-                number(automatic(&bound, &limit)),
-                number(limit.step)
-            );
-            let place = scene.source.span(&["run", "step"]);
-            return fail(Diagnostic::error(message).at(place, "too large").help(help));
+    let note = match scene.run.step {
+        StepChoice::Seconds(step) if scene.run.solver == SolverName::Explicit => {
+            if step > limit.step {
+                let message = format!(
+                    "the step {} s is above the true limit {} s of the model: it would be unstable",
+                    number(step),
+                    number(limit.step)
+                );
+                let help = format!(
+                    "the element bound {} s is set by {limiting}; take `step = \"auto\"` ({} s), a step below {} s, or \
+                     a mesh without small cells there",
+                    number(bound.step),
+                    number(automatic(&bound, &limit)),
+                    number(limit.step)
+                );
+                let place = scene.source.span(&["run", "step"]);
+                return fail(Diagnostic::error(message).at(place, "too large").help(help));
+            }
+            note_on_step(step, limit.step)
         }
-        StepChoice::Seconds(step) => (step, note_on_step(step, limit.step)),
+        _ => None,
     };
-    let steps = (scene.scene.until / asked - 1e-9).ceil().max(1.0);
-    Ok(Plan { step: scene.scene.until / steps, steps: steps as u64, bound, limit, limiting, note })
+    let mut plan = Plan { step: 0.0, steps: 0, bound, limit, limiting, note };
+    (plan.steps, plan.step) = plan.steps_of(scene, scene.scene.until);
+    Ok(plan)
+}
+
+impl Plan {
+    /// How many steps of which size [s] a scene of this duration [s] takes.
+    pub(crate) fn steps_of(&self, scene: &Scene, until: f64) -> (u64, f64) {
+        let asked = match scene.run.step {
+            StepChoice::Seconds(step) => step,
+            StepChoice::Auto(_) => match scene.run.solver {
+                SolverName::QuasiStatic => until / f64::from(scene.run.load_steps),
+                SolverName::Explicit => automatic(&self.bound, &self.limit),
+            },
+        };
+        let steps = (until / asked - 1e-9).ceil().max(1.0);
+        (steps as u64, until / steps)
+    }
 }
 
 /// The automatic step; the element bound stands in where every node is held and there is no limit.

@@ -1,12 +1,15 @@
 //! The run loop: step, look, write, until the end or a failure.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use pliant_mechanics::stability::Stability;
 use pliant_mechanics::{Energies, Observable, Real, State};
+use serde::{Deserialize, Serialize};
 
 use crate::build::Built;
+use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
 use crate::format::{Precision, SolverName};
 use crate::output::{
     FailureSummary, Frame, OutputError, OutputFolder, PLOT, SUMMARY, Schedule, Scheduled, Summary, markdown,
@@ -14,7 +17,7 @@ use crate::output::{
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::solver;
+use crate::solver::{Solver, solver};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -27,8 +30,18 @@ pub struct Progress {
     pub wall: Duration,
 }
 
+/// What a run can be given beside its scene.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options<'a> {
+    /// Where to go on, in a folder that was [reopened](OutputFolder::reopen) for it and with the plan by which it
+    /// [continues](Checkpoint::continues); at the start of the scene if not given.
+    pub resume: Option<&'a Checkpoint>,
+    /// Ends the run after the current step once it is true, with a checkpoint if the scene asks for some.
+    pub stop: Option<&'a AtomicBool>,
+}
+
 /// Samples of a run for plot and summary.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct History {
     pub times: Vec<f64>,
     pub energies: Vec<Energies>,
@@ -55,6 +68,8 @@ pub(crate) struct Outcome {
     pub files: Vec<PathBuf>,
     pub threads: usize,
     pub precision: &'static str,
+    /// The checkpoint it went on from, and its time [s].
+    pub resumed: Option<(PathBuf, f64)>,
 }
 
 /// Samples in the history.
@@ -75,13 +90,28 @@ pub fn run(
     folder: &OutputFolder,
     report: &mut (dyn FnMut(Progress) + Send),
 ) -> Result<Summary, OutputError> {
+    run_with(scene, built, plan, folder, Options::default(), report)
+}
+
+/// As [`run`], from a checkpoint or with a way to stop it.
+///
+/// # Errors
+/// If the outputs can't be opened.
+pub fn run_with(
+    scene: &Scene,
+    built: &Built,
+    plan: &Plan,
+    folder: &OutputFolder,
+    options: Options<'_>,
+    report: &mut (dyn FnMut(Progress) + Send),
+) -> Result<Summary, OutputError> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(scene.run.threads as usize)
         .build()
         .map_err(|error| OutputError::new(folder.path(), error))?;
     let mut outcome = pool.install(|| match scene.run.precision {
-        Precision::Single => advance::<f32>(scene, built, plan, folder, report),
-        Precision::Double => advance::<f64>(scene, built, plan, folder, report),
+        Precision::Single => go::<f32>(scene, built, plan, folder, options, report),
+        Precision::Double => go::<f64>(scene, built, plan, folder, options, report),
     })?;
     if let Err(error) = write_pages(scene, built, plan, folder, &mut outcome) {
         let time = Some(outcome.time);
@@ -111,76 +141,58 @@ fn write_pages(
     written.map(|_| ())
 }
 
-fn advance<R: Real>(
+fn go<R: Real>(
     scene: &Scene,
     built: &Built,
     plan: &Plan,
     folder: &OutputFolder,
+    options: Options<'_>,
     report: &mut (dyn FnMut(Progress) + Send),
 ) -> Result<Outcome, OutputError> {
-    let mut files = Vec::new();
-    let mut watching = observers::<R>(scene, built, folder.path(), &mut files)?;
-    let mut state = State::<R>::at_rest(&built.model);
-    // Contradicting constraints were refused when the model was built.
-    let mut solver =
-        solver::<R>(&scene.run, built, plan).map_err(|error| OutputError::new(folder.path(), error))?;
-    let mut history = History::default();
-    let mut sampling = Schedule::new(scene.scene.until / SAMPLES);
-    let mut worst_balance = 0.0_f64;
-    let mut worst_hourglass = (0.0, 0.0);
-    let mut failure = None;
+    let mut course = Course::<R>::new(scene, built, plan, folder, options)?;
+    let before = options.resume.map_or(0.0, |checkpoint| checkpoint.progressed.wall_seconds);
     let started = Instant::now();
+    let wall_seconds = || before + started.elapsed().as_secs_f64();
     let mut reported = started;
-    loop {
-        if let Err(error) = solver.evaluate(&mut state) {
-            failure = Some(error);
-            break;
+    let failure = loop {
+        match course.see() {
+            Ok(last) => {
+                if reported.elapsed() >= REPORT || last {
+                    reported = Instant::now();
+                    report(Progress {
+                        time: course.state.time,
+                        until: scene.scene.until,
+                        wall: Duration::try_from_secs_f64(wall_seconds()).unwrap_or_default(),
+                    });
+                }
+                if last {
+                    break course.finish().err();
+                }
+            }
+            Err(failure) => break Some(failure),
         }
-        if state.work.largest > solver.balance_floor() {
-            worst_balance = worst_balance.max(solver.observable().energies().balance);
+        let stop = options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
+        if let Err(failure) = course.step(wall_seconds(), stop) {
+            break Some(failure);
         }
-        let share = hourglass_share(solver.observable().energies(), solver.balance_floor());
-        if share > worst_hourglass.0 {
-            worst_hourglass = (share, state.time);
-        }
-        let last = state.time + 0.5 * plan.step >= scene.scene.until;
-        if sampling.is_due(state.time, plan.step, last) {
-            history.sample(built, solver.observable(), &state);
-        }
-        let frame = Frame { built, state: &state, stepper: solver.observable() };
-        if let Err(error) = look(&mut watching, &frame, plan.step, last) {
-            failure = Some(FailureSummary::output(&error, Some(state.time)));
-            break;
-        }
-        if reported.elapsed() >= REPORT || last {
-            reported = Instant::now();
-            report(Progress { time: state.time, until: scene.scene.until, wall: started.elapsed() });
-        }
-        if last {
-            break;
-        }
-        if let Err(error) = solver.advance(&mut state) {
-            failure = Some(error);
-            break;
-        }
-    }
+    };
+    let solver = course.solver.observable();
     Ok(Outcome {
         failure,
-        steps: state.steps,
-        time: state.time,
-        wall_seconds: started.elapsed().as_secs_f64(),
-        energies: *solver.observable().energies(),
-        worst_balance,
-        balance_floor: solver.balance_floor(),
-        worst_hourglass,
-        stability: (scene.run.solver == SolverName::Explicit).then_some(state.stability),
-        reactions: (0..built.model.constraints.len())
-            .map(|index| solver.observable().reaction(index))
-            .collect(),
-        history,
-        files,
+        steps: course.state.steps,
+        time: course.state.time,
+        wall_seconds: wall_seconds(),
+        energies: *solver.energies(),
+        worst_balance: course.worst_balance,
+        balance_floor: course.solver.balance_floor(),
+        worst_hourglass: course.worst_hourglass,
+        stability: (scene.run.solver == SolverName::Explicit).then_some(course.state.stability),
+        reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
+        history: course.history,
+        files: course.files.into_iter().chain(course.kept).collect(),
         threads: rayon::current_num_threads(),
         precision: R::PRECISION,
+        resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
     })
 }
 
@@ -192,6 +204,130 @@ fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
         hourglass / internal.max(f64::MIN_POSITIVE)
     } else {
         0.0
+    }
+}
+
+/// A run under way.
+struct Course<'a, R> {
+    scene: &'a Scene,
+    built: &'a Built,
+    plan: &'a Plan,
+    state: State<R>,
+    solver: Box<dyn Solver<R> + 'a>,
+    watching: Vec<Scheduled<R>>,
+    history: History,
+    sampling: Schedule,
+    worst_balance: f64,
+    /// The largest hourglass energy over the internal one, and its time [s].
+    worst_hourglass: (f64, f64),
+    checkpoints: Option<Checkpoints<'a>>,
+    /// Files written, without checkpoints.
+    files: Vec<PathBuf>,
+    /// The last checkpoint written.
+    kept: Option<PathBuf>,
+}
+
+impl<'a, R: Real> Course<'a, R> {
+    /// At the start, or where a checkpoint was.
+    fn new(
+        scene: &'a Scene,
+        built: &'a Built,
+        plan: &'a Plan,
+        folder: &'a OutputFolder,
+        options: Options<'_>,
+    ) -> Result<Self, OutputError> {
+        let failed = |reason: &dyn std::fmt::Display| OutputError::new(folder.path(), reason);
+        let mut files = Vec::new();
+        let before = options.resume.map(|checkpoint| &checkpoint.progressed);
+        let written = before.map(|before| before.outputs.as_slice());
+        let watching = observers::<R>(scene, built, folder.path(), &mut files, written)?;
+        // Contradicting constraints were refused when the model was built.
+        let mut solver = solver::<R>(&scene.run, built, plan).map_err(|error| failed(&error))?;
+        let mut state = State::<R>::at_rest(&built.model);
+        if let Some(checkpoint) = options.resume {
+            let moment = checkpoint.moment(built);
+            let Moment { state: there, equilibrium } =
+                moment.ok_or_else(|| failed(&"the checkpoint is of another model"))?;
+            state = there;
+            equilibrium.into_iter().for_each(|equilibrium| solver.resume(equilibrium));
+        }
+        Ok(Self {
+            scene,
+            built,
+            plan,
+            watching,
+            history: before.map_or_else(History::default, |before| before.history.clone()),
+            sampling: before.map_or(Schedule::new(scene.scene.until / SAMPLES), |before| before.sampling),
+            worst_balance: before.map_or(0.0, |before| before.worst_balance),
+            worst_hourglass: before.map_or((0.0, 0.0), |before| before.worst_hourglass),
+            checkpoints: Checkpoints::new(scene, built, plan, folder, state.time),
+            state,
+            solver,
+            files,
+            kept: None,
+        })
+    }
+
+    /// Evaluates the current instant and shows it to all who look; whether it is the last.
+    fn see(&mut self) -> Result<bool, FailureSummary> {
+        self.solver.evaluate(&mut self.state)?;
+        let observable = self.solver.observable();
+        if self.state.work.largest > self.solver.balance_floor() {
+            self.worst_balance = self.worst_balance.max(observable.energies().balance);
+        }
+        let share = hourglass_share(observable.energies(), self.solver.balance_floor());
+        if share > self.worst_hourglass.0 {
+            self.worst_hourglass = (share, self.state.time);
+        }
+        let last = self.is_last();
+        if self.sampling.is_due(self.state.time, self.plan.step, last) {
+            self.history.sample(self.built, observable, &self.state);
+        }
+        let frame = Frame { built: self.built, state: &self.state, stepper: observable };
+        look(&mut self.watching, &frame, self.plan.step, last)
+            .map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?;
+        Ok(last)
+    }
+
+    fn is_last(&self) -> bool {
+        self.state.time + 0.5 * self.plan.step >= self.scene.scene.until
+    }
+
+    /// Goes to the next instant, with a checkpoint there if one is due or the run is to `stop`.
+    fn step(&mut self, wall_seconds: f64, stop: bool) -> Result<(), FailureSummary> {
+        self.solver.advance(&mut self.state)?;
+        let last = self.is_last();
+        let due = (self.checkpoints.as_mut())
+            .is_some_and(|all| all.is_due(self.state.time, self.plan.step, last || stop));
+        if due && let Some(checkpoints) = &self.checkpoints {
+            let progressed = Progressed {
+                time: self.state.time,
+                steps: self.state.steps,
+                wall_seconds,
+                worst_balance: self.worst_balance,
+                worst_hourglass: self.worst_hourglass,
+                history: self.history.clone(),
+                sampling: self.sampling,
+                outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
+            };
+            let written = checkpoints.write(&progressed, &self.state, self.solver.equilibrium());
+            self.kept = Some(written.map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?);
+        }
+        // What is left of the last instant is quickly done.
+        if stop && !last {
+            return Err(FailureSummary::interrupted(
+                self.state.time,
+                due.then_some(self.kept.as_deref()).flatten(),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Ends the outputs where this run ends.
+    fn finish(&mut self) -> Result<(), FailureSummary> {
+        (self.watching.iter_mut())
+            .try_for_each(|(_, observer)| observer.finish())
+            .map_err(|error| FailureSummary::output(&error, Some(self.state.time)))
     }
 }
 

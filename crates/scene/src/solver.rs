@@ -1,7 +1,9 @@
 //! The solvers of a scene behind one face, so that one run loop serves them all.
 
 use pliant_mechanics::stability::Monitor;
-use pliant_mechanics::{CentralDifference, DynamicRelaxation, Observable, Real, RelaxationSettings, State};
+use pliant_mechanics::{
+    CentralDifference, DynamicRelaxation, Equilibrium, Observable, Real, RelaxationSettings, State,
+};
 
 use crate::build::Built;
 use crate::format::{RunTable, SolverName};
@@ -21,6 +23,15 @@ pub(crate) trait Solver<R> {
 
     /// As what an observer may ask.
     fn observable(&self) -> &dyn Observable<R>;
+
+    /// What a restart needs beside the state, after [`advance`](Self::advance): nothing where
+    /// [`evaluate`](Self::evaluate) finds everything anew.
+    fn equilibrium(&self) -> Option<Equilibrium<R>> {
+        None
+    }
+
+    /// Takes that up again.
+    fn resume(&mut self, _equilibrium: Equilibrium<R>) {}
 }
 
 /// The solver that a scene asks for.
@@ -103,5 +114,13 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
 
     fn observable(&self) -> &dyn Observable<R> {
         &self.relaxation
+    }
+
+    fn equilibrium(&self) -> Option<Equilibrium<R>> {
+        Some(self.relaxation.equilibrium())
+    }
+
+    fn resume(&mut self, equilibrium: Equilibrium<R>) {
+        self.relaxation.resume(equilibrium);
     }
 }

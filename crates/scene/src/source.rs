@@ -9,6 +9,7 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::checker::nearest;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
 
 /// Syntax errors shown of one file: what follows the first is often a consequence of it.
@@ -22,14 +23,22 @@ pub struct Source {
     name: String,
     text: Arc<str>,
     root: Node,
+    assignments: Vec<String>,
 }
+
+/// What the user types before an assignment.
+pub(crate) const SET: &str = "--set ";
+
+/// Kinds of tables that hold tables with names of the user's choice.
+const NAMED: [&str; 6] = ["law", "body", "surface", "constraint", "load", "output"];
 
 /// A value and where it was given.
 #[derive(Clone, Debug)]
 pub struct Node {
     /// Where the value stands: its own text, or the header `[law.liver]` of a table that has one.
     pub place: Place,
-    /// Where its key stands; none for items of arrays, the root and what the command line gave.
+    /// Where its key stands, in the same text as the value; none for items of arrays, the root and what an option with a
+    /// meaning of its own gave.
     pub key_span: Option<Range<usize>>,
     /// The value.
     pub value: Value,
@@ -99,11 +108,38 @@ impl Node {
         Self { place: Place::CommandLine, key_span: None, value }
     }
 
+    /// A value of an option that is shown as typed, from where it stands in the part after [`SET`].
+    fn of_option(self, text: &Arc<str>) -> Self {
+        let shift = |span: Range<usize>| span.start + SET.len()..span.end + SET.len();
+        let place = match self.place {
+            Place::File(span) => Place::Option(text.clone(), shift(span)),
+            other => other,
+        };
+        let value = match self.value {
+            Value::Table(entries) => {
+                Value::Table(entries.into_iter().map(|(key, node)| (key, node.of_option(text))).collect())
+            }
+            Value::Array(items) => Value::Array(items.into_iter().map(|n| n.of_option(text)).collect()),
+            plain => plain,
+        };
+        Self { place, key_span: self.key_span.map(shift), value }
+    }
+
     /// The entry of a table, or the item of an array whose index is `key` in decimal.
     pub fn get(&self, key: &str) -> Option<&Node> {
         match &self.value {
             Value::Table(entries) => entries.iter().find(|(name, _)| name == key).map(|(_, node)| node),
             Value::Array(items) => items.get(key.parse::<usize>().ok()?),
+            _ => None,
+        }
+    }
+
+    /// The place of the first part that an option set.
+    fn set_part(&self) -> Option<&Place> {
+        match (&self.place, &self.value) {
+            (Place::Option(..), _) => Some(&self.place),
+            (_, Value::Table(entries)) => entries.iter().find_map(|(_, node)| node.set_part()),
+            (_, Value::Array(items)) => items.iter().find_map(Node::set_part),
             _ => None,
         }
     }
@@ -135,7 +171,10 @@ impl Node {
     /// Where the key stands, or the value where it has no key.
     pub fn key_place(&self) -> Place {
         match &self.key_span {
-            Some(span) => Place::File(span.clone()),
+            Some(span) => match &self.place {
+                Place::Option(text, _) => Place::Option(text.clone(), span.clone()),
+                _ => Place::File(span.clone()),
+            },
             None => self.place.clone(),
         }
     }
@@ -163,9 +202,12 @@ impl Source {
         let value = diagnostics.is_empty().then(|| table_value(table.get_ref(), &mut diagnostics));
         drop(table);
         match value {
-            Some(value) if diagnostics.is_empty() => {
-                Ok(Self { name, text, root: Node { place: Place::File(0..0), key_span: None, value } })
-            }
+            Some(value) if diagnostics.is_empty() => Ok(Self {
+                name,
+                text,
+                root: Node { place: Place::File(0..0), key_span: None, value },
+                assignments: Vec::new(),
+            }),
             _ => Err(SceneErrors::new(name, text, diagnostics)),
         }
     }
@@ -190,12 +232,20 @@ impl Source {
         path.iter().try_fold(&self.root, |node, key| node.get(key))
     }
 
-    /// Where the value at a path stands; for a missing one the header or key of the nearest table around it.
+    /// Where the value at a path stands; for a missing one the header or key of the nearest table around it. Of a value
+    /// within a line, in which an option set a part, that part.
     pub fn span(&self, path: &[&str]) -> Place {
         match self.node(path) {
-            Some(node) => node.place.clone(),
+            Some(node) if self.is_header(node) => node.place.clone(),
+            Some(node) => node.set_part().unwrap_or(&node.place).clone(),
             None => self.around(path),
         }
+    }
+
+    fn is_header(&self, node: &Node) -> bool {
+        let Place::File(span) = &node.place else { return false };
+        matches!(node.value, Value::Table(_))
+            && self.text.get(span.clone()).is_some_and(|text| text.starts_with('['))
     }
 
     /// Where the key at a path stands; for a missing one the header or key of the nearest table around it.
@@ -226,12 +276,66 @@ impl Source {
     ///
     /// Diagnostics about it say that it was given on the command line. The error says why the path cannot be.
     pub fn set(&mut self, path: &[&str], value: impl Into<Value>) -> Result<(), Box<Diagnostic>> {
+        let steps: Vec<_> = path.iter().map(|key| ((*key).to_owned(), Place::CommandLine)).collect();
+        self.put(&steps, Node::of_command_line(value.into()))
+    }
+
+    /// Takes an assignment in TOML, as `--set "law.liver.shear-modulus = 2e3"` gives it; a single word on the right
+    /// needs no quotes. An item of an array has its index, counted from 0, as its key.
+    ///
+    /// Diagnostics about it, here and later, underline it.
+    ///
+    /// # Errors
+    /// If it is no assignment, was made before, or its path cannot be.
+    pub fn assign(&mut self, assignment: &str) -> Result<(), Box<Diagnostic>> {
+        let text: Arc<str> = format!("{SET}{assignment}").into();
+        let (path, node) = parse_assignment(assignment, &text)?;
+        let place = |depth: usize| path[depth].1.clone();
+        let key = path.iter().map(|step| step.0.as_str()).collect::<Vec<_>>();
+        let kind = NAMED.iter().find(|kind| key.first() == Some(*kind));
+        if let (Some(kind), [_, name, _, ..]) = (kind, key.as_slice())
+            && self.node(&key[..2]).is_none()
+        {
+            let known: Vec<&str> =
+                self.node(&key[..1]).map_or(&[][..], Node::entries).iter().map(|(n, _)| n.as_str()).collect();
+            let list = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+            let help = match nearest(name, known.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None if known.is_empty() => format!("it has no `[{kind}.NAME]` at all"),
+                None => format!("it has {list}"),
+            };
+            let message = format!("the scene has no {kind} `{name}`");
+            return Err(Box::new(Diagnostic::error(message).at(place(1), "no such table").help(help)));
+        }
+        let last = path.len() - 1;
+        if let Some(Place::Option(before, _)) = self.node(&key).map(|node| &node.place) {
+            let message = format!("`{}` is set twice", key.join("."));
+            let help = format!("it is set by `{before}`, too; remove one of the two");
+            return Err(Box::new(Diagnostic::error(message).at(place(last), "set again").help(help)));
+        }
+        self.put(&path, node)?;
+        self.assignments.push(assignment.to_owned());
+        Ok(())
+    }
+
+    /// The assignments taken, as typed.
+    pub fn assignments(&self) -> &[String] {
+        &self.assignments
+    }
+
+    /// Puts a value at a path of keys, each with its place; tables on the way are made where missing.
+    fn put(&mut self, path: &[(String, Place)], value: Node) -> Result<(), Box<Diagnostic>> {
         let mut node = &mut self.root;
-        for (depth, key) in path.iter().enumerate() {
+        for (depth, (key, place)) in path.iter().enumerate() {
             if node.get(key).is_none() {
                 match &mut node.value {
                     Value::Table(entries) => {
-                        entries.push(((*key).to_owned(), Node::of_command_line(Value::Table(Vec::new()))));
+                        let key_span = match place {
+                            Place::Option(_, span) => Some(span.clone()),
+                            _ => None,
+                        };
+                        let made = Node { place: place.clone(), key_span, value: Value::Table(Vec::new()) };
+                        entries.push((key.clone(), made));
                     }
                     Value::Array(items) => return Err(no_such_item(path, depth, items.len())),
                     _ => return Err(no_table(path, depth)),
@@ -242,44 +346,8 @@ impl Source {
                 None => return Err(no_table(path, depth)),
             };
         }
-        *node = Node::of_command_line(value.into());
+        *node = value;
         Ok(())
-    }
-
-    /// Takes an assignment in TOML, as `--set "law.liver.shear-modulus = 2e3"` gives it; a single word on the right
-    /// needs no quotes.
-    pub fn assign(&mut self, assignment: &str) -> Result<(), Box<Diagnostic>> {
-        let quoted;
-        let table = match (DeTable::parse(assignment), assignment.split_once('=')) {
-            (Ok(table), _) => table,
-            (Err(error), None) => return Err(no_assignment(assignment, error.message())),
-            (Err(error), Some((path, word))) => {
-                quoted = format!("{path}= {}", serde_json::Value::from(word.trim()));
-                match DeTable::parse(&quoted) {
-                    Ok(table) if is_word(word.trim()) => table,
-                    _ => return Err(no_assignment(assignment, error.message())),
-                }
-            }
-        };
-        let mut diagnostics = Vec::new();
-        let Value::Table(entries) = table_value(table.get_ref(), &mut diagnostics) else { return Ok(()) };
-        if let Some(mut diagnostic) = diagnostics.pop() {
-            diagnostic.span = None;
-            return Err(Box::new(diagnostic.at(Place::CommandLine, "")));
-        }
-        let [(key, node)] = entries.as_slice() else {
-            return Err(no_assignment(assignment, "it must set one value"));
-        };
-        let (mut path, mut node) = (vec![key.as_str()], node);
-        // A dotted key is a chain of tables whose place is their own key; `{ a = 1 }` is a value.
-        while let (Value::Table(entries), true) =
-            (&node.value, Some(&node.place) == node.key_span.clone().map(Place::File).as_ref())
-        {
-            let [(key, child)] = entries.as_slice() else { break };
-            path.push(key);
-            node = child;
-        }
-        self.set(&path, node.value.clone())
     }
 
     /// Diagnostics about this scene together with its text, ready to print.
@@ -288,22 +356,80 @@ impl Source {
     }
 }
 
-fn no_table(path: &[&str], depth: usize) -> Box<Diagnostic> {
-    let message = format!("`{}` cannot be set: `{}` is not a table", path.join("."), path[..depth].join("."));
-    Box::new(Diagnostic::error(message).at(Place::CommandLine, ""))
+/// The keys of an assignment with their places, and its value.
+type Assigned = (Vec<(String, Place)>, Node);
+
+/// Reads the part of `text` after [`SET`].
+fn parse_assignment(assignment: &str, text: &Arc<str>) -> Result<Assigned, Box<Diagnostic>> {
+    let whole = || Place::Option(text.clone(), SET.len()..text.len());
+    let refused = |why: &str, place: Place| {
+        let help = "write key=value, such as run.threads=2 or law.tissue.young-modulus=4e3; a text with spaces or signs \
+                    needs quotes within quotes: 'scene.title=\"a liver\"'";
+        let message = format!("`{assignment}` is not an assignment: {why}");
+        Box::new(Diagnostic::error(message).at(place, "").help(help))
+    };
+    if assignment.contains('\n') {
+        return Err(refused("it must be one line", whole()));
+    }
+    let (quoted, mut word) = (&mut String::new(), None);
+    let table = match (DeTable::parse(assignment), assignment.split_once('=')) {
+        (Ok(table), _) => table,
+        (Err(error), Some((path, right))) if is_word(right.trim()) => {
+            let start = assignment.len() - right.trim_start().len();
+            word = Some(start..start + right.trim().len());
+            *quoted = format!("{path}= {}", serde_json::Value::from(right.trim()));
+            DeTable::parse(quoted).map_err(|_| refused(error.message(), whole()))?
+        }
+        (Err(error), _) => {
+            let place = match error.span() {
+                Some(span) => Place::Option(text.clone(), span.start + SET.len()..span.end + SET.len()),
+                None => whole(),
+            };
+            return Err(refused(error.message(), place));
+        }
+    };
+    let mut diagnostics = Vec::new();
+    let Value::Table(entries) = table_value(table.get_ref(), &mut diagnostics) else {
+        return Err(refused("it must set one value", whole()));
+    };
+    if let Some(mut diagnostic) = diagnostics.pop() {
+        let span = diagnostic.span.take().map(|span| span.start + SET.len()..span.end + SET.len());
+        let place = span.map_or_else(whole, |span| Place::Option(text.clone(), span));
+        let label = std::mem::take(&mut diagnostic.label);
+        return Err(Box::new(diagnostic.at(place, label)));
+    }
+    let (mut path, mut node) =
+        (Vec::new(), Node { place: whole(), key_span: None, value: Value::Table(entries) });
+    // A dotted key is a chain of tables whose place is their own key; `{ a = 1 }` is a value.
+    while path.is_empty() || Some(&node.place) == node.key_span.clone().map(Place::File).as_ref() {
+        let Value::Table(entries) = &mut node.value else { break };
+        let (Some((key, child)), true) = (entries.pop(), entries.is_empty()) else {
+            return Err(refused("it must set one value", whole()));
+        };
+        path.push((key, child.clone().of_option(text).key_place()));
+        node = child;
+    }
+    if let Some(word) = word {
+        node.place = Place::File(word);
+    }
+    Ok((path, node.of_option(text)))
 }
 
-fn no_such_item(path: &[&str], depth: usize, len: usize) -> Box<Diagnostic> {
-    let (whole, array) = (path.join("."), path[..depth].join("."));
+fn joined(path: &[(String, Place)]) -> String {
+    path.iter().map(|step| step.0.as_str()).collect::<Vec<_>>().join(".")
+}
+
+fn no_table(path: &[(String, Place)], depth: usize) -> Box<Diagnostic> {
+    let (whole, leaf) = (joined(path), joined(&path[..depth]));
+    let message = format!("`{whole}` cannot be set: `{leaf}` is not a table");
+    Box::new(Diagnostic::error(message).at(path[depth].1.clone(), "no key of a table"))
+}
+
+fn no_such_item(path: &[(String, Place)], depth: usize, len: usize) -> Box<Diagnostic> {
+    let (whole, array) = (joined(path), joined(&path[..depth]));
     let message = format!("`{whole}` cannot be set: `{array}` is an array of {len}");
-    Box::new(Diagnostic::error(message).at(Place::CommandLine, "").help("items are counted from 0"))
-}
-
-fn no_assignment(assignment: &str, why: &str) -> Box<Diagnostic> {
-    let message = format!("`{assignment}` is not an assignment: {why}");
-    Box::new(
-        Diagnostic::error(message).at(Place::CommandLine, "").help("write key=value, such as run.until=2.5"),
-    )
+    let diagnostic = Diagnostic::error(message).at(path[depth].1.clone(), "no such item");
+    Box::new(diagnostic.help("items are counted from 0"))
 }
 
 /// Whether a text can stand without quotes in an assignment of the command line.
@@ -446,6 +572,7 @@ at = { node = 4 }
         match place {
             Place::File(span) => &LIVER[span],
             Place::CommandLine => "on the command line",
+            Place::Option(..) => "in an option",
         }
     }
 
@@ -506,7 +633,7 @@ at = { node = 4 }
         let mut source = liver();
         source.assign("law.parenchyma.shear-modulus = 2e3").unwrap();
         source.assign("run.device=gpu").unwrap();
-        source.assign("body.liver = { law = \"parenchyma\" }").unwrap();
+        source.assign("body.liver={ law = \"parenchyma\" }").unwrap();
         source.assign("scene.gravity.2 = 0").unwrap();
         let value = |path: &[&str]| &source.node(path).unwrap().value;
         assert!(matches!(value(&["law", "parenchyma", "shear-modulus"]), Value::Float(x) if *x == 2e3));
@@ -514,8 +641,24 @@ at = { node = 4 }
         assert!(matches!(value(&["run", "device"]), Value::String(word) if word == "gpu"));
         assert!(matches!(value(&["body", "liver", "law"]), Value::String(word) if word == "parenchyma"));
         assert!(matches!(value(&["scene", "gravity", "2"]), Value::Integer(0)));
-        for bad in ["", "run.device", "a = 1\nb = 2", "a = 3 4", "a = 99999999999999999999", "x = \"a", "= 3"]
-        {
+        let place = |path: &[&str]| match source.span(path) {
+            Place::Option(text, span) => text[span].to_owned(),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(place(&["run", "device"]), "gpu");
+        assert_eq!(place(&["law", "parenchyma", "shear-modulus"]), "2e3");
+        assert_eq!(place(&["body", "liver", "law"]), "\"parenchyma\"");
+        for bad in [
+            "",
+            "run.device",
+            "a = 1\nb = 2",
+            "scene.gravity.2=1",
+            "law.parenchym.x=1",
+            "a = 3 4",
+            "a = 99999999999999999999",
+            "x = \"a",
+            "= 3",
+        ] {
             assert!(source.assign(bad).is_err(), "{bad}");
         }
     }

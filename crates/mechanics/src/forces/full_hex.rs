@@ -1,5 +1,5 @@
 //! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation, W = Σ w W_iso(F_g) + V U(v/V):
-//! no hourglass patterns, no locking, about eight times the cost. The in-house reference for `hex8`.
+//! no hourglass patterns, no locking, eight stresses a cell. The in-house reference for `hex8`.
 
 use rayon::prelude::*;
 

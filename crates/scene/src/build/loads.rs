@@ -13,7 +13,7 @@ impl Builder<'_> {
         let scene = self.scene;
         if let Some(acceleration) = scene.scene.gravity {
             for body in 0..self.model.bodies.len() {
-                let curve = Curve { shape: Shape::Hold, from: 0.0, to: scene.scene.until };
+                let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
                 let kind = LoadKind::Gravity { body, acceleration };
                 self.model.loads.push(Load { name: "gravity".into(), kind, curve, surface: None });
             }

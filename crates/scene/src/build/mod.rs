@@ -168,6 +168,8 @@ impl<'s> Builder<'s> {
             return None;
         }
         self.note_timing(&shape, [timing.from, to], path);
+        // These two have no end, and are the same whenever the scene ends.
+        let to = if matches!(shape, Shape::Hold | Shape::Table(_)) { timing.from } else { to };
         Some(Curve { shape, from: timing.from, to })
     }
 

@@ -80,7 +80,7 @@ pub enum Element {
     Tet4IanpNiftysim,
     /// Uniform-strain hexahedron with hourglass control.
     Hex8,
-    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight times the cost.
+    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell.
     Hex8Full,
 }
 

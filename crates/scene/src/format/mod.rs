@@ -68,6 +68,18 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(range(max = 1024))]
     pub threads: u32,
+    /// Checkpoints to resume an interrupted run from (`pliant run --resume`); the last two are kept.
+    #[serde(default)]
+    pub checkpoint: Option<CheckpointTable>,
+}
+
+/// When checkpoints are written.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CheckpointTable {
+    /// Simulated time between them [s]; there is one at the end, too.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub every: f64,
 }
 
 /// Mass added for a larger step. It resists acceleration (and so damping acts on it); gravity and other loads act on the

@@ -1,22 +1,28 @@
 //! A table over time: reactions, energies, probes. Each row is on disk before the next step.
 
-use std::fs::File;
-use std::io::Write;
+use std::fs::{self, File, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::{Locator, Vector3};
 use pliant_mechanics::Real;
 use pliant_mechanics::recover::Recovery;
 
-use super::{Frame, Observer, OutputError, fields};
+use crc32fast::Hasher;
+
+use super::{Frame, Observer, OutputError, Written, fields};
 use crate::build::Built;
 use crate::format::{CsvTable, FieldName, ProbeTable};
 
 pub(super) struct Rows {
     path: PathBuf,
-    file: File,
+    header: String,
+    file: Option<File>,
     /// Bytes of the whole rows in it.
     length: u64,
+    crc: Hasher,
+    /// What an interrupted run had written beyond them. It stays until this run writes something else there.
+    beyond: Vec<u8>,
     reactions: Vec<usize>,
     energy: bool,
     probes: Vec<Probe>,
@@ -29,17 +35,12 @@ struct Probe {
     fields: Vec<FieldName>,
 }
 
-const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "external", "hourglass", "balance"];
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(crate) const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "external", "hourglass", "balance"];
+pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
 impl Rows {
-    pub(super) fn new(
-        built: &Built,
-        table: &CsvTable,
-        folder: &Path,
-        name: &str,
-    ) -> Result<Self, OutputError> {
+    pub(super) fn new(built: &Built, table: &CsvTable, folder: &Path, name: &str) -> Self {
         let path = folder.join(format!("{name}.csv"));
         let wanted = |name: &String| table.reactions.as_ref().is_none_or(|list| list.contains(name));
         let constraints = built.model.constraints.iter();
@@ -65,10 +66,37 @@ impl Rows {
             }
             probes.push(Probe::new(built, probe));
         }
-        let file = File::create(&path).map_err(|error| OutputError::new(&path, error))?;
-        let mut rows = Self { path, file, length: 0, reactions, energy: table.energy, probes };
-        rows.write(header.join(","))?;
-        Ok(rows)
+        Self {
+            path,
+            header: header.join(","),
+            file: None,
+            length: 0,
+            crc: Hasher::new(),
+            beyond: Vec::new(),
+            reactions,
+            energy: table.energy,
+            probes,
+        }
+    }
+
+    /// Begins the file with its header.
+    pub(super) fn start(&mut self) -> Result<(), OutputError> {
+        self.file = Some(File::create(&self.path).map_err(|error| self.failed(error))?);
+        let header = self.header.clone();
+        self.write(header)
+    }
+
+    /// Goes on after the rows that an interrupted run had written at its checkpoint.
+    pub(super) fn take_up(&mut self, bytes: u64, crc: u32) -> Result<(), OutputError> {
+        let mut content = fs::read(&self.path).map_err(|error| self.failed(error))?;
+        let file = OpenOptions::new().write(true).open(&self.path).and_then(|mut file| {
+            file.seek(SeekFrom::Start(bytes))?;
+            Ok(file)
+        });
+        self.file = Some(file.map_err(|error| self.failed(error))?);
+        self.beyond = content.split_off((bytes as usize).min(content.len()));
+        (self.length, self.crc) = (bytes, Hasher::new_with_initial_len(crc, bytes));
+        Ok(())
     }
 
     /// The file.
@@ -76,17 +104,51 @@ impl Rows {
         &self.path
     }
 
-    /// Writes a row in one go; of one that does not fit on the disk nothing stays.
+    fn failed(&self, error: std::io::Error) -> OutputError {
+        OutputError::new(&self.path, error)
+    }
+
+    /// Writes a row in one go; of one that does not fit on the disk nothing stays. A row that stands there already is
+    /// passed over; any other is cut off with all after it.
     fn write(&mut self, mut row: String) -> Result<(), OutputError> {
         row.push('\n');
-        match self.file.write_all(row.as_bytes()) {
-            Ok(()) => self.length += row.len() as u64,
-            Err(error) => {
-                let _ = self.file.set_len(self.length);
-                return Err(OutputError::new(&self.path, error));
+        if self.beyond.starts_with(row.as_bytes()) {
+            self.beyond.drain(..row.len());
+        } else {
+            self.cut()?;
+            let Some(file) = &mut self.file else { return Ok(()) };
+            let written =
+                file.seek(SeekFrom::Start(self.length)).and_then(|_| file.write_all(row.as_bytes()));
+            if let Err(error) = written {
+                let _ = file.set_len(self.length);
+                return Err(self.failed(error));
             }
         }
+        self.length += row.len() as u64;
+        self.crc.update(row.as_bytes());
         Ok(())
+    }
+
+    /// Ends the file after the rows of this run.
+    fn cut(&mut self) -> Result<(), OutputError> {
+        if !std::mem::take(&mut self.beyond).is_empty()
+            && let Some(file) = &self.file
+        {
+            file.set_len(self.length).map_err(|error| self.failed(error))?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether a table begins with these bytes; the reason if not.
+pub(super) fn verify(path: &Path, bytes: u64, crc: u32) -> Result<(), String> {
+    let content = fs::read(path).map_err(|error| error.to_string())?;
+    match content.get(..bytes as usize) {
+        None => Err(format!("it has {} bytes, and had {bytes} at the checkpoint", content.len())),
+        Some(rows) if crc32fast::hash(rows) != crc => {
+            Err("its rows up to the checkpoint are not those of the interrupted run".into())
+        }
+        Some(_) => Ok(()),
     }
 }
 
@@ -107,6 +169,14 @@ impl<R: Real> Observer<R> for Rows {
         }
         let row: Vec<String> = row.iter().map(|value| format!("{value:e}")).collect();
         self.write(row.join(","))
+    }
+
+    fn written(&self) -> Written {
+        Written::Rows { bytes: self.length, crc: self.crc.clone().finalize() }
+    }
+
+    fn finish(&mut self) -> Result<(), OutputError> {
+        self.cut()
     }
 }
 

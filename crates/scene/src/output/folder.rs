@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::OutputError;
+use super::{OutputError, Written, csv, vtu};
+use crate::checkpoint::{Checkpoint, ResumeError, steps_of};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
 
@@ -53,10 +54,44 @@ impl OutputFolder {
         } else {
             fs::create_dir_all(&path).map_err(failed)?;
         }
-        let probe = path.join(".pliant-write-test");
-        fs::write(&probe, b"").map_err(failed)?;
-        fs::remove_file(&probe).map_err(failed)?;
+        probe(&path).map_err(failed)?;
         Ok(Self { path })
+    }
+
+    /// Opens the folder of an interrupted run to go on with it. Nothing in it changes yet.
+    ///
+    /// # Errors
+    /// If it does not hold the outputs as they were at the checkpoint, or can't be written to.
+    pub fn reopen(path: PathBuf, scene: &Scene, checkpoint: &Checkpoint) -> Result<Self, ResumeError> {
+        let refused = |path: &Path, reason| ResumeError::OtherOutputs { path: path.to_owned(), reason };
+        if !path.is_dir() {
+            return Err(refused(&path, "there is no such folder".into()));
+        }
+        for ((name, _), (_, written)) in scene.outputs.iter().zip(&checkpoint.progressed.outputs) {
+            let (file, verified) = match written {
+                Written::Rows { bytes, crc } => {
+                    let file = path.join(format!("{name}.csv"));
+                    let verified = csv::verify(&file, *bytes, *crc);
+                    (file, verified)
+                }
+                Written::Frames(times) => (path.join(format!("{name}.pvd")), vtu::verify(&path, name, times)),
+            };
+            verified.map_err(|reason| refused(&file, reason))?;
+        }
+        probe(&path).map_err(|error| refused(&path, error.to_string()))?;
+        Ok(Self { path })
+    }
+
+    /// Removes a folder with the outputs of an earlier run of a scene; what is not of it stays.
+    pub(crate) fn clear(path: &Path, scene: &Scene) -> std::io::Result<()> {
+        remove_earlier(path, scene)?;
+        for (name, table) in &scene.outputs {
+            match table {
+                OutputTable::Csv(_) => remove(&path.join(format!("{name}.csv")))?,
+                OutputTable::Vtu(_) => remove_empty(&path.join(name))?,
+            }
+        }
+        remove_empty(path)
     }
 
     /// Its path.
@@ -77,11 +112,24 @@ impl OutputFolder {
     }
 }
 
+/// Whether files can be made in a folder.
+fn probe(folder: &Path) -> std::io::Result<()> {
+    let probe = folder.join(".pliant-write-test");
+    fs::write(&probe, b"")?;
+    fs::remove_file(&probe)
+}
+
 /// Removes what an earlier run of the same outputs left, so that no file tells of another run than its neighbours.
 /// A CSV file stays until it is written anew.
 fn remove_earlier(folder: &Path, scene: &Scene) -> std::io::Result<()> {
     for page in [SUMMARY, PLOT] {
         remove(&folder.join(page))?;
+    }
+    for entry in fs::read_dir(folder)? {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        if steps_of(name.strip_suffix(".tmp").unwrap_or(&name)).is_some() {
+            remove(&folder.join(name))?;
+        }
     }
     for (name, table) in &scene.outputs {
         if let OutputTable::Vtu(_) = table {
@@ -105,6 +153,12 @@ fn remove_frames(folder: &Path) -> std::io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Removes a folder that holds nothing, if there is one.
+fn remove_empty(path: &Path) -> std::io::Result<()> {
+    let empty = path.is_dir() && fs::read_dir(path)?.next().is_none();
+    if empty { fs::remove_dir(path) } else { Ok(()) }
 }
 
 /// Removes a regular file, if there is one.

@@ -11,12 +11,14 @@ mod vtu;
 use std::path::{Path, PathBuf};
 
 use pliant_mechanics::{Observable, Real, State};
+use serde::{Deserialize, Serialize};
 
 pub use folder::OutputFolder;
 pub(crate) use folder::{PLOT, SUMMARY};
 pub use stability::{AddedMass, StabilitySummary};
 pub use summary::{BodySummary, FailureSummary, Summary, failed_input, failed_output, number};
 
+pub(crate) use csv::{AXES, ENERGIES};
 pub(crate) use plot::plot;
 pub(crate) use summary::{bodies, markdown, summarise};
 
@@ -61,10 +63,30 @@ impl<R: Real> Frame<'_, R> {
 pub(crate) trait Observer<R> {
     /// Writes down an instant.
     fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError>;
+
+    /// What is written so far.
+    fn written(&self) -> Written;
+
+    /// Removes what an interrupted run had written beyond the end of the one that went on with it.
+    fn finish(&mut self) -> Result<(), OutputError>;
+}
+
+/// What an output has written, for a run that goes on with it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Written {
+    /// Whole rows of a table.
+    Rows {
+        /// Bytes of them and the header.
+        bytes: u64,
+        /// CRC-32 of these bytes.
+        crc: u32,
+    },
+    /// Frames of a series: their times [s].
+    Frames(Vec<f64>),
 }
 
 /// When an observer looks: at the first instant, at the one nearest to each multiple of an interval, and at the last.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Schedule {
     every: f64,
     seen: u64,
@@ -73,6 +95,13 @@ pub(crate) struct Schedule {
 impl Schedule {
     pub fn new(every: f64) -> Self {
         Self { every, seen: 0 }
+    }
+
+    /// One that has seen all up to an instant, that included.
+    pub fn after(every: f64, time: f64, step: f64) -> Self {
+        let mut schedule = Self::new(every);
+        schedule.is_due(time, step, true);
+        schedule
     }
 
     /// Whether an instant is to be looked at.
@@ -88,27 +117,38 @@ impl Schedule {
 /// An observer with its schedule.
 pub(crate) type Scheduled<R> = (Schedule, Box<dyn Observer<R>>);
 
-/// The observers of a scene's outputs. Their files are opened here; all paths go to `files`.
+/// The observers of a scene's outputs. Their files are opened here; all paths go to `files`. Those of a run that goes
+/// on take up what is `written`.
 pub(crate) fn observers<R: Real>(
     scene: &Scene,
     built: &Built,
     folder: &Path,
     files: &mut Vec<PathBuf>,
+    written: Option<&[(Schedule, Written)]>,
 ) -> Result<Vec<Scheduled<R>>, OutputError> {
     let mut all: Vec<Scheduled<R>> = Vec::new();
-    for (name, table) in &scene.outputs {
-        match table {
+    for (index, (name, table)) in scene.outputs.iter().enumerate() {
+        let before = written.and_then(|written| written.get(index));
+        let (every, observer): (f64, Box<dyn Observer<R>>) = match table {
             OutputTable::Vtu(table) => {
-                let series = vtu::Series::<R>::new(built, table, folder, name)?;
+                let mut series = vtu::Series::<R>::new(built, table, folder, name)?;
+                if let Some((_, Written::Frames(times))) = before {
+                    series.take_up(times);
+                }
                 files.push(series.index().to_owned());
-                all.push((Schedule::new(table.every), Box::new(series)));
+                (table.every, Box::new(series))
             }
             OutputTable::Csv(table) => {
-                let rows = csv::Rows::new(built, table, folder, name)?;
+                let mut rows = csv::Rows::new(built, table, folder, name);
+                match before {
+                    Some((_, Written::Rows { bytes, crc })) => rows.take_up(*bytes, *crc)?,
+                    _ => rows.start()?,
+                }
                 files.push(rows.path().to_owned());
-                all.push((Schedule::new(table.every), Box::new(rows)));
+                (table.every, Box::new(rows))
             }
-        }
+        };
+        all.push((before.map_or(Schedule::new(every), |(schedule, _)| *schedule), observer));
     }
     Ok(all)
 }

@@ -14,10 +14,13 @@ use crate::plan::{LimitingElement, Plan};
 use crate::run::{History, Outcome};
 use crate::scene::Scene;
 
+/// The status of a run that was told to stop.
+const INTERRUPTED: &str = "interrupted";
+
 /// The result of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// `done` or `failed`.
+    /// `done`, `failed` or `interrupted`.
     pub status: &'static str,
     /// Why it failed.
     pub error: Option<FailureSummary>,
@@ -56,6 +59,12 @@ pub struct Summary {
     pub warnings: Vec<String>,
     /// Files written, as paths.
     pub files: Vec<String>,
+    /// Simulated time at the end [s].
+    #[serde(skip)]
+    pub time: f64,
+    /// Energies at the end [J].
+    #[serde(skip)]
+    pub energies: Energies,
 }
 
 /// One body.
@@ -76,7 +85,7 @@ pub struct BodySummary {
 /// Why a run failed or an input was refused.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureSummary {
-    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `not-converged`, `output` or `input`.
+    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `not-converged`, `output`, `input` or `interrupted`.
     pub kind: &'static str,
     /// The body, where it is about one.
     pub body: Option<String>,
@@ -119,6 +128,18 @@ impl FailureSummary {
     pub(crate) fn output(error: &OutputError, time: Option<f64>) -> Self {
         let message = format!("{error}; what was written before stays readable; {}", error.remedy);
         Self::about("output", message, time)
+    }
+
+    /// A run that was told to stop, and the checkpoint it left.
+    pub(crate) fn interrupted(time: f64, checkpoint: Option<&Path>) -> Self {
+        let way = match checkpoint {
+            Some(path) => format!("go on with `--resume {}`", path.display()),
+            None => "what was written before stays readable; with `checkpoint = { every = 1.0 }` in `[run]` it could \
+                     be resumed"
+                .into(),
+        };
+        let message = format!("the run was interrupted at t = {} s; {way}", number(time));
+        Self::about(INTERRUPTED, message, Some(time))
     }
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
@@ -184,7 +205,11 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
     let stability = StabilitySummary::new(scene, plan, outcome);
     let reactions = built.model.constraints.iter().zip(&outcome.reactions);
     Summary {
-        status: if outcome.failure.is_none() { "done" } else { "failed" },
+        status: match &outcome.failure {
+            None => "done",
+            Some(failure) if failure.kind == INTERRUPTED => INTERRUPTED,
+            Some(_) => "failed",
+        },
         error: outcome.failure.clone(),
         bodies: bodies(built),
         nodes: built.model.node_count(),
@@ -203,6 +228,8 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
         energy_balance: outcome.energies.balance,
         reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
+        time: outcome.time,
+        energies: outcome.energies,
     }
 }
 
@@ -232,7 +259,18 @@ fn write_page(
     writeln!(page, "# {title}\n")?;
     match &outcome.failure {
         None => writeln!(page, "Done: {} s simulated in {} steps.\n", number(outcome.time), outcome.steps)?,
+        Some(failure) if failure.kind == INTERRUPTED => {
+            writeln!(page, "**Interrupted**: {}\n", failure.message)?;
+        }
         Some(failure) => writeln!(page, "**Failed** ({}): {}\n", failure.kind, failure.message)?,
+    }
+    if let Some((checkpoint, time)) = &outcome.resumed {
+        writeln!(page, "Resumed at t = {} s from `{}`.\n", number(*time), short(checkpoint))?;
+    }
+    if !scene.source.assignments().is_empty() {
+        writeln!(page, "Set on the command line:\n")?;
+        scene.source.assignments().iter().try_for_each(|set| writeln!(page, "* `{set}`"))?;
+        writeln!(page)?;
     }
     writeln!(page, "![forces and energies over time](plot.svg)\n")?;
     writeln!(page, "## Model\n")?;

@@ -12,7 +12,7 @@ use pliant_mechanics::Real;
 use pliant_mechanics::recover::Recovery;
 use rayon::prelude::*;
 
-use super::{Frame, Observer, OutputError, fields};
+use super::{Frame, Observer, OutputError, Written, fields};
 use crate::build::Built;
 use crate::format::{At, FieldName, VtuTable};
 
@@ -20,7 +20,9 @@ pub(super) struct Series<R> {
     folder: PathBuf,
     index: PathBuf,
     name: String,
-    times: Vec<(f64, String)>,
+    times: Vec<f64>,
+    /// Times of the frames that an interrupted run had written beyond these; their files stay until they are replaced.
+    beyond: Vec<f64>,
     fields: Vec<FieldName>,
     at: At,
     mesh: Mesh,
@@ -56,6 +58,7 @@ impl<R: Real> Series<R> {
             index: folder.join(format!("{name}.pvd")),
             name: name.into(),
             times: Vec::new(),
+            beyond: Vec::new(),
             fields: table.data.clone(),
             at: table.at,
             mesh,
@@ -67,6 +70,22 @@ impl<R: Real> Series<R> {
     /// The `.pvd` file.
     pub(super) fn index(&self) -> &Path {
         &self.index
+    }
+
+    /// Goes on after the frames of an interrupted run at its checkpoint.
+    pub(super) fn take_up(&mut self, times: &[f64]) {
+        self.times = times.to_vec();
+        self.beyond = listed(&self.index).unwrap_or_default().into_iter().skip(times.len()).collect();
+    }
+
+    /// Writes the list of all frames.
+    fn list(&self) -> Result<(), OutputError> {
+        let file = |(index, &time): (usize, &f64)| (time, format!("{}/{}", self.name, frame_name(index)));
+        let all: Vec<(f64, String)> = self.times.iter().chain(&self.beyond).enumerate().map(file).collect();
+        write_pvd(&self.index, &all).map_err(|error| match error {
+            MeshFileError::Write { path, source } => OutputError::new(&path, source),
+            other => OutputError::new(&self.index, other),
+        })
     }
 
     fn fill(&mut self, frame: &Frame<'_, R>) {
@@ -95,7 +114,7 @@ impl<R: Real> Series<R> {
 impl<R: Real> Observer<R> for Series<R> {
     fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
         self.fill(frame);
-        let file = format!("{:06}.vtu", self.times.len());
+        let file = frame_name(self.times.len());
         let (path, temporary) = (self.folder.join(&file), self.folder.join(format!("{file}.tmp")));
         let options =
             VtuOptions { compress: true, single: R::PRECISION == "single", time: Some(frame.time()) };
@@ -111,12 +130,69 @@ impl<R: Real> Observer<R> for Series<R> {
             let _ = fs::remove_file(&temporary);
             return Err(OutputError::new(&path, error));
         }
-        self.times.push((frame.time(), format!("{}/{file}", self.name)));
-        write_pvd(&self.index, &self.times).map_err(|error| match error {
-            MeshFileError::Write { path, source } => OutputError::new(&path, source),
-            other => OutputError::new(&self.index, other),
-        })
+        self.times.push(frame.time());
+        // A later frame of the interrupted run stays in the list as long as it comes later.
+        if !self.beyond.is_empty() {
+            self.beyond.remove(0);
+        }
+        if self.beyond.first().is_some_and(|&time| time <= frame.time()) {
+            self.remove_beyond()?;
+        }
+        self.list()
     }
+
+    fn written(&self) -> Written {
+        Written::Frames(self.times.clone())
+    }
+
+    fn finish(&mut self) -> Result<(), OutputError> {
+        if self.beyond.is_empty() {
+            return Ok(());
+        }
+        self.remove_beyond()?;
+        self.list()
+    }
+}
+
+impl<R> Series<R> {
+    fn remove_beyond(&mut self) -> Result<(), OutputError> {
+        for index in 0..std::mem::take(&mut self.beyond).len() {
+            let path = self.folder.join(frame_name(self.times.len() + index));
+            match fs::remove_file(&path) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(OutputError::new(&path, error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+fn frame_name(index: usize) -> String {
+    format!("{index:06}.vtu")
+}
+
+/// The times that a list of frames names.
+fn listed(index: &Path) -> Result<Vec<f64>, String> {
+    let text = fs::read_to_string(index).map_err(|error| error.to_string())?;
+    let document = roxmltree::Document::parse(&text).map_err(|error| error.to_string())?;
+    let frames = document.descendants().filter(|node| node.has_tag_name("DataSet"));
+    let time = |frame: roxmltree::Node<'_, '_>| frame.attribute("timestep")?.parse().ok();
+    frames.map(time).collect::<Option<_>>().ok_or_else(|| "it lists a frame without a time".into())
+}
+
+/// Whether a series begins with frames of these times; the reason if not.
+pub(super) fn verify(folder: &Path, name: &str, times: &[f64]) -> Result<(), String> {
+    if times.is_empty() {
+        return Ok(());
+    }
+    let listed = listed(&folder.join(format!("{name}.pvd")))?;
+    if !listed.starts_with(times) {
+        return Err("it does not list the frames of the interrupted run".into());
+    }
+    let missing = (0..times.len()).find(|&index| !folder.join(name).join(frame_name(index)).is_file());
+    missing.map_or(Ok(()), |index| Err(format!("`{name}/{}` is missing", frame_name(index))))
 }
 
 /// Points and cells without data and sets.

@@ -1,0 +1,198 @@
+//! Sweeps, through the real binary: the product of the values, one table, the same on any number of threads.
+
+mod support;
+
+use std::fs;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use support::{BLOCK, Told, Workshop};
+
+fn sweep(workshop: &Workshop, arguments: &[&str]) -> Told {
+    workshop.pliant(&[&["sweep", "case"], arguments].concat())
+}
+
+/// The cells of a table; commas in quotes separate none.
+fn cells(line: &str) -> Vec<String> {
+    let (mut all, mut quoted) = (vec![String::new()], false);
+    for c in line.chars() {
+        match c {
+            '"' => quoted = !quoted,
+            ',' if !quoted => all.push(String::new()),
+            c => all.last_mut().unwrap().push(c),
+        }
+    }
+    all
+}
+
+fn table(workshop: &Workshop, name: &str) -> Vec<Vec<String>> {
+    workshop.read(name).lines().map(cells).collect()
+}
+
+#[test]
+fn a_sweep_runs_the_product_and_tells_what_each_run_came_to() {
+    let workshop = Workshop::new(BLOCK);
+    let set = [
+        "--set",
+        "law.tissue.young-modulus=5e3..20e3/3",
+        "--set",
+        "scene.gravity=[0,0,-9.81],[0,0,0]",
+        "--set",
+        "scene.until=0.008",
+    ];
+    let told = sweep(&workshop, &set);
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.contains("6 runs, 0 failed\nwrote out/case-sweep/sweep.csv"), "{}", told.out);
+    let rows = table(&workshop, "out/case-sweep/sweep.csv");
+    let column = |name: &str| rows[0].iter().position(|other| other == name).expect(name);
+    assert_eq!(rows.len(), 7);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()));
+    let values: Vec<(&str, &str)> = rows[1..].iter().map(|row| (row[1].as_str(), row[2].as_str())).collect();
+    assert_eq!(values[..3], [("5000.0", "[0,0,-9.81]"), ("5000.0", "[0,0,0]"), ("12500.0", "[0,0,-9.81]")]);
+    for (run, row) in rows[1..].iter().enumerate() {
+        assert_eq!((row[0].as_str(), row[column("status")].as_str()), (&*run.to_string(), "done"));
+        assert!((row[column("time")].parse::<f64>().unwrap() - 0.008).abs() < 1e-12);
+        // Every number is that of the run alone.
+        let own = workshop.table(&format!("out/case-sweep/run-{run:04}/history.csv"));
+        let last = own.1.last().unwrap();
+        for (name, value) in own.0.iter().zip(last).skip(1) {
+            let name = if name.starts_with("probe.") { &format!("history.{name}") } else { name };
+            assert_eq!(row[column(name)].parse::<f64>().unwrap(), *value, "{name}");
+        }
+        assert!(workshop.path(&format!("out/case-sweep/run-{run:04}/summary.md")).exists());
+        assert!(!workshop.path(&format!("out/case-sweep/run-{run:04}/fields.pvd")).exists());
+    }
+    // One of them by hand.
+    let by_hand = [
+        "--set",
+        "law.tissue.young-modulus=12500.0",
+        "--set",
+        "scene.gravity=[0,0,0]",
+        "--set",
+        "scene.until=0.008",
+    ];
+    workshop.run(&by_hand).done();
+    assert_eq!(workshop.read("out/case/history.csv"), workshop.read("out/case-sweep/run-0003/history.csv"));
+
+    // The same on any number of threads, but for the wall time in the last column.
+    let again =
+        sweep(&workshop, &[&set[..], &["--threads", "3", "--out", "out/again", "--keep-fields"]].concat());
+    assert_eq!(again.code, 0, "{}", again.err);
+    let other = table(&workshop, "out/again/sweep.csv");
+    let without = |rows: &[Vec<String>]| -> Vec<Vec<String>> {
+        rows.iter().map(|row| row[..row.len() - 1].to_vec()).collect()
+    };
+    assert_eq!(without(&rows), without(&other));
+    assert!(workshop.series("out/again/run-0005/fields.pvd").len() > 1);
+}
+
+#[test]
+fn a_run_that_fails_stops_no_other() {
+    let workshop = Workshop::new(BLOCK);
+    let set = ["--set", "constraint.hand.by.2=0.001,-0.2,0.002", "--set", "scene.until=0.1"];
+    let told = sweep(&workshop, &set);
+    assert_eq!(told.code, 1, "{}", told.err);
+    assert!(told.out.contains("3 runs, 1 failed"), "{}", told.out);
+    for piece in ["1 of 3 runs failed", "run-0001 (constraint.hand.by.2=-0.2 scene.until=0.1)", "is inverted"]
+    {
+        assert!(told.words().contains(piece), "no `{piece}` in {}", told.err);
+    }
+    let rows = table(&workshop, "out/case-sweep/sweep.csv");
+    let status = rows[0].iter().position(|name| name == "status").unwrap();
+    let states: Vec<&str> = rows[1..].iter().map(|row| row[status].as_str()).collect();
+    assert_eq!(states, ["done", "failed", "done"]);
+    assert!(rows[2][status + 1].contains("is inverted"));
+    assert!(
+        rows[2].iter().zip(&rows[0]).all(|(cell, name)| !name.starts_with("reaction") || cell.is_empty())
+    );
+}
+
+#[test]
+fn all_combinations_are_checked_before_the_first_is_run() {
+    let workshop = Workshop::new(BLOCK);
+    let set = ["--set", "law.tissue.young-modulus=1e3,2e3", "--set", "law.tissue.poisson-ratio=0.3,0.7"];
+    let told = sweep(&workshop, &set);
+    assert_eq!(told.code, 2, "{}", told.err);
+    assert!(told.underlines("--set law.tissue.poisson-ratio=0.7"), "{}", told.err);
+    assert!(told.words().contains("2 of 4 combinations are wrong; nothing was run"), "{}", told.err);
+    assert_eq!(told.err.matches("found 0.7").count(), 1, "told once: {}", told.err);
+    assert!(!workshop.path("out").exists());
+    for (set, says) in [
+        ("law.tissue.young-modulus=1e3,,2e3", "a value of `law.tissue.young-modulus` is missing"),
+        ("law.tissue.young-modulus=1e3..2e3", "is no range: the number of values is missing"),
+        ("law.tisue.young-modulus=1e3,2e3", "did you mean `tissue`?"),
+        ("law.tissue.young-modulus", "is not an assignment"),
+    ] {
+        let told = sweep(&workshop, &["--set", set]);
+        assert_eq!(told.code, 2);
+        assert!(told.words().contains(says), "no `{says}` in {}", told.err);
+        assert!(told.err.contains(&format!("--set {}", set.split(',').next().unwrap())), "{}", told.err);
+    }
+    assert_eq!(sweep(&workshop, &[]).code, 2, "something is to be swept");
+}
+
+#[test]
+fn a_dry_run_lists_the_product_and_writes_nothing() {
+    let workshop = Workshop::new(BLOCK);
+    let told = sweep(
+        &workshop,
+        &["--set", "body.block.element=tet4,tet4-anp", "--set", "scene.until=1..2/2", "--dry-run"],
+    );
+    assert_eq!((told.code, told.err.as_str()), (0, ""));
+    let lines: Vec<&str> = told.out.lines().collect();
+    assert_eq!(
+        lines,
+        [
+            "run-0000  body.block.element=tet4 scene.until=1",
+            "run-0001  body.block.element=tet4 scene.until=2",
+            "run-0002  body.block.element=tet4-anp scene.until=1",
+            "run-0003  body.block.element=tet4-anp scene.until=2",
+        ]
+    );
+    assert!(!workshop.path("out").exists());
+}
+
+#[test]
+fn a_filled_folder_needs_force_and_loses_the_runs_of_an_earlier_sweep() {
+    let workshop = Workshop::new(BLOCK);
+    let three = ["--set", "scene.until=0.001,0.002,0.003"];
+    assert_eq!(sweep(&workshop, &three).code, 0);
+    workshop.write("out/case-sweep/run-0001/notes.txt", "mine");
+    let two = ["--set", "scene.until=0.001", "--set", "scene.gravity=[0,0,0]"];
+    let told = sweep(&workshop, &two);
+    assert_eq!(told.code, 2);
+    assert!(told.err.contains("it is not empty") && told.err.contains("--force"), "{}", told.err);
+    assert_eq!(sweep(&workshop, &[&two[..], &["--force"]].concat()).code, 0);
+    assert!(!workshop.path("out/case-sweep/run-0002").exists());
+    let left: Vec<_> = fs::read_dir(workshop.path("out/case-sweep/run-0001"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
+    assert_eq!(left, ["notes.txt"]);
+    assert_eq!(table(&workshop, "out/case-sweep/sweep.csv").len(), 2);
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_ends_a_sweep_with_what_it_has() {
+    let workshop = Workshop::new(BLOCK);
+    let child = workshop
+        .command(&["sweep", "case", "--threads", "1", "--set", "scene.until=0.001,100,0.002"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let patience = Instant::now();
+    while !workshop.path("out/case-sweep/run-0001/history.csv").exists() {
+        assert!(patience.elapsed() < Duration::from_secs(60), "the second run did not begin");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(killed.unwrap().success());
+    let told = Told::from(child.wait_with_output().unwrap());
+    assert_eq!(told.code, 130, "{}", told.err);
+    assert!(told.words().contains("the runs that had ended are in the table"), "{}", told.err);
+    let rows = table(&workshop, "out/case-sweep/sweep.csv");
+    let states: Vec<&str> = rows[1..].iter().map(|row| row[2].as_str()).collect();
+    assert_eq!(states, ["done", "interrupted"]);
+}

@@ -1,0 +1,587 @@
+//! Checkpoints: all that a run needs to go on as if it had never stopped, in one file.
+//!
+//! The file: [`MAGIC`], the [`FORMAT`] (u32), the length of the body (u64), the body in postcard's encoding, and the
+//! CRC-32 of all before it (u32); little-endian. The body: [`Origin`] (what the run was), [`Progressed`] (how far it
+//! and its outputs were), then [`Moment`] in the run's number type. A file appears under its name only once it is whole.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use pliant_mechanics::{Equilibrium, Real, State, fingerprint};
+use serde::{Deserialize, Serialize};
+
+use crate::build::Built;
+use crate::diagnostic::counted;
+use crate::format::{Precision, SolverName};
+use crate::output::{OutputError, OutputFolder, Schedule, Written, number};
+use crate::plan::Plan;
+use crate::run::History;
+use crate::scene::Scene;
+
+/// The first bytes of every checkpoint.
+const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
+/// The version of what follows. Any change of what is in a body needs the next number.
+const FORMAT: u32 = 2;
+/// Bytes before the body: magic, format, length.
+const HEAD: usize = 20;
+/// Bytes after it.
+const CRC: usize = 4;
+/// Checkpoints kept of a run.
+const KEPT: usize = 2;
+
+/// What a run was: what has to be the same to go on with it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Origin {
+    precision: Precision,
+    solver: SolverName,
+    /// Duration [s] of the scene, from which the step comes.
+    until: f64,
+    /// Step [s].
+    step: f64,
+    /// The parts of model and outputs, with their fingerprints.
+    parts: Vec<(String, u64)>,
+}
+
+/// How far a run and its outputs were.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Progressed {
+    pub time: f64,
+    pub steps: u64,
+    pub wall_seconds: f64,
+    pub worst_balance: f64,
+    /// The largest hourglass energy over the internal one, and its time [s].
+    pub worst_hourglass: (f64, f64),
+    /// Samples for plot and summary.
+    pub history: History,
+    pub sampling: Schedule,
+    /// Of each output of the scene.
+    pub outputs: Vec<(Schedule, Written)>,
+}
+
+/// A state between the two halves of a step, after [`advance`](crate::solver::Solver::advance), and what the solver
+/// knows beside it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Moment<R> {
+    pub state: State<R>,
+    pub equilibrium: Option<Equilibrium<R>>,
+}
+
+/// Why a run cannot be resumed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ResumeError {
+    /// The file can't be read.
+    #[error("the checkpoint `{}` cannot be read: {reason}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
+    /// A folder without checkpoints.
+    #[error("there is no checkpoint in `{}`", path.display())]
+    NoneIn {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Some other file.
+    #[error("`{}` is not a checkpoint", path.display())]
+    NotACheckpoint {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Its end is missing.
+    #[error("the checkpoint `{}` is truncated: {found} of {expected} bytes", path.display())]
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// Bytes it has.
+        found: u64,
+        /// Bytes it should have.
+        expected: u64,
+    },
+    /// Its checksum is wrong.
+    #[error("the checkpoint `{}` is damaged: its checksum does not fit its content", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Of a format that is not read here.
+    #[error("the checkpoint `{}` has format {format}; this version of pliant reads format {}", path.display(), FORMAT)]
+    OtherFormat {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: u32,
+    },
+    /// Of a run in another number type.
+    #[error("the checkpoint is of a run in {checkpoint} precision, the scene asks for {scene}")]
+    OtherPrecision {
+        /// `single` or `double`.
+        checkpoint: &'static str,
+        /// `single` or `double`.
+        scene: &'static str,
+    },
+    /// Of a run with another solver.
+    #[error("the checkpoint is of a run with the solver `{checkpoint}`, the scene asks for `{scene}`")]
+    OtherSolver {
+        /// Its word in a scene file.
+        checkpoint: &'static str,
+        /// Its word in a scene file.
+        scene: &'static str,
+    },
+    /// Of a run with another step.
+    #[error(
+        "the checkpoint is of a run with steps of {checkpoint:e} s, this scene takes steps of {scene:e} s"
+    )]
+    OtherStep {
+        /// Step [s].
+        checkpoint: f64,
+        /// Step [s].
+        scene: f64,
+    },
+    /// Of a run of another scene.
+    #[error("the checkpoint is of another scene: {}", differing(parts))]
+    OtherScene {
+        /// The parts that differ, in words; empty if only their order does.
+        parts: Vec<String>,
+        /// Duration [s] of the run that was interrupted, where the scene's is another now.
+        until: Option<f64>,
+    },
+    /// There is nothing left to do.
+    #[error(
+        "the checkpoint is at t = {} s, and the scene ends at {} s: nothing is left to run",
+        number(*time),
+        number(*until)
+    )]
+    AtTheEnd {
+        /// Time of the checkpoint [s].
+        time: f64,
+        /// End of the scene [s].
+        until: f64,
+    },
+    /// The folder does not hold the outputs that the checkpoint continues.
+    #[error("`{}` does not hold what the checkpoint continues: {reason}", path.display())]
+    OtherOutputs {
+        /// The folder, or the file in it.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl ResumeError {
+    /// What to try.
+    pub fn remedy(&self) -> String {
+        match self {
+            Self::Unreadable { .. } => "check the path and the permissions".into(),
+            Self::NoneIn { .. } => {
+                "a run leaves some where the scene says `checkpoint = { every = 1.0 }` in `[run]`".into()
+            }
+            Self::NotACheckpoint { .. } => {
+                "give a file checkpoint-….pliant of an earlier run, or the folder it is in".into()
+            }
+            Self::Truncated { .. } | Self::Damaged { .. } => {
+                "take the one before it, which a run keeps too, or run the scene from the start".into()
+            }
+            Self::OtherFormat { .. } => {
+                "resume with the version of pliant that wrote it, or run the scene from the start".into()
+            }
+            Self::OtherPrecision { checkpoint, .. } => format!("add `--precision {checkpoint}`"),
+            Self::OtherSolver { checkpoint, .. } => {
+                format!("set `solver = \"{checkpoint}\"` in `[run]`, or run from the start")
+            }
+            Self::OtherStep { checkpoint, .. } => format!(
+                "leave `step` (or `load-steps`) as it was, or give `--step {checkpoint:e}`; another step needs a run \
+                 from the start"
+            ),
+            Self::OtherScene { until, .. } => {
+                let course = until.map_or(String::new(), |until| {
+                    format!(
+                        "; a course without `to` ends with the scene: write `to = {until}` where it ended so far"
+                    )
+                });
+                format!(
+                    "resume with the scene as it was; a mesh, material, constraint, load or output that changed needs a run \
+                     from the start{course}"
+                )
+            }
+            Self::AtTheEnd { .. } => {
+                "to go on, let the scene last longer with `--until`; where its last instant is \
+                                      missing, resume from the checkpoint before this one"
+                    .into()
+            }
+            Self::OtherOutputs { .. } => {
+                "name the folder of the interrupted run with `--out DIR`, or run the scene from the start"
+                    .into()
+            }
+        }
+    }
+}
+
+fn differing(parts: &[String]) -> String {
+    const NAMED: usize = 3;
+    match parts {
+        [] => "the order of its tables differs".into(),
+        [one] => format!("{one} differs"),
+        several => {
+            let rest = several.len().saturating_sub(NAMED);
+            let more = if rest > 0 { format!(" and {}", counted(rest, "more part")) } else { String::new() };
+            format!("{}{more} differ", several[..several.len().min(NAMED)].join(", "))
+        }
+    }
+}
+
+fn word(solver: SolverName) -> &'static str {
+    match solver {
+        SolverName::Explicit => "explicit",
+        SolverName::QuasiStatic => "quasi-static",
+    }
+}
+
+fn precision(precision: Precision) -> &'static str {
+    match precision {
+        Precision::Single => f32::PRECISION,
+        Precision::Double => f64::PRECISION,
+    }
+}
+
+impl Origin {
+    fn of(scene: &Scene, built: &Built, plan: &Plan) -> Self {
+        let mut parts = built.model.fingerprints();
+        let outputs = scene.outputs.iter();
+        parts.extend(outputs.map(|(name, table)| (format!("output `{name}`"), fingerprint(table))));
+        parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));
+        parts.push(("`run.on-unstable`".into(), fingerprint(&scene.run.on_unstable.unwrap_or_default())));
+        parts.push(("`run.mass-scaling`".into(), fingerprint(&scene.run.mass_scaling)));
+        Self {
+            precision: scene.run.precision,
+            solver: scene.run.solver,
+            until: scene.scene.until,
+            step: plan.step,
+            parts,
+        }
+    }
+
+    /// Refuses another scene, precision, solver or step. A longer `until` is no other scene.
+    fn check(&self, scene: &Scene, built: &Built, plan: &Plan) -> Result<(), ResumeError> {
+        let own = Self::of(scene, built, plan);
+        if own.precision != self.precision {
+            let [checkpoint, scene] = [self.precision, own.precision].map(precision);
+            return Err(ResumeError::OtherPrecision { checkpoint, scene });
+        }
+        if own.solver != self.solver {
+            let [checkpoint, scene] = [self.solver, own.solver].map(word);
+            return Err(ResumeError::OtherSolver { checkpoint, scene });
+        }
+        if own.parts != self.parts {
+            let differ = |a: &Self, b: &Self| -> Vec<String> {
+                a.parts.iter().filter(|part| !b.parts.contains(part)).map(|part| part.0.clone()).collect()
+            };
+            let mut parts = differ(&own, self);
+            parts.extend(differ(self, &own));
+            let mut seen = std::collections::HashSet::new();
+            parts.retain(|part| seen.insert(part.clone()));
+            let until = (own.until != self.until).then_some(self.until);
+            return Err(ResumeError::OtherScene { parts, until });
+        }
+        let step = plan.steps_of(scene, self.until).1;
+        if step != self.step {
+            return Err(ResumeError::OtherStep { checkpoint: self.step, scene: step });
+        }
+        Ok(())
+    }
+}
+
+/// A checkpoint that was read and is whole.
+#[derive(Clone, Debug)]
+pub struct Checkpoint {
+    path: PathBuf,
+    origin: Origin,
+    pub(crate) progressed: Progressed,
+    /// The [`Moment`], encoded.
+    moment: Vec<u8>,
+}
+
+impl Checkpoint {
+    /// Reads a checkpoint; a folder means the last one in it.
+    ///
+    /// # Errors
+    /// If there is none, or the file is none, is of another format, or is not as it was written.
+    pub fn read(path: &Path) -> Result<Self, ResumeError> {
+        let unreadable = |path: &Path, error: std::io::Error| ResumeError::Unreadable {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        };
+        let mut file = path.to_owned();
+        if path.is_dir() {
+            let all = checkpoints_in(path).map_err(|error| unreadable(path, error))?;
+            file = all.into_iter().last().ok_or_else(|| ResumeError::NoneIn { path: path.to_owned() })?.1;
+        }
+        let bytes = fs::read(&file).map_err(|error| unreadable(&file, error))?;
+        Self::decode(&file, &bytes)
+    }
+
+    fn decode(path: &Path, bytes: &[u8]) -> Result<Self, ResumeError> {
+        let path = path.to_owned();
+        let found = bytes.len() as u64;
+        let start = bytes.len().min(MAGIC.len());
+        if bytes[..start] != MAGIC[..start] || bytes.is_empty() {
+            return Err(ResumeError::NotACheckpoint { path });
+        }
+        let Some(head) = bytes.first_chunk::<HEAD>() else {
+            return Err(ResumeError::Truncated { path, found, expected: (HEAD + CRC) as u64 });
+        };
+        let format = u32::from_le_bytes(*head[8..].first_chunk().unwrap_or(&[0; 4]));
+        if format != FORMAT {
+            return Err(ResumeError::OtherFormat { path, format });
+        }
+        let body = u64::from_le_bytes(*head[12..].first_chunk().unwrap_or(&[0; 8]));
+        let expected = body.saturating_add((HEAD + CRC) as u64);
+        if found < expected {
+            return Err(ResumeError::Truncated { path, found, expected });
+        }
+        let (content, crc) = bytes.split_at(bytes.len() - CRC);
+        if found > expected || crc32fast::hash(content).to_le_bytes() != crc {
+            return Err(ResumeError::Damaged { path });
+        }
+        let decoded = postcard::take_from_bytes::<Origin>(&content[HEAD..])
+            .and_then(|(origin, rest)| Ok((origin, postcard::take_from_bytes::<Progressed>(rest)?)));
+        match decoded {
+            Ok((origin, (progressed, moment))) => {
+                Ok(Self { path, origin, progressed, moment: moment.to_vec() })
+            }
+            Err(_) => Err(ResumeError::Damaged { path }),
+        }
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Time [s] at which the run goes on.
+    pub fn time(&self) -> f64 {
+        self.progressed.time
+    }
+
+    /// How the scene goes on from here: its plan with the step of the checkpoint. Only `until` may differ from the
+    /// scene of the interrupted run.
+    ///
+    /// # Errors
+    /// If this is not the scene of the checkpoint, or nothing of it is left.
+    pub fn continues(&self, scene: &Scene, built: &Built, plan: &Plan) -> Result<Plan, ResumeError> {
+        self.origin.check(scene, built, plan)?;
+        let (time, until, step) = (self.time(), scene.scene.until, self.origin.step);
+        if time + 0.5 * step >= until {
+            return Err(ResumeError::AtTheEnd { time, until });
+        }
+        let whole = match self.origin.precision {
+            Precision::Single => self.moment::<f32>(built).is_some(),
+            Precision::Double => self.moment::<f64>(built).is_some(),
+        };
+        if !whole || self.progressed.outputs.len() != scene.outputs.len() {
+            return Err(ResumeError::Damaged { path: self.path.clone() });
+        }
+        Ok(Plan { step, steps: (until / step - 1e-9).ceil().max(1.0) as u64, ..plan.clone() })
+    }
+
+    /// The state, if it has the sizes of the model's.
+    pub(crate) fn moment<R: Real>(&self, built: &Built) -> Option<Moment<R>> {
+        let moment: Moment<R> = postcard::from_bytes(&self.moment).ok()?;
+        let rest = State::<R>::at_rest(&built.model);
+        let sizes = |state: &State<R>| {
+            let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
+            let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
+            (nodes, history.collect::<Vec<_>>())
+        };
+        let residual = moment.equilibrium.as_ref().map_or(rest.displacement.len(), |e| e.residual.len());
+        let samples = self.progressed.history.reactions.iter();
+        let fits = sizes(&moment.state) == sizes(&rest)
+            && moment.state.stability.fits(&built.model)
+            && residual == rest.displacement.len()
+            && samples.map(Vec::len).all(|len| len == built.model.constraints.len());
+        fits.then_some(moment)
+    }
+}
+
+/// Writes the checkpoints of a run.
+pub(crate) struct Checkpoints<'a> {
+    folder: &'a OutputFolder,
+    origin: Origin,
+    schedule: Schedule,
+}
+
+impl<'a> Checkpoints<'a> {
+    /// For a run that asks for them; `time` is where it starts.
+    pub fn new(
+        scene: &Scene,
+        built: &Built,
+        plan: &Plan,
+        folder: &'a OutputFolder,
+        time: f64,
+    ) -> Option<Self> {
+        let every = scene.run.checkpoint?.every;
+        let schedule = Schedule::after(every, time, plan.step);
+        Some(Self { folder, origin: Origin::of(scene, built, plan), schedule })
+    }
+
+    /// Whether one is to be written at an instant.
+    pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
+        self.schedule.is_due(time, step, last)
+    }
+
+    /// Writes one, and removes those before the last two.
+    pub fn write<R: Real>(
+        &self,
+        progressed: &Progressed,
+        state: &State<R>,
+        equilibrium: Option<Equilibrium<R>>,
+    ) -> Result<PathBuf, OutputError> {
+        let path = self.folder.path().join(name(progressed.steps));
+        let failed = |reason: &dyn std::fmt::Display| OutputError::new(&path, reason);
+        let bytes = encode(&self.origin, progressed, state, &equilibrium).map_err(|e| failed(&e))?;
+        let temporary = path.with_extension("pliant.tmp");
+        let written = File::create(&temporary).and_then(|mut file| {
+            file.write_all(&bytes)?;
+            file.sync_all()
+        });
+        if let Err(error) = written.and_then(|()| fs::rename(&temporary, &path)) {
+            // What is half written is not left behind.
+            let _ = fs::remove_file(&temporary);
+            return Err(failed(&error));
+        }
+        let mut earlier = checkpoints_in(self.folder.path()).map_err(|error| failed(&error))?;
+        earlier.retain(|(steps, _)| *steps <= progressed.steps);
+        for (_, old) in &earlier[..earlier.len().saturating_sub(KEPT)] {
+            fs::remove_file(old).map_err(|error| OutputError::new(old, error))?;
+        }
+        Ok(path)
+    }
+}
+
+fn encode<R: Real>(
+    origin: &Origin,
+    progressed: &Progressed,
+    state: &State<R>,
+    equilibrium: &Option<Equilibrium<R>>,
+) -> postcard::Result<Vec<u8>> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(FORMAT.to_le_bytes());
+    bytes.extend([0; 8]);
+    // As the fields of a [`Moment`], one after the other.
+    let mut bytes = postcard::to_extend(&(origin, progressed, state, equilibrium), bytes)?;
+    let length = (bytes.len() - HEAD) as u64;
+    bytes[12..HEAD].copy_from_slice(&length.to_le_bytes());
+    let crc = crc32fast::hash(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    Ok(bytes)
+}
+
+const PREFIX: &str = "checkpoint-";
+const SUFFIX: &str = ".pliant";
+
+/// The file of a checkpoint after some steps; names sort as the steps do.
+fn name(steps: u64) -> String {
+    format!("{PREFIX}{steps:010}{SUFFIX}")
+}
+
+/// The steps in the name of a checkpoint; none for other names.
+pub(crate) fn steps_of(name: &str) -> Option<u64> {
+    let digits = name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?;
+    digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
+}
+
+/// The checkpoints in a folder with their steps, in order.
+fn checkpoints_in(folder: &Path) -> std::io::Result<Vec<(u64, PathBuf)>> {
+    let mut all = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let steps = path.file_name().and_then(|name| steps_of(name.to_str()?));
+        all.extend(steps.map(|steps| (steps, path)));
+    }
+    all.sort();
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::plan;
+    use crate::testing::{built, scene};
+
+    const CHECKPOINTED: &str = "[run]\ncheckpoint = { every = 0.05 }\n";
+
+    fn small() -> Vec<u8> {
+        let (scene, built) = (scene(CHECKPOINTED), built(CHECKPOINTED));
+        let plan = plan(&scene, &built).unwrap();
+        let state = State::<f32>::at_rest(&built.model);
+        let progressed = Progressed {
+            time: 0.05,
+            steps: 7,
+            wall_seconds: 1.0,
+            worst_balance: 0.0,
+            worst_hourglass: (0.0, 0.0),
+            history: History::default(),
+            sampling: Schedule::new(0.1),
+            outputs: Vec::new(),
+        };
+        encode(&Origin::of(&scene, &built, &plan), &progressed, &state, &None).unwrap()
+    }
+
+    #[test]
+    fn every_truncation_and_every_flipped_bit_is_refused() {
+        let whole = small();
+        let path = Path::new("x.pliant");
+        let read = Checkpoint::decode(path, &whole).unwrap();
+        assert_eq!(read.time(), 0.05);
+        for length in 0..whole.len() {
+            let error = Checkpoint::decode(path, &whole[..length]).unwrap_err();
+            let truncated = matches!(error, ResumeError::Truncated { .. });
+            assert!(truncated || (length == 0 && matches!(error, ResumeError::NotACheckpoint { .. })));
+        }
+        for place in 0..whole.len() {
+            for bit in 0..8 {
+                let mut flipped = whole.clone();
+                flipped[place] ^= 1 << bit;
+                let error = Checkpoint::decode(path, &flipped).unwrap_err();
+                let fits = match place {
+                    0..8 => matches!(error, ResumeError::NotACheckpoint { .. }),
+                    8..12 => matches!(error, ResumeError::OtherFormat { .. }),
+                    12..20 => matches!(error, ResumeError::Truncated { .. } | ResumeError::Damaged { .. }),
+                    _ => matches!(error, ResumeError::Damaged { .. }),
+                };
+                assert!(fits, "byte {place}: {error}");
+            }
+        }
+        let longer = [whole.as_slice(), b"x"].concat();
+        assert!(matches!(Checkpoint::decode(path, &longer), Err(ResumeError::Damaged { .. })));
+    }
+
+    /// A body whose checksum was made to fit must not bring the program down either.
+    #[test]
+    fn a_body_of_nonsense_with_a_right_checksum_is_refused() {
+        let whole = small();
+        let built = built(CHECKPOINTED);
+        for place in HEAD..whole.len() - CRC {
+            let mut forged = whole.clone();
+            forged[place] = forged[place].wrapping_add(0x7f);
+            let end = forged.len() - CRC;
+            let crc = crc32fast::hash(&forged[..end]).to_le_bytes();
+            forged[end..].copy_from_slice(&crc);
+            if let Ok(read) = Checkpoint::decode(Path::new("x.pliant"), &forged) {
+                let _ = read.moment::<f32>(&built);
+                let _ = read.moment::<f64>(&built);
+            }
+        }
+    }
+
+    /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
+    /// [`FORMAT`] the next number, and this test the new bytes.
+    #[test]
+    fn the_layout_of_format_2_is_as_it_was() {
+        let state = State::<f32>::at_rest(&built("").model);
+        let bytes = postcard::to_stdvec(&state).unwrap();
+        assert_eq!((FORMAT, bytes.len()), (1, 719));
+    }
+}
