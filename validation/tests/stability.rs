@@ -5,7 +5,7 @@ use pliant_mechanics::element::HEX_CORNERS;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Motion, Solid};
 use pliant_mechanics::prony::PronyUpdate;
-use pliant_mechanics::stability::{Monitor, OnUnstable};
+use pliant_mechanics::stability::{KEEP, Monitor, OnUnstable};
 use pliant_mechanics::tensor::{Tensor, Vector};
 use pliant_mechanics::{CentralDifference, Model, Observable, State, StepError};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
@@ -144,16 +144,18 @@ fn estimates(what: &str, specimen: &Specimen, until: f64) -> [f64; 3] {
 }
 
 #[test]
-fn the_estimate_stays_below_the_true_limit_of_deformed_bodies() {
+fn the_estimate_stays_within_its_reserve_of_the_true_limit_of_deformed_bodies() {
     let uniform = Hexes::UniformStrain(HOURGLASS);
     let averaged = Tets::Averaged(Averaging::Nodal);
     for (name, law) in laws() {
+        // What is kept in reserve for it. Fibres that carry tension only are half stiff at rest, between two slopes, and no
+        // limit found there knows the full one: for them the rest of 0.9 of the limit at rest must do.
+        let allowed = if name == "holzapfel-gasser-ogden" { 1.0 / 0.9 } else { 1.0 / KEEP };
         for cells in CELLS {
             let gravity = 9.81 * law.small_strain().shear / 1000.0;
             let block = hanging(law, cells, gravity);
             let [_, most, _] = estimates(&format!("{name}, hanging {cells:?}"), &block, 0.3);
-            // 1 %: what a mode that several cells share may exceed the change of each.
-            assert!(most < 1.01);
+            assert!(most < allowed);
         }
         for (what, element) in [
             ("tet4", (VolumeCell::Tet, Tets::Plain, uniform)),
@@ -162,7 +164,7 @@ fn the_estimate_stays_below_the_true_limit_of_deformed_bodies() {
             ("hex8-full", (VolumeCell::Hex, averaged, Hexes::Full)),
         ] {
             let [_, most, _] = estimates(&format!("{name}, pressed {what}"), &pressed(law, element), 0.5);
-            assert!(most < 1.01);
+            assert!(most < allowed);
         }
     }
 }

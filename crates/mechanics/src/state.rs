@@ -66,6 +66,8 @@ pub struct Work {
     pub damping: f64,
     /// Running maximum of kinetic energy, internal and |external| work.
     pub largest: f64,
+    /// ⅛ Δt² Σ m|a|² at the start, which the mean velocity of the method keeps from the kinetic energy from then on.
+    pub(crate) at_start: f64,
     /// Steps in a row that were off balance.
     pub(crate) steps_off_balance: u32,
     /// First half of the internal work of the step under way.
