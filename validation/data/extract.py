@@ -54,3 +54,13 @@ write("cube_hex8_10_solutions.json", {
         for key in ("NH_hg0.05", "NH_hg0.1", "NH_meandil")
     },
 })
+
+shutil.copyfile(source / "meshes/ellipsoid_tet4_h14mm.msh", here / "ellipsoid_tet4_h14mm.msh")
+solutions = numpy.load(source / "ellipsoid_tet4_h14mm_solutions.npz")
+ellipsoid = read("ellipsoid.json")
+write("ellipsoid.json", {
+    "points": ellipsoid["points"],
+    "displacement": ellipsoid["u"],
+    "T4": solutions["T4"].round(12).tolist(),
+    "ANP": solutions["ANP_BonetBurton"].round(9).tolist(),
+})

@@ -2,6 +2,7 @@
 //! run them, and the reference numbers in `data/`. A test prints what it measured:
 //! `cargo test -p pliant-validation -- --nocapture`.
 
+pub mod brain_shift;
 mod random;
 mod reference;
 mod run;

@@ -2,16 +2,42 @@
 //! [0, 0.1 m]³ compressed by 30 %.
 
 use pliant_geometry::{Mesh, io};
-use pliant_mechanics::Observable;
 use pliant_mechanics::law::AnyLaw;
-use pliant_mechanics::model::Averaging;
+use pliant_mechanics::model::{Averaging, Material};
+use pliant_mechanics::prony::PronyUpdate;
 use pliant_mechanics::tensor::{dot, sub};
+use pliant_mechanics::{DynamicRelaxation, Observable, RelaxationError, RelaxationSettings, State};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 use pliant_validation::{
-    Hexes, Specimen, Tets, claim, data_file, elastic, largest, liver, numbers, reference, relax, smooth_step,
-    soft_tissue,
+    Hexes, Specimen, Tets, claim, data_file, elastic, largest, liver, liver_relaxation, numbers, reference,
+    relax, smooth_step, soft_tissue,
 };
 use serde_json::Value;
+
+/// A load step that comes to no equilibrium, halved or not, leaves displacements, history and work as they were, bit for
+/// bit: the same step by a patient solver then ends where it would have ended.
+#[test]
+fn a_failed_load_step_leaves_the_state_untouched() {
+    let material =
+        Material { law: liver(), prony: liver_relaxation(PronyUpdate::default()), density: 1000.0 };
+    let cells = [Tets::Averaged(Averaging::Nodal), Tets::Plain];
+    for tets in cells {
+        let mesh = Block::new([0.1; 3]).mesh(Resolution::Counts([3; 3]), VolumeCell::Tet, DEFAULT_CELL_LIMIT);
+        let cube = Specimen::of_elements(mesh.unwrap(), tets, Hexes::Full, &material, [0.0, 1.0, 0.0])
+            .shift("x-max", -0.02, smooth_step(1.0))
+            .fix("x-min", [true; 3]);
+        let patient = RelaxationSettings::default();
+        let solver = |settings| DynamicRelaxation::<f64>::new(&cube.model, settings).unwrap();
+        let mut state = State::at_rest(&cube.model);
+        solver(patient).solve(&mut state, 0.5).unwrap();
+        assert!(state.history[0].cells.iter().any(|h| h.trace() != 0.0), "nothing relaxes");
+        let before = state.clone();
+        let hasty = RelaxationSettings { iterations: 300, halvings: 2, tolerance: 1e-12 };
+        let error = solver(hasty).solve(&mut state, 1.0).unwrap_err();
+        assert!(matches!(error, RelaxationError::NotConverged { iterations: 300, .. }), "{error}");
+        assert_eq!(state, before);
+    }
+}
 
 /// The cube with x = 0 held and x = 0.1 moved by −0.03, of certain elements.
 fn compressed(mesh: Mesh, tets: Tets, hexes: Hexes, law: AnyLaw) -> Specimen {

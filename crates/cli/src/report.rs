@@ -8,7 +8,9 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
 use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::{Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, number};
+use pliant_scene::{
+    LoadStepProgress, Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, number,
+};
 
 /// The input is wrong (exit code 2).
 #[derive(Debug)]
@@ -105,10 +107,18 @@ impl Bar {
     }
 
     pub fn update(&self, progress: Progress) {
-        let Progress { time, until, wall } = progress;
+        let Progress { time, until, wall, load_step } = progress;
         self.0.set_position((1000.0 * time / until) as u64);
-        let factor = time / wall.as_secs_f64().max(f64::MIN_POSITIVE);
-        self.0.set_message(format!("{time:.3} of {until} s simulated, {factor:.2} × real time"));
+        self.0.set_message(match load_step {
+            Some(LoadStepProgress { number, of, iteration, tolerance }) => format!(
+                "load step {number} of {of}: iteration {}, residual {:.1e} of {tolerance:.0e}",
+                iteration.number, iteration.residual
+            ),
+            None => {
+                let factor = time / wall.as_secs_f64().max(f64::MIN_POSITIVE);
+                format!("{time:.3} of {until} s simulated, {factor:.2} × real time")
+            }
+        });
     }
 
     pub fn update_sweep(&self, progress: SweepProgress, runs: usize) {

@@ -144,7 +144,11 @@ fn unknown_types_and_words_get_the_nearest_name() {
 
 #[test]
 fn wrong_types_tell_what_was_expected_and_what_was_found() {
-    spoilt("density = 1000", "density = \"heavy\"", &["expected a number [kg/m³], found the text \"heavy\""]);
+    spoilt(
+        "density = 1000",
+        "density = \"heavy\"",
+        &["expected a number [kg/m³] or a table of numbers, found the text \"heavy\""],
+    );
     spoilt("density = 1000", "density = \"1000\"", &["remove the quotes: 1000"]);
     spoilt("[0, 0, -9.81]", "-9.81", &["expected 3 numbers [m/s²], found -9.81"]);
     spoilt("[0, 0, -9.81]", "[0, -9.81]", &["expected 3 numbers [m/s²], found 2"]);
@@ -341,7 +345,7 @@ fn a_zero_or_not_finite_fibre_of_a_cell_is_told_by_its_number() {
     assert_refused(
         &with_mesh(mesh, &fibre_scene()),
         &[line],
-        &["`fibre` has 1 components, a direction has 3"],
+        &["`fibre` has 1 component, a direction has 3"],
     );
 }
 
@@ -434,7 +438,7 @@ fn laws_by_label_must_fit_the_labels_of_the_mesh() {
     let with_law = |law: &str| changed(FROM_FILE, "law = \"tissue\"", law);
     let two = labels(&[1, 1, 1, 2, 2, 2]);
     let law = "law = { 1 = \"tissue\" }";
-    let missing = "labels without a law: 2 (3 cells)";
+    let missing = "labels without law: 2 (3 cells)";
     assert_refused(&with_mesh(mesh(&two), &with_law(law)), &[law], &[missing, "add `LABEL = \"law\"`"]);
     assert_refused(
         &with_mesh(mesh(""), &with_law(law)),
@@ -786,4 +790,125 @@ fn new_does_not_overwrite() {
     let told = workshop.pliant(&["new", "case/scene.toml/below"]);
     assert_eq!(told.code, 2);
     assert!(told.err.contains("cannot be written"), "{}", told.err);
+}
+
+/// [`FROM_FILE`] with nodes moved node by node.
+fn moved_scene(by: &str) -> String {
+    changed(FROM_FILE, "type = \"fix\"", &format!("type = \"move\"\nby = {by}"))
+}
+
+#[test]
+fn a_motion_from_point_data_needs_an_array_of_finite_vectors() {
+    let line = "by = { point-data = \"shift\" }";
+    let scene = moved_scene("{ point-data = \"shift\" }");
+    let of = |data: &str| with_mesh(vtk(&CUBE, &TETS, &format!("POINT_DATA 8\n{data}\n")), &scene);
+    let numbers = |n: usize| "0 ".repeat(n);
+    assert_refused(
+        &with_mesh(vtk(&CUBE, &TETS, ""), &scene),
+        &[line],
+        &["the mesh of `organ` has no point data `shift`", "the mesh has no point data"],
+    );
+    assert_refused(
+        &of(&format!("VECTORS shifts double\n{}", numbers(24))),
+        &[line],
+        &["no point data `shift`", "did you mean `shifts`?"],
+    );
+    assert_refused(
+        &of(&format!("SCALARS shift double 1\nLOOKUP_TABLE default\n{}", numbers(8))),
+        &[line],
+        &["point data `shift` has 1 component, a vector has 3", "name an array of vectors"],
+    );
+    assert_refused(
+        &of(&format!("VECTORS shift double\n0 0 0 0 nan 0 {}", numbers(18))),
+        &[line],
+        &["point data `shift` is [0.0, NaN, 0.0] at node 1 (counted from 0)", "or select fewer nodes"],
+    );
+    // A built-in shape carries none.
+    let told = Workshop::block("by = [0, 0, 0.001]", line).run(&[]);
+    assert_invalid(&told, &["the mesh of `block` has no point data `shift`"]);
+}
+
+#[test]
+fn a_table_of_motions_is_refused_with_its_line() {
+    let line = "by = { csv = \"motion.csv\" }";
+    let mesh = vtk(&CUBE, &TETS, "");
+    let refused = |table: Option<&str>, says: &[&str]| {
+        let workshop = with_mesh(&mesh, &moved_scene("{ csv = \"motion.csv\" }"));
+        if let Some(table) = table {
+            workshop.write("case/motion.csv", table);
+        }
+        assert_refused(&workshop, &[line], says);
+    };
+    refused(None, &["motion.csv` cannot be read", "relative to the scene file"]);
+    refused(
+        Some("node,x,y,z\n0,0,0\n"),
+        &["motion.csv:2: a row has 4 columns, this one 3", "each row is `node,x,y,z`"],
+    );
+    refused(Some("0,0,inf,0\n"), &["motion.csv:1: `inf` is not a finite number"]);
+    refused(Some("8,0,0,0\n"), &["motion.csv:1: there is no node 8: the mesh has 8 nodes", "subtract 1"]);
+    refused(
+        Some("0,0,0,0\n1,0,0,0\n"),
+        &["no row for node 2 (counted from 0) and for 1 node more", "add a row"],
+    );
+    let both = moved_scene("{ csv = \"motion.csv\", point-data = \"shift\" }");
+    let says = ["`csv`, `point-data` cannot be given together"];
+    assert_refused(
+        &with_mesh(&mesh, &both),
+        &["by = { csv = \"motion.csv\", point-data = \"shift\" }"],
+        &says,
+    );
+    let says = ["`cvs`", "did you mean `csv`?"];
+    assert_refused(
+        &with_mesh(&mesh, &moved_scene("{ cvs = \"m.csv\" }")),
+        &["by = { cvs = \"m.csv\" }"],
+        &says,
+    );
+}
+
+#[test]
+fn a_velocity_at_the_start_needs_inertia() {
+    let line = "velocity = [0, 0, 1]";
+    let scene = changed(BLOCK, "damping = 5", line).replace("step = \"auto\"", "solver = \"quasi-static\"");
+    assert_refused(
+        &Workshop::new(&scene),
+        &[line],
+        &["`block` has a velocity, but a quasi-static run has no inertia", "solver = \"explicit\""],
+    );
+    spoilt("damping = 5", "velocity = [0, 1]", &["expected 3 numbers [m/s], found 2"]);
+}
+
+#[test]
+fn densities_by_label_must_fit_the_mesh_and_be_positive() {
+    let mesh = vtk(&CUBE, &TETS, &labels(&[1, 1, 1, 2, 2, 2]));
+    for (key, says) in [
+        ("density = { 1 = 900 }", "labels without density: 2 (3 cells)"),
+        ("density = { 1 = 900, 2 = 900, 3 = 900 }", "no cell of `organ` has label `3`"),
+        ("density = { 1 = 900, 2 = 0 }", "must be greater than 0, found 0"),
+        ("density = 1000\nhourglass = { 1 = 0.1 }", "labels without hourglass: 2 (3 cells)"),
+        ("density = 1000\nhourglass = { 1 = 0.1, 2 = 11 }", "found 11"),
+    ] {
+        let scene = changed(FROM_FILE, "density = 1000", key);
+        assert_refused(&with_mesh(&mesh, &scene), &[key.lines().last().unwrap()], &[says]);
+    }
+}
+
+#[test]
+fn a_rule_for_fibres_that_fails_is_shown_where_it_is_written() {
+    for (rule, says) in [
+        ("{ along = [0, 0, 0] }", "the fibre direction is zero"),
+        ("{ toward = [0, 0] }", "expected 3 numbers"),
+        ("{ around = { point = [0, 0, 0] } }", "missing key `axis`"),
+        (
+            "{ tangential = { surface = { set = \"z-max\" }, closest-to = [0, 0, 1] } }",
+            "where `closest-to` is perpendicular to the surface: tet",
+        ),
+        (
+            "{ tangential = { surface = { set = \"skin\" }, closest-to = [0, 0, 1] } }",
+            "no set is named `skin`",
+        ),
+        ("{ laplace = { from = { set = \"x-min\" }, to = \"all\" } }", "is in `from` and in `to`"),
+        ("{ laplce = 1 }", "unknown key `laplce`"),
+    ] {
+        spoilt("fibre = [0, 1, 0]", &format!("fibre = {rule}"), &[says]);
+    }
 }

@@ -34,6 +34,7 @@
 //! ```
 
 mod cell;
+mod closest;
 mod diagnosis;
 pub mod io;
 mod locate;
@@ -45,6 +46,7 @@ mod surface;
 mod testing;
 
 pub use cell::CellId;
+pub use closest::{SurfaceLocator, SurfacePoint};
 pub use diagnosis::{CrowdedFace, Diagnosis, diagnose, reorder};
 pub use locate::{Location, Locator};
 pub use mesh::{CellBlock, CellKind, DataArray, Mesh};

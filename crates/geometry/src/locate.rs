@@ -326,13 +326,13 @@ fn clamped(xi: Vector3) -> Vector3 {
 }
 
 /// Σ w_a x_a.
-fn on_triangle(x: &[Vector3; 3], weights: [f64; 3]) -> Vector3 {
+pub(crate) fn on_triangle(x: &[Vector3; 3], weights: [f64; 3]) -> Vector3 {
     x[0] * weights[0] + x[1] * weights[1] + x[2] * weights[2]
 }
 
 /// Barycentric coordinates of the point of a triangle closest to `p`: the corner, edge or face in whose Voronoi
 /// region `p` lies (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
-fn barycentric_of_closest([a, b, c]: &[Vector3; 3], p: &Vector3) -> [f64; 3] {
+pub(crate) fn barycentric_of_closest([a, b, c]: &[Vector3; 3], p: &Vector3) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
     let from = |x: &Vector3| (ab.dot(&(p - x)), ac.dot(&(p - x)));
     let part = |x: f64, of: f64| if of > 0.0 { x / of } else { 0.0 };

@@ -32,6 +32,8 @@ const RAMP: usize = 200;
 const RAMP_DAMPING: f64 = 0.02;
 /// Largest relative change of A₀ an iteration, down and up.
 const ADAPT: [f64; 2] = [0.90, 1.02];
+/// Iterations from one report to the next.
+const REPORT: usize = 20;
 /// The motion starts anew where the residual grows by this factor over its least.
 const RUNAWAY: f64 = 10.0;
 
@@ -76,7 +78,8 @@ pub enum RelaxationError {
     },
     /// A cell turns inside out however small the load step.
     #[error(
-        "element {element} of `{body}` is inverted (det F = {determinant:.3e}) on the way to t = {time:.6} s"
+        "element {element} of `{body}` is inverted (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
+         {iterations} iterations"
     )]
     Inverted {
         /// The body.
@@ -87,16 +90,23 @@ pub enum RelaxationError {
         node: u32,
         /// det F.
         determinant: f64,
+        /// Iterations spent on the last try.
+        iterations: usize,
         /// Time [s].
         time: f64,
     },
     /// A displacement is not a number or infinite.
-    #[error("the displacement of node {node} of `{body}` is no longer finite on the way to t = {time:.6} s")]
+    #[error(
+        "the displacement of node {node} of `{body}` is no longer finite on the way to t = {time:.6} s, after \
+         {iterations} iterations"
+    )]
     NotFinite {
         /// The body.
         body: String,
         /// The node, numbered in its body.
         node: u32,
+        /// Iterations spent on the last try.
+        iterations: usize,
         /// Time [s].
         time: f64,
     },
@@ -124,6 +134,19 @@ pub struct Convergence {
     pub residual: f64,
     /// Parts the load step was cut into.
     pub parts: u32,
+}
+
+/// How far the search for an equilibrium is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iteration {
+    /// Time [s] of the last equilibrium and of the one that is sought.
+    pub span: [f64; 2],
+    /// Iterations of this try.
+    pub number: usize,
+    /// Relative residual.
+    pub residual: f64,
+    /// Part of the way, in orders of magnitude of the residual; 0 while the load is brought on.
+    pub fraction: f64,
 }
 
 /// Sums and extremes over the nodes of one task.
@@ -238,6 +261,19 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
     /// # Errors
     /// If no equilibrium is found in load steps of the least allowed size.
     pub fn solve(&mut self, state: &mut State<R>, time: f64) -> Result<Convergence, RelaxationError> {
+        self.solve_watched(state, time, &mut |_| ())
+    }
+
+    /// The same, telling now and then how far it is.
+    ///
+    /// # Errors
+    /// If no equilibrium is found in load steps of the least allowed size.
+    pub fn solve_watched(
+        &mut self,
+        state: &mut State<R>,
+        time: f64,
+        watch: &mut dyn FnMut(Iteration),
+    ) -> Result<Convergence, RelaxationError> {
         let whole = time - state.time;
         let mut size = whole;
         let least = whole / f64::from(1_u32 << self.settings.halvings.min(30));
@@ -247,7 +283,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             let left = time - state.time;
             let end = if size >= left * (1.0 - 1e-9) { time } else { state.time + size };
             let before = state.displacement.clone();
-            match self.load_step(state, end, &mut convergence) {
+            match self.load_step(state, end, &mut convergence, watch) {
                 Ok(()) => convergence.parts += 1,
                 Err(error) => {
                     state.displacement = before;
@@ -267,17 +303,19 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         state: &mut State<R>,
         end: f64,
         convergence: &mut Convergence,
+        watch: &mut dyn FnMut(Iteration),
     ) -> Result<(), RelaxationError> {
         let mut forces = InternalForces::new(self.model, end - state.time);
         let start = self.start(state);
         self.increment.fill([R::ZERO; 3]);
         let (mut slowest, mut least) = (0.0, f64::INFINITY);
+        let (mut greatest, mut reached) = (0.0_f64, f64::INFINITY);
         for iteration in 0..self.settings.iterations {
             let s = ((iteration + 1) as f64 / RAMP as f64).min(1.0);
             let time = state.time + (end - state.time) * s * s * (3.0 - 2.0 * s);
             let ramped = iteration >= RAMP;
             self.prescribe(state, if ramped { end } else { time });
-            let sums = self.evaluate(&mut forces, state, if ramped { end } else { time })?;
+            let sums = self.evaluate(&mut forces, state, if ramped { end } else { time }, iteration)?;
             convergence.iterations += 1;
             convergence.residual = sums.relative_residual();
             if ramped && convergence.residual <= self.settings.tolerance {
@@ -289,6 +327,16 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                 least = convergence.residual;
             }
             least = least.min(convergence.residual);
+            greatest = greatest.max(convergence.residual);
+            if ramped {
+                reached = reached.min(convergence.residual);
+            }
+            if iteration % REPORT == 0 {
+                let tolerance = self.settings.tolerance;
+                let fraction = ((greatest / reached).ln() / (greatest / tolerance).ln()).clamp(0.0, 1.0);
+                let (span, residual) = ([state.time, end], convergence.residual);
+                watch(Iteration { span, number: iteration, residual, fraction });
+            }
             let damping = if ramped {
                 slowest = follow(slowest, &sums);
                 2.0 * (slowest * HIGHEST / (slowest + HIGHEST)).sqrt()
@@ -311,10 +359,11 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
     /// Moves the prescribed components to their places at a time.
     fn prescribe(&self, state: &mut State<R>, time: f64) {
         for (index, constraint) in self.model.constraints.iter().enumerate() {
-            let place = constraint.motion.displacement(time);
-            for &node in &constraint.nodes {
+            let factor = constraint.motion.factor(time);
+            for (at, &node) in constraint.nodes.iter().enumerate() {
+                let amplitude = constraint.motion.amplitude(at);
                 for c in (0..3).filter(|&c| self.owners[node as usize][c] == index as u32) {
-                    state.displacement[node as usize][c] = R::of(place[c]);
+                    state.displacement[node as usize][c] = R::of(amplitude[c] * factor);
                 }
             }
         }
@@ -326,6 +375,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         forces: &mut InternalForces<R>,
         state: &State<R>,
         time: f64,
+        iterations: usize,
     ) -> Result<Sums, RelaxationError> {
         self.take_committed_history(state);
         let inverted = forces.evaluate(&state.displacement, &mut self.trial_history).inverted;
@@ -338,6 +388,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                 element: solid.original[cell],
                 node: self.model.locate_node(solid.cells.nodes(cell)[0]).1,
                 determinant,
+                iterations,
                 time,
             });
         }
@@ -378,6 +429,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             return Err(RelaxationError::NotFinite {
                 body: self.model.bodies[body].name.clone(),
                 node,
+                iterations,
                 time,
             });
         }

@@ -46,7 +46,7 @@ pub fn fingerprint(thing: &impl Debug) -> u64 {
 
 impl Model {
     /// Each part of the model in words, such as ``load `push` ``, with its number. The material of a body is all but its
-    /// mesh: laws, fibres, masses, damping, hourglass control.
+    /// mesh: laws, fibres, masses, damping, hourglass control, velocity at the start.
     pub fn fingerprints(&self) -> Vec<(String, u64)> {
         let mut parts = Vec::new();
         for (index, body) in self.bodies.iter().enumerate() {
@@ -57,6 +57,8 @@ impl Model {
             solids().for_each(|solid| add_cells(&mut mesh, solid));
             let mut material = Fnv::new();
             material.numbers([&body.damping]);
+            let velocity = self.initial_velocity.iter().skip(range.start).take(range.len());
+            material.numbers(velocity.flatten());
             material.numbers(&self.mass[range]);
             for solid in solids() {
                 let _ = write!(material, "{:?}", solid.material);

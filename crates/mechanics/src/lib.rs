@@ -43,6 +43,7 @@ mod dynamic_relaxation;
 pub mod element;
 mod fingerprint;
 mod forces;
+pub mod harmonic;
 pub mod law;
 pub mod load;
 pub mod mapping;
@@ -57,7 +58,7 @@ mod tangent;
 pub mod tensor;
 
 pub use dynamic_relaxation::{
-    Convergence, DynamicRelaxation, Equilibrium, RelaxationError, RelaxationSettings,
+    Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings,
 };
 pub use fingerprint::fingerprint;
 pub use model::Model;

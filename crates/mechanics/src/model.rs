@@ -31,6 +31,8 @@ pub struct Model {
     pub surfaces: Vec<Surface>,
     /// Mass added for a larger stable step.
     pub mass_scaling: Option<MassScaling>,
+    /// Velocities [m/s] of the nodes at time 0, for dynamics; nodes beyond its end are at rest.
+    pub initial_velocity: Vec<Vector<f64>>,
 }
 
 /// Mass that is added to the fastest cells so that none has an element bound below a step; see [`Model::scale_mass`].
@@ -322,6 +324,13 @@ pub struct Constraint {
     pub motion: Motion,
 }
 
+impl Constraint {
+    /// The amplitude of each node's motion.
+    fn amplitudes(&self) -> impl Iterator<Item = Vector<f64>> + '_ {
+        (0..self.nodes.len()).map(|index| self.motion.amplitude(index))
+    }
+}
+
 /// The course of a prescribed motion.
 #[derive(Clone, Debug)]
 pub enum Motion {
@@ -329,28 +338,38 @@ pub enum Motion {
     Fixed,
     /// Displacement [m] × curve.
     Displacement(Vector<f64>, Curve),
+    /// Displacements [m], one per node of the constraint in their order, × curve.
+    Displacements(Vec<Vector<f64>>, Curve),
     /// Velocity [m/s] × curve; the displacement is its integral.
     Velocity(Vector<f64>, Curve),
 }
 
 impl Motion {
-    /// Displacement [m] at a time [s].
-    pub fn displacement(&self, time: f64) -> Vector<f64> {
+    /// What the factor multiplies: the displacement [m], or the velocity [m/s], of the constraint's node at `index`.
+    pub fn amplitude(&self, index: usize) -> Vector<f64> {
         match self {
             Self::Fixed => [0.0; 3],
-            Self::Displacement(by, curve) => by.map(|b| b * curve.value(time)),
-            Self::Velocity(velocity, curve) => velocity.map(|v| v * curve.integral(time)),
+            Self::Displacement(by, _) => *by,
+            Self::Displacements(by, _) => by[index],
+            Self::Velocity(velocity, _) => *velocity,
         }
     }
 
-    /// Whether two motions move a component alike at all times.
-    fn agrees_with(&self, other: &Self, component: usize) -> bool {
+    /// Displacement over amplitude at a time [s].
+    pub fn factor(&self, time: f64) -> f64 {
+        match self {
+            Self::Fixed => 0.0,
+            Self::Displacement(_, curve) | Self::Displacements(_, curve) => curve.value(time),
+            Self::Velocity(_, curve) => curve.integral(time),
+        }
+    }
+
+    /// Whether two motions of the same amplitude are the same at all times.
+    fn follows(&self, other: &Self) -> bool {
         let course = |motion: &Self| match motion {
-            Self::Displacement(by, curve) if by[component] != 0.0 => {
-                Some((by[component], false, curve.clone()))
-            }
-            Self::Velocity(by, curve) if by[component] != 0.0 => Some((by[component], true, curve.clone())),
-            _ => None,
+            Self::Fixed => None,
+            Self::Displacement(_, curve) | Self::Displacements(_, curve) => Some((false, curve.clone())),
+            Self::Velocity(_, curve) => Some((true, curve.clone())),
         };
         course(self) == course(other)
     }
@@ -463,16 +482,20 @@ impl Model {
     /// If two constraints prescribe different motions for one component of a node.
     pub fn constrained_components(&self) -> Result<Vec<[u32; 3]>, Contradiction> {
         let mut owners = vec![[FREE; 3]; self.node_count()];
+        let mut amplitudes = vec![[0.0; 3]; self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
-            for &node in &constraint.nodes {
+            for (&node, amplitude) in constraint.nodes.iter().zip(constraint.amplitudes()) {
                 for component in (0..3).filter(|&c| constraint.components[c]) {
                     let owner = &mut owners[node as usize][component];
+                    let known = &mut amplitudes[node as usize][component];
                     if *owner == FREE {
-                        *owner = index as u32;
+                        (*owner, *known) = (index as u32, amplitude[component]);
                         continue;
                     }
                     let first = &self.constraints[*owner as usize];
-                    if !first.motion.agrees_with(&constraint.motion, component) {
+                    let still = *known == 0.0;
+                    if *known != amplitude[component] || !(still || first.motion.follows(&constraint.motion))
+                    {
                         let (body, local) = self.locate_node(node);
                         return Err(Contradiction {
                             first: first.name.clone(),
@@ -486,5 +509,18 @@ impl Model {
             }
         }
         Ok(owners)
+    }
+
+    /// The amplitude of the motion of each component that has an owner (see [`Motion::amplitude`]); 0 for the others.
+    pub(crate) fn amplitudes(&self, owners: &[[u32; 3]]) -> Vec<Vector<f64>> {
+        let mut amplitudes = vec![[0.0; 3]; self.node_count()];
+        for (index, constraint) in self.constraints.iter().enumerate() {
+            for (&node, amplitude) in constraint.nodes.iter().zip(constraint.amplitudes()) {
+                for c in (0..3).filter(|&c| owners[node as usize][c] == index as u32) {
+                    amplitudes[node as usize][c] = amplitude[c];
+                }
+            }
+        }
+        amplitudes
     }
 }

@@ -22,6 +22,8 @@ pub struct CellFields {
     pub cauchy_stress: Symmetric<f64>,
     /// Strain energy per reference volume [J/m³] of the instantaneous elastic law.
     pub energy_density: f64,
+    /// Unit fibre at rest; `None` if the law has none.
+    pub fibre: Option<Vector<f64>>,
     /// Length of the deformed unit fibre; `None` if the law has none.
     pub fibre_stretch: Option<f64>,
 }
@@ -142,6 +144,7 @@ fn point_fields(
         pk2_stress,
         cauchy_stress: pk2_stress.push_forward(&deformation.gradient) * (1.0 / deformation.volume_ratio),
         energy_density: isochoric + volumetric,
+        fibre,
         fibre_stretch: fibre.map(stretch),
     }
 }
@@ -165,6 +168,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
         pk2_stress: sum.pk2_stress + point.pk2_stress * w,
         cauchy_stress: sum.cauchy_stress + point.cauchy_stress * w,
         energy_density: sum.energy_density + w * point.energy_density,
+        fibre: point.fibre,
         fibre_stretch: point.fibre_stretch.map(|stretch| sum.fibre_stretch.unwrap_or(0.0) + w * stretch),
     };
     let nothing = CellFields {
@@ -174,6 +178,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
         pk2_stress: Symmetric::ZERO,
         cauchy_stress: Symmetric::ZERO,
         energy_density: 0.0,
+        fibre: None,
         fibre_stretch: None,
     };
     weighted.fold(nothing, add_up)

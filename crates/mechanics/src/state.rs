@@ -60,7 +60,7 @@ impl<R: Real> History<R> {
 pub struct Work {
     /// ∫ f_int · du, stored and viscous part and hourglass together, to the current time.
     pub internal: f64,
-    /// Work of loads and of prescribed motions, to the current time.
+    /// Work of loads and of prescribed motions, to the current time, and the kinetic energy given at time 0.
     pub external: f64,
     /// Energy taken by mass-proportional damping, to the current time.
     pub damping: f64,
@@ -83,10 +83,11 @@ impl<R: Real> State<R> {
     pub fn at_rest(model: &Model) -> Self {
         let mut displacement = vec![[R::ZERO; 3]; model.node_count()];
         if let Ok(owners) = model.constrained_components() {
-            for (u, owner) in displacement.iter_mut().zip(owners) {
+            let amplitudes = model.amplitudes(&owners);
+            for ((u, owner), amplitude) in displacement.iter_mut().zip(owners).zip(amplitudes) {
                 for component in (0..3).filter(|&c| owner[c] != FREE) {
                     let motion = &model.constraints[owner[component] as usize].motion;
-                    u[component] = R::of(motion.displacement(0.0)[component]);
+                    u[component] = R::of(amplitude[component] * motion.factor(0.0));
                 }
             }
         }

@@ -48,7 +48,7 @@ pub struct Energies {
     pub damping: f64,
     /// Held by hourglass control.
     pub hourglass: f64,
-    /// Work of loads and prescribed motions.
+    /// Work of loads and prescribed motions, and the kinetic energy given at the start.
     pub external: f64,
     /// |kinetic + internal + damping + hourglass − external| over the largest of them so far, with ⅛ Δt² Σ m|a|² of the start
     /// as part of the kinetic energy: of loads that set in at once it stays behind for good.
@@ -210,8 +210,10 @@ pub struct CentralDifference<'m, R> {
     /// α of each node [1/s].
     damping: Vec<R>,
     applied: AppliedForces<'m>,
-    /// Prescribed displacement [m] of each constraint now and after the step.
-    target: Vec<[Vector<f64>; 2]>,
+    /// Amplitude of each prescribed component.
+    amplitude: Vec<Vector<f64>>,
+    /// Factor on the amplitudes of each constraint now and after the step.
+    factor: Vec<[f64; 2]>,
     next: Vec<Vector<R>>,
     reaction: Vec<Vector<R>>,
     sums: Vec<Sums>,
@@ -272,6 +274,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 volume * solid.material.law.longitudinal_modulus()
             })
             .sum();
+        let owners = model.constrained_components()?;
         Ok(Self {
             model,
             step,
@@ -280,11 +283,12 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             lengths: Lengths { before: step, next: step },
             relaxing: step,
             forces: InternalForces::new(model, step),
-            owners: model.constrained_components()?,
+            amplitude: model.amplitudes(&owners),
+            owners,
             mass: (0..nodes).map(|node| R::of(model.inertia(node))).collect(),
             damping,
             applied: AppliedForces::new(model),
-            target: vec![[[0.0; 3]; 2]; model.constraints.len()],
+            factor: vec![[0.0; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
             reaction: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
@@ -327,7 +331,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         if state.is_at_start() {
             self.start(state);
         }
-        self.set_targets(state.time);
+        self.set_factors(state.time);
         self.pass_over_nodes(state);
         let sums = self.sums.iter().fold(Sums::default(), Sums::merge);
         self.check_state(state, &sums, found.inverted)?;
@@ -397,15 +401,15 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has gone before.
     pub fn advance(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
-        let (owners, target) = (&self.owners, &self.target);
-        (state.displacement.par_iter_mut().zip(&state.increment).zip(owners)).with_min_len(CHUNK).for_each(
-            |((u, du), owner)| {
+        let (owners, amplitude, factor) = (&self.owners, &self.amplitude, &self.factor);
+        (state.displacement.par_iter_mut().zip(&state.increment).zip(owners).zip(amplitude))
+            .with_min_len(CHUNK)
+            .for_each(|(((u, du), owner), amplitude)| {
                 *u = add(*u, *du);
                 for component in (0..3).filter(|&c| owner[c] != FREE) {
-                    u[component] = R::of(target[owner[component] as usize][1][component]);
+                    u[component] = R::of(amplitude[component] * factor[owner[component] as usize][1]);
                 }
-            },
-        );
+            });
         state.work.internal += state.work.pending_internal;
         state.work.external += state.work.pending_external;
         state.stability.substeps = self.substeps;
@@ -423,31 +427,36 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         self.balance_floor
     }
 
-    fn set_targets(&mut self, time: f64) {
-        for (target, constraint) in self.target.iter_mut().zip(&self.model.constraints) {
-            *target = [time, time + self.lengths.next].map(|t| constraint.motion.displacement(t));
+    fn set_factors(&mut self, time: f64) {
+        for (factor, constraint) in self.factor.iter_mut().zip(&self.model.constraints) {
+            *factor = [time, time + self.lengths.next].map(|t| constraint.motion.factor(t));
         }
     }
 
-    /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with v⁰ = 0: the increment before the first step.
+    /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with a⁰ = (R − f)/m − α v⁰: the increment before the first step. A prescribed
+    /// component has no velocity of its own.
     fn start(&self, state: &mut State<R>) {
-        let mut kinetic = 0.0;
-        let half = 0.5 * self.lengths.before * self.lengths.before;
+        let dt = self.lengths.before;
+        let half = 0.5 * dt * dt;
+        let mut shock = 0.0;
+        state.work.external = 0.0;
         for (node, increment) in state.increment.iter_mut().enumerate() {
             let applied: Vector<R> = self.applied.at(node);
             let internal = self.forces.at(node);
-            for component in 0..3 {
-                increment[component] = if self.owners[node][component] == FREE {
-                    let mass = self.mass[node].to_f64();
-                    let back = -half * (applied[component] - internal[component]).to_f64() / mass;
-                    kinetic += 0.5 * mass * (back / self.lengths.before).powi(2);
-                    R::of(back)
-                } else {
-                    R::ZERO
-                };
+            let (m, alpha) = (self.mass[node].to_f64(), self.damping[node].to_f64());
+            let velocity = self.model.initial_velocity.get(node).copied().unwrap_or_default();
+            for c in 0..3 {
+                if self.owners[node][c] != FREE {
+                    increment[c] = R::ZERO;
+                    continue;
+                }
+                let acceleration = (applied[c] - internal[c]).to_f64() / m - alpha * velocity[c];
+                increment[c] = R::of(dt * velocity[c] - half * acceleration);
+                shock += 0.5 * m * (half * acceleration / dt).powi(2);
+                state.work.external += 0.5 * m * velocity[c] * velocity[c];
             }
         }
-        state.work.at_start = kinetic;
+        state.work.at_start = shock;
     }
 
     fn pass_over_nodes(&mut self, state: &State<R>) {
@@ -485,8 +494,8 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 next[c] =
                     ((R::ONE - a) * same_speed + dt * mean / m * (applied[c] - internal[c])) / (R::ONE + a);
             } else {
-                let [now, then] = self.target[owner[c] as usize];
-                next[c] = R::of(then[c] - now[c]);
+                let [now, then] = self.factor[owner[c] as usize];
+                next[c] = R::of(self.amplitude[node][c] * then - self.amplitude[node][c] * now);
                 let velocity = (same_speed + next[c]) / (R::of(2.0) * dt);
                 let inertia = m * ((next[c] - same_speed) / (dt * mean) + alpha * velocity);
                 reaction[c] = inertia + internal[c] - applied[c];

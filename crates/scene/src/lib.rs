@@ -54,12 +54,13 @@ mod testing;
 pub use build::{Built, BuiltBody, build};
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use output::{
-    AddedMass, BodySummary, FailureSummary, OutputError, OutputFolder, StabilitySummary, Summary,
-    failed_input, failed_output, number,
+    AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,
+    Summary, failed_input, failed_output, number,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Plan, SAFETY, plan};
 pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, scene_file};
+pub use solver::LoadStepProgress;
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};

@@ -80,7 +80,7 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
             "xyz".chars().zip(constraint.components).filter(|(_, on)| *on).map(|(c, _)| c).collect();
         let what = match constraint.motion {
             Motion::Fixed => "fixes",
-            Motion::Displacement(..) | Motion::Velocity(..) => "moves",
+            Motion::Displacement(..) | Motion::Displacements(..) | Motion::Velocity(..) => "moves",
         };
         let nodes = counted(constraint.nodes.len(), "node");
         writeln!(page, "constraint `{}`: {what} {axes} of {nodes}", constraint.name)?;

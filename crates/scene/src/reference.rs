@@ -107,12 +107,15 @@ pub fn describe(schema: &Schema) -> Vec<Parameter> {
 
 fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<Parameter> {
     let mut parameters: Vec<Parameter> = Vec::new();
+    let common = |key: &str| forms.len() > 1 && forms.iter().all(|form| form.property(key).is_some());
     for form in forms {
+        // What is said of one of several tables is said of the key that tells it from the others.
+        let own = form.properties.iter().filter(|(key, _)| !common(key)).count();
         for (key, schema) in &form.properties {
             let of_all = forms.iter().all(|form| form.required.contains(key));
             if parameters.iter().all(|known| known.key != *key) {
                 let mut found = parameter(schemas, key, schema, of_all, depth);
-                if found.description.is_empty() && form.properties.len() == 1 {
+                if found.description.is_empty() && own == 1 && !common(key) {
                     found.description = form.doc.unwrap_or_default().to_owned();
                 }
                 parameters.push(found);

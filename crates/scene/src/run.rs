@@ -17,7 +17,7 @@ use crate::output::{
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::{Solver, solver};
+use crate::solver::{LoadStepProgress, Solver, solver};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +28,8 @@ pub struct Progress {
     pub until: f64,
     /// Wall time so far.
     pub wall: Duration,
+    /// Where a quasi-static run is within a load step.
+    pub load_step: Option<LoadStepProgress>,
 }
 
 /// What a run can be given beside its scene.
@@ -153,6 +155,7 @@ fn go<R: Real>(
     let before = options.resume.map_or(0.0, |checkpoint| checkpoint.progressed.wall_seconds);
     let started = Instant::now();
     let wall_seconds = || before + started.elapsed().as_secs_f64();
+    let wall = || Duration::try_from_secs_f64(wall_seconds()).unwrap_or_default();
     let mut reported = started;
     let failure = loop {
         match course.see() {
@@ -162,7 +165,8 @@ fn go<R: Real>(
                     report(Progress {
                         time: course.state.time,
                         until: scene.scene.until,
-                        wall: Duration::try_from_secs_f64(wall_seconds()).unwrap_or_default(),
+                        wall: wall(),
+                        load_step: None,
                     });
                 }
                 if last {
@@ -172,7 +176,15 @@ fn go<R: Real>(
             Err(failure) => break Some(failure),
         }
         let stop = options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
-        if let Err(failure) = course.step(wall_seconds(), stop) {
+        let mut watch = |step: LoadStepProgress| {
+            if reported.elapsed() >= REPORT {
+                reported = Instant::now();
+                let [from, to] = step.iteration.span;
+                let time = from + step.iteration.fraction * (to - from);
+                report(Progress { time, until: scene.scene.until, wall: wall(), load_step: Some(step) });
+            }
+        };
+        if let Err(failure) = course.step(wall_seconds(), stop, &mut watch) {
             break Some(failure);
         }
     };
@@ -294,8 +306,13 @@ impl<'a, R: Real> Course<'a, R> {
     }
 
     /// Goes to the next instant, with a checkpoint there if one is due or the run is to `stop`.
-    fn step(&mut self, wall_seconds: f64, stop: bool) -> Result<(), FailureSummary> {
-        self.solver.advance(&mut self.state)?;
+    fn step(
+        &mut self,
+        wall_seconds: f64,
+        stop: bool,
+        watch: &mut dyn FnMut(LoadStepProgress),
+    ) -> Result<(), FailureSummary> {
+        self.solver.advance(&mut self.state, watch)?;
         let last = self.is_last();
         let due = (self.checkpoints.as_mut())
             .is_some_and(|all| all.is_due(self.state.time, self.plan.step, last || stop));

@@ -2,7 +2,7 @@
 
 use pliant_mechanics::stability::Monitor;
 use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Equilibrium, Observable, Real, RelaxationSettings, State,
+    CentralDifference, DynamicRelaxation, Equilibrium, Iteration, Observable, Real, RelaxationSettings, State,
 };
 
 use crate::build::Built;
@@ -10,13 +10,30 @@ use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
 
+/// How far a load step is.
+#[derive(Clone, Copy, Debug)]
+pub struct LoadStepProgress {
+    /// Its number, counted from 1.
+    pub number: u64,
+    /// How many load steps there are.
+    pub of: u64,
+    /// The search for its equilibrium.
+    pub iteration: Iteration,
+    /// The relative residual at which it is found.
+    pub tolerance: f64,
+}
+
 /// Brings a state from instant to instant.
 pub(crate) trait Solver<R> {
     /// Makes all that can be asked belong to the state's instant.
     fn evaluate(&mut self, state: &mut State<R>) -> Result<(), FailureSummary>;
 
-    /// Goes on to the next instant.
-    fn advance(&mut self, state: &mut State<R>) -> Result<(), FailureSummary>;
+    /// Goes on to the next instant; tells now and then how far it is, if that takes long.
+    fn advance(
+        &mut self,
+        state: &mut State<R>,
+        watch: &mut dyn FnMut(LoadStepProgress),
+    ) -> Result<(), FailureSummary>;
 
     /// Energy [J] above which the balance is judged.
     fn balance_floor(&self) -> f64;
@@ -59,6 +76,8 @@ pub(crate) fn solver<'m, R: Real>(
             Box::new(LoadSteps {
                 relaxation: DynamicRelaxation::new(&built.model, settings)?,
                 step: plan.step,
+                count: plan.steps,
+                tolerance,
             })
         }
     })
@@ -70,7 +89,11 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
     }
 
     /// A whole step, in its parts.
-    fn advance(&mut self, state: &mut State<R>) -> Result<(), FailureSummary> {
+    fn advance(
+        &mut self,
+        state: &mut State<R>,
+        _watch: &mut dyn FnMut(LoadStepProgress),
+    ) -> Result<(), FailureSummary> {
         CentralDifference::advance(self, state);
         while !state.is_between_steps() {
             Solver::evaluate(self, state)?;
@@ -93,6 +116,10 @@ struct LoadSteps<'m, R> {
     relaxation: DynamicRelaxation<'m, R>,
     /// Time between equilibria [s].
     step: f64,
+    /// How many there are.
+    count: u64,
+    /// Relative residual of an equilibrium.
+    tolerance: f64,
 }
 
 impl<R: Real> Solver<R> for LoadSteps<'_, R> {
@@ -100,12 +127,18 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
         Ok(())
     }
 
-    fn advance(&mut self, state: &mut State<R>) -> Result<(), FailureSummary> {
-        let next = (state.time / self.step).round() + 1.0;
+    fn advance(
+        &mut self,
+        state: &mut State<R>,
+        watch: &mut dyn FnMut(LoadStepProgress),
+    ) -> Result<(), FailureSummary> {
+        let number = (state.time / self.step).round() as u64 + 1;
+        let (of, tolerance) = (self.count, self.tolerance);
+        let mut told = |iteration: Iteration| watch(LoadStepProgress { number, of, iteration, tolerance });
         self.relaxation
-            .solve(state, next * self.step)
+            .solve_watched(state, number as f64 * self.step, &mut told)
             .map(|_| ())
-            .map_err(|error| FailureSummary::from(&error))
+            .map_err(|error| FailureSummary::load_step(&error, number, of))
     }
 
     fn balance_floor(&self) -> f64 {
@@ -122,5 +155,34 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
 
     fn resume(&mut self, equilibrium: Equilibrium<R>) {
         self.relaxation.resume(equilibrium);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{built, scene};
+
+    #[test]
+    fn a_load_step_tells_how_far_it_is() {
+        let more = "[run]\nsolver = 'quasi-static'\nload-steps = 2\n[constraint.top]\ntype = 'move'\nbody = 'cube'\n\
+                    nodes = { set = 'z-max' }\nby = [0, 0, 0.01]\n";
+        let (scene, built) = (scene(more), built(more));
+        let plan = crate::plan(&scene, &built).unwrap();
+        let mut solver = solver::<f64>(&scene.run, &built, &plan).unwrap();
+        let mut state = State::at_rest(&built.model);
+        for number in [1, 2] {
+            let mut told = Vec::new();
+            solver.advance(&mut state, &mut |progress| told.push(progress)).unwrap();
+            assert!(told.len() > 10 && told.iter().all(|p| (p.number, p.of) == (number, 2)));
+            let fractions: Vec<f64> = told.iter().map(|p| p.iteration.fraction).collect();
+            assert!(fractions.is_sorted() && fractions[0] == 0.0, "{fractions:?}");
+            let last = told.last().unwrap();
+            assert!(last.iteration.fraction > 0.5 && last.iteration.fraction < 1.0, "{last:?}");
+            assert!(
+                (last.iteration.span[1] - state.time).abs() < 1e-15
+                    && last.iteration.residual > last.tolerance
+            );
+        }
     }
 }

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::{CellKind, io};
+use pliant_mechanics::load::LoadKind;
+use pliant_scene::format::{ByLabel, Hourglass};
 use pliant_scene::niftysim::{ImportError, Imported, import};
 use pliant_scene::registry::LoadTable;
 use pliant_scene::source::Source;
@@ -133,7 +135,9 @@ fn hourglass_stiffness_is_scaled_as_niftysim_scales_it() {
     let (scene, _) = build(&imported);
     let (mu, kappa) = (1034.48276, 10_000.0);
     let expected = 0.075 * (kappa + 4.0 / 3.0 * mu) / mu;
-    assert!((scene.bodies[0].1.hourglass - expected).abs() < 1e-12);
+    assert!(
+        matches!(scene.bodies[0].1.hourglass, ByLabel::One(Hourglass(c)) if (c - expected).abs() < 1e-12)
+    );
     assert_note(&imported, "0.075 (λ + 2μ), which is 0.8250 μ");
 }
 
@@ -262,15 +266,6 @@ fn where_nodes_are_held_and_displaced_they_are_displaced() {
 }
 
 #[test]
-fn values_for_each_node_are_grouped() {
-    let more = "<Constraint Type=\"Disp\" DOF=\"0\" NumNodes=\"3\" LoadShape=\"RAMP\"><Nodes>4 0 1</Nodes>\
-                <Magnitudes Type=\"DIFFORM\">0.1 0.2 0.1</Magnitudes></Constraint>";
-    let (_, built) = build(&imported(&with(more)));
-    let moved: Vec<_> = built.model.constraints.iter().map(|c| c.nodes.clone()).collect();
-    assert_eq!(moved, [vec![1, 4], vec![0]]);
-}
-
-#[test]
 fn pressure_pushes_as_the_listed_faces_are_turned() {
     // The face 0 1 3 has its outward normal along −y in this order; 0 2 3 looks inwards.
     let more = "<Constraint Type=\"Pressure\" NumFaces=\"2\" FaceType=\"Tri\" LoadShape=\"STEP\">\
@@ -326,7 +321,8 @@ fn gravity_is_an_acceleration_along_a_unit_vector() {
     assert_lines(&all, &["on = \"model\"", "acceleration = [0.0, 0.0, -10.0]", "curve = \"hold\""]);
     build(&all);
     let some = gravity("NumNodes=\"2\"", "<Nodes>0 1</Nodes>");
-    assert_note(&some, "the Gravity of line 6 (gravity on some nodes only)");
+    assert_lines(&some, &["nodes = { set = \"gravity-0\" }", "acceleration = [0.0, 0.0, -10.0]"]);
+    build(&some);
 }
 
 #[test]
@@ -360,15 +356,21 @@ fn each_label_has_its_law() {
 }
 
 #[test]
-fn different_densities_keep_the_mass_and_are_named() {
+fn each_label_has_its_density_also_within_one_law() {
+    let set = |material: &str, member| format!("<ElementSet Size=\"1\">{material} {member}</ElementSet>");
     let heavy = NEO_HOOKEAN.replace("</Material>", "<Density>3000</Density></Material>");
-    let sets = format!(
-        "<ElementSet Size=\"1\">{NEO_HOOKEAN} 0</ElementSet><ElementSet Size=\"1\">{heavy} 1</ElementSet>"
-    );
-    let imported = imported(&format!("<Model>{MESH}{sets}{SYSTEM}</Model>"));
-    let (scene, _) = build(&imported);
-    assert!((scene.bodies[0].1.density - 2000.0).abs() < 1e-9);
-    assert_note(&imported, "different densities");
+    let other = heavy.replace("1000 ", "2000 ");
+    for (second, law) in
+        [(heavy, "law = \"material-0\""), (other, "law = { 0 = \"material-0\", 1 = \"material-1\" }")]
+    {
+        let sets = set(NEO_HOOKEAN, 0) + &set(&second, 1);
+        let imported = imported(&format!("<Model>{MESH}{sets}{SYSTEM}</Model>"));
+        assert_lines(&imported, &[law, "density = { 0 = 1000.0, 1 = 3000.0 }"]);
+        let (_, built) = build(&imported);
+        let densities: Vec<f64> = built.model.solids.iter().map(|solid| solid.material.density).collect();
+        assert_eq!(densities, [1000.0, 3000.0]);
+        assert_eq!(built.model.solids.iter().map(|solid| solid.original[0]).collect::<Vec<_>>(), [0, 1]);
+    }
 }
 
 /// The mesh of a file is turned about its centre, then scaled, then shifted.
@@ -656,4 +658,41 @@ fn niftysims_own_examples_are_imported() {
         assert_note(&imported, "shells and membranes");
         build(&imported);
     }
+}
+
+#[test]
+fn magnitudes_that_differ_from_node_to_node_become_point_data() {
+    let difform = |kind: &str, dof: &str| {
+        let more = format!(
+            "<Constraint Type=\"{kind}\" DOF=\"{dof}\" NumNodes=\"3\" LoadShape=\"STEP\"><Nodes>3 0 4</Nodes>\
+             <Magnitudes Type=\"DIFFORM\">0.3 0.1 0.4</Magnitudes></Constraint>"
+        );
+        imported(&with(&more))
+    };
+    let moved = difform("Disp", "2");
+    assert_lines(&moved, &["components = [\"z\"]", "by = { point-data = \"move-0\" }"]);
+    let (_, built) = build(&moved);
+    let constraint = &built.model.constraints[0];
+    assert_eq!(constraint.nodes, [0, 3, 4]);
+    assert_eq!([0, 1, 2].map(|index| constraint.motion.amplitude(index)[2]), [0.1, 0.3, 0.4]);
+    let pushed = difform("Force", "0");
+    assert_lines(&pushed, &["each = { point-data = \"force-0\" }"]);
+    let (_, built) = build(&pushed);
+    let LoadKind::Forces(forces) = &built.model.loads[0].kind else { panic!("forces") };
+    assert_eq!(forces[..], [(0, [0.1, 0.0, 0.0]), (3, [0.3, 0.0, 0.0]), (4, [0.4, 0.0, 0.0])]);
+}
+
+#[test]
+fn tractions_that_differ_from_face_to_face_become_forces_on_nodes() {
+    let more = "<Constraint Type=\"Traction\" NumFaces=\"2\" FaceType=\"Tri\" LoadShape=\"RAMP\"><Faces>0 1 3  0 1 4</Faces>\
+                <Magnitudes Type=\"DIFFORM\">0 0 6  0 12 0</Magnitudes></Constraint>";
+    let imported = imported(&with(more));
+    assert_note(&imported, "one for each face");
+    let (_, built) = build(&imported);
+    let LoadKind::Forces(forces) = &built.model.loads[0].kind else { panic!("forces") };
+    // Areas of ½ m², shared by three nodes each, and NiftySim's sign.
+    assert_eq!(
+        forces[..],
+        [(0, [0.0, -2.0, -1.0]), (1, [0.0, -2.0, -1.0]), (3, [0.0, 0.0, -1.0]), (4, [0.0, -2.0, 0.0])]
+    );
 }

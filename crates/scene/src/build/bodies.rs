@@ -1,19 +1,31 @@
-//! Bodies: nodes, cells grouped by element and law, fibres, masses.
+//! Bodies: nodes, cells grouped by element and material, masses.
 
 use std::collections::BTreeMap;
 
-use pliant_geometry::{CellBlock, CellId, CellKind, DataArray, Mesh, boundary};
+use pliant_geometry::{CellBlock, CellKind, Mesh, Surface, boundary};
 use pliant_mechanics::model::{Averaging, Body, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
 
-use super::meshes::list_cells;
 use super::{Builder, BuiltBody, SCENE, suggestion};
 use crate::diagnostic::counted;
-use crate::format::{BodyTable, Element, Fibre, LawChoice};
+use crate::format::{BodyTable, ByLabel, Density, Element, Hourglass, SolverName};
 use crate::registry::LawTable;
 
-/// Fibres shorter than this are zero.
-const ZERO_FIBRE: f64 = 1e-12;
+/// A body that is being built.
+pub(super) struct Draft<'a> {
+    pub name: &'a str,
+    pub table: &'a BodyTable,
+    pub mesh: &'a Mesh,
+    pub boundary: &'a Surface,
+}
+
+/// Some cells of a block, of one material.
+struct Part {
+    law: String,
+    density: Density,
+    hourglass: Hourglass,
+    cells: Vec<u32>,
+}
 
 impl Builder<'_> {
     pub(super) fn add_bodies(&mut self) {
@@ -22,37 +34,57 @@ impl Builder<'_> {
             let path = ["body", name.as_str()];
             let mesh_path = [path[0], path[1], "mesh"];
             let Some(mut made) = self.mesh(&table.mesh, &mesh_path) else { continue };
-            if !self.repair_and_check(&mut made.mesh, &table.mesh, &mesh_path) {
+            let file_nodes = made.mesh.points.len();
+            let file_numbers = self.repair(&mut made.mesh, &table.mesh, &mesh_path);
+            if !self.check_mesh(&made.mesh, &table.mesh, &mesh_path) {
                 continue;
             }
-            self.add_body(name, table, &made.mesh);
             let boundary = boundary(&made.mesh);
+            self.add_body(&Draft { name, table, mesh: &made.mesh, boundary: &boundary });
             self.bodies.push(BuiltBody {
                 name: name.clone(),
                 mesh: made.mesh,
                 origin: made.origin,
                 boundary,
+                file_nodes,
+                file_numbers,
             });
         }
         self.check_unused_laws();
     }
 
-    fn add_body(&mut self, name: &str, table: &BodyTable, mesh: &Mesh) {
+    fn add_body(&mut self, draft: &Draft<'_>) {
+        let &Draft { name, table, mesh, .. } = draft;
         let first = self.model.rest.len() as u32;
         let body = self.model.bodies.len();
         self.model.rest.extend(mesh.points.iter().map(|&p| <[f64; 3]>::from(p)));
         self.model.mass.resize(self.model.rest.len(), 0.0);
+        self.set_velocity(name, table, first as usize);
         let nodes = first..self.model.rest.len() as u32;
         self.model.bodies.push(Body { name: name.into(), nodes, damping: table.damping });
-        self.check_labels(name, table, mesh);
+        self.check_labels(name, ["law", "\"law\""], &table.law, mesh);
+        self.check_labels(name, ["density", "1000"], &table.density, mesh);
+        self.check_labels(name, ["hourglass", "0.2"], &table.hourglass, mesh);
         for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
             if !self.check_element(name, table, block.kind) {
                 return;
             }
-            for (law_name, cells) in cells_by_law(&table.law, block) {
-                self.add_solid(name, table, body, block, &law_name, cells);
+            for part in parts(table, block) {
+                self.add_solid(draft, body, block, part);
             }
         }
+    }
+
+    /// The velocity at the start of the model's last nodes, from a first one on.
+    fn set_velocity(&mut self, name: &str, table: &BodyTable, first: usize) {
+        let Some(velocity) = table.velocity else { return };
+        if self.scene.run.solver == SolverName::QuasiStatic {
+            let message = format!("`{name}` has a velocity, but a quasi-static run has no inertia");
+            let help = "leave it out, or run the scene with `solver = \"explicit\"`";
+            self.error(&["body", name, "velocity"], message, "plays no part", help);
+        }
+        self.model.initial_velocity.resize(first, [0.0; 3]);
+        self.model.initial_velocity.resize(self.model.rest.len(), velocity);
     }
 
     fn check_element(&mut self, name: &str, table: &BodyTable, kind: CellKind) -> bool {
@@ -66,16 +98,19 @@ impl Builder<'_> {
         fits
     }
 
-    /// Where laws go by label: whether each cell's label has a law, and each law's label a cell.
-    fn check_labels(&mut self, name: &str, table: &BodyTable, mesh: &Mesh) {
-        let LawChoice::ByLabel(map) = &table.law else { return };
-        let path = ["body", name, "law"];
+    /// Where values (law, density, …) go by label: whether each cell's label has one, and each label of theirs a cell. The
+    /// key comes with an example of a value.
+    fn check_labels<T>(&mut self, name: &str, [key, example]: [&str; 2], values: &ByLabel<T>, mesh: &Mesh) {
+        let ByLabel::Each(map) = values else { return };
+        let path = ["body", name, key];
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
             let Some(labels) = block.data.get("label") else {
                 let message = format!("the {} cells of `{name}` have no labels", block.kind.name());
-                let help = "name one law for the whole body, or use a mesh whose cell data `label` numbers its regions";
-                self.error(&path, message, "laws by label", help);
+                let help = format!(
+                    "give one {key} for the whole body, or use a mesh whose cell data `label` numbers its regions"
+                );
+                self.error(&path, message, "by label", help);
                 return;
             };
             for label in &labels.values {
@@ -86,8 +121,9 @@ impl Builder<'_> {
         let missing = counts.iter().filter(|(label, _)| !map.contains_key(*label));
         let missing = list(&mut missing.map(|(label, n)| format!("{label} ({})", counted(*n, "cell"))));
         if !missing.is_empty() {
-            let message = format!("cells of `{name}` have labels without a law: {missing}");
-            self.error(&path, message, "no law for these", "add `LABEL = \"law\"` for each of them");
+            let message = format!("cells of `{name}` have labels without {key}: {missing}");
+            let help = format!("add `LABEL = {example}` for each of them");
+            self.error(&path, message, "not for these", help);
         }
         let known = list(&mut counts.keys().cloned());
         for label in map.keys().filter(|label| !counts.contains_key(*label)) {
@@ -97,21 +133,14 @@ impl Builder<'_> {
         }
     }
 
-    fn add_solid(
-        &mut self,
-        name: &str,
-        table: &BodyTable,
-        body: usize,
-        block: &CellBlock,
-        law_name: &str,
-        cells: Vec<u32>,
-    ) {
-        let scene = self.scene;
-        let Some((_, law)) = scene.laws.iter().find(|(known, _)| known == law_name) else {
+    fn add_solid(&mut self, draft: &Draft<'_>, body: usize, block: &CellBlock, part: Part) {
+        let Part { law: law_name, density, hourglass, cells } = part;
+        let (scene, &Draft { name, table, .. }) = (self.scene, draft);
+        let Some((_, law)) = scene.laws.iter().find(|(known, _)| *known == law_name) else {
             let known: Vec<&str> = scene.laws.iter().map(|(name, _)| name.as_str()).collect();
             let message = format!("there is no law `{law_name}`");
-            let help = suggestion(law_name, &known, SCENE, "laws");
-            self.error(&law_path(name, &table.law, law_name), message, "no such law", help);
+            let help = suggestion(&law_name, &known, SCENE, "laws");
+            self.error(&law_path(name, &table.law, &law_name), message, "no such law", help);
             return;
         };
         if table.element.is_some_and(Element::averages_pressure) && !law.law.has_volumetric_energy() {
@@ -122,9 +151,9 @@ impl Builder<'_> {
             self.error(&["body", name, "element"], message, "does not go with the law", help);
             return;
         }
-        let Some(prony) = self.prony(law_name, law) else { return };
-        let Some(fibre) = self.fibres(name, table, law_name, law, block, &cells) else { return };
-        let material = Material { law: law.law, prony, density: table.density };
+        let Some(prony) = self.prony(&law_name, law) else { return };
+        let Some(fibre) = self.fibres(draft, &law_name, law, block, &cells) else { return };
+        let material = Material { law: law.law, prony, density: density.0 };
         let first = self.model.bodies[body].nodes.start;
         let rest = &self.model.rest;
         let shear = law.law.small_strain().shear;
@@ -140,7 +169,7 @@ impl Builder<'_> {
             }
             (CellKind::Tet, _) => Cells::tet4(tets(), rest),
             (_, Some(Element::Hex8Full)) => Cells::full_hex8(hexes(), rest),
-            _ => Cells::hex8(hexes(), rest, table.hourglass, shear),
+            _ => Cells::hex8(hexes(), rest, hourglass.0, shear),
         };
         self.model.add_solid(Solid { body, material, cells: cells_of, fibre, original: cells });
     }
@@ -165,89 +194,10 @@ impl Builder<'_> {
         }
     }
 
-    /// The unit fibre of each cell; empty if the law has none.
-    fn fibres(
-        &mut self,
-        name: &str,
-        table: &BodyTable,
-        law_name: &str,
-        law: &LawTable,
-        block: &CellBlock,
-        cells: &[u32],
-    ) -> Option<Vec<[f64; 3]>> {
-        if !law.law.needs_fibre() {
-            return Some(Vec::new());
-        }
-        let (given, path) = match (&table.fibre, &law.extras.fibre) {
-            (Some(fibre), _) => (fibre, ["body", name, "fibre"]),
-            (None, Some(fibre)) => (fibre, ["law", law_name, "fibre"]),
-            (None, None) => {
-                let message = format!("`{name}` has a law with fibres, but no fibre direction");
-                let help =
-                    "add `fibre = [x, y, z]` or `fibre = { cell-data = \"name\" }` to the law or the body";
-                self.error(&["body", name, "law"], message, "this law needs a fibre", help);
-                return None;
-            }
-        };
-        let field = match given {
-            Fibre::Uniform(direction) => {
-                let Some(unit) = unit(direction) else {
-                    let help = "the direction in which the fibres run, for example [0, 1, 0]; its length does not matter";
-                    self.error(&path, "the fibre direction is zero", "no direction", help);
-                    return None;
-                };
-                return Some(vec![unit; cells.len()]);
-            }
-            Fibre::PerCell(field) => &field.cell_data,
-        };
-        let Some(data) = block.data.get(field) else {
-            let known: Vec<&str> = block.data.keys().map(String::as_str).collect();
-            let help = suggestion(field, &known, "the mesh", "cell data");
-            self.error(
-                &path,
-                format!("the mesh of `{name}` has no cell data `{field}`"),
-                "no such data",
-                help,
-            );
-            return None;
-        };
-        self.fibres_from(name, field, data, block.kind, cells, &path)
-    }
-
-    fn fibres_from(
-        &mut self,
-        name: &str,
-        field: &str,
-        data: &DataArray,
-        kind: CellKind,
-        cells: &[u32],
-        path: &[&str],
-    ) -> Option<Vec<[f64; 3]>> {
-        if data.components != 3 {
-            let message =
-                format!("cell data `{field}` has {} components, a direction has 3", data.components);
-            self.error(path, message, "not directions", "name an array of vectors");
-            return None;
-        }
-        let directions: Vec<_> = cells.iter().filter_map(|&cell| unit(data.item(cell as usize))).collect();
-        if directions.len() < cells.len() {
-            let without = cells.iter().filter(|&&cell| unit(data.item(cell as usize)).is_none());
-            let without: Vec<CellId> = without.map(|&index| CellId { kind, index }).collect();
-            let message =
-                format!("cells of `{name}` whose fibre is zero or not finite: {}", list_cells(&without));
-            self.error(path, message, "from this data", "give every cell a direction in the mesh file");
-            return None;
-        }
-        Some(directions)
-    }
-
     fn check_unused_laws(&mut self) {
         let scene = self.scene;
         for (name, _) in &scene.laws {
-            let used = scene.bodies.iter().any(|(_, body)| match &body.law {
-                LawChoice::One(law) => law == name,
-                LawChoice::ByLabel(map) => map.values().any(|law| law == name),
-            });
+            let used = scene.bodies.iter().any(|(_, body)| body.law.values().contains(&name));
             if !used {
                 self.notes.push(format!("law `{name}` is used by no body"));
             }
@@ -255,33 +205,37 @@ impl Builder<'_> {
     }
 }
 
-/// The cells of a block that each law takes, by law name.
-fn cells_by_law(choice: &LawChoice, block: &CellBlock) -> BTreeMap<String, Vec<u32>> {
-    let mut cells: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+/// The cells of a block by material, laws in the order of their names.
+fn parts(table: &BodyTable, block: &CellBlock) -> Vec<Part> {
+    let labels = block.data.get("label");
+    let has_hourglass = block.kind == CellKind::Hex && table.element != Some(Element::Hex8Full);
+    let mut parts: BTreeMap<(&str, u64, u64), Part> = BTreeMap::new();
     for cell in 0..block.len() as u32 {
-        let law = match choice {
-            LawChoice::One(law) => Some(law),
-            LawChoice::ByLabel(map) => {
-                block.data.get("label").and_then(|labels| map.get(&labels.item(cell as usize)[0].to_string()))
-            }
-        };
-        if let Some(law) = law {
-            cells.entry(law.clone()).or_default().push(cell);
-        }
+        let label = labels.map(|labels| labels.item(cell as usize)[0].to_string());
+        let label = label.as_deref();
+        // A label without a value has been told.
+        let (Some(law), Some(&density)) = (table.law.of(label), table.density.of(label)) else { continue };
+        let hourglass =
+            table.hourglass.of(label).copied().filter(|_| has_hourglass).unwrap_or(Hourglass(0.0));
+        parts
+            .entry((law, density.0.to_bits(), hourglass.0.to_bits()))
+            .or_insert_with(|| Part { law: law.clone(), density, hourglass, cells: Vec::new() })
+            .cells
+            .push(cell);
     }
-    cells
+    parts.into_values().collect()
 }
 
 /// Where a body names a law: its `law`, or the label in it.
-fn law_path<'a>(body: &'a str, choice: &'a LawChoice, law: &str) -> Vec<&'a str> {
+fn law_path<'a>(body: &'a str, choice: &'a ByLabel<String>, law: &str) -> Vec<&'a str> {
     let label = match choice {
-        LawChoice::One(_) => None,
-        LawChoice::ByLabel(map) => map.iter().find(|(_, known)| *known == law).map(|(label, _)| label),
+        ByLabel::One(_) => None,
+        ByLabel::Each(map) => map.iter().find(|(_, known)| *known == law).map(|(label, _)| label),
     };
     ["body", body, "law"].into_iter().chain(label.map(String::as_str)).collect()
 }
 
-fn nodes<const N: usize>(block: &CellBlock, cell: u32, first: u32) -> [u32; N] {
+pub(super) fn nodes<const N: usize>(block: &CellBlock, cell: u32, first: u32) -> [u32; N] {
     let mut nodes = [0; N];
     for (own, node) in nodes.iter_mut().zip(block.cell(cell as usize)) {
         *own = first + node;
@@ -289,44 +243,46 @@ fn nodes<const N: usize>(block: &CellBlock, cell: u32, first: u32) -> [u32; N] {
     nodes
 }
 
-fn unit(direction: &[f64]) -> Option<[f64; 3]> {
-    let norm = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
-    (norm.is_finite() && norm > ZERO_FIBRE).then(|| [0, 1, 2].map(|c| direction[c] / norm))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::testing::built;
+    use pliant_geometry::DataArray;
 
-    fn labelled() -> CellBlock {
-        let mut block = CellBlock::new(CellKind::Tet, (0..12).collect());
-        block.data.insert("label".into(), DataArray::scalar(vec![2.0, 1.0, 2.0]));
-        block
-    }
+    use super::*;
+    use crate::testing::{CUBE, built, read};
 
     #[test]
-    fn cells_go_to_the_law_of_their_label() {
-        let map = [("1", "soft"), ("2", "hard")].map(|(label, law)| (label.to_owned(), law.to_owned()));
-        let cells = cells_by_law(&LawChoice::ByLabel(map.into()), &labelled());
-        assert_eq!((&cells["soft"], &cells["hard"]), (&vec![1], &vec![0, 2]));
-        let cells = cells_by_law(&LawChoice::One("soft".into()), &labelled());
-        assert_eq!(cells["soft"], [0, 1, 2]);
+    fn cells_go_to_the_material_of_their_label() {
+        let mut block = CellBlock::new(CellKind::Hex, (0..24).collect());
+        block.data.insert("label".into(), DataArray::scalar(vec![2.0, 1.0, 2.0]));
+        let of = |more: &str, kind: CellKind| {
+            let block =
+                CellBlock { kind, nodes: (0..3 * kind.node_count() as u32).collect(), ..block.clone() };
+            let text = CUBE.replace("law = \"tissue\"\ndensity = 1000", more);
+            parts(&read(&text).bodies[0].1, &block)
+                .into_iter()
+                .map(|part| (part.law, part.density.0, part.hourglass.0, part.cells))
+                .collect::<Vec<_>>()
+        };
+        let told = |law: &str, density, hourglass, cells: &[u32]| {
+            (law.to_owned(), density, hourglass, cells.to_vec())
+        };
+        let hex = CellKind::Hex;
+        assert_eq!(of("law = 'soft'\ndensity = 9", hex), [told("soft", 9.0, 0.2, &[0, 1, 2])]);
+        assert_eq!(
+            of("law = { 1 = 'soft', 2 = 'hard' }\ndensity = { 1 = 8, 2 = 9 }", hex),
+            [told("hard", 9.0, 0.2, &[0, 2]), told("soft", 8.0, 0.2, &[1])]
+        );
+        let by_hourglass = "law = 'soft'\ndensity = 9\nhourglass = { 1 = 0.1, 2 = 0.3 }";
+        assert_eq!(of(by_hourglass, hex), [told("soft", 9.0, 0.1, &[1]), told("soft", 9.0, 0.3, &[0, 2])]);
+        // Tets have no hourglass patterns: they stay together.
+        assert_eq!(of(by_hourglass, CellKind::Tet), [told("soft", 9.0, 0.0, &[0, 1, 2])]);
     }
 
     #[test]
     fn an_unknown_law_is_shown_at_its_label() {
         let map = [("7".to_owned(), "soft".to_owned())];
-        assert_eq!(law_path("liver", &LawChoice::ByLabel(map.into()), "soft"), ["body", "liver", "law", "7"]);
-        assert_eq!(law_path("liver", &LawChoice::One("soft".into()), "soft"), ["body", "liver", "law"]);
-    }
-
-    #[test]
-    fn a_direction_has_length_one_or_is_none() {
-        assert_eq!(unit(&[0.0, -3.0, 4.0]), Some([0.0, -0.6, 0.8]));
-        for none in [[0.0; 3], [1e-13, 0.0, 0.0], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
-            assert_eq!(unit(&none), None);
-        }
+        assert_eq!(law_path("liver", &ByLabel::Each(map.into()), "soft"), ["body", "liver", "law", "7"]);
+        assert_eq!(law_path("liver", &ByLabel::One("soft".into()), "soft"), ["body", "liver", "law"]);
     }
 
     #[test]

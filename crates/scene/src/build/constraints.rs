@@ -5,7 +5,7 @@ use pliant_mechanics::model::{Constraint, Motion};
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
-use crate::format::{Axis, MoveTable};
+use crate::format::{Axis, MoveTable, Vectors};
 use crate::registry::{ConstraintTable, LoadTable};
 
 impl Builder<'_> {
@@ -17,13 +17,13 @@ impl Builder<'_> {
                 ConstraintTable::Fix(fix) => (&fix.body, &fix.nodes, &fix.components),
                 ConstraintTable::Move(moved) => (&moved.body, &moved.nodes, &moved.components),
             };
-            let motion = match table {
-                ConstraintTable::Fix(_) => Some(Motion::Fixed),
-                ConstraintTable::Move(moved) => self.motion(moved, &path),
-            };
             let components = self.components(axes.as_deref(), &path);
             let body = self.find_body(body, &[path[0], path[1], "body"]);
             let nodes = body.and_then(|body| self.body_nodes(body, selection, &[path[0], path[1], "nodes"]));
+            let motion = match table {
+                ConstraintTable::Fix(_) => Some(Motion::Fixed),
+                ConstraintTable::Move(moved) => self.motion(moved, body.zip(nodes.as_deref()), &path),
+            };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
                 self.model.constraints.push(Constraint { name: name.clone(), nodes, components, motion });
             }
@@ -40,10 +40,16 @@ impl Builder<'_> {
         }
     }
 
-    fn motion(&mut self, table: &MoveTable, path: &[&str]) -> Option<Motion> {
+    /// The motion of some nodes of a body (`None`: they are not known, which has been told).
+    fn motion(&mut self, table: &MoveTable, nodes: Option<(usize, &[u32])>, path: &[&str]) -> Option<Motion> {
         let curve = self.curve(&table.timing, path);
-        match (table.by, table.velocity) {
-            (Some(by), None) => Some(Motion::Displacement(by, curve?)),
+        match (&table.by, table.velocity) {
+            (Some(Vectors::Uniform(by)), None) => Some(Motion::Displacement(*by, curve?)),
+            (Some(Vectors::PerNode(by)), None) => {
+                let (body, nodes) = nodes?;
+                let by = self.node_vectors(by, body, nodes, &[path, &["by"]].concat());
+                Some(Motion::Displacements(by?, curve?))
+            }
             (None, Some(velocity)) => Some(Motion::Velocity(velocity, curve?)),
             (by, _) => {
                 let found = if by.is_some() { "both" } else { "neither" };
@@ -92,6 +98,8 @@ impl Builder<'_> {
     /// Says which bodies nothing holds.
     pub(super) fn check_free_bodies(&mut self) {
         let scene = self.scene;
+        let flies =
+            |name: &str| scene.bodies.iter().any(|(own, body)| own == name && body.velocity.is_some());
         for (index, body) in self.model.bodies.iter().enumerate() {
             let held =
                 self.model.constraints.iter().any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)));
@@ -113,6 +121,7 @@ impl Builder<'_> {
                 (true, false) => "gravity makes it fall",
                 (false, true) => "its loads push it away",
                 (true, true) => "gravity and its loads carry it away",
+                (false, false) if flies(name) => "it flies on as it started",
                 (false, false) => "and nothing moves it",
             };
             self.notes.push(format!("`{name}` is held by no constraint: {fate}"));

@@ -5,7 +5,7 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
 use super::{Builder, SCENE, Target, suggestion};
-use crate::format::{CsvTable, FieldName, ForceTable, ProbeTable, VtuTable};
+use crate::format::{CsvTable, FieldName, ForceTable, ProbeTable, Vectors, VtuTable};
 use crate::registry::{LoadTable, OutputTable};
 
 impl Builder<'_> {
@@ -42,7 +42,18 @@ impl Builder<'_> {
                 None => (0..self.model.bodies.len()).collect(),
             };
             let curve = curve?;
-            let load = |body| LoadKind::Gravity { body, acceleration: gravity.acceleration };
+            let acceleration = gravity.acceleration;
+            if let Some(selection) = &gravity.nodes {
+                let [body] = bodies[..] else {
+                    let message = "`nodes` are nodes of one body, which `on` must name";
+                    self.error(&at("nodes"), message, "of which body?", "add `on = \"BODY\"`");
+                    return None;
+                };
+                let nodes = self.body_nodes(body, selection, &at("nodes"))?;
+                let weight = |node: u32| (node, acceleration.map(|a| a * self.model.mass[node as usize]));
+                return Some(vec![(LoadKind::Forces(nodes.into_iter().map(weight).collect()), curve, None)]);
+            }
+            let load = |body| LoadKind::Gravity { body, acceleration };
             return Some(bodies.into_iter().map(|body| (load(body), curve.clone(), None)).collect());
         }
         let on = match table {
@@ -84,22 +95,28 @@ impl Builder<'_> {
                 }
             }
         };
-        let force = match (table.each, table.total) {
-            (Some(each), None) => each,
-            (None, Some(total)) => total.map(|f| f / nodes.len() as f64),
+        let count = nodes.len();
+        let forces = match (&table.each, table.total) {
+            (Some(Vectors::Uniform(each)), None) => vec![*each; count],
+            (Some(Vectors::PerNode(each)), None) => {
+                let at = [path, &["each"]].concat();
+                let Target::Body(body) = target else {
+                    let help = "load the body itself, or give one vector for all nodes";
+                    self.error(&at, "the nodes of a carried surface have no data", "not on a surface", help);
+                    return None;
+                };
+                self.node_vectors(each, body, &nodes, &at)?
+            }
+            (None, Some(total)) => vec![total.map(|f| f / count as f64); count],
             (each, _) => {
                 let found = if each.is_some() { "both" } else { "neither" };
                 let message = format!("a force has exactly one of `each` and `total`, found {found}");
-                self.error(
-                    path,
-                    message,
-                    "this force",
-                    "`each` acts on every node, `total` is shared among them",
-                );
+                let help = "`each` acts on every node, `total` is shared among them";
+                self.error(path, message, "this force", help);
                 return None;
             }
         };
-        Some(LoadKind::Forces(nodes.into_iter().map(|node| (node, force)).collect()))
+        Some(LoadKind::Forces(nodes.into_iter().zip(forces).collect()))
     }
 
     /// The selected faces of a body (numbered in the model) or of a carried surface (numbered in it).
@@ -218,7 +235,7 @@ mod tests {
     use pliant_mechanics::load::LoadKind;
 
     use crate::build::Built;
-    use crate::testing::built;
+    use crate::testing::{built, mistakes};
 
     /// The sum of the forces of the only load [N], and how many nodes it acts on.
     fn sum(built: &Built) -> ([f64; 3], usize) {
@@ -236,6 +253,20 @@ mod tests {
         let ([x, y, z], nodes) = sum(&load("total = [9, 0, -18]"));
         assert!((x - 9.0).abs() < 1e-12 && y == 0.0 && (z + 18.0).abs() < 1e-12 && nodes == 9);
         assert_eq!(sum(&load("each = [1, 0, 0]")), ([9.0, 0.0, 0.0], 9));
+    }
+
+    #[test]
+    fn gravity_on_some_nodes_is_their_weight() {
+        let load = "[load.a]\ntype = 'gravity'\nacceleration = [0, 0, -10]\nnodes = { set = 'z-max' }\n";
+        let built = built(&format!("{load}on = 'cube'\n"));
+        let ([x, y, z], nodes) = sum(&built);
+        let mass: f64 = built.model.constraints[0].nodes.iter().map(|&n| built.model.mass[n as usize]).sum();
+        // The mesh is the same from above and from below.
+        assert!(x == 0.0 && y == 0.0 && (z + 10.0 * mass).abs() < 1e-12 * mass && nodes == 9, "{z} {mass}");
+        let other =
+            "[body.other]\nmesh = { block = { size = [1, 1, 1] }, edge = 1 }\nlaw = 'tissue'\ndensity = 1\n";
+        let told = mistakes(&format!("{other}{load}")).plain().to_string();
+        assert!(told.contains("`nodes` are nodes of one body"), "{told}");
     }
 
     #[test]

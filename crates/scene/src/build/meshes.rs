@@ -23,6 +23,9 @@ pub(crate) struct MeshOrigin {
 /// An organ larger or smaller than this [m] is probably in other units.
 const PLAUSIBLE_SIZE: [f64; 2] = [1e-3, 10.0];
 
+/// Carries the nodes' numbers in the file through the repairs.
+const FILE_NUMBER: &str = "number of the node in the mesh file";
+
 impl Builder<'_> {
     /// The mesh of the table at `path` (`body.NAME.mesh`), in metres; diagnostics if it can't be had.
     pub(super) fn mesh(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
@@ -129,10 +132,12 @@ impl Builder<'_> {
         }
     }
 
-    /// Applies the repairs a body's mesh asks for and refuses what cannot be simulated.
-    pub(super) fn repair_and_check(&mut self, mesh: &mut Mesh, table: &MeshTable, path: &[&str]) -> bool {
-        let fixes: &[Fix] = table.fix.as_ref().map_or(&[], |fixes| fixes.as_slice());
-        for fix in fixes {
+    /// Applies the repairs a body's mesh asks for. Returns the number of each node in the file, empty if it is the same.
+    pub(super) fn repair(&mut self, mesh: &mut Mesh, table: &MeshTable, path: &[&str]) -> Vec<u32> {
+        let Some(fixes) = &table.fix else { return Vec::new() };
+        let numbers = (0..mesh.points.len()).map(|node| node as f64).collect();
+        mesh.point_data.insert(FILE_NUMBER.into(), DataArray::scalar(numbers));
+        for fix in fixes.as_slice() {
             let what = match fix {
                 Fix::Reorder => format!("{} reordered", counted(reorder(mesh), "inverted element")),
                 Fix::DropUnused => format!("{} dropped", counted(mesh.drop_unused_points(), "unused node")),
@@ -143,6 +148,13 @@ impl Builder<'_> {
             };
             self.notes.push(format!("`{}`: {what}", path[1]));
         }
+        let numbers = mesh.point_data.remove(FILE_NUMBER).unwrap_or_default();
+        numbers.values.iter().map(|&number| number as u32).collect()
+    }
+
+    /// Refuses a body's mesh that cannot be simulated.
+    pub(super) fn check_mesh(&mut self, mesh: &Mesh, table: &MeshTable, path: &[&str]) -> bool {
+        let fixes: &[Fix] = table.fix.as_ref().map_or(&[], |fixes| fixes.as_slice());
         let place = if table.file.is_some() { [path, &["file"]].concat() } else { path.to_vec() };
         if mesh.volume_blocks().all(|block| block.is_empty()) {
             let help = "a solid body needs tets or hexes; this mesh has only surface cells or none";

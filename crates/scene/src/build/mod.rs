@@ -3,9 +3,11 @@
 
 mod bodies;
 mod constraints;
+mod fibres;
 mod loads;
 mod mass;
 mod meshes;
+mod node_vectors;
 mod surfaces;
 
 use pliant_geometry::{Mesh, Surface};
@@ -46,6 +48,17 @@ pub struct BuiltBody {
     pub origin: String,
     /// Its boundary.
     pub boundary: Surface,
+    /// Nodes in the mesh file, or of the built-in shape.
+    file_nodes: usize,
+    /// Number of each node in the mesh file; empty where no repair has changed it.
+    file_numbers: Vec<u32>,
+}
+
+impl BuiltBody {
+    /// The number that a node has in the mesh file.
+    fn number_in_file(&self, node: u32) -> u32 {
+        self.file_numbers.get(node as usize).copied().unwrap_or(node)
+    }
 }
 
 /// Builds the model of a scene.

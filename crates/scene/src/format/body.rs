@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,37 +17,69 @@ pub struct BodyTable {
     #[serde(default)]
     pub element: Option<Element>,
     /// The name of its law, or a law for each cell label: `{ 1 = "parenchyma", 2 = "tumour" }`.
-    pub law: LawChoice,
-    /// Mass per volume [kg/m³].
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub density: f64,
+    pub law: ByLabel<String>,
+    /// Mass per volume [kg/m³], or one for each cell label. Elements with averaged pressure average it apart on parts of
+    /// different density.
+    pub density: ByLabel<Density>,
     /// Mass-proportional damping [1/s].
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub damping: f64,
     /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus; above about 0.5 it stiffens
-    /// bending.
+    /// bending. One for the whole body or for each cell label.
     #[serde(default = "default_hourglass")]
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub hourglass: f64,
+    pub hourglass: ByLabel<Hourglass>,
+    /// Velocity [m/s] at the start, of all nodes that no constraint holds or moves; not for quasi-static runs.
+    #[serde(default)]
+    pub velocity: Option<[f64; 3]>,
     /// Fibre direction at rest; overrides that of the law.
     #[serde(default)]
     pub fibre: Option<Fibre>,
 }
 
-fn default_hourglass() -> f64 {
-    0.2
+fn default_hourglass() -> ByLabel<Hourglass> {
+    ByLabel::One(Hourglass(0.2))
 }
 
-/// Which law where.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+/// One value for a whole body, or one for each cell label.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
-pub enum LawChoice {
-    /// One law for the whole body.
-    One(String),
-    /// A law for each cell label.
-    ByLabel(BTreeMap<String, String>),
+pub enum ByLabel<T> {
+    /// One for the whole body.
+    One(T),
+    /// One for each cell label.
+    Each(BTreeMap<String, T>),
 }
+
+impl<T> ByLabel<T> {
+    /// The value for cells of a label (`None`: without one).
+    pub fn of(&self, label: Option<&str>) -> Option<&T> {
+        match self {
+            Self::One(value) => Some(value),
+            Self::Each(map) => map.get(label?),
+        }
+    }
+
+    /// All values.
+    pub fn values(&self) -> Vec<&T> {
+        match self {
+            Self::One(value) => vec![value],
+            Self::Each(map) => map.values().collect(),
+        }
+    }
+}
+
+/// Mass per volume [kg/m³].
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(extend("exclusiveMinimum" = 0.0))]
+pub struct Density(pub f64);
+
+/// A multiple of the shear modulus.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
+pub struct Hourglass(pub f64);
 
 /// Fibre direction.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -54,16 +87,49 @@ pub enum LawChoice {
 pub enum Fibre {
     /// The same direction everywhere; its length does not matter.
     Uniform([f64; 3]),
-    /// A direction for each cell, from the mesh.
-    PerCell(FibreField),
+    /// A direction for each cell, from the mesh or by a rule.
+    PerCell(FibreRule),
 }
 
-/// Fibre directions carried by the mesh.
+/// Where the fibre direction of each cell comes from. A rule asks at the centre of a cell.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct FibreField {
-    /// The name of a cell-data array with three components.
-    pub cell_data: String,
+pub enum FibreRule {
+    /// The name of a cell-data array of the mesh with three components: `{ cell-data = "fibre" }`.
+    CellData(String),
+    /// Along an axis, the same everywhere: `{ along = [0, 0, 1] }`.
+    Along([f64; 3]),
+    /// Towards a point [m]: `{ toward = [0, 0, 0] }`.
+    Toward([f64; 3]),
+    /// Around an axis, as the fibres of a vessel: `{ around = { point = [0, 0, 0], axis = [0, 0, 1] } }`.
+    Around {
+        /// A point of the axis [m].
+        point: [f64; 3],
+        /// The direction of the axis; the fibres turn to the right around it.
+        axis: [f64; 3],
+    },
+    /// In the surface, as close as possible to a direction: `{ tangential = { closest-to = [0, 0, 1] } }`. The surface is
+    /// taken at its point nearest to the cell.
+    Tangential {
+        /// The faces of the body's boundary that are the surface.
+        #[serde(default = "boundary")]
+        surface: Selection,
+        /// The direction that is projected on the surface.
+        #[serde(rename = "closest-to")]
+        closest_to: [f64; 3],
+    },
+    /// From one part of the surface to another, along the gradient of the harmonic function (Laplace's equation) that is 0
+    /// on the one and 1 on the other: `{ laplace = { from = { set = "inner" }, to = { set = "outer" } } }`.
+    Laplace {
+        /// The nodes where it is 0.
+        from: Selection,
+        /// The nodes where it is 1.
+        to: Selection,
+    },
+}
+
+fn boundary() -> Selection {
+    Selection::Boundary
 }
 
 /// How cells resist deformation.

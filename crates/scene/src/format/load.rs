@@ -1,5 +1,7 @@
 //! Constraints and loads.
 
+use std::path::PathBuf;
+
 use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -70,9 +72,9 @@ pub struct MoveTable {
     pub body: String,
     /// Which nodes.
     pub nodes: Selection,
-    /// Displacement [m], reached along the curve.
+    /// Displacement [m], reached along the curve: one for all nodes, or one for each node from a file.
     #[serde(default)]
-    pub by: Option<[f64; 3]>,
+    pub by: Option<Vectors>,
     /// Velocity [m/s], multiplied by the curve.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
@@ -84,6 +86,43 @@ pub struct MoveTable {
     pub timing: Timing,
 }
 
+/// Displacements [m] or forces [N] of nodes.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Vectors {
+    /// The same for all nodes.
+    Uniform([f64; 3]),
+    /// One for each node.
+    PerNode(NodeVectors),
+}
+
+/// Vectors node by node: `{ point-data = "shift" }` or `{ csv = "motion.csv" }`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct NodeVectors {
+    /// Where they come from.
+    #[serde(flatten)]
+    pub from: NodeVectorSource,
+    /// Factor on them: the size of one unit of the data in metres (0.001 for millimetres) or newtons.
+    #[serde(default = "one")]
+    pub scale: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Where vectors on nodes come from.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NodeVectorSource {
+    /// The name of a point-data array of three components in the body's mesh file.
+    PointData(String),
+    /// A file beside the scene with a row `node,x,y,z` for each of the nodes, with or without a header; nodes counted
+    /// from 0 in the order of the mesh file.
+    Csv(PathBuf),
+}
+
 /// Forces on nodes: exactly one of `each` and `total`. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -92,9 +131,9 @@ pub struct ForceTable {
     pub on: String,
     /// Which nodes.
     pub nodes: Selection,
-    /// Force on each node [N].
+    /// Force on each node [N]: the same for all, or one for each node of a body from a file.
     #[serde(default)]
-    pub each: Option<[f64; 3]>,
+    pub each: Option<Vectors>,
     /// Force [N] shared equally among the nodes.
     #[serde(default)]
     pub total: Option<[f64; 3]>,
@@ -140,6 +179,9 @@ pub struct GravityTable {
     /// The body; if not given, all.
     #[serde(default)]
     pub on: Option<String>,
+    /// Which nodes of the body; if not given, all.
+    #[serde(default)]
+    pub nodes: Option<Selection>,
     /// Acceleration [m/s²].
     pub acceleration: [f64; 3],
     /// Its course.

@@ -6,11 +6,13 @@ mod load;
 mod output;
 
 pub use body::{
-    BlockShape, BodyTable, Cells, Element, EllipsoidShape, Fibre, Fix, Fixes, LawChoice, MeshTable, Organ,
+    BlockShape, BodyTable, ByLabel, Cells, Density, Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes,
+    Hourglass, MeshTable, Organ,
 };
 pub use body::{SurfaceTable, TubeShape};
 pub use load::{
-    Axis, CurveShape, FixTable, ForceTable, GravityTable, MoveTable, PressureTable, Timing, TractionTable,
+    Axis, CurveShape, FixTable, ForceTable, GravityTable, MoveTable, NodeVectorSource, NodeVectors,
+    PressureTable, Timing, TractionTable, Vectors,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 

@@ -21,6 +21,8 @@ pub enum FieldName {
     VonMises,
     /// Green–Lagrange strain.
     GreenStrain,
+    /// Unit fibre direction at rest; zero where the law has none.
+    Fibre,
     /// Stretch along the fibre; not a number where the law has none.
     FibreStretch,
     /// Pressure [Pa], minus a third of the trace of the Cauchy stress.
@@ -42,6 +44,7 @@ impl FieldName {
             Self::Pk2Stress => "pk2-stress",
             Self::VonMises => "von-mises",
             Self::GreenStrain => "green-strain",
+            Self::Fibre => "fibre",
             Self::FibreStretch => "fibre-stretch",
             Self::Pressure => "pressure",
             Self::VolumeRatio => "J",
@@ -52,7 +55,7 @@ impl FieldName {
     /// Numbers per point or cell.
     pub fn components(self) -> usize {
         match self {
-            Self::Displacement | Self::Velocity => 3,
+            Self::Displacement | Self::Velocity | Self::Fibre => 3,
             Self::CauchyStress | Self::Pk2Stress | Self::GreenStrain => 9,
             Self::VonMises
             | Self::FibreStretch

@@ -53,6 +53,8 @@ pub(super) struct Condition {
     pub shape: Shape,
     /// Its nodes, increasing; empty for faces.
     pub nodes: Vec<u32>,
+    /// The vector of each node where they differ; `action` then says which components act.
+    pub values: Vec<[f64; 3]>,
     /// Nodes of its faces; empty for nodes.
     pub faces: Vec<Vec<u32>>,
 }
@@ -64,9 +66,6 @@ pub(super) struct Remarks {
     /// What was left out.
     pub missing: Vec<String>,
 }
-
-/// Values given for each node become one condition for each different value, up to this number.
-const MOST_VALUES: usize = 16;
 
 /// Reads all `<Constraint>` of a model or submodel.
 pub(super) fn read(
@@ -122,7 +121,7 @@ impl Reader<'_> {
         if nodes.is_empty() {
             return Vec::new();
         }
-        vec![Condition { line: line(of), action, shape, nodes, faces: Vec::new() }]
+        vec![Condition { line: line(of), action, shape, nodes, values: Vec::new(), faces: Vec::new() }]
     }
 
     /// A displacement or force: one condition for each different magnitude.
@@ -160,10 +159,6 @@ impl Reader<'_> {
         for (&value, &node) in values.iter().zip(&nodes) {
             groups.entry(value.to_bits()).or_insert((value, Vec::new())).1.push(node);
         }
-        if groups.len() > MOST_VALUES {
-            self.leave_out(of, &format!("{} different magnitudes", groups.len()));
-            return Ok(Vec::new());
-        }
         let conditions = groups
             .into_values()
             .flat_map(|(value, nodes)| self.on_nodes(of, action(value, components), shape, sorted(nodes)));
@@ -183,10 +178,6 @@ impl Reader<'_> {
             let (what, range) = ("the length of the direction", "greater than 0");
             return Err(fault(along, ImportProblem::OutOfRange { what, value: 0.0, range }));
         };
-        if nodes.len() < self.geometry.node_count() {
-            self.leave_out(of, "gravity on some nodes only");
-            return Ok(Vec::new());
-        }
         Ok(self.on_nodes(of, Action::Gravity((direction * magnitude).into()), shape, nodes))
     }
 
@@ -197,7 +188,8 @@ impl Reader<'_> {
         let both = [(outward, pressure), (inward, -pressure)];
         let condition = |(faces, pressure): (Vec<Vec<u32>>, f64)| {
             let action = Action::Pressure(pressure);
-            (!faces.is_empty()).then(|| Condition { line: line(of), action, shape, nodes: Vec::new(), faces })
+            let (nodes, values) = (Vec::new(), Vec::new());
+            (!faces.is_empty()).then(|| Condition { line: line(of), action, shape, nodes, values, faces })
         };
         Ok(both.into_iter().filter_map(condition).collect())
     }
@@ -205,25 +197,56 @@ impl Reader<'_> {
     fn traction(&mut self, of: Element<'_>) -> Result<Vec<Condition>, Fault> {
         let shape = self.shape(of)?;
         let magnitudes = needed(of, "Magnitudes", "<Magnitudes Type=\"UNIFORM\">0 0 100</Magnitudes>")?;
-        let [mut faces, inward] = self.faces(of)?;
-        let traction = match attribute(magnitudes, "Type", "Type=\"UNIFORM\"")? {
-            "UNIFORM" => numbers_of::<3>(magnitudes, "components of the traction")?,
-            "DIFFORM" => {
-                self.leave_out(of, "a traction for each face");
-                return Ok(Vec::new());
+        match attribute(magnitudes, "Type", "Type=\"UNIFORM\"")? {
+            "UNIFORM" => {
+                let traction = numbers_of::<3>(magnitudes, "components of the traction")?;
+                let [mut faces, inward] = self.faces(of)?;
+                faces.extend(inward);
+                if faces.is_empty() {
+                    return Ok(Vec::new());
+                }
+                let (action, nodes, values) = (Action::Traction(against(traction)), Vec::new(), Vec::new());
+                Ok(vec![Condition { line: line(of), action, shape, nodes, values, faces }])
             }
+            "DIFFORM" => self.traction_of_each_face(of, magnitudes, shape),
             other => {
                 let (what, known) = ("type of magnitudes", "UNIFORM, DIFFORM");
-                return Err(fault(magnitudes, ImportProblem::Unknown { what, found: other.into(), known }));
+                Err(fault(magnitudes, ImportProblem::Unknown { what, found: other.into(), known }))
             }
-        };
-        faces.extend(inward);
-        if faces.is_empty() {
-            return Ok(Vec::new());
         }
-        // NiftySim subtracts tractions from the forces on the nodes.
-        let action = Action::Traction(traction.map(|t| if t == 0.0 { 0.0 } else { -t }));
-        Ok(vec![Condition { line: line(of), action, shape, nodes: Vec::new(), faces }])
+    }
+
+    /// The forces on the nodes of faces that each have a traction of their own.
+    fn traction_of_each_face(
+        &mut self,
+        of: Element<'_>,
+        magnitudes: Element<'_>,
+        shape: Shape,
+    ) -> Result<Vec<Condition>, Fault> {
+        let faces = self.listed_faces(of)?;
+        let tractions = numbers(magnitudes)?;
+        if tractions.len() != 3 * faces.len() {
+            let wanted = format!("{}, three for each face", 3 * faces.len());
+            let problem = ImportProblem::Count { what: "magnitudes", found: tractions.len(), wanted };
+            return Err(fault(magnitudes, problem));
+        }
+        let points = &self.geometry.mesh.points;
+        let mut forces: BTreeMap<u32, [f64; 3]> = BTreeMap::new();
+        for (face, traction) in faces.iter().zip(tractions.chunks_exact(3)) {
+            let corners: Vec<Vector3> = face.iter().map(|&node| points[node as usize]).collect();
+            let share = vector_area(&corners).norm() / face.len() as f64;
+            for &node in face {
+                let force = forces.entry(node).or_default();
+                (0..3).for_each(|c| force[c] -= share * traction[c]);
+            }
+        }
+        self.remarks.notes.push(format!(
+            "the tractions of line {}, one for each face, became forces on nodes, with the other sign, as NiftySim pulls \
+             against the vector; they do not grow with the area of the deformed faces",
+            line(of)
+        ));
+        let force = |(node, force)| self.on_nodes(of, Action::Force(force), shape, vec![node]);
+        Ok(forces.into_iter().flat_map(force).collect())
     }
 
     fn leave_out(&mut self, of: Element<'_>, what: &str) {
@@ -283,6 +306,12 @@ impl Reader<'_> {
     /// The faces of a constraint that lie on the boundary, each turned outwards: those given so, and those given the
     /// other way round.
     fn faces(&mut self, of: Element<'_>) -> Result<[Vec<Vec<u32>>; 2], Fault> {
+        let listed = self.listed_faces(of)?;
+        Ok(self.turn_outwards(of, &listed))
+    }
+
+    /// The nodes of the faces of a constraint, in their order.
+    fn listed_faces(&mut self, of: Element<'_>) -> Result<Vec<Vec<u32>>, Fault> {
         let all = |faces: &mut dyn Iterator<Item = usize>| -> Vec<Vec<u32>> {
             faces.map(|face| self.surface.faces[face].nodes().to_vec()).collect()
         };
@@ -297,21 +326,18 @@ impl Reader<'_> {
                 );
                 self.remarks.notes.push(note);
             }
-            return Ok([faces, Vec::new()]);
+            return Ok(faces);
         }
         let size = match attribute(of, "NumFaces", "NumFaces=\"all\" or a number")? {
-            "all" => return Ok([all(&mut (0..self.surface.faces.len())), Vec::new()]),
+            "all" => return Ok(all(&mut (0..self.surface.faces.len()))),
             word => count(of, word)?,
         };
         let corners = match attribute(of, "FaceType", "FaceType=\"Tri\" or \"Quad\"")? {
             "Tri" => 3,
             "Quad" => 4,
             other => {
-                let what = "type of face";
-                return Err(fault(
-                    of,
-                    ImportProblem::Unknown { what, found: other.into(), known: "Tri, Quad" },
-                ));
+                let (what, known) = ("type of face", "Tri, Quad");
+                return Err(fault(of, ImportProblem::Unknown { what, found: other.into(), known }));
             }
         };
         let list = needed(of, "Faces", "<Faces>0 1 2</Faces>")?;
@@ -321,14 +347,10 @@ impl Reader<'_> {
             let problem = ImportProblem::Count { what: "nodes of faces", found: listed.len(), wanted };
             return Err(fault(list, problem));
         }
-        Ok(self.turn_outwards(of, listed.chunks_exact(corners)))
+        Ok(listed.chunks_exact(corners).map(<[u32]>::to_vec).collect())
     }
 
-    fn turn_outwards<'f>(
-        &mut self,
-        of: Element<'_>,
-        listed: impl Iterator<Item = &'f [u32]>,
-    ) -> [Vec<Vec<u32>>; 2] {
+    fn turn_outwards(&mut self, of: Element<'_>, listed: &[Vec<u32>]) -> [Vec<Vec<u32>>; 2] {
         let points = &self.geometry.mesh.points;
         let faces = &self.surface.faces;
         let known: BTreeMap<Vec<u32>, usize> =
@@ -336,7 +358,7 @@ impl Reader<'_> {
         let mut turned = [Vec::new(), Vec::new()];
         let mut inside = 0;
         for nodes in listed {
-            let Some(&index) = known.get(&sorted(nodes.to_vec())) else {
+            let Some(&index) = known.get(&sorted(nodes.clone())) else {
                 inside += 1;
                 continue;
             };
@@ -349,6 +371,11 @@ impl Reader<'_> {
         }
         turned
     }
+}
+
+/// NiftySim subtracts tractions from the forces on the nodes.
+fn against(traction: [f64; 3]) -> [f64; 3] {
+    traction.map(|t| if t == 0.0 { 0.0 } else { -t })
 }
 
 fn components(of: Element<'_>) -> Result<[bool; 3], Fault> {
@@ -423,7 +450,49 @@ pub(super) fn settle(conditions: Vec<Condition>) -> Result<Vec<Condition>, Fault
             None => settled.push(condition),
         }
     }
-    Ok(settled)
+    Ok(gathered(settled))
+}
+
+/// One condition for those of a constraint that differ in their values only.
+fn gathered(conditions: Vec<Condition>) -> Vec<Condition> {
+    /// The vector of an action on nodes, and the components in which it acts.
+    fn vector(action: &Action) -> Option<([f64; 3], [bool; 3])> {
+        match action {
+            Action::Move(by) => Some((by.map(|by| by.unwrap_or(0.0)), by.map(|by| by.is_some()))),
+            Action::Force(force) => Some((*force, [true; 3])),
+            _ => None,
+        }
+    }
+    let mut all: Vec<Condition> = Vec::new();
+    for condition in conditions {
+        let same = |last: &&mut Condition| {
+            let (Some((_, own)), Some((_, other))) = (vector(&condition.action), vector(&last.action)) else {
+                return false;
+            };
+            (last.line, last.shape, other) == (condition.line, condition.shape, own)
+                && std::mem::discriminant(&last.action) == std::mem::discriminant(&condition.action)
+        };
+        let Some((value, _)) = vector(&condition.action) else {
+            all.push(condition);
+            continue;
+        };
+        let Some(last) = all.last_mut().filter(same) else {
+            all.push(condition);
+            continue;
+        };
+        if last.values.is_empty() {
+            last.values = vec![vector(&last.action).map_or([0.0; 3], |(value, _)| value); last.nodes.len()];
+        }
+        last.values.resize(last.values.len() + condition.nodes.len(), value);
+        last.nodes.extend(condition.nodes);
+    }
+    for condition in all.iter_mut().filter(|condition| !condition.values.is_empty()) {
+        let mut pairs: Vec<_> =
+            condition.nodes.iter().copied().zip(condition.values.iter().copied()).collect();
+        pairs.sort_by_key(|(node, _)| *node);
+        (condition.nodes, condition.values) = pairs.into_iter().unzip();
+    }
+    all
 }
 
 /// A condition without the components that are displaced, if it holds any.

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use pliant_geometry::{CellKind, Mesh};
+use pliant_geometry::Mesh;
 
-use super::conditions::{self, Action, Condition, Remarks, settle, sorted};
+use super::conditions::{self, Condition, Remarks, settle, sorted};
 use super::error::{Fault, ImportProblem};
 use super::geometry::{self, Geometry, join, positive};
 use super::material::Material;
@@ -131,14 +131,6 @@ impl Model {
         let parts = apart.into_iter().zip(&maps);
         let mut conditions: Vec<Condition> =
             parts.flat_map(|(part, map)| part.into_iter().map(|c| renumbered(c, map))).collect();
-        // Gravity on all of some submodels is gravity on a part of the whole.
-        let part_only =
-            |c: &Condition| matches!(c.action, Action::Gravity(_)) && c.nodes.len() < geometry.node_count();
-        for condition in conditions.iter().filter(|&c| part_only(c)) {
-            let missing = format!("the Gravity of line {} (gravity on some submodels only)", condition.line);
-            self.remarks.missing.push(missing);
-        }
-        conditions.retain(|condition| !part_only(condition));
         conditions.extend(conditions::read(root, &geometry, &mut self.remarks)?);
         self.parts.push(Part { geometry, material, density, conditions });
         Ok(())
@@ -353,18 +345,5 @@ impl Output {
             }
         }
         Ok((every > 0).then_some(Self { every, variables }))
-    }
-}
-
-impl Part {
-    /// Volume of each cell [m³].
-    pub fn volumes(&self) -> Vec<f64> {
-        let kind: CellKind = self.geometry.solid.cell();
-        let points = &self.geometry.mesh.points;
-        let volume = |cell: &[u32]| {
-            let corners: Vec<_> = cell.iter().map(|&node| points[node as usize]).collect();
-            pliant_geometry::volume(kind, &corners)
-        };
-        self.geometry.cells().chunks_exact(kind.node_count()).map(volume).collect()
     }
 }

@@ -45,6 +45,49 @@ pub(super) fn write(model: Model, stem: &str) -> Result<Imported, Fault> {
     Ok(writer.finish(&stem, meshes))
 }
 
+/// Cells of one material and density.
+struct Region {
+    label: u32,
+    material: u32,
+    density: f64,
+}
+
+impl Region {
+    fn holds(&self, (&material, &density): (&u32, &f64)) -> bool {
+        (self.material, self.density) == (material, density)
+    }
+}
+
+/// The regions of a part. Their labels are the numbers of the materials, unless one has several densities.
+fn regions(part: &Part) -> Vec<Region> {
+    // Densities are positive: their bits are in the order of their values.
+    let pairs: BTreeSet<(u32, u64)> = part
+        .material
+        .iter()
+        .zip(&part.density)
+        .map(|(&material, density)| (material, density.to_bits()))
+        .collect();
+    let materials: BTreeSet<u32> = pairs.iter().map(|&(material, _)| material).collect();
+    let label = |at: u32, material| if materials.len() == pairs.len() { material } else { at };
+    let region = |(at, &(material, bits)): (u32, &(u32, u64))| Region {
+        label: label(at, material),
+        material,
+        density: f64::from_bits(bits),
+    };
+    (0..).zip(&pairs).map(region).collect()
+}
+
+/// A value for each label, or one for all where they do not differ.
+fn by_label(regions: &[Region], value: impl Fn(&Region) -> String) -> String {
+    let values: Vec<String> = regions.iter().map(value).collect();
+    if values.iter().all(|value| *value == values[0]) {
+        return values[0].clone();
+    }
+    let entries: Vec<String> =
+        regions.iter().zip(values).map(|(region, value)| format!("{} = {value}", region.label)).collect();
+    format!("{{ {} }}", entries.join(", "))
+}
+
 struct Writer {
     system: System,
     laws: Vec<Material>,
@@ -59,30 +102,28 @@ struct Writer {
 impl Writer {
     /// The mesh of a part; its tables are written.
     fn part(&mut self, part: Part, body: &str, file: &str) -> Mesh {
-        let used: BTreeSet<u32> = part.material.iter().copied().collect();
-        let density = self.density(&part, body);
-        let hourglass = self.hourglass(&part, &used, body);
+        let regions = regions(&part);
+        let hourglass = self.hourglass(&part, &regions, body);
         let mut mesh = part.geometry.mesh;
         let solid = part.geometry.solid;
-        if used.len() > 1 {
-            let labels = part.material.iter().map(|&law| f64::from(law)).collect();
+        if regions.len() > 1 {
+            let label = |cell: (&u32, &f64)| {
+                regions.iter().find(|region| region.holds(cell)).map_or(0, |region| region.label)
+            };
+            let labels = part.material.iter().zip(&part.density).map(|cell| f64::from(label(cell))).collect();
             mesh.block_mut(solid.cell()).data.insert("label".into(), DataArray::scalar(labels));
         }
         self.line(format!("[body.{body}]"));
         self.line(format!("mesh = {{ file = \"{file}\" }}"));
         self.line(format!("element = \"{}\"", solid.element()));
-        match used.first() {
-            Some(law) if used.len() == 1 => self.line(format!("law = \"material-{law}\"")),
-            _ => {
-                let laws: Vec<String> =
-                    used.iter().map(|law| format!("{law} = \"material-{law}\"")).collect();
-                self.line(format!("law = {{ {} }}", laws.join(", ")));
-            }
-        }
-        self.line(format!("density = {density:?}"));
+        self.line(format!(
+            "law = {}",
+            by_label(&regions, |region| format!("\"material-{}\"", region.material))
+        ));
+        self.line(format!("density = {}", by_label(&regions, |region| format!("{:?}", region.density))));
         self.line(format!("damping = {:?}", self.system.damping));
         if let Some(hourglass) = hourglass {
-            self.line(format!("hourglass = {hourglass:?}"));
+            self.line(format!("hourglass = {hourglass}"));
         }
         self.line(String::new());
         if solid == Solid::T4Anp {
@@ -103,42 +144,25 @@ impl Writer {
         mesh
     }
 
-    /// The density of a part [kg/m³]: one for a whole body.
-    fn density(&mut self, part: &Part, body: &str) -> f64 {
-        let first = part.density[0];
-        if part.density.iter().all(|&density| density == first) {
-            return first;
-        }
-        let volumes = part.volumes();
-        let mass: f64 = volumes.iter().zip(&part.density).map(|(volume, density)| volume * density).sum();
-        let mean = mass / volumes.iter().sum::<f64>();
-        let mean = if mean.is_finite() && mean > 0.0 { mean } else { first };
-        self.missing
-            .push(format!("the different densities of the materials of `{body}` (their mean is taken)"));
-        mean
-    }
-
-    /// The multiple of the shear modulus by which hexahedra resist hourglass patterns.
-    fn hourglass(&mut self, part: &Part, used: &BTreeSet<u32>, body: &str) -> Option<f64> {
+    /// The multiple of the shear modulus by which hexahedra resist hourglass patterns, as written in the scene.
+    fn hourglass(&mut self, part: &Part, regions: &[Region], body: &str) -> Option<String> {
         let coefficient = self.system.hourglass.filter(|_| part.geometry.solid == Solid::H8)?;
-        let of = |law: &u32| self.laws[*law as usize].elastic.hourglass(coefficient);
-        let values: Vec<f64> = used.iter().map(of).collect();
-        let hourglass = values.iter().copied().fold(0.0, f64::max);
+        let of = |region: &Region| self.laws[region.material as usize].elastic.hourglass(coefficient);
+        let values: Vec<f64> = regions.iter().map(of).collect();
+        let written = by_label(regions, |region| format!("{:?}", of(region)));
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let least = values.iter().copied().fold(largest, f64::min);
+        let range =
+            if least < largest { format!("{least:.4} to {largest:.4}") } else { format!("{largest:.4}") };
         self.notes.push(format!(
-            "`{body}`: NiftySim's hourglass stiffness is {coefficient} (λ + 2μ), which is {hourglass:.4} μ; 0.2 μ \
-             bends more truly"
+            "`{body}`: NiftySim's hourglass stiffness is {coefficient} (λ + 2μ), which is {range} μ; 0.2 μ bends more truly"
         ));
-        if values.iter().any(|&value| (value - hourglass).abs() > 1e-9 * hourglass) {
-            self.missing.push(format!(
-                "the different hourglass stiffness of the materials of `{body}` (the largest is taken)"
-            ));
-        }
-        if hourglass > MOST_HOURGLASS {
+        if largest > MOST_HOURGLASS {
             self.notes.push(format!(
-                "`{body}`: hourglass = {hourglass:.4} is above {MOST_HOURGLASS}, the greatest that a scene takes"
+                "`{body}`: hourglass = {largest:.4} is above {MOST_HOURGLASS}, the greatest that a scene takes"
             ));
         }
-        Some(hourglass)
+        Some(written)
     }
 
     fn condition(&mut self, condition: Condition, body: &str, solid: Solid, whole: usize, mesh: &mut Mesh) {
@@ -160,7 +184,14 @@ impl Writer {
         if !selection.is_empty() {
             self.line(selection);
         }
-        self.action(condition.action);
+        if !condition.values.is_empty() {
+            let mut data = vec![[0.0; 3]; whole];
+            for (&node, value) in condition.nodes.iter().zip(&condition.values) {
+                data[node as usize] = *value;
+            }
+            mesh.point_data.insert(set.clone(), DataArray { components: 3, values: data.concat() });
+        }
+        self.action(&condition, &set);
         if !matches!(condition.action, Action::Fix(_)) {
             self.curve(condition.shape, &condition.action);
         }
@@ -176,7 +207,7 @@ impl Writer {
         whole: usize,
         mesh: &mut Mesh,
     ) -> Option<String> {
-        if matches!(condition.action, Action::Gravity(_)) {
+        if matches!(condition.action, Action::Gravity(_)) && condition.nodes.len() == whole {
             return Some(String::new());
         }
         if condition.faces.is_empty() {
@@ -198,9 +229,12 @@ impl Writer {
         }
     }
 
-    fn action(&mut self, action: Action) {
-        let vector = |v: [f64; 3]| format!("{v:?}");
-        match action {
+    fn action(&mut self, condition: &Condition, set: &str) {
+        let vector = |v: [f64; 3]| match condition.values.is_empty() {
+            true => format!("{v:?}"),
+            false => format!("{{ point-data = \"{set}\" }}"),
+        };
+        match condition.action {
             Action::Fix(held) => self.components(held),
             Action::Move(by) => {
                 self.components(by.map(|by| by.is_some()));

@@ -26,6 +26,7 @@ pub(super) fn of_cell(fields: &CellFields, field: FieldName) -> Value {
         FieldName::Pk2Stress => tensor(&fields.pk2_stress),
         FieldName::GreenStrain => tensor(&fields.green_strain),
         FieldName::VonMises => padded(&[fields.von_mises()]),
+        FieldName::Fibre => padded(&fields.fibre.unwrap_or_default()),
         FieldName::FibreStretch => padded(&[fields.fibre_stretch.unwrap_or(f64::NAN)]),
         FieldName::Pressure => padded(&[fields.pressure()]),
         FieldName::VolumeRatio => padded(&[fields.volume_ratio]),

@@ -16,7 +16,9 @@ use serde::{Deserialize, Serialize};
 pub use folder::OutputFolder;
 pub(crate) use folder::{PLOT, SUMMARY};
 pub use stability::{AddedMass, StabilitySummary};
-pub use summary::{BodySummary, FailureSummary, Summary, failed_input, failed_output, number};
+pub use summary::{
+    BodySummary, FailureSummary, LoadStepSummary, Summary, failed_input, failed_output, number,
+};
 
 pub(crate) use csv::{AXES, ENERGIES};
 pub(crate) use plot::plot;

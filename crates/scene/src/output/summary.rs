@@ -82,6 +82,19 @@ pub struct BodySummary {
     pub mass: f64,
 }
 
+/// A load step that came to no equilibrium.
+#[derive(Clone, Debug, Serialize)]
+pub struct LoadStepSummary {
+    /// Its number, counted from 1.
+    pub number: u64,
+    /// How many there are.
+    pub of: u64,
+    /// Iterations spent on the last try.
+    pub iterations: usize,
+    /// The relative residual that was reached; none if an element or a displacement was lost on the way.
+    pub residual: Option<f64>,
+}
+
 /// Why a run failed or an input was refused.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureSummary {
@@ -95,6 +108,8 @@ pub struct FailureSummary {
     pub node: Option<u32>,
     /// Time [s].
     pub time: Option<f64>,
+    /// The load step of a quasi-static run.
+    pub load_step: Option<Box<LoadStepSummary>>,
     /// What happened and what to try.
     pub message: String,
 }
@@ -143,23 +158,32 @@ impl FailureSummary {
     }
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
-        Self { kind, body: None, element: None, node: None, time, message }
+        Self { kind, body: None, element: None, node: None, time, load_step: None, message }
     }
 }
 
-impl From<&RelaxationError> for FailureSummary {
-    fn from(error: &RelaxationError) -> Self {
-        let message = format!("{error}; {}", error.remedy());
-        let (kind, body, element, node, time) = match error {
-            RelaxationError::NotFinite { body, node, time } => ("not-finite", body, None, *node, *time),
-            RelaxationError::Inverted { body, element, node, time, .. } => {
-                ("inverted", body, Some(*element), *node, *time)
+impl FailureSummary {
+    /// A load step, counted from 1, of so many that came to no equilibrium.
+    pub(crate) fn load_step(error: &RelaxationError, number: u64, of: u64) -> Self {
+        let message = format!("load step {number} of {of}: {error}; {}", error.remedy());
+        let (kind, body, element, node, time, iterations, residual) = match error {
+            RelaxationError::NotFinite { body, node, iterations, time } => {
+                ("not-finite", body, None, *node, *time, *iterations, None)
             }
-            RelaxationError::NotConverged { body, node, time, .. } => {
-                ("not-converged", body, None, *node, *time)
+            RelaxationError::Inverted { body, element, node, iterations, time, .. } => {
+                ("inverted", body, Some(*element), *node, *time, *iterations, None)
+            }
+            RelaxationError::NotConverged { body, node, residual, iterations, time, .. } => {
+                ("not-converged", body, None, *node, *time, *iterations, Some(*residual))
             }
         };
-        Self { kind, body: Some(body.clone()), element, node: Some(node), time: Some(time), message }
+        let of_body = Self {
+            body: Some(body.clone()),
+            element,
+            node: Some(node),
+            ..Self::about(kind, message, Some(time))
+        };
+        Self { load_step: Some(Box::new(LoadStepSummary { number, of, iterations, residual })), ..of_body }
     }
 }
 
@@ -176,7 +200,7 @@ impl From<&StepError> for FailureSummary {
             }
             StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
         };
-        Self { kind, body: Some(body.clone()), element, node: Some(node), time: Some(time), message }
+        Self { body: Some(body.clone()), element, node: Some(node), ..Self::about(kind, message, Some(time)) }
     }
 }
 
