@@ -1287,6 +1287,7 @@ fn a_block_that_starts_with_a_velocity_flies_on_with_its_energy() {
 until = 0.05
 [run]
 precision = "{precision}"
+step = 2e-3
 [law.tissue]
 type = "neo-hookean"
 young-modulus = 3e3
