@@ -1,7 +1,9 @@
 //! Running a model, as a test does it: what fails, panics.
 
+use pliant_mechanics::critical_step::true_limit;
+use pliant_mechanics::stability::{Monitor, OnUnstable};
 use pliant_mechanics::{CentralDifference, DynamicRelaxation, Model, Real, State, StepError};
-use pliant_reproduce::{CaseError, Equilibrium};
+use pliant_reproduce::{CaseError, Equilibrium, run_on};
 
 /// See [`pliant_reproduce::run`].
 ///
@@ -20,6 +22,33 @@ pub fn run<R: Real>(
         CaseError::Step(error) => error,
         other => panic!("{other}"),
     })
+}
+
+/// The same with a monitor of the stable step, whose limit at rest is the true one.
+///
+/// # Errors
+/// If a step fails.
+///
+/// # Panics
+/// If constraints contradict each other.
+pub fn run_watched<R: Real>(
+    model: &Model,
+    step: f64,
+    on_unstable: OnUnstable,
+    until: f64,
+    observe: impl FnMut(&CentralDifference<R>, &State<R>),
+) -> Result<(CentralDifference<'_, R>, State<R>), StepError> {
+    run_on(watched(model, step, on_unstable), State::at_rest(model), until, observe)
+}
+
+/// A stepper with a monitor whose limit at rest is the true one.
+///
+/// # Panics
+/// If constraints contradict each other.
+pub fn watched<R: Real>(model: &Model, step: f64, on_unstable: OnUnstable) -> CentralDifference<'_, R> {
+    let limit = true_limit(model).unwrap_or_else(|error| panic!("{error}")).step;
+    let stepper = CentralDifference::new(model, step).unwrap_or_else(|error| panic!("{error}"));
+    stepper.watched(Monitor::new(model, limit, on_unstable))
 }
 
 /// See [`pliant_reproduce::settle`].

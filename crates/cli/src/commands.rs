@@ -175,6 +175,9 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
             if !arguments.json {
                 say(report::result(&summary))?;
             }
+            for warning in &summary.warnings {
+                eprintln!("warning: {warning}");
+            }
             (summary.error.as_ref().map(|error| error.message.clone()), json!(summary))
         }
         Err(error) => (Some(format!("{error}; {}", error.remedy)), pliant_scene::failed_output(&error)),

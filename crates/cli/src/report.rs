@@ -141,6 +141,7 @@ pub fn result(summary: &Summary) -> String {
         let [wall, factor] = [*wall_seconds, *real_time_factor].map(number);
         let balance = energy_balance * 100.0;
         lines.push(format!("wall time {wall} s, {factor} × real time; energies balance to {balance:.2} %"));
+        lines.extend(summary.stability.as_ref().map(ToString::to_string));
         lines.extend(summary.reactions.iter().map(|(name, force)| {
             let [x, y, z] = force.map(number);
             format!("reaction of `{name}`: ({x}, {y}, {z}) N")

@@ -631,13 +631,41 @@ fn a_step_above_the_true_limit_is_refused_and_one_below_it_runs() {
     let object = Workshop::new(BLOCK).run(&[]).done();
     let number = |key: &str| object[key].as_f64().unwrap();
     let (bound, limit) = (number("element_bound"), number("true_limit"));
-    assert!(number("step") <= 0.9 * bound && bound < limit, "{object}");
+    assert!(number("step") <= 0.9 * limit && bound < limit, "{object}");
     let says =
         ["above the true limit", "is set by element 0 (tet4) of `block`", "take `step = \"auto\"`", "m"];
     spoilt("step = \"auto\"", &format!("step = {:e}", 1.01 * limit), &says);
-    let told = Workshop::block("step = \"auto\"", &format!("step = {:e}", 0.5 * (bound + limit))).run(&[]);
+    let told = Workshop::block("step = \"auto\"", &format!("step = {:e}", 0.95 * limit)).run(&[]);
     told.done();
-    assert!(told.err.contains("lies between the element bound"), "{}", told.err);
+    assert!(told.err.contains("lies close to the true limit"), "{}", told.err);
+}
+
+#[test]
+fn what_only_dynamics_has_is_refused_elsewhere_and_checked_there() {
+    for (line, key) in
+        [("on-unstable = \"stop\"", "on-unstable"), ("mass-scaling = { target-step = 1e-3 }", "mass-scaling")]
+    {
+        let bad = format!("solver = \"quasi-static\"\n{line}");
+        let says = format!("`{key}` is for `solver = \"explicit\"`");
+        let workshop = Workshop::block("step = \"auto\"", &bad);
+        assert_refused(&workshop, &[line], &[&says, "remove it"]);
+    }
+    let step = "step = \"auto\"";
+    for (bad, says) in [
+        (
+            "mass-scaling = { target-step = 0 }",
+            "`run.mass-scaling.target-step` must be greater than 0, found 0",
+        ),
+        ("mass-scaling = { target-step = -1e-4 }", "must be greater than 0, found -0.0001"),
+        ("mass-scaling = { target-step = nan }", "nan is not a finite number"),
+        ("mass-scaling = { }", "target-step"),
+        ("mass-scaling = 1e-4", "mass-scaling"),
+        ("mass-scaling = { target-stp = 1e-4 }", "did you mean `target-step`?"),
+        ("on-unstable = \"substeps\"", "did you mean \"substep\"?"),
+        ("on-unstable = 2", "on-unstable"),
+    ] {
+        spoilt(step, bad, &[says]);
+    }
 }
 
 #[test]

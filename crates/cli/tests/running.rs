@@ -28,7 +28,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 16] = [
+const KEYS: [&str; 19] = [
     "status",
     "error",
     "bodies",
@@ -42,15 +42,19 @@ const KEYS: [&str; 16] = [
     "steps",
     "wall_seconds",
     "real_time_factor",
+    "stability",
+    "added_mass",
     "energy_balance",
     "reactions",
+    "warnings",
     "files",
 ];
 
 #[test]
 fn json_has_exactly_the_promised_keys() {
     let workshop = Workshop::new(BLOCK);
-    let done = workshop.run(&[]).done();
+    // The four automatic steps hardly resolve a gravity that sets in at once.
+    let done = workshop.run(&["--step", "1e-3"]).done();
     assert_eq!(keys(&done), KEYS);
     assert!(done["error"].is_null());
     assert_eq!((done["nodes"].as_u64(), done["elements"].as_u64()), (Some(27), Some(48)));
@@ -302,6 +306,172 @@ fn a_law_beyond_its_locking_strain_ends_the_run_with_an_error() {
     assert_eq!(told.code, 1, "{}", told.err);
     assert_eq!(told.json()["status"], "failed");
     assert!(told.err.contains("of `block`") && told.err.contains("t = "), "{}", told.err);
+}
+
+/// A block of soft tissue that gravity, set in at once, stretches by 38 %.
+const SOFT: &str = r#"[scene]
+until = 0.4
+gravity = [9.81, 0, 0]
+
+[run]
+step = "auto"
+on-unstable = "substep"
+
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 3000
+poisson-ratio = 0.45
+
+[body.block]
+mesh = { block = { size = [0.1, 0.05, 0.05], cells = [8, 4, 4] }, as = "hexes" }
+law = "tissue"
+density = 1000
+
+[constraint.wall]
+type = "fix"
+body = "block"
+nodes = { set = "x-min" }
+
+[output.history]
+type = "csv"
+every = 0.05
+probes.tip = { on = "block", at = [0.1, 0.025, 0.025] }
+"#;
+
+#[test]
+fn steps_are_cut_where_the_stable_one_falls_below_them_and_it_is_told() {
+    let workshop = Workshop::new(SOFT);
+    let done = workshop.run(&[]).done();
+    let seen = &done["stability"];
+    assert_eq!((&seen["on_unstable"], &seen["most_substeps"]), (&"substep".into(), &2.into()), "{seen}");
+    assert!(seen["cuts"].as_u64() > Some(0) && seen["extra_steps"].as_u64() > Some(0), "{seen}");
+    assert!(seen["limit_over_step"].as_f64().unwrap() < 1.0 && seen["first_cut"].is_f64(), "{seen}");
+    assert!(!done["warnings"].to_string().contains("stable step"), "{done}");
+    let page = workshop.read("out/case/summary.md");
+    assert!(
+        page.contains("During the run: smallest stable step seen: ") && page.contains("steps were cut"),
+        "{page}"
+    );
+    let told = workshop.pliant(&["run", "case", "--force"]);
+    assert!(told.out.contains("into 2 parts at the most"), "{}", told.out);
+    // `substep` is the default, and the answer that of a small step.
+    let tip = |workshop: &Workshop| workshop.table("out/case/history.csv").1;
+    let fine = Workshop::new(&changed(SOFT, "on-unstable = \"substep\"\n", ""));
+    fine.run(&["--step", "3e-4"]).done();
+    for (row, fine) in tip(&workshop).iter().zip(tip(&fine)) {
+        let (tip, time) = (row.len() - 3, row[0]);
+        // Rows are of the nearest instants, up to half a step of 3 ms apart at 0.5 m/s.
+        assert_close(row[tip], fine[tip], 1e-3, &format!("the tip at {time} s"));
+    }
+    let default = Workshop::new(&changed(SOFT, "on-unstable = \"substep\"\n", "")).run(&[]).done();
+    assert_eq!(default["stability"], *seen);
+}
+
+#[test]
+fn below_the_stable_step_a_run_can_stop_or_only_report() {
+    let told = Workshop::new(&changed(SOFT, "\"substep\"", "\"stop\"")).run(&[]);
+    assert_eq!(told.code, 1);
+    let error = &told.json()["error"];
+    assert_eq!((&error["kind"], &error["body"]), (&"unstable".into(), &"block".into()));
+    assert!(error["element"].is_u64() && error["node"].is_u64() && error["time"].is_f64(), "{error}");
+    for piece in ["the largest stable step has fallen to", "smaller `step`", "on-unstable"] {
+        assert!(told.err.contains(piece), "no `{piece}` in {}", told.err);
+    }
+    let told = Workshop::new(&changed(SOFT, "\"substep\"", "\"report\"")).run(&["--until", "0.11"]);
+    let seen = &told.json()["stability"];
+    assert!(seen["steps_below"].as_u64() > Some(0) && seen["extra_steps"] == 0, "{seen}");
+    assert!(
+        told.err.contains("warning: smallest stable step seen") && told.err.contains("below the step"),
+        "{}",
+        told.err
+    );
+}
+
+#[test]
+fn mass_scaling_enlarges_the_step_tells_the_added_mass_and_leaves_forces_at_rest() {
+    let scene = SOFT
+        .replace("until = 0.4", "until = 3.0")
+        .replace("[9.81, 0, 0]", "[0, 0, -1.0]")
+        .replace("density = 1000", "density = 1000\ndamping = 10");
+    let plain = Workshop::new(&scene).run(&[]).done();
+    let bound = plain["element_bound"].as_f64().unwrap();
+    assert!(plain["added_mass"].is_null());
+    let scaled = |factor: f64| {
+        let line = format!("step = \"auto\"\nmass-scaling = {{ target-step = {:e} }}", factor * bound);
+        Workshop::new(&changed(&scene, "step = \"auto\"", &line))
+    };
+    let workshop = scaled(1.02);
+    let told = workshop.run(&[]);
+    let done = told.done();
+    let added = &done["added_mass"];
+    // All elements are alike: each becomes heavier by 1.02² − 1.
+    assert_close(added["percent"].as_f64().unwrap(), 4.04, 1e-9, "added mass in percent");
+    assert_eq!(added["elements"], 128);
+    assert_close(
+        done["mass"].as_f64().unwrap(),
+        plain["mass"].as_f64().unwrap(),
+        0.0,
+        "mass of the material",
+    );
+    assert_close(
+        done["true_limit"].as_f64().unwrap() / plain["true_limit"].as_f64().unwrap(),
+        1.02,
+        1e-4,
+        "limit",
+    );
+    for axis in 0..3 {
+        let force = |run: &Value| run["reactions"]["wall"][axis].as_f64().unwrap();
+        // 0.25 N hang there; e^(−10 · 3/2) of the vibration is left.
+        assert_close(force(&done), force(&plain), 1e-6, "reaction at rest [N]");
+    }
+    assert!(
+        told.err.contains("note: mass scaling to") && told.err.contains("4.04 % of the mass"),
+        "{}",
+        told.err
+    );
+    assert!(workshop.read("out/case/summary.md").contains("| mass added by scaling |"));
+    let check = workshop.pliant(&["check", "case"]);
+    assert!(
+        check.out.contains("mass scaling  adds") && check.out.contains("4.04 %, to 128 elements"),
+        "{}",
+        check.out
+    );
+    let much = scaled(1.1).run(&["--until", "0.01"]);
+    much.done();
+    assert!(
+        much.words().contains("21.00 % of the mass is added") && much.words().contains("more than 5 %"),
+        "{}",
+        much.err
+    );
+    let none = scaled(0.5).run(&["--until", "0.01"]).done();
+    assert_eq!(none["added_mass"]["elements"], 0);
+}
+
+#[test]
+fn hourglass_energy_above_5_percent_is_warned_about() {
+    // Hexes one deep, pulled at one corner.
+    let pulled = "[load.pull]\ntype = \"force\"\non = \"block\"\n\
+                  nodes = { nearest = { point = [0.1, 0, 0] } }\ntotal = [0, 0.2, 0]\n\n[output.history]";
+    let coarse = changed(SOFT, "cells = [8, 4, 4]", "cells = [2, 1, 1]");
+    let coarse = changed(&changed(&coarse, "[output.history]", pulled), "gravity = [9.81, 0, 0]", "");
+    let workshop = Workshop::new(&coarse);
+    let told = workshop.run(&[]);
+    let done = told.done();
+    let warning = done["warnings"][0].as_str().unwrap();
+    for piece in [
+        "hourglass control holds",
+        "% of the internal energy",
+        "`block`",
+        "finer mesh",
+        "hex8-full",
+        "`hourglass`",
+    ] {
+        assert!(warning.contains(piece), "no `{piece}` in {warning}");
+    }
+    assert!(told.err.contains(&format!("warning: {warning}")), "{}", told.err);
+    assert!(workshop.read("out/case/summary.md").contains(&format!("**Warning:** {warning}")));
+    let full = changed(&coarse, "density = 1000", "density = 1000\nelement = \"hex8-full\"");
+    assert_eq!(Workshop::new(&full).run(&[]).done()["warnings"], serde_json::json!([]));
 }
 
 #[test]
@@ -1121,6 +1291,7 @@ fn a_block_that_starts_with_a_velocity_flies_on_with_its_energy() {
 until = 0.05
 [run]
 precision = "{precision}"
+step = 2e-3
 [law.tissue]
 type = "neo-hookean"
 young-modulus = 3e3

@@ -1,4 +1,4 @@
-//! The largest stable step of the central difference method at rest.
+//! The largest stable step of the central difference method at rest; see [`stability`](crate::stability) for a run.
 //!
 //! *Element bound* (rigorous, Irons and Treharne): λ_max(K_e) ≤ V (λ+2μ) Σ|B_a|², hence
 //! Δt_e = 2/√(n (λ+2μ)/ρ Σ|B_a|²) and Δt_cr ≥ min Δt_e.
@@ -23,7 +23,7 @@ pub struct ElementBound {
     pub cell: usize,
 }
 
-/// The bound [s] of one cell.
+/// The bound [s] of one cell, of its material's mass.
 pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
     // Hourglass patterns are as fast as a wave of modulus c μ: slower than the law's own for any usual coefficient c.
     let modulus = solid.material.law.longitudinal_modulus().max(solid.cells.hourglass_modulus(cell));
@@ -32,18 +32,29 @@ pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
     2.0 / (n * wave * solid.cells.gradient_square_sum(cell)).sqrt()
 }
 
+/// The bound [s] of one cell with what mass scaling adds to it.
+pub(crate) fn scaled_bound(model: &Model, solid: &Solid, cell: usize) -> f64 {
+    cell_bound(solid, cell) * model.mass_factor(solid, cell).sqrt()
+}
+
 /// The smallest bound over all cells; `None` without cells.
 pub fn element_bound(model: &Model) -> Option<ElementBound> {
     let mut worst: Option<ElementBound> = None;
     for (index, solid) in model.solids.iter().enumerate() {
         for cell in 0..solid.cells.len() {
-            let step = cell_bound(solid, cell);
+            let step = scaled_bound(model, solid, cell);
             if worst.is_none_or(|w| step < w.step) {
                 worst = Some(ElementBound { step, solid: index, cell });
             }
         }
     }
     worst
+}
+
+/// The limit [s] of a cell alone, from the largest eigenvalue of its stiffness over its volume [Pa/m²].
+pub(crate) fn limit_alone(model: &Model, solid: &Solid, cell: usize, stiffness: f64) -> f64 {
+    let density = solid.material.density * model.mass_factor(solid, cell);
+    2.0 / (solid.cells.nodes_per_cell() as f64 * stiffness / density).sqrt()
 }
 
 /// The true limit of the assembled operator.
@@ -67,16 +78,30 @@ const TOLERANCE: f64 = 1e-4;
 /// # Errors
 /// If constraints contradict each other.
 pub fn true_limit(model: &Model) -> Result<TrueLimit, Contradiction> {
-    let owners = model.constrained_components()?;
-    let mut operator = Operator::new(model, &owners);
+    true_limit_at(model, &vec![[0.0; 3]; model.node_count()])
+}
+
+/// The true limit of small vibrations about a deformed state; infinite if every node is held.
+///
+/// # Errors
+/// If constraints contradict each other.
+pub fn true_limit_at(model: &Model, displacement: &[Vector<f64>]) -> Result<TrueLimit, Contradiction> {
+    Ok(limit_about(model, &model.constrained_components()?, displacement))
+}
+
+/// The same where the owner of each component is known.
+pub(crate) fn limit_about(model: &Model, owners: &[[u32; 3]], displacement: &[Vector<f64>]) -> TrueLimit {
+    let mut operator = Operator::new(model, owners, displacement);
     let started = std::time::Instant::now();
     let (eigenvalue, error) = largest_eigenvalue(&mut operator, model.node_count());
     let seconds_per_call = started.elapsed().as_secs_f64() / operator.calls.max(1) as f64;
-    Ok(TrueLimit { step: 2.0 / eigenvalue.sqrt(), error, force_calls: operator.calls, seconds_per_call })
+    TrueLimit { step: 2.0 / eigenvalue.sqrt(), error, force_calls: operator.calls, seconds_per_call }
 }
 
 /// The symmetric operator M^(−1/2) K M^(−1/2) on the free components.
-struct Operator {
+struct Operator<'a> {
+    /// The state about which the model vibrates.
+    about: &'a [Vector<f64>],
     forces: InternalForces<f64>,
     history: Vec<History<f64>>,
     /// M^(−1/2), zero on held components.
@@ -86,10 +111,11 @@ struct Operator {
     calls: usize,
 }
 
-impl Operator {
-    fn new(model: &Model, owners: &[[u32; 3]]) -> Self {
-        let inverse_root_mass = (model.mass.iter().zip(owners))
-            .map(|(&m, owner)| owner.map(|o| if o == FREE && m > 0.0 { 1.0 / m.sqrt() } else { 0.0 }))
+impl<'a> Operator<'a> {
+    fn new(model: &Model, owners: &[[u32; 3]], about: &'a [Vector<f64>]) -> Self {
+        let inverse_root_mass = (owners.iter().enumerate())
+            .map(|(node, owner)| (model.inertia(node), owner))
+            .map(|(m, owner)| owner.map(|o| if o == FREE && m > 0.0 { 1.0 / m.sqrt() } else { 0.0 }))
             .collect();
         // Displacements of a millionth of a typical cell: far from round-off and from the law's curvature.
         let smallest = (model.solids.iter())
@@ -98,6 +124,7 @@ impl Operator {
             })
             .fold(f64::INFINITY, f64::min);
         Self {
+            about,
             forces: InternalForces::new(model, 1.0),
             history: vec![History::default(); model.solids.len()],
             inverse_root_mass,
@@ -114,8 +141,9 @@ impl Operator {
         let h = self.amplitude / largest;
         out.fill([0.0; 3]);
         for sign in [1.0, -1.0] {
-            for ((u, v), w) in self.displacement.iter_mut().zip(v).zip(&self.inverse_root_mass) {
-                *u = [0, 1, 2].map(|c| sign * h * v[c] * w[c]);
+            let moves = v.iter().zip(&self.inverse_root_mass);
+            for ((u, about), (v, w)) in self.displacement.iter_mut().zip(self.about).zip(moves) {
+                *u = [0, 1, 2].map(|c| about[c] + sign * h * v[c] * w[c]);
             }
             self.forces.evaluate(&self.displacement, &mut self.history);
             self.calls += 1;
@@ -133,7 +161,7 @@ impl Operator {
 }
 
 /// Largest eigenvalue by Lanczos, with its residual added, and the relative residual.
-fn largest_eigenvalue(operator: &mut Operator, nodes: usize) -> (f64, f64) {
+fn largest_eigenvalue(operator: &mut Operator<'_>, nodes: usize) -> (f64, f64) {
     let mut v: Vec<Vector<f64>> = start_vector(nodes, &operator.inverse_root_mass);
     let mut before = vec![[0.0; 3]; nodes];
     let mut w = vec![[0.0; 3]; nodes];

@@ -378,7 +378,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         iterations: usize,
     ) -> Result<Sums, RelaxationError> {
         self.take_committed_history(state);
-        let (_, inverted) = forces.evaluate(&state.displacement, &mut self.trial_history);
+        let inverted = forces.evaluate(&state.displacement, &mut self.trial_history).inverted;
         if let Some((solid, cell, determinant)) = inverted
             && determinant.is_finite()
         {
@@ -459,7 +459,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
 
     /// Takes a converged trial as the new state. Work is that of the mean of the forces before and after.
     fn commit(&mut self, forces: &mut InternalForces<R>, state: &mut State<R>, start: &Start<R>, end: f64) {
-        let (hourglass, _) = forces.evaluate(&state.displacement, &mut state.history);
+        let hourglass = forces.evaluate(&state.displacement, &mut state.history).hourglass;
         let work = &mut state.work;
         for (node, (u, u0)) in state.displacement.iter().zip(&start.displacement).enumerate() {
             let (after, before, residual) = (forces.at(node), start.internal[node], self.residual[node]);

@@ -51,8 +51,10 @@ pub mod model;
 pub mod prony;
 mod real;
 pub mod recover;
+pub mod stability;
 mod state;
 mod stepper;
+mod tangent;
 pub mod tensor;
 
 pub use dynamic_relaxation::{

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use crate::critical_step::cell_bound;
 use crate::curve::Curve;
 use crate::element::{GaussPoints, Hex8, Rest, gauss_points, hex8, tet4};
 use crate::law::AnyLaw;
@@ -16,7 +17,7 @@ use crate::tensor::Vector;
 pub struct Model {
     /// Rest positions [m] of the nodes.
     pub rest: Vec<Vector<f64>>,
-    /// Lumped masses [kg] of the nodes.
+    /// Lumped masses [kg] of the nodes, those of their materials.
     pub mass: Vec<f64>,
     /// The bodies.
     pub bodies: Vec<Body>,
@@ -28,8 +29,28 @@ pub struct Model {
     pub loads: Vec<Load>,
     /// Surfaces carried by bodies.
     pub surfaces: Vec<Surface>,
+    /// Mass added for a larger stable step.
+    pub mass_scaling: Option<MassScaling>,
     /// Velocities [m/s] of the nodes at time 0, for dynamics; nodes beyond its end are at rest.
     pub initial_velocity: Vec<Vector<f64>>,
+}
+
+/// Mass that is added to the fastest cells so that none has an element bound below a step; see [`Model::scale_mass`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct MassScaling {
+    /// The smallest element bound with it [s].
+    pub target_step: f64,
+    /// Mass added to each node [kg].
+    pub added: Vec<f64>,
+    /// How many cells were made heavier.
+    pub cells: usize,
+}
+
+impl MassScaling {
+    /// Added mass in all [kg].
+    pub fn total(&self) -> f64 {
+        self.added.iter().sum()
+    }
 }
 
 /// A body.
@@ -391,6 +412,10 @@ pub struct Contradiction {
     pub component: usize,
 }
 
+fn mass_factor(solid: &Solid, cell: usize, target_step: f64) -> f64 {
+    (target_step / cell_bound(solid, cell)).powi(2).max(1.0)
+}
+
 /// No constraint on a component of a node.
 pub const FREE: u32 = u32::MAX;
 
@@ -410,6 +435,36 @@ impl Model {
             }
         }
         self.solids.push(solid);
+    }
+
+    /// Makes every cell whose element bound lies below `target_step` [s] so much heavier that its bound equals it, once
+    /// all solids are there. What is added counts for inertia (and with it for mass-proportional damping) only: loads and
+    /// gravity act on the mass of the material, so that equilibria and their reactions stay what they are.
+    pub fn scale_mass(&mut self, target_step: f64) {
+        let mut added = vec![0.0; self.node_count()];
+        let mut cells = 0;
+        for solid in &self.solids {
+            for cell in 0..solid.cells.len() {
+                let factor = mass_factor(solid, cell, target_step);
+                if factor > 1.0 {
+                    let nodes = solid.cells.nodes(cell);
+                    let share = solid.material.density * solid.cells.volume(cell) / nodes.len() as f64;
+                    nodes.iter().for_each(|&node| added[node as usize] += (factor - 1.0) * share);
+                    cells += 1;
+                }
+            }
+        }
+        self.mass_scaling = Some(MassScaling { target_step, added, cells });
+    }
+
+    /// The factor by which mass scaling makes a cell heavier.
+    pub(crate) fn mass_factor(&self, solid: &Solid, cell: usize) -> f64 {
+        self.mass_scaling.as_ref().map_or(1.0, |scaling| mass_factor(solid, cell, scaling.target_step))
+    }
+
+    /// The mass [kg] with which a node resists acceleration: that of the material and what mass scaling adds.
+    pub fn inertia(&self, node: usize) -> f64 {
+        self.mass[node] + self.mass_scaling.as_ref().map_or(0.0, |scaling| scaling.added[node])
     }
 
     /// Number of nodes.

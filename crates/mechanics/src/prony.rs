@@ -180,19 +180,27 @@ struct Series<R> {
 
 impl<R: Real> Series<R> {
     fn new(terms: &[(f64, f64)], update: PronyUpdate, step: f64) -> Self {
-        let coefficients = |&(weight, time): &(f64, f64)| match update {
-            PronyUpdate::Exact => {
-                let x = step / time;
-                ((-x).exp(), weight * -(-x).exp_m1() / x)
-            }
-            PronyUpdate::BackwardEuler => {
-                let decay = time / (step + time);
-                (decay, weight * decay)
-            }
-        };
-        Self {
+        let mut series = Self {
             remaining: R::of(1.0 - terms.iter().map(|(weight, _)| weight).sum::<f64>()),
-            terms: terms.iter().map(coefficients).map(|(d, g)| (R::of(d), R::of(g))).collect(),
+            terms: vec![(R::ZERO, R::ZERO); terms.len()],
+        };
+        series.set_step(terms, update, step);
+        series
+    }
+
+    fn set_step(&mut self, terms: &[(f64, f64)], update: PronyUpdate, step: f64) {
+        for ((decay, gain), &(weight, time)) in self.terms.iter_mut().zip(terms) {
+            let (d, g) = match update {
+                PronyUpdate::Exact => {
+                    let x = step / time;
+                    ((-x).exp(), weight * -(-x).exp_m1() / x)
+                }
+                PronyUpdate::BackwardEuler => {
+                    let decay = time / (step + time);
+                    (decay, weight * decay)
+                }
+            };
+            (*decay, *gain) = (R::of(d), R::of(g));
         }
     }
 
@@ -224,6 +232,12 @@ impl<R: Real> Relaxation<R> {
             isochoric: Series::new(&prony.isochoric, prony.update, step),
             volumetric: Series::new(&prony.volumetric, prony.update, step),
         }
+    }
+
+    /// Takes on the coefficients of the same series for steps of `step` seconds.
+    pub fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.isochoric.set_step(&prony.isochoric, prony.update, step);
+        self.volumetric.set_step(&prony.volumetric, prony.update, step);
     }
 
     /// The isochoric stress [Pa] at the end of the step; `history` has [`Prony::isochoric_slots`] tensors.

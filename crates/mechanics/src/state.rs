@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::model::{FREE, Model, Solid};
+use crate::stability::Stability;
 use crate::tensor::{Symmetric, Vector};
 
 /// What a stepper advances.
@@ -11,7 +12,7 @@ use crate::tensor::{Symmetric, Vector};
 pub struct State<R> {
     /// Time [s].
     pub time: f64,
-    /// Steps done.
+    /// Whole steps done.
     pub steps: u64,
     /// Displacements u of the nodes [m].
     pub displacement: Vec<Vector<R>>,
@@ -21,6 +22,10 @@ pub struct State<R> {
     pub history: Vec<History<R>>,
     /// Energies so far.
     pub work: Work,
+    /// How steps are cut, and what was seen of the largest stable one.
+    pub stability: Stability,
+    /// Displacements [m] of the state whose true limit is known, at first rest; see [`Monitor`](crate::stability::Monitor).
+    pub reference: Vec<Vector<R>>,
 }
 
 /// What a relaxing law remembers of a solid.
@@ -61,6 +66,8 @@ pub struct Work {
     pub damping: f64,
     /// Running maximum of kinetic energy, internal and |external| work.
     pub largest: f64,
+    /// ⅛ Δt² Σ m|a|² at the start, which the mean velocity of the method keeps from the kinetic energy from then on.
+    pub(crate) at_start: f64,
     /// Steps in a row that were off balance.
     pub(crate) steps_off_balance: u32,
     /// First half of the internal work of the step under way.
@@ -88,9 +95,21 @@ impl<R: Real> State<R> {
             time: 0.0,
             steps: 0,
             increment: vec![[R::ZERO; 3]; model.node_count()],
+            reference: vec![[R::ZERO; 3]; model.node_count()],
             displacement,
             history: model.solids.iter().map(History::at_rest).collect(),
             work: Work::default(),
+            stability: Stability::default(),
         }
+    }
+
+    /// True before the first step.
+    pub(crate) fn is_at_start(&self) -> bool {
+        self.steps == 0 && self.is_between_steps()
+    }
+
+    /// True at the end of a whole step, false between the parts of one.
+    pub fn is_between_steps(&self) -> bool {
+        self.stability.done == 0
     }
 }

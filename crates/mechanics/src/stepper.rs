@@ -1,6 +1,8 @@
 //! The central difference method in incremental form: with a = α Δt/2,
 //! Δuⁿ⁺¹ = ((1 − a) Δuⁿ + Δt²/m (R − f)) / (1 + a), uⁿ⁺¹ = uⁿ + Δuⁿ⁺¹
 //! (thesis 5.28–5.32 without the cancellation in 2uⁿ − uⁿ⁻¹). Damping does not lower the stable step.
+//! Where the step changes from Δt⁻ to Δt⁺, velocities go on: with h = (Δt⁻ + Δt⁺)/2 and a = α h/2,
+//! Δuⁿ⁺¹ = ((1 − a) Δt⁺/Δt⁻ Δuⁿ + Δt⁺ h/m (R − f)) / (1 + a).
 //!
 //! A step has two halves: [`CentralDifference::evaluate`] finds forces, the coming increments, reactions and energies
 //! at the current time, so that all that an observer sees belongs to one instant; [`CentralDifference::advance`] moves.
@@ -11,10 +13,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::applied::AppliedForces;
-use crate::forces::InternalForces;
+use crate::critical_step::limit_about;
+use crate::forces::{Deformed, InternalForces};
 use crate::model::{Contradiction, FREE, Model};
+use crate::stability::{CHANGE, CHECK_EVERY, Look, Monitor, OnUnstable, substeps};
 use crate::state::State;
-use crate::tensor::{Vector, add};
+use crate::tensor::{Vector, add, cast};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -46,7 +50,8 @@ pub struct Energies {
     pub hourglass: f64,
     /// Work of loads and prescribed motions, and the kinetic energy given at the start.
     pub external: f64,
-    /// |kinetic + internal + damping + hourglass − external| over the largest of them so far.
+    /// |kinetic + internal + damping + hourglass − external| over the largest of them so far, with ⅛ Δt² Σ m|a|² of the start
+    /// as part of the kinetic energy: of loads that set in at once it stays behind for good.
     pub balance: f64,
 }
 
@@ -89,6 +94,25 @@ pub enum StepError {
         /// Time [s].
         time: f64,
     },
+    /// The largest stable step fell below the running one.
+    #[error(
+        "the largest stable step has fallen to {limit:.3e} s, below the step {step:.3e} s, at t = {time:.6} s: element \
+         {element} of `{body}` has become too stiff for it"
+    )]
+    BelowLimit {
+        /// The body.
+        body: String,
+        /// The element that sets the limit, numbered as in the user's mesh.
+        element: u32,
+        /// Its first node, numbered in its body.
+        node: u32,
+        /// The limit [s].
+        limit: f64,
+        /// The step [s].
+        step: f64,
+        /// Time [s].
+        time: f64,
+    },
     /// Energy appears or vanishes: the run is unstable.
     #[error(
         "the energies are off balance by {:.0} % at t = {time:.6} s; the fastest node is {node} of `{body}`",
@@ -112,6 +136,10 @@ impl StepError {
         match self {
             Self::NotFinite { .. } | Self::Unbalanced { .. } => {
                 "the step is too large for the deformed state: try a smaller `step`, a slower motion or a smoother curve"
+            }
+            Self::BelowLimit { .. } => {
+                "try a smaller `step` or a slower motion, or let the run cut its steps (`on-unstable = \"substep\"`; into 100 \
+                 parts at the most)"
             }
             Self::Inverted { .. } => {
                 "try a slower or smaller motion, a smaller `step`, more damping, or a finer mesh there"
@@ -144,11 +172,38 @@ impl Sums {
     }
 }
 
+/// Times at an instant.
+#[derive(Clone, Copy, Debug)]
+struct Lengths {
+    /// Length Δt⁻ of the (sub)step before [s].
+    before: f64,
+    /// Length Δt⁺ of the (sub)step to come [s].
+    next: f64,
+}
+
+impl Lengths {
+    /// Δt⁺/Δt⁻; exactly 1 where they are equal.
+    fn ratio(self) -> f64 {
+        self.next / self.before
+    }
+
+    /// h = (Δt⁻ + Δt⁺)/2 [s].
+    fn mean(self) -> f64 {
+        0.5 * (self.before + self.next)
+    }
+}
+
 /// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that a restart
 /// would lose.
 pub struct CentralDifference<'m, R> {
     model: &'m Model,
     step: f64,
+    monitor: Option<Monitor>,
+    /// Parts of the step to come.
+    substeps: u32,
+    lengths: Lengths,
+    /// Length of a step [s] that relaxing laws are set to.
+    relaxing: f64,
     forces: InternalForces<R>,
     owners: Vec<[u32; 3]>,
     mass: Vec<R>,
@@ -179,7 +234,8 @@ impl<R: Real> Observable<R> for CentralDifference<'_, R> {
     /// The mean of the increments before and after.
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
         let (before, after) = (state.increment[node], self.next[node]);
-        [0, 1, 2].map(|c| (before[c].to_f64() + after[c].to_f64()) / (2.0 * self.step))
+        let Lengths { next, .. } = self.lengths;
+        [0, 1, 2].map(|c| (before[c].to_f64() * self.lengths.ratio() + after[c].to_f64()) / (2.0 * next))
     }
 }
 
@@ -222,10 +278,14 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         Ok(Self {
             model,
             step,
+            monitor: None,
+            substeps: 1,
+            lengths: Lengths { before: step, next: step },
+            relaxing: step,
             forces: InternalForces::new(model, step),
             amplitude: model.amplitudes(&owners),
             owners,
-            mass: model.mass.iter().map(|&m| R::of(m)).collect(),
+            mass: (0..nodes).map(|node| R::of(model.inertia(node))).collect(),
             damping,
             applied: AppliedForces::new(model),
             factor: vec![[0.0; 2]; model.constraints.len()],
@@ -237,7 +297,14 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         })
     }
 
-    /// The step size [s].
+    /// Watches the largest stable step with a monitor of the same model.
+    #[must_use]
+    pub fn watched(mut self, monitor: Monitor) -> Self {
+        self.monitor = Some(monitor);
+        self
+    }
+
+    /// The length [s] of a whole step.
     pub fn step(&self) -> f64 {
         self.step
     }
@@ -245,21 +312,93 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// Forces, coming increments, reactions and energies at the current time.
     ///
     /// # Errors
-    /// If the state is not finite, a cell is inverted, or the energies do not balance.
+    /// If the state is not finite, a cell is inverted, the energies do not balance, or the step is above the limit and
+    /// must not be cut.
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
-        let (hourglass, inverted) = self.forces.evaluate(&state.displacement, &mut state.history);
+        let before = self.step / f64::from(state.stability.substeps);
+        if self.relaxing != before {
+            self.forces.set_step(self.model, before);
+            self.relaxing = before;
+        }
+        let found = self.forces.evaluate(&state.displacement, &mut state.history);
+        self.substeps = state.stability.substeps;
+        let below = match found.inverted {
+            None if state.is_between_steps() => self.watch(state, &found.deformed),
+            _ => Ok(()),
+        };
+        self.lengths = Lengths { before, next: self.step / f64::from(self.substeps) };
         self.applied.update(state.time, &state.displacement);
-        if state.steps == 0 {
+        if state.is_at_start() {
             self.start(state);
         }
         self.set_factors(state.time);
         self.pass_over_nodes(state);
         let sums = self.sums.iter().fold(Sums::default(), Sums::merge);
-        self.check_state(state, &sums, inverted)?;
-        self.settle_energies(state, &sums, hourglass)
+        self.check_state(state, &sums, found.inverted)?;
+        self.settle_energies(state, &sums, found.hourglass)?;
+        below
     }
 
-    /// Moves to the next instant; [`evaluate`](Self::evaluate) has gone before.
+    /// Looks at the limit where one is due, and chooses the parts of the step to come.
+    fn watch(&mut self, state: &mut State<R>, deformed: &Deformed) -> Result<(), StepError> {
+        let Some(monitor) = &mut self.monitor else { return Ok(()) };
+        let (step, now, on_unstable) = (self.step, self.substeps, monitor.on_unstable());
+        let seen = &state.stability;
+        let due = seen.checks == 0
+            || state.steps >= seen.looked_at.saturating_add(CHECK_EVERY)
+            || deformed.differs(&seen.deformed, CHANGE);
+        if due {
+            monitor.refer_to(state);
+            if let Some((mut limit, solid, cell)) =
+                monitor.limit(self.model, &state.displacement, &state.reference)
+            {
+                if monitor.doubts(state, limit, step, now) {
+                    limit = self.take_as_reference(state);
+                }
+                let look = Look { time: state.time, limit, solid, cell };
+                state.stability.note(look, *deformed, state.steps);
+            }
+        }
+        let Some(look) = state.stability.last else { return Ok(()) };
+        state.stability.steps_below += u64::from(look.limit < step);
+        match on_unstable {
+            OnUnstable::Report => Ok(()),
+            OnUnstable::Stop if look.limit < step => Err(self.below_limit(&look, state.time)),
+            OnUnstable::Stop => Ok(()),
+            OnUnstable::Substep => match substeps(step, look.limit, now) {
+                Some(substeps) => {
+                    self.substeps = substeps;
+                    state.stability.note_substeps(substeps, state.time);
+                    Ok(())
+                }
+                None => Err(self.below_limit(&look, state.time)),
+            },
+        }
+    }
+
+    /// Finds the true limit [s] of a state and makes it the reference of what follows.
+    fn take_as_reference(&self, state: &mut State<R>) -> f64 {
+        let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
+        let limit = limit_about(self.model, &self.owners, &displacement).step;
+        state.reference.clone_from(&state.displacement);
+        state.stability.reference = Some((limit, state.steps));
+        state.stability.true_limits += 1;
+        limit
+    }
+
+    fn below_limit(&self, look: &Look, time: f64) -> StepError {
+        let solid = &self.model.solids[look.solid];
+        StepError::BelowLimit {
+            body: self.model.bodies[solid.body].name.clone(),
+            element: solid.original[look.cell],
+            node: self.model.locate_node(solid.cells.nodes(look.cell)[0]).1,
+            limit: look.limit,
+            step: self.step,
+            time,
+        }
+    }
+
+    /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has gone before.
     pub fn advance(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
         let (owners, amplitude, factor) = (&self.owners, &self.amplitude, &self.factor);
@@ -273,8 +412,14 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             });
         state.work.internal += state.work.pending_internal;
         state.work.external += state.work.pending_external;
-        state.steps += 1;
-        state.time = state.steps as f64 * self.step;
+        state.stability.substeps = self.substeps;
+        state.stability.done += 1;
+        if state.stability.done == self.substeps {
+            state.stability.done = 0;
+            state.steps += 1;
+        }
+        let part = f64::from(state.stability.done) / f64::from(self.substeps);
+        state.time = (state.steps as f64 + part) * self.step;
     }
 
     /// Energy [J] above which the balance is judged.
@@ -284,14 +429,16 @@ impl<'m, R: Real> CentralDifference<'m, R> {
 
     fn set_factors(&mut self, time: f64) {
         for (factor, constraint) in self.factor.iter_mut().zip(&self.model.constraints) {
-            *factor = [time, time + self.step].map(|t| constraint.motion.factor(t));
+            *factor = [time, time + self.lengths.next].map(|t| constraint.motion.factor(t));
         }
     }
 
     /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with a⁰ = (R − f)/m − α v⁰: the increment before the first step. A prescribed
     /// component has no velocity of its own.
     fn start(&self, state: &mut State<R>) {
-        let (dt, half) = (self.step, 0.5 * self.step * self.step);
+        let dt = self.lengths.before;
+        let half = 0.5 * dt * dt;
+        let mut shock = 0.0;
         state.work.external = 0.0;
         for (node, increment) in state.increment.iter_mut().enumerate() {
             let applied: Vector<R> = self.applied.at(node);
@@ -305,9 +452,11 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 }
                 let acceleration = (applied[c] - internal[c]).to_f64() / m - alpha * velocity[c];
                 increment[c] = R::of(dt * velocity[c] - half * acceleration);
+                shock += 0.5 * m * (half * acceleration / dt).powi(2);
                 state.work.external += 0.5 * m * velocity[c] * velocity[c];
             }
         }
+        state.work.at_start = shock;
     }
 
     fn pass_over_nodes(&mut self, state: &State<R>) {
@@ -329,28 +478,30 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// The coming increment of a node and its reaction.
     #[inline(always)]
     fn pass_node(&self, node: usize, before: Vector<R>, sums: &mut Sums) -> (Vector<R>, Vector<R>) {
-        let (m, alpha, dt) = (self.mass[node], self.damping[node], R::of(self.step));
+        let (m, alpha, dt) = (self.mass[node], self.damping[node], R::of(self.lengths.next));
+        let (ratio, mean) = (R::of(self.lengths.ratio()), R::of(self.lengths.mean()));
         let half = R::of(0.5);
         let internal = self.forces.at(node);
         let applied: Vector<R> = self.applied.at(node);
         let owner = self.owners[node];
-        let a = half * alpha * dt;
+        let a = half * alpha * mean;
         let mut next = [R::ZERO; 3];
         let mut reaction = [R::ZERO; 3];
         for c in 0..3 {
             let mut external = applied[c];
+            let same_speed = before[c] * ratio;
             if owner[c] == FREE {
                 next[c] =
-                    ((R::ONE - a) * before[c] + dt * dt / m * (applied[c] - internal[c])) / (R::ONE + a);
+                    ((R::ONE - a) * same_speed + dt * mean / m * (applied[c] - internal[c])) / (R::ONE + a);
             } else {
                 let [now, then] = self.factor[owner[c] as usize];
                 next[c] = R::of(self.amplitude[node][c] * then - self.amplitude[node][c] * now);
-                let velocity = (before[c] + next[c]) / (R::of(2.0) * dt);
-                let inertia = m * ((next[c] - before[c]) / (dt * dt) + alpha * velocity);
+                let velocity = (same_speed + next[c]) / (R::of(2.0) * dt);
+                let inertia = m * ((next[c] - same_speed) / (dt * mean) + alpha * velocity);
                 reaction[c] = inertia + internal[c] - applied[c];
                 external += reaction[c];
             }
-            let velocity = ((before[c] + next[c]) / (R::of(2.0) * dt)).to_f64();
+            let velocity = ((same_speed + next[c]) / (R::of(2.0) * dt)).to_f64();
             let momentum = m.to_f64() * velocity;
             sums.kinetic += 0.5 * momentum * velocity;
             sums.damping_power += alpha.to_f64() * momentum * velocity;
@@ -399,18 +550,24 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         sums: &Sums,
         hourglass: f64,
     ) -> Result<(), StepError> {
+        let at_start = state.is_at_start();
         let work = &mut state.work;
-        if state.steps > 0 {
+        if !at_start {
             work.internal += sums.internal_before;
             work.external += sums.external_before;
-            work.damping += 0.5 * (work.damping_power + sums.damping_power) * self.step;
+            work.damping += 0.5 * (work.damping_power + sums.damping_power) * self.lengths.before;
         }
         work.damping_power = sums.damping_power;
         work.pending_internal = sums.internal_after;
         work.pending_external = sums.external_after;
         let internal = work.internal - hourglass;
         work.largest = work.largest.max(sums.kinetic).max(internal).max(work.external.abs());
-        let missing = (sums.kinetic + work.internal + work.damping - work.external).abs();
+        // Left is ⅛ Δt² Σ m|a|² of now: small where the step resolves the motion, growing where it is unstable.
+        let missing = if at_start {
+            0.0
+        } else {
+            (sums.kinetic + work.internal + work.damping + work.at_start - work.external).abs()
+        };
         let balance = missing / work.largest.max(self.balance_floor);
         self.energies = Energies {
             kinetic: sums.kinetic,

@@ -20,6 +20,6 @@ pub use case::{Case, CaseError, Correction, Figure, Findings, Row, find};
 pub use cases::CASES;
 pub use reference::{largest, mesh, numbers, reference};
 pub use report::{END, Report, START, is_own_file, replace_table};
-pub use run::{Equilibrium, relax, run, settle, smooth_step};
+pub use run::{Equilibrium, relax, run, run_on, settle, smooth_step};
 pub use specimen::{HOURGLASS, Hexes, Specimen, Tets};
 pub use tissue::{deformation, elastic, law, liver, liver_matrix, liver_relaxation, soft_tissue};

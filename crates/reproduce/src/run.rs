@@ -3,7 +3,7 @@
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::tensor::{Vector, dot};
 use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Model, Observable, Real, RelaxationSettings, State,
+    CentralDifference, DynamicRelaxation, Model, Observable, Real, RelaxationSettings, State, StepError,
 };
 
 use crate::CaseError;
@@ -17,10 +17,21 @@ pub fn run<R: Real>(
     model: &Model,
     step: f64,
     until: f64,
-    mut observe: impl FnMut(&CentralDifference<R>, &State<R>),
+    observe: impl FnMut(&CentralDifference<R>, &State<R>),
 ) -> Result<(CentralDifference<'_, R>, State<R>), CaseError> {
-    let mut stepper = CentralDifference::new(model, step)?;
-    let mut state = State::at_rest(model);
+    Ok(run_on(CentralDifference::new(model, step)?, State::at_rest(model), until, observe)?)
+}
+
+/// Steps a state to a time [s], both ends included.
+///
+/// # Errors
+/// If a step fails.
+pub fn run_on<'m, R: Real>(
+    mut stepper: CentralDifference<'m, R>,
+    mut state: State<R>,
+    until: f64,
+    mut observe: impl FnMut(&CentralDifference<R>, &State<R>),
+) -> Result<(CentralDifference<'m, R>, State<R>), StepError> {
     loop {
         stepper.evaluate(&mut state)?;
         observe(&stepper, &state);

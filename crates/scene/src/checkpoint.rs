@@ -22,7 +22,7 @@ use crate::scene::Scene;
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -50,6 +50,8 @@ pub(crate) struct Progressed {
     pub steps: u64,
     pub wall_seconds: f64,
     pub worst_balance: f64,
+    /// The largest hourglass energy over the internal one, and its time [s].
+    pub worst_hourglass: (f64, f64),
     /// Samples for plot and summary.
     pub history: History,
     pub sampling: Schedule,
@@ -250,6 +252,8 @@ impl Origin {
         let outputs = scene.outputs.iter();
         parts.extend(outputs.map(|(name, table)| (format!("output `{name}`"), fingerprint(table))));
         parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));
+        parts.push(("`run.on-unstable`".into(), fingerprint(&scene.run.on_unstable.unwrap_or_default())));
+        parts.push(("`run.mass-scaling`".into(), fingerprint(&scene.run.mass_scaling)));
         Self {
             precision: scene.run.precision,
             solver: scene.run.solver,
@@ -388,11 +392,13 @@ impl Checkpoint {
         let rest = State::<R>::at_rest(&built.model);
         let sizes = |state: &State<R>| {
             let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
-            (state.displacement.len(), state.increment.len(), history.collect::<Vec<_>>())
+            let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
+            (nodes, history.collect::<Vec<_>>())
         };
         let residual = moment.equilibrium.as_ref().map_or(rest.displacement.len(), |e| e.residual.len());
         let samples = self.progressed.history.reactions.iter();
         let fits = sizes(&moment.state) == sizes(&rest)
+            && moment.state.stability.fits(&built.model)
             && residual == rest.displacement.len()
             && samples.map(Vec::len).all(|len| len == built.model.constraints.len());
         fits.then_some(moment)
@@ -515,6 +521,7 @@ mod tests {
             steps: 7,
             wall_seconds: 1.0,
             worst_balance: 0.0,
+            worst_hourglass: (0.0, 0.0),
             history: History::default(),
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
@@ -572,9 +579,9 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_1_is_as_it_was() {
+    fn the_layout_of_format_2_is_as_it_was() {
         let state = State::<f32>::at_rest(&built("").model);
         let bytes = postcard::to_stdvec(&state).unwrap();
-        assert_eq!((FORMAT, bytes.len()), (1, 719));
+        assert_eq!((FORMAT, bytes.len()), (2, 1082));
     }
 }

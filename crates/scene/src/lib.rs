@@ -54,8 +54,8 @@ mod testing;
 pub use build::{Built, BuiltBody, build};
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use output::{
-    BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, Summary, failed_input,
-    failed_output, number,
+    AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,
+    Summary, failed_input, failed_output, number,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Plan, SAFETY, plan};

@@ -8,7 +8,7 @@ use pliant_mechanics::model::Motion;
 
 use crate::build::Built;
 use crate::diagnostic::counted;
-use crate::output::{bodies, number};
+use crate::output::{AddedMass, bodies, number};
 use crate::plan::Plan;
 use crate::registry::OutputTable;
 use crate::scene::Scene;
@@ -98,7 +98,7 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
             }
         }?;
     }
-    write_step(page, scene, plan)?;
+    write_step(page, scene, built, plan)?;
     for remark in built.warnings.iter().map(ToString::to_string).chain(built.notes.iter().cloned()) {
         writeln!(page, "note: {remark}")?;
     }
@@ -125,7 +125,7 @@ fn describe_load(built: &Built, load: &Load) -> String {
     }
 }
 
-fn write_step(page: &mut String, scene: &Scene, plan: &Plan) -> fmt::Result {
+fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> fmt::Result {
     let seconds = plan.steps as f64 * plan.limit.seconds_per_call;
     writeln!(page, "\ncritical step:")?;
     writeln!(page, "  element bound {} s, set by {}", number(plan.bound.step), plan.limiting)?;
@@ -144,6 +144,14 @@ fn write_step(page: &mut String, scene: &Scene, plan: &Plan) -> fmt::Result {
     )?;
     if let Some(note) = &plan.note {
         writeln!(page, "  {note}")?;
+    }
+    if let Some(AddedMass { mass, percent, elements, .. }) = AddedMass::new(built) {
+        let mass = number(mass);
+        writeln!(
+            page,
+            "  mass scaling  adds {mass} kg, {percent:.2} %, to {}",
+            counted(elements, "element")
+        )?;
     }
     writeln!(
         page,

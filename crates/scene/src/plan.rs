@@ -9,7 +9,7 @@ use crate::format::{SolverName, StepChoice};
 use crate::output::number;
 use crate::scene::Scene;
 
-/// Part of the element bound that an automatic step takes.
+/// Part of the true limit that an automatic step takes.
 pub const SAFETY: f64 = 0.9;
 
 /// The step of a run and what limits it.
@@ -79,13 +79,13 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
                     "the element bound {} s is set by {limiting}; take `step = \"auto\"` ({} s), a step below {} s, or \
                      a mesh without small cells there",
                     number(bound.step),
-                    number(SAFETY * bound.step),
-                    number(SAFETY * limit.step)
+                    number(automatic(&bound, &limit)),
+                    number(limit.step)
                 );
                 let place = scene.source.span(&["run", "step"]);
                 return fail(Diagnostic::error(message).at(place, "too large").help(help));
             }
-            note_on_step(step, bound.step, limit.step)
+            note_on_step(step, limit.step)
         }
         _ => None,
     };
@@ -101,7 +101,7 @@ impl Plan {
             StepChoice::Seconds(step) => step,
             StepChoice::Auto(_) => match scene.run.solver {
                 SolverName::QuasiStatic => until / f64::from(scene.run.load_steps),
-                SolverName::Explicit => SAFETY * self.bound.step,
+                SolverName::Explicit => automatic(&self.bound, &self.limit),
             },
         };
         let steps = (until / asked - 1e-9).ceil().max(1.0);
@@ -109,13 +109,16 @@ impl Plan {
     }
 }
 
-fn note_on_step(step: f64, bound: f64, limit: f64) -> Option<String> {
-    (step > bound).then(|| {
+/// The automatic step; the element bound stands in where every node is held and there is no limit.
+fn automatic(bound: &ElementBound, limit: &TrueLimit) -> f64 {
+    SAFETY * if limit.step.is_finite() { limit.step } else { bound.step }
+}
+
+fn note_on_step(step: f64, limit: f64) -> Option<String> {
+    (step > SAFETY * limit).then(|| {
         format!(
-            "the step {} s lies between the element bound {} s and the true limit {} s: stable at rest, with little \
-             reserve for deformation",
+            "the step {} s lies close to the true limit {} s: stable at rest, with little reserve for deformation",
             number(step),
-            number(bound),
             number(limit)
         )
     })
@@ -148,12 +151,12 @@ mod tests {
     }
 
     #[test]
-    fn an_automatic_step_is_a_whole_part_of_the_duration_below_the_element_bound() {
+    fn an_automatic_step_is_a_whole_part_of_the_duration_below_the_true_limit() {
         let plan = planned("").unwrap();
-        assert!(plan.step <= SAFETY * plan.bound.step && plan.bound.step <= plan.limit.step);
+        assert!(plan.step <= SAFETY * plan.limit.step && plan.bound.step <= plan.limit.step);
         assert!((plan.step * plan.steps as f64 - 0.1).abs() < 1e-15);
         assert!(
-            0.1 / (plan.steps - 1) as f64 > SAFETY * plan.bound.step,
+            0.1 / (plan.steps - 1) as f64 > SAFETY * plan.limit.step,
             "one step fewer would be too large"
         );
         assert_eq!((plan.limiting.body.as_str(), plan.limiting.element.as_str()), ("cube", "hex8"));
@@ -164,9 +167,9 @@ mod tests {
     fn a_step_is_held_against_bound_and_true_limit() {
         let automatic = planned("").unwrap();
         let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
-        let between = asked(0.5 * (automatic.bound.step + automatic.limit.step)).unwrap();
-        assert!(between.note.is_some_and(|note| note.contains("between the element bound")));
-        assert!(asked(0.5 * automatic.bound.step).unwrap().note.is_none());
+        let close = asked(0.95 * automatic.limit.step).unwrap();
+        assert!(close.note.is_some_and(|note| note.contains("close to the true limit")));
+        assert!(asked(automatic.bound.step.min(0.9 * automatic.limit.step)).unwrap().note.is_none());
         let refused = asked(1.001 * automatic.limit.step).unwrap_err().plain().to_string();
         for piece in [
             "cube.toml:",

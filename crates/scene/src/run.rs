@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use pliant_mechanics::stability::Stability;
 use pliant_mechanics::{Energies, Observable, Real, State};
 use serde::{Deserialize, Serialize};
 
 use crate::build::Built;
 use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
-use crate::format::Precision;
+use crate::format::{Precision, SolverName};
 use crate::output::{
     FailureSummary, Frame, OutputError, OutputFolder, PLOT, SUMMARY, Schedule, Scheduled, Summary, markdown,
     observers, plot, summarise,
@@ -60,6 +61,10 @@ pub(crate) struct Outcome {
     pub energies: Energies,
     pub worst_balance: f64,
     pub balance_floor: f64,
+    /// The largest hourglass energy over the internal one, and its time [s].
+    pub worst_hourglass: (f64, f64),
+    /// What was seen of the largest stable step; `None` of a run without inertia.
+    pub stability: Option<Stability>,
     pub reactions: Vec<[f64; 3]>,
     pub history: History,
     pub files: Vec<PathBuf>,
@@ -114,7 +119,7 @@ pub fn run_with(
         let time = Some(outcome.time);
         outcome.failure.get_or_insert_with(|| FailureSummary::output(&error, time));
     }
-    Ok(summarise(built, plan, &outcome))
+    Ok(summarise(scene, built, plan, &outcome))
 }
 
 /// Writes the plot and the page that shows it.
@@ -130,7 +135,7 @@ fn write_pages(
         .map_err(|reason| OutputError::new(&folder.path().join(PLOT), reason))?;
     outcome.files.push(folder.write(PLOT, &svg)?);
     outcome.files.push(page);
-    let text = markdown(scene, built, plan, outcome, &summarise(built, plan, outcome));
+    let text = markdown(scene, built, plan, outcome, &summarise(scene, built, plan, outcome));
     let written = folder.write(SUMMARY, &text);
     if written.is_err() {
         outcome.files.pop();
@@ -192,6 +197,8 @@ fn go<R: Real>(
         energies: *solver.energies(),
         worst_balance: course.worst_balance,
         balance_floor: course.solver.balance_floor(),
+        worst_hourglass: course.worst_hourglass,
+        stability: (scene.run.solver == SolverName::Explicit).then_some(course.state.stability),
         reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
         history: course.history,
         files: course.files.into_iter().chain(course.kept).collect(),
@@ -199,6 +206,17 @@ fn go<R: Real>(
         precision: R::PRECISION,
         resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
     })
+}
+
+/// Hourglass energy over internal energy; 0 while both together are below the floor [J] from which on energies mean
+/// something.
+fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
+    let Energies { internal, hourglass, .. } = *energies;
+    if hourglass > 0.0 && internal + hourglass > floor {
+        hourglass / internal.max(f64::MIN_POSITIVE)
+    } else {
+        0.0
+    }
 }
 
 /// A run under way.
@@ -212,6 +230,8 @@ struct Course<'a, R> {
     history: History,
     sampling: Schedule,
     worst_balance: f64,
+    /// The largest hourglass energy over the internal one, and its time [s].
+    worst_hourglass: (f64, f64),
     checkpoints: Option<Checkpoints<'a>>,
     /// Files written, without checkpoints.
     files: Vec<PathBuf>,
@@ -251,6 +271,7 @@ impl<'a, R: Real> Course<'a, R> {
             history: before.map_or_else(History::default, |before| before.history.clone()),
             sampling: before.map_or(Schedule::new(scene.scene.until / SAMPLES), |before| before.sampling),
             worst_balance: before.map_or(0.0, |before| before.worst_balance),
+            worst_hourglass: before.map_or((0.0, 0.0), |before| before.worst_hourglass),
             checkpoints: Checkpoints::new(scene, built, plan, folder, state.time),
             state,
             solver,
@@ -265,6 +286,10 @@ impl<'a, R: Real> Course<'a, R> {
         let observable = self.solver.observable();
         if self.state.work.largest > self.solver.balance_floor() {
             self.worst_balance = self.worst_balance.max(observable.energies().balance);
+        }
+        let share = hourglass_share(observable.energies(), self.solver.balance_floor());
+        if share > self.worst_hourglass.0 {
+            self.worst_hourglass = (share, self.state.time);
         }
         let last = self.is_last();
         if self.sampling.is_due(self.state.time, self.plan.step, last) {
@@ -297,6 +322,7 @@ impl<'a, R: Real> Course<'a, R> {
                 steps: self.state.steps,
                 wall_seconds,
                 worst_balance: self.worst_balance,
+                worst_hourglass: self.worst_hourglass,
                 history: self.history.clone(),
                 sampling: self.sampling,
                 outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),

@@ -1,5 +1,6 @@
 //! The solvers of a scene behind one face, so that one run loop serves them all.
 
+use pliant_mechanics::stability::Monitor;
 use pliant_mechanics::{
     CentralDifference, DynamicRelaxation, Equilibrium, Iteration, Observable, Real, RelaxationSettings, State,
 };
@@ -57,7 +58,16 @@ pub(crate) fn solver<'m, R: Real>(
     plan: &Plan,
 ) -> Result<Box<dyn Solver<R> + 'm>, pliant_mechanics::model::Contradiction> {
     Ok(match run.solver {
-        SolverName::Explicit => Box::new(CentralDifference::new(&built.model, plan.step)?),
+        SolverName::Explicit => {
+            let stepper = CentralDifference::new(&built.model, plan.step)?;
+            // Where every node is held there is no limit to watch.
+            Box::new(if plan.limit.step.is_finite() {
+                let on_unstable = run.on_unstable.unwrap_or_default();
+                stepper.watched(Monitor::new(&built.model, plan.limit.step, on_unstable))
+            } else {
+                stepper
+            })
+        }
         SolverName::QuasiStatic => {
             let precise = RelaxationSettings::default().tolerance;
             let tolerance =
@@ -78,12 +88,17 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
         CentralDifference::evaluate(self, state).map_err(|error| FailureSummary::from(&error))
     }
 
+    /// A whole step, in its parts.
     fn advance(
         &mut self,
         state: &mut State<R>,
         _watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
         CentralDifference::advance(self, state);
+        while !state.is_between_steps() {
+            Solver::evaluate(self, state)?;
+            CentralDifference::advance(self, state);
+        }
         Ok(())
     }
 

@@ -16,7 +16,7 @@ use super::{BATCH, CHUNK, Findings, ForceField, displacement_gradient, relative_
 use crate::Real;
 use crate::law::{AnyLaw, Deformation, Split};
 use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
-use crate::prony::Relaxation;
+use crate::prony::{Prony, Relaxation};
 use crate::state::History;
 use crate::tensor::{Symmetric, Tensor, Vector, cast};
 
@@ -145,7 +145,7 @@ impl<R: Real> AveragedTets<R> {
     ) -> Deformation<R> {
         let h = self.gradient_of(cell, displacement);
         let own = Deformation::from_displacement_gradient(&h);
-        findings.note_volume_ratio(cell, own.volume_ratio);
+        findings.note(cell, own.volume_ratio, &own.strain_twice);
         if self.averaging != Averaging::NiftySim {
             return own;
         }
@@ -252,5 +252,8 @@ impl<R: Real> ForceField<R> for AveragedTets<R> {
                 },
             );
         }
+    }
+    fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.relaxation.set_step(prony, step);
     }
 }

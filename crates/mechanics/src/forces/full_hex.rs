@@ -9,7 +9,7 @@ use crate::Real;
 use crate::element::GaussPoints;
 use crate::law::{AnyLaw, Deformation};
 use crate::model::{CellBlock, Solid};
-use crate::prony::Relaxation;
+use crate::prony::{Prony, Relaxation};
 use crate::state::History;
 use crate::tensor::{Symmetric, Vector, add, cast, scale};
 
@@ -108,7 +108,7 @@ impl<R: Real> FullHexes<R> {
         let u = relative_displacements(&self.nodes[cell], displacement);
         for (deformation, gradient) in batch.deformation.iter_mut().zip(&self.gradient[cell]) {
             *deformation = Deformation::from_displacement_gradient(&displacement_gradient(&u, gradient));
-            findings.note_volume_ratio(cell, deformation.volume_ratio);
+            findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
         }
         batch.evaluate(&self.law, 8, &self.fibre[8 * cell * self.families..8 * (cell + 1) * self.families]);
         forces.fill([R::ZERO; 3]);
@@ -151,5 +151,8 @@ impl<R: Real> ForceField<R> for FullHexes<R> {
                 },
             );
         }
+    }
+    fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.relaxation.set_step(prony, step);
     }
 }

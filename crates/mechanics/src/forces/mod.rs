@@ -17,10 +17,13 @@ pub(crate) use batch::pressure;
 use full_hex::FullHexes;
 use plain::SolidForces;
 
+use serde::{Deserialize, Serialize};
+
 use crate::Real;
 use crate::model::{Cells, Model, Solid};
+use crate::prony::Prony;
 use crate::state::History;
-use crate::tensor::{Tensor, Vector, add, scale, sub};
+use crate::tensor::{Symmetric, Tensor, Vector, add, scale, sub};
 
 /// Cells per parallel task; the sums of a task are added up in order.
 const CHUNK: usize = 256;
@@ -35,6 +38,50 @@ pub struct Findings {
     pub hourglass: f64,
     /// The first cell of the pass with det F ≤ 0 or not a number, and its det F.
     pub inverted: Option<(usize, f64)>,
+    /// How far the cells are deformed.
+    pub(crate) deformed: Deformed,
+}
+
+/// The extremes of deformation over some cells.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Deformed {
+    /// The least det F.
+    least_volume_ratio: f64,
+    /// The largest |C − I|².
+    largest_strain: f64,
+}
+
+impl Default for Deformed {
+    fn default() -> Self {
+        Self { least_volume_ratio: 1.0, largest_strain: 0.0 }
+    }
+}
+
+impl Deformed {
+    fn merge(self, other: Self) -> Self {
+        Self {
+            least_volume_ratio: self.least_volume_ratio.min(other.least_volume_ratio),
+            largest_strain: self.largest_strain.max(other.largest_strain),
+        }
+    }
+
+    /// Whether the least J or the largest stretch, taken as √(1 + |C − I|), differ by more than a factor.
+    pub(crate) fn differs(&self, other: &Self, factor: f64) -> bool {
+        let stretch = |d: &Self| (1.0 + d.largest_strain.sqrt()).sqrt();
+        let apart = |a: f64, b: f64| a > factor * b || b > factor * a;
+        apart(self.least_volume_ratio, other.least_volume_ratio) || apart(stretch(self), stretch(other))
+    }
+}
+
+/// What an evaluation of all cells found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Found {
+    /// Energy held by hourglass patterns [J].
+    pub hourglass: f64,
+    /// The first inverted cell as (solid, cell, det F).
+    pub inverted: Option<(usize, usize, f64)>,
+    /// How far the cells are deformed.
+    pub(crate) deformed: Deformed,
 }
 
 /// Internal forces of one solid, compiled for its element and number type.
@@ -50,12 +97,20 @@ pub trait ForceField<R>: Send + Sync {
         slots: &mut [Vector<R>],
         findings: &mut [Findings],
     );
+
+    /// Relaxes from now on over steps of `step` seconds.
+    fn set_step(&mut self, prony: &Prony, step: f64);
 }
 
 impl Findings {
-    /// Notes a cell whose det F is not above zero, the first one.
+    /// Notes how far a cell is deformed, by its det F and C − I, and whether it is the first whose det F is not above
+    /// zero.
     #[inline(always)]
-    fn note_volume_ratio<R: Real>(&mut self, cell: usize, j: R) {
+    fn note<R: Real>(&mut self, cell: usize, j: R, strain_twice: &Symmetric<R>) {
+        let [xx, yy, zz, xy, yz, xz] = strain_twice.0;
+        let strain = xx * xx + yy * yy + zz * zz + R::of(2.0) * (xy * xy + yz * yz + xz * xz);
+        self.deformed =
+            self.deformed.merge(Deformed { least_volume_ratio: j.to_f64(), largest_strain: strain.to_f64() });
         if self.inverted.is_none() && (j <= R::ZERO || j.partial_cmp(&R::ZERO).is_none()) {
             self.inverted = Some((cell, j.to_f64()));
         }
@@ -172,23 +227,25 @@ impl<R: Real> InternalForces<R> {
     }
 
     /// Evaluates all cells. `history` has one entry per solid, each empty for the instantaneous elastic response.
-    /// Returns the hourglass energy [J] and the first inverted cell as (solid, cell, det F).
-    pub(crate) fn evaluate(
-        &mut self,
-        displacement: &[Vector<R>],
-        history: &mut [History<R>],
-    ) -> (f64, Option<(usize, usize, f64)>) {
-        let mut hourglass = 0.0;
-        let mut inverted = None;
+    pub(crate) fn evaluate(&mut self, displacement: &[Vector<R>], history: &mut [History<R>]) -> Found {
+        let mut found = Found::default();
         for (index, field) in self.fields.iter_mut().enumerate() {
             let slots = &mut self.slots[self.field_offsets[index]..self.field_offsets[index + 1]];
             field.evaluate(displacement, &mut history[index], slots, &mut self.findings[index]);
             for findings in &self.findings[index] {
-                hourglass += findings.hourglass;
-                inverted = inverted.or(findings.inverted.map(|(cell, j)| (index, cell, j)));
+                found.hourglass += findings.hourglass;
+                found.inverted = found.inverted.or(findings.inverted.map(|(cell, j)| (index, cell, j)));
+                found.deformed = found.deformed.merge(findings.deformed);
             }
         }
-        (hourglass, inverted)
+        found
+    }
+
+    /// Relaxes from now on over steps of `step` seconds.
+    pub(crate) fn set_step(&mut self, model: &Model, step: f64) {
+        for (field, solid) in self.fields.iter_mut().zip(&model.solids) {
+            field.set_step(&solid.material.prony, step);
+        }
     }
 
     /// The internal force [N] on a node from the last evaluation.

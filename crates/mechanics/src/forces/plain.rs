@@ -7,7 +7,7 @@ use super::{BATCH, CHUNK, Findings, ForceField, displacement_gradient, relative_
 use crate::Real;
 use crate::law::{AnyLaw, Deformation};
 use crate::model::{CellBlock, Hourglass, Solid};
-use crate::prony::Relaxation;
+use crate::prony::{Prony, Relaxation};
 use crate::state::History;
 use crate::tensor::{Symmetric, Vector, add, cast, dot, scale};
 
@@ -60,7 +60,7 @@ impl<R: Real, const N: usize> SolidForces<R, N> {
                 let u = relative_displacements(&self.nodes[cell], displacement);
                 let h = displacement_gradient(&u, &self.gradient[cell]);
                 let deformation = Deformation::from_displacement_gradient(&h);
-                findings.note_volume_ratio(cell, deformation.volume_ratio);
+                findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
                 batch.deformation[point] = deformation;
             }
             let fibres = &self.fibre[cells.start * self.families..cells.end * self.families];
@@ -132,5 +132,8 @@ impl<R: Real, const N: usize> ForceField<R> for SolidForces<R, N> {
                 },
             );
         }
+    }
+    fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.relaxation.set_step(prony, step);
     }
 }

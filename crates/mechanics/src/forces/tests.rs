@@ -82,7 +82,8 @@ fn laws() -> [AnyLaw; 2] {
 
 fn forces(model: &Model, displacement: &[Vector<f64>]) -> (Vec<Vector<f64>>, f64) {
     let mut internal = InternalForces::new(model, 1.0);
-    let (hourglass, _) = internal.evaluate(displacement, &mut vec![History::default(); model.solids.len()]);
+    let hourglass =
+        internal.evaluate(displacement, &mut vec![History::default(); model.solids.len()]).hourglass;
     ((0..model.node_count()).map(|node| internal.at(node)).collect(), hourglass)
 }
 
@@ -262,7 +263,8 @@ fn an_inverted_cell_is_found() {
     let model = distorted_cube("tet4", laws()[0]);
     let mut displacement = vec![[0.0; 3]; model.node_count()];
     displacement[21] = [0.3, 0.0, 0.0];
-    let (_, inverted) = InternalForces::new(&model, 1.0).evaluate(&displacement, &mut [History::default()]);
+    let inverted =
+        InternalForces::new(&model, 1.0).evaluate(&displacement, &mut [History::default()]).inverted;
     let (solid, cell, determinant) = inverted.unwrap();
     assert_eq!(solid, 0);
     assert!(determinant < 0.0);

@@ -5,6 +5,7 @@ mod bodies;
 mod constraints;
 mod fibres;
 mod loads;
+mod mass;
 mod meshes;
 mod node_vectors;
 mod surfaces;
@@ -74,9 +75,11 @@ pub fn build(scene: &Scene) -> Result<Built, SceneErrors> {
         notes: Vec::new(),
     };
     builder.add_bodies();
+    builder.check_explicit_only();
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }
+    builder.scale_mass();
     builder.add_surfaces();
     builder.add_constraints();
     builder.add_loads();

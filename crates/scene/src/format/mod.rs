@@ -17,6 +17,7 @@ pub use load::{
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 
 use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
+use pliant_mechanics::stability::OnUnstable;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -45,10 +46,17 @@ pub struct RunTable {
     /// How the state goes from instant to instant.
     #[serde(default)]
     pub solver: SolverName,
-    /// Time step [s]; `auto`: 0.9 × the element bound of the critical step, or one of `load-steps` equal ones where
+    /// Time step [s]; `auto`: 0.9 × the true limit of the assembled model at rest, or one of `load-steps` equal ones where
     /// the solver is `quasi-static`.
     #[serde(default)]
     pub step: StepChoice,
+    /// What an explicit run does when the largest stable step of the deformed model, watched during the run, falls below
+    /// its step; if not given, `substep`.
+    #[serde(default)]
+    pub on_unstable: Option<OnUnstable>,
+    /// Makes the elements that limit an explicit step heavier.
+    #[serde(default)]
+    pub mass_scaling: Option<MassScalingTable>,
     /// Load steps of a quasi-static run with `step = "auto"`.
     #[serde(default = "ten")]
     #[schemars(range(min = 1, max = 1_000_000))]
@@ -74,6 +82,16 @@ pub struct CheckpointTable {
     /// Simulated time between them [s]; there is one at the end, too.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
+}
+
+/// Mass added for a larger step. It resists acceleration (and so damping acts on it); gravity and other loads act on the
+/// mass of the material, so that equilibria and their forces do not change.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct MassScalingTable {
+    /// Elements whose bound of the critical step is below this [s] become so heavy that they reach it.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub target_step: f64,
 }
 
 fn ten() -> u32 {

@@ -389,7 +389,8 @@ impl Writer {
         let _ = write!(
             scene,
             "\n[scene]\ntitle = \"{stem}\"\nuntil = {until:?}  # the total time {total:?} s and NiftySim's last step\n\n\
-             [run]\nprecision = \"single\"  # as NiftySim\nstep = {step:?}\n\n"
+             [run]\nprecision = \"single\"  # as NiftySim\nstep = {step:?}\n\
+             on-unstable = \"report\"  # NiftySim goes on at the same step\n\n"
         );
         for (index, law) in self.laws.iter().enumerate() {
             let _ = writeln!(scene, "[law.material-{index}]\n{}\n", law.lines().join("\n"));

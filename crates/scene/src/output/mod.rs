@@ -4,6 +4,7 @@ mod csv;
 mod fields;
 mod folder;
 mod plot;
+mod stability;
 mod summary;
 mod vtu;
 
@@ -14,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use folder::OutputFolder;
 pub(crate) use folder::{PLOT, SUMMARY};
+pub use stability::{AddedMass, StabilitySummary};
 pub use summary::{
     BodySummary, FailureSummary, LoadStepSummary, Summary, failed_input, failed_output, number,
 };

@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
 use super::OutputError;
+use super::stability::{AddedMass, StabilitySummary, doubts};
 use crate::build::Built;
 use crate::plan::{LimitingElement, Plan};
 use crate::run::{History, Outcome};
@@ -29,7 +30,7 @@ pub struct Summary {
     pub nodes: usize,
     /// Number of elements.
     pub elements: usize,
-    /// Mass [kg].
+    /// Mass of the materials [kg].
     pub mass: f64,
     /// Time step [s].
     pub step: f64,
@@ -45,11 +46,17 @@ pub struct Summary {
     pub wall_seconds: f64,
     /// Simulated time over wall time.
     pub real_time_factor: f64,
+    /// What was seen of the largest stable step; `null` of a quasi-static run.
+    pub stability: Option<StabilitySummary>,
+    /// What mass scaling adds; `null` without it.
+    pub added_mass: Option<AddedMass>,
     /// Imbalance of the energies at the end, as a fraction of the largest.
     pub energy_balance: f64,
     /// Force [N] of each constraint at the end, by name.
     #[serde(serialize_with = "as_map")]
     pub reactions: Vec<(String, [f64; 3])>,
+    /// What to know before trusting the result.
+    pub warnings: Vec<String>,
     /// Files written, as paths.
     pub files: Vec<String>,
     /// Simulated time at the end [s].
@@ -91,7 +98,7 @@ pub struct LoadStepSummary {
 /// Why a run failed or an input was refused.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureSummary {
-    /// `not-finite`, `inverted`, `unbalanced`, `not-converged`, `output`, `input` or `interrupted`.
+    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `not-converged`, `output`, `input` or `interrupted`.
     pub kind: &'static str,
     /// The body, where it is about one.
     pub body: Option<String>,
@@ -127,7 +134,7 @@ fn empty(status: &str, error: FailureSummary) -> Json {
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
         "true_limit": null, "limiting_element": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
-        "energy_balance": null, "reactions": {}, "files": [],
+        "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
 
@@ -188,6 +195,9 @@ impl From<&StepError> for FailureSummary {
             StepError::Inverted { body, element, node, time, .. } => {
                 ("inverted", body, Some(*element), *node, *time)
             }
+            StepError::BelowLimit { body, element, node, time, .. } => {
+                ("unstable", body, Some(*element), *node, *time)
+            }
             StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
         };
         Self { body: Some(body.clone()), element, node: Some(node), ..Self::about(kind, message, Some(time)) }
@@ -215,7 +225,8 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
 }
 
 /// Puts together what a run came to.
-pub(crate) fn summarise(built: &Built, plan: &Plan, outcome: &Outcome) -> Summary {
+pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Outcome) -> Summary {
+    let stability = StabilitySummary::new(scene, plan, outcome);
     let reactions = built.model.constraints.iter().zip(&outcome.reactions);
     Summary {
         status: match &outcome.failure {
@@ -235,6 +246,9 @@ pub(crate) fn summarise(built: &Built, plan: &Plan, outcome: &Outcome) -> Summar
         steps: outcome.steps,
         wall_seconds: outcome.wall_seconds,
         real_time_factor: outcome.time / outcome.wall_seconds.max(f64::MIN_POSITIVE),
+        warnings: doubts(built, outcome, stability.as_ref()),
+        stability,
+        added_mass: AddedMass::new(built),
         energy_balance: outcome.energies.balance,
         reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
@@ -303,8 +317,15 @@ fn write_page(
     writeln!(page, "| step | {} s |", number(plan.step))?;
     writeln!(page, "| element bound | {} s, set by {} |", number(plan.bound.step), plan.limiting)?;
     writeln!(page, "| true limit (assembled operator) | {} s |", number(plan.limit.step))?;
+    if let Some(AddedMass { mass, percent, elements, .. }) = &summary.added_mass {
+        let mass = number(*mass);
+        writeln!(page, "| mass added by scaling | {mass} kg, {percent:.2} %, to {elements} elements |")?;
+    }
     if let Some(note) = &plan.note {
         writeln!(page, "\n{note}.")?;
+    }
+    if let Some(stability) = &summary.stability {
+        writeln!(page, "\nDuring the run: {stability}.")?;
     }
     write_energies(page, outcome)?;
     write_reactions(page, built, outcome)?;
@@ -315,8 +336,10 @@ fn write_page(
     writeln!(page, "| per element and step | {} ns |", number(summary.wall_seconds / work.max(1.0) * 1e9))?;
     writeln!(page, "| threads | {} |", outcome.threads)?;
     writeln!(page, "| precision | {} |", outcome.precision)?;
-    let remarks: Vec<String> =
-        built.warnings.iter().map(ToString::to_string).chain(built.notes.iter().cloned()).collect();
+    let doubts = summary.warnings.iter().map(|doubt| format!("**Warning:** {doubt}"));
+    let remarks: Vec<String> = (doubts.chain(built.warnings.iter().map(ToString::to_string)))
+        .chain(built.notes.iter().cloned())
+        .collect();
     if !remarks.is_empty() {
         writeln!(page, "\n## Remarks\n")?;
         remarks.iter().try_for_each(|remark| writeln!(page, "* {remark}"))?;

@@ -1,0 +1,425 @@
+//! The largest stable step of a deformed state, watched during a run.
+//!
+//! A cell's own limit is Δt_e = 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
+//! ([`tangent`](crate::tangent)); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the true
+//! limit L of a reference state, at first rest, the limit now is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e),
+//! where r_e² is the stiffness of the cell in the reference state over that now, the smaller one of the ratios for all
+//! modes and for plane waves. So a cell that is slower than the assembly counts with its own limit, and one that the
+//! assembly holds back, with its change. Measured on deformed bodies against the true limit about their state, it is 0 to
+//! 25 % too small; of fibres that carry tension only, whose stiffness jumps at rest, up to 4.3 % too large:
+//! `validation/tests/stability.rs`.
+//!
+//! Where this estimate falls below the step it may be the cells in question that do not matter. Then the true limit
+//! of the current state is found, by as many force evaluations as some 50 to 100 steps take, and the current state becomes
+//! the reference.
+//!
+//! Stiffness is found for the cells that stand first in two cheap orders, one by an isotropic guess of their speed
+//! and one by stretch: 18 stresses and the eigenvalue problems cost as much as 50 steps of a cell.
+//! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control
+//! does not change with deformation. Loads that follow the surface do not count.
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::Real;
+use crate::critical_step::{limit_alone, scaled_bound};
+use crate::forces::Deformed;
+use crate::model::{Model, Solid, with_cells};
+use crate::state::State;
+use crate::tangent::{Stiffness, gradient_square, stiffness};
+use crate::tensor::{Symmetric, Tensor, Vector, cast, dot, sub};
+
+/// Steps between two looks at the limit.
+pub const CHECK_EVERY: u64 = 50;
+/// A look is taken earlier where the least J or the largest stretch has changed by this factor.
+pub const CHANGE: f64 = 1.1;
+/// Substeps are chosen so that they reach this part of the limit at the most.
+pub const RESERVE: f64 = 0.95;
+/// They are kept up to this part: the limit may fall before the next look.
+pub const KEEP: f64 = 0.97;
+/// Steps between two true limits, except where a run would stop.
+pub const REFERENCE_EVERY: u64 = 1000;
+/// The most substeps a step is cut into.
+pub const MOST_SUBSTEPS: u32 = 100;
+/// One in this many cells is looked at closely, for each of the two orders …
+const SHARE: usize = 256;
+/// … and at least this many.
+const LEAST: usize = 16;
+
+/// What a run does when the limit falls below its step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnUnstable {
+    /// Cut the steps into equal parts until the limit recovers.
+    #[default]
+    Substep,
+    /// End with an error.
+    Stop,
+    /// Go on at the same step; the smallest limit is reported.
+    Report,
+}
+
+/// How the steps of a run are cut, and what was seen of the limit. Part of the state, so that a copy of it goes on alike.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stability {
+    /// Parts of the step under way, or of the last one.
+    pub substeps: u32,
+    /// Parts of the step under way already done; 0 between steps.
+    pub done: u32,
+    /// Looks taken at the limit.
+    pub checks: u64,
+    /// True limits found since the beginning.
+    pub true_limits: u32,
+    /// The last look.
+    pub last: Option<Look>,
+    /// The look with the smallest limit.
+    pub smallest: Option<Look>,
+    /// Steps at the start of which the limit was known to be below the whole step.
+    pub steps_below: u64,
+    /// How often whole steps were given up for substeps.
+    pub cuts: u32,
+    /// Time [s] of the first cut.
+    pub first_cut: Option<f64>,
+    /// Time [s] at which the last step that was cut began.
+    pub last_cut: Option<f64>,
+    /// The most parts of a step.
+    pub most_substeps: u32,
+    /// Substeps beyond one a step, in all.
+    pub extra_steps: u64,
+    /// The last true limit and the steps done then; its state is [`State::reference`](crate::State::reference).
+    pub(crate) reference: Option<(f64, u64)>,
+    /// Deformation at the last look.
+    pub(crate) deformed: Deformed,
+    /// Steps done at the last look.
+    pub(crate) looked_at: u64,
+}
+
+impl Default for Stability {
+    fn default() -> Self {
+        Self {
+            substeps: 1,
+            done: 0,
+            checks: 0,
+            true_limits: 0,
+            reference: None,
+            last: None,
+            smallest: None,
+            steps_below: 0,
+            cuts: 0,
+            first_cut: None,
+            last_cut: None,
+            most_substeps: 1,
+            extra_steps: 0,
+            deformed: Deformed::default(),
+            looked_at: 0,
+        }
+    }
+}
+
+impl Stability {
+    /// Whether it can be of a state between two steps of a model.
+    pub fn fits(&self, model: &Model) -> bool {
+        let known = |look: &Look| {
+            model.solids.get(look.solid).is_some_and(|solid| look.cell < solid.cells.len())
+                && look.limit > 0.0
+        };
+        self.done == 0
+            && (1..=MOST_SUBSTEPS).contains(&self.substeps)
+            && self.last.iter().chain(&self.smallest).all(known)
+    }
+
+    /// Records a look and the deformation it was taken at.
+    pub(crate) fn note(&mut self, look: Look, deformed: Deformed, steps: u64) {
+        self.checks += 1;
+        (self.last, self.deformed, self.looked_at) = (Some(look), deformed, steps);
+        if self.smallest.is_none_or(|smallest| look.limit < smallest.limit) {
+            self.smallest = Some(look);
+        }
+    }
+
+    /// Records into how many parts the step that begins now is cut.
+    pub(crate) fn note_substeps(&mut self, substeps: u32, time: f64) {
+        if substeps > 1 {
+            self.cuts += u32::from(self.substeps == 1);
+            self.first_cut.get_or_insert(time);
+            self.last_cut = Some(time);
+            self.most_substeps = self.most_substeps.max(substeps);
+            self.extra_steps += u64::from(substeps) - 1;
+        }
+    }
+}
+
+/// The parts into which a step is cut, from how many there are now and the limit; `None` if more than
+/// [`MOST_SUBSTEPS`] are needed. Fewer than now only where they keep the reserve, so that a limit that hovers at a
+/// number of parts does not make it change all the time.
+pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
+    let enough = (step / (RESERVE * limit)).ceil();
+    if enough > f64::from(MOST_SUBSTEPS) || enough.is_nan() {
+        return None;
+    }
+    let enough = (enough as u32).max(1);
+    let stable = step / f64::from(now) <= KEEP * limit;
+    Some(if stable { now.min(enough) } else { enough })
+}
+
+/// The limit at an instant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Look {
+    /// Time [s].
+    pub time: f64,
+    /// The largest stable step [s], estimated or true.
+    pub limit: f64,
+    /// The solid of the cell that sets it.
+    pub solid: usize,
+    /// The cell in that solid.
+    pub cell: usize,
+}
+
+/// Watches the largest stable step of a model. Holds constants and scratch, and what follows from the reference.
+pub struct Monitor {
+    on_unstable: OnUnstable,
+    solids: Vec<Watch>,
+    /// The reference of the state that the watch is made for.
+    reference: Option<(f64, u64)>,
+}
+
+/// The cells of a solid under watch.
+struct Watch {
+    /// L [s].
+    limit: f64,
+    /// Of each cell in the reference state, once it was needed.
+    reference: Vec<Option<Stiffness>>,
+    /// λ of hourglass control alone, over V [Pa/m²].
+    hourglass: Vec<f64>,
+    /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with the element bound Δt_e at rest: brings the guesses of all cells to one scale.
+    weight: Vec<f64>,
+    /// What stands first in the two orders.
+    rank: Vec<[f64; 2]>,
+    order: [Vec<u32>; 2],
+    /// Limit [s] and reference of the cells looked at closely.
+    found: Vec<(f64, Stiffness)>,
+}
+
+impl Monitor {
+    /// A monitor of a model whose limit at rest is `limit` [s].
+    pub fn new(model: &Model, limit: f64, on_unstable: OnUnstable) -> Self {
+        let solids = model.solids.iter().map(|solid| Watch::new(model, solid, limit)).collect();
+        Self { on_unstable, solids, reference: None }
+    }
+
+    /// What to do when the limit falls below the step.
+    pub fn on_unstable(&self) -> OnUnstable {
+        self.on_unstable
+    }
+
+    /// Takes on the reference of a state, where it has another one than before.
+    pub(crate) fn refer_to<R>(&mut self, state: &State<R>) {
+        let reference = state.stability.reference;
+        if let (true, Some((limit, _))) = (self.reference != reference, reference) {
+            for watch in &mut self.solids {
+                watch.limit = limit;
+                watch.reference.fill(None);
+            }
+        }
+        self.reference = reference;
+    }
+
+    /// Whether an estimate needs the true limit: it asks for other than whole steps, and the last one is long past.
+    pub(crate) fn doubts<R>(&self, state: &State<R>, limit: f64, step: f64, now: u32) -> bool {
+        let rested = state
+            .stability
+            .reference
+            .is_none_or(|(_, steps)| state.steps >= steps.saturating_add(REFERENCE_EVERY));
+        match self.on_unstable {
+            OnUnstable::Substep => rested && substeps(step, limit, now) != Some(1),
+            OnUnstable::Stop => KEEP * limit < step,
+            OnUnstable::Report => rested && KEEP * limit < step,
+        }
+    }
+
+    /// The limit of a deformed state: the estimate [s], the solid and the cell that set it; `None` without cells or
+    /// where no cell's stiffness is a number. `reference` is the state whose true limit is known.
+    pub fn limit<R: Real>(
+        &mut self,
+        model: &Model,
+        displacement: &[Vector<R>],
+        reference: &[Vector<R>],
+    ) -> Option<(f64, usize, usize)> {
+        let solids = self.solids.iter_mut().zip(&model.solids).enumerate();
+        solids
+            .filter_map(|(index, (watch, solid))| {
+                watch.rank(solid, displacement);
+                watch.pick();
+                let found = [0, 1].map(|by| watch.smallest(model, solid, displacement, reference, by));
+                smaller(found[0], found[1]).map(|(limit, cell)| (limit, index, cell))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// The same with every cell looked at closely, as a measure of what [`limit`](Self::limit) leaves out.
+    pub fn limit_of_all<R: Real>(
+        &self,
+        model: &Model,
+        displacement: &[Vector<R>],
+        reference: &[Vector<R>],
+    ) -> Option<(f64, usize, usize)> {
+        let solids = self.solids.iter().zip(&model.solids).enumerate();
+        solids
+            .filter_map(|(index, (watch, solid))| {
+                let limit = |cell: usize| (watch.look(model, solid, displacement, reference, cell).0, cell);
+                let all = (0..solid.cells.len()).into_par_iter().map(limit).map(finite);
+                all.reduce(|| None, smaller).map(|(limit, cell)| (limit, index, cell))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+}
+
+impl Watch {
+    fn new(model: &Model, solid: &Solid, limit: f64) -> Self {
+        let count = solid.cells.len();
+        let modulus = solid.material.law.longitudinal_modulus();
+        let weight = |cell: usize| {
+            let square = gradient_square_of(solid, cell);
+            let slowest = scaled_bound(model, solid, cell).max(limit);
+            1.0 / (product_square(&square, &Symmetric::IDENTITY).sqrt() * modulus * slowest * slowest)
+        };
+        Self {
+            limit,
+            reference: vec![None; count],
+            hourglass: (0..count).map(|cell| hourglass_modulus(solid, cell)).collect(),
+            weight: (0..count).map(weight).collect(),
+            rank: vec![[0.0; 2]; count],
+            order: [(0..count as u32).collect(), (0..count as u32).collect()],
+            found: vec![(0.0, Stiffness::default()); picked(count)],
+        }
+    }
+
+    /// Finds both ranks of every cell: the squared speed by an isotropic guess, and the squared stretch.
+    fn rank<R: Real>(&mut self, solid: &Solid, displacement: &[Vector<R>]) {
+        let bulk = solid.material.law.small_strain().bulk;
+        let rest = solid.material.law.longitudinal_modulus();
+        let weight = &self.weight;
+        self.rank.par_iter_mut().enumerate().with_min_len(256).for_each(|(cell, rank)| {
+            let (h, square) =
+                (displacement_gradient(solid, cell, displacement), gradient_square_of(solid, cell));
+            let strain = Symmetric::green_lagrange_twice(&h);
+            let c = strain + Symmetric::IDENTITY;
+            let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
+            let along_fibres = solid.fibres(cell).iter().map(|&fibre| c.quadratic(fibre));
+            let stretch = along_fibres.reduce(f64::max).unwrap_or(c.trace() / 3.0);
+            // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
+            let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * c.trace() / 3.0;
+            // |G C⁻¹| over |G|: how much closer the deformed faces lie, the closest pair counting most.
+            let closeness = product_square(&square, &(c.cofactor() * (1.0 / (j * j)))).sqrt();
+            *rank = [closeness * modulus * weight[cell], stretch];
+        });
+    }
+
+    /// Brings the cells that stand first to the front of each order.
+    fn pick(&mut self) {
+        let (rank, picked) = (&self.rank, self.found.len());
+        for (by, order) in self.order.iter_mut().enumerate() {
+            // Cells of equal rank go by number, so that the choice does not depend on what came before.
+            let first =
+                |a: &u32, b: &u32| rank[*b as usize][by].total_cmp(&rank[*a as usize][by]).then(a.cmp(b));
+            if picked < order.len() {
+                order.select_nth_unstable_by(picked, first);
+            }
+        }
+    }
+
+    /// The smallest limit [s] of the cells that stand first in an order, and its cell.
+    fn smallest<R: Real>(
+        &mut self,
+        model: &Model,
+        solid: &Solid,
+        displacement: &[Vector<R>],
+        reference: &[Vector<R>],
+        by: usize,
+    ) -> Option<(f64, usize)> {
+        let mut found = std::mem::take(&mut self.found);
+        found.par_iter_mut().zip(&self.order[by]).with_min_len(8).for_each(|(found, &cell)| {
+            *found = self.look(model, solid, displacement, reference, cell as usize);
+        });
+        let mut least = None;
+        for (&(limit, before), &cell) in found.iter().zip(&self.order[by]) {
+            self.reference[cell as usize] = Some(before);
+            least = smaller(least, finite((limit, cell as usize)));
+        }
+        self.found = found;
+        least
+    }
+
+    /// The limit [s] that a cell sets, and its stiffness in the reference state.
+    fn look<R: Real>(
+        &self,
+        model: &Model,
+        solid: &Solid,
+        displacement: &[Vector<R>],
+        reference: &[Vector<R>],
+        cell: usize,
+    ) -> (f64, Stiffness) {
+        let in_state = |displacement: &[Vector<R>]| {
+            let h = displacement_gradient(solid, cell, displacement);
+            let square = gradient_square_of(solid, cell);
+            let Stiffness { mode, wave } = stiffness(&solid.material.law, solid.fibres(cell), &h, &square);
+            Stiffness { mode: mode.max(self.hourglass[cell]), wave }
+        };
+        let now = in_state(displacement);
+        let before = self.reference[cell].unwrap_or_else(|| in_state(reference));
+        let [mode, wave] = [before.mode / now.mode, before.wave / now.wave].map(f64::sqrt);
+        let own = limit_alone(model, solid, cell, now.mode);
+        (own.max(self.limit * mode.min(wave)), before)
+    }
+}
+
+/// How many of some cells are looked at closely for each order.
+fn picked(count: usize) -> usize {
+    (count / SHARE).max(LEAST).min(count)
+}
+
+/// A limit that is a number, with its cell.
+fn finite((limit, cell): (f64, usize)) -> Option<(f64, usize)> {
+    limit.is_finite().then_some((limit, cell))
+}
+
+/// The smaller limit; of equal ones that of the first cell.
+fn smaller(a: Option<(f64, usize)>, b: Option<(f64, usize)>) -> Option<(f64, usize)> {
+    match (a, b) {
+        (Some(x), Some(y)) => Some(if (y.0, y.1) < (x.0, x.1) { y } else { x }),
+        (found, None) | (None, found) => found,
+    }
+}
+
+/// c μ ΣB² [Pa/m²], see [`critical_step::cell_bound`](crate::critical_step::cell_bound).
+fn hourglass_modulus(solid: &Solid, cell: usize) -> f64 {
+    solid.cells.hourglass_modulus(cell) * solid.cells.gradient_square_sum(cell)
+}
+
+/// Σ B_a ⊗ B_a [1/m²].
+fn gradient_square_of(solid: &Solid, cell: usize) -> Symmetric<f64> {
+    with_cells!(&solid.cells, block => gradient_square(&block.rest[cell].gradient))
+}
+
+/// ∂u/∂X, the mean over the cell.
+fn displacement_gradient<R: Real>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
+    let mut h = Tensor::ZERO;
+    with_cells!(&solid.cells, block => {
+        let (nodes, gradient) = (&block.nodes[cell], &block.rest[cell].gradient);
+        let origin: Vector<f64> = cast(displacement[nodes[0] as usize]);
+        for (&node, &b) in nodes.iter().zip(gradient).skip(1) {
+            h.add_outer(sub(cast(displacement[node as usize]), origin), b);
+        }
+    });
+    h
+}
+
+/// tr (A B A B).
+fn product_square(a: &Symmetric<f64>, b: &Symmetric<f64>) -> f64 {
+    let (product, transposed) = {
+        let product = a.full().times_symmetric(b);
+        (product, product.transpose())
+    };
+    (0..3).map(|i| dot(product.0[i], transposed.0[i])).sum()
+}

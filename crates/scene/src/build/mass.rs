@@ -1,0 +1,55 @@
+//! Mass scaling, and what of `[run]` is for dynamics only.
+
+use super::Builder;
+use crate::diagnostic::{Diagnostic, counted};
+use crate::format::SolverName;
+use crate::output::number;
+
+/// Added mass, as a fraction, from which on a scene is doubted.
+const MUCH: f64 = 0.05;
+
+impl Builder<'_> {
+    /// Refuses what means nothing to a solver without inertia.
+    pub(super) fn check_explicit_only(&mut self) {
+        let run = &self.scene.run;
+        if run.solver != SolverName::QuasiStatic {
+            return;
+        }
+        let given =
+            [("on-unstable", run.on_unstable.is_some()), ("mass-scaling", run.mass_scaling.is_some())];
+        for (key, _) in given.into_iter().filter(|(_, given)| *given) {
+            let message = format!(
+                "`{key}` is for `solver = \"explicit\"`: quasi-static equilibria have no stable step"
+            );
+            self.error(
+                &["run", key],
+                message,
+                "means nothing here",
+                "remove it, or take `solver = \"explicit\"`",
+            );
+        }
+    }
+
+    pub(super) fn scale_mass(&mut self) {
+        let Some(table) = self.scene.run.mass_scaling else { return };
+        self.model.scale_mass(table.target_step);
+        let Some(scaling) = &self.model.mass_scaling else { return };
+        let (added, mass) = (scaling.total(), self.model.mass.iter().sum::<f64>());
+        let share = added / mass;
+        let told = format!(
+            "mass scaling to {} s makes {} of {} heavier: {} kg or {:.2} % of the mass is added",
+            number(table.target_step),
+            scaling.cells,
+            counted(self.model.cell_count(), "element"),
+            number(added),
+            share * 100.0
+        );
+        if share > MUCH {
+            let place = self.source().span(&["run", "mass-scaling"]);
+            let help = "motions become slower than they are; take a smaller `target-step`, or remove it to see what it changes";
+            self.out.push(Diagnostic::warning(told).at(place, "more than 5 %").help(help));
+        } else {
+            self.notes.push(told);
+        }
+    }
+}

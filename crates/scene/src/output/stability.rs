@@ -1,0 +1,146 @@
+//! What a run tells of its stable step, of added mass and of hourglass energy.
+
+use std::fmt;
+
+use pliant_mechanics::stability::{Look, OnUnstable};
+use serde::Serialize;
+
+use super::number;
+use crate::build::Built;
+use crate::diagnostic::counted;
+use crate::plan::Plan;
+use crate::run::Outcome;
+use crate::scene::Scene;
+
+/// Hourglass energy, as a fraction of the internal one, from which on a run is doubted.
+const MUCH_HOURGLASS: f64 = 0.05;
+
+/// What was seen of the largest stable step while it was watched.
+#[derive(Clone, Debug, Serialize)]
+pub struct StabilitySummary {
+    /// What the run does when the limit falls below its step.
+    pub on_unstable: OnUnstable,
+    /// How often the limit was looked at.
+    pub checks: u64,
+    /// The smallest limit seen [s]; `None` if it was never looked at.
+    pub smallest_limit: Option<f64>,
+    /// The smallest limit over the running step.
+    pub limit_over_step: Option<f64>,
+    /// When it was seen [s].
+    pub smallest_at: Option<f64>,
+    /// Steps during which the limit was known to be below the whole step.
+    pub steps_below: u64,
+    /// How often the run went from whole steps to cut ones.
+    pub cuts: u32,
+    /// Beginning of the first step that was cut [s].
+    pub first_cut: Option<f64>,
+    /// Beginning of the last step that was cut [s].
+    pub last_cut: Option<f64>,
+    /// The most parts of a step.
+    pub most_substeps: u32,
+    /// Steps taken beyond the whole ones.
+    pub extra_steps: u64,
+}
+
+impl StabilitySummary {
+    pub(crate) fn new(scene: &Scene, plan: &Plan, outcome: &Outcome) -> Option<Self> {
+        let seen = outcome.stability?;
+        let of = |value: fn(&Look) -> f64| seen.smallest.as_ref().map(value);
+        Some(Self {
+            on_unstable: scene.run.on_unstable.unwrap_or_default(),
+            checks: seen.checks,
+            smallest_limit: of(|look| look.limit),
+            limit_over_step: of(|look| look.limit).map(|limit| limit / plan.step),
+            smallest_at: of(|look| look.time),
+            steps_below: seen.steps_below,
+            cuts: seen.cuts,
+            first_cut: seen.first_cut,
+            last_cut: seen.last_cut,
+            most_substeps: seen.most_substeps,
+            extra_steps: seen.extra_steps,
+        })
+    }
+
+    /// Why the result may be wrong.
+    fn doubt(&self) -> Option<String> {
+        let fell = self.limit_over_step.is_some_and(|ratio| ratio < 1.0);
+        (fell && self.on_unstable == OnUnstable::Report)
+            .then(|| format!("{self}; take a smaller `step`, or `on-unstable = \"substep\"`"))
+    }
+}
+
+impl fmt::Display for StabilitySummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.smallest_limit, self.limit_over_step, self.smallest_at) {
+            (Some(limit), Some(ratio), Some(time)) => write!(
+                f,
+                "smallest stable step seen: {} s, {ratio:.2} × the step, at t = {} s",
+                number(limit),
+                number(time)
+            )?,
+            _ => write!(f, "the stable step was not looked at")?,
+        }
+        if let (Some(first), Some(last)) = (self.first_cut, self.last_cut) {
+            let [first, last] = [first, last].map(number);
+            let times = counted(self.cuts as usize, "time");
+            let extra = counted(self.extra_steps as usize, "extra step");
+            write!(
+                f,
+                "; steps were cut {times} between t = {first} s and {last} s, into {} parts at the most: {extra}",
+                self.most_substeps
+            )?;
+        } else if self.steps_below > 0 {
+            write!(f, "; it was below the step during {}", counted(self.steps_below as usize, "step"))?;
+        }
+        Ok(())
+    }
+}
+
+/// Mass that mass scaling adds.
+#[derive(Clone, Debug, Serialize)]
+pub struct AddedMass {
+    /// In all [kg].
+    pub mass: f64,
+    /// In percent of the mass of the materials.
+    pub percent: f64,
+    /// Elements made heavier.
+    pub elements: usize,
+    /// The smallest element bound with it [s].
+    pub target_step: f64,
+}
+
+impl AddedMass {
+    pub(crate) fn new(built: &Built) -> Option<Self> {
+        let scaling = built.model.mass_scaling.as_ref()?;
+        let (mass, whole) = (scaling.total(), built.model.mass.iter().sum::<f64>());
+        let percent = mass / whole * 100.0;
+        Some(Self { mass, percent, elements: scaling.cells, target_step: scaling.target_step })
+    }
+}
+
+/// What a user should know before trusting a result.
+pub(crate) fn doubts(built: &Built, outcome: &Outcome, stability: Option<&StabilitySummary>) -> Vec<String> {
+    let (share, time) = outcome.worst_hourglass;
+    let hourglass = (share > MUCH_HOURGLASS).then(|| {
+        let (of, remedy) = match share < 10.0 {
+            true => (format!("{:.1} % of the internal energy", share * 100.0), HOURGLASS_REMEDY),
+            false => ("more than ten times the internal energy".to_owned(), HOURGLASS_REMEDY),
+        };
+        let bodies: Vec<String> = (built.model.bodies.iter().enumerate())
+            .filter(|(index, _)| {
+                built.model.solids.iter().any(|solid| solid.body == *index && solid.cells.element() == "hex8")
+            })
+            .map(|(_, body)| format!("`{}`", body.name))
+            .collect();
+        format!(
+            "hourglass control holds {of} at t = {} s, more than 5 %: the shape of the elements of {} is not resolved; \
+             {remedy}",
+            number(time),
+            bodies.join(", ")
+        )
+    });
+    hourglass.into_iter().chain(stability.and_then(StabilitySummary::doubt)).collect()
+}
+
+const HOURGLASS_REMEDY: &str =
+    "try a finer mesh, `element = \"hex8-full\"`, another `hourglass`, or a load spread over more nodes";
