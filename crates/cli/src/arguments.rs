@@ -68,6 +68,38 @@ pub enum Command {
                       Exit codes: 0 all numbers within their tolerance, 1 one is not, 2 the input is wrong."
     )]
     Reproduce(Reproduce),
+    /// Measure what a step costs on this machine.
+    #[command(after_help = BENCH_HELP)]
+    Bench(Bench),
+}
+
+const BENCH_HELP: &str = "\
+Examples:
+  pliant bench                                   two minutes: all laws and elements, the thesis's series of meshes
+  pliant bench --full                            on to meshes of two million elements
+  pliant bench --list
+  pliant bench --only tet4-nh-55566 --only tet4-nh-55566-all
+  pliant bench --json > bench.json
+
+Keep the machine otherwise idle; least and most of the repeats show whether it was.";
+
+#[derive(Debug, clap::Args)]
+pub struct Bench {
+    /// Measure everything, not just the default selection.
+    #[arg(long, conflicts_with = "only")]
+    pub full: bool,
+    /// Say what there is, and measure nothing.
+    #[arg(long)]
+    pub list: bool,
+    /// Measure this row only; may be given several times. Three meshes or more of a series show its linear cost, too.
+    #[arg(long, value_name = "ID")]
+    pub only: Vec<String>,
+    /// Repeats of each row; the median counts.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub repeats: u16,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, clap::Args)]
@@ -208,6 +240,7 @@ impl Command {
         match self {
             Self::Run(run) => run.json,
             Self::Info(info) => info.json,
+            Self::Bench(bench) => bench.json,
             Self::Sweep(_)
             | Self::Check(_)
             | Self::New { .. }

@@ -17,6 +17,7 @@ use serde_json::{Map, Value as Json, json};
 use tempfile::TempDir;
 
 use crate::arguments::{self, Check, Command, Info, Overrides, Precision, Run};
+use crate::bench::bench;
 use crate::report::{self, Bar, Failure, say};
 use crate::reproduce::reproduce;
 
@@ -37,6 +38,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Info(arguments) => info(&arguments),
         Command::Import { model, out } => import(&model, &out),
         Command::Reproduce(arguments) => reproduce(&arguments),
+        Command::Bench(arguments) => bench(&arguments),
     }
 }
 

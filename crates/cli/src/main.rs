@@ -1,6 +1,7 @@
 //! `pliant`: real-time simulation of soft organs. Words and wiring only; the work is done by the libraries.
 
 mod arguments;
+mod bench;
 mod commands;
 mod report;
 mod reproduce;

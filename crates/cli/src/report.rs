@@ -126,6 +126,11 @@ impl Bar {
         self.0.set_message(progress.words(runs));
     }
 
+    pub fn update_bench(&self, progress: &pliant_bench::Progress) {
+        self.0.set_position((1000.0 * progress.part) as u64);
+        self.0.set_message(progress.now.clone());
+    }
+
     pub fn finish(&self) {
         self.0.finish_and_clear();
     }

@@ -6,20 +6,19 @@
 
 mod case;
 pub mod cases;
-mod machine;
 mod page;
 mod picture;
 mod plot;
 mod reference;
 mod report;
 mod run;
-mod specimen;
-mod tissue;
 
 pub use case::{Case, CaseError, Correction, Figure, Findings, Row, find};
 pub use cases::CASES;
+pub use pliant_bench::{
+    HOURGLASS, Hexes, Specimen, Tets, deformation, elastic, law, liver, liver_matrix, liver_relaxation,
+    soft_tissue,
+};
 pub use reference::{largest, mesh, numbers, reference};
 pub use report::{END, Report, START, is_own_file, replace_table};
 pub use run::{Equilibrium, relax, run, run_on, settle, smooth_step};
-pub use specimen::{HOURGLASS, Hexes, Specimen, Tets};
-pub use tissue::{deformation, elastic, law, liver, liver_matrix, liver_relaxation, soft_tissue};

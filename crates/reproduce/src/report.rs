@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
+use pliant_bench::Machine;
 use serde_json::json;
 
 use crate::case::{Case, Findings, Row};
-use crate::machine::Machine;
 use crate::page;
 
 /// The files of a report.

@@ -2,12 +2,11 @@
 //! hexahedra, single precision, all cores. Repeats of all models are interleaved, so that what else the machine does
 //! meets all alike; the median counts.
 
-use std::time::Instant;
-
+use pliant_bench::{Clocked, Spread};
+use pliant_mechanics::State;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::{Prony, PronyUpdate};
-use pliant_mechanics::{CentralDifference, State};
 use pliant_meshing::VolumeCell;
 use serde_json::json;
 
@@ -65,19 +64,14 @@ fn measure(cells: usize) -> Result<Vec<[f64; 4]>, CaseError> {
     // One step for all: that of the stiffest.
     let step = cubes.iter().map(|cube| 0.9 * cube.element_bound()).fold(f64::INFINITY, f64::min);
     let mut running = Vec::new();
-    for cube in &cubes {
-        running.push((CentralDifference::<f32>::new(&cube.model, step)?, State::at_rest(&cube.model)));
+    for Specimen { model, .. } in &cubes {
+        running.push(Clocked::<f32>::new(model, step, State::at_rest(model))?);
     }
-    let steps = (ELEMENT_STEPS / cells.pow(3)).max(2);
+    let steps = ELEMENT_STEPS / cells.pow(3);
     let mut times = vec![[0.0; 4]; REPEATS + 1];
     for repeat in &mut times {
-        for ((stepper, state), time) in running.iter_mut().zip(repeat) {
-            let started = Instant::now();
-            for _ in 0..steps {
-                stepper.evaluate(state)?;
-                stepper.advance(state);
-            }
-            *time = started.elapsed().as_secs_f64() / steps as f64;
+        for (cube, time) in running.iter_mut().zip(repeat) {
+            *time = cube.seconds_per_step(steps.max(2))?;
         }
     }
     // The first warms up and does not count.
@@ -86,9 +80,7 @@ fn measure(cells: usize) -> Result<Vec<[f64; 4]>, CaseError> {
 
 /// The median over the repeats of what is made of their times.
 fn median(repeats: &[[f64; 4]], of: impl Fn(&[f64; 4]) -> f64) -> f64 {
-    let mut values: Vec<f64> = repeats.iter().map(of).collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    Spread::of(repeats.iter().map(of)).median
 }
 
 fn compute() -> Result<Findings, CaseError> {

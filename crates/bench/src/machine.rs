@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// A machine, in words.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Machine {
+pub struct Machine {
     /// The processor's model.
     pub processor: String,
     /// Cores that may be used.

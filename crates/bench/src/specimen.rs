@@ -99,8 +99,7 @@ impl Specimen {
         material: &Material,
         fibre: Vector<f64>,
     ) -> Self {
-        let mesh = Block::new(size).mesh(Resolution::Counts(counts), cells, DEFAULT_CELL_LIMIT);
-        Self::new(mesh.unwrap_or_else(|error| panic!("{error}")), material, fibre)
+        Self::new(block(size, counts, cells), material, fibre)
     }
 
     /// The nodes of a face of the bounding box.
@@ -212,6 +211,12 @@ impl Specimen {
             (self.model.rest.iter().enumerate()).min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
         closest.map_or(0, |(node, _)| node)
     }
+}
+
+/// The mesh of [`Specimen::block`].
+pub(crate) fn block(size: [f64; 3], counts: [usize; 3], cells: VolumeCell) -> Mesh {
+    let mesh = Block::new(size).mesh(Resolution::Counts(counts), cells, DEFAULT_CELL_LIMIT);
+    mesh.unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn nodes_of<const N: usize>(cell: &[u32]) -> [u32; N] {

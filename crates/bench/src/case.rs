@@ -1,0 +1,320 @@
+//! What can be measured: cubes of 0.1 m, each of one element, one law, one precision and one number of threads.
+//!
+//! The edges 10, 16, 25 and 38 are those of thesis Fig. 6.7 (1,331 to 59,319 nodes); the larger ones lead on to 10⁶ cells.
+//! 21³ × 6 tets (55,566) and 30³ hexes (27,000) are the meshes on which all laws are compared.
+
+use std::thread;
+
+use pliant_mechanics::model::{Averaging, Material};
+use pliant_mechanics::prony::{Prony, PronyUpdate};
+use pliant_meshing::VolumeCell;
+
+use crate::specimen::block;
+use crate::{HOURGLASS, Hexes, Specimen, Tets, elastic, liver, liver_relaxation, soft_tissue};
+
+/// Edge of all cubes [m].
+pub(crate) const EDGE: f64 = 0.1;
+
+/// Cells along the edge of the cubes of the series: first the thesis's, then on to 10⁶ cells and more.
+const SERIES: [usize; 8] = [10, 16, 25, 38, 56, 70, 100, 126];
+/// How many of them the default selection measures.
+const THESIS: usize = 4;
+/// The most tets of a cube, and the most hexes.
+const MOST: usize = 2_100_000;
+/// Cells along the edge of the cube of `hex8-full`.
+const FULL_EDGE: usize = 16;
+
+/// An element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Element {
+    /// `tet4`
+    Tet4,
+    /// `tet4-anp`
+    Tet4Anp,
+    /// `hex8`
+    Hex8,
+    /// `hex8-full`
+    Hex8Full,
+}
+
+impl Element {
+    /// All.
+    pub const ALL: [Self; 4] = [Self::Tet4, Self::Tet4Anp, Self::Hex8, Self::Hex8Full];
+
+    /// Its name in a scene file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tet4 => "tet4",
+            Self::Tet4Anp => "tet4-anp",
+            Self::Hex8 => "hex8",
+            Self::Hex8Full => "hex8-full",
+        }
+    }
+
+    /// Nodes of a cell.
+    pub fn nodes(self) -> usize {
+        match self {
+            Self::Tet4 | Self::Tet4Anp => 4,
+            Self::Hex8 | Self::Hex8Full => 8,
+        }
+    }
+
+    /// Cells of a cube with `edge` grid cells along each edge.
+    pub fn cells(self, edge: usize) -> usize {
+        edge.pow(3) * if self.nodes() == 4 { 6 } else { 1 }
+    }
+
+    /// Cells along the edge of the cube on which all laws are compared.
+    fn reference_edge(self) -> usize {
+        match self {
+            Self::Tet4 | Self::Tet4Anp => 21,
+            Self::Hex8 => 30,
+            Self::Hex8Full => FULL_EDGE,
+        }
+    }
+}
+
+/// A law with its tissue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LawKind {
+    /// Neo-Hookean, brain-like: E = 3 kPa, ν = 0.45.
+    NeoHookean,
+    /// Transversely isotropic, liver-like.
+    Fibres,
+    /// The first, half of its isochoric stress relaxing (one Prony term).
+    NeoHookeanProny,
+    /// The second, likewise.
+    FibresProny,
+}
+
+impl LawKind {
+    /// All.
+    pub const ALL: [Self; 4] = [Self::NeoHookean, Self::Fibres, Self::NeoHookeanProny, Self::FibresProny];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NeoHookean => "NH",
+            Self::Fibres => "TI",
+            Self::NeoHookeanProny => "NH+Prony",
+            Self::FibresProny => "TI+Prony",
+        }
+    }
+
+    /// Whether it has fibres.
+    pub fn has_fibres(self) -> bool {
+        matches!(self, Self::Fibres | Self::FibresProny)
+    }
+
+    /// Whether it relaxes.
+    pub fn relaxes(self) -> bool {
+        matches!(self, Self::NeoHookeanProny | Self::FibresProny)
+    }
+
+    fn material(self) -> Material {
+        let law = if self.has_fibres() { liver() } else { soft_tissue() };
+        let prony = if self.relaxes() { liver_relaxation(PronyUpdate::Exact) } else { Prony::default() };
+        Material { prony, ..elastic(law) }
+    }
+}
+
+/// A number type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 32 bits.
+    Single,
+    /// 64 bits.
+    Double,
+}
+
+impl Precision {
+    /// Its name in a scene file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Double => "double",
+        }
+    }
+
+    /// Bytes of a number.
+    pub fn bytes(self) -> f64 {
+        match self {
+            Self::Single => 4.0,
+            Self::Double => 8.0,
+        }
+    }
+}
+
+/// How many threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Threads {
+    /// One.
+    One,
+    /// One for each core.
+    All,
+}
+
+impl Threads {
+    /// The number on this machine.
+    pub fn count(self) -> usize {
+        match self {
+            Self::One => 1,
+            Self::All => thread::available_parallelism().map_or(1, usize::from),
+        }
+    }
+}
+
+/// One thing to measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// The element.
+    pub element: Element,
+    /// The law.
+    pub law: LawKind,
+    /// Grid cells along the edge of the cube.
+    pub edge: usize,
+    /// The number type.
+    pub precision: Precision,
+    /// The threads.
+    pub threads: Threads,
+}
+
+impl Case {
+    /// What it is called on the command line: `tet4-nh-55566`, with `-double` and `-all` unless single on one thread.
+    pub fn id(&self) -> String {
+        let law = self.law.name().to_lowercase().replace('+', "-");
+        let precision = if self.precision == Precision::Double { "-double" } else { "" };
+        let threads = if self.threads == Threads::All { "-all" } else { "" };
+        format!("{}-{law}-{}{precision}{threads}", self.element.name(), self.cells())
+    }
+
+    /// Cells of the mesh.
+    pub fn cells(&self) -> usize {
+        self.element.cells(self.edge)
+    }
+
+    /// Nodes of the mesh.
+    pub fn nodes(&self) -> usize {
+        (self.edge + 1).pow(3)
+    }
+
+    /// Whether the default selection has it: all laws on one mesh an element, and the thesis's series.
+    pub fn is_default(&self) -> bool {
+        let [simplest, richest] = [LawKind::NeoHookean, LawKind::FibresProny].map(|law| self.law == law);
+        let reference = self.edge == self.element.reference_edge();
+        match (self.precision, self.threads) {
+            (Precision::Single, _) if reference && self.element != Element::Hex8Full => true,
+            (_, Threads::One) if reference => simplest || richest,
+            (Precision::Single, Threads::One) => simplest && self.in_series(THESIS),
+            (Precision::Single, Threads::All) => (simplest || richest) && self.in_series(THESIS),
+            (Precision::Double, _) => false,
+        }
+    }
+
+    /// Whether it belongs to the series of meshes, among its first `count`.
+    fn in_series(&self, count: usize) -> bool {
+        matches!(self.element, Element::Tet4 | Element::Hex8)
+            && self.cells() <= MOST
+            && SERIES[..count].contains(&self.edge)
+    }
+
+    /// The cube, at rest and free.
+    pub(crate) fn specimen(&self) -> Specimen {
+        let cells = if self.element.nodes() == 4 { VolumeCell::Tet } else { VolumeCell::Hex };
+        let tets = match self.element {
+            Element::Tet4Anp => Tets::Averaged(Averaging::Nodal),
+            _ => Tets::Plain,
+        };
+        let hexes = match self.element {
+            Element::Hex8Full => Hexes::Full,
+            _ => Hexes::UniformStrain(HOURGLASS),
+        };
+        let mesh = block([EDGE; 3], [self.edge; 3], cells);
+        Specimen::of_elements(mesh, tets, hexes, &self.law.material(), [0.0, 1.0, 0.0])
+    }
+}
+
+/// All there is to measure, those of the same element, law, precision and threads one after another.
+pub fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for element in Element::ALL {
+        for law in LawKind::ALL {
+            for (precision, threads) in [
+                (Precision::Single, Threads::One),
+                (Precision::Single, Threads::All),
+                (Precision::Double, Threads::One),
+                (Precision::Double, Threads::All),
+            ] {
+                let mut edges = SERIES.to_vec();
+                edges.push(element.reference_edge());
+                edges.sort_unstable();
+                edges.dedup();
+                let case = |edge| Case { element, law, edge, precision, threads };
+                cases.extend(edges.into_iter().map(case).filter(|case| {
+                    case.edge == element.reference_edge()
+                        || precision == Precision::Single
+                            && matches!(law, LawKind::NeoHookean | LawKind::FibresProny)
+                            && case.in_series(SERIES.len())
+                }));
+            }
+        }
+    }
+    cases
+}
+
+/// The case of an id.
+///
+/// # Errors
+/// If there is none: the id most like it.
+pub fn find(id: &str) -> Result<Case, String> {
+    let (typed, known) = (id.to_lowercase(), cases());
+    let likeness = |case: &&Case| strsim::jaro_winkler(&case.id(), &typed);
+    match known.iter().find(|case| case.id() == typed) {
+        Some(case) => Ok(*case),
+        None => {
+            let nearest = known.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+            Err(nearest.map_or_else(String::new, Case::id))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_unique_and_lead_back_to_their_case() {
+        let known = cases();
+        let mut ids: Vec<String> = known.iter().map(Case::id).collect();
+        for (case, id) in known.iter().zip(&ids) {
+            assert_eq!(find(&id.to_uppercase()), Ok(*case));
+        }
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), known.len());
+        assert_eq!(find("tet4-nh-5556").unwrap_err(), "tet4-nh-55566");
+    }
+
+    #[test]
+    fn the_series_are_the_thesiss_and_lead_beyond_a_million_cells() {
+        for (id, nodes) in [("hex8-nh-1000", 1331), ("hex8-nh-54872", 59319), ("tet4-nh-6000", 1331)] {
+            let case = find(id).unwrap();
+            assert_eq!(case.nodes(), nodes);
+            assert!(case.is_default());
+        }
+        for element in [Element::Tet4, Element::Hex8] {
+            assert!(cases().iter().any(|case| case.element == element && case.cells() >= 1_000_000));
+        }
+    }
+
+    #[test]
+    fn the_meshes_have_as_many_nodes_and_cells_as_told() {
+        for element in Element::ALL {
+            let case = Case { element, edge: 3, ..find("tet4-ti-prony-55566").unwrap() };
+            let model = case.specimen().model;
+            assert_eq!(model.node_count(), case.nodes());
+            let cells = &model.solids[0].cells;
+            assert_eq!((cells.len(), cells.element()), (case.cells(), element.name()));
+        }
+    }
+}

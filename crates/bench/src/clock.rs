@@ -1,0 +1,86 @@
+//! Steps against the clock.
+
+use std::time::Instant;
+
+use pliant_mechanics::model::Contradiction;
+use pliant_mechanics::{CentralDifference, Model, Real, State, StepError};
+
+/// A model under the clock: a stepper and the state that it steps.
+pub struct Clocked<'m, R> {
+    stepper: CentralDifference<'m, R>,
+    state: State<R>,
+}
+
+impl<'m, R: Real> Clocked<'m, R> {
+    /// A state of a model, to be advanced by steps of `step` seconds.
+    ///
+    /// # Errors
+    /// If constraints contradict each other.
+    pub fn new(model: &'m Model, step: f64, state: State<R>) -> Result<Self, Contradiction> {
+        Ok(Self { stepper: CentralDifference::new(model, step)?, state })
+    }
+
+    /// Takes some steps, at least one, on the current rayon pool; returns the wall time of one [s].
+    ///
+    /// # Errors
+    /// If a step fails.
+    pub fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepError> {
+        let steps = steps.max(1);
+        let started = Instant::now();
+        for _ in 0..steps {
+            self.stepper.evaluate(&mut self.state)?;
+            self.stepper.advance(&mut self.state);
+        }
+        Ok(started.elapsed().as_secs_f64() / steps as f64)
+    }
+
+    /// How many steps take `seconds` of wall time, found by taking some: this warms up, too.
+    ///
+    /// # Errors
+    /// If a step fails.
+    pub fn steps_within(&mut self, seconds: f64) -> Result<usize, StepError> {
+        let mut steps = 1;
+        loop {
+            let each = self.seconds_per_step(steps)?;
+            let enough = (seconds / each.max(f64::MIN_POSITIVE)).ceil();
+            if each * steps as f64 >= 0.25 * seconds {
+                return Ok((enough as usize).max(1));
+            }
+            // Towards the quarter in at most four times the steps: the first ones are slow.
+            steps = (0.3 * enough).min(4.0 * steps as f64).ceil() as usize;
+        }
+    }
+}
+
+/// The middle of repeats and how far they lie apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// The median, of an even number the upper one; not a number without values.
+    pub median: f64,
+    /// The smallest.
+    pub least: f64,
+    /// The largest.
+    pub most: f64,
+}
+
+impl Spread {
+    /// Of some values.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        let mut values: Vec<f64> = values.into_iter().collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let at = |place: usize| values.get(place).copied().unwrap_or(f64::NAN);
+        Self { median: at(values.len() / 2), least: at(0), most: at(values.len().saturating_sub(1)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spread_does_not_depend_on_the_order() {
+        let spread = Spread::of([3.0, 1.0, 9.0, 2.0, 4.0]);
+        assert_eq!(spread, Spread { median: 3.0, least: 1.0, most: 9.0 });
+        assert!(Spread::of([]).median.is_nan());
+    }
+}

@@ -1,0 +1,389 @@
+//! What was measured, as a table and as JSON.
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::case::Case;
+use crate::clock::Spread;
+use crate::suite::Settings;
+use crate::{Count, Machine, Rates};
+
+/// What a critical step is taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Limit {
+    /// The smallest element bound.
+    ElementBound,
+    /// The true limit of the assembled operator.
+    #[serde(rename = "true-limit")]
+    True,
+}
+
+/// One measured case.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// What it is called on the command line.
+    pub id: String,
+    /// The mesh: `cube-21` has 21 grid cells along each edge.
+    pub mesh: String,
+    /// Cells.
+    pub cells: usize,
+    /// The element.
+    pub element: &'static str,
+    /// The law.
+    pub law: &'static str,
+    /// The number type.
+    pub precision: &'static str,
+    /// Threads.
+    pub threads: usize,
+    /// The processor.
+    pub adapter: String,
+    /// The path that ran.
+    pub design: &'static str,
+    /// Wall time of a step per element [ns], the median of the repeats.
+    pub ns_per_element_step: f64,
+    /// The same of the fastest repeat.
+    pub ns_least: f64,
+    /// The same of the slowest repeat.
+    pub ns_most: f64,
+    /// Elements stepped in a second.
+    pub elements_per_second: f64,
+    /// Bytes to and from memory per element and step, as counted.
+    pub bytes_per_element: f64,
+    /// Operations per element and step, as counted.
+    pub flops_per_element: f64,
+    /// Bytes a second over those that these threads copy.
+    pub bandwidth_fraction: f64,
+    /// Operations a second over those that these threads reach in multiply-adds.
+    pub flop_fraction: f64,
+    /// The step [s] that a run would take: 0.9 × the limit at rest.
+    pub critical_step: f64,
+    /// The limit that is meant: the true one, or for large meshes the element bound.
+    pub critical_step_from: Limit,
+    /// The critical step over the wall time of a step.
+    pub real_time_factor: f64,
+    /// The case.
+    #[serde(skip)]
+    pub case: Case,
+}
+
+impl Row {
+    /// From the wall times of a step [s] and the step [s] with the limit it is taken from.
+    pub(crate) fn new(
+        case: Case,
+        machine: &Machine,
+        rates: &Rates,
+        seconds: Spread,
+        (step, critical_step_from): (f64, Limit),
+    ) -> Self {
+        let (cells, count) = (case.cells() as f64, Count::of(&case));
+        let ns = |seconds: f64| 1e9 * seconds / cells;
+        let elements_per_second = cells / seconds.median;
+        Self {
+            id: case.id(),
+            mesh: format!("cube-{}", case.edge),
+            cells: case.cells(),
+            element: case.element.name(),
+            law: case.law.name(),
+            precision: case.precision.name(),
+            threads: rates.threads,
+            adapter: machine.processor.clone(),
+            design: "cpu",
+            ns_per_element_step: ns(seconds.median),
+            ns_least: ns(seconds.least),
+            ns_most: ns(seconds.most),
+            elements_per_second,
+            bytes_per_element: count.bytes,
+            flops_per_element: count.flops,
+            bandwidth_fraction: elements_per_second * count.bytes / rates.copy,
+            flop_fraction: elements_per_second * count.flops / rates.multiply_add(case.precision),
+            critical_step: step,
+            critical_step_from,
+            real_time_factor: step / seconds.median,
+            case,
+        }
+    }
+}
+
+/// T = b N over the meshes of a series: the cost of an element if it is the same in all of them.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// One of the cases.
+    pub case: Case,
+    /// Threads.
+    pub threads: usize,
+    /// Meshes.
+    pub meshes: usize,
+    /// Cells of the smallest and of the largest mesh.
+    pub cells: [usize; 2],
+    /// b [ns], by least squares of the relative deviations b N/T − 1.
+    pub ns_per_element_step: f64,
+    /// The largest |T/(b N) − 1| …
+    pub largest_deviation: f64,
+    /// … and the cells of the mesh that has it.
+    pub farthest: usize,
+}
+
+impl Fit {
+    /// The fits of all series of three meshes or more.
+    pub(crate) fn all(rows: &[Row]) -> Vec<Self> {
+        let mut fits = Vec::<Self>::new();
+        for row in rows {
+            if !fits.iter().any(|fit| fit.covers(&row.case)) {
+                let of_series: Vec<&Row> =
+                    rows.iter().filter(|other| same_series(&row.case, &other.case)).collect();
+                fits.extend(Self::of(&of_series));
+            }
+        }
+        fits
+    }
+
+    /// `None` of fewer than three meshes.
+    fn of(rows: &[&Row]) -> Option<Self> {
+        let (first, last) =
+            (rows.iter().min_by_key(|row| row.cells)?, rows.iter().max_by_key(|row| row.cells)?);
+        // Of r = N/T, b = Σ r / Σ r².
+        let rates = rows.iter().map(|row| 1.0 / row.ns_per_element_step);
+        let b = rates.clone().sum::<f64>() / rates.map(|r| r * r).sum::<f64>();
+        let deviation = |row: &Row| (row.ns_per_element_step / b - 1.0).abs();
+        let farthest = rows.iter().max_by(|x, y| deviation(x).total_cmp(&deviation(y)))?;
+        (rows.len() >= 3).then(|| Self {
+            case: first.case,
+            threads: first.threads,
+            meshes: rows.len(),
+            cells: [first.cells, last.cells],
+            ns_per_element_step: b,
+            largest_deviation: deviation(farthest),
+            farthest: farthest.cells,
+        })
+    }
+
+    /// Whether a case belongs to the series.
+    pub(crate) fn covers(&self, case: &Case) -> bool {
+        same_series(&self.case, case)
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "element": self.case.element.name(),
+            "law": self.case.law.name(),
+            "precision": self.case.precision.name(),
+            "threads": self.threads,
+            "meshes": self.meshes,
+            "cells": self.cells,
+            "ns_per_element_step": self.ns_per_element_step,
+            "largest_deviation": self.largest_deviation,
+            "farthest": self.farthest,
+        })
+    }
+}
+
+fn same_series(a: &Case, b: &Case) -> bool {
+    Case { edge: b.edge, ..*a } == *b
+}
+
+/// All that was measured.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The machine.
+    pub machine: Machine,
+    /// How it was measured.
+    pub settings: Settings,
+    /// What the machine can do, for each number of threads.
+    pub rates: Vec<Rates>,
+    /// The cases.
+    pub rows: Vec<Row>,
+    /// Linear cost of the series.
+    pub fits: Vec<Fit>,
+    /// The largest cubes in real time as predicted, measured.
+    pub cubes: Vec<Row>,
+}
+
+impl Report {
+    /// As one JSON object.
+    pub fn json(&self) -> Value {
+        json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "date": today(),
+            "machine": self.machine,
+            "rates": self.rates,
+            "repeats": self.settings.repeats,
+            "rows": self.rows,
+            "linear_cost": self.fits.iter().map(Fit::json).collect::<Vec<_>>(),
+            "largest_real_time_cubes": self.cubes,
+        })
+    }
+
+    /// As tables in Markdown, aligned to be read as they are.
+    pub fn table(&self) -> String {
+        let Machine { processor, cores, system } = &self.machine;
+        let mut parts = vec![
+            format!("{processor}, {cores} cores, {system}; pliant {}, {}.", env!("CARGO_PKG_VERSION"), today()),
+            format!(
+                "Whole steps; median of {} repeats of {} s or more, least and most beside it; design `cpu`.",
+                self.settings.repeats, self.settings.seconds
+            ),
+            self.rates_table(),
+            "Bytes and operations are counted per element and step; \"copy\" and \"mul-add\" are the parts of the rates \
+             above that they make up. Δt is 0.9 × the true limit (* element bound)."
+                .to_owned(),
+            rows_table(&self.rows),
+        ];
+        if !self.fits.is_empty() {
+            parts.push("Linear cost: time of a step = b × elements over the meshes of a series.".to_owned());
+            parts.push(self.fits_table());
+        }
+        if !self.cubes.is_empty() {
+            parts.push(
+                "Largest cube in real time (0.1 m; brain-like NH, E = 3 kPa, ν = 0.45; liver-like TI+Prony), predicted from \
+                 the linear cost and Δt ∝ 1/n, and measured at that size."
+                    .to_owned(),
+            );
+            parts.push(self.cubes_table());
+        }
+        parts.join("\n\n")
+    }
+
+    fn rates_table(&self) -> String {
+        let rows = self.rates.iter().map(|rates| {
+            [rates.copy, rates.single, rates.double].map(|rate| format!("{:.1}", 1e-9 * rate)).into_iter()
+        });
+        let rows = rows.zip(&self.rates).map(|(cells, rates)| {
+            std::iter::once(rates.threads.to_string()).chain(cells).collect::<Vec<_>>()
+        });
+        markdown(&["threads", "copy GB/s", "mul-add single Gflop/s", "double"], rows.collect())
+    }
+
+    fn fits_table(&self) -> String {
+        let rows = self.fits.iter().map(|fit| {
+            vec![
+                fit.case.element.name().to_owned(),
+                fit.case.law.name().to_owned(),
+                fit.case.precision.name().to_owned(),
+                fit.threads.to_string(),
+                format!("{} of {} to {} elements", fit.meshes, fit.cells[0], fit.cells[1]),
+                format!("{:.2}", fit.ns_per_element_step),
+                format!("{:.1} % at {}", 100.0 * fit.largest_deviation, fit.farthest),
+            ]
+        });
+        let header = ["element", "law", "precision", "threads", "meshes", "b ns", "largest deviation"];
+        markdown(&header, rows.collect())
+    }
+
+    fn cubes_table(&self) -> String {
+        let rows = self.cubes.iter().map(|row| {
+            vec![
+                row.element.to_owned(),
+                row.law.to_owned(),
+                format!("{}³", row.case.edge),
+                row.cells.to_string(),
+                row.case.nodes().to_string(),
+                row.threads.to_string(),
+                format!("{:.3}", 1e3 * row.critical_step),
+                format!("{:.3}", 1e-6 * row.ns_per_element_step * row.cells as f64),
+                format!("{:.2}", row.real_time_factor),
+            ]
+        });
+        let header = [
+            "element",
+            "law",
+            "cube",
+            "elements",
+            "nodes",
+            "threads",
+            "Δt ms",
+            "step takes ms",
+            "× real time",
+        ];
+        markdown(&header, rows.collect())
+    }
+}
+
+fn rows_table(rows: &[Row]) -> String {
+    let rows = rows.iter().map(|row| {
+        let star = if row.critical_step_from == Limit::True { "" } else { "*" };
+        vec![
+            row.mesh.clone(),
+            row.cells.to_string(),
+            row.element.to_owned(),
+            row.law.to_owned(),
+            row.precision.to_owned(),
+            row.threads.to_string(),
+            format!("{:.2}", row.ns_per_element_step),
+            format!("{:.2}–{:.2}", row.ns_least, row.ns_most),
+            format!("{:.2}", 1e-6 * row.elements_per_second),
+            format!("{:.0}", row.bytes_per_element),
+            format!("{:.0}", row.flops_per_element),
+            format!("{:.1} %", 100.0 * row.bandwidth_fraction),
+            format!("{:.1} %", 100.0 * row.flop_fraction),
+            format!("{:.4}{star}", 1e3 * row.critical_step),
+            format!("{:.3}", row.real_time_factor),
+        ]
+    });
+    let header = [
+        "mesh",
+        "elements",
+        "element",
+        "law",
+        "precision",
+        "threads",
+        "ns",
+        "least–most",
+        "M/s",
+        "bytes",
+        "flops",
+        "copy",
+        "mul-add",
+        "Δt ms",
+        "× real time",
+    ];
+    markdown(&header, rows.collect())
+}
+
+/// A Markdown table with columns of equal width, numbers to the right.
+fn markdown(header: &[&str], rows: Vec<Vec<String>>) -> String {
+    let wide = |text: &str| text.chars().count();
+    let widths: Vec<usize> = (header.iter().enumerate())
+        .map(|(column, title)| {
+            rows.iter().map(|row| wide(&row[column])).chain([wide(title), 3]).max().unwrap_or(3)
+        })
+        .collect();
+    let is_number =
+        |column: usize| rows.iter().all(|row| row[column].starts_with(|c: char| c.is_ascii_digit()));
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        let padded = cells.zip(&widths).enumerate().map(|(column, (text, width))| {
+            let space = " ".repeat(width - wide(text));
+            if is_number(column) { space + text } else { text.to_owned() + &space }
+        });
+        format!("| {} |", padded.collect::<Vec<_>>().join(" | "))
+    };
+    let rule = widths.iter().enumerate().map(|(column, width)| {
+        let dashes = "-".repeat(width + 1);
+        if is_number(column) { dashes + ":" } else { format!(":{dashes}") }
+    });
+    let rule = format!("|{}|", rule.collect::<Vec<_>>().join("|"));
+    let mut lines = vec![line(&mut header.iter().copied()), rule];
+    lines.extend(rows.iter().map(|row| line(&mut row.iter().map(String::as_str))));
+    lines.join("\n")
+}
+
+fn today() -> String {
+    time::OffsetDateTime::now_utc().date().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_aligned_with_numbers_to_the_right() {
+        let rows = vec![vec!["tet4".into(), "7.60".into()], vec!["hex8-full".into(), "104.00".into()]];
+        let lines = [
+            "| element   |     ns |",
+            "|:----------|-------:|",
+            "| tet4      |   7.60 |",
+            "| hex8-full | 104.00 |",
+        ];
+        assert_eq!(markdown(&["element", "ns"], rows), lines.join("\n"));
+    }
+}

@@ -1,0 +1,246 @@
+//! Measuring cases one after another.
+//!
+//! Each cube is held at `x-min` and begins squeezed and sheared, every cell alike, with `x-max` held where that brings it:
+//! so all cells are deformed from the first step on and go on to vibrate. It is warmed up, then stepped for so many steps
+//! that a repeat takes [`Settings::seconds`].
+
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::model::Contradiction;
+use pliant_mechanics::{Model, Real, State, StepError};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+
+use crate::case::{Case, EDGE, Element, LawKind, Precision, Threads};
+use crate::clock::{Clocked, Spread};
+use crate::report::{Fit, Limit, Report, Row};
+use crate::{Machine, Rates, Specimen};
+
+/// Displacement of `x-max` [m]; that of a node at x is x/[`EDGE`] of it.
+const SQUEEZE: [f64; 3] = [-0.02 * EDGE, 0.01 * EDGE, 0.005 * EDGE];
+/// Up to this many cells the true limit of the step is found; it costs as much as some 100 steps in double precision.
+const CELLS_OF_TRUE_LIMIT: usize = 100_000;
+/// Part of the limit that a run takes as its step: the critical step of a row.
+const PART_OF_LIMIT: f64 = 0.9;
+/// Part of the limit that is stepped under the clock. The length of a step does not change its cost, and the cubes vibrate
+/// for tens of thousands of steps without damping or a watch that would cut them where the limit falls.
+const PART_UNDER_THE_CLOCK: f64 = 0.5;
+
+/// How to measure.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Repeats that count, at least one.
+    pub repeats: usize,
+    /// Wall time of a repeat [s].
+    pub seconds: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { repeats: 5, seconds: 0.2 }
+    }
+}
+
+/// How far a measurement is.
+#[derive(Clone, Debug)]
+pub struct Progress {
+    /// Part of the cases done.
+    pub part: f64,
+    /// What is measured now.
+    pub now: String,
+}
+
+/// Why there is no measurement.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// A step failed.
+    #[error("`{id}`: {source}; {}", source.remedy())]
+    Step {
+        /// The case.
+        id: String,
+        /// Why.
+        source: StepError,
+    },
+    /// Constraints contradict each other.
+    #[error(transparent)]
+    Contradiction(#[from] Contradiction),
+    /// No threads.
+    #[error("{0}")]
+    Threads(#[from] ThreadPoolBuildError),
+}
+
+/// Measures cases in their order. Where the series of a cube has three meshes or more, its linear cost is found, and
+/// with it the largest cube in real time.
+///
+/// # Errors
+/// If threads cannot be started or a step fails.
+pub fn measure(
+    cases: &[Case],
+    settings: Settings,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Report, BenchError> {
+    let mut bench = Bench { machine: Machine::this(), settings, pools: Vec::new(), limits: Vec::new() };
+    let mut rows = Vec::new();
+    for (done, case) in cases.iter().enumerate() {
+        progress(Progress { part: done as f64 / cases.len() as f64, now: case.id() });
+        rows.push(bench.row(case)?);
+    }
+    progress(Progress { part: 1.0, now: "largest cubes in real time".into() });
+    let fits = Fit::all(&rows);
+    let mut cubes = Vec::new();
+    for fit in &fits {
+        if let Some(case) = largest_in_real_time(fit, &rows) {
+            cubes.push(bench.row(&case)?);
+        }
+    }
+    let rates = bench.pools.iter().map(|(_, rates)| *rates).collect();
+    Ok(Report { machine: bench.machine, settings, rates, rows, fits, cubes })
+}
+
+/// The cube of n³ grid cells whose step is predicted to take as long as it simulates: with T = b k n³ for k cells in a
+/// grid cell and Δt = d/n, n⁴ = d/(b k). Asked of the tissues of thesis Fig. 6.7 on all threads.
+fn largest_in_real_time(fit: &Fit, rows: &[Row]) -> Option<Case> {
+    let thesis = matches!(fit.case.element, Element::Tet4 | Element::Hex8)
+        && matches!(fit.case.law, LawKind::NeoHookean | LawKind::FibresProny)
+        && (fit.case.precision, fit.case.threads) == (Precision::Single, Threads::All);
+    // Of the finest mesh whose true limit is known; else of the finest.
+    let known = rows.iter().filter(|row| fit.covers(&row.case));
+    let finest = known.max_by_key(|row| (row.critical_step_from == Limit::True, row.cells))?;
+    let d = finest.critical_step * finest.case.edge as f64;
+    let per_grid_cell = 1e-9 * fit.ns_per_element_step * fit.case.element.cells(1) as f64;
+    let edge = (d / per_grid_cell).powf(0.25).floor() as usize;
+    (thesis && edge > 0).then_some(Case { edge, ..fit.case })
+}
+
+/// What lasts from case to case.
+struct Bench {
+    machine: Machine,
+    settings: Settings,
+    pools: Vec<(ThreadPool, Rates)>,
+    /// Known limits [s]: they do not depend on precision, threads and relaxation.
+    limits: Vec<((Element, bool, usize), f64)>,
+}
+
+impl Bench {
+    /// The threads and what they can do, measured when they are first needed.
+    fn pool(&mut self, threads: Threads) -> Result<&(ThreadPool, Rates), BenchError> {
+        let count = threads.count();
+        let known = self.pools.iter().position(|(_, rates)| rates.threads == count);
+        let index = match known {
+            Some(index) => index,
+            None => {
+                let pool = ThreadPoolBuilder::new().num_threads(count).build()?;
+                let rates = Rates::measure(&pool, self.settings.repeats);
+                self.pools.push((pool, rates));
+                self.pools.len() - 1
+            }
+        };
+        Ok(&self.pools[index])
+    }
+
+    fn row(&mut self, case: &Case) -> Result<Row, BenchError> {
+        let specimen = squeezed(case.specimen());
+        let (limit, from) = self.limit(case, &specimen);
+        let (step, settings) = (PART_UNDER_THE_CLOCK * limit, self.settings);
+        let (pool, rates) = self.pool(case.threads)?;
+        let repeats = pool.install(|| match case.precision {
+            Precision::Single => repeats::<f32>(case, &specimen, step, settings),
+            Precision::Double => repeats::<f64>(case, &specimen, step, settings),
+        })?;
+        let rates = *rates;
+        Ok(Row::new(*case, &self.machine, &rates, Spread::of(repeats), (PART_OF_LIMIT * limit, from)))
+    }
+
+    /// The largest stable step at rest [s], and what it is.
+    fn limit(&mut self, case: &Case, specimen: &Specimen) -> (f64, Limit) {
+        if case.cells() > CELLS_OF_TRUE_LIMIT {
+            return (specimen.element_bound(), Limit::ElementBound);
+        }
+        let key = (case.element, case.law.has_fibres(), case.edge);
+        let known = self.limits.iter().find(|(of, _)| *of == key).map(|(_, limit)| *limit);
+        let limit = known.unwrap_or_else(|| {
+            let limit = specimen.true_limit();
+            self.limits.push((key, limit));
+            limit
+        });
+        (limit, Limit::True)
+    }
+}
+
+/// With `x-min` held and `x-max` where [`SQUEEZE`] brings it.
+fn squeezed(specimen: Specimen) -> Specimen {
+    let hold = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
+    specimen.fix("x-min", [true; 3]).carry("x-max", SQUEEZE, hold)
+}
+
+/// Every cell squeezed alike.
+fn start<R: Real>(model: &Model) -> State<R> {
+    let displacement = model.rest.iter().map(|x| SQUEEZE.map(|by| R::of(by * x[0] / EDGE))).collect();
+    State { displacement, ..State::at_rest(model) }
+}
+
+/// Wall times of a step [s].
+fn repeats<R: Real>(
+    case: &Case,
+    specimen: &Specimen,
+    step: f64,
+    settings: Settings,
+) -> Result<Vec<f64>, BenchError> {
+    let mut clocked = Clocked::new(&specimen.model, step, start::<R>(&specimen.model))?;
+    let named = |source| BenchError::Step { id: case.id(), source };
+    let steps = clocked.steps_within(settings.seconds).map_err(named)?;
+    (0..settings.repeats.max(1)).map(|_| clocked.seconds_per_step(steps).map_err(named)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::find;
+
+    fn row(id: &str, ns: f64) -> Row {
+        let case = find(id).unwrap();
+        let rates = Rates { threads: case.threads.count(), copy: 1e10, single: 1e11, double: 5e10 };
+        let seconds = 1e-9 * ns * case.cells() as f64;
+        let spread = Spread { median: seconds, least: seconds, most: seconds };
+        // Δt = 5 ms/n.
+        Row::new(case, &Machine::this(), &rates, spread, (5e-3 / case.edge as f64, Limit::True))
+    }
+
+    #[test]
+    fn a_cube_of_the_predicted_size_takes_as_long_as_it_simulates() {
+        let rows = ["hex8-nh-1000-all", "hex8-nh-4096-all", "hex8-nh-15625-all"].map(|id| row(id, 50.0));
+        let fits = Fit::all(&rows);
+        assert_eq!(fits.len(), 1);
+        assert!((fits[0].ns_per_element_step - 50.0).abs() < 1e-9 && fits[0].largest_deviation < 1e-12);
+        // n⁴ = 5e-3/50e-9 = 10⁵, n = 17.78.
+        assert_eq!(largest_in_real_time(&fits[0], &rows).unwrap().edge, 17);
+    }
+
+    #[test]
+    fn a_cost_that_is_not_linear_shows_as_a_deviation() {
+        let rows = [("hex8-nh-1000", 40.0), ("hex8-nh-4096", 40.0), ("hex8-nh-15625", 60.0)]
+            .map(|(id, ns)| row(id, ns));
+        let fit = &Fit::all(&rows)[0];
+        assert!((40.0..60.0).contains(&fit.ns_per_element_step));
+        assert!(fit.largest_deviation > 0.2 && fit.farthest == 15625);
+        assert!(Fit::all(&rows[..2]).is_empty());
+    }
+
+    #[test]
+    fn every_cell_of_a_cube_is_deformed_from_the_first_step_on() {
+        let case = find("tet4-nh-6000").unwrap();
+        let specimen = squeezed(case.specimen());
+        let step = 0.5 * specimen.element_bound();
+        let settings = Settings { repeats: 1, seconds: 0.0 };
+        assert!(repeats::<f32>(&case, &specimen, step, settings).unwrap()[0] > 0.0);
+        let displacement = start::<f64>(&specimen.model).displacement;
+        let rest = State::<f64>::at_rest(&specimen.model).displacement;
+        assert!(
+            specimen.face("x-max").iter().all(|&node| displacement[node as usize] == rest[node as usize])
+        );
+        let cells = &specimen.model.solids[0].cells;
+        for cell in 0..cells.len() {
+            let along_x = || cells.nodes(cell).iter().map(|&node| displacement[node as usize][0]);
+            let spread = along_x().fold(f64::MIN, f64::max) - along_x().fold(f64::MAX, f64::min);
+            assert!((spread - 0.02 * EDGE / 10.0).abs() < 1e-12, "cell {cell}: {spread}");
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! `pliant bench`: what a step costs on this machine.
+
+use std::process::ExitCode;
+
+use pliant_bench::{Case, Settings, cases, find, measure};
+
+use crate::arguments::Bench;
+use crate::report::{Bar, Failure, say};
+
+pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
+    if arguments.list {
+        say(list())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let cases = chosen(arguments)?;
+    let bar = Bar::new();
+    let settings = Settings { repeats: arguments.repeats.into(), ..Settings::default() };
+    let result = measure(&cases, settings, &mut |progress| bar.update_bench(&progress));
+    bar.finish();
+    match result {
+        Ok(report) if arguments.json => say(report.json())?,
+        Ok(report) => say(report.table())?,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return Ok(ExitCode::from(1));
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The rows asked for, in the order of the table.
+fn chosen(arguments: &Bench) -> Result<Vec<Case>, Failure> {
+    let mut asked = Vec::new();
+    for id in &arguments.only {
+        asked.push(find(id).map_err(|nearest| {
+            let help = format!("did you mean `{nearest}`? `pliant bench --list` prints all");
+            Failure::plain(format!("there is no row `{id}`"), help)
+        })?);
+    }
+    let wanted = |case: &Case| match asked.as_slice() {
+        [] => arguments.full || case.is_default(),
+        asked => asked.contains(case),
+    };
+    Ok(cases().into_iter().filter(wanted).collect())
+}
+
+fn list() -> String {
+    let line = |case: Case| {
+        let selection = if case.is_default() { "default" } else { "--full" };
+        format!(
+            "{:<32} {selection:<8} {} {}, cube of {} elements, {} precision, threads: {}",
+            case.id(),
+            case.element.name(),
+            case.law.name(),
+            case.cells(),
+            case.precision.name(),
+            case.threads.count()
+        )
+    };
+    cases().into_iter().map(line).collect::<Vec<_>>().join("\n")
+}

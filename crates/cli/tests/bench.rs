@@ -1,0 +1,88 @@
+//! `pliant bench` through the real binary.
+
+mod support;
+
+use serde_json::Value;
+use support::Workshop;
+
+const KEYS: [&str; 16] = [
+    "mesh",
+    "cells",
+    "element",
+    "law",
+    "precision",
+    "threads",
+    "adapter",
+    "design",
+    "ns_per_element_step",
+    "elements_per_second",
+    "bytes_per_element",
+    "flops_per_element",
+    "bandwidth_fraction",
+    "flop_fraction",
+    "critical_step",
+    "real_time_factor",
+];
+
+#[test]
+fn the_list_names_every_row_in_a_line() {
+    let told = Workshop::new("").pliant(&["bench", "--list"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    for id in ["tet4-nh-55566", "hex8-ti-prony-27000-double-all", "hex8-nh-1000", "tet4-anp-ti-55566-all"] {
+        assert_eq!(told.out.lines().filter(|line| line.split(' ').next() == Some(id)).count(), 1, "{id}");
+    }
+}
+
+#[test]
+fn a_row_has_the_promised_keys_with_numbers_that_agree() {
+    let told = Workshop::new("").pliant(&["bench", "--only", "hex8-nh-1000", "--repeats", "3", "--json"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let report = told.json();
+    let rows = report["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 1);
+    let row = rows[0].as_object().unwrap();
+    assert!(KEYS.iter().all(|key| row.contains_key(*key)), "{row:?}");
+    assert_eq!((row["cells"].as_u64(), row["threads"].as_u64()), (Some(1000), Some(1)));
+    for (key, word) in [("element", "hex8"), ("law", "NH"), ("precision", "single"), ("design", "cpu")] {
+        assert_eq!(row[key], word);
+    }
+    assert!(row["adapter"].as_str().is_some_and(|name| !name.is_empty()));
+    let number = |key: &str| row[key].as_f64().filter(|x| x.is_finite() && *x > 0.0).expect(key);
+    KEYS[8..].iter().for_each(|key| _ = number(key));
+    let ns = number("ns_per_element_step");
+    assert!(number("ns_least") <= ns && ns <= number("ns_most"));
+    let same = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    same(number("elements_per_second"), 1e9 / ns);
+    same(number("real_time_factor"), number("critical_step") / (1e-9 * ns * 1000.0));
+    let rates = &report["rates"][0];
+    let share = |count: &str, rate: &str| number(count) / (1e-9 * ns) / rates[rate].as_f64().unwrap();
+    same(number("bandwidth_fraction"), share("bytes_per_element", "copy"));
+    same(number("flop_fraction"), share("flops_per_element", "single"));
+    assert!(number("flop_fraction") < 1.0, "no step is faster than bare multiply-adds");
+    assert_eq!(report["linear_cost"], Value::Array(Vec::new()), "one mesh shows no line");
+}
+
+#[test]
+fn several_rows_make_a_table_and_three_meshes_a_line() {
+    let ids = ["hex8-nh-1000", "hex8-nh-4096", "hex8-nh-15625"].map(|id| ["--only", id]).concat();
+    let told = Workshop::new("").pliant(&[&["bench", "--repeats", "1"], ids.as_slice()].concat());
+    assert_eq!(told.code, 0, "{}", told.err);
+    for mesh in ["cube-10", "cube-16", "cube-25"] {
+        assert_eq!(
+            told.out.lines().filter(|line| line.starts_with(&format!("| {mesh} "))).count(),
+            1,
+            "{mesh}"
+        );
+    }
+    assert!(told.out.contains("3 of 1000 to 15625 elements"), "{}", told.out);
+}
+
+#[test]
+fn an_unknown_row_is_answered_with_the_nearest() {
+    let workshop = Workshop::new("");
+    let told = workshop.pliant(&["bench", "--only", "tet4-nh-5556", "--json"]);
+    assert_eq!(told.code, 2);
+    assert!(told.err.contains("did you mean `tet4-nh-55566`?"), "{}", told.err);
+    assert!(told.out.contains("tet4-nh-5556"), "{}", told.out);
+    assert_eq!(workshop.pliant(&["bench", "--repeats", "0"]).code, 2);
+}
