@@ -80,6 +80,7 @@ Examples:
   pliant bench --list
   pliant bench --only tet4-nh-55566 --only tet4-nh-55566-all
   pliant bench --json > bench.json
+  pliant bench --full --table docs/performance.md
 
 Keep the machine otherwise idle; least and most of the repeats show whether it was.";
 
@@ -100,6 +101,9 @@ pub struct Bench {
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
+    /// Also renew the tables in a Markdown file, between its two marks.
+    #[arg(long, value_name = "FILE")]
+    pub table: Option<PathBuf>,
 }
 
 #[derive(Debug, clap::Args)]

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use pliant_bench::{Case, Settings, cases, find, measure};
 
 use crate::arguments::Bench;
+use crate::page::Page;
 use crate::report::{Bar, Failure, say};
 
 pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
@@ -13,17 +14,25 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     let cases = chosen(arguments)?;
+    let page = arguments.table.as_deref().map(|path| Page::read(path, "bench")).transpose()?;
     let bar = Bar::new();
     let settings = Settings { repeats: arguments.repeats.into(), ..Settings::default() };
     let result = measure(&cases, settings, &mut |progress| bar.update_bench(&progress));
     bar.finish();
-    match result {
-        Ok(report) if arguments.json => say(report.json())?,
-        Ok(report) => say(report.table())?,
+    let report = match result {
+        Ok(report) => report,
         Err(error) => {
             eprintln!("error: {error}");
             return Ok(ExitCode::from(1));
         }
+    };
+    if arguments.json {
+        say(report.json())?;
+    } else {
+        say(report.table())?;
+    }
+    if let Some(page) = page {
+        page.renew(&format!("\n{}\n\n", report.table()))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -3,6 +3,7 @@
 mod arguments;
 mod bench;
 mod commands;
+mod page;
 mod report;
 mod reproduce;
 

@@ -1,15 +1,14 @@
 //! `pliant reproduce`: the results of the literature, computed, judged and written down.
 
-use std::fs;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use pliant_reproduce::{CASES, Case, END, Report, START, find, is_own_file, replace_table};
+use pliant_reproduce::{CASES, Case, Report, find, is_own_file};
 use pliant_scene::OutputFolder;
 
 use crate::arguments::Reproduce;
+use crate::page::Page;
 use crate::report::{Failure, say};
 
 pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode, Failure> {
@@ -18,7 +17,7 @@ pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     let cases = chosen(&arguments.only)?;
-    let page = arguments.table.as_deref().map(read_page).transpose()?;
+    let page = arguments.table.as_deref().map(|path| Page::read(path, "reproduce")).transpose()?;
     let folder = OutputFolder::claim(arguments.out.clone(), arguments.force, is_own_file)
         .map_err(|error| Failure::plain(&error, error.remedy))?;
 
@@ -27,10 +26,8 @@ pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode, Failure> {
         let path = folder.write(name, &content).map_err(|error| Failure::plain(&error, error.remedy))?;
         eprintln!("wrote {}", path.display());
     }
-    if let (Some(path), Some(page)) = (&arguments.table, page) {
-        let new = replace_table(&page, &report.table()).unwrap_or(page);
-        fs::write(path, new).map_err(|error| unwritable(path, &error))?;
-        eprintln!("renewed the table in {}", path.display());
+    if let Some(page) = page {
+        page.renew(&report.table())?;
     }
     say(verdict(&report))?;
     let [_, failed] = report.counts();
@@ -57,29 +54,6 @@ fn list() -> String {
     let all: f64 = CASES.iter().map(|case| case.seconds).sum();
     lines.push(format!("{:<12} about {all:>3.0} s on two cores", "all"));
     lines.join("\n")
-}
-
-/// A Markdown file with the two marks in it.
-fn read_page(path: &Path) -> Result<String, Failure> {
-    let page = fs::read_to_string(path).map_err(|error| {
-        Failure::plain(
-            format!("`{}` cannot be read: {error}", path.display()),
-            "check the name after `--table`",
-        )
-    })?;
-    if replace_table(&page, "").is_none() {
-        let message = format!("`{}` has no place for the table", path.display());
-        return Err(Failure::plain(
-            message,
-            format!("put the lines {START} and {END} where it should stand"),
-        ));
-    }
-    Ok(page)
-}
-
-fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
-    let message = format!("`{}` cannot be written: {error}", path.display());
-    Failure::plain(message, "check the file and its permissions")
 }
 
 /// Computes with a bar on standard error that counts expected seconds; nothing where nobody looks.

@@ -65,7 +65,11 @@ fn a_row_has_the_promised_keys_with_numbers_that_agree() {
 #[test]
 fn several_rows_make_a_table_and_three_meshes_a_line() {
     let ids = ["hex8-nh-1000", "hex8-nh-4096", "hex8-nh-15625"].map(|id| ["--only", id]).concat();
-    let told = Workshop::new("").pliant(&[&["bench", "--repeats", "1"], ids.as_slice()].concat());
+    let workshop = Workshop::new("");
+    workshop
+        .write("page.md", "# Page\n<!-- pliant bench: start -->\nold\n<!-- pliant bench: end -->\nmore\n");
+    let told =
+        workshop.pliant(&[&["bench", "--repeats", "1", "--table", "page.md"], ids.as_slice()].concat());
     assert_eq!(told.code, 0, "{}", told.err);
     for mesh in ["cube-10", "cube-16", "cube-25"] {
         assert_eq!(
@@ -75,6 +79,10 @@ fn several_rows_make_a_table_and_three_meshes_a_line() {
         );
     }
     assert!(told.out.contains("3 of 1000 to 15625 elements"), "{}", told.out);
+    let page = workshop.read("page.md");
+    let (before, after) = page.split_once(told.out.trim_end()).expect("the same tables");
+    assert_eq!(before, "# Page\n<!-- pliant bench: start -->\n\n");
+    assert_eq!(after, "\n\n<!-- pliant bench: end -->\nmore\n");
 }
 
 #[test]
@@ -85,4 +93,8 @@ fn an_unknown_row_is_answered_with_the_nearest() {
     assert!(told.err.contains("did you mean `tet4-nh-55566`?"), "{}", told.err);
     assert!(told.out.contains("tet4-nh-5556"), "{}", told.out);
     assert_eq!(workshop.pliant(&["bench", "--repeats", "0"]).code, 2);
+    workshop.write("page.md", "# Page\n");
+    let told = workshop.pliant(&["bench", "--table", "page.md"]);
+    assert_eq!(told.code, 2);
+    assert!(told.words().contains("`page.md` has no place for the table"), "{}", told.err);
 }

@@ -20,5 +20,5 @@ pub use pliant_bench::{
     soft_tissue,
 };
 pub use reference::{largest, mesh, numbers, reference};
-pub use report::{END, Report, START, is_own_file, replace_table};
+pub use report::{Report, is_own_file};
 pub use run::{Equilibrium, relax, run, run_on, settle, smooth_step};

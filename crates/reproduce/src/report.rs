@@ -10,10 +10,6 @@ use crate::page;
 
 /// The files of a report.
 const FILES: [&str; 2] = ["index.html", "results.json"];
-/// Before the table that [`replace_table`] replaces.
-pub const START: &str = "<!-- pliant reproduce: start -->";
-/// After it.
-pub const END: &str = "<!-- pliant reproduce: end -->";
 
 /// Cases and what they came to.
 #[derive(Clone, Debug)]
@@ -165,13 +161,6 @@ pub fn is_own_file(name: &str) -> bool {
     FILES.contains(&name)
 }
 
-/// A page with the text between the marks [`START`] and [`END`] replaced; `None` without them.
-pub fn replace_table(page: &str, table: &str) -> Option<String> {
-    let (before, rest) = page.split_once(START)?;
-    let (_, after) = rest.split_once(END)?;
-    Some(format!("{before}{START}\n{table}{END}{after}"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -194,13 +183,5 @@ mod tests {
         assert_eq!(digits(-2189.3333333, 2.2e-6, -2189.3333333), "-2189.333");
         assert_eq!(digits(52.7, 5.27, 50.4834), "50.5");
         assert_eq!(digits(0.0, 1e-5, 4.6512e-7), "4.7e-7");
-    }
-
-    #[test]
-    fn a_table_is_replaced_between_its_marks_only() {
-        let page = format!("# Page\n{START}\nold\n{END}\nmore\n");
-        let new = replace_table(&page, "| new |\n").unwrap();
-        assert_eq!(new, format!("# Page\n{START}\n| new |\n{END}\nmore\n"));
-        assert_eq!(replace_table("# Page\n", ""), None);
     }
 }
