@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use pliant_bench::{Case, Settings, cases, find, measure};
+use serde_json::json;
 
 use crate::arguments::Bench;
 use crate::page::Page;
@@ -23,6 +24,9 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
         Ok(report) => report,
         Err(error) => {
             eprintln!("error: {error}");
+            if arguments.json {
+                say(json!({ "error": error.to_string() }))?;
+            }
             return Ok(ExitCode::from(1));
         }
     };
