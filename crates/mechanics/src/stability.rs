@@ -1,7 +1,7 @@
 //! The largest stable step of a deformed state, watched during a run.
 //!
 //! A cell's own limit is Δt_e = 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
-//! ([`tangent`](crate::tangent)); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the true
+//! (`tangent.rs`); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the true
 //! limit L of a reference state, at first rest, the limit now is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e),
 //! where r_e² is the stiffness of the cell in the reference state over that now, the smaller one of the ratios for all
 //! modes and for plane waves. So a cell that is slower than the assembly counts with its own limit, and one that the
