@@ -1,16 +1,16 @@
-//! Claims of the literature, each a test in `tests/`. Here is what the tests share: materials, specimens and how to
-//! run them, and the reference numbers in `data/`. A test prints what it measured:
-//! `cargo test -p pliant-validation -- --nocapture`.
+//! Claims of the literature, each a test in `tests/`. What the tests share: materials, specimens and how to run them
+//! (from `pliant-reproduce`, which shows some of the same computations to users), and the reference numbers in `data/`.
+//! A test prints what it measured: `cargo test -p pliant-validation -- --nocapture`.
 
-pub mod brain_shift;
 mod random;
 mod reference;
 mod run;
-mod specimen;
-mod tissue;
 
+pub use pliant_reproduce::cases::brain_shift;
+pub use pliant_reproduce::{
+    Equilibrium, HOURGLASS, Hexes, Specimen, Tets, deformation, elastic, largest, law, liver,
+    liver_relaxation, numbers, smooth_step, soft_tissue,
+};
 pub use random::Random;
-pub use reference::{claim, data_file, largest, numbers, reference};
-pub use run::{Equilibrium, relax, run, run_on, run_watched, settle, smooth_step, watched};
-pub use specimen::{HOURGLASS, Hexes, Specimen, Tets};
-pub use tissue::{deformation, elastic, law, liver, liver_relaxation, soft_tissue};
+pub use reference::{claim, data_file, reference};
+pub use run::{relax, run, run_on, run_watched, settle, watched};

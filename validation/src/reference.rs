@@ -19,17 +19,6 @@ pub fn reference(name: &str) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// An array of numbers of a reference file; anything else counts as not a number, which meets no claim.
-pub fn numbers(value: &Value) -> Vec<f64> {
-    let list = value.as_array().map(Vec::as_slice).unwrap_or_default();
-    list.iter().map(|x| x.as_f64().unwrap_or(f64::NAN)).collect()
-}
-
-/// The largest of some deviations; not a number if one of them is not, unlike a fold with `f64::max`.
-pub fn largest(deviations: impl IntoIterator<Item = f64>) -> f64 {
-    deviations.into_iter().fold(0.0, |worst, x| if x > worst || x.is_nan() { x } else { worst })
-}
-
 /// Prints a measured deviation beside its limit and holds it to the limit.
 ///
 /// # Panics

@@ -1,15 +1,11 @@
-//! Running a model from rest, through its history or to its equilibrium.
+//! Running a model, as a test does it: what fails, panics.
 
 use pliant_mechanics::critical_step::true_limit;
-use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::stability::{Monitor, OnUnstable};
-use pliant_mechanics::tensor::{Vector, dot};
-use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Model, Observable, Real, RelaxationSettings, State, StepError,
-};
+use pliant_mechanics::{CentralDifference, DynamicRelaxation, Model, Real, State, StepError};
+use pliant_reproduce::{CaseError, Equilibrium};
 
-/// Steps a model from rest to a time [s], both ends included. `observe` sees every instant once its forces, reactions
-/// and energies are known. Returns the last instant.
+/// See [`pliant_reproduce::run`].
 ///
 /// # Errors
 /// If a step fails.
@@ -22,11 +18,29 @@ pub fn run<R: Real>(
     until: f64,
     observe: impl FnMut(&CentralDifference<R>, &State<R>),
 ) -> Result<(CentralDifference<'_, R>, State<R>), StepError> {
-    let stepper = CentralDifference::new(model, step).unwrap_or_else(|error| panic!("{error}"));
-    run_on(stepper, State::at_rest(model), until, observe)
+    pliant_reproduce::run(model, step, until, observe).map_err(|error| match error {
+        CaseError::Step(error) => error,
+        other => panic!("{other}"),
+    })
 }
 
-/// The same with a monitor of the stable step, whose limit at rest is the true one.
+/// See [`pliant_reproduce::settle`].
+///
+/// # Panics
+/// If a step fails or the model still moves.
+pub fn settle(model: &Model, step: f64, until: f64) -> Equilibrium<'_> {
+    pliant_reproduce::settle(model, step, until).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// See [`pliant_reproduce::relax`].
+///
+/// # Panics
+/// If there is no equilibrium.
+pub fn relax(model: &Model) -> (DynamicRelaxation<'_, f64>, State<f64>) {
+    pliant_reproduce::relax(model).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// As [`run`], with a monitor of the stable step, whose limit at rest is the true one.
 ///
 /// # Errors
 /// If a step fails.
@@ -71,49 +85,4 @@ pub fn run_on<'m, R: Real>(
         }
         stepper.advance(&mut state);
     }
-}
-
-/// A state that has come to rest.
-pub struct Equilibrium<'m> {
-    /// The stepper, for its reactions.
-    pub stepper: CentralDifference<'m, f64>,
-    /// The state.
-    pub state: State<f64>,
-    /// The largest displacement of a node [m].
-    pub largest: f64,
-}
-
-/// Applies what a damped model asks for within `until` seconds and checks that it has come to rest: going on at its
-/// largest speed, no node would move by more than 1e-7 of the largest displacement in a tenth of a second, the time in
-/// which the slowest of the overdamped vibrations of these models decays by e at the least.
-///
-/// # Panics
-/// If a step fails or the model still moves.
-pub fn settle(model: &Model, step: f64, until: f64) -> Equilibrium<'_> {
-    let (stepper, state) = run(model, step, until, |_, _| ()).unwrap_or_else(|error| panic!("{error}"));
-    let length = |v: Vector<f64>| dot(v, v).sqrt();
-    let largest = state.displacement.iter().map(|&u| length(u)).fold(0.0, f64::max);
-    let speed =
-        (0..model.node_count()).map(|node| length(stepper.velocity(&state, node))).fold(0.0, f64::max);
-    let creep = 0.1 * speed / largest;
-    assert!(creep < 1e-7, "not at rest after {until} s: creeps by {creep:.1e} of its displacement in 0.1 s");
-    Equilibrium { stepper, state, largest }
-}
-
-/// The equilibrium at 1 s, found in one load step by dynamic relaxation to a residual of 1e-8 of the largest force.
-///
-/// # Panics
-/// If there is none.
-pub fn relax(model: &Model) -> (DynamicRelaxation<'_, f64>, State<f64>) {
-    let settings = RelaxationSettings { tolerance: 1e-8, ..RelaxationSettings::default() };
-    let mut solver = DynamicRelaxation::new(model, settings).unwrap_or_else(|error| panic!("{error}"));
-    let mut state = State::at_rest(model);
-    let convergence = solver.solve(&mut state, 1.0).unwrap_or_else(|error| panic!("{error}"));
-    println!("{convergence:?}");
-    (solver, state)
-}
-
-/// From 0 at the start to 1 at a time [s], with a continuous velocity.
-pub fn smooth_step(to: f64) -> Curve {
-    Curve { shape: Shape::SmoothStep, from: 0.0, to }
 }

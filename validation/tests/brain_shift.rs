@@ -1,73 +1,30 @@
 //! Brain shift on an ellipsoid (the setting is in `brain_shift` of the library), held to a converged solution of
 //! quadratic tets at 52 points inside and, mesh by mesh, to two other codes.
 
-use pliant_geometry::{Locator, Mesh, Vector3, boundary, io};
-use pliant_mechanics::model::Averaging;
-use pliant_mechanics::tensor::{Vector, dot, sub};
-use pliant_validation::brain_shift::{brain, mesh, stuffed, with_regions};
-use pliant_validation::{Tets, claim, data_file, largest, numbers, reference, relax};
-use serde_json::Value;
-
-const ANP: Tets = Tets::Averaged(Averaging::Nodal);
-
-fn length(v: Vector<f64>) -> f64 {
-    dot(v, v).sqrt()
-}
-
-fn vectors(value: &Value) -> Vec<Vector<f64>> {
-    value.as_array().unwrap().iter().map(|v| numbers(v).try_into().unwrap()).collect()
-}
-
-/// The mesh of 734 nodes of the reference.
-fn reference_mesh() -> Mesh {
-    with_regions(io::read(&data_file("ellipsoid_tet4_h14mm.msh")).unwrap().mesh)
-}
-
-/// The largest difference of two fields over the largest vector of the second.
-fn off(found: &[Vector<f64>], expected: &[Vector<f64>]) -> f64 {
-    let difference = found.iter().zip(expected).map(|(a, b)| length(sub(*a, *b)));
-    largest(difference) / largest(expected.iter().map(|&u| length(u)))
-}
+use pliant_geometry::{Mesh, Vector3, boundary, io};
+use pliant_validation::brain_shift::{ANP, Shifted, mesh, off_on_the_same_mesh, reference_mesh, stuffed};
+use pliant_validation::{Tets, claim};
 
 /// Holds the root mean square and the largest deviation [m] at the 52 points to limits.
 fn check_points(name: &str, mesh: Mesh, [rms_limit, largest_limit]: [f64; 2]) {
-    let data = reference("ellipsoid.json");
-    let brain = brain(mesh, ANP);
-    let (_, state) = relax(&brain.model);
-    let locator = Locator::new(&brain.mesh);
-    let at = |point: Vector<f64>| {
-        let location = locator.locate(Vector3::from(point)).unwrap();
-        assert_eq!(location.distance, 0.0);
-        let nodes = brain.mesh.block(location.kind).unwrap().cell(location.cell as usize);
-        let mut u = [0.0; 3];
-        for (&node, weight) in nodes.iter().zip(location.weights()) {
-            (0..3).for_each(|c| u[c] += weight * state.displacement[node as usize][c]);
-        }
-        u
-    };
-    let (points, expected) = (vectors(&data["points"]), vectors(&data["displacement"]));
-    assert_eq!((points.len(), expected.len()), (52, 52));
-    let off: Vec<f64> = points.iter().zip(&expected).map(|(&point, &u)| length(sub(at(point), u))).collect();
-    let rms = (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt();
-    println!("{name}: {} nodes", brain.model.node_count());
+    let shifted = Shifted::new(mesh, ANP).unwrap();
+    assert_eq!(shifted.at_points().len(), 52);
+    let [rms, largest] = shifted.off();
+    println!("{name}: {} nodes", shifted.brain.model.node_count());
     claim(&format!("{name}: rms deviation [m]"), rms, rms_limit);
-    claim(&format!("{name}: largest deviation [m]"), largest(off), largest_limit);
+    claim(&format!("{name}: largest deviation [m]"), largest, largest_limit);
 }
 
 /// 1e-5: the accuracy of the reference, held by two codes.
 #[test]
 fn plain_tets_shift_as_two_other_codes_say() {
-    let brain = brain(reference_mesh(), Tets::Plain);
-    let (_, state) = relax(&brain.model);
-    claim("T4", off(&state.displacement, &vectors(&reference("ellipsoid.json")["T4"])), 1e-5);
+    claim("T4", off_on_the_same_mesh("T4", Tets::Plain).unwrap(), 1e-5);
 }
 
 /// 1e-4: one prototype, whose force was verified as the gradient of its energy.
 #[test]
 fn tets_with_average_nodal_pressure_shift_as_the_prototype_says() {
-    let brain = brain(reference_mesh(), ANP);
-    let (_, state) = relax(&brain.model);
-    claim("ANP", off(&state.displacement, &vectors(&reference("ellipsoid.json")["ANP"])), 1e-4);
+    claim("ANP", off_on_the_same_mesh("ANP", ANP).unwrap(), 1e-4);
 }
 
 #[test]

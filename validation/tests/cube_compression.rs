@@ -6,24 +6,14 @@ use pliant_geometry::io;
 use pliant_mechanics::Observable;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::tensor::{dot, sub};
-use pliant_meshing::VolumeCell;
+use pliant_reproduce::cases::cube;
 use pliant_validation::{
     Specimen, claim, data_file, elastic, largest, liver, numbers, reference, settle, smooth_step, soft_tissue,
 };
 
-/// Force F [N] and bulge [mm] of the cube at 20 %, from hexahedra with `n` cells along the full edge: an eighth of the
-/// cube, its glued platen at x = 0, its symmetry planes at x = 0.05, y = 0 and z = 0.
+/// Force F [N] and bulge [mm] of the cube at 20 %, from hexahedra with `n` cells along the full edge.
 fn compressed_by_a_fifth(n: usize) -> [f64; 2] {
-    let eighth = Specimen::block([0.05; 3], [n / 2; 3], VolumeCell::Hex, &elastic(soft_tissue()), [0.0; 3])
-        .shift("x-min", 0.2 * 0.05, smooth_step(0.5))
-        .fix("x-min", [false, true, true])
-        .fix("x-max", [true, false, false])
-        .fix("y-min", [false, true, false])
-        .fix("z-min", [false, false, true])
-        .damped(60.0);
-    let rest = settle(&eighth.model, 0.5 * eighth.element_bound(), 2.0);
-    let force = 4.0 * rest.stepper.reaction(eighth.constraint("move x-min"))[0];
-    let bulge = 1e3 * rest.state.displacement[eighth.node_at([0.05, 0.05, 0.0])][1];
+    let [force, bulge] = cube::compressed_by_a_fifth(n).unwrap();
     println!("n = {n}: F = {force:.4} N, bulge = {bulge:.4} mm");
     [force, bulge]
 }

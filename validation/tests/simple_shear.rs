@@ -2,20 +2,12 @@
 //! right (Taylor et al. 2009). Reference: closed forms with fifty digits.
 //! *A*: F = I + γ e₂⊗e₁, which stretches fibres along e₁; *B*: F = I + γ e₁⊗e₂, which does not.
 
-use pliant_mechanics::law::{AnyLaw, Split};
+use pliant_mechanics::law::Split;
 use pliant_mechanics::prony::{PronyUpdate, Relaxation};
 use pliant_mechanics::tensor::Symmetric;
-use pliant_validation::{claim, deformation, largest, law, liver_relaxation, numbers, reference};
-use serde_json::{Value, json};
-
-/// Components of S that do not vanish, in the order of [`Symmetric`].
-const COMPONENTS: [&str; 4] = ["S11", "S22", "S33", "S12"];
-
-/// Shear rates [1/s] of the curves.
-const RATES: [f64; 3] = [2.5, 0.25, 0.025];
-
-/// Step [s] at which the errors of the updates are known.
-const STEP: f64 = 0.01;
+use pliant_reproduce::cases::shear::{RATES, STEP, curves, data, deviation, law_of, rate_name};
+use pliant_validation::{claim, deformation, largest, liver_relaxation, numbers};
+use serde_json::Value;
 
 /// One kind of fibres in one direction of shear.
 #[derive(Clone, Copy, Debug)]
@@ -33,20 +25,11 @@ const CASES_A: [Case; 3] = [
 const CASE_B: Case = Case { geometry: "B", fibres: "energy" };
 
 impl Case {
-    fn law(&self) -> AnyLaw {
-        let mut parameters = json!({ "shear-modulus": 6568.0, "bulk-modulus": 6568.0 * 29.0 / 3.0 });
-        if self.fibres == "isotropic" {
-            return law("neo-hookean", parameters);
-        }
-        parameters["fibre-modulus"] = json!(13136.0);
-        parameters["convention"] = json!(self.fibres);
-        law("transversely-isotropic", parameters)
-    }
-
     /// The elastic stress [Pa] at a shear, fibres along e₁.
     fn elastic(&self, shear: f64) -> Split<Symmetric<f64>> {
         let (a, b) = if self.geometry == "A" { (0.0, shear) } else { (shear, 0.0) };
-        self.law().stress(&deformation([[1.0, a, 0.0], [b, 1.0, 0.0], [0.0, 0.0, 1.0]]), [1.0, 0.0, 0.0])
+        let (law, fibres) = (law_of(self.fibres), [[1.0, 0.0, 0.0]]);
+        law.stress(&deformation([[1.0, a, 0.0], [b, 1.0, 0.0], [0.0, 0.0, 1.0]]), &fibres[..law.families()])
     }
 
     /// The stress [Pa] at shears, from rest, at a rate [1/s] and with a step [s].
@@ -69,27 +52,13 @@ impl Case {
 
     /// The curves of the reference: `instantaneous`, `equilibrium` or `rate_2.5` and so on.
     fn curves(&self, data: &Value, name: &str) -> [Vec<f64>; 4] {
-        COMPONENTS.map(|component| numbers(&data[self.geometry][self.fibres][name][component]))
+        curves(data, self.geometry, self.fibres, name)
     }
-}
-
-fn rate_name(rate: f64) -> String {
-    format!("rate_{rate}")
-}
-
-/// The largest deviation of stresses from four curves, each relative to the largest value of its curve.
-fn deviation(curves: &[Vec<f64>; 4], stresses: &[Symmetric<f64>]) -> f64 {
-    largest((0..4).map(|component| {
-        let curve = &curves[component];
-        assert_eq!(curve.len(), stresses.len());
-        let off = stresses.iter().zip(curve).map(|(s, c)| (s.0[component] - c).abs());
-        largest(off) / largest(curve.iter().map(|s| s.abs()))
-    }))
 }
 
 #[test]
 fn thesis_6_3_elastic_limits_with_fibres_by_energy_by_taylor_and_without() {
-    let data = reference("shear_curves.json");
+    let data = data();
     let shears = numbers(&data["gamma"]);
     let relaxed = liver_relaxation(PronyUpdate::Exact);
     for case in CASES_A.into_iter().chain([CASE_B]) {
@@ -120,7 +89,7 @@ fn shear_across_the_fibres_does_not_feel_them() {
 /// S₁₁ at γ = 1 and 2.5/s, relative to itself: the number by which the reference judges an update
 /// (`visco_update_errors.json`: 2.4276e-5 exact for linear stress, 2.3381e-3 backward Euler, at 0.01 s).
 fn error_of_s11_at_the_end(update: PronyUpdate) -> f64 {
-    let (data, case) = (reference("shear_curves.json"), CASES_A[0]);
+    let (data, case) = (data(), CASES_A[0]);
     let expected = case.curves(&data, "rate_2.5")[0].last().copied().unwrap();
     let found = case.sheared(&[1.0], 2.5, update, STEP)[0].0[0];
     (found / expected - 1.0).abs()
@@ -161,7 +130,7 @@ fn truncation_bound(case: Case, component: usize, rate: f64, shear: f64) -> f64 
 
 #[test]
 fn thesis_6_4_every_component_at_every_rate_is_exact_up_to_the_curvature_within_a_step() {
-    let data = reference("shear_curves.json");
+    let data = data();
     let shears = numbers(&data["gamma"]);
     for case in CASES_A.into_iter().chain([CASE_B]) {
         for rate in RATES {
@@ -182,7 +151,7 @@ fn thesis_6_4_every_component_at_every_rate_is_exact_up_to_the_curvature_within_
 
 #[test]
 fn thesis_6_4_halving_the_step_quarters_the_error_or_halves_that_of_backward_euler() {
-    let data = reference("shear_curves.json");
+    let data = data();
     let shears = numbers(&data["gamma"]);
     for (update, order) in [(PronyUpdate::Exact, 4.0), (PronyUpdate::BackwardEuler, 2.0)] {
         for case in CASES_A {

@@ -47,7 +47,8 @@ fn tissues() -> Vec<Tissue> {
 /// Normal components of S [Pa] of a block stretched along its axes.
 fn normal_stress(tissue: &Tissue, stretch: [f64; 3]) -> [f64; 3] {
     let [x, y, z] = stretch;
-    let stress = tissue.law.stress(&deformation([[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]), tissue.fibre);
+    let state = deformation([[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]);
+    let stress = tissue.law.stress(&state, &[tissue.fibre][..tissue.law.families()]);
     let [xx, yy, zz, ..] = (stress.isochoric + stress.volumetric).0;
     [xx, yy, zz]
 }

@@ -62,6 +62,31 @@ pub enum Command {
     /// Say what a mesh file holds, how good it is, and what is wrong with it.
     #[command(after_help = "Examples:\n  pliant info liver.msh\n  pliant info liver.msh --convert liver.vtu")]
     Info(Info),
+    /// Compute the solid results of the thesis and write them beside the printed ones.
+    #[command(
+        after_help = "Examples:\n  pliant reproduce\n  pliant reproduce --list\n  pliant reproduce --only fig-6.3 --out shear\n\n\
+                      Exit codes: 0 all numbers within their tolerance, 1 one is not, 2 the input is wrong."
+    )]
+    Reproduce(Reproduce),
+}
+
+#[derive(Debug, clap::Args)]
+pub struct Reproduce {
+    /// Folder for index.html and results.json.
+    #[arg(long, value_name = "DIR", default_value = "reproduce")]
+    pub out: PathBuf,
+    /// Write into a folder that holds other files.
+    #[arg(long)]
+    pub force: bool,
+    /// Say what there is, and compute nothing.
+    #[arg(long)]
+    pub list: bool,
+    /// Compute this case only; may be given several times.
+    #[arg(long, value_name = "ID")]
+    pub only: Vec<String>,
+    /// Also renew the table of results in a Markdown file, between its two marks.
+    #[arg(long, value_name = "FILE", conflicts_with = "only")]
+    pub table: Option<PathBuf>,
 }
 
 #[derive(Debug, clap::Args)]
@@ -187,7 +212,8 @@ impl Command {
             | Self::Check(_)
             | Self::New { .. }
             | Self::Schema { .. }
-            | Self::Import { .. } => false,
+            | Self::Import { .. }
+            | Self::Reproduce(_) => false,
         }
     }
 }

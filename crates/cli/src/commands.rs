@@ -18,6 +18,7 @@ use tempfile::TempDir;
 
 use crate::arguments::{self, Check, Command, Info, Overrides, Precision, Run};
 use crate::report::{self, Bar, Failure, say};
+use crate::reproduce::reproduce;
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
@@ -35,6 +36,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         }
         Command::Info(arguments) => info(&arguments),
         Command::Import { model, out } => import(&model, &out),
+        Command::Reproduce(arguments) => reproduce(&arguments),
     }
 }
 

@@ -3,6 +3,7 @@
 mod arguments;
 mod commands;
 mod report;
+mod reproduce;
 
 use std::process::ExitCode;
 

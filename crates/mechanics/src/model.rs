@@ -84,10 +84,18 @@ pub struct Solid {
     pub material: Material,
     /// The cells with their element.
     pub cells: Cells,
-    /// Unit fibre direction at rest, one per cell; empty if the law has none.
+    /// Unit fibre directions at rest, cell by cell as many as the law has families.
     pub fibre: Vec<Vector<f64>>,
     /// The number of each cell in the user's mesh, counted over the cells of its kind.
     pub original: Vec<u32>,
+}
+
+impl Solid {
+    /// The directions of the families of fibres in a cell, at rest.
+    pub fn fibres(&self, cell: usize) -> &[Vector<f64>] {
+        let families = self.material.law.families();
+        &self.fibre[cell * families..(cell + 1) * families]
+    }
 }
 
 /// Cells of one element type.
@@ -415,10 +423,10 @@ impl Model {
     /// Adds ρV/N of every cell of a solid to its nodes.
     ///
     /// # Panics
-    /// If the law has fibres and the cells have none.
+    /// If not every cell has a direction for each of the law's families of fibres.
     pub fn add_solid(&mut self, solid: Solid) {
-        let needed = if solid.material.law.needs_fibre() { solid.cells.len() } else { solid.fibre.len() };
-        assert_eq!(solid.fibre.len(), needed, "a law with fibres needs one direction per cell");
+        let needed = solid.material.law.families() * solid.cells.len();
+        assert_eq!(solid.fibre.len(), needed, "every cell has a direction for each family of fibres");
         for cell in 0..solid.cells.len() {
             let nodes = solid.cells.nodes(cell);
             let share = solid.material.density * solid.cells.volume(cell) / nodes.len() as f64;

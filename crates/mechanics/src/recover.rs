@@ -24,7 +24,7 @@ pub struct CellFields {
     pub energy_density: f64,
     /// Unit fibre at rest; `None` if the law has none.
     pub fibre: Option<Vector<f64>>,
-    /// Length of the deformed unit fibre; `None` if the law has none.
+    /// Length of the deformed unit fibre (of the first family); `None` if the law has none.
     pub fibre_stretch: Option<f64>,
 }
 
@@ -78,7 +78,7 @@ impl<'a, R: Real> Recovery<'a, R> {
         let per_cell = History::<R>::slots(part);
         let own = &self.state.history[solid].cells[cell * per_cell..(cell + 1) * per_cell];
         let history: Vec<Symmetric<f64>> = own.iter().map(|h| Symmetric(h.0.map(R::to_f64))).collect();
-        let fibre = part.fibre.get(cell).copied();
+        let fibres = part.fibres(cell);
         let averages = &self.averages[solid];
         match &part.cells {
             Cells::FullHex8(_, points) => {
@@ -86,13 +86,13 @@ impl<'a, R: Real> Recovery<'a, R> {
                 let at = |point: usize| {
                     let h = gradient(&u, &points[cell].gradient[point]);
                     let own = &history[point * slots..(point + 1) * slots];
-                    (point_fields(part, &h, fibre, averages, cell, own), points[cell].weight[point])
+                    (point_fields(part, &h, fibres, averages, cell, own), points[cell].weight[point])
                 };
                 mean((0..8).map(at), part.cells.volume(cell))
             }
             cells => {
                 let h = with_cells!(cells, block => gradient(&u, &block.rest[cell].gradient));
-                point_fields(part, &h, fibre, averages, cell, &history)
+                point_fields(part, &h, fibres, averages, cell, &history)
             }
         }
     }
@@ -110,7 +110,7 @@ fn gradient(u: &[Vector<f64>], shape: &[Vector<f64>]) -> Tensor<f64> {
 fn point_fields(
     solid: &Solid,
     h: &Tensor<f64>,
-    fibre: Option<Vector<f64>>,
+    fibres: &[Vector<f64>],
     averages: &Averages,
     cell: usize,
     history: &[Symmetric<f64>],
@@ -122,9 +122,8 @@ fn point_fields(
         }
         Averages::None | Averages::Pressure(_) => Deformation::from_displacement_gradient(h),
     };
-    let a = fibre.unwrap_or([0.0; 3]);
-    let Split { isochoric, volumetric } = law.energy(&deformation, a);
-    let elastic = law.stress(&deformation, a);
+    let Split { isochoric, volumetric } = law.energy(&deformation, fibres);
+    let elastic = law.stress(&deformation, fibres);
     let pk2_stress = match averages {
         Averages::Pressure(pressures) => {
             let volumetric = deformation.inverse_cauchy_green * (deformation.volume_ratio * pressures[cell]);
@@ -144,8 +143,8 @@ fn point_fields(
         pk2_stress,
         cauchy_stress: pk2_stress.push_forward(&deformation.gradient) * (1.0 / deformation.volume_ratio),
         energy_density: isochoric + volumetric,
-        fibre,
-        fibre_stretch: fibre.map(stretch),
+        fibre: fibres.first().copied(),
+        fibre_stretch: fibres.first().copied().map(stretch),
     }
 }
 

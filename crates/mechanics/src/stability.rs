@@ -306,12 +306,13 @@ impl Watch {
             let strain = Symmetric::green_lagrange_twice(&h);
             let c = strain + Symmetric::IDENTITY;
             let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
-            let stretch = match solid.fibre.get(cell) {
-                Some(&fibre) => c.quadratic(fibre),
-                None => c.trace() / 3.0,
+            let mean = c.trace() / 3.0;
+            let stretch = match solid.fibres(cell) {
+                [] => mean,
+                fibres => fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max),
             };
             // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
-            let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * c.trace() / 3.0;
+            let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * mean;
             // |G C⁻¹| over |G|: how much closer the deformed faces lie, the closest pair counting most.
             let closeness = product_square(&square, &(c.cofactor() * (1.0 / (j * j)))).sqrt();
             *rank = [closeness * modulus * weight[cell], stretch];
@@ -364,9 +365,8 @@ impl Watch {
     ) -> (f64, Stiffness) {
         let in_state = |displacement: &[Vector<R>]| {
             let h = displacement_gradient(solid, cell, displacement);
-            let fibre = solid.fibre.get(cell).copied().unwrap_or_default();
             let square = gradient_square_of(solid, cell);
-            let Stiffness { mode, wave } = stiffness(&solid.material.law, fibre, &h, &square);
+            let Stiffness { mode, wave } = stiffness(&solid.material.law, solid.fibres(cell), &h, &square);
             Stiffness { mode: mode.max(self.hourglass[cell]), wave }
         };
         let now = in_state(displacement);

@@ -30,7 +30,7 @@ pub(crate) struct Stiffness {
 /// defined.
 pub(crate) fn stiffness(
     law: &AnyLaw,
-    fibre: Vector<f64>,
+    fibres: &[Vector<f64>],
     h: &Tensor<f64>,
     square: &Symmetric<f64>,
 ) -> Stiffness {
@@ -42,7 +42,7 @@ pub(crate) fn stiffness(
             let moved = |by: f64| {
                 let mut moved = *h;
                 moved.0[i] = add(moved.0[i], scale(column, by));
-                first_piola_kirchhoff(law, fibre, &moved)
+                first_piola_kirchhoff(law, fibres, &moved)
             };
             let (ahead, behind) = (moved(DIFFERENCE), moved(-DIFFERENCE));
             for k in 0..3 {
@@ -124,9 +124,9 @@ fn eigenvector(a: &SMatrix<f64, 3, 3>, eigenvalue: f64) -> SVector<f64, 3> {
     longest.and_then(|v| v.try_normalize(f64::MIN_POSITIVE)).unwrap_or_else(SVector::x)
 }
 
-fn first_piola_kirchhoff(law: &AnyLaw, fibre: Vector<f64>, h: &Tensor<f64>) -> Tensor<f64> {
+fn first_piola_kirchhoff(law: &AnyLaw, fibres: &[Vector<f64>], h: &Tensor<f64>) -> Tensor<f64> {
     let deformation = Deformation::from_displacement_gradient(h);
-    let stress = law.stress(&deformation, fibre);
+    let stress = law.stress(&deformation, fibres);
     deformation.gradient.times_symmetric(&(stress.isochoric + stress.volumetric))
 }
 

@@ -94,8 +94,8 @@ impl<'a> Base64<'a> {
     }
 }
 
-/// Appends bytes as one padded piece.
-pub(super) fn encode(bytes: &[u8], text: &mut Vec<u8>) {
+/// Appends bytes as one padded piece (RFC 4648).
+pub fn encode(bytes: &[u8], text: &mut Vec<u8>) {
     let group = |a: u8, b: u8, c: u8| {
         let bits = u32::from_be_bytes([0, a, b, c]);
         [18, 12, 6, 0].map(|shift| ALPHABET[(bits >> shift) as usize & 63])

@@ -26,6 +26,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use crate::Mesh;
+pub use base64::encode as encode_base64;
 pub use error::{MeshFileError, MeshFileProblem, Place};
 use surface_out::SurfaceOut;
 pub use vtu_write::{VtuOptions, save_vtu, write_pvd, write_vtu};

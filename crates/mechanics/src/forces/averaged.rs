@@ -27,6 +27,7 @@ pub(super) struct AveragedTets<R> {
     gradient: Vec<[Vector<R>; 4]>,
     volume: Vec<R>,
     fibre: Vec<Vector<R>>,
+    families: usize,
     local: LocalNodes,
     /// V_n = Σ V_e/4 [m³].
     node_volume: Vec<R>,
@@ -54,6 +55,7 @@ impl<R: Real> AveragedTets<R> {
             gradient: cells.rest.iter().map(|rest| rest.gradient.map(cast)).collect(),
             volume: cells.rest.iter().map(|rest| R::of(rest.volume)).collect(),
             fibre: solid.fibre.iter().map(|&a| cast(a)).collect(),
+            families: solid.material.law.families(),
             node_volume,
             relaxation: Relaxation::new(prony, step),
             isochoric_slots: prony.isochoric_slots(),
@@ -200,7 +202,7 @@ impl<R: Real> AveragedTets<R> {
             for (point, cell) in cells.clone().enumerate() {
                 batch.deformation[point] = self.deformation(cell, displacement, &mut findings);
             }
-            let fibres = if self.fibre.is_empty() { &[] } else { &self.fibre[cells.clone()] };
+            let fibres = &self.fibre[cells.start * self.families..cells.end * self.families];
             batch.evaluate(&self.law, cells.len(), fibres);
             for (point, (cell, forces)) in cells.zip(slots.chunks_exact_mut(4)).enumerate() {
                 let own = if history.is_empty() {

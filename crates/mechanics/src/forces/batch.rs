@@ -22,7 +22,8 @@ impl<R: Real> Batch<R> {
         }
     }
 
-    /// The stresses of the first `count` points. `fibres` has their directions; it may be empty for a law without.
+    /// The stresses of the first `count` points. `fibres` has their directions, as many a point as the law
+    /// has families.
     pub(super) fn evaluate(&mut self, law: &AnyLaw, count: usize, fibres: &[Vector<R>]) {
         let (deformation, elastic) = (&self.deformation[..count], &mut self.elastic[..count]);
         with_law!(law, law => stresses(law, deformation, fibres, elastic));
@@ -36,14 +37,9 @@ fn stresses<R: Real, L: Law>(
     fibres: &[Vector<R>],
     stresses: &mut [Split<Symmetric<R>>],
 ) {
-    if L::FIBRE {
-        for ((stress, deformation), &fibre) in stresses.iter_mut().zip(deformations).zip(fibres) {
-            *stress = law.stress(deformation, fibre);
-        }
-    } else {
-        for (stress, deformation) in stresses.iter_mut().zip(deformations) {
-            *stress = law.stress(deformation, [R::ZERO; 3]);
-        }
+    let families = law.families();
+    for (point, (stress, deformation)) in stresses.iter_mut().zip(deformations).enumerate() {
+        *stress = law.stress(deformation, &fibres[point * families..(point + 1) * families]);
     }
 }
 
@@ -61,6 +57,6 @@ pub(crate) fn pressure<R: Real>(law: &AnyLaw, volume_change: R) -> R {
     // S = J U' C⁻¹ with C⁻¹ = c⁻² I.
     let deformation = [Deformation::from_displacement_gradient(&h)];
     let mut stress = [Split { isochoric: Symmetric::ZERO, volumetric: Symmetric::ZERO }];
-    with_law!(law, law => stresses(law, &deformation, &[[R::ONE, R::ZERO, R::ZERO]], &mut stress));
+    with_law!(law, law => stresses(law, &deformation, &[[R::ONE, R::ZERO, R::ZERO]; 2], &mut stress));
     stress[0].volumetric.0[0] * c * c / j
 }

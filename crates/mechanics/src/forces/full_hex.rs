@@ -21,7 +21,9 @@ pub(super) struct FullHexes<R> {
     /// Volumes of the points [m³].
     weight: Vec<[R; 8]>,
     volume: Vec<R>,
+    /// Directions at the eight points of each cell.
     fibre: Vec<Vector<R>>,
+    families: usize,
     relaxation: Relaxation<R>,
     isochoric_slots: usize,
     volumetric_slots: usize,
@@ -38,7 +40,8 @@ impl<R: Real> FullHexes<R> {
             gradient: points.iter().map(|cell| cell.gradient.map(|point| point.map(cast))).collect(),
             weight: points.iter().map(|cell| cell.weight.map(R::of)).collect(),
             volume: cells.rest.iter().map(|rest| R::of(rest.volume)).collect(),
-            fibre: solid.fibre.iter().map(|&a| cast(a)).collect(),
+            fibre: (0..cells.nodes.len()).flat_map(|cell| solid.fibres(cell).repeat(8)).map(cast).collect(),
+            families: solid.material.law.families(),
             relaxation: Relaxation::new(prony, step),
             isochoric_slots: prony.isochoric_slots(),
             volumetric_slots: prony.volumetric_slots(),
@@ -107,7 +110,7 @@ impl<R: Real> FullHexes<R> {
             *deformation = Deformation::from_displacement_gradient(&displacement_gradient(&u, gradient));
             findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
         }
-        batch.evaluate(&self.law, 8, &[self.fibre.get(cell).copied().unwrap_or_default(); 8]);
+        batch.evaluate(&self.law, 8, &self.fibre[8 * cell * self.families..8 * (cell + 1) * self.families]);
         forces.fill([R::ZERO; 3]);
         for (point, (gradient, &weight)) in self.gradient[cell].iter().zip(&self.weight[cell]).enumerate() {
             let deformation = &batch.deformation[point];

@@ -18,6 +18,7 @@ pub(super) struct SolidForces<R, const N: usize> {
     gradient: Vec<[Vector<R>; N]>,
     volume: Vec<R>,
     fibre: Vec<Vector<R>>,
+    families: usize,
     hourglass: Option<Hourglass<R, N>>,
     relaxation: Relaxation<R>,
     history_slots: usize,
@@ -35,6 +36,7 @@ impl<R: Real, const N: usize> SolidForces<R, N> {
             gradient: cells.rest.iter().map(|rest| rest.gradient.map(cast)).collect(),
             volume: cells.rest.iter().map(|rest| R::of(rest.volume)).collect(),
             fibre: solid.fibre.iter().map(|&a| cast(a)).collect(),
+            families: solid.material.law.families(),
             hourglass,
             relaxation: Relaxation::new(&solid.material.prony, step),
             history_slots: solid.material.prony.slots(),
@@ -61,7 +63,7 @@ impl<R: Real, const N: usize> SolidForces<R, N> {
                 findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
                 batch.deformation[point] = deformation;
             }
-            let fibres = if self.fibre.is_empty() { &[] } else { &self.fibre[cells.clone()] };
+            let fibres = &self.fibre[cells.start * self.families..cells.end * self.families];
             batch.evaluate(&self.law, cells.len(), fibres);
             for (point, (cell, forces)) in cells.zip(slots.chunks_exact_mut(N)).enumerate() {
                 let elastic = batch.elastic[point];

@@ -67,7 +67,7 @@ fn distorted_cube(element: &str, law: AnyLaw) -> Model {
     model.bodies.push(Body { name: "cube".into(), nodes: 0..n.pow(3), damping: 0.0 });
     let material = Material { law, prony: Prony::default(), density: 1000.0 };
     let count = cells.len();
-    let fibre = if material.law.needs_fibre() { vec![[0.6, 0.0, 0.8]; count] } else { vec![] };
+    let fibre = vec![[0.6, 0.0, 0.8]; count * material.law.families()];
     model.add_solid(Solid { body: 0, material, cells, fibre, original: (0..count as u32).collect() });
     model
 }
@@ -91,7 +91,7 @@ fn forces(model: &Model, displacement: &[Vector<f64>]) -> (Vec<Vector<f64>>, f64
 fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
     let solid = &model.solids[0];
     let law = &solid.material.law;
-    let fibre = solid.fibre.first().copied().unwrap_or([0.0; 3]);
+    let fibres = solid.fibres(0);
     let gradient = |cell: usize, shape: &[Vector<f64>]| {
         let mut h = Tensor::ZERO;
         for (&node, &b) in solid.cells.nodes(cell).iter().zip(shape) {
@@ -99,13 +99,13 @@ fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
         }
         h
     };
-    let split = |h: &Tensor<f64>| law.energy(&Deformation::from_displacement_gradient(h), fibre);
+    let split = |h: &Tensor<f64>| law.energy(&Deformation::from_displacement_gradient(h), fibres);
     let change = |h: &Tensor<f64>| h.determinant() + h.second_invariant() + h.trace();
     // U(J) from a pure dilation.
     let dilation = |x: f64| {
         let stretch = (1.0 + x).cbrt() - 1.0;
         let h = Tensor([[stretch, 0.0, 0.0], [0.0, stretch, 0.0], [0.0, 0.0, stretch]]);
-        law.energy(&Deformation::from_displacement_gradient(&h), fibre).volumetric
+        law.energy(&Deformation::from_displacement_gradient(&h), fibres).volumetric
     };
     match &solid.cells {
         Cells::FullHex8(block, points) => (0..block.nodes.len())
@@ -270,6 +270,6 @@ fn an_inverted_cell_is_found() {
     assert!(determinant < 0.0);
     assert!(model.solids[0].cells.nodes(cell).contains(&21));
     let Split { isochoric, .. } =
-        laws()[0].energy(&Deformation::from_displacement_gradient(&Tensor::ZERO), [0.0; 3]);
+        laws()[0].energy(&Deformation::from_displacement_gradient(&Tensor::ZERO), &[]);
     assert_eq!(isochoric, 0.0);
 }

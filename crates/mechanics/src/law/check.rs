@@ -1,7 +1,7 @@
 //! Checks that several laws make of their parameters.
 
 use super::ParameterError;
-use crate::tensor::{Vector, dot, scale};
+use crate::tensor::{Vector, dot};
 
 /// Finite and above zero.
 pub(super) fn positive(key: &'static str, value: f64, unit: &str) -> Result<f64, ParameterError> {
@@ -37,20 +37,6 @@ pub(super) fn shear_at_rest(key: &'static str, shear: f64, formula: &str) -> Res
     }
     let message = format!("the shear modulus at rest, {formula}, must be greater than 0 Pa, found {shear}");
     Err(ParameterError { key, message, help: "otherwise the solid is not stable at rest".into() })
-}
-
-/// A direction scaled to length 1: a fibre that is not would be stressed at rest.
-pub(super) fn unit_direction(
-    key: &'static str,
-    direction: Vector<f64>,
-) -> Result<Vector<f64>, ParameterError> {
-    let length = dot(direction, direction).sqrt();
-    if length.is_finite() && length > 1e-12 {
-        return Ok(scale(direction, 1.0 / length));
-    }
-    let message = format!("`{key}` must be a direction, found {direction:?}");
-    let help = "for example [0, 1, 0]; its length does not matter";
-    Err(ParameterError { key, message, help: help.into() })
 }
 
 /// How far axes may be from unit length and from right angles.

@@ -127,7 +127,7 @@ impl Law for FungOrthotropic {
     }
 
     #[inline(always)]
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Split<R> {
+    fn energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
         let (q, _) = self.exponent(deformation);
         Split {
             isochoric: R::of(0.5 * self.modulus) * q.exp_m1(),
@@ -136,7 +136,7 @@ impl Law for FungOrthotropic {
     }
 
     #[inline(always)]
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Split<Symmetric<R>> {
+    fn stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
         let (q, slope) = self.exponent(deformation);
         let stress = slope * (R::of(self.modulus) * q.exp());
         Split {

@@ -41,13 +41,13 @@ impl SplitLaw for Gent {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> R {
+    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         let used = deformation.isochoric_first_invariant_minus_3() * R::of(1.0 / self.limit);
         R::of(-0.5 * self.shear * self.limit) * (-used).max(-R::ONE).ln_1p()
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Symmetric<R> {
+    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
         let used = deformation.isochoric_first_invariant_minus_3() * R::of(1.0 / self.limit);
         deformation.first_invariant_stress(R::of(0.5 * self.shear) / (R::ONE - used).max(R::ZERO))
     }
@@ -72,8 +72,8 @@ mod tests {
         let sheared = |g: f64| {
             let h = Tensor([[0.0, g, 0.0], [0.0; 3], [0.0; 3]]);
             let deformation = Deformation::from_displacement_gradient(&h);
-            let energy: f64 = law.isochoric_energy(&deformation, [0.0; 3]);
-            (energy, law.isochoric_stress(&deformation, [0.0; 3]))
+            let energy: f64 = law.isochoric_energy(&deformation, &[]);
+            (energy, law.isochoric_stress(&deformation, &[]))
         };
         // Ī₁ − 3 = g² in simple shear.
         let (energy, stress) = sheared(0.7);

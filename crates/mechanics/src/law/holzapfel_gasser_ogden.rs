@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::split::fibre_stiffness;
 use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric, check};
 use crate::Real;
-use crate::tensor::{Symmetric, Vector, cast};
+use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean matrix with one or two families of stiffening fibres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,14 +23,15 @@ pub struct HolzapfelGasserOgden {
     pub exponent: f64,
     /// Dispersion κ of the fibres.
     pub dispersion: f64,
-    /// Unit direction of the second family, the same everywhere; `None` for a single family.
-    pub second_fibre: Option<Vector<f64>>,
+    /// Families of fibres, 1 or 2.
+    pub families: usize,
     /// Volumetric energy.
     pub volumetric: Volumetric,
 }
 
 /// Parameters of the Holzapfel–Gasser–Ogden law: Ψ = c/2 (Ī₁ − 3) + Σ k₁/(2k₂) (e^(k₂ ⟨E⟩²) − 1) + U(J),
-/// E = κ (Ī₁ − 3) + (1 − 3κ)(Ī₄ − 1). The first family is the `fibre` of the law or the body.
+/// E = κ (Ī₁ − 3) + (1 − 3κ)(Ī₄ − 1). The families are `fibre` and
+/// `second-fibre` of the law or the body.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct HolzapfelGasserOgdenParameters {
@@ -47,9 +48,14 @@ pub struct HolzapfelGasserOgdenParameters {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 0.333_333_333_333_333_3))]
     pub dispersion: f64,
-    /// Direction of the second family at rest, the same in every cell; its length does not matter. Without it there is
-    /// one family.
-    pub second_fibre: Option<[f64; 3]>,
+    /// Families of fibres; with 2, the law or the body has a `second-fibre`.
+    #[serde(default = "one")]
+    #[schemars(range(min = 1, max = 2))]
+    pub families: usize,
+}
+
+fn one() -> usize {
+    1
 }
 
 impl HolzapfelGasserOgden {
@@ -78,7 +84,6 @@ impl HolzapfelGasserOgden {
 
 impl SplitLaw for HolzapfelGasserOgden {
     type Parameters = HolzapfelGasserOgdenParameters;
-    const FIBRE: bool = true;
 
     fn new(parameters: &HolzapfelGasserOgdenParameters) -> Result<Self, ParameterError> {
         let (shear, volumetric) = parameters.matrix.parts()?;
@@ -88,34 +93,36 @@ impl SplitLaw for HolzapfelGasserOgden {
             let help = "0: all fibres along one direction; 1/3: fibres in all directions";
             return Err(ParameterError { key: "dispersion", message, help: help.into() });
         }
-        let second_fibre =
-            parameters.second_fibre.map(|b| check::unit_direction("second-fibre", b)).transpose()?;
+        let families = parameters.families;
+        if !(1..=2).contains(&families) {
+            let message = format!("`families` must be 1 or 2, found {families}");
+            let help = "1: fibres along `fibre`; 2: also along `second-fibre`";
+            return Err(ParameterError { key: "families", message, help: help.into() });
+        }
         Ok(Self {
             shear,
             fibre: check::not_negative("fibre-modulus", parameters.fibre_modulus, "0 leaves the fibres out")?,
             exponent: check::positive("fibre-exponent", parameters.fibre_exponent, "")?,
             dispersion,
-            second_fibre,
+            families,
             volumetric,
         })
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> R {
-        let mut energy = R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3()
-            + self.family_energy(deformation, fibre);
-        if let Some(second) = self.second_fibre {
-            energy += self.family_energy(deformation, cast(second));
+    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
+        let mut energy = R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3();
+        for &fibre in fibres {
+            energy += self.family_energy(deformation, fibre);
         }
         energy
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Symmetric<R> {
-        let mut stress = deformation.first_invariant_stress(R::of(0.5 * self.shear))
-            + self.family_stress(deformation, fibre);
-        if let Some(second) = self.second_fibre {
-            stress = stress + self.family_stress(deformation, cast(second));
+    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
+        let mut stress = deformation.first_invariant_stress(R::of(0.5 * self.shear));
+        for &fibre in fibres {
+            stress = stress + self.family_stress(deformation, fibre);
         }
         stress
     }
@@ -128,9 +135,12 @@ impl SplitLaw for HolzapfelGasserOgden {
         self.shear
     }
 
+    fn families(&self) -> usize {
+        self.families
+    }
+
     fn fibre_stiffness(&self) -> f64 {
         // To first order E = (1 − 3κ)(Ī₄ − 1); every family under tension.
-        let families = if self.second_fibre.is_some() { 2.0 } else { 1.0 };
-        families * fibre_stiffness(self.fibre * (1.0 - 3.0 * self.dispersion).powi(2))
+        self.families as f64 * fibre_stiffness(self.fibre * (1.0 - 3.0 * self.dispersion).powi(2))
     }
 }

@@ -93,9 +93,6 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// What a user gives, each parameter with unit and range.
     type Parameters: DeserializeOwned + JsonSchema;
 
-    /// True if the law needs a fibre direction in every cell.
-    const FIBRE: bool = false;
-
     /// True if the volumetric stress is J U′(J) C⁻¹, of an energy of J alone. Elements that average the change of
     /// volume stand on it: without it they compute another law.
     const VOLUMETRIC_ENERGY: bool = true;
@@ -103,11 +100,16 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Checks and converts the user's parameters.
     fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
 
-    /// Strain energy per reference volume [J/m³]. `fibre` is the unit direction at rest.
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Split<R>;
+    /// Strain energy per reference volume [J/m³]. `fibres` are the unit directions of the families at rest.
+    fn energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R>;
 
     /// Second Piola–Kirchhoff stress [Pa].
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Split<Symmetric<R>>;
+    fn stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>>;
+
+    /// Families of fibres, each with a direction in every cell.
+    fn families(&self) -> usize {
+        0
+    }
 
     /// Moduli at rest, without the fibres; of a law without isotropic matrix the largest shear modulus.
     fn small_strain(&self) -> SmallStrainModuli;
@@ -165,11 +167,6 @@ macro_rules! registry {
                 match self { $(Self::$law(_) => $name,)* }
             }
 
-            /// True if the law needs a fibre direction in every cell.
-            pub fn needs_fibre(&self) -> bool {
-                match self { $(Self::$law(_) => <$law as Law>::FIBRE,)* }
-            }
-
             /// True if an element may average the change of volume; see [`Law::VOLUMETRIC_ENERGY`].
             pub fn has_volumetric_energy(&self) -> bool {
                 match self { $(Self::$law(_) => <$law as Law>::VOLUMETRIC_ENERGY,)* }
@@ -223,13 +220,18 @@ registry! {
 
 impl AnyLaw {
     /// Strain energy per reference volume [J/m³]; see [`Law::energy`].
-    pub fn energy(&self, deformation: &Deformation<f64>, fibre: Vector<f64>) -> Split<f64> {
-        with_law!(self, law => law.energy(deformation, fibre))
+    pub fn energy(&self, deformation: &Deformation<f64>, fibres: &[Vector<f64>]) -> Split<f64> {
+        with_law!(self, law => law.energy(deformation, fibres))
     }
 
     /// Second Piola–Kirchhoff stress [Pa]; see [`Law::stress`].
-    pub fn stress(&self, deformation: &Deformation<f64>, fibre: Vector<f64>) -> Split<Symmetric<f64>> {
-        with_law!(self, law => law.stress(deformation, fibre))
+    pub fn stress(&self, deformation: &Deformation<f64>, fibres: &[Vector<f64>]) -> Split<Symmetric<f64>> {
+        with_law!(self, law => law.stress(deformation, fibres))
+    }
+
+    /// Families of fibres, each with a direction in every cell.
+    pub fn families(&self) -> usize {
+        with_law!(self, law => Law::families(law))
     }
 
     /// Moduli at rest; see [`Law::small_strain`].

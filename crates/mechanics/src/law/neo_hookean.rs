@@ -34,12 +34,12 @@ impl SplitLaw for NeoHookean {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> R {
+    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3()
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibre: Vector<R>) -> Symmetric<R> {
+    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
         deformation.first_invariant_stress(R::of(0.5 * self.shear))
     }
 

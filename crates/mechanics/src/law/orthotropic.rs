@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::split::fibre_stiffness;
 use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric, check};
 use crate::Real;
-use crate::tensor::{Symmetric, Vector, cast};
+use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean matrix with two families of fibres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,14 +19,12 @@ pub struct Orthotropic {
     pub first: [f64; 2],
     /// Moduli e₆ and e₇ of the second family [Pa].
     pub second: [f64; 2],
-    /// Unit direction b of the second family, the same everywhere.
-    pub second_fibre: Vector<f64>,
     /// Volumetric energy.
     pub volumetric: Volumetric,
 }
 
-/// Parameters of the orthotropic law: Ψ = μ/2 (Ī₁ − 3) + ½ Σ eₖ (Īₖ − 1)² + U(J), k = 4 … 7. The first family is the
-/// `fibre` of the law or the body, the second is given here.
+/// Parameters of the orthotropic law: Ψ = μ/2 (Ī₁ − 3) + ½ Σ eₖ (Īₖ − 1)² + U(J), k = 4 … 7. The families are
+/// `fibre` and `second-fibre` of the law or the body.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct OrthotropicParameters {
@@ -49,31 +47,27 @@ pub struct OrthotropicParameters {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub e7: f64,
-    /// Direction b of the second family at rest, the same in every cell; its length does not matter.
-    pub second_fibre: [f64; 3],
 }
 
 impl SplitLaw for Orthotropic {
     type Parameters = OrthotropicParameters;
-    const FIBRE: bool = true;
 
     fn new(parameters: &OrthotropicParameters) -> Result<Self, ParameterError> {
-        let OrthotropicParameters { matrix, e4, e5, e6, e7, second_fibre } = *parameters;
+        let OrthotropicParameters { matrix, e4, e5, e6, e7 } = *parameters;
         let (shear, volumetric) = matrix.parts()?;
         let modulus = |key, value| check::not_negative(key, value, "0 leaves the term out");
         Ok(Self {
             shear,
             first: [modulus("e4", e4)?, modulus("e5", e5)?],
             second: [modulus("e6", e6)?, modulus("e7", e7)?],
-            second_fibre: check::unit_direction("second-fibre", second_fibre)?,
             volumetric,
         })
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> R {
+    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
         let mut energy = R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3();
-        for (a, [e, f]) in [(fibre, self.first), (cast(self.second_fibre), self.second)] {
+        for (a, [e, f]) in [(fibres[0], self.first), (fibres[1], self.second)] {
             let [x, y] = deformation.fibre_strains(a);
             energy += R::of(0.5 * e) * x * x + R::of(0.5 * f) * y * y;
         }
@@ -81,9 +75,9 @@ impl SplitLaw for Orthotropic {
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Symmetric<R> {
+    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
         let mut stress = deformation.first_invariant_stress(R::of(0.5 * self.shear));
-        for (a, [e, f]) in [(fibre, self.first), (cast(self.second_fibre), self.second)] {
+        for (a, [e, f]) in [(fibres[0], self.first), (fibres[1], self.second)] {
             let [x, y] = deformation.fibre_strains(a);
             stress = stress + deformation.fibre_stresses(a, [R::of(e) * x, R::of(f) * y]);
         }
@@ -96,6 +90,10 @@ impl SplitLaw for Orthotropic {
 
     fn shear(&self) -> f64 {
         self.shear
+    }
+
+    fn families(&self) -> usize {
+        2
     }
 
     fn fibre_stiffness(&self) -> f64 {

@@ -17,23 +17,25 @@ pub trait SplitLaw: Copy + Send + Sync + 'static {
     /// What a user gives, each parameter with unit and range.
     type Parameters: DeserializeOwned + JsonSchema;
 
-    /// True if the law needs a fibre direction in every cell.
-    const FIBRE: bool = false;
-
     /// Checks and converts the user's parameters.
     fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
 
-    /// Isochoric energy per reference volume [J/m³]. `fibre` is the unit direction at rest.
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> R;
+    /// Isochoric energy per reference volume [J/m³]. `fibres` are the unit directions of the families at rest.
+    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R;
 
     /// Second Piola–Kirchhoff stress of the isochoric energy [Pa], put together by [`Deformation`].
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Symmetric<R>;
+    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R>;
 
     /// The volumetric energy.
     fn volumetric(&self) -> Volumetric;
 
     /// Shear modulus of the matrix at rest [Pa]: 2 (W₁ + W₂).
     fn shear(&self) -> f64;
+
+    /// Families of fibres, each with a direction in every cell.
+    fn families(&self) -> usize {
+        0
+    }
 
     /// An upper bound of what fibres add to ρc² at rest, over all directions [Pa].
     fn fibre_stiffness(&self) -> f64 {
@@ -50,30 +52,33 @@ pub(super) fn fibre_stiffness(modulus: f64) -> f64 {
 
 impl<L: SplitLaw> Law for L {
     type Parameters = L::Parameters;
-    const FIBRE: bool = L::FIBRE;
 
     fn new(parameters: &L::Parameters) -> Result<Self, ParameterError> {
         <L as SplitLaw>::new(parameters)
     }
 
     #[inline(always)]
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Split<R> {
+    fn energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R> {
         Split {
-            isochoric: self.isochoric_energy(deformation, fibre),
+            isochoric: self.isochoric_energy(deformation, fibres),
             volumetric: self.volumetric().energy(deformation),
         }
     }
 
     #[inline(always)]
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Split<Symmetric<R>> {
+    fn stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
         Split {
-            isochoric: self.isochoric_stress(deformation, fibre),
+            isochoric: self.isochoric_stress(deformation, fibres),
             volumetric: self.volumetric().stress(deformation),
         }
     }
 
     fn small_strain(&self) -> SmallStrainModuli {
         SmallStrainModuli { shear: self.shear(), bulk: self.volumetric().bulk }
+    }
+
+    fn families(&self) -> usize {
+        SplitLaw::families(self)
     }
 
     fn longitudinal_modulus(&self) -> f64 {

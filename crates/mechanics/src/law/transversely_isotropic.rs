@@ -49,7 +49,6 @@ pub struct TransverselyIsotropicParameters {
 
 impl SplitLaw for TransverselyIsotropic {
     type Parameters = TransverselyIsotropicParameters;
-    const FIBRE: bool = true;
 
     fn new(parameters: &TransverselyIsotropicParameters) -> Result<Self, ParameterError> {
         let (shear, volumetric) = parameters.matrix.parts()?;
@@ -63,16 +62,16 @@ impl SplitLaw for TransverselyIsotropic {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> R {
-        let strain = deformation.fibre_strain(fibre);
+    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
+        let strain = deformation.fibre_strain(fibres[0]);
         R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3()
             + R::of(0.5 * self.fibre) * strain * strain
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibre: Vector<R>) -> Symmetric<R> {
+    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
         deformation.first_invariant_stress(R::of(0.5 * self.shear))
-            + deformation.fibre_stress(fibre, R::of(self.fibre) * deformation.fibre_strain(fibre))
+            + deformation.fibre_stress(fibres[0], R::of(self.fibre) * deformation.fibre_strain(fibres[0]))
     }
 
     fn volumetric(&self) -> Volumetric {
@@ -81,6 +80,10 @@ impl SplitLaw for TransverselyIsotropic {
 
     fn shear(&self) -> f64 {
         self.shear
+    }
+
+    fn families(&self) -> usize {
+        1
     }
 
     fn fibre_stiffness(&self) -> f64 {

@@ -196,7 +196,16 @@ impl Builder<'_> {
 
     fn check_unused_laws(&mut self) {
         let scene = self.scene;
-        for (name, _) in &scene.laws {
+        for (name, law) in &scene.laws {
+            let families = law.law.families();
+            let unused = match families {
+                0 if law.extras.fibre.is_some() => Some("has no fibres: its `fibre` says nothing"),
+                0 | 1 if law.extras.second_fibre.is_some() => {
+                    Some("has not two families of fibres: its `second-fibre` says nothing")
+                }
+                _ => None,
+            };
+            self.notes.extend(unused.map(|what| format!("law `{name}` {what}")));
             let used = scene.bodies.iter().any(|(_, body)| body.law.values().contains(&name));
             if !used {
                 self.notes.push(format!("law `{name}` is used by no body"));

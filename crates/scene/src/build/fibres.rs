@@ -36,7 +36,7 @@ struct Lost {
 type Directions = (Vec<Option<[f64; 3]>>, Lost);
 
 impl Builder<'_> {
-    /// The unit fibre of some cells of a body; empty if the law has none.
+    /// The unit fibres of some cells of a body, cell by cell as many as the law has families.
     pub(super) fn fibres(
         &mut self,
         draft: &Draft<'_>,
@@ -45,20 +45,47 @@ impl Builder<'_> {
         block: &CellBlock,
         cells: &[u32],
     ) -> Option<Vec<[f64; 3]>> {
-        if !law.law.needs_fibre() {
-            return Some(Vec::new());
-        }
+        let families = [
+            ("fibre", &draft.table.fibre, &law.extras.fibre),
+            ("second-fibre", &draft.table.second_fibre, &law.extras.second_fibre),
+        ];
+        let wanted = families.iter().take(law.law.families());
+        // Both, so that the mistakes of both are told.
+        let found: Vec<_> = wanted
+            .map(|&(key, of_body, of_law)| {
+                let given = match (of_body, of_law) {
+                    (Some(fibre), _) => Some((fibre, ["body", draft.name, key])),
+                    (None, Some(fibre)) => Some((fibre, ["law", law_name, key])),
+                    (None, None) => None,
+                };
+                self.family(key, given, draft, block, cells)
+            })
+            .collect();
+        let found: Vec<Vec<[f64; 3]>> = found.into_iter().collect::<Option<_>>()?;
+        Some((0..cells.len()).flat_map(|cell| found.iter().map(move |family| family[cell])).collect())
+    }
+
+    /// The unit direction of one family of fibres in some cells of a body, from what was given and where.
+    fn family(
+        &mut self,
+        key: &str,
+        given: Option<(&Fibre, [&str; 3])>,
+        draft: &Draft<'_>,
+        block: &CellBlock,
+        cells: &[u32],
+    ) -> Option<Vec<[f64; 3]>> {
         let name = draft.name;
-        let (given, path) = match (&draft.table.fibre, &law.extras.fibre) {
-            (Some(fibre), _) => (fibre, ["body", name, "fibre"]),
-            (None, Some(fibre)) => (fibre, ["law", law_name, "fibre"]),
-            (None, None) => {
-                let message = format!("`{name}` has a law with fibres, but no fibre direction");
-                let help = "add to the law or the body `fibre = [x, y, z]`, `fibre = { cell-data = \"name\" }` or a rule: \
-                            `along`, `toward`, `around`, `tangential`, `laplace`";
-                self.error(&["body", name, "law"], message, "this law needs a fibre", help);
-                return None;
-            }
+        let Some((given, path)) = given else {
+            let message = match key {
+                "fibre" => format!("`{name}` has a law with fibres, but no fibre direction"),
+                _ => format!("`{name}` has a law with two families of fibres, but no `{key}`"),
+            };
+            let help = format!(
+                "add to the law or the body `{key} = [x, y, z]`, `{key} = {{ cell-data = \"name\" }}` or a rule: \
+                 `along`, `toward`, `around`, `tangential`, `laplace`"
+            );
+            self.error(&["body", name, "law"], message, "this law needs a fibre", help);
+            return None;
         };
         let found = match given {
             Fibre::Uniform(direction) => along(direction, cells.len(), &[]),
@@ -110,14 +137,19 @@ fn directions(
             };
             Ok((cells.iter().map(to).collect(), lost))
         }
-        FibreRule::Around { point, axis } => {
+        FibreRule::Around { point, axis, angle } => {
             let axis = axis_of(axis, "the axis", &["around", "axis"])?;
-            let around = |cell| unit(axis.cross(&(centre(cell) - Vector3::from(*point))), LOST * size);
+            let axis = Vector3::from(axis);
+            let (along, around) = angle.to_radians().sin_cos();
+            let direction = |cell| {
+                let ring = unit(axis.cross(&(centre(cell) - Vector3::from(*point))), LOST * size)?;
+                unit(Vector3::from(ring) * around + axis * along, ZERO)
+            };
             let lost = Lost {
                 cells: "whose centre lies on the axis that their fibre is to turn around",
                 help: "move the axis off the centres of cells, or give these cells a law of their own",
             };
-            Ok((cells.iter().map(around).collect(), lost))
+            Ok((cells.iter().map(direction).collect(), lost))
         }
         FibreRule::Tangential { surface, closest_to } => {
             let wanted = axis_of(closest_to, "`closest-to`", &["tangential", "closest-to"])?;
@@ -292,6 +324,30 @@ mod tests {
         for (centre, fibre) in fibres(TUBE, "{ around = { point = [0, 0, 1], axis = [0, 0, 1] } }") {
             let radial = Vector3::new(centre.x, centre.y, 0.0).normalize();
             assert!((fibre - Vector3::z().cross(&radial)).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn two_families_climb_a_vessel_to_the_right_and_to_the_left() {
+        let helix =
+            |angle: f64| format!("{{ around = {{ point = [0, 0, 0], axis = [0, 0, 1], angle = {angle} }} }}");
+        let text = format!(
+            "[scene]\nuntil = 1\n[law.wall]\ntype = 'holzapfel-gasser-ogden'\nfamilies = 2\nyoung-modulus = 1e4\n\
+             poisson-ratio = 0.45\nfibre-modulus = 5e3\nfibre-exponent = 1\nfibre = {}\n[body.vessel]\n\
+             mesh = {{ {TUBE} }}\nlaw = 'wall'\ndensity = 1000\n",
+            helix(30.0)
+        );
+        let missing = build(&read(&text)).expect_err("a mistake").plain().to_string();
+        assert!(missing.contains("two families of fibres, but no `second-fibre`"), "{missing}");
+        let Built { model, .. } = build(&read(&format!("{text}second-fibre = {}\n", helix(-30.0))))
+            .unwrap_or_else(|error| panic!("{}", error.plain()));
+        let solid = &model.solids[0];
+        assert_eq!(solid.fibre.len(), 2 * solid.cells.len());
+        for cell in 0..solid.cells.len() {
+            let [a, b] = solid.fibres(cell) else { panic!("two families") };
+            // The axis halves the angle between them: their sum is a ring, their difference the axis.
+            assert!((a[2] - 0.5).abs() < 1e-12 && (b[2] + 0.5).abs() < 1e-12);
+            assert!((a[0] - b[0]).abs() < 1e-12 && (a[1] - b[1]).abs() < 1e-12);
         }
     }
 

@@ -35,6 +35,9 @@ pub struct BodyTable {
     /// Fibre direction at rest; overrides that of the law.
     #[serde(default)]
     pub fibre: Option<Fibre>,
+    /// Direction of the second family of fibres at rest; overrides that of the law.
+    #[serde(default)]
+    pub second_fibre: Option<Fibre>,
 }
 
 fn default_hourglass() -> ByLabel<Hourglass> {
@@ -101,12 +104,16 @@ pub enum FibreRule {
     Along([f64; 3]),
     /// Towards a point [m]: `{ toward = [0, 0, 0] }`.
     Toward([f64; 3]),
-    /// Around an axis, as the fibres of a vessel: `{ around = { point = [0, 0, 0], axis = [0, 0, 1] } }`.
+    /// Around an axis, as the fibres of a vessel: `{ around = { point = [0, 0, 0], axis = [0, 0, 1], angle = 30 } }`.
     Around {
         /// A point of the axis [m].
         point: [f64; 3],
         /// The direction of the axis; the fibres turn to the right around it.
         axis: [f64; 3],
+        /// Angle [degrees] by which they climb along the axis: 0 makes rings, 90 lines along the axis.
+        #[serde(default)]
+        #[schemars(range(min = -90.0, max = 90.0))]
+        angle: f64,
     },
     /// In the surface, as close as possible to a direction: `{ tangential = { closest-to = [0, 0, 1] } }`. The surface is
     /// taken at its point nearest to the cell.

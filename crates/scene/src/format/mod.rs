@@ -151,6 +151,9 @@ pub struct LawExtras {
     /// Fibre direction at rest, for laws with fibres; a body may give its own.
     #[serde(default)]
     pub fibre: Option<Fibre>,
+    /// Direction of the second family of fibres at rest, for laws with two; a body may give its own.
+    #[serde(default)]
+    pub second_fibre: Option<Fibre>,
     /// Relaxation by Prony series; any number of terms on either part of the stress.
     #[serde(default)]
     pub prony: Vec<PronyTerm>,

@@ -38,6 +38,17 @@ impl OutputFolder {
     /// # Errors
     /// If the folder holds something, or can't be written to.
     pub fn prepare(path: PathBuf, scene: &Scene, force: bool) -> Result<Self, OutputError> {
+        let folder = Self::claim(path, force, |_| false)?;
+        remove_earlier(folder.path(), scene).map_err(|error| OutputError::new(folder.path(), error))?;
+        Ok(folder)
+    }
+
+    /// Makes the folder. One that holds something else than files called as `own` tells is refused unless `force` is
+    /// given.
+    ///
+    /// # Errors
+    /// If the folder holds something, or can't be written to.
+    pub fn claim(path: PathBuf, force: bool, own: impl Fn(&str) -> bool) -> Result<Self, OutputError> {
         let failed = |error: std::io::Error| OutputError::new(&path, error);
         let refused =
             |reason: &str, remedy| OutputError { path: path.clone(), reason: reason.into(), remedy };
@@ -45,12 +56,13 @@ impl OutputFolder {
             return Err(refused("it is a file, not a folder", "choose another name with `--out DIR`"));
         }
         if path.is_dir() {
-            let filled = fs::read_dir(&path).map_err(failed)?.next().is_some();
+            let mut entries = fs::read_dir(&path).map_err(failed)?;
+            let filled =
+                entries.any(|entry| !entry.is_ok_and(|entry| own(&entry.file_name().to_string_lossy())));
             if filled && !force {
                 let remedy = "add `--force` to replace what an earlier run left there, or choose another with `--out DIR`";
                 return Err(refused("it is not empty", remedy));
             }
-            remove_earlier(&path, scene).map_err(failed)?;
         } else {
             fs::create_dir_all(&path).map_err(failed)?;
         }
@@ -100,7 +112,10 @@ impl OutputFolder {
     }
 
     /// Writes a whole file in one go: under a temporary name first, so that a failure leaves the old one.
-    pub(crate) fn write(&self, name: &str, content: &str) -> Result<PathBuf, OutputError> {
+    ///
+    /// # Errors
+    /// If it can't be written.
+    pub fn write(&self, name: &str, content: &str) -> Result<PathBuf, OutputError> {
         let (path, temporary) = (self.path.join(name), self.path.join(format!("{name}.tmp")));
         let written = fs::write(&temporary, content).and_then(|()| fs::rename(&temporary, &path));
         written.map_err(|error| {

@@ -80,7 +80,7 @@ impl Specimen {
                     }
                 }
             };
-            let count = if material.law.needs_fibre() { cells.len() } else { 0 };
+            let count = cells.len() * material.law.families();
             let original = (0..cells.len() as u32).collect();
             let (fibre, material) = (vec![fibre; count], material.clone());
             model.add_solid(Solid { body: 0, material, cells, fibre, original });
@@ -142,6 +142,12 @@ impl Specimen {
     #[must_use]
     pub fn shift(self, face: &str, along_x: f64, curve: Curve) -> Self {
         self.constrain("move", face, [true, false, false], Motion::Displacement([along_x, 0.0, 0.0], curve))
+    }
+
+    /// With a face displaced as a whole: the constraint `move x-max` and so on.
+    #[must_use]
+    pub fn carry(self, face: &str, by: Vector<f64>, curve: Curve) -> Self {
+        self.constrain("move", face, [true; 3], Motion::Displacement(by, curve))
     }
 
     fn constrain(mut self, verb: &str, face: &str, components: [bool; 3], motion: Motion) -> Self {

@@ -19,7 +19,12 @@ pub fn soft_tissue() -> AnyLaw {
     law("neo-hookean", json!({ "young-modulus": 3000.0, "poisson-ratio": 0.45 }))
 }
 
-/// Liver-like tissue: μ = 6568 Pa, ν = 0.45, and fibres of η = 13136 Pa in the energy convention.
+/// Liver-like tissue without fibres: μ = 6568 Pa, ν = 0.45.
+pub fn liver_matrix() -> AnyLaw {
+    law("neo-hookean", json!({ "shear-modulus": 6568.0, "bulk-modulus": 6568.0 * 29.0 / 3.0 }))
+}
+
+/// Liver-like tissue with fibres of η = 13136 Pa in the energy convention.
 pub fn liver() -> AnyLaw {
     let parameters =
         json!({ "shear-modulus": 6568.0, "bulk-modulus": 6568.0 * 29.0 / 3.0, "fibre-modulus": 13136.0 });

@@ -1,0 +1,126 @@
+//! `pliant reproduce`: the results of the literature, computed, judged and written down.
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use pliant_reproduce::{CASES, Case, END, Report, START, find, is_own_file, replace_table};
+use pliant_scene::OutputFolder;
+
+use crate::arguments::Reproduce;
+use crate::report::{Failure, say};
+
+pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode, Failure> {
+    if arguments.list {
+        say(list())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let cases = chosen(&arguments.only)?;
+    let page = arguments.table.as_deref().map(read_page).transpose()?;
+    let folder = OutputFolder::claim(arguments.out.clone(), arguments.force, is_own_file)
+        .map_err(|error| Failure::plain(&error, error.remedy))?;
+
+    let report = compute(&cases);
+    for (name, content) in report.files() {
+        let path = folder.write(name, &content).map_err(|error| Failure::plain(&error, error.remedy))?;
+        eprintln!("wrote {}", path.display());
+    }
+    if let (Some(path), Some(page)) = (&arguments.table, page) {
+        let new = replace_table(&page, &report.table()).unwrap_or(page);
+        fs::write(path, new).map_err(|error| unwritable(path, &error))?;
+        eprintln!("renewed the table in {}", path.display());
+    }
+    say(verdict(&report))?;
+    let [_, failed] = report.counts();
+    Ok(ExitCode::from(u8::from(failed > 0)))
+}
+
+/// The cases asked for, in the order of the page; all if none is.
+fn chosen(ids: &[String]) -> Result<Vec<&'static Case>, Failure> {
+    let mut asked = Vec::new();
+    for id in ids {
+        asked.push(find(id).map_err(|nearest| {
+            let help = format!("did you mean `{nearest}`? `pliant reproduce --list` prints all");
+            Failure::plain(format!("there is no case `{id}`"), help)
+        })?);
+    }
+    let wanted = |case: &&Case| asked.is_empty() || asked.iter().any(|a| a.id == case.id);
+    Ok(CASES.iter().filter(wanted).collect())
+}
+
+fn list() -> String {
+    let mut lines: Vec<String> = (CASES.iter())
+        .map(|case| format!("{:<12} about {:>3.0} s  {}", case.id, case.seconds.max(1.0), case.title))
+        .collect();
+    let all: f64 = CASES.iter().map(|case| case.seconds).sum();
+    lines.push(format!("{:<12} about {all:>3.0} s on two cores", "all"));
+    lines.join("\n")
+}
+
+/// A Markdown file with the two marks in it.
+fn read_page(path: &Path) -> Result<String, Failure> {
+    let page = fs::read_to_string(path).map_err(|error| {
+        Failure::plain(
+            format!("`{}` cannot be read: {error}", path.display()),
+            "check the name after `--table`",
+        )
+    })?;
+    if replace_table(&page, "").is_none() {
+        let message = format!("`{}` has no place for the table", path.display());
+        return Err(Failure::plain(
+            message,
+            format!("put the lines {START} and {END} where it should stand"),
+        ));
+    }
+    Ok(page)
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
+    let message = format!("`{}` cannot be written: {error}", path.display());
+    Failure::plain(message, "check the file and its permissions")
+}
+
+/// Computes with a bar on standard error that counts expected seconds; nothing where nobody looks.
+fn compute(cases: &[&'static Case]) -> Report {
+    let all: f64 = cases.iter().map(|case| case.seconds).sum();
+    let bar = ProgressBar::new((10.0 * all).max(1.0) as u64);
+    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {elapsed}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let mut before = 0.0;
+    let report = Report::new(cases, |case| {
+        bar.set_message(format!("{}, about {:.0} s", case.id, case.seconds.max(1.0)));
+        bar.set_position((10.0 * before) as u64);
+        before += case.seconds;
+    });
+    bar.finish_and_clear();
+    report
+}
+
+/// What failed, and how many passed.
+fn verdict(report: &Report) -> String {
+    let mut lines: Vec<String> = (report.rows().filter(|row| row.pass == Some(false)))
+        .map(|row| {
+            let number =
+                |value: Option<f64>| value.map_or_else(|| "nothing".to_owned(), |v| format!("{v:.6e}"));
+            format!(
+                "failed: {}, {}: {} {} instead of {} ± {}",
+                row.id,
+                row.quantity,
+                number(row.computed),
+                row.unit,
+                number(row.reference),
+                number(row.tolerance)
+            )
+        })
+        .collect();
+    let [passed, failed] = report.counts();
+    lines.push(format!(
+        "{passed} of {} judged numbers are within their tolerance; {:.0} s",
+        passed + failed,
+        report.wall().as_secs_f64()
+    ));
+    lines.join("\n")
+}

@@ -1,0 +1,228 @@
+//! One result of the literature: what it shows, what was corrected in it, and what comes out here.
+
+use pliant_mechanics::model::Contradiction;
+use pliant_mechanics::{RelaxationError, StepError};
+use pliant_scene::diagnostic::SceneErrors;
+use serde::Serialize;
+
+use crate::cases::CASES;
+
+/// A result of the literature.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// What it is called on the command line: `fig-6.3`.
+    pub id: &'static str,
+    /// What it is about, in a few words.
+    pub title: &'static str,
+    /// What the source shows, in own words.
+    pub shows: &'static str,
+    /// What is wrong in the printed source.
+    pub corrections: &'static [Correction],
+    /// About how long it takes on two cores [s].
+    pub seconds: f64,
+    /// Computes it.
+    pub(crate) compute: fn() -> Result<Findings, CaseError>,
+}
+
+/// A mistake of the printed source, put right.
+#[derive(Clone, Copy, Debug)]
+pub struct Correction {
+    /// The place, and what stands there.
+    pub printed: &'static str,
+    /// What it should be.
+    pub correct: &'static str,
+    /// How one sees it.
+    pub why: &'static str,
+}
+
+/// What a case comes to.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    /// Numbers.
+    pub rows: Vec<Row>,
+    /// Plots and pictures.
+    pub figures: Vec<Figure>,
+}
+
+/// A plot or a picture.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// An SVG element.
+    pub svg: String,
+    /// What one sees.
+    pub caption: String,
+}
+
+/// A number beside the one it should be.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// The case it belongs to.
+    pub id: &'static str,
+    /// What it is.
+    pub quantity: String,
+    /// Its unit; empty for a plain number.
+    pub unit: &'static str,
+    /// What it should be; for a deviation 0; `None` if nothing is known.
+    pub reference: Option<f64>,
+    /// What it is here; `None` if the case failed.
+    pub computed: Option<f64>,
+    /// How far off it may be, in the row's unit.
+    pub tolerance: Option<f64>,
+    /// Whether it is within the tolerance; `None` without one.
+    pub pass: Option<bool>,
+    /// Where the reference comes from.
+    pub source: &'static str,
+    /// Whether another machine gives another number.
+    #[serde(skip)]
+    pub machine: bool,
+}
+
+impl Row {
+    /// A number that must come within `tolerance` of `reference`.
+    pub(crate) fn judged(
+        quantity: impl Into<String>,
+        unit: &'static str,
+        [reference, tolerance]: [f64; 2],
+        computed: f64,
+        source: &'static str,
+    ) -> Self {
+        let pass = (computed - reference).abs() <= tolerance;
+        Self {
+            tolerance: Some(tolerance),
+            pass: Some(pass),
+            reference: Some(reference),
+            ..Self::shown(quantity, unit, computed, source)
+        }
+    }
+
+    /// A relative deviation that may be up to `limit`.
+    pub(crate) fn deviation(
+        quantity: impl Into<String>,
+        limit: f64,
+        computed: f64,
+        source: &'static str,
+    ) -> Self {
+        Self::judged(quantity, "", [0.0, limit], computed, source)
+    }
+
+    /// A number that is shown and not judged.
+    pub(crate) fn shown(
+        quantity: impl Into<String>,
+        unit: &'static str,
+        computed: f64,
+        source: &'static str,
+    ) -> Self {
+        Self {
+            id: "",
+            quantity: quantity.into(),
+            unit,
+            reference: None,
+            computed: Some(computed),
+            tolerance: None,
+            pass: None,
+            source,
+            machine: false,
+        }
+    }
+
+    /// A measurement of this machine, beside one of another: shown and not judged.
+    pub(crate) fn timed(
+        quantity: impl Into<String>,
+        unit: &'static str,
+        reference: Option<f64>,
+        computed: f64,
+        source: &'static str,
+    ) -> Self {
+        Self { reference, machine: true, ..Self::shown(quantity, unit, computed, source) }
+    }
+}
+
+/// Why a case has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum CaseError {
+    /// A step failed.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// No equilibrium was found.
+    #[error(transparent)]
+    Relaxation(#[from] RelaxationError),
+    /// Constraints contradict each other.
+    #[error(transparent)]
+    Contradiction(#[from] Contradiction),
+    /// A scene is wrong.
+    #[error("{}", .0.plain())]
+    Scene(#[from] SceneErrors),
+    /// A model that should have come to rest has not.
+    #[error("not at rest after {until} s: creeps by {creep:.1e} of its displacement in 0.1 s")]
+    Moving {
+        /// Time [s].
+        until: f64,
+        /// Movement in a tenth of a second at the present speed, over the largest displacement.
+        creep: f64,
+    },
+    /// A figure could not be drawn.
+    #[error("a figure could not be drawn: {0}")]
+    Drawing(String),
+}
+
+impl Case {
+    /// Computes the case. If it fails, its one row tells so.
+    pub fn run(&self) -> Findings {
+        let mut findings = (self.compute)().unwrap_or_else(|error| Findings {
+            rows: vec![Row {
+                computed: None,
+                pass: Some(false),
+                ..Row::shown(format!("the case runs to its end; it did not: {error}"), "", 0.0, "")
+            }],
+            figures: Vec::new(),
+        });
+        for row in &mut findings.rows {
+            row.id = self.id;
+        }
+        findings
+    }
+}
+
+/// The case of an id.
+///
+/// # Errors
+/// If there is none: the id most like it.
+pub fn find(id: &str) -> Result<&'static Case, &'static str> {
+    CASES.iter().find(|case| case.id.eq_ignore_ascii_case(id)).ok_or_else(|| {
+        let likeness = |case: &&Case| strsim::jaro_winkler(case.id, &id.to_lowercase());
+        let nearest = CASES.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+        nearest.map_or("", |case| case.id)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_passes_within_its_tolerance_and_never_when_it_is_not_a_number() {
+        let pass = |computed| Row::judged("force", "N", [8.75, 0.1], computed, "").pass;
+        assert_eq!([8.84, 8.66, 8.86, f64::NAN].map(pass), [true, true, false, false].map(Some));
+        assert_eq!(Row::shown("force", "N", 1.0, "").pass, None);
+    }
+
+    #[test]
+    fn a_failed_case_is_a_failed_row() {
+        let compute = || Err(CaseError::Drawing("no ink".into()));
+        let case = Case { id: "x", title: "", shows: "", corrections: &[], seconds: 0.0, compute };
+        let findings = case.run();
+        assert_eq!((findings.rows.len(), findings.rows[0].pass), (1, Some(false)));
+        assert!(findings.rows[0].quantity.contains("no ink"));
+    }
+
+    #[test]
+    fn ids_are_found_and_slips_are_answered_with_the_nearest() {
+        assert_eq!(find("FIG-6.3").unwrap().id, "fig-6.3");
+        assert_eq!(find("fig6.10").unwrap_err(), "fig-6.10");
+        assert_eq!(find("brain").unwrap_err(), "brain-shift");
+        let mut ids: Vec<&str> = CASES.iter().map(|case| case.id).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), CASES.len());
+    }
+}

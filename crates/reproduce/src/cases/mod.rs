@@ -1,0 +1,39 @@
+//! The cases, in the order of the page.
+
+pub mod brain_shift;
+pub mod cost;
+pub mod cube;
+pub mod elements;
+pub mod liver;
+pub mod relaxation;
+pub mod shear;
+
+use crate::case::{Case, Correction};
+
+/// All cases.
+pub const CASES: &[Case] = &[
+    shear::ELASTIC,
+    shear::VISCOELASTIC,
+    cube::DEFORMED,
+    relaxation::CASE,
+    cost::CASE,
+    liver::CASE,
+    elements::CASE,
+    brain_shift::CASE,
+];
+
+/// The thesis's factor 2, which every case with fibres meets.
+const FIBRE_FACTOR: Correction = Correction {
+    printed: "(6.6): fibre stress η (Ī₄ − 1) …",
+    correct: "2η (Ī₄ − 1) …",
+    why: "The energy η/2 (Ī₄ − 1)² of (6.4) has twice that stress (S = 2 ∂Ψ/∂C; the thesis's own (5.48) agrees). The \
+          thesis's code and NiftySim carry the same slip, so that a published η means half of it in the energy; \
+          scenes choose with `convention = \"taylor\"`.",
+};
+
+/// The growing memory of the thesis's relaxation integrals.
+const RELAXATION_SIGN: Correction = Correction {
+    printed: "(5.52), (5.54), (6.8): e^(−(s−t)/τ)",
+    correct: "e^(−(t−s)/τ).",
+    why: "As printed, the memory of a stress grows with its age t − s; (5.58) to (5.61) are right.",
+};
