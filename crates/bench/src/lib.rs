@@ -20,7 +20,7 @@ pub use clock::{Clocked, Spread};
 pub use count::Count;
 pub use machine::Machine;
 pub use rates::Rates;
-pub use report::{Fit, Limit, Report, Row};
+pub use report::{Cube, Fit, Limit, Report, Row};
 pub use specimen::{HOURGLASS, Hexes, Specimen, Tets};
 pub use suite::{BenchError, Progress, Settings, measure};
 pub use tissue::{deformation, elastic, law, liver, liver_matrix, liver_relaxation, soft_tissue};

@@ -11,7 +11,7 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::case::{Case, EDGE, Element, LawKind, Precision, Threads};
 use crate::clock::{Clocked, Spread};
-use crate::report::{Fit, Limit, Report, Row};
+use crate::report::{Cube, Fit, Limit, Report, Row};
 use crate::{Machine, Rates, Specimen};
 
 /// Displacement of `x-max` [m]; that of a node at x is x/[`EDGE`] of it.
@@ -89,7 +89,7 @@ pub fn measure(
     let mut cubes = Vec::new();
     for fit in &fits {
         if let Some(case) = largest_in_real_time(fit, &rows) {
-            cubes.push(bench.row(&case, usize::MAX)?);
+            cubes.push(bench.cube(case)?);
         }
     }
     let rates = bench.pools.iter().map(|(_, rates)| *rates).collect();
@@ -149,6 +149,21 @@ impl Bench {
         })?;
         let rates = *rates;
         Ok(Row::new(*case, &self.machine, &rates, Spread::of(repeats), (PART_OF_LIMIT * limit, from)))
+    }
+
+    /// Measures a cube of a predicted size, and of the size that its measurement tells, three at the most.
+    fn cube(&mut self, mut case: Case) -> Result<Cube, BenchError> {
+        let predicted = case.edge;
+        let mut row = self.row(&case, usize::MAX)?;
+        for _ in 0..2 {
+            let edge = ((case.edge as f64 * row.real_time_factor.powf(0.25)) as usize).max(1);
+            if edge == case.edge {
+                break;
+            }
+            case.edge = edge;
+            row = self.row(&case, usize::MAX)?;
+        }
+        Ok(Cube { predicted, row })
     }
 
     /// The largest stable step at rest [s], and what it is.

@@ -86,6 +86,24 @@ fn several_rows_make_a_table_and_three_meshes_a_line() {
 }
 
 #[test]
+fn a_series_of_tissues_on_all_threads_leads_to_a_cube_in_real_time() {
+    let ids = ["hex8-nh-1000-all", "hex8-nh-4096-all", "hex8-nh-15625-all"].map(|id| ["--only", id]).concat();
+    let told = Workshop::new("").pliant(&[&["bench", "--repeats", "1", "--json"], ids.as_slice()].concat());
+    assert_eq!(told.code, 0, "{}", told.err);
+    let report = told.json();
+    let fit = &report["linear_cost"][0];
+    let cost = fit["ns_per_element_step"].as_f64().unwrap();
+    assert!(cost > 0.0 && fit["largest_deviation"].as_f64().unwrap() >= 0.0);
+    let cubes = report["largest_real_time_cubes"].as_array().unwrap();
+    assert_eq!(cubes.len(), 1);
+    let predicted = cubes[0]["predicted"].as_f64().unwrap();
+    // b n³ = d/n with d from the finest mesh.
+    let d = 25.0 * report["rows"][2]["critical_step"].as_f64().unwrap();
+    assert_eq!(predicted, (d / (1e-9 * cost)).powf(0.25).floor());
+    assert!(KEYS.iter().all(|key| !cubes[0][*key].is_null()));
+}
+
+#[test]
 fn an_unknown_row_is_answered_with_the_nearest() {
     let workshop = Workshop::new("");
     let told = workshop.pliant(&["bench", "--only", "tet4-nh-5556", "--json"]);
