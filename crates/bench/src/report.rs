@@ -256,17 +256,15 @@ impl Report {
 
     fn rates_table(&self) -> String {
         let rows = self.rates.iter().map(|rates| {
-            [rates.copy, rates.single, rates.double].map(|rate| format!("{:.1}", 1e-9 * rate)).into_iter()
+            let giga = |rate: f64| format!("{:.1}", 1e-9 * rate);
+            [rates.threads.to_string(), giga(rates.copy), giga(rates.single), giga(rates.double)]
         });
-        let rows = rows.zip(&self.rates).map(|(cells, rates)| {
-            std::iter::once(rates.threads.to_string()).chain(cells).collect::<Vec<_>>()
-        });
-        markdown(&["threads", "copy GB/s", "mul-add single Gflop/s", "double"], rows.collect())
+        markdown(["threads", "copy GB/s", "mul-add single Gflop/s", "double"], rows.collect())
     }
 
     fn fits_table(&self) -> String {
         let rows = self.fits.iter().map(|fit| {
-            vec![
+            [
                 fit.case.element.name().to_owned(),
                 fit.case.law.name().to_owned(),
                 fit.case.precision.name().to_owned(),
@@ -277,12 +275,12 @@ impl Report {
             ]
         });
         let header = ["element", "law", "precision", "threads", "meshes", "b ns", "largest deviation"];
-        markdown(&header, rows.collect())
+        markdown(header, rows.collect())
     }
 
     fn cubes_table(&self) -> String {
         let rows = self.cubes.iter().map(|Cube { predicted, row }| {
-            vec![
+            [
                 row.element.to_owned(),
                 row.law.to_owned(),
                 format!("{predicted}³"),
@@ -298,7 +296,8 @@ impl Report {
         let header = [
             "element",
             "law",
-            "cube",
+            "predicted",
+            "measured",
             "elements",
             "nodes",
             "threads",
@@ -306,14 +305,14 @@ impl Report {
             "step takes ms",
             "× real time",
         ];
-        markdown(&header, rows.collect())
+        markdown(header, rows.collect())
     }
 }
 
 fn rows_table(rows: &[Row]) -> String {
     let rows = rows.iter().map(|row| {
         let star = if row.critical_step_from == Limit::True { "" } else { "*" };
-        vec![
+        [
             row.mesh.clone(),
             row.cells.to_string(),
             row.element.to_owned(),
@@ -348,11 +347,11 @@ fn rows_table(rows: &[Row]) -> String {
         "Δt ms",
         "× real time",
     ];
-    markdown(&header, rows.collect())
+    markdown(header, rows.collect())
 }
 
 /// A Markdown table with columns of equal width, numbers to the right.
-fn markdown(header: &[&str], rows: Vec<Vec<String>>) -> String {
+fn markdown<const N: usize>(header: [&str; N], rows: Vec<[String; N]>) -> String {
     let wide = |text: &str| text.chars().count();
     let widths: Vec<usize> = (header.iter().enumerate())
         .map(|(column, title)| {
@@ -388,13 +387,13 @@ mod tests {
 
     #[test]
     fn tables_are_aligned_with_numbers_to_the_right() {
-        let rows = vec![vec!["tet4".into(), "7.60".into()], vec!["hex8-full".into(), "104.00".into()]];
+        let rows = vec![["tet4".into(), "7.60".into()], ["hex8-full".into(), "104.00".into()]];
         let lines = [
             "| element   |     ns |",
             "|:----------|-------:|",
             "| tet4      |   7.60 |",
             "| hex8-full | 104.00 |",
         ];
-        assert_eq!(markdown(&["element", "ns"], rows), lines.join("\n"));
+        assert_eq!(markdown(["element", "ns"], rows), lines.join("\n"));
     }
 }
