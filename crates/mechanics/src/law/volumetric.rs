@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Deformation;
-use crate::Real;
+use crate::Number;
 use crate::tensor::Symmetric;
 
 /// How the energy grows with the change of volume.
@@ -50,7 +50,7 @@ impl Volumetric {
 
     /// U(J) [J/m³].
     #[inline(always)]
-    pub fn energy<R: Real>(&self, deformation: &Deformation<R>) -> R {
+    pub fn energy<R: Number>(&self, deformation: &Deformation<R>) -> R {
         let (j, x) = (deformation.volume_ratio, deformation.volume_change);
         let half = R::of(0.5);
         R::of(self.bulk)
@@ -64,7 +64,7 @@ impl Volumetric {
 
     /// J U′(J) [Pa], the Kirchhoff pressure (positive in tension).
     #[inline(always)]
-    pub fn kirchhoff_pressure<R: Real>(&self, deformation: &Deformation<R>) -> R {
+    pub fn kirchhoff_pressure<R: Number>(&self, deformation: &Deformation<R>) -> R {
         let (j, x) = (deformation.volume_ratio, deformation.volume_change);
         R::of(self.bulk)
             * match self.energy {
@@ -77,7 +77,7 @@ impl Volumetric {
 
     /// S = J U′(J) C⁻¹ [Pa].
     #[inline(always)]
-    pub fn stress<R: Real>(&self, deformation: &Deformation<R>) -> Symmetric<R> {
+    pub fn stress<R: Number>(&self, deformation: &Deformation<R>) -> Symmetric<R> {
         deformation.inverse_cauchy_green * self.kirchhoff_pressure(deformation)
     }
 
