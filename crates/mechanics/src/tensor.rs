@@ -32,7 +32,7 @@ pub fn scale<R: Number>(a: Vector<R>, s: R) -> Vector<R> {
 /// a · b.
 #[inline(always)]
 pub fn dot<R: Number>(a: Vector<R>, b: Vector<R>) -> R {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
 /// a × b.
@@ -64,7 +64,7 @@ impl<R: Number> Tensor<R> {
     pub fn add_outer(&mut self, a: Vector<R>, b: Vector<R>) {
         for (row, ai) in self.0.iter_mut().zip(a) {
             for (entry, bj) in row.iter_mut().zip(b) {
-                *entry += ai * bj;
+                *entry = ai.mul_add(bj, *entry);
             }
         }
     }
