@@ -13,7 +13,8 @@ use rayon::prelude::*;
 
 use super::batch::{Batch, PACKS, pressures};
 use super::{
-    Findings, ForceField, PackedCells, displacement_gradient, for_each_task, gather, relative, scatter,
+    Findings, ForceField, PackedCells, Places, Slot, by_cell, by_component, displacement_gradient,
+    for_each_task, gather, relative, scatter,
 };
 use crate::Real;
 use crate::lanes::{Lanes, PACK, Pack, Processor, Work, entry, load_tensor};
@@ -21,7 +22,7 @@ use crate::law::{AnyLaw, Split};
 use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
 use crate::prony::{Prony, Relaxation};
 use crate::state::History;
-use crate::tensor::{Symmetric, Tensor, Vector};
+use crate::tensor::{Symmetric, Tensor};
 
 pub(super) struct AveragedTets<R> {
     processor: Processor,
@@ -69,7 +70,7 @@ impl<R: Real> AveragedTets<R> {
     }
 
     /// J_e − 1 of all cells, as their share in the average.
-    fn volume_changes(&mut self, displacement: &[Vector<R>]) {
+    fn volume_changes(&mut self, displacement: &Places<R>) {
         let mut values = std::mem::take(&mut self.cell_value);
         values.par_chunks_mut(PACKS).enumerate().with_min_len(4).for_each(|(task, values)| {
             let first = task * PACKS;
@@ -137,7 +138,7 @@ impl<R: Real> AveragedTets<R> {
 struct VolumeChanges<'a, R> {
     cells: &'a PackedCells<R, 4>,
     first: usize,
-    displacement: &'a [Vector<R>],
+    displacement: &'a Places<R>,
     values: &'a mut [Pack<R>],
 }
 
@@ -147,13 +148,15 @@ impl<R: Real> Work<R> for VolumeChanges<'_, R> {
     #[inline(always)]
     fn run<L: Lanes<R>>(self) {
         let Self { cells, first, displacement, values } = self;
-        let mut moved = [[[Pack::ZERO; 3]; 4]; PACKS];
-        for (pack, moved) in moved[..values.len()].iter_mut().enumerate() {
-            gather(&cells.nodes[first + pack], displacement, moved);
+        let mut gathered = [[Pack([[R::ZERO; 4]; PACK]); 4]; PACKS];
+        let mut moved = [[Pack::ZERO; 3]; 4];
+        for (pack, gathered) in gathered[..values.len()].iter_mut().enumerate() {
+            gather(&cells.nodes[first + pack], displacement, gathered);
         }
-        for ((pack, value), moved) in values.iter_mut().enumerate().zip(&moved) {
+        for ((pack, value), gathered) in values.iter_mut().enumerate().zip(&gathered) {
+            by_component(gathered, &mut moved);
             for at in (0..PACK).step_by(L::WIDTH) {
-                let u = relative::<R, L, 4>(moved, at);
+                let u = relative::<R, L, 4>(&moved, at);
                 let change = volume_change(&displacement_gradient(&u, &cells.gradient[first + pack], at));
                 (change * L::of(0.25) * L::load(&cells.volume[first + pack], at)).store(value, at);
             }
@@ -213,9 +216,9 @@ impl<R: Real> Work<R> for Pressures<'_, R> {
 struct Pass<'a, R> {
     field: &'a AveragedTets<R>,
     first: usize,
-    displacement: &'a [Vector<R>],
+    displacement: &'a Places<R>,
     history: &'a mut [Pack<R>],
-    slots: &'a mut [Vector<Pack<R>>],
+    slots: &'a mut [Slot<R>],
 }
 
 impl<R: Real> Work<R> for Pass<'_, R> {
@@ -228,19 +231,22 @@ impl<R: Real> Work<R> for Pass<'_, R> {
         let per_pack = 6 * field.cell_slots();
         let mut findings = Findings::default();
         let mut batch = Batch::new();
-        let mut moved = [[[Pack::ZERO; 3]; 4]; PACKS];
+        let mut gathered = [[Pack([[R::ZERO; 4]; PACK]); 4]; PACKS];
+        let mut moved = [[Pack::ZERO; 3]; 4];
+        let mut forces = [[Pack::ZERO; 3]; 4];
         let mut averages = [Pack::ZERO; PACKS];
         for (index, slots) in slots.chunks_mut(PACKS * 4).enumerate() {
             let first = first + index * PACKS;
             let packs = slots.len() / 4;
             for pack in 0..packs {
-                gather(&cells.nodes[first + pack], displacement, &mut moved[pack]);
+                gather(&cells.nodes[first + pack], displacement, &mut gathered[pack]);
                 averages[pack] = field.average_to_pack(first + pack);
             }
             // A deformation that is averaged shows its own measures before, others theirs after.
             for pack in 0..packs {
+                by_component(&gathered[pack], &mut moved);
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let u = relative::<R, L, 4>(&moved[pack], at);
+                    let u = relative::<R, L, 4>(&moved, at);
                     batch.set(pack, at, &displacement_gradient(&u, &cells.gradient[first + pack], at));
                 }
             }
@@ -256,7 +262,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 }
             }
             batch.evaluate::<L>(&field.law, packs, 1, cells.fibres(first, packs));
-            for (pack, forces) in slots.chunks_exact_mut(4).enumerate() {
+            for (pack, slots) in slots.chunks_exact_mut(4).enumerate() {
                 if field.averaging != Averaging::NiftySim {
                     batch.note(pack, (first + pack) * PACK, &mut findings);
                 }
@@ -268,8 +274,9 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                     let piola =
                         field.piola(&f, elastic, L::load(&averages[pack], at), &mut history[own.clone()], at);
                     let volume = L::load(&cells.volume[first + pack], at);
-                    scatter(&piola, &cells.gradient[first + pack], volume, forces, at);
+                    scatter(&piola, &cells.gradient[first + pack], volume, &mut forces, at);
                 }
+                by_cell(&forces, slots);
             }
         }
         findings
@@ -313,9 +320,9 @@ impl<R: Real> AveragedTets<R> {
 impl<R: Real> ForceField<R> for AveragedTets<R> {
     fn evaluate(
         &mut self,
-        displacement: &[Vector<R>],
+        displacement: &Places<R>,
         history: &mut History<R>,
-        slots: &mut [Vector<Pack<R>>],
+        slots: &mut [Slot<R>],
         findings: &mut [Findings<R>],
     ) {
         self.volume_changes(displacement);

@@ -5,7 +5,10 @@ use rayon::prelude::*;
 
 use super::averaged::{Pressures, for_each_pressure, volume_change};
 use super::batch::{Batch, PACKS};
-use super::{Findings, ForceField, PackedCells, displacement_gradient, for_each_task, gather, relative};
+use super::{
+    Findings, ForceField, PackedCells, Places, Slot, by_cell, by_component, displacement_gradient,
+    for_each_task, gather, relative,
+};
 use crate::Real;
 use crate::element::GaussPoints;
 use crate::lanes::{Lanes, PACK, Pack, Processor, Work, load_vector, store_vector};
@@ -66,7 +69,7 @@ impl<R: Real> FullHexes<R> {
     }
 
     /// U'(v/V) of all cells, relaxed where the law's volumetric part relaxes.
-    fn pressures(&mut self, displacement: &[Vector<R>], history: &mut [Pack<R>]) {
+    fn pressures(&mut self, displacement: &Places<R>, history: &mut [Pack<R>]) {
         let mut values = std::mem::take(&mut self.pressure);
         values.par_iter_mut().enumerate().with_min_len(8).for_each(|(pack, value)| {
             self.processor.run(MeanChange { field: self, pack, displacement, value });
@@ -83,7 +86,7 @@ impl<R: Real> FullHexes<R> {
 struct MeanChange<'a, R> {
     field: &'a FullHexes<R>,
     pack: usize,
-    displacement: &'a [Vector<R>],
+    displacement: &'a Places<R>,
     value: &'a mut Pack<R>,
 }
 
@@ -93,8 +96,10 @@ impl<R: Real> Work<R> for MeanChange<'_, R> {
     #[inline(always)]
     fn run<L: Lanes<R>>(self) {
         let Self { field, pack, displacement, value } = self;
+        let mut gathered = [Pack([[R::ZERO; 4]; PACK]); 8];
         let mut moved = [[Pack::ZERO; 3]; 8];
-        gather(&field.cells.nodes[pack], displacement, &mut moved);
+        gather(&field.cells.nodes[pack], displacement, &mut gathered);
+        by_component(&gathered, &mut moved);
         for at in (0..PACK).step_by(L::WIDTH) {
             let u = relative::<R, L, 8>(&moved, at);
             let mut change = L::ZERO;
@@ -110,9 +115,9 @@ impl<R: Real> Work<R> for MeanChange<'_, R> {
 struct Pass<'a, R> {
     field: &'a FullHexes<R>,
     first: usize,
-    displacement: &'a [Vector<R>],
+    displacement: &'a Places<R>,
     history: &'a mut [Pack<R>],
-    slots: &'a mut [Vector<Pack<R>>],
+    slots: &'a mut [Slot<R>],
 }
 
 impl<R: Real> Work<R> for Pass<'_, R> {
@@ -123,11 +128,14 @@ impl<R: Real> Work<R> for Pass<'_, R> {
         let Self { field, first, displacement, history, slots } = self;
         let mut findings = Findings::default();
         let mut batch = Batch::new();
+        let mut gathered = [Pack([[R::ZERO; 4]; PACK]); 8];
         let mut moved = [[Pack::ZERO; 3]; 8];
+        let mut forces = [[Pack::ZERO; 3]; 8];
         let per_point = 6 * field.isochoric_slots;
-        for (index, forces) in slots.chunks_exact_mut(8).enumerate() {
+        for (index, slots) in slots.chunks_exact_mut(8).enumerate() {
             let cells = first + index;
-            gather(&field.cells.nodes[cells], displacement, &mut moved);
+            gather(&field.cells.nodes[cells], displacement, &mut gathered);
+            by_component(&gathered, &mut moved);
             forces.fill([Pack::ZERO; 3]);
             for points in [0, PACKS] {
                 for pack in 0..PACKS {
@@ -158,6 +166,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                     }
                 }
             }
+            by_cell(&forces, slots);
         }
         findings
     }
@@ -166,9 +175,9 @@ impl<R: Real> Work<R> for Pass<'_, R> {
 impl<R: Real> ForceField<R> for FullHexes<R> {
     fn evaluate(
         &mut self,
-        displacement: &[Vector<R>],
+        displacement: &Places<R>,
         history: &mut History<R>,
-        slots: &mut [Vector<Pack<R>>],
+        slots: &mut [Slot<R>],
         findings: &mut [Findings<R>],
     ) {
         self.pressures(displacement, &mut history.pressures);

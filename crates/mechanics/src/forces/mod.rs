@@ -33,6 +33,9 @@ use crate::tensor::{Tensor, Vector, add, cast, scale, sub};
 /// Packs of cells per parallel task; the sums of a task are added up in order.
 const TASK: usize = 16;
 
+/// The forces [N] of a pack of cells on one of their nodes, cell by cell; the fourth number is unused.
+type Slot<R> = Pack<[R; 4]>;
+
 /// What a pass over some packs of cells found, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Findings<R> {
@@ -103,9 +106,9 @@ pub trait ForceField<R>: Send + Sync {
     /// `findings` has one entry per [`TASK`] packs.
     fn evaluate(
         &mut self,
-        displacement: &[Vector<R>],
+        displacement: &Places<R>,
         history: &mut History<R>,
-        slots: &mut [Vector<Pack<R>>],
+        slots: &mut [Slot<R>],
         findings: &mut [Findings<R>],
     );
 
@@ -178,15 +181,15 @@ impl<R: Real, const N: usize> PackedCells<R, N> {
     }
 }
 
-/// Does `pass` in parallel for every [`TASK`] packs of cells: it takes the first pack, the slots (`nodes` vectors a pack)
+/// Does `pass` in parallel for every [`TASK`] packs of cells: it takes the first pack, the slots (`nodes` a pack)
 /// and the history (`per_pack` packs a pack of cells; none if there is no history).
 fn for_each_task<R: Real>(
-    slots: &mut [Vector<Pack<R>>],
+    slots: &mut [Slot<R>],
     nodes: usize,
     history: &mut [Pack<R>],
     per_pack: usize,
     findings: &mut [Findings<R>],
-    pass: impl Fn(usize, &mut [Vector<Pack<R>>], &mut [Pack<R>]) -> Findings<R> + Sync,
+    pass: impl Fn(usize, &mut [Slot<R>], &mut [Pack<R>]) -> Findings<R> + Sync,
 ) {
     let tasks = slots.par_chunks_mut(TASK * nodes).zip(findings).enumerate();
     if history.is_empty() {
@@ -200,16 +203,57 @@ fn for_each_task<R: Real>(
     }
 }
 
-/// The displacements of the nodes of a pack of cells.
+/// Vectors of nodes, each of which can be read as four numbers at once.
+pub struct Places<R>(Vec<R>);
+
+impl<R: Real> Places<R> {
+    fn set(&mut self, vectors: &[Vector<R>]) {
+        let numbers = vectors.as_flattened();
+        self.0.resize(numbers.len() + 1, R::ZERO);
+        self.0[..numbers.len()].copy_from_slice(numbers);
+    }
+
+    /// The vector of a node, and the number after it.
+    #[inline(always)]
+    fn at(&self, node: u32) -> [R; 4] {
+        let mut four = [R::ZERO; 4];
+        four.copy_from_slice(&self.0[3 * node as usize..][..4]);
+        four
+    }
+}
+
+/// The displacements of the nodes of a pack of cells, cell by cell.
 #[inline(always)]
 fn gather<R: Real, const N: usize>(
     nodes: &[[u32; PACK]; N],
-    displacement: &[Vector<R>],
-    to: &mut [Vector<Pack<R>>; N],
+    displacement: &Places<R>,
+    to: &mut [Slot<R>; N],
 ) {
-    for (nodes, [x, y, z]) in nodes.iter().zip(to) {
-        for (lane, &node) in nodes.iter().enumerate() {
-            [x.0[lane], y.0[lane], z.0[lane]] = displacement[node as usize];
+    for (nodes, to) in nodes.iter().zip(to) {
+        for (to, &node) in to.0.iter_mut().zip(nodes) {
+            *to = displacement.at(node);
+        }
+    }
+}
+
+/// Vectors cell by cell become components side by side.
+#[inline(always)]
+fn by_component<R: Real, const N: usize>(cells: &[Slot<R>; N], to: &mut [Vector<Pack<R>>; N]) {
+    for (cells, [x, y, z]) in cells.iter().zip(to) {
+        for lane in 0..PACK {
+            x.0[lane] = cells.0[lane][0];
+            y.0[lane] = cells.0[lane][1];
+            z.0[lane] = cells.0[lane][2];
+        }
+    }
+}
+
+/// Components side by side become vectors cell by cell.
+#[inline(always)]
+fn by_cell<R: Real>(forces: &[Vector<Pack<R>>], slots: &mut [Slot<R>]) {
+    for (slot, [x, y, z]) in slots.iter_mut().zip(forces) {
+        for lane in 0..PACK {
+            slot.0[lane] = [x.0[lane], y.0[lane], z.0[lane], R::ZERO];
         }
     }
 }
@@ -272,7 +316,8 @@ pub(crate) struct InternalForces<R> {
     fields: Vec<Box<dyn ForceField<R>>>,
     /// First slot of each field, one more than there are fields.
     field_offsets: Vec<usize>,
-    slots: Vec<Vector<Pack<R>>>,
+    slots: Vec<Slot<R>>,
+    displacement: Places<R>,
     /// What each task of each field found.
     findings: Vec<Vec<Findings<R>>>,
     /// First entry of `incident` of each node, one more than there are nodes.
@@ -304,8 +349,9 @@ impl<R: Real> InternalForces<R> {
         places.sort_by_key(|(node, _)| *node);
         Self {
             fields: model.solids.iter().map(|solid| R::force_field(solid, step)).collect(),
-            slots: vec![[Pack::ZERO; 3]; field_offsets[field_offsets.len() - 1]],
+            slots: vec![Pack([[R::ZERO; 4]; PACK]); field_offsets[field_offsets.len() - 1]],
             field_offsets,
+            displacement: Places(vec![R::ZERO; 3 * model.node_count() + 1]),
             findings: (model.solids.iter())
                 .map(|solid| vec![Findings::default(); solid.cells.len().div_ceil(TASK * PACK)])
                 .collect(),
@@ -317,9 +363,10 @@ impl<R: Real> InternalForces<R> {
     /// Evaluates all cells. `history` has one entry per solid, each empty for the instantaneous elastic response.
     pub(crate) fn evaluate(&mut self, displacement: &[Vector<R>], history: &mut [History<R>]) -> Found {
         let mut found = Found::default();
+        self.displacement.set(displacement);
         for (index, field) in self.fields.iter_mut().enumerate() {
             let slots = &mut self.slots[self.field_offsets[index]..self.field_offsets[index + 1]];
-            field.evaluate(displacement, &mut history[index], slots, &mut self.findings[index]);
+            field.evaluate(&self.displacement, &mut history[index], slots, &mut self.findings[index]);
             for findings in &self.findings[index] {
                 found.inverted = found.inverted.or(findings.inverted.map(|(cell, j)| (index, cell, j)));
                 for lane in 0..PACK {
@@ -345,10 +392,13 @@ impl<R: Real> InternalForces<R> {
     #[inline(always)]
     pub(crate) fn at(&self, node: usize) -> Vector<R> {
         let places = &self.incident[self.node_offsets[node] as usize..self.node_offsets[node + 1] as usize];
-        places.iter().fold([R::ZERO; 3], |sum, &place| {
-            let (slot, lane) = (place as usize / PACK, place as usize % PACK);
-            let [x, y, z] = &self.slots[slot];
-            add(sum, [x.0[lane], y.0[lane], z.0[lane]])
-        })
+        let mut sum = [R::ZERO; 4];
+        for &place in places {
+            let force = &self.slots[place as usize / PACK].0[place as usize % PACK];
+            for c in 0..4 {
+                sum[c] += force[c];
+            }
+        }
+        [sum[0], sum[1], sum[2]]
     }
 }

@@ -2,7 +2,8 @@
 
 use super::batch::{Batch, PACKS};
 use super::{
-    Findings, ForceField, PackedCells, displacement_gradient, for_each_task, gather, relative, scatter,
+    Findings, ForceField, PackedCells, Places, Slot, by_cell, by_component, displacement_gradient,
+    for_each_task, gather, relative, scatter,
 };
 use crate::Real;
 use crate::lanes::{Lanes, PACK, Pack, Processor, Work, load_vector, store_vector};
@@ -59,9 +60,9 @@ impl<R: Real, const N: usize> SolidForces<R, N> {
 struct Pass<'a, R, const N: usize> {
     field: &'a SolidForces<R, N>,
     first: usize,
-    displacement: &'a [Vector<R>],
+    displacement: &'a Places<R>,
     history: &'a mut [Pack<R>],
-    slots: &'a mut [Vector<Pack<R>>],
+    slots: &'a mut [Slot<R>],
 }
 
 impl<R: Real, const N: usize> Work<R> for Pass<'_, R, N> {
@@ -73,21 +74,24 @@ impl<R: Real, const N: usize> Work<R> for Pass<'_, R, N> {
         let cells = &field.cells;
         let mut findings = Findings::default();
         let mut batch = Batch::new();
+        let mut gathered = [[Pack([[R::ZERO; 4]; PACK]); N]; PACKS];
         let mut moved = [[[Pack::ZERO; 3]; N]; PACKS];
+        let mut forces = [[Pack::ZERO; 3]; N];
         for (index, slots) in slots.chunks_mut(PACKS * N).enumerate() {
             let first = first + index * PACKS;
             let packs = slots.len() / N;
-            for (pack, moved) in moved[..packs].iter_mut().enumerate() {
-                gather(&cells.nodes[first + pack], displacement, moved);
+            for (pack, gathered) in gathered[..packs].iter_mut().enumerate() {
+                gather(&cells.nodes[first + pack], displacement, gathered);
             }
-            for (pack, moved) in moved[..packs].iter().enumerate() {
+            for (pack, moved) in moved[..packs].iter_mut().enumerate() {
+                by_component(&gathered[pack], moved);
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let u = relative::<R, L, N>(moved, at);
                     batch.set(pack, at, &displacement_gradient(&u, &cells.gradient[first + pack], at));
                 }
             }
             batch.evaluate::<L>(&field.law, packs, 1, cells.fibres(first, packs));
-            for (pack, forces) in slots.chunks_exact_mut(N).enumerate() {
+            for (pack, slots) in slots.chunks_exact_mut(N).enumerate() {
                 batch.note(pack, (first + pack) * PACK, &mut findings);
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let elastic = batch.elastic::<L>(pack, at);
@@ -99,17 +103,18 @@ impl<R: Real, const N: usize> Work<R> for Pass<'_, R, N> {
                     };
                     let piola = batch.deformation_gradient::<L>(pack, at).times_symmetric(&stress);
                     let volume = L::load(&cells.volume[first + pack], at);
-                    scatter(&piola, &cells.gradient[first + pack], volume, forces, at);
+                    scatter(&piola, &cells.gradient[first + pack], volume, &mut forces, at);
                 }
                 if let Some(control) = &field.hourglass {
                     for at in (0..PACK).step_by(L::WIDTH) {
                         let u = relative::<R, L, N>(&moved[pack], at);
                         let stiffness = L::load(&control.stiffness[first + pack], at);
                         let patterns = &control.patterns[first + pack];
-                        let energy = resist_hourglass(patterns, stiffness, &u, forces, at);
+                        let energy = resist_hourglass(patterns, stiffness, &u, &mut forces, at);
                         (energy + L::load(&findings.hourglass, at)).store(&mut findings.hourglass, at);
                     }
                 }
+                by_cell(&forces, slots);
             }
         }
         findings
@@ -148,9 +153,9 @@ fn resist_hourglass<R: Real, L: Lanes<R>, const N: usize>(
 impl<R: Real, const N: usize> ForceField<R> for SolidForces<R, N> {
     fn evaluate(
         &mut self,
-        displacement: &[Vector<R>],
+        displacement: &Places<R>,
         history: &mut History<R>,
-        slots: &mut [Vector<Pack<R>>],
+        slots: &mut [Slot<R>],
         findings: &mut [Findings<R>],
     ) {
         let this = &*self;
