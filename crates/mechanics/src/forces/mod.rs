@@ -31,7 +31,7 @@ use crate::state::History;
 use crate::tensor::{Tensor, Vector, add, cast, scale, sub};
 
 /// Packs of cells per parallel task; the sums of a task are added up in order.
-const TASK: usize = 16;
+const TASK: usize = 32;
 
 /// The forces [N] of a pack of cells on one of their nodes, cell by cell; the fourth number is unused.
 type Slot<R> = Pack<[R; 4]>;
