@@ -10,8 +10,8 @@ use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim, number, reference,
-    registry,
+    Built, Checkpoint, Options, OutputFolder, PLAUSIBLE_SIZE, Plan, Scene, Sweep, SweepOptions, niftysim,
+    number, reference, registry,
 };
 use serde_json::{Map, Value as Json, json};
 use tempfile::TempDir;
@@ -341,6 +341,9 @@ fn info_page(MeshFile { mesh, format, notes, .. }: &MeshFile) -> String {
     if let Some((low, high)) = mesh.bounds() {
         let at = |p: Vector3| format!("({}, {}, {})", number(p.x), number(p.y), number(p.z));
         lines.push(format!("from {} to {} m", at(low), at(high)));
+        if (high - low).norm() > PLAUSIBLE_SIZE[1] {
+            lines.push("note: larger than any organ; for a mesh in millimetres give `--scale 0.001`".into());
+        }
     }
     lines.push(QualityReport::new(mesh).to_string().trim_end().to_owned());
     lines.extend(sets(mesh).map(|(name, count)| format!("set `{name}`: {count} nodes")));

@@ -954,6 +954,15 @@ fn mesh_files_of_every_volume_format_become_bodies() {
 }
 
 #[test]
+fn info_asks_whether_a_large_mesh_is_in_millimetres() {
+    let workshop = Workshop::new("");
+    workshop.write("organ.vtk", vtk(&CUBE.map(|p| p.map(|x| 1000.0 * x)), &TETS, ""));
+    let hint = "give `--scale 0.001`";
+    assert!(workshop.pliant(&["info", "organ.vtk"]).out.contains(hint));
+    assert!(!workshop.pliant(&["info", "organ.vtk", "--scale", "0.001"]).out.contains(hint));
+}
+
+#[test]
 fn mesh_files_of_every_surface_format_become_surfaces() {
     let workshop = Workshop::new(BLOCK);
     let quads = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";

@@ -1,7 +1,7 @@
 //! The largest stable step of a deformed state, watched during a run.
 //!
 //! A cell's own limit is Δt_e = 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
-//! ([`tangent`](crate::tangent)); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the true
+//! (`tangent.rs`); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the true
 //! limit L of a reference state, at first rest, the limit now is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e),
 //! where r_e² is the stiffness of the cell in the reference state over that now, the smaller one of the ratios for all
 //! modes and for plane waves. So a cell that is slower than the assembly counts with its own limit, and one that the
@@ -306,10 +306,13 @@ impl Watch {
             let strain = Symmetric::green_lagrange_twice(&h);
             let c = strain + Symmetric::IDENTITY;
             let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
-            let along_fibres = solid.fibres(cell).iter().map(|&fibre| c.quadratic(fibre));
-            let stretch = along_fibres.reduce(f64::max).unwrap_or(c.trace() / 3.0);
+            let mean = c.trace() / 3.0;
+            let stretch = match solid.fibres(cell) {
+                [] => mean,
+                fibres => fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max),
+            };
             // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
-            let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * c.trace() / 3.0;
+            let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * mean;
             // |G C⁻¹| over |G|: how much closer the deformed faces lie, the closest pair counting most.
             let closeness = product_square(&square, &(c.cofactor() * (1.0 / (j * j)))).sqrt();
             *rank = [closeness * modulus * weight[cell], stretch];

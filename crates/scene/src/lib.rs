@@ -51,7 +51,7 @@ mod sweep;
 #[cfg(test)]
 mod testing;
 
-pub use build::{Built, BuiltBody, build};
+pub use build::{Built, BuiltBody, PLAUSIBLE_SIZE, build};
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use output::{
     AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,

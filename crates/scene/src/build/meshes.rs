@@ -21,7 +21,7 @@ pub(crate) struct MeshOrigin {
 }
 
 /// An organ larger or smaller than this [m] is probably in other units.
-const PLAUSIBLE_SIZE: [f64; 2] = [1e-3, 10.0];
+pub const PLAUSIBLE_SIZE: [f64; 2] = [1e-3, 10.0];
 
 /// Carries the nodes' numbers in the file through the repairs.
 const FILE_NUMBER: &str = "number of the node in the mesh file";

@@ -21,6 +21,7 @@ use crate::scene::Scene;
 use crate::source::Source;
 
 pub(crate) use meshes::MeshOrigin;
+pub use meshes::PLAUSIBLE_SIZE;
 
 /// A model, and what the outputs need beside it.
 #[derive(Clone, Debug)]
