@@ -392,13 +392,17 @@ impl<R: Real> InternalForces<R> {
     #[inline(always)]
     pub(crate) fn at(&self, node: usize) -> Vector<R> {
         let places = &self.incident[self.node_offsets[node] as usize..self.node_offsets[node + 1] as usize];
-        let mut sum = [R::ZERO; 4];
-        for &place in places {
-            let force = &self.slots[place as usize / PACK].0[place as usize % PACK];
-            for c in 0..4 {
-                sum[c] += force[c];
+        // Four sums, so that an addition need not wait for the one before.
+        let mut sums = [[R::ZERO; 4]; 4];
+        for places in places.chunks(4) {
+            for (sum, &place) in sums.iter_mut().zip(places) {
+                let force = &self.slots[place as usize / PACK].0[place as usize % PACK];
+                for c in 0..4 {
+                    sum[c] += force[c];
+                }
             }
         }
-        [sum[0], sum[1], sum[2]]
+        let [a, b, d, e] = sums;
+        [0, 1, 2].map(|c| (a[c] + b[c]) + (d[c] + e[c]))
     }
 }
