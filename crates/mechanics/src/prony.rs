@@ -266,7 +266,7 @@ impl<R: Real> Relaxation<R> {
     }
 
     /// The total stress [Pa] at the end of the step from the elastic one, and the history advanced to it.
-    /// `history` has [`Prony::slots`] × 6 packs; all zero at rest.
+    /// `history` has [`Prony::slots`] × 6 packs, all zero at rest; none gives the elastic stress.
     #[inline(always)]
     pub fn advance<L: Lanes<R>>(
         &self,
@@ -274,7 +274,7 @@ impl<R: Real> Relaxation<R> {
         history: &mut [Pack<R>],
         at: usize,
     ) -> Symmetric<L> {
-        let (isochoric, volumetric) = history.split_at_mut(6 * self.isochoric.slots());
+        let (isochoric, volumetric) = history.split_at_mut(history.len().min(6 * self.isochoric.slots()));
         Symmetric(self.isochoric.advance(elastic.isochoric.0, isochoric, at))
             + Symmetric(self.volumetric.advance(elastic.volumetric.0, volumetric, at))
     }

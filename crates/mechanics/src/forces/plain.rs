@@ -95,12 +95,9 @@ impl<R: Real, const N: usize> Work<R> for Pass<'_, R, N> {
                 batch.note(pack, (first + pack) * PACK, &mut findings);
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let elastic = batch.elastic::<L>(pack, at);
-                    let stress = if history.is_empty() {
-                        elastic.isochoric + elastic.volumetric
-                    } else {
-                        let own = (index * PACKS + pack) * field.history;
-                        field.relaxation.advance(elastic, &mut history[own..own + field.history], at)
-                    };
+                    let own = (index * PACKS + pack) * field.history;
+                    let own = own.min(history.len())..(own + field.history).min(history.len());
+                    let stress = field.relaxation.advance(elastic, &mut history[own], at);
                     let piola = batch.deformation_gradient::<L>(pack, at).times_symmetric(&stress);
                     let volume = L::load(&cells.volume[first + pack], at);
                     scatter(&piola, &cells.gradient[first + pack], volume, &mut forces, at);
