@@ -352,6 +352,7 @@ impl<R: Real> Block<R> {
     }
 
     /// Adds kinetic energy, damping power and the halves of the works to sums kept apart by lane.
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn add_to(&self, sums: &mut [[f64; BLOCK]; 6], lengths: Lengths) {
         let (ratio, per_two_steps) = (lengths.ratio(), 0.5 / lengths.next);

@@ -238,9 +238,10 @@ impl<R: Real> Work<R> for Pass<'_, R> {
         for (index, slots) in slots.chunks_mut(PACKS * 4).enumerate() {
             let first = first + index * PACKS;
             let packs = slots.len() / 4;
-            for pack in 0..packs {
-                gather(&cells.nodes[first + pack], displacement, &mut gathered[pack]);
-                averages[pack] = field.average_to_pack(first + pack);
+            for (pack, (gathered, average)) in gathered.iter_mut().zip(&mut averages).take(packs).enumerate()
+            {
+                gather(&cells.nodes[first + pack], displacement, gathered);
+                *average = field.average_to_pack(first + pack);
             }
             // A deformation that is averaged shows its own measures before, others theirs after.
             for pack in 0..packs {
@@ -252,12 +253,12 @@ impl<R: Real> Work<R> for Pass<'_, R> {
             }
             if field.averaging == Averaging::NiftySim {
                 batch.measure::<L>(packs);
-                for pack in 0..packs {
+                for (pack, average) in averages[..packs].iter().enumerate() {
                     batch.note(pack, (first + pack) * PACK, &mut findings);
                     for at in (0..PACK).step_by(L::WIDTH) {
                         let h: Tensor<L> = load_tensor(&batch.gradient[pack], at);
                         let own = L::load(&batch.volume_ratio[pack], at);
-                        batch.set(pack, at, &dilated(&h, own, L::load(&averages[pack], at)));
+                        batch.set(pack, at, &dilated(&h, own, L::load(average, at)));
                     }
                 }
             }
