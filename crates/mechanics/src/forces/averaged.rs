@@ -244,8 +244,8 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 *average = field.average_to_pack(first + pack);
             }
             // A deformation that is averaged shows its own measures before, others theirs after.
-            for pack in 0..packs {
-                by_component(&gathered[pack], &mut moved);
+            for (pack, gathered) in gathered[..packs].iter().enumerate() {
+                by_component(gathered, &mut moved);
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let u = relative::<R, L, 4>(&moved, at);
                     batch.set(pack, at, &displacement_gradient(&u, &cells.gradient[first + pack], at));
