@@ -2,6 +2,7 @@
 //! right (Taylor et al. 2009). Reference: closed forms with fifty digits.
 //! *A*: F = I + γ e₂⊗e₁, which stretches fibres along e₁; *B*: F = I + γ e₁⊗e₂, which does not.
 
+use pliant_mechanics::Pack;
 use pliant_mechanics::law::Split;
 use pliant_mechanics::prony::{PronyUpdate, Relaxation};
 use pliant_mechanics::tensor::Symmetric;
@@ -36,11 +37,11 @@ impl Case {
     fn sheared(&self, shears: &[f64], rate: f64, update: PronyUpdate, step: f64) -> Vec<Symmetric<f64>> {
         let prony = liver_relaxation(update);
         let relaxation = Relaxation::<f64>::new(&prony, step);
-        let mut history = vec![Symmetric::ZERO; prony.slots()];
+        let mut history = vec![Pack::default(); 6 * prony.slots()];
         let mut steps = 0;
         let mut next_at = |shear: f64| loop {
             let now = rate * step * f64::from(steps);
-            let stress = relaxation.advance(self.elastic(now), &mut history);
+            let stress = relaxation.advance(self.elastic(now), &mut history, 0);
             steps += 1;
             if now > shear - 1e-9 {
                 assert!((now - shear).abs() < 1e-12, "no step ends at shear {shear}");

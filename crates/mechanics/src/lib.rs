@@ -44,6 +44,7 @@ pub mod element;
 mod fingerprint;
 mod forces;
 pub mod harmonic;
+mod lanes;
 pub mod law;
 pub mod load;
 pub mod mapping;
@@ -61,8 +62,9 @@ pub use dynamic_relaxation::{
     Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings,
 };
 pub use fingerprint::fingerprint;
+pub use lanes::Pack;
 pub use model::Model;
-pub use real::Real;
+pub use real::{Number, Real};
 pub use state::{History, State, Work};
 pub use stepper::{
     BALANCE_LIMIT, BALANCE_STEPS, CentralDifference, Energies, Observable, StepError, balance_floor,

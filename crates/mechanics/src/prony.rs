@@ -6,12 +6,11 @@
 //! *backward Euler* (thesis 5.57–5.61, there written with a − h): d = τ/(Δt + τ), g = a d.
 //! Leaves out: a thermodynamic derivation; for anisotropic finite strain the dissipation may be non-monotone.
 
-use std::ops::{Add, Mul, Sub};
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
+use crate::lanes::{Lanes, Pack};
 use crate::law::Split;
 use crate::tensor::Symmetric;
 
@@ -164,12 +163,6 @@ pub struct Relaxation<R> {
     volumetric: Series<R>,
 }
 
-/// What a series can relax: tensors, or the pressure of a node.
-trait Relaxes<R>: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<R, Output = Self> {}
-
-impl<R: Real> Relaxes<R> for Symmetric<R> {}
-impl<R: Real> Relaxes<R> for R {}
-
 #[derive(Clone, Debug)]
 struct Series<R> {
     /// 1 − Σ a.
@@ -204,18 +197,32 @@ impl<R: Real> Series<R> {
         }
     }
 
-    /// S of one part, and its history advanced in place; `history` is Φⁿ⁻¹ followed by one h per term.
+    /// S of one part, and its history advanced in place; `history` is Φⁿ⁻¹ followed by one h per term, each with as many
+    /// packs as S has components.
     #[inline(always)]
-    fn advance<T: Relaxes<R>>(&self, elastic: T, history: &mut [T]) -> T {
+    fn advance<L: Lanes<R>, const C: usize>(
+        &self,
+        elastic: [L; C],
+        history: &mut [Pack<R>],
+        at: usize,
+    ) -> [L; C] {
+        let (history, _) = history.as_chunks_mut::<C>();
         let Some((previous, terms)) = history.split_first_mut() else {
             return elastic;
         };
-        let change = elastic - *previous;
-        *previous = elastic;
-        let mut stress = elastic * self.remaining;
+        let (mut stress, mut change) = (elastic, elastic);
+        for c in 0..C {
+            change[c] -= L::load(&previous[c], at);
+            elastic[c].store(&mut previous[c], at);
+            stress[c] = elastic[c] * L::splat(self.remaining);
+        }
         for (h, &(decay, gain)) in terms.iter_mut().zip(&self.terms) {
-            *h = *h * decay + change * gain;
-            stress = stress + *h;
+            let (decay, gain) = (L::splat(decay), L::splat(gain));
+            for c in 0..C {
+                let now = L::load(&h[c], at).mul_add(decay, change[c] * gain);
+                now.store(&mut h[c], at);
+                stress[c] += now;
+            }
         }
         stress
     }
@@ -240,25 +247,36 @@ impl<R: Real> Relaxation<R> {
         self.volumetric.set_step(&prony.volumetric, prony.update, step);
     }
 
-    /// The isochoric stress [Pa] at the end of the step; `history` has [`Prony::isochoric_slots`] tensors.
+    /// The isochoric stress [Pa] at the end of the step; `history` has [`Prony::isochoric_slots`] × 6 packs, of which the
+    /// lanes from `at` on are advanced.
     #[inline(always)]
-    pub fn advance_isochoric(&self, elastic: Symmetric<R>, history: &mut [Symmetric<R>]) -> Symmetric<R> {
-        self.isochoric.advance(elastic, history)
+    pub fn advance_isochoric<L: Lanes<R>>(
+        &self,
+        elastic: Symmetric<L>,
+        history: &mut [Pack<R>],
+        at: usize,
+    ) -> Symmetric<L> {
+        Symmetric(self.isochoric.advance(elastic.0, history, at))
     }
 
-    /// The pressure [Pa] at the end of the step; `history` has [`Prony::volumetric_slots`] numbers.
+    /// The pressure [Pa] at the end of the step; `history` has [`Prony::volumetric_slots`] packs.
     #[inline(always)]
-    pub fn advance_pressure(&self, elastic: R, history: &mut [R]) -> R {
-        self.volumetric.advance(elastic, history)
+    pub fn advance_pressure<L: Lanes<R>>(&self, elastic: L, history: &mut [Pack<R>], at: usize) -> L {
+        self.volumetric.advance([elastic], history, at)[0]
     }
 
     /// The total stress [Pa] at the end of the step from the elastic one, and the history advanced to it.
-    /// `history` has [`Prony::slots`] tensors; all zero at rest.
+    /// `history` has [`Prony::slots`] × 6 packs, all zero at rest; none gives the elastic stress.
     #[inline(always)]
-    pub fn advance(&self, elastic: Split<Symmetric<R>>, history: &mut [Symmetric<R>]) -> Symmetric<R> {
-        let (isochoric, volumetric) = history.split_at_mut(self.isochoric.slots());
-        self.isochoric.advance(elastic.isochoric, isochoric)
-            + self.volumetric.advance(elastic.volumetric, volumetric)
+    pub fn advance<L: Lanes<R>>(
+        &self,
+        elastic: Split<Symmetric<L>>,
+        history: &mut [Pack<R>],
+        at: usize,
+    ) -> Symmetric<L> {
+        let (isochoric, volumetric) = history.split_at_mut(history.len().min(6 * self.isochoric.slots()));
+        Symmetric(self.isochoric.advance(elastic.isochoric.0, isochoric, at))
+            + Symmetric(self.volumetric.advance(elastic.volumetric.0, volumetric, at))
     }
 }
 
@@ -270,12 +288,12 @@ mod tests {
         let term = PronyTerm { part: Part::Isochoric, weight: 0.5, time: 0.58 };
         let prony = Prony::new(&[term], update).unwrap();
         let relaxation = Relaxation::<f64>::new(&prony, step);
-        let mut history = vec![Symmetric::ZERO; prony.slots()];
+        let mut history = vec![Pack::ZERO; 6 * prony.slots()];
         let mut stress = 0.0;
         for n in 0..=(time / step).round() as usize {
             let elastic =
                 Split { isochoric: Symmetric::IDENTITY * (n as f64 * step), volumetric: Symmetric::ZERO };
-            stress = relaxation.advance(elastic, &mut history).0[0];
+            stress = relaxation.advance(elastic, &mut history, 0).0[0];
         }
         stress
     }

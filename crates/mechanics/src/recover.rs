@@ -75,9 +75,7 @@ impl<'a, R: Real> Recovery<'a, R> {
         let origin: Vector<f64> = cast(self.state.displacement[nodes[0] as usize]);
         let u: Vec<Vector<f64>> =
             nodes.iter().map(|&node| sub(cast(self.state.displacement[node as usize]), origin)).collect();
-        let per_cell = History::<R>::slots(part);
-        let own = &self.state.history[solid].cells[cell * per_cell..(cell + 1) * per_cell];
-        let history: Vec<Symmetric<f64>> = own.iter().map(|h| Symmetric(h.0.map(R::to_f64))).collect();
+        let history = self.state.history[solid].of_cell(part, cell);
         let fibres = part.fibres(cell);
         let averages = &self.averages[solid];
         match &part.cells {
@@ -184,12 +182,9 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
 }
 
 fn averages<R: Real>(solid: &Solid, history: &History<R>, displacement: &[Vector<R>]) -> Averages {
-    let pressures: Vec<f64> = history.pressures.iter().map(|&p| p.to_f64()).collect();
-    let slots = solid.material.prony.volumetric_slots();
-    let own = |index: usize| &pressures[index * slots..(index + 1) * slots];
     let relaxed = |index: usize, change: f64| {
         let elastic = pressure(&solid.material.law, change);
-        solid.material.prony.pressure(elastic, own(index))
+        solid.material.prony.pressure(elastic, &history.of_pressure(solid, index))
     };
     let change = |cell: usize, gradients: &[Vector<f64>]| {
         let nodes = solid.cells.nodes(cell);

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
+use crate::lanes::{PACK, Pack};
 use crate::model::{FREE, Model, Solid};
 use crate::stability::Stability;
 use crate::tensor::{Symmetric, Vector};
@@ -31,20 +32,34 @@ pub struct State<R> {
 /// What a relaxing law remembers of a solid.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct History<R> {
-    /// [`History::slots`] tensors per cell, cell after cell.
-    pub cells: Vec<Symmetric<R>>,
-    /// Where pressures are averaged: Φⁿ⁻¹ and one h per volumetric term, one averaged pressure after the other.
-    pub pressures: Vec<R>,
+    /// For each pack of cells [`History::slots`] tensors of six packs.
+    pub cells: Vec<Pack<R>>,
+    /// Where pressures are averaged, for each pack of them: Φⁿ⁻¹ and one h per volumetric term.
+    pub pressures: Vec<Pack<R>>,
 }
 
 impl<R: Real> History<R> {
     /// At rest.
     fn at_rest(solid: &Solid) -> Self {
-        let pressures = solid.cells.averaged_pressures() * solid.material.prony.volumetric_slots();
+        let packs = |count: usize, slots: usize| vec![Pack::ZERO; count.div_ceil(PACK) * slots];
         Self {
-            cells: vec![Symmetric::ZERO; solid.cells.len() * Self::slots(solid)],
-            pressures: vec![R::ZERO; pressures],
+            cells: packs(solid.cells.len(), 6 * Self::slots(solid)),
+            pressures: packs(solid.cells.averaged_pressures(), solid.material.prony.volumetric_slots()),
         }
+    }
+
+    /// The tensors of a cell.
+    pub(crate) fn of_cell(&self, solid: &Solid, cell: usize) -> Vec<Symmetric<f64>> {
+        let slots = Self::slots(solid);
+        let number =
+            |slot: usize, k: usize| self.cells[(cell / PACK * slots + slot) * 6 + k].0[cell % PACK].to_f64();
+        (0..slots).map(|slot| Symmetric([0, 1, 2, 3, 4, 5].map(|k| number(slot, k)))).collect()
+    }
+
+    /// What an averaged pressure remembers [Pa].
+    pub(crate) fn of_pressure(&self, solid: &Solid, index: usize) -> Vec<f64> {
+        let slots = solid.material.prony.volumetric_slots();
+        (0..slots).map(|slot| self.pressures[index / PACK * slots + slot].0[index % PACK].to_f64()).collect()
     }
 
     /// Tensors of history per cell.

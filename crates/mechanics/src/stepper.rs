@@ -15,6 +15,7 @@ use crate::Real;
 use crate::applied::AppliedForces;
 use crate::critical_step::limit_about;
 use crate::forces::{Deformed, InternalForces};
+use crate::lanes::{Lanes, Processor, Work};
 use crate::model::{Contradiction, FREE, Model};
 use crate::stability::{CHANGE, CHECK_EVERY, Look, Monitor, OnUnstable, substeps};
 use crate::state::State;
@@ -206,10 +207,14 @@ pub struct CentralDifference<'m, R> {
     relaxing: f64,
     forces: InternalForces<R>,
     owners: Vec<[u32; 3]>,
-    mass: Vec<R>,
-    /// α of each node [1/s].
-    damping: Vec<R>,
+    /// Mass of each component [kg].
+    mass: Vec<Vector<R>>,
+    /// α of each component [1/s].
+    damping: Vec<Vector<R>>,
     applied: AppliedForces<'m>,
+    /// True if there is any load.
+    loaded: bool,
+    processor: Processor,
     /// Amplitude of each prescribed component.
     amplitude: Vec<Vector<f64>>,
     /// Factor on the amplitudes of each constraint now and after the step.
@@ -257,6 +262,121 @@ pub(crate) fn sum_owned<R: Real>(
     sum
 }
 
+/// Nodes that are passed over together, all components side by side.
+const BLOCK: usize = 16;
+
+/// A pass over the nodes from `first` on: the coming increments, reactions and sums.
+struct NodePass<'a, 'm, R> {
+    stepper: &'a CentralDifference<'m, R>,
+    first: usize,
+    before: &'a [Vector<R>],
+    next: &'a mut [Vector<R>],
+    reaction: &'a mut [Vector<R>],
+}
+
+impl<R: Real> Work<R> for NodePass<'_, '_, R> {
+    type Output = Sums;
+
+    /// Plain loops over a block of components, which the compiler makes wide.
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) -> Sums {
+        let Self { stepper, first, before, next, reaction } = self;
+        let mut sums = [[0.0; BLOCK]; 6];
+        let blocks = before.chunks(BLOCK).zip(next.chunks_mut(BLOCK)).zip(reaction.chunks_mut(BLOCK));
+        for (index, ((before, next), reaction)) in blocks.enumerate() {
+            let nodes = first + index * BLOCK..first + index * BLOCK + before.len();
+            let mut block = Block::at_rest();
+            for (to, node) in nodes.clone().enumerate() {
+                block.internal[to] = stepper.forces.at(node);
+                if stepper.loaded {
+                    block.external[to] = stepper.applied.at(node);
+                }
+            }
+            block.before[..before.len()].copy_from_slice(before);
+            block.mass[..before.len()].copy_from_slice(&stepper.mass[nodes.clone()]);
+            block.damping[..before.len()].copy_from_slice(&stepper.damping[nodes.clone()]);
+            block.move_freely(stepper.lengths);
+            reaction.fill([R::ZERO; 3]);
+            for (to, node) in nodes.enumerate() {
+                let owner = stepper.owners[node];
+                if owner == [FREE; 3] {
+                    continue;
+                }
+                for c in (0..3).filter(|&c| owner[c] != FREE) {
+                    let (applied, internal) = (block.external[to][c], block.internal[to][c]);
+                    (block.next[to][c], reaction[to][c]) =
+                        stepper.prescribe(node, c, block.before[to][c], applied, internal);
+                    block.external[to][c] += reaction[to][c];
+                }
+            }
+            block.add_to(&mut sums, stepper.lengths);
+            next.copy_from_slice(&block.next[..next.len()]);
+        }
+        let [kinetic, damping_power, internal_before, internal_after, external_before, external_after] =
+            sums.map(|lanes| lanes.iter().sum());
+        Sums { kinetic, damping_power, internal_before, internal_after, external_before, external_after }
+    }
+}
+
+/// What is known of a block of nodes; beyond the last node, of nodes at rest.
+struct Block<R> {
+    before: [Vector<R>; BLOCK],
+    next: [Vector<R>; BLOCK],
+    internal: [Vector<R>; BLOCK],
+    external: [Vector<R>; BLOCK],
+    mass: [Vector<R>; BLOCK],
+    damping: [Vector<R>; BLOCK],
+}
+
+impl<R: Real> Block<R> {
+    #[inline(always)]
+    fn at_rest() -> Self {
+        let zero = [[R::ZERO; 3]; BLOCK];
+        let mass = [[R::ONE; 3]; BLOCK];
+        Self { before: zero, next: zero, internal: zero, external: zero, mass, damping: zero }
+    }
+
+    /// The increments of nodes that nothing holds.
+    #[inline(always)]
+    fn move_freely(&mut self, lengths: Lengths) {
+        let (ratio, step, half_mean) =
+            (R::of(lengths.ratio()), R::of(lengths.next * lengths.mean()), R::of(0.5 * lengths.mean()));
+        let (before, next) = (self.before.as_flattened(), self.next.as_flattened_mut());
+        let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
+        let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
+        for i in 0..3 * BLOCK {
+            let a = damping[i] * half_mean;
+            let push = step / mass[i] * (external[i] - internal[i]);
+            next[i] = ((R::ONE - a) * (before[i] * ratio) + push) / (R::ONE + a);
+        }
+    }
+
+    /// Adds kinetic energy, damping power and the halves of the works to sums kept apart by lane.
+    #[allow(clippy::needless_range_loop)]
+    #[inline(always)]
+    fn add_to(&self, sums: &mut [[f64; BLOCK]; 6], lengths: Lengths) {
+        let (ratio, per_two_steps) = (lengths.ratio(), 0.5 / lengths.next);
+        let (before, next) = (self.before.as_flattened(), self.next.as_flattened());
+        let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
+        let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
+        for part in 0..3 {
+            for lane in 0..BLOCK {
+                let i = part * BLOCK + lane;
+                let (before, next) = (before[i].to_f64(), next[i].to_f64());
+                let (internal, external) = (internal[i].to_f64(), external[i].to_f64());
+                let velocity = (before * ratio + next) * per_two_steps;
+                let twice_kinetic = mass[i].to_f64() * velocity * velocity;
+                sums[0][lane] += 0.5 * twice_kinetic;
+                sums[1][lane] += damping[i].to_f64() * twice_kinetic;
+                sums[2][lane] += 0.5 * internal * before;
+                sums[3][lane] += 0.5 * internal * next;
+                sums[4][lane] += 0.5 * external * before;
+                sums[5][lane] += 0.5 * external * next;
+            }
+        }
+    }
+}
+
 impl<'m, R: Real> CentralDifference<'m, R> {
     /// A stepper for steps of `step` seconds.
     ///
@@ -264,9 +384,9 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// If constraints contradict each other.
     pub fn new(model: &'m Model, step: f64) -> Result<Self, Contradiction> {
         let nodes = model.node_count();
-        let mut damping = vec![R::ZERO; nodes];
+        let mut damping = vec![[R::ZERO; 3]; nodes];
         for body in &model.bodies {
-            damping[body.nodes.start as usize..body.nodes.end as usize].fill(R::of(body.damping));
+            damping[body.nodes.start as usize..body.nodes.end as usize].fill([R::of(body.damping); 3]);
         }
         let stiffness: f64 = (model.solids.iter())
             .map(|solid| {
@@ -285,9 +405,11 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             forces: InternalForces::new(model, step),
             amplitude: model.amplitudes(&owners),
             owners,
-            mass: (0..nodes).map(|node| R::of(model.inertia(node))).collect(),
+            mass: (0..nodes).map(|node| [R::of(model.inertia(node)); 3]).collect(),
             damping,
             applied: AppliedForces::new(model),
+            loaded: !model.loads.is_empty(),
+            processor: Processor::detect(),
             factor: vec![[0.0; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
             reaction: vec![[R::ZERO; 3]; nodes],
@@ -443,7 +565,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         for (node, increment) in state.increment.iter_mut().enumerate() {
             let applied: Vector<R> = self.applied.at(node);
             let internal = self.forces.at(node);
-            let (m, alpha) = (self.mass[node].to_f64(), self.damping[node].to_f64());
+            let (m, alpha) = (self.mass[node][0].to_f64(), self.damping[node][0].to_f64());
             let velocity = self.model.initial_velocity.get(node).copied().unwrap_or_default();
             for c in 0..3 {
                 if self.owners[node][c] != FREE {
@@ -463,54 +585,32 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         let mut next = std::mem::take(&mut self.next);
         let mut reaction = std::mem::take(&mut self.reaction);
         let mut sums = std::mem::take(&mut self.sums);
-        (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(&mut sums)).enumerate().for_each(
-            |(task, ((next, reaction), sums))| {
-                *sums = Sums::default();
-                for (offset, (next, reaction)) in next.iter_mut().zip(reaction).enumerate() {
-                    let node = task * CHUNK + offset;
-                    (*next, *reaction) = self.pass_node(node, state.increment[node], sums);
-                }
-            },
-        );
+        let increment = state.increment.par_chunks(CHUNK);
+        (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(increment).zip(&mut sums))
+            .enumerate()
+            .for_each(|(task, (((next, reaction), before), sums))| {
+                *sums = self.processor.run(NodePass {
+                    stepper: self,
+                    first: task * CHUNK,
+                    before,
+                    next,
+                    reaction,
+                });
+            });
         (self.next, self.reaction, self.sums) = (next, reaction, sums);
     }
 
-    /// The coming increment of a node and its reaction.
-    #[inline(always)]
-    fn pass_node(&self, node: usize, before: Vector<R>, sums: &mut Sums) -> (Vector<R>, Vector<R>) {
-        let (m, alpha, dt) = (self.mass[node], self.damping[node], R::of(self.lengths.next));
-        let (ratio, mean) = (R::of(self.lengths.ratio()), R::of(self.lengths.mean()));
-        let half = R::of(0.5);
-        let internal = self.forces.at(node);
-        let applied: Vector<R> = self.applied.at(node);
-        let owner = self.owners[node];
-        let a = half * alpha * mean;
-        let mut next = [R::ZERO; 3];
-        let mut reaction = [R::ZERO; 3];
-        for c in 0..3 {
-            let mut external = applied[c];
-            let same_speed = before[c] * ratio;
-            if owner[c] == FREE {
-                next[c] =
-                    ((R::ONE - a) * same_speed + dt * mean / m * (applied[c] - internal[c])) / (R::ONE + a);
-            } else {
-                let [now, then] = self.factor[owner[c] as usize];
-                next[c] = R::of(self.amplitude[node][c] * then - self.amplitude[node][c] * now);
-                let velocity = (same_speed + next[c]) / (R::of(2.0) * dt);
-                let inertia = m * ((next[c] - same_speed) / (dt * mean) + alpha * velocity);
-                reaction[c] = inertia + internal[c] - applied[c];
-                external += reaction[c];
-            }
-            let velocity = ((same_speed + next[c]) / (R::of(2.0) * dt)).to_f64();
-            let momentum = m.to_f64() * velocity;
-            sums.kinetic += 0.5 * momentum * velocity;
-            sums.damping_power += alpha.to_f64() * momentum * velocity;
-            sums.internal_before += 0.5 * (internal[c] * before[c]).to_f64();
-            sums.internal_after += 0.5 * (internal[c] * next[c]).to_f64();
-            sums.external_before += 0.5 * (external * before[c]).to_f64();
-            sums.external_after += 0.5 * (external * next[c]).to_f64();
-        }
-        (next, reaction)
+    /// The increment and the reaction [N] of a component that moves as prescribed.
+    fn prescribe(&self, node: usize, c: usize, before: R, applied: R, internal: R) -> (R, R) {
+        let [now, then] = self.factor[self.owners[node][c] as usize];
+        let amplitude = self.amplitude[node][c];
+        let (dt, mean) = (R::of(self.lengths.next), R::of(self.lengths.mean()));
+        let same_speed = before * R::of(self.lengths.ratio());
+        let next = R::of(amplitude * then - amplitude * now);
+        let velocity = (same_speed + next) / (R::of(2.0) * dt);
+        let inertia =
+            self.mass[node][c] * ((next - same_speed) / (dt * mean) + self.damping[node][c] * velocity);
+        (next, inertia + internal - applied)
     }
 
     fn check_state(

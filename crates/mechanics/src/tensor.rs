@@ -6,44 +6,44 @@ use std::ops::{Add, Mul, Sub};
 
 use serde::{Deserialize, Serialize};
 
-use crate::Real;
+use crate::{Number, Real};
 
 /// A vector in space.
 pub type Vector<R> = [R; 3];
 
 /// a + b.
 #[inline(always)]
-pub fn add<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
+pub fn add<R: Number>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// a − b.
 #[inline(always)]
-pub fn sub<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
+pub fn sub<R: Number>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// s a.
 #[inline(always)]
-pub fn scale<R: Real>(a: Vector<R>, s: R) -> Vector<R> {
+pub fn scale<R: Number>(a: Vector<R>, s: R) -> Vector<R> {
     [a[0] * s, a[1] * s, a[2] * s]
 }
 
 /// a · b.
 #[inline(always)]
-pub fn dot<R: Real>(a: Vector<R>, b: Vector<R>) -> R {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+pub fn dot<R: Number>(a: Vector<R>, b: Vector<R>) -> R {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
 /// a × b.
 #[inline(always)]
-pub fn cross<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
+pub fn cross<R: Number>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// A vector in another number type.
 #[inline(always)]
-pub fn cast<A: Real, B: Real>(a: Vector<A>) -> Vector<B> {
+pub fn cast<A: Real, B: Number>(a: Vector<A>) -> Vector<B> {
     [B::of(a[0].to_f64()), B::of(a[1].to_f64()), B::of(a[2].to_f64())]
 }
 
@@ -51,7 +51,7 @@ pub fn cast<A: Real, B: Real>(a: Vector<A>) -> Vector<B> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tensor<R>(pub [[R; 3]; 3]);
 
-impl<R: Real> Tensor<R> {
+impl<R: Number> Tensor<R> {
     /// All zeros.
     pub const ZERO: Self = Self([[R::ZERO; 3]; 3]);
 
@@ -64,7 +64,7 @@ impl<R: Real> Tensor<R> {
     pub fn add_outer(&mut self, a: Vector<R>, b: Vector<R>) {
         for (row, ai) in self.0.iter_mut().zip(a) {
             for (entry, bj) in row.iter_mut().zip(b) {
-                *entry += ai * bj;
+                *entry = ai.mul_add(bj, *entry);
             }
         }
     }
@@ -86,6 +86,23 @@ impl<R: Real> Tensor<R> {
     #[inline(always)]
     pub fn determinant(&self) -> R {
         dot(self.0[0], cross(self.0[1], self.0[2]))
+    }
+
+    /// The cofactor matrix: T⁻ᵀ det T.
+    #[inline(always)]
+    pub fn cofactor(&self) -> Self {
+        let [a, b, c] = self.0;
+        Self([cross(b, c), cross(c, a), cross(a, b)])
+    }
+
+    /// T + s A.
+    #[inline(always)]
+    pub fn plus_scaled(&self, a: &Self, s: R) -> Self {
+        let mut sum = *self;
+        for (row, other) in sum.0.iter_mut().zip(a.0) {
+            *row = add(*row, scale(other, s));
+        }
+        sum
     }
 
     /// The sum of the principal minors of order two.
@@ -119,7 +136,7 @@ impl<R: Real> Tensor<R> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Symmetric<R>(pub [R; 6]);
 
-impl<R: Real> Symmetric<R> {
+impl<R: Number> Symmetric<R> {
     /// All zeros.
     pub const ZERO: Self = Self([R::ZERO; 6]);
 
@@ -211,7 +228,7 @@ impl<R: Real> Symmetric<R> {
     }
 }
 
-impl<R: Real> Add for Symmetric<R> {
+impl<R: Number> Add for Symmetric<R> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
@@ -220,7 +237,7 @@ impl<R: Real> Add for Symmetric<R> {
     }
 }
 
-impl<R: Real> Sub for Symmetric<R> {
+impl<R: Number> Sub for Symmetric<R> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
@@ -229,7 +246,7 @@ impl<R: Real> Sub for Symmetric<R> {
     }
 }
 
-impl<R: Real> Mul<R> for Symmetric<R> {
+impl<R: Number> Mul<R> for Symmetric<R> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, s: R) -> Self {

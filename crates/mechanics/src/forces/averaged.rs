@@ -11,249 +11,343 @@
 
 use rayon::prelude::*;
 
-use super::batch::{Batch, pressure};
-use super::{BATCH, CHUNK, Findings, ForceField, displacement_gradient, relative_displacements, scatter};
+use super::batch::{Batch, PACKS, pressures};
+use super::{
+    Findings, ForceField, PackedCells, Places, Slot, by_cell, by_component, displacement_gradient,
+    for_each_task, gather, relative, scatter,
+};
 use crate::Real;
-use crate::law::{AnyLaw, Deformation, Split};
+use crate::lanes::{Lanes, PACK, Pack, Processor, Work, entry, load_tensor};
+use crate::law::{AnyLaw, Split};
 use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
 use crate::prony::{Prony, Relaxation};
 use crate::state::History;
-use crate::tensor::{Symmetric, Tensor, Vector, cast};
+use crate::tensor::{Symmetric, Tensor};
 
 pub(super) struct AveragedTets<R> {
+    processor: Processor,
     law: AnyLaw,
     averaging: Averaging,
-    nodes: Vec<[u32; 4]>,
-    gradient: Vec<[Vector<R>; 4]>,
-    volume: Vec<R>,
-    fibre: Vec<Vector<R>>,
-    families: usize,
+    cells: PackedCells<R, 4>,
+    /// Local nodes of packs of cells.
+    local_nodes: Vec<[[u32; PACK]; 4]>,
     local: LocalNodes,
-    /// V_n = Σ V_e/4 [m³].
-    node_volume: Vec<R>,
+    /// 1/V_n with V_n = Σ V_e/4 [1/m³].
+    inverse_volume: Vec<R>,
     relaxation: Relaxation<R>,
     isochoric_slots: usize,
     volumetric_slots: usize,
-    /// J_e − 1, or what a cell gives its nodes in a further average.
-    cell_value: Vec<R>,
+    /// V_e/4 times J_e − 1, or what a cell gives its nodes in a further average.
+    cell_value: Vec<Pack<R>>,
     /// J_n − 1, then p_n [Pa].
-    node_value: Vec<R>,
+    node_value: Vec<Pack<R>>,
 }
 
 impl<R: Real> AveragedTets<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<4>, averaging: Averaging, step: f64) -> Self {
         let local = LocalNodes::new(cells);
-        let node_volume = (0..local.len())
-            .map(|node| local.cells_at(node).map(|cell| 0.25 * cells.rest[cell].volume).sum::<f64>())
-            .map(R::of)
-            .collect();
+        let volume_at = |node| local.cells_at(node).map(|cell| 0.25 * cells.rest[cell].volume).sum::<f64>();
         let prony = &solid.material.prony;
+        let packed = PackedCells::new(solid, cells);
+        let last = cells.nodes.len().saturating_sub(1);
+        let local_node = |pack: usize, a: usize, lane: usize| local.nodes[last.min(pack * PACK + lane)][a];
         Self {
+            processor: Processor::detect(),
             law: solid.material.law,
             averaging,
-            nodes: cells.nodes.clone(),
-            gradient: cells.rest.iter().map(|rest| rest.gradient.map(cast)).collect(),
-            volume: cells.rest.iter().map(|rest| R::of(rest.volume)).collect(),
-            fibre: solid.fibre.iter().map(|&a| cast(a)).collect(),
-            families: solid.material.law.families(),
-            node_volume,
+            local_nodes: (packed.packs())
+                .map(|pack| [0, 1, 2, 3].map(|a| std::array::from_fn(|lane| local_node(pack, a, lane))))
+                .collect(),
+            inverse_volume: (0..local.len()).map(|node| R::of(1.0 / volume_at(node))).collect(),
             relaxation: Relaxation::new(prony, step),
             isochoric_slots: prony.isochoric_slots(),
             volumetric_slots: prony.volumetric_slots(),
-            cell_value: vec![R::ZERO; cells.nodes.len()],
-            node_value: vec![R::ZERO; local.len()],
+            cell_value: vec![Pack::ZERO; packed.packs().len()],
+            node_value: vec![Pack::ZERO; local.len().div_ceil(PACK)],
+            cells: packed,
             local,
         }
     }
 
-    fn gradient_of(&self, cell: usize, displacement: &[Vector<R>]) -> Tensor<R> {
-        displacement_gradient(&relative_displacements(&self.nodes[cell], displacement), &self.gradient[cell])
-    }
-
-    /// J_e − 1 of all cells.
-    fn volume_changes(&mut self, displacement: &[Vector<R>]) {
+    /// J_e − 1 of all cells, as their share in the average.
+    fn volume_changes(&mut self, displacement: &Places<R>) {
         let mut values = std::mem::take(&mut self.cell_value);
-        values.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(cell, value)| {
-            let h = self.gradient_of(cell, displacement);
-            *value = h.trace() + h.second_invariant() + h.determinant();
+        values.par_chunks_mut(PACKS).enumerate().with_min_len(4).for_each(|(task, values)| {
+            let first = task * PACKS;
+            self.processor.run(VolumeChanges { cells: &self.cells, first, displacement, values });
         });
         self.cell_value = values;
     }
 
     /// The mean of the cells' values at each node, weighted by volume.
     fn average_to_nodes(&mut self) {
-        let (local, volume, values, node_volume) =
-            (&self.local, &self.volume, &self.cell_value, &self.node_volume);
-        self.node_value.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(node, value)| {
-            let mut sum = R::ZERO;
-            for cell in local.cells_at(node) {
-                sum += volume[cell] * values[cell];
+        let (local, values, inverse_volume) = (&self.local, &self.cell_value, &self.inverse_volume);
+        self.node_value.par_iter_mut().enumerate().with_min_len(16).for_each(|(pack, nodes)| {
+            for (lane, value) in nodes.0.iter_mut().enumerate() {
+                let node = pack * PACK + lane;
+                if node < local.len() {
+                    let sum = local.cells_at(node).fold(R::ZERO, |sum, cell| sum + entry(values, cell));
+                    *value = sum * inverse_volume[node];
+                }
             }
-            *value = sum * R::of(0.25) / node_volume[node];
         });
     }
 
-    /// The mean of a cell's four nodal values.
-    #[inline(always)]
-    fn average_to_cell(&self, cell: usize) -> R {
-        let [a, b, c, d] = self.local.nodes[cell];
-        let value = |node: u32| self.node_value[node as usize];
-        (value(a) + value(b) + value(c) + value(d)) * R::of(0.25)
+    /// p from J − 1, relaxed where the law's volumetric part relaxes.
+    fn to_pressures(&self, values: &mut [Pack<R>], history: &mut [Pack<R>]) {
+        let pass = |values: &mut [Pack<R>], history: &mut [Pack<R>]| {
+            let (law, relaxation, slots) = (&self.law, &self.relaxation, self.volumetric_slots);
+            self.processor.run(Pressures { law, relaxation, slots, values, history });
+        };
+        for_each_pressure(values, history, self.volumetric_slots, pass);
     }
 
-    /// p_n from J_n − 1, relaxed where the law's volumetric part relaxes.
-    fn pressures_of_nodes(&mut self, history: &mut [R]) {
-        let (law, relaxation) = (&self.law, &self.relaxation);
-        let pressure = |value: R| pressure(law, value);
-        if history.is_empty() {
-            self.node_value.par_iter_mut().with_min_len(CHUNK).for_each(|value| *value = pressure(*value));
-        } else {
-            let own = history.par_chunks_mut(self.volumetric_slots).with_min_len(CHUNK);
-            self.node_value.par_iter_mut().zip(own).for_each(|(value, history)| {
-                *value = relaxation.advance_pressure(pressure(*value), history);
-            });
-        }
-    }
-
-    /// p_e' = U'(J̄_e) of all cells, relaxed likewise, averaged back to the nodes.
-    fn pressures_by_cells(&mut self, history: &mut [R]) {
+    /// p_n of all nodes by way of the cells' own pressures.
+    fn pressures_by_cells(&mut self, history: &mut [Pack<R>]) {
         let mut values = std::mem::take(&mut self.cell_value);
-        let of_cell = |cell: usize| pressure(&self.law, self.average_to_cell(cell));
-        if history.is_empty() {
-            values
-                .par_iter_mut()
-                .enumerate()
-                .with_min_len(CHUNK)
-                .for_each(|(cell, value)| *value = of_cell(cell));
-        } else {
-            let own = history.par_chunks_mut(self.volumetric_slots).with_min_len(CHUNK);
-            values.par_iter_mut().zip(own).enumerate().for_each(|(cell, (value, history))| {
-                *value = self.relaxation.advance_pressure(of_cell(cell), history);
-            });
-        }
+        values.par_iter_mut().enumerate().with_min_len(16).for_each(|(pack, value)| {
+            *value = self.average_to_pack(pack);
+        });
+        self.to_pressures(&mut values, history);
+        values.par_iter_mut().zip(&self.cells.volume).with_min_len(16).for_each(|(value, volume)| {
+            *value = Pack::from_fn(|lane| R::of(0.25) * volume.0[lane] * value.0[lane]);
+        });
         self.cell_value = values;
         self.average_to_nodes();
     }
 
-    /// The deformation whose stress the law is asked for: the cell's own, or F̄ = (J̄/J)^(1/3) F.
+    /// The means of the four nodal values of the cells of a pack.
     #[inline(always)]
-    fn deformation(
-        &self,
-        cell: usize,
-        displacement: &[Vector<R>],
-        findings: &mut Findings,
-    ) -> Deformation<R> {
-        let h = self.gradient_of(cell, displacement);
-        let own = Deformation::from_displacement_gradient(&h);
-        findings.note(cell, own.volume_ratio, &own.strain_twice);
-        if self.averaging != Averaging::NiftySim {
-            return own;
+    fn average_to_pack(&self, pack: usize) -> Pack<R> {
+        let nodes = &self.local_nodes[pack];
+        let value = |a: usize, lane: usize| entry(&self.node_value, nodes[a][lane] as usize);
+        let mut mean = Pack::ZERO;
+        for (lane, mean) in mean.0.iter_mut().enumerate() {
+            *mean = (value(0, lane) + value(1, lane) + value(2, lane) + value(3, lane)) * R::of(0.25);
         }
-        let ratio = ((R::ONE + self.average_to_cell(cell)) / own.volume_ratio).cbrt();
-        let mut scaled = Tensor::ZERO;
-        for (i, row) in scaled.0.iter_mut().enumerate() {
-            for (k, entry) in row.iter_mut().enumerate() {
-                let unit = if i == k { R::ONE } else { R::ZERO };
-                *entry = ratio * h.0[i][k] + (ratio - R::ONE) * unit;
+        mean
+    }
+
+    /// Tensors of history per cell.
+    fn cell_slots(&self) -> usize {
+        self.isochoric_slots + if self.averaging == Averaging::NiftySim { self.volumetric_slots } else { 0 }
+    }
+}
+
+/// J_e − 1 of up to [`PACKS`] packs of cells, times V_e/4.
+struct VolumeChanges<'a, R> {
+    cells: &'a PackedCells<R, 4>,
+    first: usize,
+    displacement: &'a Places<R>,
+    values: &'a mut [Pack<R>],
+}
+
+impl<R: Real> Work<R> for VolumeChanges<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) {
+        let Self { cells, first, displacement, values } = self;
+        let mut gathered = [[Pack([[R::ZERO; 4]; PACK]); 4]; PACKS];
+        let mut moved = [[Pack::ZERO; 3]; 4];
+        for (pack, gathered) in gathered[..values.len()].iter_mut().enumerate() {
+            gather(&cells.nodes[first + pack], displacement, gathered);
+        }
+        for ((pack, value), gathered) in values.iter_mut().enumerate().zip(&gathered) {
+            by_component(gathered, &mut moved);
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let u = relative::<R, L, 4>(&moved, at);
+                let change = volume_change(&displacement_gradient(&u, &cells.gradient[first + pack], at));
+                (change * L::of(0.25) * L::load(&cells.volume[first + pack], at)).store(value, at);
             }
         }
-        Deformation::from_displacement_gradient(&scaled)
     }
+}
 
-    /// The stress that goes with it: the law's where the deformation is averaged, else its isochoric part and the
-    /// pressure of the nodes.
+/// J − 1, without cancellation.
+#[inline(always)]
+pub(super) fn volume_change<L: crate::Number>(h: &Tensor<L>) -> L {
+    h.trace() + h.second_invariant() + h.determinant()
+}
+
+/// Does `pass` in parallel for every [`PACKS`] packs of pressures and their history.
+pub(super) fn for_each_pressure<R: Real>(
+    values: &mut [Pack<R>],
+    history: &mut [Pack<R>],
+    slots: usize,
+    pass: impl Fn(&mut [Pack<R>], &mut [Pack<R>]) + Sync,
+) {
+    let values = values.par_chunks_mut(PACKS).with_min_len(4);
+    if history.is_empty() {
+        values.for_each(|values| pass(values, &mut []));
+    } else {
+        values.zip(history.par_chunks_mut(PACKS * slots)).for_each(|(values, history)| pass(values, history));
+    }
+}
+
+/// Up to [`PACKS`] packs of J − 1 become pressures [Pa].
+pub(super) struct Pressures<'a, R> {
+    pub law: &'a AnyLaw,
+    pub relaxation: &'a Relaxation<R>,
+    pub slots: usize,
+    pub values: &'a mut [Pack<R>],
+    pub history: &'a mut [Pack<R>],
+}
+
+impl<R: Real> Work<R> for Pressures<'_, R> {
+    type Output = ();
+
     #[inline(always)]
-    fn stress(
-        &self,
-        cell: usize,
-        deformation: &Deformation<R>,
-        elastic: Split<Symmetric<R>>,
-        history: &mut [Symmetric<R>],
-    ) -> Symmetric<R> {
-        if self.averaging == Averaging::NiftySim {
-            return if history.is_empty() {
-                elastic.isochoric + elastic.volumetric
-            } else {
-                self.relaxation.advance(elastic, history)
-            };
+    fn run<L: Lanes<R>>(self) {
+        let Self { law, relaxation, slots, values, history } = self;
+        pressures::<R, L>(law, values, &mut Batch::new());
+        if history.is_empty() {
+            return;
         }
-        let isochoric = if history.is_empty() {
-            elastic.isochoric
-        } else {
-            self.relaxation.advance_isochoric(elastic.isochoric, history)
-        };
-        let pressure = deformation.volume_ratio * self.average_to_cell(cell);
-        isochoric + deformation.inverse_cauchy_green * pressure
+        for (value, history) in values.iter_mut().zip(history.chunks_exact_mut(slots)) {
+            for at in (0..PACK).step_by(L::WIDTH) {
+                relaxation.advance_pressure(L::load(value, at), history, at).store(value, at);
+            }
+        }
     }
+}
 
-    fn pass(
-        &self,
-        first: usize,
-        displacement: &[Vector<R>],
-        history: &mut [Symmetric<R>],
-        slots: &mut [Vector<R>],
-    ) -> Findings {
+/// A pass over the packs from `first` on, as many as `slots` has room for.
+struct Pass<'a, R> {
+    field: &'a AveragedTets<R>,
+    first: usize,
+    displacement: &'a Places<R>,
+    history: &'a mut [Pack<R>],
+    slots: &'a mut [Slot<R>],
+}
+
+impl<R: Real> Work<R> for Pass<'_, R> {
+    type Output = Findings<R>;
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) -> Findings<R> {
+        let Self { field, first, displacement, history, slots } = self;
+        let cells = &field.cells;
+        let per_pack = 6 * field.cell_slots();
         let mut findings = Findings::default();
         let mut batch = Batch::new();
-        let per_cell = self.cell_slots();
-        for (index, slots) in slots.chunks_mut(BATCH * 4).enumerate() {
-            let offset = index * BATCH;
-            let cells = first + offset..first + offset + slots.len() / 4;
-            for (point, cell) in cells.clone().enumerate() {
-                batch.deformation[point] = self.deformation(cell, displacement, &mut findings);
+        let mut gathered = [[Pack([[R::ZERO; 4]; PACK]); 4]; PACKS];
+        let mut moved = [[Pack::ZERO; 3]; 4];
+        let mut forces = [[Pack::ZERO; 3]; 4];
+        let mut averages = [Pack::ZERO; PACKS];
+        for (index, slots) in slots.chunks_mut(PACKS * 4).enumerate() {
+            let first = first + index * PACKS;
+            let packs = slots.len() / 4;
+            for (pack, (gathered, average)) in gathered.iter_mut().zip(&mut averages).take(packs).enumerate()
+            {
+                gather(&cells.nodes[first + pack], displacement, gathered);
+                *average = field.average_to_pack(first + pack);
             }
-            let fibres = &self.fibre[cells.start * self.families..cells.end * self.families];
-            batch.evaluate(&self.law, cells.len(), fibres);
-            for (point, (cell, forces)) in cells.zip(slots.chunks_exact_mut(4)).enumerate() {
-                let own = if history.is_empty() {
-                    &mut []
-                } else {
-                    &mut history[(offset + point) * per_cell..(offset + point + 1) * per_cell]
-                };
-                let deformation = &batch.deformation[point];
-                let stress = self.stress(cell, deformation, batch.elastic[point], own);
-                let piola = deformation.gradient.times_symmetric(&stress);
-                scatter(&piola, &self.gradient[cell], self.volume[cell], forces);
+            // A deformation that is averaged shows its own measures before, others theirs after.
+            for (pack, gathered) in gathered[..packs].iter().enumerate() {
+                by_component(gathered, &mut moved);
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let u = relative::<R, L, 4>(&moved, at);
+                    batch.set(pack, at, &displacement_gradient(&u, &cells.gradient[first + pack], at));
+                }
+            }
+            if field.averaging == Averaging::NiftySim {
+                batch.measure::<L>(packs);
+                for (pack, average) in averages[..packs].iter().enumerate() {
+                    batch.note(pack, (first + pack) * PACK, &mut findings);
+                    for at in (0..PACK).step_by(L::WIDTH) {
+                        let h: Tensor<L> = load_tensor(&batch.gradient[pack], at);
+                        let own = L::load(&batch.volume_ratio[pack], at);
+                        batch.set(pack, at, &dilated(&h, own, L::load(average, at)));
+                    }
+                }
+            }
+            batch.evaluate::<L>(&field.law, packs, 1, cells.fibres(first, packs));
+            for (pack, slots) in slots.chunks_exact_mut(4).enumerate() {
+                if field.averaging != Averaging::NiftySim {
+                    batch.note(pack, (first + pack) * PACK, &mut findings);
+                }
+                let own = (index * PACKS + pack) * per_pack;
+                let own = own.min(history.len())..(own + per_pack).min(history.len());
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let elastic = batch.elastic::<L>(pack, at);
+                    let f = batch.deformation_gradient::<L>(pack, at);
+                    let piola =
+                        field.piola(&f, elastic, L::load(&averages[pack], at), &mut history[own.clone()], at);
+                    let volume = L::load(&cells.volume[first + pack], at);
+                    scatter(&piola, &cells.gradient[first + pack], volume, &mut forces, at);
+                }
+                by_cell(&forces, slots);
             }
         }
         findings
     }
+}
 
-    fn cell_slots(&self) -> usize {
-        self.isochoric_slots + if self.averaging == Averaging::NiftySim { self.volumetric_slots } else { 0 }
+/// ∂ū/∂X of F̄ = (J̄/J)^(1/3) F, with J̄ − 1 in `change`.
+#[inline(always)]
+fn dilated<L: crate::Number>(h: &Tensor<L>, volume_ratio: L, change: L) -> Tensor<L> {
+    let ratio = ((L::ONE + change) / volume_ratio).cbrt();
+    let mut scaled = *h;
+    for i in 0..3 {
+        for k in 0..3 {
+            scaled.0[i][k] = ratio * h.0[i][k];
+        }
+        scaled.0[i][i] += ratio - L::ONE;
+    }
+    scaled
+}
+
+impl<R: Real> AveragedTets<R> {
+    /// The first Piola–Kirchhoff stress: of the law where the deformation is averaged, else of its isochoric part and the
+    /// pressure of the nodes, F S_iso + p cof F.
+    #[inline(always)]
+    fn piola<L: Lanes<R>>(
+        &self,
+        f: &Tensor<L>,
+        elastic: Split<Symmetric<L>>,
+        average: L,
+        history: &mut [Pack<R>],
+        at: usize,
+    ) -> Tensor<L> {
+        if self.averaging == Averaging::NiftySim {
+            return f.times_symmetric(&self.relaxation.advance(elastic, history, at));
+        }
+        let isochoric = self.relaxation.advance_isochoric(elastic.isochoric, history, at);
+        f.times_symmetric(&isochoric).plus_scaled(&f.cofactor(), average)
     }
 }
 
 impl<R: Real> ForceField<R> for AveragedTets<R> {
     fn evaluate(
         &mut self,
-        displacement: &[Vector<R>],
+        displacement: &Places<R>,
         history: &mut History<R>,
-        slots: &mut [Vector<R>],
-        findings: &mut [Findings],
+        slots: &mut [Slot<R>],
+        findings: &mut [Findings<R>],
     ) {
         self.volume_changes(displacement);
         self.average_to_nodes();
         match self.averaging {
-            Averaging::Nodal => self.pressures_of_nodes(&mut history.pressures),
+            Averaging::Nodal => {
+                let mut values = std::mem::take(&mut self.node_value);
+                self.to_pressures(&mut values, &mut history.pressures);
+                self.node_value = values;
+            }
             Averaging::Variational => self.pressures_by_cells(&mut history.pressures),
             Averaging::NiftySim => {}
         }
         let this = &*self;
-        let tasks = slots.par_chunks_mut(CHUNK * 4).zip(findings).enumerate();
-        if history.cells.is_empty() {
-            tasks.for_each(|(task, (slots, findings))| {
-                *findings = this.pass(task * CHUNK, displacement, &mut [], slots);
-            });
-        } else {
-            tasks.zip(history.cells.par_chunks_mut(CHUNK * this.cell_slots())).for_each(
-                |((task, (slots, findings)), history)| {
-                    *findings = this.pass(task * CHUNK, displacement, history, slots);
-                },
-            );
-        }
+        let per_pack = 6 * this.cell_slots();
+        for_each_task(slots, 4, &mut history.cells, per_pack, findings, |first, slots, history| {
+            this.processor.run(Pass { field: this, first, displacement, history, slots })
+        });
     }
     fn set_step(&mut self, prony: &Prony, step: f64) {
         self.relaxation.set_step(prony, step);
+    }
+    #[cfg(test)]
+    fn set_processor(&mut self, processor: Processor) {
+        self.processor = processor;
     }
 }

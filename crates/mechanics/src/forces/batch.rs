@@ -1,62 +1,197 @@
-//! Points evaluated together: elements fill in deformations, the law answers with stresses. So an element is compiled once
-//! for each number type and a law once for each, not every law again in every element; the choice of the law costs one
-//! branch per batch.
+//! Points evaluated together: elements fill in displacement gradients, the law answers with stresses. So an element is
+//! compiled once for each kind of lanes and a law once for each, not every law again in every element; the choice of the
+//! law costs one branch per batch.
 
-use super::BATCH;
-use crate::Real;
+use super::Findings;
+use super::averaged::volume_change;
+use crate::lanes::{
+    Lanes, PACK, Pack, Processor, Work, load_symmetric, load_tensor, load_vector, store_vector,
+};
 use crate::law::{AnyLaw, Deformation, Law, Split, with_law};
-use crate::tensor::{Symmetric, Tensor, Vector};
+use crate::tensor::{Symmetric, Tensor, Vector, dot};
+use crate::{Number, Real};
 
-/// Deformations of up to [`BATCH`] points and their elastic stresses.
+/// Packs of points in a batch: few enough for the first cache.
+pub(super) const PACKS: usize = 4;
+
+/// The most families of fibres of any law.
+const FAMILIES: usize = 2;
+
+/// Displacement gradients of up to [`PACKS`] packs of points, and what the law finds there.
 pub(super) struct Batch<R> {
-    pub deformation: [Deformation<R>; BATCH],
-    /// Second Piola–Kirchhoff stress [Pa].
-    pub elastic: [Split<Symmetric<R>>; BATCH],
+    /// ∂u/∂X.
+    pub gradient: [Tensor<Pack<R>>; PACKS],
+    /// Elastic second Piola–Kirchhoff stress [Pa].
+    pub elastic: [Split<Symmetric<Pack<R>>>; PACKS],
+    /// J.
+    pub volume_ratio: [Pack<R>; PACKS],
+    /// |C − I|².
+    pub strain: [Pack<R>; PACKS],
 }
 
 impl<R: Real> Batch<R> {
     pub(super) fn new() -> Self {
+        let stress = Symmetric([Pack::ZERO; 6]);
         Self {
-            deformation: [Deformation::from_displacement_gradient(&Tensor::ZERO); BATCH],
-            elastic: [Split { isochoric: Symmetric::ZERO, volumetric: Symmetric::ZERO }; BATCH],
+            gradient: [Tensor([[Pack::ZERO; 3]; 3]); PACKS],
+            elastic: [Split { isochoric: stress, volumetric: stress }; PACKS],
+            volume_ratio: [Pack::ZERO; PACKS],
+            strain: [Pack::ZERO; PACKS],
         }
     }
 
-    /// The stresses of the first `count` points. `fibres` has their directions, as many a point as the law
-    /// has families.
-    pub(super) fn evaluate(&mut self, law: &AnyLaw, count: usize, fibres: &[Vector<R>]) {
-        let (deformation, elastic) = (&self.deformation[..count], &mut self.elastic[..count]);
-        with_law!(law, law => stresses(law, deformation, fibres, elastic));
+    /// Sets ∂u/∂X of the points from lane `at` of a pack on.
+    #[inline(always)]
+    pub(super) fn set<L: Lanes<R>>(&mut self, pack: usize, at: usize, h: &Tensor<L>) {
+        for (row, to) in h.0.into_iter().zip(&mut self.gradient[pack].0) {
+            store_vector(row, to, at);
+        }
+    }
+
+    /// J and |C − I|² of the first packs.
+    #[inline(always)]
+    pub(super) fn measure<L: Lanes<R>>(&mut self, packs: usize) {
+        for pack in 0..packs {
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let h: Tensor<L> = load_tensor(&self.gradient[pack], at);
+                let strain = Symmetric::green_lagrange_twice(&h);
+                (L::ONE + volume_change(&h)).store(&mut self.volume_ratio[pack], at);
+                square(&strain).store(&mut self.strain[pack], at);
+            }
+        }
+    }
+
+    /// The stresses of the first packs. `fibres` has the directions of each cell, which has `points` points one after the other.
+    #[inline(always)]
+    pub(super) fn evaluate<L: Lanes<R>>(
+        &mut self,
+        law: &AnyLaw,
+        packs: usize,
+        points: usize,
+        fibres: &[Vector<Pack<R>>],
+    ) {
+        with_law!(law, law => L::call(Stresses { law: *law, batch: self, packs, points, fibres }));
+    }
+
+    /// The elastic stress of the points from lane `at` of a pack on.
+    #[inline(always)]
+    pub(super) fn elastic<L: Lanes<R>>(&self, pack: usize, at: usize) -> Split<Symmetric<L>> {
+        let Split { isochoric, volumetric } = &self.elastic[pack];
+        Split { isochoric: load_symmetric(isochoric, at), volumetric: load_symmetric(volumetric, at) }
+    }
+
+    /// F of the points from lane `at` of a pack on.
+    #[inline(always)]
+    pub(super) fn deformation_gradient<L: Lanes<R>>(&self, pack: usize, at: usize) -> Tensor<L> {
+        let mut f: Tensor<L> = load_tensor(&self.gradient[pack], at);
+        for i in 0..3 {
+            f.0[i][i] += L::ONE;
+        }
+        f
+    }
+
+    /// Notes how far the points of a pack of cells are deformed, and which cell is the first whose det F is not above
+    /// zero.
+    #[inline(always)]
+    pub(super) fn note(&self, pack: usize, first_cell: usize, findings: &mut Findings<R>) {
+        let (ratios, strains) = (&self.volume_ratio[pack].0, &self.strain[pack].0);
+        let mut sound = true;
+        for lane in 0..PACK {
+            let j = ratios[lane];
+            sound &= j > R::ZERO;
+            let (least, largest) =
+                (&mut findings.least_volume_ratio.0[lane], &mut findings.largest_strain.0[lane]);
+            *least = if j < *least { j } else { *least };
+            *largest = if strains[lane] > *largest { strains[lane] } else { *largest };
+        }
+        if !sound && findings.inverted.is_none() {
+            let broken = |j: &R| j.partial_cmp(&R::ZERO) != Some(std::cmp::Ordering::Greater);
+            let lane = ratios.iter().position(broken).unwrap_or(0);
+            findings.inverted = Some((first_cell + lane, ratios[lane].to_f64()));
+        }
     }
 }
 
-#[inline(never)]
-fn stresses<R: Real, L: Law>(
-    law: &L,
-    deformations: &[Deformation<R>],
-    fibres: &[Vector<R>],
-    stresses: &mut [Split<Symmetric<R>>],
-) {
-    let families = law.families();
-    for (point, (stress, deformation)) in stresses.iter_mut().zip(deformations).enumerate() {
-        *stress = law.stress(deformation, &fibres[point * families..(point + 1) * families]);
+/// S:S.
+#[inline(always)]
+fn square<L: Number>(s: &Symmetric<L>) -> L {
+    let [xx, yy, zz, xy, yz, xz] = s.0;
+    let shear = dot([xy, yz, xz], [xy, yz, xz]);
+    dot([xx, yy, zz], [xx, yy, zz]) + shear + shear
+}
+
+/// The stresses of a law at the points of a batch.
+struct Stresses<'a, R, T> {
+    law: T,
+    batch: &'a mut Batch<R>,
+    packs: usize,
+    points: usize,
+    fibres: &'a [Vector<Pack<R>>],
+}
+
+impl<R: Real, T: Law> Work<R> for Stresses<'_, R, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) {
+        let Self { law, batch, packs, points, fibres } = self;
+        let families = law.families();
+        for pack in 0..packs {
+            let own = &fibres[pack / points * families..][..families];
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let h = load_tensor(&batch.gradient[pack], at);
+                let deformation = Deformation::<L>::from_displacement_gradient(&h);
+                let mut directions = [[L::ZERO; 3]; FAMILIES];
+                for (direction, fibre) in directions.iter_mut().zip(own) {
+                    *direction = load_vector(fibre, at);
+                }
+                let Split { isochoric, volumetric } = law.stress(&deformation, &directions[..families]);
+                for k in 0..6 {
+                    isochoric.0[k].store(&mut batch.elastic[pack].isochoric.0[k], at);
+                    volumetric.0[k].store(&mut batch.elastic[pack].volumetric.0[k], at);
+                }
+                deformation.volume_ratio.store(&mut batch.volume_ratio[pack], at);
+                square(&deformation.strain_twice).store(&mut batch.strain[pack], at);
+            }
+        }
     }
 }
 
-/// U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, from its stress in a pure dilation F = J^(1/3) I.
-/// Takes J − 1.
-pub(crate) fn pressure<R: Real>(law: &AnyLaw, volume_change: R) -> R {
-    let j = R::ONE + volume_change;
-    let c = j.cbrt();
-    // c − 1 = x/(c² + c + 1), without cancellation.
-    let stretch = volume_change / (c * c + c + R::ONE);
-    let mut h = Tensor::ZERO;
-    for i in 0..3 {
-        h.0[i][i] = stretch;
+/// U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, at up to [`PACKS`] packs of J − 1, from its stress in a pure
+/// dilation F = J^(1/3) I.
+#[inline(always)]
+pub(super) fn pressures<R: Real, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack<R>], batch: &mut Batch<R>) {
+    for (pack, change) in values.iter().enumerate() {
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let x = L::load(change, at);
+            let c = (L::ONE + x).cbrt();
+            // c − 1 = x/(c² + c + 1), without cancellation.
+            let (stretch, o) = (x / (c * c + c + L::ONE), L::ZERO);
+            batch.set(pack, at, &Tensor([[stretch, o, o], [o, stretch, o], [o, o, stretch]]));
+        }
     }
-    // S = J U' C⁻¹ with C⁻¹ = c⁻² I.
-    let deformation = [Deformation::from_displacement_gradient(&h)];
-    let mut stress = [Split { isochoric: Symmetric::ZERO, volumetric: Symmetric::ZERO }];
-    with_law!(law, law => stresses(law, &deformation, &[[R::ONE, R::ZERO, R::ZERO]; 2], &mut stress));
-    stress[0].volumetric.0[0] * c * c / j
+    let any = [R::ONE, R::ZERO, R::ZERO].map(|a| Pack([a; PACK]));
+    batch.evaluate::<L>(law, values.len(), PACKS, &[any; FAMILIES]);
+    for (pack, pressure) in values.iter_mut().enumerate() {
+        for at in (0..PACK).step_by(L::WIDTH) {
+            // S = J U' C⁻¹ with C⁻¹ = c⁻² I and J = c³.
+            let c = L::ONE + L::load(&batch.gradient[pack].0[0][0], at);
+            let stress = L::load(&batch.elastic[pack].volumetric.0[0], at);
+            (stress / c).store(pressure, at);
+        }
+    }
+}
+
+/// U'(J) [Pa] at one J − 1.
+pub(crate) fn pressure(law: &AnyLaw, volume_change: f64) -> f64 {
+    struct One<'a>(&'a AnyLaw, Pack<f64>);
+    impl Work<f64> for One<'_> {
+        type Output = f64;
+        #[inline(always)]
+        fn run<L: Lanes<f64>>(mut self) -> f64 {
+            pressures::<f64, L>(self.0, std::slice::from_mut(&mut self.1), &mut Batch::new());
+            self.1.0[0]
+        }
+    }
+    Processor::detect().run(One(law, Pack([volume_change; PACK])))
 }

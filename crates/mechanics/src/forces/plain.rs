@@ -1,86 +1,117 @@
 //! One evaluation point a cell: linear tetrahedra, and uniform-strain hexahedra with hourglass control.
 
-use rayon::prelude::*;
-
-use super::batch::Batch;
-use super::{BATCH, CHUNK, Findings, ForceField, displacement_gradient, relative_displacements, scatter};
+use super::batch::{Batch, PACKS};
+use super::{
+    Findings, ForceField, PackedCells, Places, Slot, by_cell, by_component, displacement_gradient,
+    for_each_task, gather, relative, scatter,
+};
 use crate::Real;
-use crate::law::{AnyLaw, Deformation};
-use crate::model::{CellBlock, Hourglass, Solid};
+use crate::lanes::{Lanes, PACK, Pack, Processor, Work, load_vector, store_vector};
+use crate::law::AnyLaw;
+use crate::model::{CellBlock, Solid};
 use crate::prony::{Prony, Relaxation};
 use crate::state::History;
-use crate::tensor::{Symmetric, Vector, add, cast, dot, scale};
+use crate::tensor::{Vector, add, dot, scale};
 
 /// Cells with one evaluation point.
 pub(super) struct SolidForces<R, const N: usize> {
+    processor: Processor,
     law: AnyLaw,
-    nodes: Vec<[u32; N]>,
-    gradient: Vec<[Vector<R>; N]>,
-    volume: Vec<R>,
-    fibre: Vec<Vector<R>>,
-    families: usize,
-    hourglass: Option<Hourglass<R, N>>,
+    cells: PackedCells<R, N>,
+    hourglass: Option<PackedHourglass<R, N>>,
     relaxation: Relaxation<R>,
-    history_slots: usize,
+    /// Packs of history for a pack of cells.
+    history: usize,
+}
+
+/// Hourglass control of packs of cells; see [`Hourglass`](crate::model::Hourglass).
+struct PackedHourglass<R, const N: usize> {
+    patterns: Vec<[[Pack<R>; N]; 4]>,
+    stiffness: Vec<Pack<R>>,
 }
 
 impl<R: Real, const N: usize> SolidForces<R, N> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<N>, step: f64) -> Self {
-        let hourglass = cells.hourglass.as_ref().map(|control| Hourglass {
-            patterns: control.patterns.iter().map(|cell| cell.map(|gamma| gamma.map(R::of))).collect(),
-            stiffness: control.stiffness.iter().map(|&k| R::of(k)).collect(),
+        let packed = PackedCells::new(solid, cells);
+        let hourglass = cells.hourglass.as_ref().map(|control| PackedHourglass {
+            patterns: (packed.packs())
+                .map(|pack| {
+                    [0, 1, 2, 3].map(|c| {
+                        std::array::from_fn(|a| packed.pack(pack, |cell| R::of(control.patterns[cell][c][a])))
+                    })
+                })
+                .collect(),
+            stiffness: (packed.packs())
+                .map(|pack| packed.pack(pack, |cell| R::of(control.stiffness[cell])))
+                .collect(),
         });
         Self {
+            processor: Processor::detect(),
             law: solid.material.law,
-            nodes: cells.nodes.clone(),
-            gradient: cells.rest.iter().map(|rest| rest.gradient.map(cast)).collect(),
-            volume: cells.rest.iter().map(|rest| R::of(rest.volume)).collect(),
-            fibre: solid.fibre.iter().map(|&a| cast(a)).collect(),
-            families: solid.material.law.families(),
+            cells: packed,
             hourglass,
             relaxation: Relaxation::new(&solid.material.prony, step),
-            history_slots: solid.material.prony.slots(),
+            history: 6 * solid.material.prony.slots(),
         }
     }
+}
 
-    /// The cells from `first` on, as many as `slots` has room for.
-    fn pass(
-        &self,
-        first: usize,
-        displacement: &[Vector<R>],
-        history: &mut [Symmetric<R>],
-        slots: &mut [Vector<R>],
-    ) -> Findings {
+/// A pass over the packs from `first` on, as many as `slots` has room for.
+struct Pass<'a, R, const N: usize> {
+    field: &'a SolidForces<R, N>,
+    first: usize,
+    displacement: &'a Places<R>,
+    history: &'a mut [Pack<R>],
+    slots: &'a mut [Slot<R>],
+}
+
+impl<R: Real, const N: usize> Work<R> for Pass<'_, R, N> {
+    type Output = Findings<R>;
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) -> Findings<R> {
+        let Self { field, first, displacement, history, slots } = self;
+        let cells = &field.cells;
         let mut findings = Findings::default();
         let mut batch = Batch::new();
-        for (index, slots) in slots.chunks_mut(BATCH * N).enumerate() {
-            let offset = index * BATCH;
-            let cells = first + offset..first + offset + slots.len() / N;
-            for (point, cell) in cells.clone().enumerate() {
-                let u = relative_displacements(&self.nodes[cell], displacement);
-                let h = displacement_gradient(&u, &self.gradient[cell]);
-                let deformation = Deformation::from_displacement_gradient(&h);
-                findings.note(cell, deformation.volume_ratio, &deformation.strain_twice);
-                batch.deformation[point] = deformation;
+        let mut gathered = [[Pack([[R::ZERO; 4]; PACK]); N]; PACKS];
+        let mut moved = [[[Pack::ZERO; 3]; N]; PACKS];
+        let mut forces = [[Pack::ZERO; 3]; N];
+        for (index, slots) in slots.chunks_mut(PACKS * N).enumerate() {
+            let first = first + index * PACKS;
+            let packs = slots.len() / N;
+            for (pack, gathered) in gathered[..packs].iter_mut().enumerate() {
+                gather(&cells.nodes[first + pack], displacement, gathered);
             }
-            let fibres = &self.fibre[cells.start * self.families..cells.end * self.families];
-            batch.evaluate(&self.law, cells.len(), fibres);
-            for (point, (cell, forces)) in cells.zip(slots.chunks_exact_mut(N)).enumerate() {
-                let elastic = batch.elastic[point];
-                let stress = if history.is_empty() {
-                    elastic.isochoric + elastic.volumetric
-                } else {
-                    let cell = offset + point;
-                    let own = cell * self.history_slots..(cell + 1) * self.history_slots;
-                    self.relaxation.advance(elastic, &mut history[own])
-                };
-                let piola = batch.deformation[point].gradient.times_symmetric(&stress);
-                scatter(&piola, &self.gradient[cell], self.volume[cell], forces);
-                if let Some(control) = &self.hourglass {
-                    let u = relative_displacements(&self.nodes[cell], displacement);
-                    findings.hourglass +=
-                        resist_hourglass(&control.patterns[cell], control.stiffness[cell], &u, forces);
+            for (pack, moved) in moved[..packs].iter_mut().enumerate() {
+                by_component(&gathered[pack], moved);
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let u = relative::<R, L, N>(moved, at);
+                    batch.set(pack, at, &displacement_gradient(&u, &cells.gradient[first + pack], at));
                 }
+            }
+            batch.evaluate::<L>(&field.law, packs, 1, cells.fibres(first, packs));
+            for (pack, slots) in slots.chunks_exact_mut(N).enumerate() {
+                batch.note(pack, (first + pack) * PACK, &mut findings);
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let elastic = batch.elastic::<L>(pack, at);
+                    let own = (index * PACKS + pack) * field.history;
+                    let own = own.min(history.len())..(own + field.history).min(history.len());
+                    let stress = field.relaxation.advance(elastic, &mut history[own], at);
+                    let piola = batch.deformation_gradient::<L>(pack, at).times_symmetric(&stress);
+                    let volume = L::load(&cells.volume[first + pack], at);
+                    scatter(&piola, &cells.gradient[first + pack], volume, &mut forces, at);
+                }
+                if let Some(control) = &field.hourglass {
+                    for at in (0..PACK).step_by(L::WIDTH) {
+                        let u = relative::<R, L, N>(&moved[pack], at);
+                        let stiffness = L::load(&control.stiffness[first + pack], at);
+                        let patterns = &control.patterns[first + pack];
+                        let energy = resist_hourglass(patterns, stiffness, &u, &mut forces, at);
+                        (energy + L::load(&findings.hourglass, at)).store(&mut findings.hourglass, at);
+                    }
+                }
+                by_cell(&forces, slots);
             }
         }
         findings
@@ -89,51 +120,51 @@ impl<R: Real, const N: usize> SolidForces<R, N> {
 
 /// f_a += k Σ_c γ_ca q_c with q_c = Σ_b γ_cb u_b; returns the energy ½ k Σ |q_c|² [J].
 #[inline(always)]
-fn resist_hourglass<R: Real, const N: usize>(
-    patterns: &[[R; N]; 4],
-    stiffness: R,
-    u: &[Vector<R>; N],
-    forces: &mut [Vector<R>],
-) -> f64 {
-    let mut energy = R::ZERO;
-    for gamma in patterns {
-        let mut q = [R::ZERO; 3];
-        for (&g, &ua) in gamma.iter().zip(u) {
-            q = add(q, scale(ua, g));
+fn resist_hourglass<R: Real, L: Lanes<R>, const N: usize>(
+    patterns: &[[Pack<R>; N]; 4],
+    stiffness: L,
+    u: &[Vector<L>; N],
+    forces: &mut [Vector<Pack<R>>],
+    at: usize,
+) -> L {
+    let mut energy = L::ZERO;
+    let mut kq = [[L::ZERO; 3]; 4];
+    for (gamma, kq) in patterns.iter().zip(&mut kq) {
+        let mut q = [L::ZERO; 3];
+        for (g, &ua) in gamma.iter().zip(u) {
+            q = add(q, scale(ua, L::load(g, at)));
         }
         energy += dot(q, q);
-        let kq = scale(q, stiffness);
-        for (force, &g) in forces.iter_mut().zip(gamma) {
-            *force = add(*force, scale(kq, g));
-        }
+        *kq = scale(q, stiffness);
     }
-    0.5 * (stiffness * energy).to_f64()
+    for (a, force) in forces.iter_mut().enumerate() {
+        let mut sum = load_vector(force, at);
+        for (gamma, &kq) in patterns.iter().zip(&kq) {
+            sum = add(sum, scale(kq, L::load(&gamma[a], at)));
+        }
+        store_vector(sum, force, at);
+    }
+    L::of(0.5) * stiffness * energy
 }
 
 impl<R: Real, const N: usize> ForceField<R> for SolidForces<R, N> {
     fn evaluate(
         &mut self,
-        displacement: &[Vector<R>],
+        displacement: &Places<R>,
         history: &mut History<R>,
-        slots: &mut [Vector<R>],
-        findings: &mut [Findings],
+        slots: &mut [Slot<R>],
+        findings: &mut [Findings<R>],
     ) {
         let this = &*self;
-        let history = &mut history.cells;
-        let tasks = slots.par_chunks_mut(CHUNK * N).zip(findings).enumerate();
-        if history.is_empty() {
-            tasks.for_each(|(task, (slots, findings))| {
-                *findings = this.pass(task * CHUNK, displacement, &mut [], slots);
-            });
-        } else {
-            tasks.zip(history.par_chunks_mut(CHUNK * this.history_slots)).for_each(
-                |((task, (slots, findings)), history)| {
-                    *findings = this.pass(task * CHUNK, displacement, history, slots);
-                },
-            );
-        }
+        for_each_task(slots, N, &mut history.cells, this.history, findings, |first, slots, history| {
+            this.processor.run(Pass { field: this, first, displacement, history, slots })
+        });
     }
     fn set_step(&mut self, prony: &Prony, step: f64) {
         self.relaxation.set_step(prony, step);
+    }
+    #[cfg(test)]
+    fn set_processor(&mut self, processor: Processor) {
+        self.processor = processor;
     }
 }

@@ -2,9 +2,12 @@
 //! line in [`ELEMENTS`] and its energy in [`energy`].
 
 use super::*;
+use crate::State;
+use crate::lanes::Processor;
+use crate::law::battery::every_law;
 use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
 use crate::model::{Averaging, Body, Cells, LocalNodes, Material};
-use crate::prony::Prony;
+use crate::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use crate::tensor::{cast, cross, dot};
 
 /// Every element whose force is the gradient of an energy.
@@ -272,4 +275,90 @@ fn an_inverted_cell_is_found() {
     let Split { isochoric, .. } =
         laws()[0].energy(&Deformation::from_displacement_gradient(&Tensor::ZERO), &[]);
     assert_eq!(isochoric, 0.0);
+}
+
+/// Forces on the nodes and how far the cells are deformed, on some processor, after a motion of three steps.
+fn moved_on<R: Real>(processor: Processor, model: &Model) -> (Vec<Vector<f64>>, Deformed) {
+    let mut internal = InternalForces::<R>::new(model, 0.1);
+    internal.fields.iter_mut().for_each(|field| field.set_processor(processor));
+    let mut history = State::<R>::at_rest(model).history;
+    let mut random = Random(13);
+    let mut deformed = Deformed::default();
+    for _ in 0..3 {
+        let displacement: Vec<Vector<R>> = model.rest.iter().map(|_| cast(random.vector(0.01))).collect();
+        deformed = internal.evaluate(&displacement, &mut history).deformed;
+    }
+    ((0..model.node_count()).map(|node| cast(internal.at(node))).collect(), deformed)
+}
+
+fn apart(a: &[Vector<f64>], b: &[Vector<f64>]) -> f64 {
+    largest(a.iter().zip(b).map(|(&a, &b)| sub(a, b))) / largest(a.iter().copied())
+}
+
+/// Of every law and element, without and with history: 162 tets or 27 hexes, so that the last pack is not full.
+fn every_kernel() -> impl Iterator<Item = Model> {
+    let elements = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"];
+    let models = every_law().into_iter().flat_map(move |law| elements.map(|e| (e, law)));
+    models.filter(|(e, law)| matches!(*e, "tet4" | "hex8") || law.has_volumetric_energy()).flat_map(
+        |(element, law)| {
+            let terms =
+                [Part::Isochoric, Part::Volumetric].map(|part| PronyTerm { part, weight: 0.4, time: 0.3 });
+            [vec![], terms.to_vec()].map(|terms| {
+                let mut model = distorted_cube(element, law);
+                model.solids[0].material.prony = Prony::new(&terms, PronyUpdate::Exact).unwrap();
+                model
+            })
+        },
+    )
+}
+
+#[test]
+fn lanes_compute_what_plain_numbers_do_for_every_law_and_element() {
+    for model in every_kernel() {
+        let solid = &model.solids[0];
+        let name = format!("{} {}", solid.material.law.name(), solid.cells.element());
+        let all = Processor::all();
+        let (single, double) = (moved_on::<f32>(all[0], &model), moved_on::<f64>(all[0], &model));
+        for &processor in &all[1..] {
+            let (forces, deformed) = moved_on::<f32>(processor, &model);
+            assert!(apart(&single.0, &forces) <= 2e-5, "{name}: {:e}", apart(&single.0, &forces));
+            assert!(!deformed.differs(&single.1, 1.0001), "{name}");
+            let (forces, deformed) = moved_on::<f64>(processor, &model);
+            assert!(apart(&double.0, &forces) <= 1e-12, "{name}: {:e}", apart(&double.0, &forces));
+            assert!(!deformed.differs(&double.1, 1.0001), "{name}");
+        }
+        // AVX2 and AVX-512, where this processor has both.
+        for pair in all[1..].windows(2) {
+            assert_eq!(moved_on::<f32>(pair[0], &model), moved_on::<f32>(pair[1], &model), "{name}");
+            assert_eq!(moved_on::<f64>(pair[0], &model), moved_on::<f64>(pair[1], &model), "{name}");
+        }
+    }
+}
+
+#[test]
+fn packs_of_tets_are_their_cells_one_by_one() {
+    for law in every_law() {
+        let model = distorted_cube("tet4", law);
+        let mut random = Random(17);
+        let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
+        let solid = &model.solids[0];
+        let mut expected = vec![[0.0; 3]; model.node_count()];
+        for cell in 0..solid.cells.len() {
+            let Cells::Tet4(block) = &solid.cells else { unreachable!() };
+            let (nodes, rest) = (&block.nodes[cell], &block.rest[cell]);
+            let mut h = Tensor::ZERO;
+            for (&node, &b) in nodes.iter().zip(&rest.gradient) {
+                h.add_outer(displacement[node as usize], b);
+            }
+            let deformation = Deformation::from_displacement_gradient(&h);
+            let Split { isochoric, volumetric } = law.stress(&deformation, solid.fibres(cell));
+            let piola = deformation.gradient.times_symmetric(&(isochoric + volumetric));
+            for (&node, &b) in nodes.iter().zip(&rest.gradient) {
+                let force = &mut expected[node as usize];
+                *force = add(*force, scale(piola.apply(b), rest.volume));
+            }
+        }
+        let (forces, _) = forces(&model, &displacement);
+        assert!(apart(&expected, &forces) <= 1e-12, "{}: {:e}", law.name(), apart(&expected, &forces));
+    }
 }

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Compressibility, Deformation, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Network of chains that lock.
@@ -71,14 +71,18 @@ impl SplitLaw for ArrudaBoyce {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         let x = deformation.isochoric_first_invariant_minus_3();
         let [a, b, c, d, e] = self.coefficients;
         x * (R::of(a) + x * (R::of(b) + x * (R::of(c) + x * (R::of(d) + x * R::of(e)))))
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        _fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let x = deformation.isochoric_first_invariant_minus_3();
         let [a, b, c, d, e] = self.coefficients;
         let slope = x * (R::of(3.0 * c) + x * (R::of(4.0 * d) + x * R::of(5.0 * e)));

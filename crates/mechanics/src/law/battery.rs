@@ -10,7 +10,7 @@ fn law(name: &str, parameters: Value) -> AnyLaw {
 }
 
 /// Every law, and those with a choice of volumetric energies with each of them.
-fn every_law() -> Vec<AnyLaw> {
+pub(crate) fn every_law() -> Vec<AnyLaw> {
     let with_moduli = |extra: Value| merged(json!({ "shear-modulus": 0.7, "bulk-modulus": 5.0 }), extra);
     let with_bulk = |extra: Value| merged(json!({ "bulk-modulus": 5.0 }), extra);
     let parameters = [

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean solid whose shear term changes volume too.
@@ -35,14 +35,14 @@ impl Law for CoupledNeoHookean {
     }
 
     #[inline(always)]
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
+    fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
         let x = deformation.volume_change;
         let shape = deformation.strain_twice.trace() - R::of(2.0) * x.ln_1p();
         Split { isochoric: R::of(0.5 * self.shear) * shape, volumetric: R::of(0.5 * self.lame) * x * x }
     }
 
     #[inline(always)]
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
+    fn stress<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
         // I − C⁻¹ = C⁻¹ (C − I).
         let inverse = deformation.inverse_cauchy_green;
         let shape = inverse.commuting_product(&deformation.strain_twice);

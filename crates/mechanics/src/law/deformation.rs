@@ -6,7 +6,7 @@
 //! Φ = 2 (W₁ + Ī₁ W₂) I − 2 W₂ C̄ + 2 W₄ a⊗a + 2 W₅ (a⊗C̄a + C̄a⊗a). Here it is put together from terms that vanish at
 //! rest: the isotropic part is C⁻¹ dev M with M a polynomial of C − I.
 
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Tensor, Vector, dot};
 
 /// A deformation at one point and its measures.
@@ -28,7 +28,7 @@ pub struct Deformation<R> {
     pub isochoric_change: R,
 }
 
-impl<R: Real> Deformation<R> {
+impl<R: Number> Deformation<R> {
     /// From the displacement gradient H = ∂u/∂X. J ≤ 0 is the caller's to report: the measures are then meaningless.
     #[inline(always)]
     pub fn from_displacement_gradient(h: &Tensor<R>) -> Self {
@@ -133,7 +133,7 @@ impl<R: Real> Deformation<R> {
 
 /// a⊗b + b⊗a.
 #[inline(always)]
-fn twice_symmetrised<R: Real>(a: Vector<R>, b: Vector<R>) -> Symmetric<R> {
+fn twice_symmetrised<R: Number>(a: Vector<R>, b: Vector<R>) -> Symmetric<R> {
     let two = R::of(2.0);
     Symmetric([
         two * a[0] * b[0],

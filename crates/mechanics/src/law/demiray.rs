@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Isotropic solid that stiffens exponentially.
@@ -40,13 +40,17 @@ impl SplitLaw for Demiray {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         let x = deformation.isochoric_first_invariant_minus_3();
         R::of(0.5 * self.shear / self.exponent) * (R::of(self.exponent) * x).exp_m1()
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        _fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let x = deformation.isochoric_first_invariant_minus_3();
         deformation.first_invariant_stress(R::of(0.5 * self.shear) * (R::of(self.exponent) * x).exp())
     }

@@ -10,7 +10,7 @@ use super::principal::principal;
 use super::{
     Deformation, Law, ParameterError, SmallStrainModuli, Split, Volumetric, VolumetricEnergy, check,
 };
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Tensor, Vector, cast, dot};
 
 /// Exponential of a quadratic form of the strain.
@@ -52,7 +52,7 @@ pub struct FungOrthotropicParameters {
 impl FungOrthotropic {
     /// ½ ∂Q/∂E in the material axes, from C − I there.
     #[inline(always)]
-    fn half_slope<R: Real>(&self, strain_twice: &Symmetric<R>) -> Symmetric<R> {
+    fn half_slope<R: Number>(&self, strain_twice: &Symmetric<R>) -> Symmetric<R> {
         let [xx, yy, zz, xy, yz, xz] = strain_twice.0;
         let half = R::of(0.5);
         let form = Symmetric(cast_six(self.normal));
@@ -63,7 +63,7 @@ impl FungOrthotropic {
 
     /// C − I in the material axes, ½ ∂Q/∂E there, and Q = ∂Q/∂E : ½E (a form of second degree).
     #[inline(always)]
-    fn exponent<R: Real>(&self, deformation: &Deformation<R>) -> (R, Symmetric<R>) {
+    fn exponent<R: Number>(&self, deformation: &Deformation<R>) -> (R, Symmetric<R>) {
         let strain_twice = deformation.strain_twice.push_forward(&self.axes_as());
         let slope = self.half_slope(&strain_twice);
         let ([xx, yy, zz, xy, yz, xz], s) = (strain_twice.0, slope.0);
@@ -72,14 +72,14 @@ impl FungOrthotropic {
     }
 
     #[inline(always)]
-    fn axes_as<R: Real>(&self) -> Tensor<R> {
+    fn axes_as<R: Number>(&self) -> Tensor<R> {
         let rows = self.axes.0;
         Tensor([cast(rows[0]), cast(rows[1]), cast(rows[2])])
     }
 }
 
 #[inline(always)]
-fn cast_six<R: Real>(s: Symmetric<f64>) -> [R; 6] {
+fn cast_six<R: Number>(s: Symmetric<f64>) -> [R; 6] {
     let s = s.0;
     [R::of(s[0]), R::of(s[1]), R::of(s[2]), R::of(s[3]), R::of(s[4]), R::of(s[5])]
 }
@@ -127,7 +127,7 @@ impl Law for FungOrthotropic {
     }
 
     #[inline(always)]
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
+    fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
         let (q, _) = self.exponent(deformation);
         Split {
             isochoric: R::of(0.5 * self.modulus) * q.exp_m1(),
@@ -136,7 +136,7 @@ impl Law for FungOrthotropic {
     }
 
     #[inline(always)]
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
+    fn stress<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
         let (q, slope) = self.exponent(deformation);
         let stress = slope * (R::of(self.modulus) * q.exp());
         Split {

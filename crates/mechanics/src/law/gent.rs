@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean solid that locks.
@@ -41,13 +41,17 @@ impl SplitLaw for Gent {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         let used = deformation.isochoric_first_invariant_minus_3() * R::of(1.0 / self.limit);
         R::of(-0.5 * self.shear * self.limit) * (-used).max(-R::ONE).ln_1p()
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        _fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let used = deformation.isochoric_first_invariant_minus_3() * R::of(1.0 / self.limit);
         deformation.first_invariant_stress(R::of(0.5 * self.shear) / (R::ONE - used).max(R::ZERO))
     }

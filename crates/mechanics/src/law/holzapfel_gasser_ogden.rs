@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::split::fibre_stiffness;
 use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean matrix with one or two families of stiffening fibres.
@@ -61,20 +61,20 @@ fn one() -> usize {
 impl HolzapfelGasserOgden {
     /// ⟨E⟩ of one family.
     #[inline(always)]
-    fn tension<R: Real>(&self, deformation: &Deformation<R>, a: Vector<R>) -> R {
+    fn tension<R: Number>(&self, deformation: &Deformation<R>, a: Vector<R>) -> R {
         let spread = R::of(self.dispersion) * deformation.isochoric_first_invariant_minus_3();
         let along = R::of(1.0 - 3.0 * self.dispersion) * deformation.fibre_strain(a);
         (spread + along).max(R::ZERO)
     }
 
     #[inline(always)]
-    fn family_energy<R: Real>(&self, deformation: &Deformation<R>, a: Vector<R>) -> R {
+    fn family_energy<R: Number>(&self, deformation: &Deformation<R>, a: Vector<R>) -> R {
         let tension = self.tension(deformation, a);
         R::of(0.5 * self.fibre / self.exponent) * (R::of(self.exponent) * tension * tension).exp_m1()
     }
 
     #[inline(always)]
-    fn family_stress<R: Real>(&self, deformation: &Deformation<R>, a: Vector<R>) -> Symmetric<R> {
+    fn family_stress<R: Number>(&self, deformation: &Deformation<R>, a: Vector<R>) -> Symmetric<R> {
         let tension = self.tension(deformation, a);
         let p = R::of(self.fibre) * tension * (R::of(self.exponent) * tension * tension).exp();
         deformation.first_invariant_stress(R::of(self.dispersion) * p)
@@ -110,7 +110,7 @@ impl SplitLaw for HolzapfelGasserOgden {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
         let mut energy = R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3();
         for &fibre in fibres {
             energy += self.family_energy(deformation, fibre);
@@ -119,7 +119,11 @@ impl SplitLaw for HolzapfelGasserOgden {
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let mut stress = deformation.first_invariant_stress(R::of(0.5 * self.shear));
         for &fibre in fibres {
             stress = stress + self.family_stress(deformation, fibre);

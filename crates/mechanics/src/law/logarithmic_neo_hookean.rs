@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean solid of many textbooks and codes.
@@ -35,14 +35,14 @@ impl Law for LogarithmicNeoHookean {
     }
 
     #[inline(always)]
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
+    fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
         let ln_j = deformation.volume_change.ln_1p();
         let shape = deformation.strain_twice.trace() - R::of(2.0) * ln_j;
         Split { isochoric: R::of(0.5 * self.shear) * shape, volumetric: R::of(0.5 * self.lame) * ln_j * ln_j }
     }
 
     #[inline(always)]
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
+    fn stress<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
         // I − C⁻¹ = C⁻¹ (C − I).
         let inverse = deformation.inverse_cauchy_green;
         Split {

@@ -29,7 +29,7 @@ mod volumetric;
 mod yeoh;
 
 #[cfg(test)]
-mod battery;
+pub(crate) mod battery;
 
 pub use arruda_boyce::ArrudaBoyce;
 pub use coupled_neo_hookean::CoupledNeoHookean;
@@ -55,7 +55,7 @@ pub use yeoh::Yeoh;
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
 
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// A quantity split into the part that changes shape and the part that changes volume.
@@ -101,10 +101,10 @@ pub trait Law: Copy + Send + Sync + 'static {
     fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
 
     /// Strain energy per reference volume [J/m³]. `fibres` are the unit directions of the families at rest.
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R>;
+    fn energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R>;
 
     /// Second Piola–Kirchhoff stress [Pa].
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>>;
+    fn stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>>;
 
     /// Families of fibres, each with a direction in every cell.
     fn families(&self) -> usize {

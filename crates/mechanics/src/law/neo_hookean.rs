@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean solid with shape and volume separated.
@@ -34,12 +34,16 @@ impl SplitLaw for NeoHookean {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3()
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        _fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         deformation.first_invariant_stress(R::of(0.5 * self.shear))
     }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::principal::principal;
 use super::{Compressibility, Deformation, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// The most terms a law can have; six serve every fit known to us.
@@ -82,7 +82,7 @@ impl SplitLaw for Ogden {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         let (strains, _) = principal(&deformation.isochoric_strain_twice());
         let mut energy = R::ZERO;
         for term in self.terms() {
@@ -96,7 +96,11 @@ impl SplitLaw for Ogden {
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        _fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let (strains, directions) = principal(&deformation.isochoric_strain_twice());
         let mut kirchhoff = [R::ZERO; 3];
         for term in self.terms() {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::split::fibre_stiffness;
 use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean matrix with two families of fibres.
@@ -65,7 +65,7 @@ impl SplitLaw for Orthotropic {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
         let mut energy = R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3();
         for (a, [e, f]) in [(fibres[0], self.first), (fibres[1], self.second)] {
             let [x, y] = deformation.fibre_strains(a);
@@ -75,7 +75,11 @@ impl SplitLaw for Orthotropic {
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let mut stress = deformation.first_invariant_stress(R::of(0.5 * self.shear));
         for (a, [e, f]) in [(fibres[0], self.first), (fibres[1], self.second)] {
             let [x, y] = deformation.fibre_strains(a);

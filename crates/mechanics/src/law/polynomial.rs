@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Compressibility, Deformation, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Energy quadratic in both invariants.
@@ -52,7 +52,7 @@ impl SplitLaw for Polynomial {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         let [first, second] = deformation.isochoric_invariants_minus_3();
         let ([c10, c01], [c20, c11, c02]) = (self.linear, self.quadratic);
         first * (R::of(c10) + R::of(c20) * first + R::of(c11) * second)
@@ -60,7 +60,11 @@ impl SplitLaw for Polynomial {
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        _fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let [first, second] = deformation.isochoric_invariants_minus_3();
         let ([c10, c01], [c20, c11, c02]) = (self.linear, self.quadratic);
         let w1 = R::of(c10) + R::of(2.0 * c20) * first + R::of(c11) * second;

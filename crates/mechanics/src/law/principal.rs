@@ -1,7 +1,7 @@
 //! Principal values and directions of a symmetric tensor by cyclic Jacobi rotations: no branch, no convergence test,
 //! equal values welcome. Five rounds: each squares the off-diagonal part at least, 10⁻¹ becomes 10⁻¹⁶ in four.
 
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 const ROUNDS: usize = 5;
@@ -11,7 +11,7 @@ const TINY: f64 = 1e-30;
 
 /// Principal values, and the unit direction of each.
 #[inline(always)]
-pub(super) fn principal<R: Real>(s: &Symmetric<R>) -> ([R; 3], [Vector<R>; 3]) {
+pub(super) fn principal<R: Number>(s: &Symmetric<R>) -> ([R; 3], [Vector<R>; 3]) {
     let [xx, yy, zz, xy, yz, xz] = s.0;
     let (o, l) = (R::ZERO, R::ONE);
     let mut turning = Turning {
@@ -36,7 +36,7 @@ struct Turning<R> {
     directions: [Vector<R>; 3],
 }
 
-impl<R: Real> Turning<R> {
+impl<R: Number> Turning<R> {
     /// Turns the axes p and q until the entry between them is zero; r is the third axis (Golub and Van Loan 8.5.2).
     #[inline(always)]
     fn annihilate(&mut self, p: usize, q: usize, r: usize) {
@@ -64,6 +64,7 @@ impl<R: Real> Turning<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Real;
     use crate::tensor::{dot, scale, sub};
 
     fn check<R: Real>(s: [f64; 6]) {

@@ -9,7 +9,7 @@ use super::{
     Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split, Volumetric,
     VolumetricEnergy,
 };
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// A law with an isochoric and a volumetric energy.
@@ -21,10 +21,11 @@ pub trait SplitLaw: Copy + Send + Sync + 'static {
     fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
 
     /// Isochoric energy per reference volume [J/m³]. `fibres` are the unit directions of the families at rest.
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R;
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R;
 
     /// Second Piola–Kirchhoff stress of the isochoric energy [Pa], put together by [`Deformation`].
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R>;
+    fn isochoric_stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>])
+    -> Symmetric<R>;
 
     /// The volumetric energy.
     fn volumetric(&self) -> Volumetric;
@@ -58,7 +59,7 @@ impl<L: SplitLaw> Law for L {
     }
 
     #[inline(always)]
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R> {
+    fn energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R> {
         Split {
             isochoric: self.isochoric_energy(deformation, fibres),
             volumetric: self.volumetric().energy(deformation),
@@ -66,7 +67,7 @@ impl<L: SplitLaw> Law for L {
     }
 
     #[inline(always)]
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
+    fn stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
         Split {
             isochoric: self.isochoric_stress(deformation, fibres),
             volumetric: self.volumetric().stress(deformation),

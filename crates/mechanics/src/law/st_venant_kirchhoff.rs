@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Hooke's law in the Green–Lagrange strain.
@@ -39,7 +39,7 @@ impl Law for StVenantKirchhoff {
     }
 
     #[inline(always)]
-    fn energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
+    fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
         let strain = deformation.strain_twice * R::of(0.5);
         let trace = strain.trace();
         Split {
@@ -49,7 +49,7 @@ impl Law for StVenantKirchhoff {
     }
 
     #[inline(always)]
-    fn stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
+    fn stress<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
         let strain_twice = deformation.strain_twice;
         Split {
             isochoric: strain_twice * R::of(self.shear),

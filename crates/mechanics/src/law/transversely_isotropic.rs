@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::split::fibre_stiffness;
 use super::{Deformation, Matrix, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Neo-Hookean matrix with one family of fibres.
@@ -62,14 +62,18 @@ impl SplitLaw for TransverselyIsotropic {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R {
         let strain = deformation.fibre_strain(fibres[0]);
         R::of(0.5 * self.shear) * deformation.isochoric_first_invariant_minus_3()
             + R::of(0.5 * self.fibre) * strain * strain
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         deformation.first_invariant_stress(R::of(0.5 * self.shear))
             + deformation.fibre_stress(fibres[0], R::of(self.fibre) * deformation.fibre_strain(fibres[0]))
     }

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Compressibility, Deformation, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Exponential in the first invariant, linear in the second.
@@ -44,13 +44,17 @@ impl SplitLaw for VerondaWestmann {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         let [first, second] = deformation.isochoric_invariants_minus_3();
         R::of(self.c1) * (R::of(self.c2) * first).exp_m1() - R::of(0.5 * self.c1 * self.c2) * second
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        _fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let x = deformation.isochoric_first_invariant_minus_3();
         let w1 = R::of(self.c1 * self.c2) * (R::of(self.c2) * x).exp();
         deformation.isotropic_stress(w1, R::of(-0.5 * self.c1 * self.c2))

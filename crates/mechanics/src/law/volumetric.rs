@@ -8,14 +8,13 @@
 //! | `j-ln-j` | κ (J ln J − J + 1) | κ J ln J | κ J | finite at J → 0, its slope is not |
 //!
 //! The energies of the last three lose digits to cancellation at small volume changes (not the stresses): read them in
-//! double precision. The form is chosen at run time: a step of tets takes as long as with the quadratic form fixed (65 ns a
-//! cell, neo-Hookean, 24,576 tets, single precision, one thread); a kernel for each form would be four times the code.
+//! double precision. The form is chosen at run time, the same for all lanes; a kernel for each form would be four times the code.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Deformation;
-use crate::Real;
+use crate::Number;
 use crate::tensor::Symmetric;
 
 /// How the energy grows with the change of volume.
@@ -50,7 +49,7 @@ impl Volumetric {
 
     /// U(J) [J/m³].
     #[inline(always)]
-    pub fn energy<R: Real>(&self, deformation: &Deformation<R>) -> R {
+    pub fn energy<R: Number>(&self, deformation: &Deformation<R>) -> R {
         let (j, x) = (deformation.volume_ratio, deformation.volume_change);
         let half = R::of(0.5);
         R::of(self.bulk)
@@ -64,7 +63,7 @@ impl Volumetric {
 
     /// J U′(J) [Pa], the Kirchhoff pressure (positive in tension).
     #[inline(always)]
-    pub fn kirchhoff_pressure<R: Real>(&self, deformation: &Deformation<R>) -> R {
+    pub fn kirchhoff_pressure<R: Number>(&self, deformation: &Deformation<R>) -> R {
         let (j, x) = (deformation.volume_ratio, deformation.volume_change);
         R::of(self.bulk)
             * match self.energy {
@@ -77,7 +76,7 @@ impl Volumetric {
 
     /// S = J U′(J) C⁻¹ [Pa].
     #[inline(always)]
-    pub fn stress<R: Real>(&self, deformation: &Deformation<R>) -> Symmetric<R> {
+    pub fn stress<R: Number>(&self, deformation: &Deformation<R>) -> Symmetric<R> {
         deformation.inverse_cauchy_green * self.kirchhoff_pressure(deformation)
     }
 

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Compressibility, Deformation, ParameterError, SplitLaw, Volumetric, check};
-use crate::Real;
+use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// Energy cubic in the first invariant.
@@ -44,14 +44,18 @@ impl SplitLaw for Yeoh {
     }
 
     #[inline(always)]
-    fn isochoric_energy<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
+    fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> R {
         let x = deformation.isochoric_first_invariant_minus_3();
         let [c1, c2, c3] = self.c;
         x * (R::of(c1) + x * (R::of(c2) + x * R::of(c3)))
     }
 
     #[inline(always)]
-    fn isochoric_stress<R: Real>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Symmetric<R> {
+    fn isochoric_stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        _fibres: &[Vector<R>],
+    ) -> Symmetric<R> {
         let x = deformation.isochoric_first_invariant_minus_3();
         let [c1, c2, c3] = self.c;
         deformation.first_invariant_stress(R::of(c1) + x * (R::of(2.0 * c2) + x * R::of(3.0 * c3)))

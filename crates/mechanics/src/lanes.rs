@@ -1,0 +1,361 @@
+//! Numbers side by side: kernels written once, generic over [`Lanes`], run sixteen, eight or four cells at a time.
+//!
+//! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it. The processor
+//! is asked once, when a force field is made: AVX-512 (with the feature `avx512`), else AVX2 with FMA, or NEON; without
+//! any of them the kernels run in plain numbers. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
+//! (tested), elsewhere to round-off.
+#![allow(unsafe_code)]
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use pulp::{Arch, Simd, WithSimd};
+use serde::{Deserialize, Serialize};
+
+use crate::tensor::{Symmetric, Tensor, Vector};
+use crate::{Number, Real};
+
+/// Numbers in a pack: the widest register in single precision.
+pub(crate) const PACK: usize = 16;
+
+/// Numbers of neighbouring cells, aligned so that none of their registers crosses a cache line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+#[repr(C, align(64))]
+pub struct Pack<R>(pub [R; PACK]);
+
+impl<R: Real> Pack<R> {
+    /// All zeros.
+    pub(crate) const ZERO: Self = Self([R::ZERO; PACK]);
+
+    /// From the number of each lane.
+    pub(crate) fn from_fn(number: impl FnMut(usize) -> R) -> Self {
+        Self(std::array::from_fn(number))
+    }
+}
+
+/// The number of an entry in a row of packs.
+#[inline(always)]
+pub(crate) fn entry<R: Real>(packs: &[Pack<R>], index: usize) -> R {
+    packs[index / PACK].0[index % PACK]
+}
+
+/// Numbers of `R` side by side; arithmetic is lane by lane.
+pub trait Lanes<R>: Number {
+    /// How many; divides [`PACK`].
+    const WIDTH: usize;
+    /// The same number in every lane.
+    fn splat(value: R) -> Self;
+    /// Those of a pack from lane `at` on, a multiple of the width.
+    fn load(pack: &Pack<R>, at: usize) -> Self;
+    /// Writes them into a pack from lane `at` on.
+    fn store(self, pack: &mut Pack<R>, at: usize);
+    /// Does the work in a function of its own, compiled for these lanes.
+    fn call<W: Work<R>>(work: W) -> W::Output;
+}
+
+/// The lanes' part of a vector of packs.
+#[inline(always)]
+pub(crate) fn load_vector<R: Real, L: Lanes<R>>(from: &Vector<Pack<R>>, at: usize) -> Vector<L> {
+    [L::load(&from[0], at), L::load(&from[1], at), L::load(&from[2], at)]
+}
+
+/// Writes a vector into packs.
+#[inline(always)]
+pub(crate) fn store_vector<R: Real, L: Lanes<R>>(vector: Vector<L>, to: &mut Vector<Pack<R>>, at: usize) {
+    for (number, pack) in vector.into_iter().zip(to) {
+        number.store(pack, at);
+    }
+}
+
+/// The lanes' part of a tensor of packs.
+#[inline(always)]
+pub(crate) fn load_tensor<R: Real, L: Lanes<R>>(from: &Tensor<Pack<R>>, at: usize) -> Tensor<L> {
+    let rows = &from.0;
+    Tensor([load_vector(&rows[0], at), load_vector(&rows[1], at), load_vector(&rows[2], at)])
+}
+
+/// The lanes' part of a symmetric tensor of packs.
+#[inline(always)]
+pub(crate) fn load_symmetric<R: Real, L: Lanes<R>>(from: &Symmetric<Pack<R>>, at: usize) -> Symmetric<L> {
+    let mut symmetric = Symmetric::ZERO;
+    for (number, pack) in symmetric.0.iter_mut().zip(&from.0) {
+        *number = L::load(pack, at);
+    }
+    symmetric
+}
+
+/// Work that is written for any lanes. What it calls must be inlined, or it is not compiled for the processor.
+pub trait Work<R> {
+    /// What comes out.
+    type Output;
+    /// Does it.
+    fn run<L: Lanes<R>>(self) -> Self::Output;
+}
+
+/// The lanes of this processor.
+#[derive(Clone, Copy, Debug)]
+pub struct Processor(Arch);
+
+impl Processor {
+    /// Asks the processor.
+    pub(crate) fn detect() -> Self {
+        Self(Arch::new())
+    }
+
+    /// Plain numbers, and the lanes that this processor has.
+    #[cfg(test)]
+    pub(crate) fn all() -> Vec<Self> {
+        #[allow(unused_mut)]
+        let mut all = vec![Self(Arch::Scalar), Self::detect()];
+        #[cfg(target_arch = "x86_64")]
+        all.extend(pulp::x86::V3::try_new().map(|v3| Self(Arch::V3(v3))));
+        all
+    }
+
+    /// Does the work in the widest lanes.
+    #[inline]
+    pub(crate) fn run<R: Real, W: Work<R>>(self, work: W) -> W::Output {
+        match self.0 {
+            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+            Arch::V4(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            #[cfg(target_arch = "x86_64")]
+            Arch::V3(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            #[cfg(target_arch = "aarch64")]
+            Arch::Neon(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            _ => work.run::<R>(),
+        }
+    }
+}
+
+/// Work on its way into a function compiled for `S`.
+struct InLanes<R, W>(W, std::marker::PhantomData<R>);
+
+impl<R: Real, W: Work<R>> WithSimd for InLanes<R, W> {
+    type Output = W::Output;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> W::Output {
+        self.0.run::<R::Wide<S>>()
+    }
+}
+
+/// The proof that the processor has the instructions of `S`, out of thin air: `Lanes` have no room to carry it.
+///
+/// # Safety
+/// Only where `S` has been detected. All uses are in methods of the wide types below. Their values and functions are
+/// reached through [`Real::Wide`] alone, which nothing but [`InLanes`] names, and `InLanes` is handed the proof.
+#[inline(always)]
+unsafe fn proof<S: Simd>() -> S {
+    const { assert!(size_of::<S>() == 0) };
+    // SAFETY: a type without size has one value, and no bytes of it are read; that the proof holds is the caller's.
+    unsafe { std::mem::transmute_copy(&()) }
+}
+
+macro_rules! wide {
+    ($wide:ident, $type:ty, $vector:ident, $guess:expr, $iterations:literal,
+     $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $mul_add:ident, $sqrt:ident, $max:ident, $abs:ident,
+     $and:ident, $or:ident, $splat:ident, $slice:ident, $slice_mut:ident) => {
+        /// As many numbers as a register holds.
+        #[derive(Clone, Copy, Debug)]
+        #[repr(transparent)]
+        pub struct $wide<S: Simd>(S::$vector);
+
+        impl<S: Simd> $wide<S> {
+            #[inline(always)]
+            fn simd() -> S {
+                // SAFETY: see `proof`.
+                unsafe { proof() }
+            }
+
+            const fn constant(value: $type) -> Self {
+                const { assert!(size_of::<S::$vector>() <= size_of::<Pack<$type>>()) };
+                // SAFETY: a vector is plain numbers (`Pod`), no longer than the array.
+                Self(unsafe { std::mem::transmute_copy(&[value; PACK]) })
+            }
+
+            /// Lane by lane in plain numbers.
+            #[inline(always)]
+            fn each(self, f: impl Fn($type) -> $type) -> Self {
+                let mut pack = Pack([0.0; PACK]);
+                self.store(&mut pack, 0);
+                for number in &mut pack.0[..Self::WIDTH] {
+                    *number = f(*number);
+                }
+                Self::load(&pack, 0)
+            }
+        }
+
+        impl<S: Simd> Lanes<$type> for $wide<S> {
+            const WIDTH: usize = size_of::<S::$vector>() / size_of::<$type>();
+            #[inline(always)]
+            fn splat(value: $type) -> Self {
+                Self(Self::simd().$splat(value))
+            }
+            #[inline(always)]
+            fn load(pack: &Pack<$type>, at: usize) -> Self {
+                Self(S::$slice(&pack.0).0[at / Self::WIDTH])
+            }
+            #[inline(always)]
+            fn store(self, pack: &mut Pack<$type>, at: usize) {
+                S::$slice_mut(&mut pack.0).0[at / Self::WIDTH] = self.0;
+            }
+            #[inline(always)]
+            fn call<W: Work<$type>>(work: W) -> W::Output {
+                Self::simd().vectorize(InLanes(work, std::marker::PhantomData::<$type>))
+            }
+        }
+
+        impl<S: Simd> Number for $wide<S> {
+            const ZERO: Self = Self::constant(0.0);
+            const ONE: Self = Self::constant(1.0);
+            #[inline(always)]
+            fn of(value: f64) -> Self {
+                Self::splat(value as $type)
+            }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, term: Self) -> Self {
+                Self(Self::simd().$mul_add(self.0, factor.0, term.0))
+            }
+            #[inline(always)]
+            fn cbrt(self) -> Self {
+                // As in plain numbers; a third of the bits is their sum over 4, 16, 64, … in words of 32 bits each.
+                let simd = Self::simd();
+                let bits: S::u32s = pulp::cast(self.0);
+                let over = |bits, power| simd.wrapping_dyn_shr_u32s(bits, simd.splat_u32s(power));
+                let third = simd.add_u32s(over(bits, 2), over(bits, 4));
+                let third = simd.add_u32s(third, over(third, 4));
+                let third = simd.add_u32s(third, over(third, 8));
+                let guess: S::u32s = pulp::cast(Self::splat(<$type>::from_bits($guess)).0);
+                let mut y = Self(pulp::cast(simd.add_u32s(third, guess)));
+                let twice = self + self;
+                for _ in 0..$iterations {
+                    let cube = y * y * y;
+                    y = y * (cube + twice) / (cube + cube + self);
+                }
+                y
+            }
+            #[inline(always)]
+            fn ln_1p(self) -> Self {
+                self.each(<$type>::ln_1p)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                self.each(<$type>::exp)
+            }
+            #[inline(always)]
+            fn exp_m1(self) -> Self {
+                self.each(<$type>::exp_m1)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self(Self::simd().$sqrt(self.0))
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                Self(Self::simd().$max(self.0, other.0))
+            }
+            #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                let simd = Self::simd();
+                let sign = simd.$and(sign.0, Self::splat(-0.0).0);
+                Self(simd.$or(simd.$abs(self.0), sign))
+            }
+        }
+
+        wide!(@operator $wide, Add, add, $add);
+        wide!(@operator $wide, Sub, sub, $sub);
+        wide!(@operator $wide, Mul, mul, $mul);
+        wide!(@operator $wide, Div, div, $div);
+
+        impl<S: Simd> Neg for $wide<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self(Self::simd().$neg(self.0))
+            }
+        }
+        impl<S: Simd> AddAssign for $wide<S> {
+            #[inline(always)]
+            fn add_assign(&mut self, other: Self) {
+                *self = *self + other;
+            }
+        }
+        impl<S: Simd> SubAssign for $wide<S> {
+            #[inline(always)]
+            fn sub_assign(&mut self, other: Self) {
+                *self = *self - other;
+            }
+        }
+
+        impl Lanes<$type> for $type {
+            const WIDTH: usize = 1;
+            #[inline(always)]
+            fn splat(value: $type) -> Self {
+                value
+            }
+            #[inline(always)]
+            fn load(pack: &Pack<$type>, at: usize) -> Self {
+                pack.0[at]
+            }
+            #[inline(always)]
+            fn store(self, pack: &mut Pack<$type>, at: usize) {
+                pack.0[at] = self;
+            }
+            #[inline(never)]
+            fn call<W: Work<$type>>(work: W) -> W::Output {
+                work.run::<Self>()
+            }
+        }
+    };
+    (@operator $wide:ident, $trait:ident, $method:ident, $simd:ident) => {
+        impl<S: Simd> $trait for $wide<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(Self::simd().$simd(self.0, other.0))
+            }
+        }
+    };
+}
+
+wide!(
+    WideF32,
+    f32,
+    f32s,
+    709_958_130,
+    2,
+    add_f32s,
+    sub_f32s,
+    mul_f32s,
+    div_f32s,
+    neg_f32s,
+    mul_add_e_f32s,
+    sqrt_f32s,
+    max_f32s,
+    abs_f32s,
+    and_f32s,
+    or_f32s,
+    splat_f32s,
+    as_simd_f32s,
+    as_mut_simd_f32s
+);
+wide!(
+    WideF64,
+    f64,
+    f64s,
+    715_094_163 << 32,
+    3,
+    add_f64s,
+    sub_f64s,
+    mul_f64s,
+    div_f64s,
+    neg_f64s,
+    mul_add_e_f64s,
+    sqrt_f64s,
+    max_f64s,
+    abs_f64s,
+    and_f64s,
+    or_f64s,
+    splat_f64s,
+    as_simd_f64s,
+    as_mut_simd_f64s
+);
