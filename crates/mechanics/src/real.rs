@@ -52,7 +52,7 @@ pub trait Number:
     fn copysign(self, sign: Self) -> Self;
 }
 
-/// A real number that the kernels can run in; by itself the narrowest of [`Lanes`].
+/// A real number that the kernels can run in; by itself the narrowest of lanes.
 pub trait Real: Number + Lanes<Self> + Default + PartialOrd + Serialize + DeserializeOwned + Sum {
     /// Relative spacing of the numbers near one.
     const EPSILON: f64;
