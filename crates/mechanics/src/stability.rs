@@ -10,11 +10,11 @@
 //! `validation/tests/stability.rs`.
 //!
 //! Where this estimate falls below the step it may be the cells in question that do not matter. Then the true limit
-//! of the current state is found, by as many force evaluations as some 50 to 100 steps take, and the current state becomes
-//! the reference.
+//! of the current state is found, by Lanczos' iteration of many force evaluations, and the current state becomes the
+//! reference.
 //!
 //! Stiffness is found for the cells that stand first in two cheap orders, one by an isotropic guess of their speed
-//! and one by stretch: 18 stresses and the eigenvalue problems cost as much as 50 steps of a cell.
+//! and one by stretch: 18 stresses and the eigenvalue problems cost far more than a step of a cell.
 //! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control
 //! does not change with deformation. Loads that follow the surface do not count.
 
