@@ -1,0 +1,96 @@
+//! What can go wrong with a device, and what to do.
+
+/// Why a device can't be used, or not any longer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GpuError {
+    /// No adapter was found.
+    #[error("no graphics processor was found: no driver for Vulkan, Metal or Direct3D 12 answers")]
+    NoAdapter,
+    /// No adapter has this name.
+    #[error("there is no adapter `{asked}`; found: {}", found.join(", "))]
+    UnknownAdapter {
+        /// What was asked for.
+        asked: String,
+        /// The names of those found.
+        found: Vec<String>,
+    },
+    /// The driver refused to open the adapter.
+    #[error("`{adapter}` can't be opened: {reason}")]
+    Refused {
+        /// The adapter.
+        adapter: String,
+        /// What the driver says.
+        reason: String,
+    },
+    /// The device is gone: unplugged, reset, or stopped by a watchdog.
+    #[error("`{adapter}` was lost: {reason}")]
+    Lost {
+        /// The adapter.
+        adapter: String,
+        /// What the driver says.
+        reason: String,
+    },
+    /// The device's memory is full.
+    #[error("`{adapter}` is out of memory; the model takes {needed} MiB there")]
+    OutOfMemory {
+        /// The adapter.
+        adapter: String,
+        /// What the model takes [MiB].
+        needed: u64,
+    },
+    /// An array is larger than the adapter allows.
+    #[error(
+        "{what} of the model take {needed} bytes, more than the {limit} bytes `{adapter}` allows in one buffer"
+    )]
+    TooLarge {
+        /// The adapter.
+        adapter: String,
+        /// What the array holds.
+        what: &'static str,
+        /// Its size [B].
+        needed: u64,
+        /// The most that is allowed [B].
+        limit: u64,
+    },
+    /// Something that runs on the processor only.
+    #[error("{what} can't run on a graphics processor")]
+    Unsupported {
+        /// What it is.
+        what: String,
+    },
+    /// The driver reports a fault of the program.
+    #[error("`{adapter}` reports a fault in its use: {reason}")]
+    Internal {
+        /// The adapter.
+        adapter: String,
+        /// What the driver says.
+        reason: String,
+    },
+}
+
+impl GpuError {
+    /// What to try.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::NoAdapter => {
+                "install a driver (Debian and Ubuntu: `mesa-vulkan-drivers libvulkan1`, or that of the vendor; Fedora: \
+                 `mesa-vulkan-drivers vulkan-loader`), see what is found with `pliant devices`, or take `device = \"cpu\"`"
+            }
+            Self::UnknownAdapter { .. } => {
+                "`pliant devices` lists what is there; a part of the name is enough"
+            }
+            Self::Refused { .. } => "update the driver, or take another adapter of `pliant devices`",
+            Self::Lost { .. } => {
+                "run again, from the last checkpoint if there is one (`--resume`); if it comes back, update the driver \
+                 or take `device = \"cpu\"`"
+            }
+            Self::OutOfMemory { .. } | Self::TooLarge { .. } => {
+                "take a coarser mesh, an adapter with more memory (`pliant devices`) or `device = \"cpu\"`"
+            }
+            Self::Unsupported { .. } => "take `device = \"cpu\"`",
+            Self::Internal { .. } => {
+                "take `device = \"cpu\"`, and report this: it is a fault of Pliant or of the driver"
+            }
+        }
+    }
+}
