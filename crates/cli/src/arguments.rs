@@ -71,6 +71,16 @@ pub enum Command {
     /// Measure what a step costs on this machine.
     #[command(after_help = BENCH_HELP)]
     Bench(Bench),
+    /// List the graphics processors a scene can run on.
+    #[command(after_help = "Examples:\n  pliant devices\n  pliant run scenes/liver --device gpu\n  \
+                            pliant run scenes/liver --device gpu --set run.adapter=nvidia\n\n\
+                            The first one is taken where a scene names none. What is found can be narrowed by the variable \
+                            WGPU_BACKEND (vulkan, metal, dx12).")]
+    Devices {
+        /// Print one JSON array on standard output.
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 const BENCH_HELP: &str = "\
@@ -143,6 +153,16 @@ pub struct Overrides {
     /// Number type of the solver.
     #[arg(long)]
     pub precision: Option<Precision>,
+    /// Where the solver runs; `auto`: on a graphics processor if there is one that can.
+    #[arg(long)]
+    pub device: Option<DeviceName>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum DeviceName {
+    Cpu,
+    Gpu,
+    Auto,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -245,6 +265,7 @@ impl Command {
             Self::Run(run) => run.json,
             Self::Info(info) => info.json,
             Self::Bench(bench) => bench.json,
+            Self::Devices { json } => *json,
             Self::Sweep(_)
             | Self::Check(_)
             | Self::New { .. }

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
+use pliant_gpu::{Adapter, GpuError};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
@@ -16,7 +17,7 @@ use pliant_scene::{
 use serde_json::{Map, Value as Json, json};
 use tempfile::TempDir;
 
-use crate::arguments::{self, Check, Command, Info, Overrides, Precision, Run};
+use crate::arguments::{self, Check, Command, DeviceName, Info, Overrides, Precision, Run};
 use crate::bench::bench;
 use crate::report::{self, Bar, Failure, say};
 use crate::reproduce::reproduce;
@@ -39,6 +40,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Import { model, out } => import(&model, &out),
         Command::Reproduce(arguments) => reproduce(&arguments),
         Command::Bench(arguments) => bench(&arguments),
+        Command::Devices { json } => devices(json),
     }
 }
 
@@ -51,11 +53,17 @@ fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), F
         Precision::Single => "single",
         Precision::Double => "double",
     });
+    let device = overrides.device.map(|device| match device {
+        DeviceName::Cpu => "cpu",
+        DeviceName::Gpu => "gpu",
+        DeviceName::Auto => "auto",
+    });
     let settings = [
         (["scene", "until"], overrides.until.map(Value::from)),
         (["run", "step"], overrides.step.map(Value::from)),
         (["run", "threads"], overrides.threads.map(Value::from)),
         (["run", "precision"], precision.map(Value::from)),
+        (["run", "device"], device.map(Value::from)),
     ];
     for (path, value) in settings {
         if let Some(value) = value
@@ -163,7 +171,7 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
         }
         None => fresh_folder(arguments, &scene)?,
     };
-    for note in built.notes.iter().chain(&plan.note) {
+    for note in built.notes.iter().chain(&plan.note).chain(&plan.target.note) {
         eprintln!("note: {note}");
     }
     let bar = Bar::new();
@@ -194,6 +202,26 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
             Ok(ExitCode::from(if interrupted { INTERRUPTED } else { 1 }))
         }
     }
+}
+
+/// Lists the graphics processors.
+fn devices(json: bool) -> Result<ExitCode, Failure> {
+    let found = pliant_gpu::adapters();
+    if json {
+        let object = |a: &Adapter| {
+            json!({
+                "name": a.name, "kind": a.kind.to_string(), "backend": a.backend, "driver": a.driver,
+                "largest_buffer": a.largest_buffer, "shared_memory": a.shared_memory, "group_size": a.group_size,
+                "float_atomics": a.float_atomics, "timestamps": a.timestamps,
+            })
+        };
+        say(Json::Array(found.iter().map(object).collect()))?;
+    } else if found.is_empty() {
+        say(format_args!("{}; {}", GpuError::NoAdapter, GpuError::NoAdapter.remedy()))?;
+    } else {
+        say(report::adapters(&found))?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {

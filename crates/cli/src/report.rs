@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
+use pliant_gpu::Adapter;
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::{
     LoadStepProgress, Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, number,
@@ -154,6 +155,24 @@ pub fn result(summary: &Summary) -> String {
     }
     lines.extend(summary.files.iter().map(|file| format!("wrote {file}")));
     lines.join("\n")
+}
+
+/// The graphics processors as a list, the best first.
+pub fn adapters(found: &[Adapter]) -> String {
+    let of = |a: &Adapter| {
+        let atomics = if a.float_atomics { "adds floats atomically" } else { "no atomic floats" };
+        format!(
+            "{}\n  {}, {}, {}\n  arrays to {} MiB, {} KiB shared by a group of up to {} invocations, {atomics}",
+            a.name,
+            a.kind,
+            a.backend,
+            a.driver,
+            a.largest_buffer >> 20,
+            a.shared_memory >> 10,
+            a.group_size,
+        )
+    };
+    found.iter().map(of).collect::<Vec<_>>().join("\n")
 }
 
 /// Prints a line on standard output. A reader that has gone away (`pliant schema | head`) is no mistake.

@@ -39,6 +39,8 @@ const KEYS: [&str; 19] = [
     "element_bound",
     "true_limit",
     "limiting_element",
+    "device",
+    "precision",
     "steps",
     "wall_seconds",
     "real_time_factor",

@@ -239,13 +239,6 @@ fn word(solver: SolverName) -> &'static str {
     }
 }
 
-fn precision(precision: Precision) -> &'static str {
-    match precision {
-        Precision::Single => f32::PRECISION,
-        Precision::Double => f64::PRECISION,
-    }
-}
-
 impl Origin {
     fn of(scene: &Scene, built: &Built, plan: &Plan) -> Self {
         let mut parts = built.model.fingerprints();
@@ -255,7 +248,7 @@ impl Origin {
         parts.push(("`run.on-unstable`".into(), fingerprint(&scene.run.on_unstable.unwrap_or_default())));
         parts.push(("`run.mass-scaling`".into(), fingerprint(&scene.run.mass_scaling)));
         Self {
-            precision: scene.run.precision,
+            precision: plan.target.precision,
             solver: scene.run.solver,
             until: scene.scene.until,
             step: plan.step,
@@ -267,7 +260,7 @@ impl Origin {
     fn check(&self, scene: &Scene, built: &Built, plan: &Plan) -> Result<(), ResumeError> {
         let own = Self::of(scene, built, plan);
         if own.precision != self.precision {
-            let [checkpoint, scene] = [self.precision, own.precision].map(precision);
+            let [checkpoint, scene] = [self.precision, own.precision].map(Precision::word);
             return Err(ResumeError::OtherPrecision { checkpoint, scene });
         }
         if own.solver != self.solver {
@@ -429,6 +422,11 @@ impl<'a> Checkpoints<'a> {
     /// Whether one is to be written at an instant.
     pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
         self.schedule.is_due(time, step, last)
+    }
+
+    /// How many steps may go on from a time without missing one.
+    pub fn stride(&self, time: f64, step: f64) -> u64 {
+        self.schedule.stride(time, step)
     }
 
     /// Writes one, and removes those before the last two.

@@ -48,6 +48,7 @@ mod solver;
 pub mod source;
 mod starter;
 mod sweep;
+mod target;
 #[cfg(test)]
 mod testing;
 
@@ -64,3 +65,4 @@ pub use scene::{ReadError, Scene, open, scene_file};
 pub use solver::LoadStepProgress;
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
+pub use target::Target;

@@ -8,6 +8,7 @@ use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{SolverName, StepChoice};
 use crate::output::number;
 use crate::scene::Scene;
+use crate::target::Target;
 
 /// Part of the true limit that an automatic step takes.
 pub const SAFETY: f64 = 0.9;
@@ -27,6 +28,8 @@ pub struct Plan {
     pub limiting: LimitingElement,
     /// What to tell the user about a step that was asked for.
     pub note: Option<String>,
+    /// Where the run computes.
+    pub target: Target,
 }
 
 /// The cell that sets the element bound.
@@ -53,10 +56,10 @@ impl std::fmt::Display for LimitingElement {
     }
 }
 
-/// Chooses the step.
+/// Chooses the step, and where to compute.
 ///
 /// # Errors
-/// If the step asked for is above the true limit.
+/// If the step asked for is above the true limit, or the scene can't run where it asks to.
 pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
     let fail = |diagnostic| Err(scene.source.errors(vec![diagnostic]));
     let Some(bound) = element_bound(&built.model) else {
@@ -89,7 +92,11 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         }
         _ => None,
     };
-    let mut plan = Plan { step: 0.0, steps: 0, bound, limit, limiting, note };
+    let target = match Target::choose(scene) {
+        Ok(target) => target,
+        Err(diagnostic) => return fail(*diagnostic),
+    };
+    let mut plan = Plan { step: 0.0, steps: 0, bound, limit, limiting, note, target };
     (plan.steps, plan.step) = plan.steps_of(scene, scene.scene.until);
     Ok(plan)
 }

@@ -13,11 +13,11 @@ use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
 use crate::format::{Precision, SolverName};
 use crate::output::{
     FailureSummary, Frame, OutputError, OutputFolder, PLOT, SUMMARY, Schedule, Scheduled, Summary, markdown,
-    observers, plot, summarise,
+    observers, plot, steps_to, summarise,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::{LoadStepProgress, Solver, solver};
+use crate::solver::{LoadStepProgress, Solver, Wanted, on_processor};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -69,9 +69,30 @@ pub(crate) struct Outcome {
     pub history: History,
     pub files: Vec<PathBuf>,
     pub threads: usize,
-    pub precision: &'static str,
     /// The checkpoint it went on from, and its time [s].
     pub resumed: Option<(PathBuf, f64)>,
+}
+
+impl Outcome {
+    /// Of a run whose solver could not be made.
+    fn not_begun(failure: FailureSummary, built: &Built) -> Self {
+        Self {
+            failure: Some(failure),
+            steps: 0,
+            time: 0.0,
+            wall_seconds: 0.0,
+            energies: Energies::default(),
+            worst_balance: 0.0,
+            balance_floor: 0.0,
+            worst_hourglass: (0.0, 0.0),
+            stability: None,
+            reactions: vec![[0.0; 3]; built.model.constraints.len()],
+            history: History::default(),
+            files: Vec::new(),
+            threads: rayon::current_num_threads(),
+            resumed: None,
+        }
+    }
 }
 
 /// Samples in the history.
@@ -111,9 +132,13 @@ pub fn run_with(
         .num_threads(scene.run.threads as usize)
         .build()
         .map_err(|error| OutputError::new(folder.path(), error))?;
-    let mut outcome = pool.install(|| match scene.run.precision {
-        Precision::Single => go::<f32>(scene, built, plan, folder, options, report),
-        Precision::Double => go::<f64>(scene, built, plan, folder, options, report),
+    let mut outcome = pool.install(|| match (&plan.target.device, plan.target.precision) {
+        (_, Precision::Single) => {
+            go::<f32>(scene, built, plan, folder, options, |_| on_processor(&scene.run, built, plan), report)
+        }
+        (_, Precision::Double) => {
+            go::<f64>(scene, built, plan, folder, options, |_| on_processor(&scene.run, built, plan), report)
+        }
     })?;
     if let Err(error) = write_pages(scene, built, plan, folder, &mut outcome) {
         let time = Some(outcome.time);
@@ -143,15 +168,21 @@ fn write_pages(
     written.map(|_| ())
 }
 
-fn go<R: Real>(
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
-    folder: &OutputFolder,
+fn go<'a, R: Real>(
+    scene: &'a Scene,
+    built: &'a Built,
+    plan: &'a Plan,
+    folder: &'a OutputFolder,
     options: Options<'_>,
+    solver: impl FnOnce(&State<R>) -> Result<Box<dyn Solver<R> + 'a>, FailureSummary>,
     report: &mut (dyn FnMut(Progress) + Send),
 ) -> Result<Outcome, OutputError> {
-    let mut course = Course::<R>::new(scene, built, plan, folder, options)?;
+    let state = beginning(built, folder, options)?;
+    let solver = match solver(&state.state) {
+        Ok(solver) => solver,
+        Err(failure) => return Ok(Outcome::not_begun(failure, built)),
+    };
+    let mut course = Course::<R>::new(scene, built, plan, folder, options, state, solver)?;
     let before = options.resume.map_or(0.0, |checkpoint| checkpoint.progressed.wall_seconds);
     let started = Instant::now();
     let wall_seconds = || before + started.elapsed().as_secs_f64();
@@ -203,9 +234,22 @@ fn go<R: Real>(
         history: course.history,
         files: course.files.into_iter().chain(course.kept).collect(),
         threads: rayon::current_num_threads(),
-        precision: R::PRECISION,
         resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
     })
+}
+
+/// Where the run begins: at rest, or where a checkpoint was.
+fn beginning<R: Real>(
+    built: &Built,
+    folder: &OutputFolder,
+    options: Options<'_>,
+) -> Result<Moment<R>, OutputError> {
+    match options.resume {
+        Some(checkpoint) => checkpoint
+            .moment(built)
+            .ok_or_else(|| OutputError::new(folder.path(), "the checkpoint is of another model")),
+        None => Ok(Moment { state: State::at_rest(&built.model), equilibrium: None }),
+    }
 }
 
 /// Hourglass energy over internal energy; 0 while both together are below the floor [J] from which on energies mean
@@ -247,22 +291,14 @@ impl<'a, R: Real> Course<'a, R> {
         plan: &'a Plan,
         folder: &'a OutputFolder,
         options: Options<'_>,
+        Moment { state, equilibrium }: Moment<R>,
+        mut solver: Box<dyn Solver<R> + 'a>,
     ) -> Result<Self, OutputError> {
-        let failed = |reason: &dyn std::fmt::Display| OutputError::new(folder.path(), reason);
         let mut files = Vec::new();
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
         let written = before.map(|before| before.outputs.as_slice());
         let watching = observers::<R>(scene, built, folder.path(), &mut files, written)?;
-        // Contradicting constraints were refused when the model was built.
-        let mut solver = solver::<R>(&scene.run, built, plan).map_err(|error| failed(&error))?;
-        let mut state = State::<R>::at_rest(&built.model);
-        if let Some(checkpoint) = options.resume {
-            let moment = checkpoint.moment(built);
-            let Moment { state: there, equilibrium } =
-                moment.ok_or_else(|| failed(&"the checkpoint is of another model"))?;
-            state = there;
-            equilibrium.into_iter().for_each(|equilibrium| solver.resume(equilibrium));
-        }
+        equilibrium.into_iter().for_each(|equilibrium| solver.resume(equilibrium));
         Ok(Self {
             scene,
             built,
@@ -282,7 +318,10 @@ impl<'a, R: Real> Course<'a, R> {
 
     /// Evaluates the current instant and shows it to all who look; whether it is the last.
     fn see(&mut self) -> Result<bool, FailureSummary> {
-        self.solver.evaluate(&mut self.state)?;
+        let (time, step, last) = (self.state.time, self.plan.step, self.is_last());
+        let looked_at = self.watching.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
+        let wanted = if looked_at { Wanted::Everything } else { Wanted::Energies };
+        self.solver.evaluate(&mut self.state, wanted)?;
         let observable = self.solver.observable();
         if self.state.work.largest > self.solver.balance_floor() {
             self.worst_balance = self.worst_balance.max(observable.energies().balance);
@@ -291,18 +330,28 @@ impl<'a, R: Real> Course<'a, R> {
         if share > self.worst_hourglass.0 {
             self.worst_hourglass = (share, self.state.time);
         }
-        let last = self.is_last();
-        if self.sampling.is_due(self.state.time, self.plan.step, last) {
+        if self.sampling.is_due(time, step, last) {
             self.history.sample(self.built, observable, &self.state);
         }
         let frame = Frame { built: self.built, state: &self.state, stepper: observable };
-        look(&mut self.watching, &frame, self.plan.step, last)
+        look(&mut self.watching, &frame, step, last)
             .map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?;
         Ok(last)
     }
 
     fn is_last(&self) -> bool {
         self.state.time + 0.5 * self.plan.step >= self.scene.scene.until
+    }
+
+    /// The steps to the next instant at which there is something to do.
+    fn stride(&self) -> u64 {
+        let (time, step) = (self.state.time, self.plan.step);
+        (self.watching.iter().map(|(schedule, _)| schedule))
+            .chain([&self.sampling])
+            .map(|schedule| schedule.stride(time, step))
+            .chain(self.checkpoints.as_ref().map(|checkpoints| checkpoints.stride(time, step)))
+            .chain([steps_to(self.scene.scene.until, time, step), self.solver.stride()])
+            .fold(u64::MAX, u64::min)
     }
 
     /// Goes to the next instant, with a checkpoint there if one is due or the run is to `stop`.
@@ -312,11 +361,13 @@ impl<'a, R: Real> Course<'a, R> {
         stop: bool,
         watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
-        self.solver.advance(&mut self.state, watch)?;
+        let steps = self.stride();
+        self.solver.advance(&mut self.state, steps, watch)?;
         let last = self.is_last();
         let due = (self.checkpoints.as_mut())
             .is_some_and(|all| all.is_due(self.state.time, self.plan.step, last || stop));
         if due && let Some(checkpoints) = &self.checkpoints {
+            self.solver.bring_back(&mut self.state)?;
             let progressed = Progressed {
                 time: self.state.time,
                 steps: self.state.steps,

@@ -1,5 +1,6 @@
 //! The solvers of a scene behind one face, so that one run loop serves them all.
 
+use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::stability::Monitor;
 use pliant_mechanics::{
     CentralDifference, DynamicRelaxation, Equilibrium, Iteration, Observable, Real, RelaxationSettings, State,
@@ -9,6 +10,15 @@ use crate::build::Built;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
+
+/// What of a state is to belong to its instant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// Energies and reactions.
+    Energies,
+    /// The fields, too.
+    Everything,
+}
 
 /// How far a load step is.
 #[derive(Clone, Copy, Debug)]
@@ -25,15 +35,27 @@ pub struct LoadStepProgress {
 
 /// Brings a state from instant to instant.
 pub(crate) trait Solver<R> {
-    /// Makes all that can be asked belong to the state's instant.
-    fn evaluate(&mut self, state: &mut State<R>) -> Result<(), FailureSummary>;
+    /// Makes what can be asked belong to the state's instant, and of the state what is wanted.
+    fn evaluate(&mut self, state: &mut State<R>, wanted: Wanted) -> Result<(), FailureSummary>;
 
-    /// Goes on to the next instant; tells now and then how far it is, if that takes long.
+    /// Goes so many steps on from an instant that was evaluated, not more than its stride; tells now and then how far it
+    /// is, if that takes long.
     fn advance(
         &mut self,
         state: &mut State<R>,
+        steps: u64,
         watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary>;
+
+    /// The most steps it takes in one go: more than one where the state is far away.
+    fn stride(&self) -> u64 {
+        1
+    }
+
+    /// Makes the state complete, as a checkpoint needs it.
+    fn bring_back(&mut self, _state: &mut State<R>) -> Result<(), FailureSummary> {
+        Ok(())
+    }
 
     /// Energy [J] above which the balance is judged.
     fn balance_floor(&self) -> f64;
@@ -51,22 +73,27 @@ pub(crate) trait Solver<R> {
     fn resume(&mut self, _equilibrium: Equilibrium<R>) {}
 }
 
-/// The solver that a scene asks for.
-pub(crate) fn solver<'m, R: Real>(
+/// Watches the largest stable step of an explicit run; where every node is held there is no limit to watch.
+fn monitor(run: &RunTable, built: &Built, plan: &Plan) -> Option<Monitor> {
+    let on_unstable = run.on_unstable.unwrap_or_default();
+    (plan.limit.step.is_finite()).then(|| Monitor::new(&built.model, plan.limit.step, on_unstable))
+}
+
+/// The solver that a scene asks for, on the processor.
+pub(crate) fn on_processor<'m, R: Real>(
     run: &RunTable,
     built: &'m Built,
     plan: &Plan,
-) -> Result<Box<dyn Solver<R> + 'm>, pliant_mechanics::model::Contradiction> {
+) -> Result<Box<dyn Solver<R> + 'm>, FailureSummary> {
+    // Refused when the model was built.
+    let contradicting = |error: Contradiction| FailureSummary::input(&error);
     Ok(match run.solver {
         SolverName::Explicit => {
-            let stepper = CentralDifference::new(&built.model, plan.step)?;
-            // Where every node is held there is no limit to watch.
-            Box::new(if plan.limit.step.is_finite() {
-                let on_unstable = run.on_unstable.unwrap_or_default();
-                stepper.watched(Monitor::new(&built.model, plan.limit.step, on_unstable))
-            } else {
-                stepper
-            })
+            let stepper = CentralDifference::new(&built.model, plan.step).map_err(contradicting)?;
+            match monitor(run, built, plan) {
+                Some(monitor) => Box::new(stepper.watched(monitor)),
+                None => Box::new(stepper),
+            }
         }
         SolverName::QuasiStatic => {
             let precise = RelaxationSettings::default().tolerance;
@@ -74,7 +101,7 @@ pub(crate) fn solver<'m, R: Real>(
                 run.tolerance.unwrap_or(if R::EPSILON > 1e-10 { 100.0 * precise } else { precise });
             let settings = RelaxationSettings { tolerance, ..RelaxationSettings::default() };
             Box::new(LoadSteps {
-                relaxation: DynamicRelaxation::new(&built.model, settings)?,
+                relaxation: DynamicRelaxation::new(&built.model, settings).map_err(contradicting)?,
                 step: plan.step,
                 count: plan.steps,
                 tolerance,
@@ -84,7 +111,7 @@ pub(crate) fn solver<'m, R: Real>(
 }
 
 impl<R: Real> Solver<R> for CentralDifference<'_, R> {
-    fn evaluate(&mut self, state: &mut State<R>) -> Result<(), FailureSummary> {
+    fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
         CentralDifference::evaluate(self, state).map_err(|error| FailureSummary::from(&error))
     }
 
@@ -92,11 +119,12 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
     fn advance(
         &mut self,
         state: &mut State<R>,
+        _steps: u64,
         _watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
         CentralDifference::advance(self, state);
         while !state.is_between_steps() {
-            Solver::evaluate(self, state)?;
+            Solver::evaluate(self, state, Wanted::Energies)?;
             CentralDifference::advance(self, state);
         }
         Ok(())
@@ -123,13 +151,14 @@ struct LoadSteps<'m, R> {
 }
 
 impl<R: Real> Solver<R> for LoadSteps<'_, R> {
-    fn evaluate(&mut self, _state: &mut State<R>) -> Result<(), FailureSummary> {
+    fn evaluate(&mut self, _state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
         Ok(())
     }
 
     fn advance(
         &mut self,
         state: &mut State<R>,
+        _steps: u64,
         watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
         let number = (state.time / self.step).round() as u64 + 1;
@@ -169,11 +198,11 @@ mod tests {
                     nodes = { set = 'z-max' }\nby = [0, 0, 0.01]\n";
         let (scene, built) = (scene(more), built(more));
         let plan = crate::plan(&scene, &built).unwrap();
-        let mut solver = solver::<f64>(&scene.run, &built, &plan).unwrap();
+        let mut solver = on_processor::<f64>(&scene.run, &built, &plan).unwrap();
         let mut state = State::at_rest(&built.model);
         for number in [1, 2] {
             let mut told = Vec::new();
-            solver.advance(&mut state, &mut |progress| told.push(progress)).unwrap();
+            solver.advance(&mut state, 1, &mut |progress| told.push(progress)).unwrap();
             assert!(told.len() > 10 && told.iter().all(|p| (p.number, p.of) == (number, 2)));
             let fractions: Vec<f64> = told.iter().map(|p| p.iteration.fraction).collect();
             assert!(fractions.is_sorted() && fractions[0] == 0.0, "{fractions:?}");

@@ -40,9 +40,16 @@ pub struct SceneTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RunTable {
-    /// Number type of the solver.
+    /// Where the solver runs.
     #[serde(default)]
-    pub precision: Precision,
+    pub device: DeviceName,
+    /// The graphics processor, by a part of its name in `pliant devices`; if not given, the best one.
+    #[serde(default)]
+    pub adapter: Option<String>,
+    /// Number type of the solver; if not given, `double` on the processor and `single` on a graphics processor, which has
+    /// no other.
+    #[serde(default)]
+    pub precision: Option<Precision>,
     /// How the state goes from instant to instant.
     #[serde(default)]
     pub solver: SolverName,
@@ -109,15 +116,37 @@ pub enum SolverName {
     QuasiStatic,
 }
 
-/// Number type of the solver.
+/// Where a solver runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviceName {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A graphics processor.
+    Gpu,
+    /// A graphics processor where there is one and it can run the scene, else the processor; the run says which and why.
+    Auto,
+}
+
+/// Number type of the solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Precision {
     /// 32-bit numbers: faster, about six digits.
     Single,
     /// 64-bit numbers: the reference.
-    #[default]
     Double,
+}
+
+impl Precision {
+    /// Its word in a scene file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Double => "double",
+        }
+    }
 }
 
 /// A time step.

@@ -106,14 +106,29 @@ impl Schedule {
         schedule
     }
 
-    /// Whether an instant is to be looked at.
+    /// Whether an instant is still to be looked at.
+    pub fn awaits(&self, time: f64, step: f64, last: bool) -> bool {
+        last || time + 0.5 * step >= self.seen as f64 * self.every
+    }
+
+    /// How many steps may go on from a time without missing an instant to be looked at; at least one.
+    pub fn stride(&self, time: f64, step: f64) -> u64 {
+        steps_to(self.seen as f64 * self.every, time, step)
+    }
+
+    /// Whether an instant is to be looked at; from now on it is not.
     pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
-        let due = last || time + 0.5 * step >= self.seen as f64 * self.every;
+        let due = self.awaits(time, step, last);
         if due {
             self.seen = (((time + 0.5 * step) / self.every).floor() as u64).saturating_add(1);
         }
         due
     }
+}
+
+/// Steps from a time to the instant nearest to another time, at least one; rather one too few than one too many.
+pub(crate) fn steps_to(goal: f64, time: f64, step: f64) -> u64 {
+    (((goal - time) / step - 0.5 - 1e-6).ceil()).max(1.0) as u64
 }
 
 /// An observer with its schedule.
@@ -167,6 +182,27 @@ mod tests {
             (0..=10).filter(|&n| schedule.is_due(f64::from(n) * step, step, n == 10)).collect();
         // 0.00, 0.09, 0.21, 0.30.
         assert_eq!(seen, [0, 3, 7, 10]);
+    }
+
+    #[test]
+    fn strides_miss_no_instant() {
+        for (every, step) in [(0.1, 0.03), (0.1, 0.1), (0.1, 0.02), (0.01, 0.05), (1.0, 1e-4)] {
+            let end = 20_000_u64;
+            let mut one_by_one = Schedule::new(every);
+            let mut in_strides = one_by_one;
+            let seen: Vec<u64> =
+                (0..end).filter(|&n| one_by_one.is_due(n as f64 * step, step, false)).collect();
+            let (mut found, mut looks, mut n) = (Vec::new(), 0, 0);
+            while n < end {
+                looks += 1;
+                if in_strides.is_due(n as f64 * step, step, false) {
+                    found.push(n);
+                }
+                n += in_strides.stride(n as f64 * step, step);
+            }
+            assert_eq!(seen, found, "every {every} s in steps of {step} s");
+            assert!(looks <= 2 * seen.len(), "{looks} looks for {} instants", seen.len());
+        }
     }
 
     #[test]

@@ -40,6 +40,10 @@ pub struct Summary {
     pub true_limit: f64,
     /// The element that sets the bound.
     pub limiting_element: LimitingElement,
+    /// Where it was computed: `cpu`, or the name of the graphics processor.
+    pub device: String,
+    /// `single` or `double`.
+    pub precision: &'static str,
     /// Steps taken.
     pub steps: u64,
     /// Wall time of the steps and their outputs [s].
@@ -98,7 +102,7 @@ pub struct LoadStepSummary {
 /// Why a run failed or an input was refused.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureSummary {
-    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `not-converged`, `output`, `input` or `interrupted`.
+    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `not-converged`, `device`, `output`, `input` or `interrupted`.
     pub kind: &'static str,
     /// The body, where it is about one.
     pub body: Option<String>,
@@ -133,7 +137,7 @@ fn empty(status: &str, error: FailureSummary) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "true_limit": null, "limiting_element": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "true_limit": null, "limiting_element": null, "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
@@ -155,6 +159,11 @@ impl FailureSummary {
         };
         let message = format!("the run was interrupted at t = {} s; {way}", number(time));
         Self::about(INTERRUPTED, message, Some(time))
+    }
+
+    /// A scene that should have been refused before.
+    pub(crate) fn input(error: &dyn std::fmt::Display) -> Self {
+        Self::about("input", error.to_string(), None)
     }
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
@@ -243,6 +252,8 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
         element_bound: plan.bound.step,
         true_limit: plan.limit.step,
         limiting_element: plan.limiting.clone(),
+        device: plan.target.name().to_owned(),
+        precision: plan.target.precision.word(),
         steps: outcome.steps,
         wall_seconds: outcome.wall_seconds,
         real_time_factor: outcome.time / outcome.wall_seconds.max(f64::MIN_POSITIVE),
@@ -334,8 +345,9 @@ fn write_page(
     writeln!(page, "| real-time factor | {} |", number(summary.real_time_factor))?;
     let work = outcome.steps as f64 * summary.elements as f64;
     writeln!(page, "| per element and step | {} ns |", number(summary.wall_seconds / work.max(1.0) * 1e9))?;
+    writeln!(page, "| device | {} |", summary.device)?;
     writeln!(page, "| threads | {} |", outcome.threads)?;
-    writeln!(page, "| precision | {} |", outcome.precision)?;
+    writeln!(page, "| precision | {} |", summary.precision)?;
     let doubts = summary.warnings.iter().map(|doubt| format!("**Warning:** {doubt}"));
     let remarks: Vec<String> = (doubts.chain(built.warnings.iter().map(ToString::to_string)))
         .chain(built.notes.iter().cloned())

@@ -1,0 +1,100 @@
+//! Scenes on a graphics processor, through the real binary: where they run, what is refused and what is told. Without an
+//! adapter the tests that need one are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
+
+mod support;
+
+use support::{BLOCK, Told, Workshop, changed};
+
+/// [`BLOCK`] on a device.
+fn on(device: &str) -> Workshop {
+    Workshop::new(&changed(BLOCK, "precision = \"double\"", device))
+}
+
+/// What is told where no adapter is found: on Linux none answers to Direct3D.
+fn without_adapters(workshop: &Workshop, arguments: &[&str]) -> Told {
+    let mut command = workshop.command(arguments);
+    command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into()
+}
+
+/// Whether there is an adapter.
+fn is_there() -> bool {
+    let found = !pliant_gpu::adapters().is_empty();
+    let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
+    assert!(found || !required, "no graphics processor was found, and PLIANT_REQUIRE_GPU=1 asks for one");
+    if !found {
+        eprintln!("skipped: no graphics processor was found");
+    }
+    found
+}
+
+#[test]
+fn devices_are_listed_with_what_matters() {
+    if !is_there() {
+        return;
+    }
+    let workshop = Workshop::new(BLOCK);
+    let best = pliant_gpu::adapters().remove(0);
+    let told = workshop.pliant(&["devices"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    for piece in [best.name.as_str(), best.backend.as_str(), "MiB", "KiB"] {
+        assert!(told.out.contains(piece), "no `{piece}` in:\n{}", told.out);
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&workshop.pliant(&["devices", "--json"]).out).expect("JSON");
+    assert_eq!(json[0]["name"], best.name);
+    assert_eq!(json[0]["largest_buffer"], best.largest_buffer);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn without_an_adapter_the_packages_are_named_and_auto_runs_on_the_processor() {
+    let told = without_adapters(&on("device = \"cpu\""), &["devices"]);
+    assert_eq!(told.code, 0);
+    assert!(told.out.contains("no graphics processor was found"), "{}", told.out);
+    assert!(told.out.contains("mesa-vulkan-drivers"), "{}", told.out);
+
+    let refused = without_adapters(&on("device = \"gpu\""), &["run", "case", "--json"]);
+    assert_eq!(refused.code, 2, "{}", refused.err);
+    assert!(refused.underlines("device = \"gpu\""), "{}", refused.err);
+    assert!(refused.words().contains("mesa-vulkan-drivers"), "{}", refused.err);
+    assert_eq!(refused.json()["error"]["kind"], "input");
+
+    let ran = without_adapters(&on("device = \"auto\""), &["run", "case", "--json", "--step", "1e-3"]);
+    let json = ran.done();
+    assert_eq!((&json["device"], &json["precision"]), (&"cpu".into(), &"double".into()));
+    assert!(ran.words().contains("it runs on the processor"), "{}", ran.err);
+}
+
+#[test]
+fn what_only_the_processor_can_do_is_refused_by_name_before_the_run() {
+    for (run, line, says) in [
+        ("device = \"gpu\"\nsolver = \"quasi-static\"", "solver = \"quasi-static\"", "the solver `quasi-static`"),
+        ("device = \"gpu\"\nprecision = \"double\"", "precision = \"double\"", "double precision"),
+    ] {
+        let told = on(run).pliant(&["check", "case"]);
+        assert_eq!(told.code, 2, "{}", told.out);
+        assert!(told.underlines(line) || told.underlines("device = \"gpu\""), "{}", told.err);
+        assert!(told.words().contains(&format!("{says} runs on the processor only")), "{}", told.err);
+        assert!(told.words().contains("device = \"cpu\""), "{}", told.err);
+    }
+    let auto = on("device = \"auto\"\nsolver = \"quasi-static\"\nload-steps = 2");
+    let told = auto.run(&[]);
+    assert_eq!(told.done()["device"], "cpu");
+    assert!(told.words().contains("the solver `quasi-static` runs on the processor only"), "{}", told.err);
+}
+
+#[test]
+fn an_adapter_that_is_not_there_or_not_used_is_refused_in_the_users_line() {
+    let unused = on("device = \"cpu\"\nadapter = \"x\"").run(&[]);
+    assert_eq!(unused.code, 2);
+    assert!(unused.underlines("adapter = \"x\"") && unused.words().contains("runs on the processor"));
+    if !is_there() {
+        return;
+    }
+    let unknown = on("device = \"gpu\"\nadapter = \"no such adapter\"").run(&[]);
+    assert_eq!(unknown.code, 2);
+    assert!(unknown.underlines("adapter = \"no such adapter\""), "{}", unknown.err);
+    for piece in ["there is no adapter", &pliant_gpu::adapters()[0].name, "pliant devices"] {
+        assert!(unknown.words().contains(piece), "no `{piece}` in:\n{}", unknown.err);
+    }
+}

@@ -1,0 +1,112 @@
+//! Where a run computes: on the processor or on a graphics processor, as the scene asks and the machine has it.
+
+use pliant_gpu::{Device, GpuError, Kind};
+
+use crate::diagnostic::Diagnostic;
+use crate::format::{DeviceName, Precision, RunTable, SolverName};
+use crate::scene::Scene;
+
+/// Where a run computes, and in which numbers.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// The graphics processor; `None`: the processor.
+    pub device: Option<Device>,
+    /// The number type.
+    pub precision: Precision,
+    /// Why it is not where one might expect it.
+    pub note: Option<String>,
+}
+
+impl Target {
+    /// As the scene asks; opens the device.
+    ///
+    /// # Errors
+    /// If a graphics processor is asked for, and there is none or it can't run the scene.
+    pub(crate) fn choose(scene: &Scene) -> Result<Self, Box<Diagnostic>> {
+        let run = &scene.run;
+        match run.device {
+            DeviceName::Cpu => match &run.adapter {
+                None => Ok(Self::processor(run, None)),
+                Some(name) => {
+                    let message =
+                        format!("the adapter `{name}` is named, but the scene runs on the processor");
+                    let place = scene.source.span(&["run", "adapter"]);
+                    let error = Diagnostic::error(message).at(place, "not used");
+                    Err(Box::new(error.help("set `device = \"gpu\"` or `\"auto\"`, or leave `adapter` out")))
+                }
+            },
+            DeviceName::Gpu => match processor_only(run) {
+                None => match open(run) {
+                    Ok(device) => {
+                        let software = device.adapter().kind == Kind::Software;
+                        let note = software.then(|| {
+                            format!(
+                                "`{}` is the processor in disguise: right, but slower than `device = \"cpu\"`",
+                                device.adapter().name
+                            )
+                        });
+                        Ok(Self { device: Some(device), precision: Precision::Single, note })
+                    }
+                    Err(error) => {
+                        let key = if run.adapter.is_some() { "adapter" } else { "device" };
+                        let place = scene.source.span(&["run", key]);
+                        Err(Box::new(Diagnostic::error(error.to_string()).at(place, "").help(error.remedy())))
+                    }
+                },
+                Some((key, what, help)) => {
+                    let error = Diagnostic::error(format!("{what} runs on the processor only"))
+                        .at(scene.source.span(&["run", "device"]), "not for this")
+                        .also(scene.source.span(&["run", key]), "asked for here");
+                    Err(Box::new(error.help(help)))
+                }
+            },
+            DeviceName::Auto => Ok(match processor_only(run) {
+                Some((_, what, _)) => {
+                    Self::processor(run, Some(format!("{what} runs on the processor only")))
+                }
+                None => match open(run) {
+                    Ok(device) if device.adapter().kind == Kind::Software => {
+                        let name = &device.adapter().name;
+                        Self::processor(
+                            run,
+                            Some(format!(
+                                "the only adapter, `{name}`, is the processor in disguise: it runs there"
+                            )),
+                        )
+                    }
+                    Ok(device) => {
+                        let note = Some(format!("it runs on `{}`", device.adapter().name));
+                        Self { device: Some(device), precision: Precision::Single, note }
+                    }
+                    Err(error) => Self::processor(run, Some(format!("{error}: it runs on the processor"))),
+                },
+            }),
+        }
+    }
+
+    fn processor(run: &RunTable, note: Option<String>) -> Self {
+        Self { device: None, precision: run.precision.unwrap_or(Precision::Double), note }
+    }
+
+    /// `cpu`, or the name of the graphics processor.
+    pub fn name(&self) -> &str {
+        self.device.as_ref().map_or("cpu", |device| &device.adapter().name)
+    }
+}
+
+/// The key that a graphics processor can't serve, in words, and what to do.
+fn processor_only(run: &RunTable) -> Option<(&'static str, &'static str, &'static str)> {
+    if run.solver == SolverName::QuasiStatic {
+        let help = "set `device = \"cpu\"`, or `solver = \"explicit\"`";
+        return Some(("solver", "the solver `quasi-static`", help));
+    }
+    if run.precision == Some(Precision::Double) {
+        let help = "set `device = \"cpu\"`, or leave `precision` out";
+        return Some(("precision", "double precision", help));
+    }
+    None
+}
+
+fn open(run: &RunTable) -> Result<Device, GpuError> {
+    Device::open(run.adapter.as_deref())
+}
