@@ -13,10 +13,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::applied::AppliedForces;
+use crate::energies::Energies;
 use crate::forces::InternalForces;
 use crate::model::{Contradiction, FREE, Model};
 use crate::state::{History, State};
-use crate::stepper::{Energies, Observable, sum_owned};
+use crate::stepper::{Observable, sum_owned};
 use crate::tensor::{Vector, sub};
 
 /// Nodes per parallel task.

@@ -15,7 +15,7 @@ use crate::tensor::{Symmetric, Tensor, Vector};
 use crate::{Number, Real};
 
 /// Numbers in a pack: the widest register in single precision.
-pub(crate) const PACK: usize = 16;
+pub const PACK: usize = 16;
 
 /// Numbers of neighbouring cells, aligned so that none of their registers crosses a cache line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

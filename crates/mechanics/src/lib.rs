@@ -41,6 +41,7 @@ pub mod critical_step;
 pub mod curve;
 mod dynamic_relaxation;
 pub mod element;
+mod energies;
 mod fingerprint;
 mod forces;
 pub mod harmonic;
@@ -54,6 +55,8 @@ mod real;
 pub mod recover;
 pub mod stability;
 mod state;
+mod step_control;
+mod step_error;
 mod stepper;
 mod tangent;
 pub mod tensor;
@@ -61,11 +64,13 @@ pub mod tensor;
 pub use dynamic_relaxation::{
     Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings,
 };
+pub use energies::{BALANCE_LIMIT, BALANCE_STEPS, Energies, Sums, balance_floor, model_balance_floor};
 pub use fingerprint::fingerprint;
-pub use lanes::Pack;
+pub use forces::Deformed;
+pub use lanes::{PACK, Pack};
 pub use model::Model;
 pub use real::{Number, Real};
 pub use state::{History, State, Work};
-pub use stepper::{
-    BALANCE_LIMIT, BALANCE_STEPS, CentralDifference, Energies, Observable, StepError, balance_floor,
-};
+pub use step_control::{Lengths, StepControl};
+pub use step_error::StepError;
+pub use stepper::{CentralDifference, Observable};

@@ -520,7 +520,7 @@ impl Model {
     }
 
     /// The amplitude of the motion of each component that has an owner (see [`Motion::amplitude`]); 0 for the others.
-    pub(crate) fn amplitudes(&self, owners: &[[u32; 3]]) -> Vec<Vector<f64>> {
+    pub fn amplitudes(&self, owners: &[[u32; 3]]) -> Vec<Vector<f64>> {
         let mut amplitudes = vec![[0.0; 3]; self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
             for (&node, amplitude) in constraint.nodes.iter().zip(constraint.amplitudes()) {

@@ -119,7 +119,7 @@ impl<R: Real> State<R> {
     }
 
     /// True before the first step.
-    pub(crate) fn is_at_start(&self) -> bool {
+    pub fn is_at_start(&self) -> bool {
         self.steps == 0 && self.is_between_steps()
     }
 

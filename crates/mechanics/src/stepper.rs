@@ -9,52 +9,21 @@
 //! Runs on the current rayon pool; sums go in the order of the nodes for any number of threads.
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::applied::AppliedForces;
-use crate::critical_step::limit_about;
+use crate::energies::{Energies, Sums, model_balance_floor};
 use crate::forces::{Deformed, InternalForces};
 use crate::lanes::{Lanes, Processor, Work};
 use crate::model::{Contradiction, FREE, Model};
-use crate::stability::{CHANGE, CHECK_EVERY, Look, Monitor, OnUnstable, substeps};
+use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
-use crate::tensor::{Vector, add, cast};
+use crate::step_control::{Lengths, StepControl};
+use crate::step_error::StepError;
+use crate::tensor::{Vector, add};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
-
-/// The balance is judged once an energy exceeds this fraction of Σ V (λ+2μ): below it, round-off counts.
-pub fn balance_floor<R: Real>() -> f64 {
-    // 1e-9 in double and 1e-6 in single precision.
-    (R::EPSILON * 10.0).max(1e-9)
-}
-
-/// A run whose energies are off by more than this fraction of the largest one ends …
-pub const BALANCE_LIMIT: f64 = 0.05;
-
-/// … once they are so for this many steps in a row. A shock unbalances the few steps in which the struck nodes move
-/// but their stress wave is not yet resolved; a stable vibration with more than 5 % of its energy in the step error
-/// (ωΔt > 0.45) passes through zero every seventh step; only a growing one stays.
-pub const BALANCE_STEPS: u32 = 20;
-
-/// Energies at one instant [J].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Energies {
-    /// ½ Σ m v².
-    pub kinetic: f64,
-    /// ∫ f_int · du without hourglass control: stored and viscous part together.
-    pub internal: f64,
-    /// Taken by mass-proportional damping.
-    pub damping: f64,
-    /// Held by hourglass control.
-    pub hourglass: f64,
-    /// Work of loads and prescribed motions, and the kinetic energy given at the start.
-    pub external: f64,
-    /// |kinetic + internal + damping + hourglass − external| over the largest of them so far, with ⅛ Δt² Σ m|a|² of the start
-    /// as part of the kinetic energy: of loads that set in at once it stays behind for good.
-    pub balance: f64,
-}
 
 /// What can be asked about the instant a state stands at, of whatever brought it there.
 pub trait Observable<R> {
@@ -68,140 +37,11 @@ pub trait Observable<R> {
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64>;
 }
 
-/// Why a step could not be taken.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum StepError {
-    /// A displacement is not a number or infinite.
-    #[error("the displacement of node {node} of `{body}` is no longer finite at t = {time:.6} s")]
-    NotFinite {
-        /// The body.
-        body: String,
-        /// The node, numbered in its body.
-        node: u32,
-        /// Time [s].
-        time: f64,
-    },
-    /// A cell is turned inside out.
-    #[error("element {element} of `{body}` is inverted (det F = {determinant:.3e}) at t = {time:.6} s")]
-    Inverted {
-        /// The body.
-        body: String,
-        /// The element, numbered as in the user's mesh.
-        element: u32,
-        /// Its first node, numbered in its body.
-        node: u32,
-        /// det F.
-        determinant: f64,
-        /// Time [s].
-        time: f64,
-    },
-    /// The largest stable step fell below the running one.
-    #[error(
-        "the largest stable step has fallen to {limit:.3e} s, below the step {step:.3e} s, at t = {time:.6} s: element \
-         {element} of `{body}` has become too stiff for it"
-    )]
-    BelowLimit {
-        /// The body.
-        body: String,
-        /// The element that sets the limit, numbered as in the user's mesh.
-        element: u32,
-        /// Its first node, numbered in its body.
-        node: u32,
-        /// The limit [s].
-        limit: f64,
-        /// The step [s].
-        step: f64,
-        /// Time [s].
-        time: f64,
-    },
-    /// Energy appears or vanishes: the run is unstable.
-    #[error(
-        "the energies are off balance by {:.0} % at t = {time:.6} s; the fastest node is {node} of `{body}`",
-        balance * 100.0
-    )]
-    Unbalanced {
-        /// The body of the fastest node.
-        body: String,
-        /// The fastest node, numbered in its body.
-        node: u32,
-        /// The balance, as a fraction.
-        balance: f64,
-        /// Time [s].
-        time: f64,
-    },
-}
-
-impl StepError {
-    /// What to try.
-    pub fn remedy(&self) -> &'static str {
-        match self {
-            Self::NotFinite { .. } | Self::Unbalanced { .. } => {
-                "the step is too large for the deformed state: try a smaller `step`, a slower motion or a smoother curve"
-            }
-            Self::BelowLimit { .. } => {
-                "try a smaller `step` or a slower motion, or let the run cut its steps (`on-unstable = \"substep\"`; into 100 \
-                 parts at the most)"
-            }
-            Self::Inverted { .. } => {
-                "try a slower or smaller motion, a smaller `step`, more damping, or a finer mesh there"
-            }
-        }
-    }
-}
-
-/// Sums over the nodes of one task.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    kinetic: f64,
-    damping_power: f64,
-    internal_before: f64,
-    internal_after: f64,
-    external_before: f64,
-    external_after: f64,
-}
-
-impl Sums {
-    fn merge(self, b: &Self) -> Self {
-        Self {
-            kinetic: self.kinetic + b.kinetic,
-            damping_power: self.damping_power + b.damping_power,
-            internal_before: self.internal_before + b.internal_before,
-            internal_after: self.internal_after + b.internal_after,
-            external_before: self.external_before + b.external_before,
-            external_after: self.external_after + b.external_after,
-        }
-    }
-}
-
-/// Times at an instant.
-#[derive(Clone, Copy, Debug)]
-struct Lengths {
-    /// Length Δt⁻ of the (sub)step before [s].
-    before: f64,
-    /// Length Δt⁺ of the (sub)step to come [s].
-    next: f64,
-}
-
-impl Lengths {
-    /// Δt⁺/Δt⁻; exactly 1 where they are equal.
-    fn ratio(self) -> f64 {
-        self.next / self.before
-    }
-
-    /// h = (Δt⁻ + Δt⁺)/2 [s].
-    fn mean(self) -> f64 {
-        0.5 * (self.before + self.next)
-    }
-}
-
 /// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that a restart
 /// would lose.
 pub struct CentralDifference<'m, R> {
     model: &'m Model,
-    step: f64,
-    monitor: Option<Monitor>,
-    /// Parts of the step to come.
-    substeps: u32,
+    control: StepControl,
     lengths: Lengths,
     /// Length of a step [s] that relaxing laws are set to.
     relaxing: f64,
@@ -388,18 +228,10 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         for body in &model.bodies {
             damping[body.nodes.start as usize..body.nodes.end as usize].fill([R::of(body.damping); 3]);
         }
-        let stiffness: f64 = (model.solids.iter())
-            .map(|solid| {
-                let volume: f64 = (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum();
-                volume * solid.material.law.longitudinal_modulus()
-            })
-            .sum();
         let owners = model.constrained_components()?;
         Ok(Self {
             model,
-            step,
-            monitor: None,
-            substeps: 1,
+            control: StepControl::new(step),
             lengths: Lengths { before: step, next: step },
             relaxing: step,
             forces: InternalForces::new(model, step),
@@ -415,20 +247,20 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             reaction: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
             energies: Energies::default(),
-            balance_floor: balance_floor::<R>() * stiffness,
+            balance_floor: model_balance_floor::<R>(model),
         })
     }
 
     /// Watches the largest stable step with a monitor of the same model.
     #[must_use]
     pub fn watched(mut self, monitor: Monitor) -> Self {
-        self.monitor = Some(monitor);
+        self.control.watch(monitor);
         self
     }
 
     /// The length [s] of a whole step.
     pub fn step(&self) -> f64 {
-        self.step
+        self.control.step()
     }
 
     /// Forces, coming increments, reactions and energies at the current time.
@@ -437,18 +269,18 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// If the state is not finite, a cell is inverted, the energies do not balance, or the step is above the limit and
     /// must not be cut.
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
-        let before = self.step / f64::from(state.stability.substeps);
-        if self.relaxing != before {
-            self.forces.set_step(self.model, before);
-            self.relaxing = before;
+        self.control.keep(state);
+        self.lengths = self.control.lengths(state);
+        if self.relaxing != self.lengths.before {
+            self.relaxing = self.lengths.before;
+            self.forces.set_step(self.model, self.relaxing);
         }
         let found = self.forces.evaluate(&state.displacement, &mut state.history);
-        self.substeps = state.stability.substeps;
         let below = match found.inverted {
             None if state.is_between_steps() => self.watch(state, &found.deformed),
             _ => Ok(()),
         };
-        self.lengths = Lengths { before, next: self.step / f64::from(self.substeps) };
+        self.lengths = self.control.lengths(state);
         self.applied.update(state.time, &state.displacement);
         if state.is_at_start() {
             self.start(state);
@@ -463,61 +295,12 @@ impl<'m, R: Real> CentralDifference<'m, R> {
 
     /// Looks at the limit where one is due, and chooses the parts of the step to come.
     fn watch(&mut self, state: &mut State<R>, deformed: &Deformed) -> Result<(), StepError> {
-        let Some(monitor) = &mut self.monitor else { return Ok(()) };
-        let (step, now, on_unstable) = (self.step, self.substeps, monitor.on_unstable());
-        let seen = &state.stability;
-        let due = seen.checks == 0
-            || state.steps >= seen.looked_at.saturating_add(CHECK_EVERY)
-            || deformed.differs(&seen.deformed, CHANGE);
-        if due {
-            monitor.refer_to(state);
-            if let Some((mut limit, solid, cell)) =
-                monitor.limit(self.model, &state.displacement, &state.reference)
-            {
-                if monitor.doubts(state, limit, step, now) {
-                    limit = self.take_as_reference(state);
-                }
-                let look = Look { time: state.time, limit, solid, cell };
-                state.stability.note(look, *deformed, state.steps);
-            }
+        if self.control.is_due(state, deformed, CHECK_EVERY) {
+            self.control.look(self.model, &self.owners, state, deformed);
         }
-        let Some(look) = state.stability.last else { return Ok(()) };
-        state.stability.steps_below += u64::from(look.limit < step);
-        match on_unstable {
-            OnUnstable::Report => Ok(()),
-            OnUnstable::Stop if look.limit < step => Err(self.below_limit(&look, state.time)),
-            OnUnstable::Stop => Ok(()),
-            OnUnstable::Substep => match substeps(step, look.limit, now) {
-                Some(substeps) => {
-                    self.substeps = substeps;
-                    state.stability.note_substeps(substeps, state.time);
-                    Ok(())
-                }
-                None => Err(self.below_limit(&look, state.time)),
-            },
-        }
-    }
-
-    /// Finds the true limit [s] of a state and makes it the reference of what follows.
-    fn take_as_reference(&self, state: &mut State<R>) -> f64 {
-        let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
-        let limit = limit_about(self.model, &self.owners, &displacement).step;
-        state.reference.clone_from(&state.displacement);
-        state.stability.reference = Some((limit, state.steps));
-        state.stability.true_limits += 1;
-        limit
-    }
-
-    fn below_limit(&self, look: &Look, time: f64) -> StepError {
-        let solid = &self.model.solids[look.solid];
-        StepError::BelowLimit {
-            body: self.model.bodies[solid.body].name.clone(),
-            element: solid.original[look.cell],
-            node: self.model.locate_node(solid.cells.nodes(look.cell)[0]).1,
-            limit: look.limit,
-            step: self.step,
-            time,
-        }
+        let below = self.control.choose(self.model, state);
+        self.control.note(state);
+        below
     }
 
     /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has gone before.
@@ -532,16 +315,8 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                     u[component] = R::of(amplitude[component] * factor[owner[component] as usize][1]);
                 }
             });
-        state.work.internal += state.work.pending_internal;
-        state.work.external += state.work.pending_external;
-        state.stability.substeps = self.substeps;
-        state.stability.done += 1;
-        if state.stability.done == self.substeps {
-            state.stability.done = 0;
-            state.steps += 1;
-        }
-        let part = f64::from(state.stability.done) / f64::from(self.substeps);
-        state.time = (state.steps as f64 + part) * self.step;
+        state.work.advance();
+        self.control.count(state);
     }
 
     /// Energy [J] above which the balance is judged.
@@ -561,7 +336,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         let dt = self.lengths.before;
         let half = 0.5 * dt * dt;
         let mut shock = 0.0;
-        state.work.external = 0.0;
+        let mut kinetic = 0.0;
         for (node, increment) in state.increment.iter_mut().enumerate() {
             let applied: Vector<R> = self.applied.at(node);
             let internal = self.forces.at(node);
@@ -575,10 +350,10 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 let acceleration = (applied[c] - internal[c]).to_f64() / m - alpha * velocity[c];
                 increment[c] = R::of(dt * velocity[c] - half * acceleration);
                 shock += 0.5 * m * (half * acceleration / dt).powi(2);
-                state.work.external += 0.5 * m * velocity[c] * velocity[c];
+                kinetic += 0.5 * m * velocity[c] * velocity[c];
             }
         }
-        state.work.at_start = shock;
+        state.work.begin(kinetic, shock);
     }
 
     fn pass_over_nodes(&mut self, state: &State<R>) {
@@ -619,27 +394,17 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         sums: &Sums,
         inverted: Option<(usize, usize, f64)>,
     ) -> Result<(), StepError> {
-        let finite =
-            sums.kinetic.is_finite() && sums.internal_after.is_finite() && sums.external_after.is_finite();
+        let finite = sums.is_finite();
         // An inverted cell comes first: its forces are meaningless, often not finite, so that it is the cause.
         if let Some((solid, cell, determinant)) = inverted
             && (finite || determinant.is_finite())
         {
-            let solid = &self.model.solids[solid];
-            return Err(StepError::Inverted {
-                body: self.model.bodies[solid.body].name.clone(),
-                element: solid.original[cell],
-                node: self.model.locate_node(solid.cells.nodes(cell)[0]).1,
-                determinant,
-                time: state.time,
-            });
+            return Err(StepError::inverted(self.model, solid, cell, determinant, state.time));
         }
         if !finite {
             let lost = |u: &Vector<R>| u.iter().any(|x| !x.to_f64().is_finite());
             let node = (state.displacement.iter().position(lost)).or_else(|| self.next.iter().position(lost));
-            let (body, node) = self.model.locate_node(node.unwrap_or(0) as u32);
-            let body = self.model.bodies[body].name.clone();
-            return Err(StepError::NotFinite { body, node, time: state.time });
+            return Err(StepError::not_finite(self.model, node.unwrap_or(0) as u32, state.time));
         }
         Ok(())
     }
@@ -650,39 +415,11 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         sums: &Sums,
         hourglass: f64,
     ) -> Result<(), StepError> {
-        let at_start = state.is_at_start();
-        let work = &mut state.work;
-        if !at_start {
-            work.internal += sums.internal_before;
-            work.external += sums.external_before;
-            work.damping += 0.5 * (work.damping_power + sums.damping_power) * self.lengths.before;
-        }
-        work.damping_power = sums.damping_power;
-        work.pending_internal = sums.internal_after;
-        work.pending_external = sums.external_after;
-        let internal = work.internal - hourglass;
-        work.largest = work.largest.max(sums.kinetic).max(internal).max(work.external.abs());
-        // Left is ⅛ Δt² Σ m|a|² of now: small where the step resolves the motion, growing where it is unstable.
-        let missing = if at_start {
-            0.0
-        } else {
-            (sums.kinetic + work.internal + work.damping + work.at_start - work.external).abs()
-        };
-        let balance = missing / work.largest.max(self.balance_floor);
-        self.energies = Energies {
-            kinetic: sums.kinetic,
-            internal,
-            damping: work.damping,
-            hourglass,
-            external: work.external,
-            balance,
-        };
-        let off = work.largest > self.balance_floor && balance > BALANCE_LIMIT;
-        work.steps_off_balance = if off { work.steps_off_balance + 1 } else { 0 };
-        if work.steps_off_balance >= BALANCE_STEPS {
-            let (body, node) = self.model.locate_node(self.fastest_node());
-            let body = self.model.bodies[body].name.clone();
-            return Err(StepError::Unbalanced { body, node, balance, time: state.time });
+        let before = (!state.is_at_start()).then_some(self.lengths.before);
+        self.energies = state.work.settle(sums, hourglass, before, self.balance_floor);
+        if state.work.has_lost_balance() {
+            let (fastest, balance) = (self.fastest_node(), self.energies.balance);
+            return Err(StepError::unbalanced(self.model, fastest, balance, state.time));
         }
         Ok(())
     }

@@ -59,11 +59,11 @@ impl<R: Real> Default for Findings<R> {
 
 /// The extremes of deformation over some cells.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Deformed {
+pub struct Deformed {
     /// The least det F.
-    least_volume_ratio: f64,
+    pub least_volume_ratio: f64,
     /// The largest |C − I|².
-    largest_strain: f64,
+    pub largest_strain: f64,
 }
 
 impl Default for Deformed {

@@ -1,0 +1,148 @@
+//! Steps against the largest stable one: watches the limit, cuts steps into parts, and keeps the clock.
+
+use crate::Real;
+use crate::critical_step::limit_about;
+use crate::forces::Deformed;
+use crate::model::Model;
+use crate::stability::{CHANGE, Look, Monitor, OnUnstable, substeps};
+use crate::state::State;
+use crate::step_error::StepError;
+use crate::tensor::{Vector, cast};
+
+/// Lengths of the (sub)steps at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lengths {
+    /// Length Δt⁻ of the (sub)step before [s].
+    pub before: f64,
+    /// Length Δt⁺ of the (sub)step to come [s].
+    pub next: f64,
+}
+
+impl Lengths {
+    /// Δt⁺/Δt⁻; exactly 1 where they are equal.
+    pub fn ratio(self) -> f64 {
+        self.next / self.before
+    }
+
+    /// h = (Δt⁻ + Δt⁺)/2 [s].
+    pub fn mean(self) -> f64 {
+        0.5 * (self.before + self.next)
+    }
+}
+
+/// Whole steps of one length, cut where the limit asks for it.
+pub struct StepControl {
+    step: f64,
+    monitor: Option<Monitor>,
+    /// Parts of the step to come.
+    substeps: u32,
+}
+
+impl StepControl {
+    /// Steps of `step` seconds, not watched.
+    pub fn new(step: f64) -> Self {
+        Self { step, monitor: None, substeps: 1 }
+    }
+
+    /// Watches the limit from now on.
+    pub fn watch(&mut self, monitor: Monitor) {
+        self.monitor = Some(monitor);
+    }
+
+    /// The length [s] of a whole step.
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Parts of the step to come.
+    pub fn substeps(&self) -> u32 {
+        self.substeps
+    }
+
+    /// Keeps, for the step to come, the parts of the one before.
+    pub fn keep<R>(&mut self, state: &State<R>) {
+        self.substeps = state.stability.substeps;
+    }
+
+    /// The (sub)step before the state's instant and the one to come.
+    pub fn lengths<R>(&self, state: &State<R>) -> Lengths {
+        let part = |parts: u32| self.step / f64::from(parts);
+        Lengths { before: part(state.stability.substeps), next: part(self.substeps) }
+    }
+
+    /// Whether a look at the limit is due: the first one, `every` steps after the last, or where the deformation differs.
+    pub fn is_due<R>(&self, state: &State<R>, deformed: &Deformed, every: u64) -> bool {
+        let seen = &state.stability;
+        self.monitor.is_some()
+            && (seen.checks == 0
+                || state.steps >= seen.looked_at.saturating_add(every)
+                || deformed.differs(&seen.deformed, CHANGE))
+    }
+
+    /// Looks at the limit of a state.
+    pub fn look<R: Real>(
+        &mut self,
+        model: &Model,
+        owners: &[[u32; 3]],
+        state: &mut State<R>,
+        deformed: &Deformed,
+    ) {
+        let Some(monitor) = &mut self.monitor else { return };
+        monitor.refer_to(state);
+        if let Some((mut limit, solid, cell)) = monitor.limit(model, &state.displacement, &state.reference) {
+            if monitor.doubts(state, limit, self.step, self.substeps) {
+                limit = take_as_reference(model, owners, state);
+            }
+            let look = Look { time: state.time, limit, solid, cell };
+            state.stability.note(look, *deformed, state.steps);
+        }
+    }
+
+    /// Chooses the parts of the step that begins now, from the last look.
+    ///
+    /// # Errors
+    /// If the step is above the limit and must not be cut, or not as finely as needed.
+    pub fn choose<R>(&mut self, model: &Model, state: &mut State<R>) -> Result<(), StepError> {
+        let (Some(monitor), Some(look)) = (&self.monitor, state.stability.last) else { return Ok(()) };
+        let below = || Err(StepError::below_limit(model, &look, self.step, state.time));
+        match monitor.on_unstable() {
+            OnUnstable::Report => {}
+            OnUnstable::Stop if look.limit < self.step => return below(),
+            OnUnstable::Stop => {}
+            OnUnstable::Substep => match substeps(self.step, look.limit, self.substeps) {
+                Some(substeps) => self.substeps = substeps,
+                None => return below(),
+            },
+        }
+        Ok(())
+    }
+
+    /// Notes that a whole step begins.
+    pub fn note<R>(&self, state: &mut State<R>) {
+        let (Some(_), Some(look)) = (&self.monitor, state.stability.last) else { return };
+        state.stability.steps_below += u64::from(look.limit < self.step);
+        state.stability.note_substeps(self.substeps, state.time);
+    }
+
+    /// Moves the clock of a state on by the (sub)step to come.
+    pub fn count<R>(&self, state: &mut State<R>) {
+        state.stability.substeps = self.substeps;
+        state.stability.done += 1;
+        if state.stability.done == self.substeps {
+            state.stability.done = 0;
+            state.steps += 1;
+        }
+        let part = f64::from(state.stability.done) / f64::from(self.substeps);
+        state.time = (state.steps as f64 + part) * self.step;
+    }
+}
+
+/// Finds the true limit [s] of a state and makes it the reference of what follows.
+fn take_as_reference<R: Real>(model: &Model, owners: &[[u32; 3]], state: &mut State<R>) -> f64 {
+    let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
+    let limit = limit_about(model, owners, &displacement).step;
+    state.reference.clone_from(&state.displacement);
+    state.stability.reference = Some((limit, state.steps));
+    state.stability.true_limits += 1;
+    limit
+}

@@ -1,0 +1,114 @@
+//! Why a step could not be taken, with place, time and remedy.
+
+use crate::model::Model;
+use crate::stability::Look;
+
+/// The name of a node's body and the node's number in it.
+fn located(model: &Model, node: u32) -> (String, u32) {
+    let (body, node) = model.locate_node(node);
+    (model.bodies[body].name.clone(), node)
+}
+
+/// Why a step could not be taken.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// A displacement is not a number or infinite.
+    #[error("the displacement of node {node} of `{body}` is no longer finite at t = {time:.6} s")]
+    NotFinite {
+        /// The body.
+        body: String,
+        /// The node, numbered in its body.
+        node: u32,
+        /// Time [s].
+        time: f64,
+    },
+    /// A cell is turned inside out.
+    #[error("element {element} of `{body}` is inverted (det F = {determinant:.3e}) at t = {time:.6} s")]
+    Inverted {
+        /// The body.
+        body: String,
+        /// The element, numbered as in the user's mesh.
+        element: u32,
+        /// Its first node, numbered in its body.
+        node: u32,
+        /// det F.
+        determinant: f64,
+        /// Time [s].
+        time: f64,
+    },
+    /// The largest stable step fell below the running one.
+    #[error(
+        "the largest stable step has fallen to {limit:.3e} s, below the step {step:.3e} s, at t = {time:.6} s: element \
+         {element} of `{body}` has become too stiff for it"
+    )]
+    BelowLimit {
+        /// The body.
+        body: String,
+        /// The element that sets the limit, numbered as in the user's mesh.
+        element: u32,
+        /// Its first node, numbered in its body.
+        node: u32,
+        /// The limit [s].
+        limit: f64,
+        /// The step [s].
+        step: f64,
+        /// Time [s].
+        time: f64,
+    },
+    /// Energy appears or vanishes: the run is unstable.
+    #[error(
+        "the energies are off balance by {:.0} % at t = {time:.6} s; the fastest node is {node} of `{body}`",
+        balance * 100.0
+    )]
+    Unbalanced {
+        /// The body of the fastest node.
+        body: String,
+        /// The fastest node, numbered in its body.
+        node: u32,
+        /// The balance, as a fraction.
+        balance: f64,
+        /// Time [s].
+        time: f64,
+    },
+}
+
+impl StepError {
+    pub(crate) fn not_finite(model: &Model, node: u32, time: f64) -> Self {
+        let (body, node) = located(model, node);
+        Self::NotFinite { body, node, time }
+    }
+
+    pub(crate) fn inverted(model: &Model, solid: usize, cell: usize, determinant: f64, time: f64) -> Self {
+        let solid = &model.solids[solid];
+        let (body, node) = located(model, solid.cells.nodes(cell)[0]);
+        Self::Inverted { body, element: solid.original[cell], node, determinant, time }
+    }
+
+    pub(crate) fn below_limit(model: &Model, look: &Look, step: f64, time: f64) -> Self {
+        let solid = &model.solids[look.solid];
+        let (body, node) = located(model, solid.cells.nodes(look.cell)[0]);
+        Self::BelowLimit { body, element: solid.original[look.cell], node, limit: look.limit, step, time }
+    }
+
+    /// That the energies of a state are off balance, where a node is the fastest.
+    pub fn unbalanced(model: &Model, fastest: u32, balance: f64, time: f64) -> Self {
+        let (body, node) = located(model, fastest);
+        Self::Unbalanced { body, node, balance, time }
+    }
+
+    /// What to try.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::NotFinite { .. } | Self::Unbalanced { .. } => {
+                "the step is too large for the deformed state: try a smaller `step`, a slower motion or a smoother curve"
+            }
+            Self::BelowLimit { .. } => {
+                "try a smaller `step` or a slower motion, or let the run cut its steps (`on-unstable = \"substep\"`; into 100 \
+                 parts at the most)"
+            }
+            Self::Inverted { .. } => {
+                "try a slower or smaller motion, a smaller `step`, more damping, or a finer mesh there"
+            }
+        }
+    }
+}
