@@ -68,7 +68,11 @@ fn without_an_adapter_the_packages_are_named_and_auto_runs_on_the_processor() {
 #[test]
 fn what_only_the_processor_can_do_is_refused_by_name_before_the_run() {
     for (run, line, says) in [
-        ("device = \"gpu\"\nsolver = \"quasi-static\"", "solver = \"quasi-static\"", "the solver `quasi-static`"),
+        (
+            "device = \"gpu\"\nsolver = \"quasi-static\"",
+            "solver = \"quasi-static\"",
+            "the solver `quasi-static`",
+        ),
         ("device = \"gpu\"\nprecision = \"double\"", "precision = \"double\"", "double precision"),
     ] {
         let told = on(run).pliant(&["check", "case"]);

@@ -9,7 +9,17 @@ use support::Workshop;
 fn the_list_names_every_case_in_a_line() {
     let told = Workshop::new("").pliant(&["reproduce", "--list"]);
     assert_eq!(told.code, 0, "{}", told.err);
-    for id in ["fig-6.3", "fig-6.4", "fig-6.5", "fig-6.6", "fig-6.7", "fig-6.10", "elements", "brain-shift"] {
+    for id in [
+        "fig-6.3",
+        "fig-6.4",
+        "fig-6.5",
+        "fig-6.6",
+        "fig-6.7",
+        "fig-6.9",
+        "fig-6.10",
+        "elements",
+        "brain-shift",
+    ] {
         assert_eq!(told.out.lines().filter(|line| line.split(' ').next() == Some(id)).count(), 1, "{id}");
     }
 }

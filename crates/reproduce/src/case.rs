@@ -160,6 +160,9 @@ pub enum CaseError {
         /// Movement in a tenth of a second at the present speed, over the largest displacement.
         creep: f64,
     },
+    /// A scene could not be run.
+    #[error("{0}")]
+    Run(String),
     /// A figure could not be drawn.
     #[error("a figure could not be drawn: {0}")]
     Drawing(String),

@@ -4,6 +4,7 @@ pub mod brain_shift;
 pub mod cost;
 pub mod cube;
 pub mod elements;
+pub mod framework;
 pub mod liver;
 pub mod relaxation;
 pub mod shear;
@@ -17,6 +18,7 @@ pub const CASES: &[Case] = &[
     cube::DEFORMED,
     relaxation::CASE,
     cost::CASE,
+    framework::CASE,
     liver::CASE,
     elements::CASE,
     brain_shift::CASE,

@@ -1,0 +1,139 @@
+//! Figure 6.9: what the framework costs: the bare step of a cube of hexahedra under gravity against the whole program, on
+//! this machine: single precision, all cores. Both begin at rest and take the same steps of the same model; repeats are
+//! interleaved, so that what else the machine does meets both alike.
+
+use pliant_bench::{Clocked, Spread};
+use pliant_mechanics::State;
+use pliant_scene::source::Source;
+use pliant_scene::{Built, OutputFolder, Plan, Scene};
+use rayon::ThreadPoolBuilder;
+
+use crate::case::{Case, CaseError, Findings, Row};
+use crate::plot::{Curve, Key, Pen, Plot};
+
+/// Elements along the edge of the cubes: 1,331 to 29,791 nodes.
+const CELLS: [usize; 5] = [10, 15, 20, 25, 30];
+/// Repeats of both.
+const REPEATS: usize = 9;
+/// Elements stepped in a repeat.
+const ELEMENT_STEPS: usize = 2_000_000;
+
+/// Figure 6.9.
+pub const CASE: Case = Case {
+    id: "fig-6.9",
+    title: "Fig. 6.9: the bare step against the whole program",
+    shows: "Time of one step of a cube of hexahedra under gravity, with 1,331 to 29,791 nodes: by the solver alone, and \
+            inside of a framework (there SOFA), whose separate parts cost 8.4 % for large meshes. Here the whole program reads \
+            the scene, checks every instant, watches the largest stable step, samples energies and reactions and writes a \
+            table 25 times a second of simulated time.",
+    corrections: &[],
+    seconds: 12.0,
+    compute,
+};
+
+/// The cube with so many elements along its edge, for so many seconds.
+fn scene(cells: usize, until: f64) -> Result<Scene, CaseError> {
+    let text = format!(
+        "[scene]\nuntil = {until:?}\ngravity = [0, 0, -9.81]\n[run]\nprecision = \"single\"\n[law.tissue]\n\
+         type = \"neo-hookean\"\nyoung-modulus = 20e3\npoisson-ratio = 0.45\n[body.cube]\nmesh = {{ block = {{ size = \
+         [0.1, 0.1, 0.1], cells = [{cells}, {cells}, {cells}] }}, as = \"hexes\" }}\nlaw = \"tissue\"\ndensity = 1000\n\
+         [constraint.base]\ntype = \"fix\"\nbody = \"cube\"\nnodes = {{ set = \"z-min\" }}\n[output.history]\ntype = \
+         \"csv\"\nevery = 0.04\n"
+    );
+    Ok(Scene::from_source(Source::parse("cube.toml", text)?, ".".into())?)
+}
+
+/// A scene that is ready to run.
+struct Program {
+    scene: Scene,
+    built: Built,
+    plan: Plan,
+}
+
+impl Program {
+    fn new(cells: usize) -> Result<Self, CaseError> {
+        let short = scene(cells, 1e-3)?;
+        let built = pliant_scene::build(&short)?;
+        // The duration that takes as many steps as are to be timed.
+        let step = pliant_scene::plan(&short, &built)?.step;
+        let scene = scene(cells, step * (ELEMENT_STEPS / cells.pow(3)) as f64)?;
+        let built = pliant_scene::build(&scene)?;
+        let plan = pliant_scene::plan(&scene, &built)?;
+        Ok(Self { scene, built, plan })
+    }
+
+    /// Wall time of a step of the solver alone [s], on threads of its own as the whole program has.
+    fn bare(&self) -> Result<f64, CaseError> {
+        let model = &self.built.model;
+        let mut clocked = Clocked::<f32>::new(model, self.plan.step, State::at_rest(model))?;
+        let pool = ThreadPoolBuilder::new().build().map_err(|error| CaseError::Run(error.to_string()))?;
+        Ok(pool.install(|| clocked.seconds_per_step(self.plan.steps as usize))?)
+    }
+
+    /// Wall time of a step of the whole program [s], from its own summary.
+    fn whole(&self) -> Result<f64, CaseError> {
+        let unwritable = |error: &dyn std::fmt::Display| CaseError::Run(error.to_string());
+        let place = tempfile::tempdir().map_err(|error| unwritable(&error))?;
+        let folder = OutputFolder::prepare(place.path().join("run"), &self.scene, false)
+            .map_err(|error| unwritable(&error))?;
+        let summary = pliant_scene::run(&self.scene, &self.built, &self.plan, &folder, &mut |_| ())
+            .map_err(|error| unwritable(&error))?;
+        match summary.error {
+            None => Ok(summary.wall_seconds / summary.steps as f64),
+            Some(failure) => Err(CaseError::Run(failure.message)),
+        }
+    }
+}
+
+fn compute() -> Result<Findings, CaseError> {
+    let mut points = Vec::new();
+    for cells in CELLS {
+        let program = Program::new(cells)?;
+        let mut times = Vec::new();
+        for _ in 0..=REPEATS {
+            times.push([program.bare()?, program.whole()?]);
+        }
+        // The first warms up and does not count.
+        let median = |of: &dyn Fn(&[f64; 2]) -> f64| Spread::of(times[1..].iter().map(of)).median;
+        let nodes = (cells + 1).pow(3) as f64;
+        points.push((nodes, median(&|t| t[0]), median(&|t| t[1]), median(&|t| 100.0 * (t[1] / t[0] - 1.0))));
+    }
+    let mut findings = Findings::default();
+    let curves = [("the solver alone", 0), ("the whole program", 1)].map(|(name, which)| {
+        let time = |&(nodes, bare, whole, _): &(f64, f64, f64, f64)| (nodes, 1e3 * [bare, whole][which]);
+        Curve::new(name, which, Pen::Line, points.iter().map(time).collect())
+    });
+    let plot = Plot {
+        title: "Time of a step",
+        axes: ["nodes", "time [ms]"],
+        logarithmic: false,
+        key: Key::UpperLeft,
+        curves: &curves,
+    };
+    findings.figures.push(plot.figure("Medians of 9 repeats, interleaved; single precision, all cores.")?);
+    for (which, (nodes, bare, whole, cost)) in points.iter().enumerate() {
+        let last = which + 1 == points.len();
+        let (reference, source) = if last { (Some(8.4), "thesis, for large meshes") } else { (None, "") };
+        let quantity = format!("what the framework adds to a step of {nodes} nodes");
+        findings.rows.push(Row::timed(quantity, "%", reference, *cost, source));
+        if last {
+            for (name, time) in [("the solver alone", bare), ("the whole program", whole)] {
+                let quantity = format!("{name}: a step of {nodes} nodes");
+                findings.rows.push(Row::timed(quantity, "ms", None, 1e3 * time, ""));
+            }
+        }
+    }
+    Ok(findings)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_take_the_same_steps() {
+        let program = Program::new(10).unwrap();
+        let steps = (ELEMENT_STEPS / 1000) as u64;
+        assert!(program.plan.steps.abs_diff(steps) <= 1, "{}", program.plan.steps);
+    }
+}
