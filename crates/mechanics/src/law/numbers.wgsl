@@ -39,12 +39,12 @@ fn ln_1p(x: f32) -> f32 {
 
 // 2ⁿ and eʳ − 1 with x = n ln 2 + r, |r| ≤ ln 2/2, so that eˣ = 2ⁿ eʳ. Beyond x = 88.3 2ⁿ is infinite.
 fn power_and_rest(x: f32) -> vec2f {
-    let above = select(x, -87.0, x < -87.0);
-    let n = round(above * 1.442695);
-    let r = fma(n, -1.4286068e-6, fma(n, -0.69314575, above));
+    let n = i32(round(clamp(x * 1.442695, -126.0, 128.0)));
+    // ln 2 in two parts, the first 22713/2¹⁵: the product is exact, and whole, so that no compiler adds the parts up again.
+    let r = (select(x, -87.0, x < -87.0) - f32(n * 22713) / 32768.0) - f32(n) * 1.4286068e-6;
     // Taylor: what follows r⁷ is below 2e-9 r.
     let series = fma(r, fma(r, fma(r, fma(r, fma(r, 1.0 / 5040.0, 1.0 / 720.0), 1.0 / 120.0), 1.0 / 24.0), 1.0 / 6.0), 0.5);
-    return vec2f(bitcast<f32>((i32(min(n, 128.0)) + 127) << 23u), fma(r * r, series, r));
+    return vec2f(bitcast<f32>((n + 127) << 23u), fma(r * r, series, r));
 }
 
 // eˣ.
