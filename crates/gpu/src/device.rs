@@ -147,6 +147,11 @@ impl Device {
         &self.adapter
     }
 
+    /// The handles of wgpu, for work beside the stepper's on the same device.
+    pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.device, &self.queue)
+    }
+
     /// Notes what the driver reports, the first thing only: what follows are its consequences.
     fn listen(&self) {
         let note = {

@@ -163,12 +163,13 @@ pub struct Relaxation<R> {
     volumetric: Series<R>,
 }
 
+/// Those of one part.
 #[derive(Clone, Debug)]
-struct Series<R> {
+pub struct Series<R> {
     /// 1 − Σ a.
-    remaining: R,
+    pub remaining: R,
     /// (d, g) per term.
-    terms: Vec<(R, R)>,
+    pub terms: Vec<(R, R)>,
 }
 
 impl<R: Real> Series<R> {
@@ -239,6 +240,16 @@ impl<R: Real> Relaxation<R> {
             isochoric: Series::new(&prony.isochoric, prony.update, step),
             volumetric: Series::new(&prony.volumetric, prony.update, step),
         }
+    }
+
+    /// Those of the isochoric part.
+    pub fn isochoric(&self) -> &Series<R> {
+        &self.isochoric
+    }
+
+    /// Those of the volumetric part.
+    pub fn volumetric(&self) -> &Series<R> {
+        &self.volumetric
     }
 
     /// Takes on the coefficients of the same series for steps of `step` seconds.

@@ -50,6 +50,8 @@ const BINOMIAL: [[f64; 5]; 5] = [
 impl SplitLaw for ArrudaBoyce {
     type Parameters = ArrudaBoyceParameters;
 
+    const WGSL: &'static str = include_str!("arruda_boyce.wgsl");
+
     fn new(parameters: &ArrudaBoyceParameters) -> Result<Self, ParameterError> {
         let modulus = check::positive("shear-modulus", parameters.shear_modulus, " Pa")?;
         let lock = parameters.locking_stretch;
@@ -87,6 +89,11 @@ impl SplitLaw for ArrudaBoyce {
         let [a, b, c, d, e] = self.coefficients;
         let slope = x * (R::of(3.0 * c) + x * (R::of(4.0 * d) + x * R::of(5.0 * e)));
         deformation.first_invariant_stress(R::of(a) + x * (R::of(2.0 * b) + slope))
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        let [a, b, c, d, e] = self.coefficients;
+        vec![a, 2.0 * b, 3.0 * c, 4.0 * d, 5.0 * e]
     }
 
     fn volumetric(&self) -> Volumetric {

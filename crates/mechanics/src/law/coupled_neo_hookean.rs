@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
+use super::{Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split};
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
@@ -51,6 +51,10 @@ impl Law for CoupledNeoHookean {
             isochoric: shape * R::of(self.shear),
             volumetric: inverse * (deformation.volume_ratio * pressure),
         }
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[include_str!("coupled_neo_hookean.wgsl")], &[self.shear, self.lame])
     }
 
     fn small_strain(&self) -> SmallStrainModuli {

@@ -34,6 +34,8 @@ pub struct DemirayParameters {
 impl SplitLaw for Demiray {
     type Parameters = DemirayParameters;
 
+    const WGSL: &'static str = include_str!("demiray.wgsl");
+
     fn new(parameters: &DemirayParameters) -> Result<Self, ParameterError> {
         let (shear, volumetric) = parameters.matrix.parts()?;
         Ok(Self { shear, exponent: check::positive("exponent", parameters.exponent, "")?, volumetric })
@@ -53,6 +55,10 @@ impl SplitLaw for Demiray {
     ) -> Symmetric<R> {
         let x = deformation.isochoric_first_invariant_minus_3();
         deformation.first_invariant_stress(R::of(0.5 * self.shear) * (R::of(self.exponent) * x).exp())
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        vec![0.5 * self.shear, self.exponent]
     }
 
     fn volumetric(&self) -> Volumetric {

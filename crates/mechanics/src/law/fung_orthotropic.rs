@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::principal::principal;
 use super::{
-    Deformation, Law, ParameterError, SmallStrainModuli, Split, Volumetric, VolumetricEnergy, check,
+    Deformation, Law, ParameterError, Shader, SmallStrainModuli, Split, Volumetric, VolumetricEnergy, check,
 };
 use crate::Number;
 use crate::tensor::{Symmetric, Tensor, Vector, cast, dot};
@@ -143,6 +143,11 @@ impl Law for FungOrthotropic {
             isochoric: stress.push_forward(&self.axes_as().transpose()),
             volumetric: self.volumetric.stress(deformation),
         }
+    }
+
+    fn shader(&self) -> Shader {
+        let own = [&[self.modulus], &self.normal.0[..], &self.shear, self.axes.0.as_flattened()].concat();
+        self.volumetric.shader(&[include_str!("fung_orthotropic.wgsl")], &own)
     }
 
     /// The shear modulus is the largest over all shears at rest, the bulk modulus that of a pure dilation.

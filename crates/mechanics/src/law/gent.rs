@@ -35,6 +35,8 @@ pub struct GentParameters {
 impl SplitLaw for Gent {
     type Parameters = GentParameters;
 
+    const WGSL: &'static str = include_str!("gent.wgsl");
+
     fn new(parameters: &GentParameters) -> Result<Self, ParameterError> {
         let (shear, volumetric) = parameters.matrix.parts()?;
         Ok(Self { shear, limit: check::positive("limit", parameters.limit, "")?, volumetric })
@@ -54,6 +56,10 @@ impl SplitLaw for Gent {
     ) -> Symmetric<R> {
         let used = deformation.isochoric_first_invariant_minus_3() * R::of(1.0 / self.limit);
         deformation.first_invariant_stress(R::of(0.5 * self.shear) / (R::ONE - used).max(R::ZERO))
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        vec![0.5 * self.shear, 1.0 / self.limit]
     }
 
     fn volumetric(&self) -> Volumetric {

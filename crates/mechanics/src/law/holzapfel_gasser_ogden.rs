@@ -85,6 +85,8 @@ impl HolzapfelGasserOgden {
 impl SplitLaw for HolzapfelGasserOgden {
     type Parameters = HolzapfelGasserOgdenParameters;
 
+    const WGSL: &'static str = include_str!("holzapfel_gasser_ogden.wgsl");
+
     fn new(parameters: &HolzapfelGasserOgdenParameters) -> Result<Self, ParameterError> {
         let (shear, volumetric) = parameters.matrix.parts()?;
         let dispersion = parameters.dispersion;
@@ -129,6 +131,11 @@ impl SplitLaw for HolzapfelGasserOgden {
             stress = stress + self.family_stress(deformation, fibre);
         }
         stress
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        let (spread, along) = (self.dispersion, 1.0 - 3.0 * self.dispersion);
+        vec![0.5 * self.shear, self.fibre, self.exponent, spread, along, self.families as f64]
     }
 
     fn volumetric(&self) -> Volumetric {

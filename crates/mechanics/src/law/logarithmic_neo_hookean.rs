@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
+use super::{Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split};
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
@@ -49,6 +49,10 @@ impl Law for LogarithmicNeoHookean {
             isochoric: inverse.commuting_product(&deformation.strain_twice) * R::of(self.shear),
             volumetric: inverse * (R::of(self.lame) * deformation.volume_change.ln_1p()),
         }
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[include_str!("logarithmic_neo_hookean.wgsl")], &[self.shear, self.lame])
     }
 
     fn small_strain(&self) -> SmallStrainModuli {

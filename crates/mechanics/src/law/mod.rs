@@ -21,6 +21,7 @@ mod ogden;
 mod orthotropic;
 mod polynomial;
 mod principal;
+mod shader;
 mod split;
 mod st_venant_kirchhoff;
 mod transversely_isotropic;
@@ -45,6 +46,7 @@ pub use neo_hookean::NeoHookean;
 pub use ogden::{MOST_TERMS, Ogden, OgdenTerm};
 pub use orthotropic::Orthotropic;
 pub use polynomial::Polynomial;
+pub use shader::Shader;
 pub use split::{Compressibility, Matrix, SplitLaw};
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use transversely_isotropic::{FibreConvention, TransverselyIsotropic};
@@ -105,6 +107,9 @@ pub trait Law: Copy + Send + Sync + 'static {
 
     /// Second Piola–Kirchhoff stress [Pa].
     fn stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>>;
+
+    /// The stress in WGSL, its text in the file beside the law's.
+    fn shader(&self) -> Shader;
 
     /// Families of fibres, each with a direction in every cell.
     fn families(&self) -> usize {
@@ -227,6 +232,11 @@ impl AnyLaw {
     /// Second Piola–Kirchhoff stress [Pa]; see [`Law::stress`].
     pub fn stress(&self, deformation: &Deformation<f64>, fibres: &[Vector<f64>]) -> Split<Symmetric<f64>> {
         with_law!(self, law => law.stress(deformation, fibres))
+    }
+
+    /// The stress in WGSL; see [`Law::shader`].
+    pub fn shader(&self) -> Shader {
+        with_law!(self, law => law.shader())
     }
 
     /// Families of fibres, each with a direction in every cell.

@@ -34,6 +34,8 @@ pub struct MooneyRivlinParameters {
 impl SplitLaw for MooneyRivlin {
     type Parameters = MooneyRivlinParameters;
 
+    const WGSL: &'static str = include_str!("mooney_rivlin.wgsl");
+
     fn new(parameters: &MooneyRivlinParameters) -> Result<Self, ParameterError> {
         let MooneyRivlinParameters { c10, c01, compressibility } = *parameters;
         let shear = check::shear_at_rest("c10", 2.0 * (c10 + c01), "2 (c10 + c01)")?;
@@ -53,6 +55,10 @@ impl SplitLaw for MooneyRivlin {
         _fibres: &[Vector<R>],
     ) -> Symmetric<R> {
         deformation.isotropic_stress(R::of(self.c10), R::of(self.c01))
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        vec![self.c10, self.c01]
     }
 
     fn volumetric(&self) -> Volumetric {

@@ -28,6 +28,8 @@ pub struct NeoHookeanParameters {
 impl SplitLaw for NeoHookean {
     type Parameters = NeoHookeanParameters;
 
+    const WGSL: &'static str = include_str!("neo_hookean.wgsl");
+
     fn new(parameters: &NeoHookeanParameters) -> Result<Self, ParameterError> {
         let (shear, volumetric) = parameters.matrix.parts()?;
         Ok(Self { shear, volumetric })
@@ -45,6 +47,10 @@ impl SplitLaw for NeoHookean {
         _fibres: &[Vector<R>],
     ) -> Symmetric<R> {
         deformation.first_invariant_stress(R::of(0.5 * self.shear))
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        vec![0.5 * self.shear]
     }
 
     fn volumetric(&self) -> Volumetric {

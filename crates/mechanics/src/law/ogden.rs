@@ -56,6 +56,8 @@ impl Ogden {
 impl SplitLaw for Ogden {
     type Parameters = OgdenParameters;
 
+    const WGSL: &'static str = concat!(include_str!("principal.wgsl"), "\n", include_str!("ogden.wgsl"));
+
     fn new(parameters: &OgdenParameters) -> Result<Self, ParameterError> {
         let given = &parameters.terms;
         let wrong = |message| {
@@ -118,6 +120,12 @@ impl SplitLaw for Ogden {
             stress = stress + Symmetric::dyad(direction) * value;
         }
         stress
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        let terms = self.terms().iter();
+        let each = terms.flat_map(|term| [0.5 * term.exponent, 2.0 * term.shear_modulus / term.exponent]);
+        std::iter::once(self.count as f64).chain(each).collect()
     }
 
     fn volumetric(&self) -> Volumetric {

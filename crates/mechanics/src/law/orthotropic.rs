@@ -52,6 +52,8 @@ pub struct OrthotropicParameters {
 impl SplitLaw for Orthotropic {
     type Parameters = OrthotropicParameters;
 
+    const WGSL: &'static str = include_str!("orthotropic.wgsl");
+
     fn new(parameters: &OrthotropicParameters) -> Result<Self, ParameterError> {
         let OrthotropicParameters { matrix, e4, e5, e6, e7 } = *parameters;
         let (shear, volumetric) = matrix.parts()?;
@@ -86,6 +88,11 @@ impl SplitLaw for Orthotropic {
             stress = stress + deformation.fibre_stresses(a, [R::of(e) * x, R::of(f) * y]);
         }
         stress
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        let ([e4, e5], [e6, e7]) = (self.first, self.second);
+        vec![0.5 * self.shear, e4, e5, e6, e7]
     }
 
     fn volumetric(&self) -> Volumetric {

@@ -44,6 +44,8 @@ pub struct PolynomialParameters {
 impl SplitLaw for Polynomial {
     type Parameters = PolynomialParameters;
 
+    const WGSL: &'static str = include_str!("polynomial.wgsl");
+
     fn new(parameters: &PolynomialParameters) -> Result<Self, ParameterError> {
         let PolynomialParameters { c10, c01, c20, c11, c02, compressibility } = *parameters;
         let shear = check::shear_at_rest("c10", 2.0 * (c10 + c01), "2 (c10 + c01)")?;
@@ -70,6 +72,11 @@ impl SplitLaw for Polynomial {
         let w1 = R::of(c10) + R::of(2.0 * c20) * first + R::of(c11) * second;
         let w2 = R::of(c01) + R::of(c11) * first + R::of(2.0 * c02) * second;
         deformation.isotropic_stress(w1, w2)
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        let ([c10, c01], [c20, c11, c02]) = (self.linear, self.quadratic);
+        vec![c10, c01, 2.0 * c20, c11, 2.0 * c02]
     }
 
     fn volumetric(&self) -> Volumetric {

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::{
-    Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split, Volumetric,
+    Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split, Volumetric,
     VolumetricEnergy,
 };
 use crate::Number;
@@ -26,6 +26,12 @@ pub trait SplitLaw: Copy + Send + Sync + 'static {
     /// Second Piola–Kirchhoff stress of the isochoric energy [Pa], put together by [`Deformation`].
     fn isochoric_stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>])
     -> Symmetric<R>;
+
+    /// The isochoric stress in WGSL: `fn isochoric_stress(d: Deformation, a: vec3f, b: vec3f) -> Symmetric`.
+    const WGSL: &'static str;
+
+    /// What it reads as `parameter(1)` and on; `parameter(0)` is the bulk modulus.
+    fn shader_parameters(&self) -> Vec<f64>;
 
     /// The volumetric energy.
     fn volumetric(&self) -> Volumetric;
@@ -72,6 +78,10 @@ impl<L: SplitLaw> Law for L {
             isochoric: self.isochoric_stress(deformation, fibres),
             volumetric: self.volumetric().stress(deformation),
         }
+    }
+
+    fn shader(&self) -> Shader {
+        self.volumetric().shader(&[L::WGSL, include_str!("split.wgsl")], &self.shader_parameters())
     }
 
     fn small_strain(&self) -> SmallStrainModuli {

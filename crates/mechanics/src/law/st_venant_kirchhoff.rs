@@ -5,7 +5,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Deformation, ElasticConstants, Law, ParameterError, SmallStrainModuli, Split};
+use super::{Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split};
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
@@ -55,6 +55,10 @@ impl Law for StVenantKirchhoff {
             isochoric: strain_twice * R::of(self.shear),
             volumetric: Symmetric::IDENTITY * (R::of(0.5 * self.lame) * strain_twice.trace()),
         }
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[include_str!("st_venant_kirchhoff.wgsl")], &[self.shear, 0.5 * self.lame])
     }
 
     fn small_strain(&self) -> SmallStrainModuli {

@@ -50,6 +50,8 @@ pub struct TransverselyIsotropicParameters {
 impl SplitLaw for TransverselyIsotropic {
     type Parameters = TransverselyIsotropicParameters;
 
+    const WGSL: &'static str = include_str!("transversely_isotropic.wgsl");
+
     fn new(parameters: &TransverselyIsotropicParameters) -> Result<Self, ParameterError> {
         let (shear, volumetric) = parameters.matrix.parts()?;
         let given =
@@ -76,6 +78,10 @@ impl SplitLaw for TransverselyIsotropic {
     ) -> Symmetric<R> {
         deformation.first_invariant_stress(R::of(0.5 * self.shear))
             + deformation.fibre_stress(fibres[0], R::of(self.fibre) * deformation.fibre_strain(fibres[0]))
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        vec![0.5 * self.shear, self.fibre]
     }
 
     fn volumetric(&self) -> Volumetric {

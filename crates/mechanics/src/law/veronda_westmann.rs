@@ -37,6 +37,8 @@ pub struct VerondaWestmannParameters {
 impl SplitLaw for VerondaWestmann {
     type Parameters = VerondaWestmannParameters;
 
+    const WGSL: &'static str = include_str!("veronda_westmann.wgsl");
+
     fn new(parameters: &VerondaWestmannParameters) -> Result<Self, ParameterError> {
         let c1 = check::positive("c1", parameters.c1, " Pa")?;
         let c2 = check::positive("c2", parameters.c2, "")?;
@@ -58,6 +60,10 @@ impl SplitLaw for VerondaWestmann {
         let x = deformation.isochoric_first_invariant_minus_3();
         let w1 = R::of(self.c1 * self.c2) * (R::of(self.c2) * x).exp();
         deformation.isotropic_stress(w1, R::of(-0.5 * self.c1 * self.c2))
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        vec![self.c1 * self.c2, self.c2]
     }
 
     fn volumetric(&self) -> Volumetric {

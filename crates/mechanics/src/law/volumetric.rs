@@ -13,7 +13,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Deformation;
+use super::{Deformation, Shader};
 use crate::Number;
 use crate::tensor::Symmetric;
 
@@ -78,6 +78,20 @@ impl Volumetric {
     #[inline(always)]
     pub fn stress<R: Number>(&self, deformation: &Deformation<R>) -> Symmetric<R> {
         deformation.inverse_cauchy_green * self.kirchhoff_pressure(deformation)
+    }
+
+    /// A law with this energy in WGSL: `snippets` and `own` are the rest of it, its parameters from index 1 on.
+    pub(super) fn shader(&self, snippets: &[&str], own: &[f64]) -> Shader {
+        let pressure = match self.energy {
+            VolumetricEnergy::Quadratic => "j * x",
+            VolumetricEnergy::QuadLog => "0.5 * x * (j + 1.0)",
+            VolumetricEnergy::LnSquared => "ln_1p(x)",
+            VolumetricEnergy::JLnJ => "j * ln_1p(x)",
+        };
+        let pressure =
+            format!("fn relative_kirchhoff_pressure(j: f32, x: f32) -> f32 {{\n    return {pressure};\n}}\n");
+        let shared = [pressure.as_str(), include_str!("volumetric.wgsl")];
+        Shader::new(&[&shared, snippets].concat(), &[&[self.bulk], own].concat())
     }
 
     /// J² U″(J) [Pa] at a volume ratio: κ at rest; what the volume adds to ρc² of the deformed solid.

@@ -37,6 +37,8 @@ pub struct YeohParameters {
 impl SplitLaw for Yeoh {
     type Parameters = YeohParameters;
 
+    const WGSL: &'static str = include_str!("yeoh.wgsl");
+
     fn new(parameters: &YeohParameters) -> Result<Self, ParameterError> {
         let YeohParameters { c1, c2, c3, compressibility } = *parameters;
         let c = [check::positive("c1", c1, " Pa")?, check::finite("c2", c2)?, check::finite("c3", c3)?];
@@ -59,6 +61,11 @@ impl SplitLaw for Yeoh {
         let x = deformation.isochoric_first_invariant_minus_3();
         let [c1, c2, c3] = self.c;
         deformation.first_invariant_stress(R::of(c1) + x * (R::of(2.0 * c2) + x * R::of(3.0 * c3)))
+    }
+
+    fn shader_parameters(&self) -> Vec<f64> {
+        let [c1, c2, c3] = self.c;
+        vec![c1, 2.0 * c2, 3.0 * c3]
     }
 
     fn volumetric(&self) -> Volumetric {

@@ -1,0 +1,38 @@
+//! How forces come from cells to nodes.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A design of the kernels; all give the same answers within round-off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Design {
+    /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every time.
+    Gather,
+}
+
+impl Design {
+    /// All of them.
+    pub const ALL: &[Self] = &[Self::Gather];
+}
+
+impl fmt::Display for Design {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Gather => "gather",
+        })
+    }
+}
+
+impl FromStr for Design {
+    type Err = UnknownDesign;
+
+    fn from_str(name: &str) -> Result<Self, UnknownDesign> {
+        let known = Self::ALL.iter().find(|design| design.to_string() == name);
+        known.copied().ok_or_else(|| UnknownDesign(name.to_owned()))
+    }
+}
+
+/// A name no design has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no design `{0}`; there are {}", Design::ALL.iter().map(Design::to_string).collect::<Vec<_>>().join(", "))]
+pub struct UnknownDesign(pub String);

@@ -1,0 +1,133 @@
+//! Loads on the device: dead forces and the corners of pressed faces, listed by the nodes they act on.
+
+use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
+use pliant_mechanics::model::Model;
+use pliant_mechanics::tensor::{Vector, scale, sub};
+
+use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::solids::Four;
+use crate::{Device, GpuError};
+
+/// Marks an entry as a corner of a face.
+const CORNER: u32 = u32::MAX;
+
+/// The loads of a model.
+pub(crate) struct DeviceLoads {
+    /// Finds the forces of pressed faces.
+    pub pressure: Option<Kernel>,
+    /// What the pass over the nodes reads.
+    pub bound: Bound,
+}
+
+/// Where a load acts: nodes of the model with weights.
+fn weights(model: &Model, load: &Load, point: u32) -> Vec<(u32, f64)> {
+    match load.surface {
+        None => vec![(point, 1.0)],
+        Some(surface) => {
+            let row = model.surfaces[surface].mapping.row(point as usize);
+            row.map(|(node, weight)| (node as u32, weight)).collect()
+        }
+    }
+}
+
+/// The corners of all pressed faces.
+#[derive(Default)]
+struct Corners {
+    offsets: Vec<u32>,
+    nodes: Vec<[u32; 2]>,
+    rest: Vec<Four>,
+}
+
+impl Corners {
+    /// Adds a face of a load and, for its nodes, its corners.
+    fn add(&mut self, model: &Model, (index, load): (usize, &Load), face: &Face, pressure: f64, entries: &mut [Vec<Four>]) {
+        let rest: &[Vector<f64>] = load.surface.map_or(&model.rest, |surface| &model.surfaces[surface].rest);
+        let count = if face[3] == NO_NODE { 3 } else { 4 };
+        let beside = [pressure as f32, f32::from_bits(index as u32), f32::from_bits(count), 0.0];
+        for (k, &point) in face.iter().enumerate() {
+            let corner = self.rest.len() as u32;
+            let mut place = [0.0; 3];
+            if point != NO_NODE {
+                place = sub(rest[point as usize], rest[face[0] as usize]);
+                for (node, weight) in weights(model, load, point) {
+                    self.nodes.push([node, (weight as f32).to_bits()]);
+                    let entry = [f32::from_bits(corner), weight as f32, 0.0, f32::from_bits(CORNER)];
+                    entries[node as usize].push(entry);
+                }
+            }
+            self.rest.push([place[0] as f32, place[1] as f32, place[2] as f32, beside[k]]);
+            self.offsets.push(self.nodes.len() as u32);
+        }
+    }
+}
+
+impl DeviceLoads {
+    /// # Errors
+    /// If an array is too large.
+    pub(crate) fn new(
+        memory: &Memory<'_>,
+        device: &Device,
+        instant: &Bound,
+        model: &Model,
+        displacement: &wgpu::Buffer,
+        constants: &[(&str, usize)],
+    ) -> Result<Self, GpuError> {
+        let mut entries: Vec<Vec<Four>> = vec![Vec::new(); model.node_count()];
+        let mut corners = Corners { offsets: vec![0], ..Corners::default() };
+        for (index, load) in model.loads.iter().enumerate() {
+            match &load.kind {
+                LoadKind::Forces(list) => {
+                    for &(point, force) in list {
+                        for (node, weight) in weights(model, load, point) {
+                            let [x, y, z] = scale(force, weight).map(|f| f as f32);
+                            entries[node as usize].push([x, y, z, f32::from_bits(index as u32)]);
+                        }
+                    }
+                }
+                LoadKind::Pressure { faces, pressure } => {
+                    for face in faces {
+                        corners.add(model, (index, load), face, *pressure, &mut entries);
+                    }
+                }
+                LoadKind::Gravity { .. } => {}
+            }
+        }
+        let mut offsets = vec![0];
+        for entries in &entries {
+            offsets.push(offsets[offsets.len() - 1] + entries.len() as u32);
+        }
+        let mut bodies = vec![0_u32; model.node_count()];
+        for (index, body) in model.bodies.iter().enumerate() {
+            bodies[body.nodes.start as usize..body.nodes.end as usize].fill(index as u32);
+        }
+        let offsets = memory.filled("the loads", &offsets)?;
+        let entries = memory.filled("the loads", &entries.concat())?;
+        let bodies = memory.filled("the bodies of nodes", &bodies)?;
+        let forces = memory.zeros("the pressed faces", corners.rest.len() * size_of::<Four>())?;
+        let faces = corners.rest.len() / 4;
+        let pressure = if faces > 0 {
+            let [places, nodes, rest] = [
+                memory.filled("the pressed faces", &corners.offsets)?,
+                memory.filled("the pressed faces", &corners.nodes)?,
+                memory.filled("the pressed faces", &corners.rest)?,
+            ];
+            let bound = Bound::new(
+                device,
+                &[
+                    Binding::Read(displacement),
+                    Binding::Read(&places),
+                    Binding::Read(&nodes),
+                    Binding::Read(&rest),
+                    Binding::Write(&forces),
+                ],
+            );
+            let snippets = [include_str!("shaders/instant.wgsl"), include_str!("shaders/pressure.wgsl")];
+            let constants = [constants, &[("FACES", faces)]].concat();
+            Some(Kernel::new(device, "pressure", &constants, &snippets, &[instant, &bound], faces))
+        } else {
+            None
+        };
+        let read = [&offsets, &entries, &forces, &bodies].map(Binding::Read);
+        Ok(Self { pressure, bound: Bound::new(device, &read) })
+    }
+}

@@ -1,0 +1,177 @@
+//! Instants of a run as the device sees them, and their submission.
+
+use bytemuck::{Pod, Zeroable};
+use pliant_mechanics::load::LoadKind;
+use pliant_mechanics::model::Model;
+use pliant_mechanics::{Lengths, StepError};
+
+use crate::kernel::{Binding, Bound, Memory};
+use crate::{Device, GpuError};
+
+/// Most instants in a submission.
+pub(crate) const MOST: usize = 128;
+
+/// Why steps could not be taken.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepFailure {
+    /// The run has come to an end.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// The device fails.
+    #[error(transparent)]
+    Device(#[from] GpuError),
+}
+
+impl StepFailure {
+    /// What to try.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Step(error) => error.remedy(),
+            Self::Device(error) => error.remedy(),
+        }
+    }
+}
+
+/// What kernels do at an instant.
+pub(crate) mod flags {
+    pub(crate) const MOVES: u32 = 1;
+    pub(crate) const MEASURES: u32 = 2;
+    pub(crate) const STARTS: u32 = 4;
+}
+
+/// Numbers of an instant; twin of the one in instant.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub(crate) struct Instant {
+    pub index: u32,
+    pub row: u32,
+    pub flags: u32,
+    pub before: f32,
+    pub ratio: f32,
+    pub push: f32,
+    pub per_push: f32,
+    pub half_mean: f32,
+    pub per_two_steps: f32,
+    pub padding: [u32; 3],
+}
+
+impl Instant {
+    pub(crate) fn new(index: u32, flags: u32, lengths: Lengths) -> Self {
+        let push = lengths.next * lengths.mean();
+        Self {
+            index,
+            row: 0,
+            flags,
+            before: lengths.before as f32,
+            ratio: lengths.ratio() as f32,
+            push: push as f32,
+            per_push: (1.0 / push) as f32,
+            half_mean: (0.5 * lengths.mean()) as f32,
+            per_two_steps: (0.5 / lengths.next) as f32,
+            padding: [0; 3],
+        }
+    }
+}
+
+/// Instants of the next submission, with the factors of constraints and loads at each.
+pub(crate) struct Instants {
+    /// What all kernels read.
+    pub bound: Bound,
+    instants: wgpu::Buffer,
+    table: wgpu::Buffer,
+    pub findings: wgpu::Buffer,
+    /// Bytes from one instant to the next.
+    spacing: usize,
+    bytes: Vec<u8>,
+    numbers: Vec<f32>,
+    /// Numbers in a row of the table.
+    stride: usize,
+    count: usize,
+}
+
+/// Where numbers stand in a row of the table.
+pub(crate) fn table_constants(model: &Model) -> [(&'static str, usize); 2] {
+    let loads = 2 * model.constraints.len();
+    [("LOADS", loads), ("GRAVITY", loads + model.loads.len())]
+}
+
+/// What is found at all instants, before any.
+const NOTHING: [u32; 4] = [u32::MAX, u32::MAX, f32::to_bits(1.0), 0];
+
+impl Instants {
+    /// # Errors
+    /// If an array is too large.
+    pub(crate) fn new(memory: &Memory<'_>, device: &Device, model: &Model) -> Result<Self, GpuError> {
+        let alignment = device.device.limits().min_uniform_buffer_offset_alignment as usize;
+        let spacing = size_of::<Instant>().next_multiple_of(alignment);
+        let stride = 2 * model.constraints.len() + model.loads.len() + 3 * model.bodies.len();
+        let instants = memory.uniform("the instants", spacing * MOST);
+        let table = memory.zeros("the factors of motions and loads", stride * MOST * size_of::<f32>())?;
+        let findings = memory.filled("the findings", &NOTHING)?;
+        let size = size_of::<Instant>() as u64;
+        let bound = Bound::new(
+            device,
+            &[Binding::Moving(&instants, size), Binding::Write(&findings), Binding::Read(&table)],
+        );
+        Ok(Self { bound, instants, table, findings, spacing, bytes: vec![], numbers: vec![], stride, count: 0 })
+    }
+
+    /// Forgets what was found.
+    pub(crate) fn forget(&self, device: &Device) {
+        device.queue.write_buffer(&self.findings, 0, bytemuck::cast_slice(&NOTHING));
+    }
+
+    /// Forgets how far cells were deformed.
+    pub(crate) fn forget_deformation(&self, device: &Device) {
+        device.queue.write_buffer(&self.findings, 8, bytemuck::cast_slice(&NOTHING[2..]));
+    }
+
+    /// Adds an instant at a time [s], `next` seconds before the one after it.
+    pub(crate) fn push(&mut self, model: &Model, time: f64, next: f64, mut instant: Instant) {
+        instant.row = self.numbers.len() as u32;
+        for constraint in &model.constraints {
+            let [now, then] = [time, time + next].map(|t| constraint.motion.factor(t));
+            self.numbers.extend([(then - now) as f32, then as f32]);
+        }
+        let mut gravity = vec![[0.0; 3]; model.bodies.len()];
+        for load in &model.loads {
+            let factor = load.curve.value(time);
+            self.numbers.push(factor as f32);
+            if let LoadKind::Gravity { body, acceleration } = load.kind {
+                for (sum, a) in gravity[body].iter_mut().zip(acceleration) {
+                    *sum += factor * a;
+                }
+            }
+        }
+        self.numbers.extend(gravity.as_flattened().iter().map(|&g| g as f32));
+        debug_assert_eq!(self.numbers.len() % self.stride.max(1), 0);
+        self.bytes.resize(self.count * self.spacing, 0);
+        self.bytes.extend_from_slice(bytemuck::bytes_of(&instant));
+        self.count += 1;
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Submits them: `encode` adds the kernels of each to the pass, from its place and the offset of its numbers.
+    pub(crate) fn submit(
+        &mut self,
+        device: &Device,
+        mut encode: impl FnMut(&mut wgpu::ComputePass<'_>, usize, u32),
+    ) -> wgpu::SubmissionIndex {
+        device.queue.write_buffer(&self.instants, 0, &self.bytes);
+        device.queue.write_buffer(&self.table, 0, bytemuck::cast_slice(&self.numbers));
+        let mut encoder = device.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        for place in 0..self.count {
+            encode(&mut pass, place, (place * self.spacing) as u32);
+        }
+        drop(pass);
+        self.bytes.clear();
+        self.numbers.clear();
+        self.count = 0;
+        device.queue.submit([encoder.finish()])
+    }
+}

@@ -1,0 +1,13 @@
+// Goes on from an instant that was looked at.
+
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let node = number(group, groups, local);
+    if node < NODES && end() > instant.index {
+        go(node, next_increment[node].xyz, bitcast<u32>(nodes[node].w));
+    }
+}

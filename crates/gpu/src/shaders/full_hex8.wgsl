@@ -1,0 +1,52 @@
+// Forces of hexahedra with eight Gauss points and one mean dilatation. Rows at rest: the eight B_a of each point, with the
+// point's volume beside the first; 1/V beside the second of the first point.
+
+const FIBRES = 64u;
+
+@group(1) @binding(4) var<storage, read_write> pressures: array<f32>;
+
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let cell = number(group, groups, local);
+    if cell >= CELLS || end() < instant.index {
+        return;
+    }
+    let low = cell_nodes[cell];
+    let high = cell_nodes[CELLS + cell];
+    let origin = displacement_of(low.x);
+    var u = array<vec3f, 8>(
+        vec3f(0.0), displacement_of(low.y) - origin, displacement_of(low.z) - origin, displacement_of(low.w) - origin,
+        displacement_of(high.x) - origin, displacement_of(high.y) - origin, displacement_of(high.z) - origin,
+        displacement_of(high.w) - origin,
+    );
+    var gradient: array<mat3x3f, 8>;
+    var change = 0.0;
+    for (var point = 0u; point < 8u; point++) {
+        var h = mat3x3f();
+        for (var a = 1u; a < 8u; a++) {
+            h += outer(u[a], row(point * 8u + a, cell).xyz);
+        }
+        gradient[point] = h;
+        change += row(point * 8u, cell).w * volume_change(h);
+    }
+    let pressure = relaxed_pressure(change * row(1u, cell).w, cell);
+    var force = array<vec3f, 8>();
+    for (var point = 0u; point < 8u; point++) {
+        let d = deformation(gradient[point]);
+        let elastic = law_stress(d, fibre(0u, cell), fibre(1u, cell));
+        let stress = relaxed_isochoric(elastic.isochoric, cell, point * (SLOTS / 8u));
+        let weight = row(point * 8u, cell).w;
+        let piola = weight * (gradient_times(d.gradient, stress) + pressure * cofactor(d.gradient));
+        for (var a = 0u; a < 8u; a++) {
+            force[a] += piola * row(point * 8u + a, cell).xyz;
+        }
+        note(d.volume_ratio, d.strain_twice, abs(force[0]) + abs(force[7]));
+    }
+    for (var a = 0u; a < 8u; a++) {
+        give(cell, a, cell_nodes[a / 4u * CELLS + cell][a % 4u], vec4f(force[a], 0.0));
+    }
+}

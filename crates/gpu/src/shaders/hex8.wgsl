@@ -1,0 +1,48 @@
+// Forces of uniform-strain hexahedra with hourglass control. Rows at rest: the eight B_a, with the volume and the stiffness
+// k [N/m] of the control beside the first two; the four patterns γ at each node.
+
+const FIBRES = 16u;
+
+fn node(cell: u32, corner: u32) -> u32 {
+    return cell_nodes[corner / 4u * CELLS + cell][corner % 4u];
+}
+
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let cell = number(group, groups, local);
+    if cell >= CELLS || end() < instant.index {
+        return;
+    }
+    let volume = row(0u, cell).w;
+    let stiffness = row(1u, cell).w;
+    let origin = displacement_of(node(cell, 0u));
+    var h = mat3x3f();
+    // Columns: q_c = Σ γ_ca u_a.
+    var q = mat4x3f();
+    for (var a = 1u; a < 8u; a++) {
+        let u = displacement_of(node(cell, a)) - origin;
+        h += outer(u, row(a, cell).xyz);
+        let gamma = row(8u + a, cell);
+        q += mat4x3f(u * gamma.x, u * gamma.y, u * gamma.z, u * gamma.w);
+    }
+    let d = deformation(h);
+    let stress = relaxed_stress(law_stress(d, fibre(0u, cell), fibre(1u, cell)), cell);
+    let piola = volume * gradient_times(d.gradient, stress);
+    let energy = 0.5 * stiffness * (dot(q[0], q[0]) + dot(q[1], q[1]) + dot(q[2], q[2]) + dot(q[3], q[3]));
+    q = stiffness * q;
+    var first = vec3f(0.0);
+    var size = vec3f(0.0);
+    for (var a = 1u; a < 8u; a++) {
+        let f = piola * row(a, cell).xyz;
+        first -= f;
+        let whole = f + q * row(8u + a, cell);
+        size += abs(whole);
+        give(cell, a, node(cell, a), vec4f(whole, 0.0));
+    }
+    give(cell, 0u, node(cell, 0u), vec4f(first + q * row(8u, cell), energy));
+    note(d.volume_ratio, d.strain_twice, size);
+}

@@ -1,0 +1,55 @@
+// What belongs to one instant of a run; twin of `Instant` in run.rs. Δt⁻ and Δt⁺ are the steps before and after it, h their mean.
+
+struct Instant {
+    // Its number since the last one that was looked at.
+    index: u32,
+    // Where its row of the table begins.
+    row: u32,
+    // What is done: MOVES, MEASURES, STARTS.
+    flags: u32,
+    // Δt⁻ [s].
+    before: f32,
+    // Δt⁺/Δt⁻.
+    ratio: f32,
+    // Δt⁺ h [s²].
+    push: f32,
+    // 1/(Δt⁺ h) [1/s²].
+    per_push: f32,
+    // h/2 [s].
+    half_mean: f32,
+    // 1/(2 Δt⁺) [1/s].
+    per_two_steps: f32,
+}
+
+// Goes on to the next instant.
+const MOVES = 1u;
+// Sums up energies and finds how far cells are deformed.
+const MEASURES = 2u;
+// Begins at velocities, which stand in place of the increments.
+const STARTS = 4u;
+
+// Where in `findings` what is found.
+const BROKEN = 0u;
+const OVERFLOWN = 1u;
+const LEAST_VOLUME_RATIO = 2u;
+const LARGEST_STRAIN = 3u;
+
+@group(0) @binding(0) var<uniform> instant: Instant;
+// The first instants at which a cell is broken and a sum overflows; bits of the least J and of the largest |C − I|².
+@group(0) @binding(1) var<storage, read_write> findings: array<atomic<u32>, 4>;
+// For each instant of a submission the factors of constraints, those of loads, and the gravity of bodies.
+@group(0) @binding(2) var<storage, read> table: array<f32>;
+
+// The first instant that is not sound; all stands still there.
+fn end() -> u32 {
+    return min(atomicLoad(&findings[BROKEN]), atomicLoad(&findings[OVERFLOWN]));
+}
+
+fn does(flag: u32) -> bool {
+    return (instant.flags & flag) != 0u;
+}
+
+// The number of an invocation, in groups that fill up to two dimensions.
+fn number(group: vec3u, groups: vec3u, local: u32) -> u32 {
+    return (group.y * groups.x + group.x) * GROUP + local;
+}

@@ -1,0 +1,338 @@
+//! Cells on the device: constants at rest, histories, and the kernels that find their forces.
+
+use pliant_mechanics::model::{Averaging, CellBlock, Cells, LocalNodes, Model, Solid};
+use pliant_mechanics::prony::Relaxation;
+use pliant_mechanics::tensor::Vector;
+use pliant_mechanics::{History, PACK};
+
+use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::transfer::Transfer;
+use crate::{Device, GpuError};
+
+const INSTANT: &str = include_str!("shaders/instant.wgsl");
+const CELLS: &str = include_str!("shaders/cells.wgsl");
+const PRONY: &str = include_str!("shaders/prony.wgsl");
+const PRESSURE_HISTORY: &str = include_str!("shaders/pressure_history.wgsl");
+const TET: &str = include_str!("shaders/tet.wgsl");
+const AVERAGES: &str = include_str!("shaders/averages.wgsl");
+
+/// Four numbers that are read at once.
+pub(crate) type Four = [f32; 4];
+
+fn four([x, y, z]: Vector<f64>, w: f64) -> Four {
+    [x as f32, y as f32, z as f32, w as f32]
+}
+
+/// A solid on the device.
+pub(crate) struct DeviceSolid {
+    /// In the order they run.
+    kernels: Vec<Kernel>,
+    /// What relaxing laws remember of cells and of averaged pressures.
+    histories: [wgpu::Buffer; 2],
+    /// Parameters of the law, then coefficients of relaxation.
+    constants: wgpu::Buffer,
+    /// Where the coefficients begin [B].
+    series: u64,
+}
+
+/// What a design adds to the kernels of cells.
+pub(crate) struct Way<'a> {
+    /// Gives `displacement_of` and `give`.
+    pub snippet: &'a str,
+    pub bound: &'a Bound,
+    /// Numbers of the solid that the snippet needs.
+    pub constants: Vec<(&'static str, usize)>,
+}
+
+impl DeviceSolid {
+    /// # Errors
+    /// If an array is too large, or an element averages pressures and the law has none.
+    pub(crate) fn new(memory: &Memory<'_>, device: &Device, instant: &Bound, solid: &Solid, way: &Way<'_>) -> Result<Self, GpuError> {
+        let (cells, law) = (&solid.cells, &solid.material.law);
+        if cells.averages_pressure() && !law.has_volumetric_energy() {
+            let what = format!("`{}` with `{}`, which has no volumetric energy,", cells.element(), law.name());
+            return Err(GpuError::Unsupported { what });
+        }
+        let prony = &solid.material.prony;
+        let shader = law.shader();
+        let parameters: Vec<Four> = shader.parameters.chunks(4).map(|chunk| {
+            let mut four = Four::default();
+            four[..chunk.len()].copy_from_slice(chunk);
+            four
+        }).collect();
+        let series = 1 + prony.isochoric.len() + prony.volumetric.len();
+        let constants = memory.uniform("constants of a solid", (parameters.len() + series) * size_of::<Four>());
+        device.queue.write_buffer(&constants, 0, bytemuck::cast_slice(&parameters));
+
+        let slots = History::<f32>::slots(solid);
+        let packs = |count: usize, slots: usize| count.div_ceil(PACK) * slots * PACK * size_of::<f32>();
+        let averaged = match cells {
+            Cells::AveragedTet4(block, Averaging::Nodal) => LocalNodes::new(block).len(),
+            _ if cells.averages_pressure() => cells.len(),
+            _ => 0,
+        };
+        let histories = [
+            memory.zeros("the histories", packs(cells.len(), 6 * slots))?,
+            memory.zeros("the histories", packs(averaged, prony.volumetric_slots()))?,
+        ];
+        let nodes = memory.filled("the cells", &rows_of_nodes(cells))?;
+        let rest = memory.filled("the shapes of cells at rest", &rows_at_rest(solid))?;
+        let mut bindings =
+            vec![Binding::Read(&nodes), Binding::Read(&rest), Binding::Write(&histories[0]), Binding::Uniform(&constants)];
+        let averages = match cells {
+            Cells::AveragedTet4(block, _) => Some(Averages::new(memory, block)?),
+            _ => None,
+        };
+        match &averages {
+            Some(averages) => bindings.extend(averages.bindings(&histories[1])),
+            None if cells.averages_pressure() => bindings.push(Binding::Write(&histories[1])),
+            None => {}
+        }
+        let bound = Bound::new(device, &bindings);
+
+        let mut numbers = vec![
+            ("CELLS", cells.len()),
+            ("FAMILIES", law.families()),
+            ("PARAMETERS", parameters.len()),
+            ("SERIES", series),
+            ("ISOCHORIC_TERMS", prony.isochoric.len()),
+            ("VOLUMETRIC_TERMS", prony.volumetric.len()),
+            ("SLOTS", slots),
+            ("LOCAL_NODES", averages.as_ref().map_or(0, |averages| averages.count)),
+        ];
+        numbers.extend(way.constants.iter().copied());
+        let kernel = |name: &str, more: &[&str], count: usize| {
+            let common = [INSTANT, &shader.source, CELLS, PRONY, way.snippet];
+            let snippets = [&common, more].concat();
+            Kernel::new(device, name, &numbers, &snippets, &[instant, &bound, way.bound], count)
+        };
+        let count = cells.len();
+        let kernels = match cells {
+            Cells::Tet4(_) => vec![kernel("tet4", &[TET, include_str!("shaders/tet4.wgsl")], count)],
+            Cells::Hex8(_) => vec![kernel("hex8", &[include_str!("shaders/hex8.wgsl")], count)],
+            Cells::FullHex8(..) => {
+                let own = include_str!("shaders/full_hex8.wgsl");
+                vec![kernel("hex8-full", &[PRESSURE_HISTORY, own], count)]
+            }
+            Cells::AveragedTet4(_, averaging) => {
+                let averaging_kernel = |name: &str, more: &[&str], count: usize| {
+                    kernel(name, &[&[TET, AVERAGES], more].concat(), count)
+                };
+                let local = averages.as_ref().map_or(0, |averages| averages.count);
+                let to_nodes = include_str!("shaders/node_averages.wgsl");
+                let means = [include_str!("shaders/node_means.wgsl"), to_nodes];
+                let node_pressures = [PRESSURE_HISTORY, include_str!("shaders/node_pressures.wgsl"), to_nodes];
+                let cell_pressures = [PRESSURE_HISTORY, include_str!("shaders/cell_pressures.wgsl")];
+                let forces = include_str!("shaders/averaged_tet4.wgsl");
+                let of_pressure = [include_str!("shaders/averaged_pressure.wgsl"), forces];
+                let of_deformation = [include_str!("shaders/averaged_deformation.wgsl"), forces];
+                let changes = averaging_kernel("volume changes", &[include_str!("shaders/volume_changes.wgsl")], count);
+                match averaging {
+                    Averaging::Nodal => vec![
+                        changes,
+                        averaging_kernel("nodal pressures", &node_pressures, local),
+                        averaging_kernel("tet4-anp", &of_pressure, count),
+                    ],
+                    Averaging::Variational => vec![
+                        changes,
+                        averaging_kernel("nodal averages", &means, local),
+                        averaging_kernel("pressures", &cell_pressures, count),
+                        averaging_kernel("nodal averages", &means, local),
+                        averaging_kernel("tet4-ianp", &of_pressure, count),
+                    ],
+                    Averaging::NiftySim => vec![
+                        changes,
+                        averaging_kernel("nodal averages", &means, local),
+                        averaging_kernel("tet4-ianp-niftysim", &of_deformation, count),
+                    ],
+                }
+            }
+        };
+        let series = (parameters.len() * size_of::<Four>()) as u64;
+        Ok(Self { kernels, histories, constants, series })
+    }
+
+    /// Relaxes from now on over steps of `step` seconds.
+    pub(crate) fn set_step(&self, device: &Device, solid: &Solid, step: f64) {
+        let relaxation = Relaxation::<f32>::new(&solid.material.prony, step);
+        let [isochoric, volumetric] = [relaxation.isochoric(), relaxation.volumetric()];
+        let mut rows = vec![[isochoric.remaining, volumetric.remaining, 0.0, 0.0]];
+        rows.extend(isochoric.terms.iter().chain(&volumetric.terms).map(|&(decay, gain)| [decay, gain, 0.0, 0.0]));
+        device.queue.write_buffer(&self.constants, self.series, bytemuck::cast_slice(&rows));
+    }
+
+    pub(crate) fn kernels(&self) -> &[Kernel] {
+        &self.kernels
+    }
+
+    /// Takes up the history of a state.
+    pub(crate) fn upload(&self, device: &Device, history: &History<f32>) {
+        for (buffer, packs) in self.histories.iter().zip([&history.cells, &history.pressures]) {
+            let numbers: Vec<f32> = packs.iter().flat_map(|pack| pack.0).collect();
+            device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&numbers));
+        }
+    }
+
+    /// Brings the history back.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(crate) fn bring_back(&self, transfer: &mut Transfer, device: &Device, history: &mut History<f32>) -> Result<(), GpuError> {
+        for (buffer, packs) in self.histories.iter().zip([&mut history.cells, &mut history.pressures]) {
+            if packs.is_empty() {
+                continue;
+            }
+            transfer.read::<[f32; PACK]>(device, buffer, packs.len(), |numbers| {
+                packs.iter_mut().zip(numbers).for_each(|(pack, numbers)| pack.0 = *numbers);
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Nodes, four to a row of all cells.
+fn rows_of_nodes(cells: &Cells) -> Vec<[u32; 4]> {
+    (0..cells.nodes_per_cell() / 4)
+        .flat_map(|row| (0..cells.len()).map(move |cell| [0, 1, 2, 3].map(|a| cells.nodes(cell)[4 * row + a])))
+        .collect()
+}
+
+/// What the element needs of the shape at rest, then the directions of the fibres; row by row of all cells.
+fn rows_at_rest(solid: &Solid) -> Vec<Four> {
+    let mut rows = match &solid.cells {
+        Cells::Tet4(block) | Cells::AveragedTet4(block, _) => tets_at_rest(block),
+        Cells::Hex8(block) => hexes_at_rest(block),
+        Cells::FullHex8(block, points) => {
+            let row = |point: usize, a: usize| {
+                points.iter().zip(&block.rest).map(move |(points, rest)| {
+                    let beside = match (point, a) {
+                        (_, 0) => points.weight[point],
+                        (0, 1) => 1.0 / rest.volume,
+                        _ => 0.0,
+                    };
+                    four(points.gradient[point][a], beside)
+                })
+            };
+            (0..64).flat_map(|index| row(index / 8, index % 8)).collect()
+        }
+    };
+    for family in 0..solid.material.law.families() {
+        rows.extend((0..solid.cells.len()).map(|cell| four(solid.fibres(cell)[family], 0.0)));
+    }
+    rows
+}
+
+fn tets_at_rest(block: &CellBlock<4>) -> Vec<Four> {
+    (1..4)
+        .flat_map(|a| {
+            block.rest.iter().map(move |rest| four(rest.gradient[a], if a == 1 { rest.volume } else { 0.0 }))
+        })
+        .collect()
+}
+
+fn hexes_at_rest(block: &CellBlock<8>) -> Vec<Four> {
+    let control = block.hourglass.as_ref();
+    let gradients = (0..8).flat_map(|a| {
+        block.rest.iter().enumerate().map(move |(cell, rest)| {
+            let beside = match a {
+                0 => rest.volume,
+                1 => control.map_or(0.0, |control| control.stiffness[cell]),
+                _ => 0.0,
+            };
+            four(rest.gradient[a], beside)
+        })
+    });
+    let patterns = (0..8).flat_map(|a| {
+        (0..block.rest.len()).map(move |cell| {
+            control.map_or(Four::default(), |control| control.patterns[cell].map(|gamma| gamma[a] as f32))
+        })
+    });
+    gradients.chain(patterns).collect()
+}
+
+/// What averaging over the nodes of a solid needs.
+struct Averages {
+    /// Nodes of the solid.
+    count: usize,
+    cell_values: wgpu::Buffer,
+    node_values: wgpu::Buffer,
+    nodes: wgpu::Buffer,
+    offsets: wgpu::Buffer,
+    cells: wgpu::Buffer,
+    inverse_volume: wgpu::Buffer,
+}
+
+impl Averages {
+    fn new(memory: &Memory<'_>, block: &CellBlock<4>) -> Result<Self, GpuError> {
+        let local = LocalNodes::new(block);
+        let mut offsets = vec![0];
+        let (mut cells, mut inverse_volume) = (Vec::new(), Vec::new());
+        for node in 0..local.len() {
+            cells.extend(local.cells_at(node).map(|cell| cell as u32));
+            offsets.push(cells.len() as u32);
+            let volume: f64 = local.cells_at(node).map(|cell| 0.25 * block.rest[cell].volume).sum();
+            inverse_volume.push((1.0 / volume) as f32);
+        }
+        Ok(Self {
+            count: local.len(),
+            cell_values: memory.zeros("the averages", block.nodes.len() * size_of::<f32>())?,
+            node_values: memory.zeros("the averages", local.len() * size_of::<f32>())?,
+            nodes: memory.filled("the cells", &local.nodes)?,
+            offsets: memory.filled("the cells at nodes", &offsets)?,
+            cells: memory.filled("the cells at nodes", &cells)?,
+            inverse_volume: memory.filled("the averages", &inverse_volume)?,
+        })
+    }
+
+    fn bindings<'a>(&'a self, pressures: &'a wgpu::Buffer) -> [Binding<'a>; 7] {
+        [
+            Binding::Write(&self.cell_values),
+            Binding::Write(&self.node_values),
+            Binding::Read(&self.nodes),
+            Binding::Read(&self.offsets),
+            Binding::Read(&self.cells),
+            Binding::Read(&self.inverse_volume),
+            Binding::Write(pressures),
+        ]
+    }
+}
+
+/// The slots of all cells, and for each node those that are its own, in the order of solids and cells.
+pub(crate) struct Slots {
+    /// First slot of each solid, one more than there are solids. Slots of a solid lie node by node of the cells.
+    pub first: Vec<usize>,
+    /// First entry of `of_node` of each node.
+    pub offsets: Vec<u32>,
+    pub of_node: Vec<u32>,
+}
+
+impl Slots {
+    pub(crate) fn new(model: &Model) -> Self {
+        let mut first = vec![0];
+        let mut offsets = vec![0_u32; model.node_count() + 1];
+        let each = |visit: &mut dyn FnMut(usize, usize, usize, u32)| {
+            for (index, solid) in model.solids.iter().enumerate() {
+                for cell in 0..solid.cells.len() {
+                    for (a, &node) in solid.cells.nodes(cell).iter().enumerate() {
+                        visit(index, cell, a, node);
+                    }
+                }
+            }
+        };
+        for solid in &model.solids {
+            first.push(first[first.len() - 1] + solid.cells.len() * solid.cells.nodes_per_cell());
+        }
+        each(&mut |_, _, _, node| offsets[node as usize + 1] += 1);
+        for node in 0..model.node_count() {
+            offsets[node + 1] += offsets[node];
+        }
+        let mut next = offsets.clone();
+        let mut of_node = vec![0; first[first.len() - 1]];
+        each(&mut |solid, cell, a, node| {
+            let place = &mut next[node as usize];
+            of_node[*place as usize] = (first[solid] + a * model.solids[solid].cells.len() + cell) as u32;
+            *place += 1;
+        });
+        Self { first, offsets, of_node }
+    }
+}

@@ -1,0 +1,26 @@
+//! Laws for graphics processors: each is a snippet of WGSL beside its Rust twin, put together here with what it stands on.
+
+/// The stress of a law in WGSL.
+///
+/// The text stands by itself but for `fn parameter(index: u32) -> f32`, which the module around it defines. It gives
+/// `law_stress(deformation(h), a, b)`, the two parts of the second Piola–Kirchhoff stress [Pa] from the displacement
+/// gradient and the directions of the fibres (any, where the law has none), and, if
+/// [the law's energy has a volumetric part](super::AnyLaw::has_volumetric_energy), `law_pressure(volume_change)`: U′(J) [Pa].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shader {
+    /// WGSL; the same for all parameters of a law and a volumetric energy.
+    pub source: String,
+    /// What `parameter` returns, by index. At least one.
+    pub parameters: Vec<f32>,
+}
+
+impl Shader {
+    /// From the law's own snippets and parameters.
+    pub(super) fn new(snippets: &[&str], parameters: &[f64]) -> Self {
+        let shared = [include_str!("numbers.wgsl"), include_str!("deformation.wgsl")];
+        Self {
+            source: [&shared, snippets].concat().join("\n"),
+            parameters: parameters.iter().map(|&p| p as f32).collect(),
+        }
+    }
+}
