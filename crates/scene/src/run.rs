@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use pliant_gpu::Wanted;
 use pliant_mechanics::stability::Stability;
 use pliant_mechanics::{Energies, Observable, Real, State};
 use serde::{Deserialize, Serialize};
@@ -17,7 +18,7 @@ use crate::output::{
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::{LoadStepProgress, Solver, Wanted, on_processor};
+use crate::solver::{LoadStepProgress, Solver, on_device, on_processor};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -97,6 +98,8 @@ impl Outcome {
 
 /// Samples in the history.
 const SAMPLES: f64 = 1000.0;
+/// Those of a run on a graphics processor, which has to stop for each.
+const SAMPLES_ON_DEVICE: f64 = 250.0;
 
 /// Wall time between two reports of progress.
 const REPORT: Duration = Duration::from_millis(100);
@@ -133,10 +136,14 @@ pub fn run_with(
         .build()
         .map_err(|error| OutputError::new(folder.path(), error))?;
     let mut outcome = pool.install(|| match (&plan.target.device, plan.target.precision) {
-        (_, Precision::Single) => {
+        (Some(device), _) => {
+            let solver = |state: &_| on_device(&scene.run, built, plan, device, state);
+            go::<f32>(scene, built, plan, folder, options, solver, report)
+        }
+        (None, Precision::Single) => {
             go::<f32>(scene, built, plan, folder, options, |_| on_processor(&scene.run, built, plan), report)
         }
-        (_, Precision::Double) => {
+        (None, Precision::Double) => {
             go::<f64>(scene, built, plan, folder, options, |_| on_processor(&scene.run, built, plan), report)
         }
     })?;
@@ -296,6 +303,7 @@ impl<'a, R: Real> Course<'a, R> {
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
+        let samples = if plan.target.device.is_some() { SAMPLES_ON_DEVICE } else { SAMPLES };
         let written = before.map(|before| before.outputs.as_slice());
         let watching = observers::<R>(scene, built, folder.path(), &mut files, written)?;
         equilibrium.into_iter().for_each(|equilibrium| solver.resume(equilibrium));
@@ -305,7 +313,7 @@ impl<'a, R: Real> Course<'a, R> {
             plan,
             watching,
             history: before.map_or_else(History::default, |before| before.history.clone()),
-            sampling: before.map_or(Schedule::new(scene.scene.until / SAMPLES), |before| before.sampling),
+            sampling: before.map_or(Schedule::new(scene.scene.until / samples), |before| before.sampling),
             worst_balance: before.map_or(0.0, |before| before.worst_balance),
             worst_hourglass: before.map_or((0.0, 0.0), |before| before.worst_hourglass),
             checkpoints: Checkpoints::new(scene, built, plan, folder, state.time),

@@ -1,5 +1,6 @@
 //! The solvers of a scene behind one face, so that one run loop serves them all.
 
+use pliant_gpu::{Device, GpuStepper, Wanted};
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::stability::Monitor;
 use pliant_mechanics::{
@@ -10,15 +11,6 @@ use crate::build::Built;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
-
-/// What of a state is to belong to its instant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wanted {
-    /// Energies and reactions.
-    Energies,
-    /// The fields, too.
-    Everything,
-}
 
 /// How far a load step is.
 #[derive(Clone, Copy, Debug)]
@@ -108,6 +100,59 @@ pub(crate) fn on_processor<'m, R: Real>(
             })
         }
     })
+}
+
+/// The solver that a scene asks for, on a graphics processor, from a state on.
+pub(crate) fn on_device<'m>(
+    run: &RunTable,
+    built: &'m Built,
+    plan: &Plan,
+    device: &Device,
+    state: &State<f32>,
+) -> Result<Box<dyn Solver<f32> + 'm>, FailureSummary> {
+    let stepper = GpuStepper::new(device, &built.model, plan.step, run.design);
+    let mut stepper = stepper.map_err(|error| FailureSummary::device(&error, None))?;
+    if let Some(monitor) = monitor(run, built, plan) {
+        stepper = stepper.watched(monitor);
+    }
+    stepper.upload(state);
+    Ok(Box::new(stepper))
+}
+
+/// Most steps in one go on a graphics processor, so that a run can be stopped and shows how far it is.
+const STRIDE: u64 = 1024;
+
+impl Solver<f32> for GpuStepper<'_> {
+    fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), FailureSummary> {
+        GpuStepper::evaluate(self, state, wanted)
+            .map_err(|failure| FailureSummary::step(&failure, state.time))
+    }
+
+    fn advance(
+        &mut self,
+        state: &mut State<f32>,
+        steps: u64,
+        _watch: &mut dyn FnMut(LoadStepProgress),
+    ) -> Result<(), FailureSummary> {
+        GpuStepper::advance(self, state, steps).map_err(|failure| FailureSummary::step(&failure, state.time))
+    }
+
+    fn stride(&self) -> u64 {
+        STRIDE
+    }
+
+    fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), FailureSummary> {
+        let failed = |error| FailureSummary::device(&error, Some(state.time));
+        GpuStepper::bring_back(self, state).map_err(failed)
+    }
+
+    fn balance_floor(&self) -> f64 {
+        GpuStepper::balance_floor(self)
+    }
+
+    fn observable(&self) -> &dyn Observable<f32> {
+        self
+    }
 }
 
 impl<R: Real> Solver<R> for CentralDifference<'_, R> {

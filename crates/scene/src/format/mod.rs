@@ -16,6 +16,7 @@ pub use load::{
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 
+use pliant_gpu::Design;
 use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
 use pliant_mechanics::stability::OnUnstable;
 use schemars::JsonSchema;
@@ -46,6 +47,9 @@ pub struct RunTable {
     /// The graphics processor, by a part of its name in `pliant devices`; if not given, the best one.
     #[serde(default)]
     pub adapter: Option<String>,
+    /// How the kernels of a graphics processor bring forces from cells to nodes; if not given, the way that measured best.
+    #[serde(default)]
+    pub design: Option<Design>,
     /// Number type of the solver; if not given, `double` on the processor and `single` on a graphics processor, which has
     /// no other.
     #[serde(default)]

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use pliant_gpu::{GpuError, StepFailure};
 use pliant_mechanics::{Energies, RelaxationError, StepError};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
@@ -159,6 +160,19 @@ impl FailureSummary {
         };
         let message = format!("the run was interrupted at t = {} s; {way}", number(time));
         Self::about(INTERRUPTED, message, Some(time))
+    }
+
+    /// A device that failed, at a time of the run.
+    pub(crate) fn device(error: &GpuError, time: Option<f64>) -> Self {
+        Self::about("device", format!("{error}; {}", error.remedy()), time)
+    }
+
+    /// Steps on a device that could not be taken.
+    pub(crate) fn step(failure: &StepFailure, time: f64) -> Self {
+        match failure {
+            StepFailure::Step(error) => error.into(),
+            StepFailure::Device(error) => Self::device(error, Some(time)),
+        }
     }
 
     /// A scene that should have been refused before.
