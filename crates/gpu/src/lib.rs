@@ -6,8 +6,19 @@
 //! }
 //! ```
 
+mod design;
 mod device;
 mod error;
+mod kernel;
+mod loads;
+mod nodes;
+mod run;
+mod solids;
+mod stepper;
+mod transfer;
 
+pub use design::{Design, UnknownDesign};
 pub use device::{Adapter, Device, Kind, adapters};
 pub use error::GpuError;
+pub use run::StepFailure;
+pub use stepper::{GpuStepper, Wanted};
