@@ -3,8 +3,12 @@
 use std::fmt;
 use std::str::FromStr;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// A design of the kernels; all give the same answers within round-off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Design {
     /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every time.
     Gather,
@@ -28,11 +32,14 @@ impl FromStr for Design {
 
     fn from_str(name: &str) -> Result<Self, UnknownDesign> {
         let known = Self::ALL.iter().find(|design| design.to_string() == name);
-        known.copied().ok_or_else(|| UnknownDesign(name.to_owned()))
+        known.copied().ok_or_else(|| UnknownDesign { name: name.to_owned() })
     }
 }
 
 /// A name no design has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no design `{0}`; there are {}", Design::ALL.iter().map(Design::to_string).collect::<Vec<_>>().join(", "))]
-pub struct UnknownDesign(pub String);
+#[error("there is no design `{name}`; there are {}", Design::ALL.iter().map(Design::to_string).collect::<Vec<_>>().join(", "))]
+pub struct UnknownDesign {
+    /// The name.
+    pub name: String,
+}

@@ -1,5 +1,7 @@
 //! What can go wrong with a device, and what to do.
 
+use pliant_mechanics::model::Contradiction;
+
 /// Why a device can't be used, or not any longer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
@@ -58,6 +60,9 @@ pub enum GpuError {
         /// What it is.
         what: String,
     },
+    /// Constraints contradict each other.
+    #[error(transparent)]
+    Contradiction(#[from] Contradiction),
     /// The driver reports a fault of the program.
     #[error("`{adapter}` reports a fault in its use: {reason}")]
     Internal {
@@ -88,6 +93,7 @@ impl GpuError {
                 "take a coarser mesh, an adapter with more memory (`pliant devices`) or `device = \"cpu\"`"
             }
             Self::Unsupported { .. } => "take `device = \"cpu\"`",
+            Self::Contradiction(_) => "leave the node out of one of the two, or give both the same motion",
             Self::Internal { .. } => {
                 "take `device = \"cpu\"`, and report this: it is a fault of Pliant or of the driver"
             }

@@ -34,13 +34,21 @@ impl<'d> Memory<'d> {
     ///
     /// # Errors
     /// If it is larger than the adapter allows.
-    pub(crate) fn filled<T: NoUninit>(&self, what: &'static str, contents: &[T]) -> Result<wgpu::Buffer, GpuError> {
+    pub(crate) fn filled<T: NoUninit>(
+        &self,
+        what: &'static str,
+        contents: &[T],
+    ) -> Result<wgpu::Buffer, GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(contents);
         self.count(what, bytes.len() as u64)?;
         let least = [0; 16];
         let contents = if bytes.len() < least.len() { &least } else { bytes };
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        Ok(self.device.device.create_buffer_init(&BufferInitDescriptor { label: Some(what), contents, usage }))
+        Ok(self.device.device.create_buffer_init(&BufferInitDescriptor {
+            label: Some(what),
+            contents,
+            usage,
+        }))
     }
 
     /// An array of zeros.
@@ -127,10 +135,13 @@ impl Bound {
             })
             .collect();
         let device = &device.device;
-        let layout =
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &layout });
-        let group =
-            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
+        let layout = device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &layout });
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &layout,
+            entries: &entries,
+        });
         Self { layout, group }
     }
 }
@@ -164,6 +175,7 @@ impl Kernel {
         for (name, value) in constants {
             source += &format!("const {name} = {value}u;\n");
         }
+        source += include_str!("shaders/number.wgsl");
         source += &snippets.join("\n");
         let gpu = &device.device;
         let module = gpu.create_shader_module(wgpu::ShaderModuleDescriptor {

@@ -6,8 +6,21 @@
 //! }
 //! ```
 
+mod design;
 mod device;
 mod error;
+mod kernel;
+mod loads;
+mod nodes;
+mod rates;
+mod run;
+mod solids;
+mod stepper;
+mod transfer;
 
+pub use design::{Design, UnknownDesign};
 pub use device::{Adapter, Device, Kind, adapters};
 pub use error::GpuError;
+pub use rates::DeviceRates;
+pub use run::StepFailure;
+pub use stepper::{GpuStepper, Wanted};

@@ -40,7 +40,14 @@ struct Corners {
 
 impl Corners {
     /// Adds a face of a load and, for its nodes, its corners.
-    fn add(&mut self, model: &Model, (index, load): (usize, &Load), face: &Face, pressure: f64, entries: &mut [Vec<Four>]) {
+    fn add(
+        &mut self,
+        model: &Model,
+        (index, load): (usize, &Load),
+        face: &Face,
+        pressure: f64,
+        entries: &mut [Vec<Four>],
+    ) {
         let rest: &[Vector<f64>] = load.surface.map_or(&model.rest, |surface| &model.surfaces[surface].rest);
         let count = if face[3] == NO_NODE { 3 } else { 4 };
         let beside = [pressure as f32, f32::from_bits(index as u32), f32::from_bits(count), 0.0];

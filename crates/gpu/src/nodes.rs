@@ -62,7 +62,10 @@ impl DeviceNodes {
                     hold = held.len() as u32;
                     held.push(node);
                     let [x, y, z] = amplitudes[node as usize].map(|a| a as f32);
-                    holds.push(Hold { owner: [owner[0], owner[1], owner[2], FREE], amplitude: [x, y, z, 0.0] });
+                    holds.push(Hold {
+                        owner: [owner[0], owner[1], owner[2], FREE],
+                        amplitude: [x, y, z, 0.0],
+                    });
                 }
                 let (inertia, mass) = (model.inertia(node as usize), model.mass[node as usize]);
                 constants.push([inertia as f32, body.damping as f32, mass as f32, f32::from_bits(hold)]);

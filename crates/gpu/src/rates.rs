@@ -45,8 +45,7 @@ impl DeviceRates {
         let instant = Bound::new(device, &[Binding::Moving(&nothing, 256)]);
         let arrays = Bound::new(device, &[Binding::Read(&source), Binding::Write(&target)]);
         let kernel = |name, snippet, invocations| {
-            let snippets = [include_str!("shaders/number.wgsl"), snippet];
-            Kernel::new(device, name, &[("ROUNDS", ROUNDS)], &snippets, &[&instant, &arrays], invocations)
+            Kernel::new(device, name, &[("ROUNDS", ROUNDS)], &[snippet], &[&instant, &arrays], invocations)
         };
         let best = |kernel: &Kernel| -> Result<f64, GpuError> {
             let mut best = f64::INFINITY;
@@ -56,8 +55,11 @@ impl DeviceRates {
             Ok(best)
         };
         let copy = kernel("copy", include_str!("shaders/copy.wgsl"), bytes / 16);
-        let arithmetic =
-            kernel("multiply and add", include_str!("shaders/multiply_add.wgsl"), INVOCATIONS.min(bytes / 16));
+        let arithmetic = kernel(
+            "multiply and add",
+            include_str!("shaders/multiply_add.wgsl"),
+            INVOCATIONS.min(bytes / 16),
+        );
         let empty = kernel("empty", include_str!("shaders/empty.wgsl"), 1);
         let operations = 2 * 4 * 8 * ROUNDS * INVOCATIONS.min(bytes / 16);
         Ok(Self {

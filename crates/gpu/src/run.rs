@@ -113,7 +113,17 @@ impl Instants {
             device,
             &[Binding::Moving(&instants, size), Binding::Write(&findings), Binding::Read(&table)],
         );
-        Ok(Self { bound, instants, table, findings, spacing, bytes: vec![], numbers: vec![], stride, count: 0 })
+        Ok(Self {
+            bound,
+            instants,
+            table,
+            findings,
+            spacing,
+            bytes: vec![],
+            numbers: vec![],
+            stride,
+            count: 0,
+        })
     }
 
     /// Forgets what was found.
@@ -155,18 +165,18 @@ impl Instants {
         self.count
     }
 
-    /// Submits them: `encode` adds the kernels of each to the pass, from its place and the offset of its numbers.
+    /// Submits them: `encode` adds the kernels of each to the pass, from what they read, its place and the offset of its numbers.
     pub(crate) fn submit(
         &mut self,
         device: &Device,
-        mut encode: impl FnMut(&mut wgpu::ComputePass<'_>, usize, u32),
+        mut encode: impl FnMut(&mut wgpu::ComputePass<'_>, &Bound, usize, u32),
     ) -> wgpu::SubmissionIndex {
         device.queue.write_buffer(&self.instants, 0, &self.bytes);
         device.queue.write_buffer(&self.table, 0, bytemuck::cast_slice(&self.numbers));
         let mut encoder = device.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
         for place in 0..self.count {
-            encode(&mut pass, place, (place * self.spacing) as u32);
+            encode(&mut pass, &self.bound, place, (place * self.spacing) as u32);
         }
         drop(pass);
         self.bytes.clear();

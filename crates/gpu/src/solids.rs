@@ -47,21 +47,33 @@ pub(crate) struct Way<'a> {
 impl DeviceSolid {
     /// # Errors
     /// If an array is too large, or an element averages pressures and the law has none.
-    pub(crate) fn new(memory: &Memory<'_>, device: &Device, instant: &Bound, solid: &Solid, way: &Way<'_>) -> Result<Self, GpuError> {
+    pub(crate) fn new(
+        memory: &Memory<'_>,
+        device: &Device,
+        instant: &Bound,
+        solid: &Solid,
+        way: &Way<'_>,
+    ) -> Result<Self, GpuError> {
         let (cells, law) = (&solid.cells, &solid.material.law);
         if cells.averages_pressure() && !law.has_volumetric_energy() {
-            let what = format!("`{}` with `{}`, which has no volumetric energy,", cells.element(), law.name());
+            let what =
+                format!("`{}` with `{}`, which has no volumetric energy,", cells.element(), law.name());
             return Err(GpuError::Unsupported { what });
         }
         let prony = &solid.material.prony;
         let shader = law.shader();
-        let parameters: Vec<Four> = shader.parameters.chunks(4).map(|chunk| {
-            let mut four = Four::default();
-            four[..chunk.len()].copy_from_slice(chunk);
-            four
-        }).collect();
+        let parameters: Vec<Four> = shader
+            .parameters
+            .chunks(4)
+            .map(|chunk| {
+                let mut four = Four::default();
+                four[..chunk.len()].copy_from_slice(chunk);
+                four
+            })
+            .collect();
         let series = 1 + prony.isochoric.len() + prony.volumetric.len();
-        let constants = memory.uniform("constants of a solid", (parameters.len() + series) * size_of::<Four>());
+        let constants =
+            memory.uniform("constants of a solid", (parameters.len() + series) * size_of::<Four>());
         device.queue.write_buffer(&constants, 0, bytemuck::cast_slice(&parameters));
 
         let slots = History::<f32>::slots(solid);
@@ -77,8 +89,12 @@ impl DeviceSolid {
         ];
         let nodes = memory.filled("the cells", &rows_of_nodes(cells))?;
         let rest = memory.filled("the shapes of cells at rest", &rows_at_rest(solid))?;
-        let mut bindings =
-            vec![Binding::Read(&nodes), Binding::Read(&rest), Binding::Write(&histories[0]), Binding::Uniform(&constants)];
+        let mut bindings = vec![
+            Binding::Read(&nodes),
+            Binding::Read(&rest),
+            Binding::Write(&histories[0]),
+            Binding::Uniform(&constants),
+        ];
         let averages = match cells {
             Cells::AveragedTet4(block, _) => Some(Averages::new(memory, block)?),
             _ => None,
@@ -121,12 +137,14 @@ impl DeviceSolid {
                 let local = averages.as_ref().map_or(0, |averages| averages.count);
                 let to_nodes = include_str!("shaders/node_averages.wgsl");
                 let means = [include_str!("shaders/node_means.wgsl"), to_nodes];
-                let node_pressures = [PRESSURE_HISTORY, include_str!("shaders/node_pressures.wgsl"), to_nodes];
+                let node_pressures =
+                    [PRESSURE_HISTORY, include_str!("shaders/node_pressures.wgsl"), to_nodes];
                 let cell_pressures = [PRESSURE_HISTORY, include_str!("shaders/cell_pressures.wgsl")];
                 let forces = include_str!("shaders/averaged_tet4.wgsl");
                 let of_pressure = [include_str!("shaders/averaged_pressure.wgsl"), forces];
                 let of_deformation = [include_str!("shaders/averaged_deformation.wgsl"), forces];
-                let changes = averaging_kernel("volume changes", &[include_str!("shaders/volume_changes.wgsl")], count);
+                let changes =
+                    averaging_kernel("volume changes", &[include_str!("shaders/volume_changes.wgsl")], count);
                 match averaging {
                     Averaging::Nodal => vec![
                         changes,
@@ -157,7 +175,9 @@ impl DeviceSolid {
         let relaxation = Relaxation::<f32>::new(&solid.material.prony, step);
         let [isochoric, volumetric] = [relaxation.isochoric(), relaxation.volumetric()];
         let mut rows = vec![[isochoric.remaining, volumetric.remaining, 0.0, 0.0]];
-        rows.extend(isochoric.terms.iter().chain(&volumetric.terms).map(|&(decay, gain)| [decay, gain, 0.0, 0.0]));
+        rows.extend(
+            isochoric.terms.iter().chain(&volumetric.terms).map(|&(decay, gain)| [decay, gain, 0.0, 0.0]),
+        );
         device.queue.write_buffer(&self.constants, self.series, bytemuck::cast_slice(&rows));
     }
 
@@ -177,7 +197,12 @@ impl DeviceSolid {
     ///
     /// # Errors
     /// If the device fails.
-    pub(crate) fn bring_back(&self, transfer: &mut Transfer, device: &Device, history: &mut History<f32>) -> Result<(), GpuError> {
+    pub(crate) fn bring_back(
+        &self,
+        transfer: &mut Transfer,
+        device: &Device,
+        history: &mut History<f32>,
+    ) -> Result<(), GpuError> {
         for (buffer, packs) in self.histories.iter().zip([&mut history.cells, &mut history.pressures]) {
             if packs.is_empty() {
                 continue;
@@ -193,7 +218,9 @@ impl DeviceSolid {
 /// Nodes, four to a row of all cells.
 fn rows_of_nodes(cells: &Cells) -> Vec<[u32; 4]> {
     (0..cells.nodes_per_cell() / 4)
-        .flat_map(|row| (0..cells.len()).map(move |cell| [0, 1, 2, 3].map(|a| cells.nodes(cell)[4 * row + a])))
+        .flat_map(|row| {
+            (0..cells.len()).map(move |cell| [0, 1, 2, 3].map(|a| cells.nodes(cell)[4 * row + a]))
+        })
         .collect()
 }
 

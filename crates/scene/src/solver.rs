@@ -142,8 +142,7 @@ impl Solver<f32> for GpuStepper<'_> {
     }
 
     fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), FailureSummary> {
-        let failed = |error| FailureSummary::device(&error, Some(state.time));
-        GpuStepper::bring_back(self, state).map_err(failed)
+        GpuStepper::bring_back(self, state).map_err(|failure| FailureSummary::step(&failure, state.time))
     }
 
     fn balance_floor(&self) -> f64 {

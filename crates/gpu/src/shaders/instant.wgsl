@@ -48,8 +48,3 @@ fn end() -> u32 {
 fn does(flag: u32) -> bool {
     return (instant.flags & flag) != 0u;
 }
-
-// The number of an invocation, in groups that fill up to two dimensions.
-fn number(group: vec3u, groups: vec3u, local: u32) -> u32 {
-    return (group.y * groups.x + group.x) * GROUP + local;
-}

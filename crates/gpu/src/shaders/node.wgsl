@@ -6,20 +6,20 @@
 // hourglass control, shock; then internal and external work and damping power of all instants that were passed over.
 @group(1) @binding(6) var<storage, read_write> sums: array<vec4f>;
 
-var<workgroup> partial: array<vec4f, GROUP>;
+var<workgroup> terms: array<vec4f, GROUP>;
 
 // The sum over a group.
 fn total(local: u32, value: vec4f) -> vec4f {
     workgroupBarrier();
-    partial[local] = value;
+    terms[local] = value;
     for (var half = GROUP / 2u; half > 0u; half /= 2u) {
         workgroupBarrier();
         if local < half {
-            partial[local] += partial[local + half];
+            terms[local] += terms[local + half];
         }
     }
     workgroupBarrier();
-    return partial[0];
+    return terms[0];
 }
 
 @compute @workgroup_size(GROUP)
@@ -38,18 +38,18 @@ fn main(
         let held = bitcast<u32>(of_node.w);
         let gathered = internal_force(node);
         let internal = gathered.xyz;
-        var external = external_force(node, of_node.z);
+        var applied = external_force(node, of_node.z);
         var before = increment[node].xyz;
         var shock = vec3f(0.0);
         if does(STARTS) {
             let half = 0.5 * instant.before * instant.before;
-            let acceleration = (external - internal) / inertia - damping * before;
+            let acceleration = (applied - internal) / inertia - damping * before;
             before = instant.before * before - half * acceleration;
             shock = half / instant.before * acceleration;
         }
         var same_speed = before * instant.ratio;
         let a = damping * instant.half_mean;
-        var next = ((1.0 - a) * same_speed + instant.push / inertia * (external - internal)) / (1.0 + a);
+        var next = ((1.0 - a) * same_speed + instant.push / inertia * (applied - internal)) / (1.0 + a);
         if held != FREE {
             let hold = holds[held];
             var reaction = vec3f(0.0);
@@ -65,8 +65,8 @@ fn main(
                 next[c] = hold.amplitude[c] * table[instant.row + 2u * hold.owner[c]];
                 let velocity = (same_speed[c] + next[c]) * instant.per_two_steps;
                 let acceleration = (next[c] - same_speed[c]) * instant.per_push + damping * velocity;
-                reaction[c] = inertia * acceleration + internal[c] - external[c];
-                external[c] += reaction[c];
+                reaction[c] = inertia * acceleration + internal[c] - applied[c];
+                applied[c] += reaction[c];
             }
             reactions[held] = vec4f(reaction, 0.0);
         }
@@ -78,12 +78,12 @@ fn main(
         let power = damping * twice_kinetic;
         if does(MOVES) {
             let both = 0.5 * (before + next);
-            first = vec4f(dot(internal, both), dot(external, both), power, 0.0);
+            first = vec4f(dot(internal, both), dot(applied, both), power, 0.0);
             go(node, next, held);
         } else {
             first = vec4f(0.5 * twice_kinetic, power, 0.5 * dot(internal, before), 0.5 * dot(internal, next));
-            second.x = 0.5 * dot(external, before);
-            second.y = 0.5 * dot(external, next);
+            second.x = 0.5 * dot(applied, before);
+            second.y = 0.5 * dot(applied, next);
             second.z = gathered.w;
             second.w = 0.5 * inertia * dot(shock, shock);
             next_increment[node] = vec4f(next, 0.0);

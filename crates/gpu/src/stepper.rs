@@ -1,0 +1,589 @@
+//! The central difference method on a device; the method itself stands in the stepper of `pliant-mechanics`.
+
+use std::time::Instant as Clock;
+
+use pliant_mechanics::model::{FREE, Model};
+use pliant_mechanics::stability::{Monitor, Stability};
+use pliant_mechanics::tensor::Vector;
+use pliant_mechanics::{
+    CentralDifference, Deformed, Energies, Lengths, Observable, State, StepControl, StepError, Sums,
+    model_balance_floor,
+};
+
+use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::loads::DeviceLoads;
+use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
+use crate::run::{Instant, Instants, MOST, StepFailure, flags, table_constants};
+use crate::solids::{DeviceSolid, Four, Slots, Way};
+use crate::transfer::Transfer;
+use crate::{Design, Device, GpuError};
+
+/// Steps between two instants that are looked at: the energies, how far cells are deformed, whether all is sound.
+const LOOK_EVERY: u64 = 100;
+
+/// Steps between two looks at the largest stable step, unless the deformation has changed: for each the displacements come
+/// back, and the processor ranks all cells.
+const LIMIT_EVERY: u64 = 1000;
+
+/// A submission takes no longer than this [s]: systems take a device away from a program that keeps it for seconds.
+const LONGEST_SUBMISSION: f64 = 0.2;
+
+/// What comes back of an evaluated instant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// Energies and reactions.
+    Energies,
+    /// Also displacements, increments and what relaxing laws remember.
+    Everything,
+}
+
+/// Where a state stood when it was looked at.
+#[derive(Clone, Copy)]
+struct Origin {
+    steps: u64,
+    time: f64,
+    stability: Stability,
+}
+
+/// What came of an evaluation.
+struct Results {
+    sums: Sums,
+    hourglass: f64,
+    shock: f64,
+    /// Internal and external work and damping power of the instants passed over.
+    passed: [f64; 3],
+    /// The first instant that is not sound.
+    broken: Option<u32>,
+    deformed: Deformed,
+    reactions: Vec<Four>,
+}
+
+/// Steps a state of one model by one step size, in single precision, on a device. The state lies there: what a call
+/// changes of the one that is handed in is its clock, its energies, what was seen of the limit, and what it is asked for.
+///
+/// The first state that is handed in is taken up; [`upload`](Self::upload) takes up another one.
+pub struct GpuStepper<'m> {
+    device: Device,
+    model: &'m Model,
+    design: Design,
+    owners: Vec<[u32; 3]>,
+    control: StepControl,
+    lengths: Lengths,
+    balance_floor: f64,
+    solids: Vec<DeviceSolid>,
+    nodes: DeviceNodes,
+    kernels: NodeKernels,
+    loads: Option<DeviceLoads>,
+    instants: Instants,
+    transfer: Transfer,
+    /// Length of a step [s] that relaxing laws are set to.
+    relaxing: Option<f64>,
+    /// Whether a state was taken up.
+    loaded: bool,
+    /// Whether its instant is evaluated.
+    evaluated: bool,
+    /// The last instant that was looked at, the instants since then and the length of their steps [s].
+    origin: Option<Origin>,
+    since: u32,
+    /// Whether the work of the instants since then is entered.
+    entered: bool,
+    /// Time an instant takes [s], once known.
+    pace: Option<f64>,
+    energies: Energies,
+    /// Of each constraint.
+    reactions: Vec<Vector<f64>>,
+    /// Which held nodes each constraint moves, and which of their components.
+    owned: Vec<Vec<(u32, [bool; 3])>>,
+    next: Vec<Vector<f32>>,
+}
+
+impl Observable<f32> for GpuStepper<'_> {
+    fn energies(&self) -> &Energies {
+        &self.energies
+    }
+
+    fn reaction(&self, constraint: usize) -> Vector<f64> {
+        self.reactions[constraint]
+    }
+
+    /// The mean of the increments before and after; belongs to the last instant of which everything was wanted.
+    fn velocity(&self, state: &State<f32>, node: usize) -> Vector<f64> {
+        let (before, after) = (state.increment[node], self.next[node]);
+        let Lengths { next, .. } = self.lengths;
+        [0, 1, 2].map(|c| (f64::from(before[c]) * self.lengths.ratio() + f64::from(after[c])) / (2.0 * next))
+    }
+}
+
+impl<'m> GpuStepper<'m> {
+    /// A stepper for steps of `step` seconds. Without a design it takes the one that is fastest as a rule.
+    ///
+    /// # Errors
+    /// If constraints contradict each other, or the device can't take the model.
+    pub fn new(
+        device: &Device,
+        model: &'m Model,
+        step: f64,
+        design: Option<Design>,
+    ) -> Result<Self, GpuError> {
+        let owners = model.constrained_components()?;
+        let memory = Memory::new(device);
+        let full = device.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let stepper = Self::on_device(device, &memory, model, step, design.unwrap_or(Design::Gather), owners);
+        let full = pollster::block_on(full.pop());
+        if full.is_some() {
+            let (adapter, needed) = (device.adapter().name.clone(), memory.mebibytes());
+            return Err(GpuError::OutOfMemory { adapter, needed });
+        }
+        device.check()?;
+        stepper
+    }
+
+    fn on_device(
+        device: &Device,
+        memory: &Memory<'_>,
+        model: &'m Model,
+        step: f64,
+        design: Design,
+        owners: Vec<[u32; 3]>,
+    ) -> Result<Self, GpuError> {
+        let nodes = DeviceNodes::new(memory, model, &owners)?;
+        let instants = Instants::new(memory, device, model)?;
+        let constants = table_constants(model);
+        let loads = if model.loads.is_empty() {
+            None
+        } else {
+            Some(DeviceLoads::new(memory, device, &instants.bound, model, &nodes.displacement, &constants)?)
+        };
+        let slots = Slots::new(model);
+        let forces = memory.zeros("the forces of cells", slots.of_node.len() * size_of::<Four>())?;
+        let offsets = memory.filled("the cells at nodes", &slots.offsets)?;
+        let of_node = memory.filled("the cells at nodes", &slots.of_node)?;
+        let gathered = Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read));
+        let given = Bound::new(device, &[Binding::Read(&nodes.displacement), Binding::Write(&forces)]);
+        let solids = (model.solids.iter().zip(&slots.first))
+            .map(|(solid, &first)| {
+                let snippet = include_str!("shaders/gather_cells.wgsl");
+                let way = Way { snippet, bound: &given, constants: vec![("FIRST_SLOT", first)] };
+                DeviceSolid::new(memory, device, &instants.bound, solid, &way)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let gather = (include_str!("shaders/gather_nodes.wgsl"), &gathered);
+        let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), &constants);
+        let control = StepControl::new(step);
+        Ok(Self {
+            device: device.clone(),
+            model,
+            design,
+            control,
+            lengths: Lengths { before: step, next: step },
+            balance_floor: model_balance_floor::<f32>(model),
+            solids,
+            kernels,
+            loads,
+            instants,
+            transfer: Transfer::default(),
+            relaxing: None,
+            loaded: false,
+            evaluated: false,
+            origin: None,
+            since: 0,
+            entered: true,
+            pace: None,
+            energies: Energies::default(),
+            reactions: vec![[0.0; 3]; model.constraints.len()],
+            owned: owned(model, &owners, &nodes.held),
+            next: vec![[0.0; 3]; nodes.count],
+            nodes,
+            owners,
+        })
+    }
+
+    /// Watches the largest stable step with a monitor of the same model.
+    #[must_use]
+    pub fn watched(mut self, monitor: Monitor) -> Self {
+        self.control.watch(monitor);
+        self
+    }
+
+    /// The length [s] of a whole step.
+    pub fn step(&self) -> f64 {
+        self.control.step()
+    }
+
+    /// Energy [J] above which the balance is judged.
+    pub fn balance_floor(&self) -> f64 {
+        self.balance_floor
+    }
+
+    /// How forces come from cells to nodes.
+    pub fn design(&self) -> Design {
+        self.design
+    }
+
+    /// Takes up a state as it stands, between two instants or at the first one.
+    pub fn upload(&mut self, state: &State<f32>) {
+        let queue = &self.device.queue;
+        let velocity = |node: usize| {
+            let v = self.model.initial_velocity.get(node).copied().unwrap_or_default();
+            [0, 1, 2].map(|c| if self.owners[node][c] == FREE { v[c] as f32 } else { 0.0 })
+        };
+        // The start makes increments of velocities.
+        let increment = match state.is_at_start() {
+            true => fours((0..self.nodes.count).map(velocity)),
+            false => fours(state.increment.iter().copied()),
+        };
+        let displacement = fours(state.displacement.iter().copied());
+        queue.write_buffer(&self.nodes.displacement, 0, bytemuck::cast_slice(&displacement));
+        queue.write_buffer(&self.nodes.increment, 0, bytemuck::cast_slice(&increment));
+        for (solid, history) in self.solids.iter().zip(&state.history) {
+            solid.upload(&self.device, history);
+        }
+        self.instants.forget(&self.device);
+        self.entered = true;
+        (self.loaded, self.evaluated, self.origin, self.since) = (true, false, None, 0);
+    }
+
+    /// Forces, coming increments, reactions and energies at the state's instant.
+    ///
+    /// # Errors
+    /// If the state is not finite, a cell is inverted, the energies do not balance, the step is above the limit and
+    /// must not be cut, or the device fails.
+    pub fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), StepFailure> {
+        if !self.loaded {
+            self.upload(state);
+        }
+        if !self.evaluated {
+            self.evaluate_anew(state)?;
+        }
+        if wanted == Wanted::Everything {
+            self.bring_back(state)?;
+        }
+        Ok(())
+    }
+
+    fn evaluate_anew(&mut self, state: &mut State<f32>) -> Result<(), StepFailure> {
+        self.control.keep(state);
+        self.lengths = self.control.lengths(state);
+        self.relax(self.lengths.before);
+        self.instants.forget_deformation(&self.device);
+        let starts = if state.is_at_start() { flags::STARTS } else { 0 };
+        let mut results = self.submit_evaluation(state.time, flags::MEASURES | starts, true)?;
+        if let Some(broken) = results.broken {
+            return Err(self.fail(state, broken));
+        }
+        self.enter_passed(state, &results, self.lengths.before);
+        let below = if state.is_between_steps() { self.watch(state, &results.deformed)? } else { Ok(()) };
+        if self.lengths != self.control.lengths(state) {
+            self.lengths = self.control.lengths(state);
+            let shock = results.shock;
+            results = self.submit_evaluation(state.time, flags::MEASURES, false)?;
+            results.shock = shock;
+        }
+        if !results.sums.is_finite() {
+            return Err(self.fail(state, self.since));
+        }
+        let at_start = state.is_at_start();
+        if at_start {
+            state.work.begin(self.kinetic_at_start(), results.shock);
+        }
+        let before = (!at_start).then_some(self.lengths.before);
+        self.energies = state.work.settle(&results.sums, results.hourglass, before, self.balance_floor);
+        self.enter_reactions(&results.reactions);
+        (self.evaluated, self.since) = (true, 0);
+        self.origin = Some(Origin { steps: state.steps, time: state.time, stability: state.stability });
+        if state.work.has_lost_balance() {
+            self.bring_back(state)?;
+            let square = |u: &Vector<f32>| u.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>();
+            let fastest = (0..).zip(&self.next).max_by(|(_, a), (_, b)| square(a).total_cmp(&square(b)));
+            let fastest = fastest.map_or(0, |(node, _)| node);
+            return Err(StepError::unbalanced(self.model, fastest, self.energies.balance, state.time).into());
+        }
+        Ok(below?)
+    }
+
+    /// Goes `steps` whole steps on; an instant that is not evaluated yet is so first.
+    ///
+    /// # Errors
+    /// As [`Self::evaluate`], at any of them; the state then stands at the instant of the error.
+    pub fn advance(&mut self, state: &mut State<f32>, steps: u64) -> Result<(), StepFailure> {
+        let mut left = steps;
+        while left > 0 {
+            self.evaluate(state, Wanted::Energies)?;
+            // Where energies are off balance each step counts.
+            let stride = if state.work.is_off_balance() { 1 } else { left.min(LOOK_EVERY) };
+            self.go(state, stride)?;
+            left -= stride;
+        }
+        Ok(())
+    }
+
+    /// Brings displacements, increments and what relaxing laws remember back to the state, and enters its energies.
+    ///
+    /// # Errors
+    /// If the device fails, or a step since the last look could not be taken.
+    pub fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), StepFailure> {
+        if !self.loaded || (!self.evaluated && self.origin.is_none()) {
+            return Ok(());
+        }
+        if !self.evaluated && self.since > 0 {
+            let results = self.results()?;
+            if let Some(broken) = results.broken {
+                return Err(self.fail(state, broken));
+            }
+            self.enter_passed(state, &results, self.lengths.next);
+        }
+        Ok(self.bring_arrays_back(state)?)
+    }
+
+    fn bring_arrays_back(&mut self, state: &mut State<f32>) -> Result<(), GpuError> {
+        let (count, device, transfer) = (self.nodes.count, &self.device, &mut self.transfer);
+        let mut vectors = |buffer: &wgpu::Buffer, to: &mut [Vector<f32>]| {
+            transfer.read::<Four>(device, buffer, count, |fours| {
+                to.iter_mut().zip(fours).for_each(|(to, &[x, y, z, _])| *to = [x, y, z]);
+            })
+        };
+        vectors(&self.nodes.displacement, &mut state.displacement)?;
+        vectors(&self.nodes.increment, &mut state.increment)?;
+        vectors(&self.nodes.next, &mut self.next)?;
+        for (solid, history) in self.solids.iter().zip(&mut state.history) {
+            solid.bring_back(&mut self.transfer, &self.device, history)?;
+        }
+        Ok(())
+    }
+
+    /// Goes whole steps on from an evaluated instant, without looking.
+    fn go(&mut self, state: &mut State<f32>, steps: u64) -> Result<(), GpuError> {
+        let end = state.steps + steps;
+        state.work.advance();
+        (self.evaluated, self.entered) = (false, false);
+        let mut first = true;
+        let mut running = None;
+        while state.steps < end {
+            let most =
+                self.pace.map_or(16.0, |pace| LONGEST_SUBMISSION / pace).clamp(1.0, MOST as f64) as usize;
+            while state.steps < end && self.instants.len() < most {
+                let lengths = match self.since {
+                    0 => self.lengths,
+                    _ => Lengths { before: self.lengths.next, next: self.lengths.next },
+                };
+                let instant = Instant::new(self.since, flags::MOVES, lengths);
+                self.instants.push(self.model, state.time, lengths.next, instant);
+                self.count(state);
+            }
+            if !first || self.instants.len() > 1 {
+                self.relax(self.lengths.next);
+            }
+            let (begun, count) = (Clock::now(), self.instants.len());
+            let submitted = self.submit_steps(first);
+            first = false;
+            // One submission waits while another runs.
+            if let Some(earlier) = running.replace(submitted) {
+                self.wait_for(earlier)?;
+            } else if self.pace.is_none() {
+                self.device.wait()?;
+                self.pace = Some(begun.elapsed().as_secs_f64() / count as f64);
+            }
+        }
+        self.device.check()
+    }
+
+    fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
+        let waited = self.device.device.poll(wait);
+        self.device.check()?;
+        waited.map(|_| ()).map_err(|error| GpuError::Lost {
+            adapter: self.device.adapter().name.clone(),
+            reason: error.to_string(),
+        })
+    }
+
+    /// Moves the clock on by an instant. Whole steps that begin without a look are noted here.
+    fn count(&mut self, state: &mut State<f32>) {
+        if self.since > 0 && state.is_between_steps() {
+            self.control.note(state);
+        }
+        self.control.count(state);
+        self.since += 1;
+    }
+
+    /// Looks at the limit where that is due, and chooses the parts of the step to come.
+    fn watch(
+        &mut self,
+        state: &mut State<f32>,
+        deformed: &Deformed,
+    ) -> Result<Result<(), StepError>, GpuError> {
+        if self.control.is_due(state, deformed, LIMIT_EVERY) {
+            let displacement = &mut state.displacement;
+            self.transfer.read::<Four>(
+                &self.device,
+                &self.nodes.displacement,
+                self.nodes.count,
+                |fours| {
+                    displacement.iter_mut().zip(fours).for_each(|(to, &[x, y, z, _])| *to = [x, y, z]);
+                },
+            )?;
+            self.control.look(self.model, &self.owners, state, deformed);
+        }
+        let below = self.control.choose(self.model, state);
+        self.control.note(state);
+        Ok(below)
+    }
+
+    /// Relaxes from now on over steps of `step` seconds.
+    fn relax(&mut self, step: f64) {
+        if self.relaxing != Some(step) {
+            self.relaxing = Some(step);
+            for (on_device, solid) in self.solids.iter().zip(&self.model.solids) {
+                on_device.set_step(&self.device, solid, step);
+            }
+        }
+    }
+
+    /// Evaluates an instant, with the forces of cells found anew or as they stand.
+    fn submit_evaluation(&mut self, time: f64, flags: u32, anew: bool) -> Result<Results, GpuError> {
+        let instant = Instant::new(self.since, flags, self.lengths);
+        self.instants.push(self.model, time, self.lengths.next, instant);
+        let (loads, solids, nodes) = (&self.loads, &self.solids, &self.kernels);
+        self.instants.submit(&self.device, |pass, bound, _, offset| {
+            if anew {
+                force_kernels(loads, solids).for_each(|kernel| kernel.run(pass, bound, offset));
+            }
+            nodes.pass.run(pass, bound, offset);
+        });
+        self.results()
+    }
+
+    /// Goes on from the instants that are pushed; the first of them may be one that was looked at.
+    fn submit_steps(&mut self, from_look: bool) -> wgpu::SubmissionIndex {
+        let (loads, solids, nodes) = (&self.loads, &self.solids, &self.kernels);
+        self.instants.submit(&self.device, |pass, bound, place, offset| {
+            if from_look && place == 0 {
+                nodes.advance.run(pass, bound, offset);
+            } else {
+                force_kernels(loads, solids).for_each(|kernel| kernel.run(pass, bound, offset));
+                nodes.pass.run(pass, bound, offset);
+            }
+        })
+    }
+
+    /// Reads what the last evaluation and the instants before it found.
+    fn results(&mut self) -> Result<Results, GpuError> {
+        let (nodes, findings) = (&self.nodes, &self.instants.findings);
+        let bytes = |count: usize| (count * size_of::<f32>()) as u64;
+        let arrays = [
+            (&nodes.sums, bytes(nodes.groups * SUMS)),
+            (findings, bytes(4)),
+            (&nodes.reactions, bytes(nodes.held.len() * 4)),
+        ];
+        let mut read = None;
+        self.transfer.read_all(&self.device, &arrays, |parts| {
+            let mut sums = [0.0; SUMS];
+            for group in bytemuck::cast_slice::<u8, [f32; SUMS]>(parts[0]) {
+                sums.iter_mut().zip(group).for_each(|(sum, &number)| *sum += f64::from(number));
+            }
+            let found: &[u32] = bytemuck::cast_slice(parts[1]);
+            read = Some((
+                sums,
+                [found[0], found[1], found[2], found[3]],
+                bytemuck::cast_slice(parts[2]).to_vec(),
+            ));
+        })?;
+        let (sums, [broken, _, least, largest], reactions) = read.unwrap_or_default();
+        Ok(Results {
+            sums: Sums {
+                kinetic: sums[0],
+                damping_power: sums[1],
+                internal_before: sums[2],
+                internal_after: sums[3],
+                external_before: sums[4],
+                external_after: sums[5],
+            },
+            hourglass: sums[6],
+            shock: sums[7],
+            passed: [sums[8], sums[9], sums[10]],
+            broken: (broken != u32::MAX).then_some(broken),
+            deformed: Deformed {
+                least_volume_ratio: f64::from(f32::from_bits(least)),
+                largest_strain: f64::from(f32::from_bits(largest)),
+            },
+            reactions,
+        })
+    }
+
+    /// Enters the work of the instants passed over, `step` seconds from one to the next, once.
+    fn enter_passed(&mut self, state: &mut State<f32>, results: &Results, step: f64) {
+        if self.since > 1 && !self.entered {
+            let [internal, external, power] = results.passed;
+            state.work.pass_over(internal, external, power, step);
+        }
+        self.entered = true;
+    }
+
+    fn enter_reactions(&mut self, forces: &[Four]) {
+        for (sum, owned) in self.reactions.iter_mut().zip(&self.owned) {
+            *sum = [0.0; 3];
+            for &(hold, owns) in owned {
+                for c in (0..3).filter(|&c| owns[c]) {
+                    sum[c] += f64::from(forces[hold as usize][c]);
+                }
+            }
+        }
+    }
+
+    /// ½ Σ m v² of the velocities given at the start [J].
+    fn kinetic_at_start(&self) -> f64 {
+        let of_node = |(node, velocity): (usize, &Vector<f64>)| {
+            let square: f64 =
+                (0..3).filter(|&c| self.owners[node][c] == FREE).map(|c| velocity[c] * velocity[c]).sum();
+            0.5 * self.model.inertia(node) * square
+        };
+        self.model.initial_velocity.iter().take(self.nodes.count).enumerate().map(of_node).sum()
+    }
+
+    /// Brings back the state as it stood at an instant that is not sound, where the device stopped. The processor finds
+    /// out what is wrong with it.
+    fn fail(&mut self, state: &mut State<f32>, at: u32) -> StepFailure {
+        if let Some(Origin { steps, time, stability }) = self.origin {
+            (state.steps, state.time, state.stability) = (steps, time, stability);
+            self.since = 0;
+            while self.since < at {
+                self.count(state);
+            }
+        }
+        if let Err(error) = self.bring_arrays_back(state) {
+            return error.into();
+        }
+        let mut copy = State { work: Default::default(), ..state.clone() };
+        let found = CentralDifference::new(self.model, self.control.step())
+            .map_err(|error| error.to_string())
+            .and_then(|mut stepper| match stepper.evaluate(&mut copy) {
+                Err(error) => Ok(error),
+                Ok(()) => Err("a cell it finds broken is sound on the processor".to_owned()),
+            });
+        match found {
+            Ok(error) => error.into(),
+            Err(reason) => GpuError::Internal { adapter: self.device.adapter().name.clone(), reason }.into(),
+        }
+    }
+}
+
+/// For each constraint the places in `held` of its nodes, and the components it owns.
+fn owned(model: &Model, owners: &[[u32; 3]], held: &[u32]) -> Vec<Vec<(u32, [bool; 3])>> {
+    let of_node = |index: u32, node: u32| {
+        let owns = owners[node as usize].map(|owner| owner == index);
+        held.binary_search(&node).ok().map(|hold| (hold as u32, owns))
+    };
+    (0..)
+        .zip(&model.constraints)
+        .map(|(index, constraint)| constraint.nodes.iter().filter_map(|&node| of_node(index, node)).collect())
+        .collect()
+}
+
+/// What finds the forces at an instant, in order.
+fn force_kernels<'a>(
+    loads: &'a Option<DeviceLoads>,
+    solids: &'a [DeviceSolid],
+) -> impl Iterator<Item = &'a Kernel> {
+    let pressure = loads.iter().filter_map(|loads| loads.pressure.as_ref());
+    pressure.chain(solids.iter().flat_map(DeviceSolid::kernels))
+}

@@ -1,0 +1,122 @@
+//! A cube of distorted cells, held at its base and moved at its top.
+
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::law::AnyLaw;
+use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};
+use pliant_mechanics::prony::Prony;
+use pliant_mechanics::tensor::Vector;
+use serde_json::{Value, json};
+
+/// Every element.
+pub const ELEMENTS: [&str; 6] = ["tet4", "tet4-anp", "tet4-ianp", "tet4-ianp-niftysim", "hex8", "hex8-full"];
+
+/// Edge of the cube [m].
+pub const EDGE: f64 = 0.1;
+
+/// Cells along an edge.
+pub const CELLS: u32 = 4;
+
+/// A law from its name and parameters.
+pub fn law(name: &str, parameters: Value) -> AnyLaw {
+    AnyLaw::from_json(name, parameters).unwrap()
+}
+
+/// Tissue of 1 kPa.
+pub fn neo_hookean() -> AnyLaw {
+    law("neo-hookean", json!({ "shear-modulus": 1000.0, "bulk-modulus": 5000.0 }))
+}
+
+/// A material without relaxation.
+pub fn elastic(law: AnyLaw) -> Material {
+    Material { law, prony: Prony::default(), density: 1000.0 }
+}
+
+fn place(x: u32, y: u32, z: u32) -> u32 {
+    (z * (CELLS + 1) + y) * (CELLS + 1) + x
+}
+
+/// The nodes of a plane z = const.
+pub fn layer(z: u32) -> Vec<u32> {
+    (0..=CELLS).flat_map(|y| (0..=CELLS).map(move |x| place(x, y, z))).collect()
+}
+
+/// The quads of the top, outward.
+pub fn top_quads() -> Vec<[u32; 4]> {
+    let quad = |x, y| {
+        [place(x, y, CELLS), place(x + 1, y, CELLS), place(x + 1, y + 1, CELLS), place(x, y + 1, CELLS)]
+    };
+    (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| quad(x, y))).collect()
+}
+
+/// A factor that grows smoothly from 0 to 1 until a time [s].
+pub fn smooth(to: f64) -> Curve {
+    Curve { shape: Shape::SmoothStep, from: 0.0, to }
+}
+
+/// The cube, free.
+pub fn free_cube(element: &str, material: Material) -> Model {
+    let mut seed = 7_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let mut model = Model::default();
+    let size = EDGE / f64::from(CELLS);
+    for (z, y, x) in
+        (0..=CELLS).flat_map(|z| (0..=CELLS).flat_map(move |y| (0..=CELLS).map(move |x| (z, y, x))))
+    {
+        let interior = [x, y, z].iter().all(|&i| i > 0 && i < CELLS);
+        let shift: Vector<f64> = [0, 1, 2].map(|_| if interior { 0.2 * size * random() } else { 0.0 });
+        model.rest.push([0, 1, 2].map(|c| f64::from([x, y, z][c]) * size + shift[c]));
+    }
+    let mut hexes = Vec::new();
+    for (z, y, x) in (0..CELLS).flat_map(|z| (0..CELLS).flat_map(move |y| (0..CELLS).map(move |x| (z, y, x))))
+    {
+        let low = [place(x, y, z), place(x + 1, y, z), place(x + 1, y + 1, z), place(x, y + 1, z)];
+        let [a, b, c, d] = low.map(|node| node + place(0, 0, 1));
+        hexes.push([low[0], low[1], low[2], low[3], a, b, c, d]);
+    }
+    // Kuhn's split: all six tets around the diagonal 0–6.
+    const KUHN: [[usize; 4]; 6] =
+        [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
+    let tets = || hexes.iter().flat_map(|hex| KUHN.map(|tet| tet.map(|corner| hex[corner]))).collect();
+    let rest = &model.rest;
+    let cells = match element {
+        "tet4" => Cells::tet4(tets(), rest),
+        "tet4-anp" => Cells::averaged_tet4(tets(), rest, Averaging::Nodal),
+        "tet4-ianp" => Cells::averaged_tet4(tets(), rest, Averaging::Variational),
+        "tet4-ianp-niftysim" => Cells::averaged_tet4(tets(), rest, Averaging::NiftySim),
+        "hex8" => Cells::hex8(hexes, rest, 0.1, material.law.small_strain().shear),
+        "hex8-full" => Cells::full_hex8(hexes, rest),
+        other => panic!("no element `{other}`"),
+    };
+    model.mass = vec![0.0; model.rest.len()];
+    model.bodies.push(Body { name: "cube".into(), nodes: 0..model.rest.len() as u32, damping: 0.0 });
+    let families = material.law.families();
+    let directions = [[0.6, 0.0, 0.8], [0.0, 0.8, -0.6]];
+    let fibre = (0..cells.len()).flat_map(|_| directions[..families].to_vec()).collect();
+    let original = (0..cells.len() as u32).collect();
+    model.add_solid(Solid { body: 0, material, cells, fibre, original });
+    model
+}
+
+/// The cube with its base held.
+pub fn held_cube(element: &str, material: Material) -> Model {
+    let mut model = free_cube(element, material);
+    let (name, components) = ("base".into(), [true; 3]);
+    model.constraints.push(Constraint { name, nodes: layer(0), components, motion: Motion::Fixed });
+    model
+}
+
+/// The cube with its base held and its top moved aside and down by up to a fifth.
+pub fn moved_cube(element: &str, material: Material) -> Model {
+    let mut model = held_cube(element, material);
+    let motion = Motion::Displacement([0.1 * EDGE, 0.05 * EDGE, -0.2 * EDGE], smooth(0.2));
+    model.constraints.push(Constraint {
+        name: "top".into(),
+        nodes: layer(CELLS),
+        components: [true; 3],
+        motion,
+    });
+    model
+}
