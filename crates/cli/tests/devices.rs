@@ -102,3 +102,88 @@ fn an_adapter_that_is_not_there_or_not_used_is_refused_in_the_users_line() {
         assert!(unknown.words().contains(piece), "no `{piece}` in:\n{}", unknown.err);
     }
 }
+
+/// How far two series of displacements are apart at their ends, over the size of the first.
+fn apart(a: &Workshop, b: &Workshop) -> f64 {
+    let last = |workshop: &Workshop| {
+        let (time, frame) = workshop.series("out/case/fields.pvd").pop().expect("a frame");
+        (time, frame.mesh.point_data["displacement"].values.clone())
+    };
+    let ((time_a, a), (time_b, b)) = (last(a), last(b));
+    assert_eq!(time_a, time_b);
+    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
+    norm(&mut a.iter().zip(&b).map(|(a, b)| a - b)) / norm(&mut a.iter().copied())
+}
+
+/// A step that resolves the gravity of [`BLOCK`], which sets in at once.
+const STEP: [&str; 2] = ["--step", "1e-3"];
+
+#[test]
+fn a_scene_of_every_kind_of_part_runs_on_a_device_as_on_the_processor() {
+    if !is_there() {
+        return;
+    }
+    let [cpu, gpu] = ["device = \"cpu\"", "device = \"gpu\""].map(on);
+    let reference = cpu.run(&STEP).done();
+    let told = gpu.run(&STEP);
+    let json = told.done();
+    assert_eq!(json["device"], pliant_gpu::adapters()[0].name);
+    assert_eq!((&json["precision"], &reference["precision"]), (&"single".into(), &"double".into()));
+    let apart = apart(&cpu, &gpu);
+    assert!(apart < 1e-5, "displacements are {apart} apart");
+    for constraint in ["base", "hand"] {
+        for axis in 0..3 {
+            let [a, b] =
+                [&reference, &json].map(|json| json["reactions"][constraint][axis].as_f64().unwrap());
+            assert!((a - b).abs() < 1e-4, "{constraint} {axis}: {a} N, {b} N");
+        }
+    }
+    // The tables have the same rows; the page names the device.
+    let [(_, a), (_, b)] = [&cpu, &gpu].map(|workshop| workshop.table("out/case/history.csv"));
+    assert_eq!(
+        a.iter().map(|row| row[0]).collect::<Vec<_>>(),
+        b.iter().map(|row| row[0]).collect::<Vec<_>>()
+    );
+    assert!(gpu.read("out/case/summary.md").contains(json["device"].as_str().unwrap()));
+}
+
+#[test]
+fn a_checkpoint_goes_from_device_to_processor_and_back() {
+    if !is_there() {
+        return;
+    }
+    let with = |device: &str| {
+        let scene = changed(
+            BLOCK,
+            "precision = \"double\"",
+            &format!("device = \"{device}\"\nprecision = \"single\""),
+        );
+        Workshop::new(&changed(&scene, "threads = 1", "threads = 1\ncheckpoint = { every = 0.005 }"))
+    };
+    let whole = with("cpu");
+    whole.run(&STEP).done();
+    for (first, then) in [("gpu", "cpu"), ("cpu", "gpu"), ("gpu", "gpu")] {
+        let workshop = with(first);
+        workshop.run(&STEP).done();
+        // The last one but the one at the end.
+        let checkpoint = "out/case/checkpoint-0000000015.pliant";
+        let resumed = workshop.run(&[&STEP[..], &["--resume", checkpoint, "--device", then]].concat());
+        assert_eq!(resumed.done()["device"] == "cpu", then == "cpu", "{}", resumed.err);
+        let apart = apart(&whole, &workshop);
+        assert!(apart < 1e-5, "from {first} to {then} displacements are {apart} apart");
+    }
+}
+
+#[test]
+fn a_failed_run_on_a_device_names_element_and_time() {
+    if !is_there() {
+        return;
+    }
+    let crushed = changed(BLOCK, "by = [0, 0, 0.001]", "by = [0, 0, -0.12]");
+    let told = Workshop::new(&changed(&crushed, "precision = \"double\"", "device = \"gpu\"")).run(&STEP);
+    assert_eq!(told.code, 1, "{}", told.out);
+    let error = &told.json()["error"];
+    assert!(["inverted", "not-finite", "unstable"].contains(&error["kind"].as_str().unwrap()), "{error}");
+    assert_eq!(error["body"], "block");
+    assert!(error["node"].is_u64() && error["time"].as_f64().is_some_and(|time| time > 0.0), "{error}");
+}
