@@ -1,10 +1,12 @@
-//! What can be measured: cubes of 0.1 m, each of one element, one law, one precision and one number of threads.
+//! What can be measured: cubes of 0.1 m, each of one element, one law, one precision and one place: threads of the
+//! processor, or a design on a graphics processor.
 //!
 //! The edges 10, 16, 25 and 38 are those of thesis Fig. 6.7 (1,331 to 59,319 nodes); the larger ones lead on to 10⁶ cells.
 //! 21³ × 6 tets (55,566) and 30³ hexes (27,000) are the meshes on which all laws are compared.
 
 use std::thread;
 
+use pliant_gpu::Design;
 use pliant_mechanics::model::{Averaging, Material};
 use pliant_mechanics::prony::{Prony, PronyUpdate};
 use pliant_meshing::VolumeCell;
@@ -21,6 +23,8 @@ const SERIES: [usize; 8] = [10, 16, 25, 38, 56, 70, 100, 126];
 const THESIS: usize = 4;
 /// The most tets of a cube, and the most hexes.
 const MOST: usize = 2_100_000;
+/// Cells along the edge of the large cubes on a graphics processor.
+const ON_DEVICE: [usize; 2] = [60, 100];
 /// Cells along the edge of the cube of `hex8-full`.
 const FULL_EDGE: usize = 16;
 
@@ -164,6 +168,15 @@ impl Threads {
     }
 }
 
+/// Where a case runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// On the processor.
+    Processor(Threads),
+    /// On the best graphics processor, by a design.
+    Device(Design),
+}
+
 /// One thing to measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Case {
@@ -175,17 +188,22 @@ pub struct Case {
     pub edge: usize,
     /// The number type.
     pub precision: Precision,
-    /// The threads.
-    pub threads: Threads,
+    /// Where it runs.
+    pub place: Place,
 }
 
 impl Case {
-    /// What it is called on the command line: `tet4-nh-55566`, with `-double` and `-all` unless single on one thread.
+    /// What it is called on the command line: `tet4-nh-55566`, with `-double` and `-all` unless single on one thread, or
+    /// with the design on a graphics processor.
     pub fn id(&self) -> String {
         let law = self.law.name().to_lowercase().replace('+', "-");
         let precision = if self.precision == Precision::Double { "-double" } else { "" };
-        let threads = if self.threads == Threads::All { "-all" } else { "" };
-        format!("{}-{law}-{}{precision}{threads}", self.element.name(), self.cells())
+        let place = match self.place {
+            Place::Processor(Threads::One) => String::new(),
+            Place::Processor(Threads::All) => "-all".to_owned(),
+            Place::Device(design) => format!("-{design}"),
+        };
+        format!("{}-{law}-{}{precision}{place}", self.element.name(), self.cells())
     }
 
     /// Cells of the mesh.
@@ -198,11 +216,17 @@ impl Case {
         (self.edge + 1).pow(3)
     }
 
-    /// Whether the default selection has it: all laws on one mesh an element, and the thesis's series.
+    /// Whether it runs on a graphics processor.
+    pub fn is_on_device(&self) -> bool {
+        matches!(self.place, Place::Device(_))
+    }
+
+    /// Whether the default selection has it: all laws on one mesh an element, and the thesis's series, on the processor.
     pub fn is_default(&self) -> bool {
         let [simplest, richest] = [LawKind::NeoHookean, LawKind::FibresProny].map(|law| self.law == law);
         let reference = self.edge == self.element.reference_edge();
-        match (self.precision, self.threads) {
+        let Place::Processor(threads) = self.place else { return false };
+        match (self.precision, threads) {
             (Precision::Single, _) if reference && self.element != Element::Hex8Full => true,
             (_, Threads::One) if reference => simplest || richest,
             (Precision::Single, Threads::One) => simplest && self.in_series(THESIS),
@@ -234,8 +258,29 @@ impl Case {
     }
 }
 
-/// All there is to measure, those of the same element, law, precision and threads one after another.
+/// All there is to measure, those of the same element, law, precision and place one after another.
 pub fn cases() -> Vec<Case> {
+    let mut cases = on_processor();
+    cases.extend(on_device());
+    cases
+}
+
+/// All designs on the mesh on which laws are compared, and for the simplest and the richest law on large ones.
+fn on_device() -> impl Iterator<Item = Case> {
+    let kinds = Element::ALL.into_iter().flat_map(|element| {
+        [LawKind::NeoHookean, LawKind::FibresProny].into_iter().map(move |law| (element, law))
+    });
+    kinds.flat_map(|(element, law)| {
+        Design::ALL.iter().flat_map(move |&design| {
+            let large = matches!(element, Element::Tet4 | Element::Hex8).then_some(ON_DEVICE);
+            let edges = [element.reference_edge()].into_iter().chain(large.into_iter().flatten());
+            let (precision, place) = (Precision::Single, Place::Device(design));
+            edges.map(move |edge| Case { element, law, edge, precision, place })
+        })
+    })
+}
+
+fn on_processor() -> Vec<Case> {
     let mut cases = Vec::new();
     for element in Element::ALL {
         for law in LawKind::ALL {
@@ -249,7 +294,8 @@ pub fn cases() -> Vec<Case> {
                 edges.push(element.reference_edge());
                 edges.sort_unstable();
                 edges.dedup();
-                let case = |edge| Case { element, law, edge, precision, threads };
+                let place = Place::Processor(threads);
+                let case = |edge| Case { element, law, edge, precision, place };
                 cases.extend(edges.into_iter().map(case).filter(|case| {
                     case.edge == element.reference_edge()
                         || precision == Precision::Single

@@ -2,8 +2,38 @@
 
 use std::time::Instant;
 
+use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure};
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::{CentralDifference, Model, Real, State, StepError};
+
+/// What can be stepped against the clock.
+pub trait Timed {
+    /// Why a step can fail.
+    type Error;
+
+    /// Takes some steps, at least one; returns the wall time of one [s].
+    ///
+    /// # Errors
+    /// If a step fails.
+    fn seconds_per_step(&mut self, steps: usize) -> Result<f64, Self::Error>;
+
+    /// How many steps take `seconds` of wall time, found by taking some: this warms up, too.
+    ///
+    /// # Errors
+    /// If a step fails.
+    fn steps_within(&mut self, seconds: f64) -> Result<usize, Self::Error> {
+        let mut steps = 1;
+        loop {
+            let each = self.seconds_per_step(steps)?;
+            let enough = (seconds / each.max(f64::MIN_POSITIVE)).ceil();
+            if each * steps as f64 >= 0.25 * seconds {
+                return Ok((enough as usize).max(1));
+            }
+            // Towards the quarter in at most four times the steps: the first ones are slow.
+            steps = (0.3 * enough).min(4.0 * steps as f64).ceil() as usize;
+        }
+    }
+}
 
 /// A model under the clock: a stepper and the state that it steps.
 pub struct Clocked<'m, R> {
@@ -19,12 +49,13 @@ impl<'m, R: Real> Clocked<'m, R> {
     pub fn new(model: &'m Model, step: f64, state: State<R>) -> Result<Self, Contradiction> {
         Ok(Self { stepper: CentralDifference::new(model, step)?, state })
     }
+}
 
-    /// Takes some steps, at least one, on the current rayon pool; returns the wall time of one [s].
-    ///
-    /// # Errors
-    /// If a step fails.
-    pub fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepError> {
+/// On the current rayon pool.
+impl<R: Real> Timed for Clocked<'_, R> {
+    type Error = StepError;
+
+    fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepError> {
         let steps = steps.max(1);
         let started = Instant::now();
         for _ in 0..steps {
@@ -33,22 +64,43 @@ impl<'m, R: Real> Clocked<'m, R> {
         }
         Ok(started.elapsed().as_secs_f64() / steps as f64)
     }
+}
 
-    /// How many steps take `seconds` of wall time, found by taking some: this warms up, too.
+/// A model under the clock on a graphics processor.
+pub struct ClockedOnDevice<'m> {
+    device: Device,
+    stepper: GpuStepper<'m>,
+    state: State<f32>,
+}
+
+impl<'m> ClockedOnDevice<'m> {
+    /// A state of a model, to be advanced by steps of `step` seconds.
     ///
     /// # Errors
-    /// If a step fails.
-    pub fn steps_within(&mut self, seconds: f64) -> Result<usize, StepError> {
-        let mut steps = 1;
-        loop {
-            let each = self.seconds_per_step(steps)?;
-            let enough = (seconds / each.max(f64::MIN_POSITIVE)).ceil();
-            if each * steps as f64 >= 0.25 * seconds {
-                return Ok((enough as usize).max(1));
-            }
-            // Towards the quarter in at most four times the steps: the first ones are slow.
-            steps = (0.3 * enough).min(4.0 * steps as f64).ceil() as usize;
-        }
+    /// If the device can't take the model.
+    pub fn new(
+        device: &Device,
+        model: &'m Model,
+        step: f64,
+        design: Design,
+        state: State<f32>,
+    ) -> Result<Self, GpuError> {
+        let mut stepper = GpuStepper::new(device, model, step, Some(design))?;
+        stepper.upload(&state);
+        Ok(Self { device: device.clone(), stepper, state })
+    }
+}
+
+/// The looks that the stepper takes now and then are steps' cost, too.
+impl Timed for ClockedOnDevice<'_> {
+    type Error = StepFailure;
+
+    fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepFailure> {
+        let steps = steps.max(1);
+        let started = Instant::now();
+        self.stepper.advance(&mut self.state, steps as u64)?;
+        self.device.wait()?;
+        Ok(started.elapsed().as_secs_f64() / steps as f64)
     }
 }
 

@@ -15,8 +15,8 @@ mod specimen;
 mod suite;
 mod tissue;
 
-pub use case::{Case, Element, LawKind, Precision, Threads, cases, find};
-pub use clock::{Clocked, Spread};
+pub use case::{Case, Element, LawKind, Place, Precision, Threads, cases, find};
+pub use clock::{Clocked, ClockedOnDevice, Spread, Timed};
 pub use count::Count;
 pub use machine::Machine;
 pub use rates::Rates;

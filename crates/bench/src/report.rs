@@ -1,5 +1,6 @@
 //! What was measured, as a table and as JSON.
 
+use pliant_gpu::{Adapter, DeviceRates};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -34,12 +35,12 @@ pub struct Row {
     pub law: &'static str,
     /// The number type.
     pub precision: &'static str,
-    /// Threads.
-    pub threads: usize,
-    /// The processor.
+    /// Threads; `null` on a graphics processor.
+    pub threads: Option<usize>,
+    /// The processor, or the graphics processor.
     pub adapter: String,
-    /// The path that ran.
-    pub design: &'static str,
+    /// The path that ran: `cpu`, or the design on a graphics processor.
+    pub design: String,
     /// Wall time of a step per element [ns], the median of the repeats.
     pub ns_per_element_step: f64,
     /// The same of the fastest repeat.
@@ -67,12 +68,23 @@ pub struct Row {
     pub case: Case,
 }
 
+/// Where a case ran, and what can be done there.
+#[derive(Clone, Debug)]
+pub(crate) struct Measured {
+    pub adapter: String,
+    pub threads: Option<usize>,
+    pub design: String,
+    /// Bytes read and written in copying [1/s].
+    pub copy: f64,
+    /// Operations in multiply-adds [1/s].
+    pub multiply_add: f64,
+}
+
 impl Row {
     /// From the wall times of a step [s] and the step [s] with the limit it is taken from.
     pub(crate) fn new(
         case: Case,
-        machine: &Machine,
-        rates: &Rates,
+        place: Measured,
         seconds: Spread,
         (step, critical_step_from): (f64, Limit),
     ) -> Self {
@@ -86,22 +98,27 @@ impl Row {
             element: case.element.name(),
             law: case.law.name(),
             precision: case.precision.name(),
-            threads: rates.threads,
-            adapter: machine.processor.clone(),
-            design: "cpu",
+            threads: place.threads,
+            adapter: place.adapter,
+            design: place.design,
             ns_per_element_step: ns(seconds.median),
             ns_least: ns(seconds.least),
             ns_most: ns(seconds.most),
             elements_per_second,
             bytes_per_element: count.bytes,
             flops_per_element: count.flops,
-            bandwidth_fraction: elements_per_second * count.bytes / rates.copy,
-            flop_fraction: elements_per_second * count.flops / rates.multiply_add(case.precision),
+            bandwidth_fraction: elements_per_second * count.bytes / place.copy,
+            flop_fraction: elements_per_second * count.flops / place.multiply_add,
             critical_step: step,
             critical_step_from,
             real_time_factor: step / seconds.median,
             case,
         }
+    }
+
+    /// The threads, or the design on a graphics processor.
+    fn place(&self) -> String {
+        self.threads.map_or_else(|| self.design.clone(), |threads| threads.to_string())
     }
 }
 
@@ -110,8 +127,8 @@ impl Row {
 pub struct Fit {
     /// One of the cases.
     pub case: Case,
-    /// Threads.
-    pub threads: usize,
+    /// Threads, or the design.
+    pub place: String,
     /// Meshes.
     pub meshes: usize,
     /// Cells of the smallest and of the largest mesh.
@@ -149,7 +166,7 @@ impl Fit {
         let farthest = rows.iter().max_by(|x, y| deviation(x).total_cmp(&deviation(y)))?;
         (rows.len() >= 3).then(|| Self {
             case: first.case,
-            threads: first.threads,
+            place: first.place(),
             meshes: rows.len(),
             cells: [first.cells, last.cells],
             ns_per_element_step: b,
@@ -168,7 +185,7 @@ impl Fit {
             "element": self.case.element.name(),
             "law": self.case.law.name(),
             "precision": self.case.precision.name(),
-            "threads": self.threads,
+            "place": self.place,
             "meshes": self.meshes,
             "cells": self.cells,
             "ns_per_element_step": self.ns_per_element_step,
@@ -192,6 +209,44 @@ pub struct Cube {
     pub row: Row,
 }
 
+/// The graphics processor that cases ran on.
+#[derive(Clone, Debug)]
+pub struct OnDevice {
+    /// What it is.
+    pub adapter: Adapter,
+    /// What it can do.
+    pub rates: DeviceRates,
+}
+
+impl OnDevice {
+    fn words(&self) -> String {
+        let Adapter { name, kind, backend, driver, .. } = &self.adapter;
+        let launch = 1e6 * self.rates.launch;
+        format!("{name} ({kind}, {backend}, {driver}): an empty kernel in a chain takes {launch:.2} µs.")
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "adapter": self.adapter.name,
+            "kind": self.adapter.kind.to_string(),
+            "backend": self.adapter.backend,
+            "driver": self.adapter.driver,
+            "copy": self.rates.copy,
+            "multiply_add": self.rates.multiply_add,
+            "launch": self.rates.launch,
+        })
+    }
+}
+
+/// A case that the device can't take.
+#[derive(Clone, Debug, Serialize)]
+pub struct Refused {
+    /// The case.
+    pub id: String,
+    /// Why.
+    pub reason: String,
+}
+
 /// All that was measured.
 #[derive(Clone, Debug)]
 pub struct Report {
@@ -201,8 +256,12 @@ pub struct Report {
     pub settings: Settings,
     /// What the machine can do, for each number of threads.
     pub rates: Vec<Rates>,
+    /// The graphics processor, if any case ran there.
+    pub device: Option<OnDevice>,
     /// The cases.
     pub rows: Vec<Row>,
+    /// Cases that were too large for it.
+    pub refused: Vec<Refused>,
     /// Linear cost of the series.
     pub fits: Vec<Fit>,
     /// The largest cubes in real time.
@@ -217,8 +276,10 @@ impl Report {
             "date": today(),
             "machine": self.machine,
             "rates": self.rates,
+            "device": self.device.as_ref().map(OnDevice::json),
             "repeats": self.settings.repeats,
             "rows": self.rows,
+            "refused": self.refused,
             "linear_cost": self.fits.iter().map(Fit::json).collect::<Vec<_>>(),
             "largest_real_time_cubes": self.cubes,
         })
@@ -230,7 +291,7 @@ impl Report {
         let mut parts = vec![
             format!("{processor}, {cores} cores, {system}; pliant {}, {}.", env!("CARGO_PKG_VERSION"), today()),
             format!(
-                "Whole steps; median of {} repeats of {} s or more, least and most beside it; design `cpu`.",
+                "Whole steps; median of {} repeats of {} s or more, least and most beside it.",
                 self.settings.repeats, self.settings.seconds
             ),
             self.rates_table(),
@@ -239,6 +300,9 @@ impl Report {
                 .to_owned(),
             rows_table(&self.rows),
         ];
+        parts.extend(
+            self.refused.iter().map(|Refused { id, reason }| format!("`{id}` was not measured: {reason}.")),
+        );
         if !self.fits.is_empty() {
             parts.push("Linear cost: time of a step = b × elements over the meshes of a series.".to_owned());
             parts.push(self.fits_table());
@@ -255,11 +319,17 @@ impl Report {
     }
 
     fn rates_table(&self) -> String {
-        let rows = self.rates.iter().map(|rates| {
-            let giga = |rate: f64| format!("{:.1}", 1e-9 * rate);
+        let giga = |rate: f64| format!("{:.1}", 1e-9 * rate);
+        let processor = self.rates.iter().map(|rates| {
             [rates.threads.to_string(), giga(rates.copy), giga(rates.single), giga(rates.double)]
         });
-        markdown(["threads", "copy GB/s", "mul-add single Gflop/s", "double"], rows.collect())
+        let device = self.device.iter().map(|OnDevice { adapter, rates }| {
+            [adapter.name.clone(), giga(rates.copy), giga(rates.multiply_add), "–".into()]
+        });
+        let rows = processor.chain(device).collect();
+        let mut parts = vec![markdown(["threads", "copy GB/s", "mul-add single Gflop/s", "double"], rows)];
+        parts.extend(self.device.as_ref().map(OnDevice::words));
+        parts.join("\n\n")
     }
 
     fn fits_table(&self) -> String {
@@ -268,13 +338,14 @@ impl Report {
                 fit.case.element.name().to_owned(),
                 fit.case.law.name().to_owned(),
                 fit.case.precision.name().to_owned(),
-                fit.threads.to_string(),
+                fit.place.clone(),
                 format!("{} of {} to {} elements", fit.meshes, fit.cells[0], fit.cells[1]),
                 format!("{:.2}", fit.ns_per_element_step),
                 format!("{:.1} % at {}", 100.0 * fit.largest_deviation, fit.farthest),
             ]
         });
-        let header = ["element", "law", "precision", "threads", "meshes", "b ns", "largest deviation"];
+        let header =
+            ["element", "law", "precision", "threads or design", "meshes", "b ns", "largest deviation"];
         markdown(header, rows.collect())
     }
 
@@ -287,7 +358,7 @@ impl Report {
                 format!("{}³", row.case.edge),
                 row.cells.to_string(),
                 row.case.nodes().to_string(),
-                row.threads.to_string(),
+                row.place(),
                 format!("{:.3}", 1e3 * row.critical_step),
                 format!("{:.3}", 1e-6 * row.ns_per_element_step * row.cells as f64),
                 format!("{:.2}", row.real_time_factor),
@@ -300,7 +371,7 @@ impl Report {
             "measured",
             "elements",
             "nodes",
-            "threads",
+            "threads or design",
             "Δt ms",
             "step takes ms",
             "× real time",
@@ -318,7 +389,7 @@ fn rows_table(rows: &[Row]) -> String {
             row.element.to_owned(),
             row.law.to_owned(),
             row.precision.to_owned(),
-            row.threads.to_string(),
+            row.place(),
             format!("{:.2}", row.ns_per_element_step),
             format!("{:.2}–{:.2}", row.ns_least, row.ns_most),
             format!("{:.2}", 1e-6 * row.elements_per_second),
@@ -336,7 +407,7 @@ fn rows_table(rows: &[Row]) -> String {
         "element",
         "law",
         "precision",
-        "threads",
+        "threads or design",
         "ns",
         "least–most",
         "M/s",

@@ -4,14 +4,15 @@
 //! so all cells are deformed from the first step on and go on to vibrate. It is warmed up, then stepped for so many steps
 //! that a repeat takes [`Settings::seconds`].
 
+use pliant_gpu::{Device, DeviceRates, GpuError, StepFailure};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::{Model, Real, State, StepError};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-use crate::case::{Case, EDGE, Element, LawKind, Precision, Threads};
-use crate::clock::{Clocked, Spread};
-use crate::report::{Cube, Fit, Limit, Report, Row};
+use crate::case::{Case, EDGE, Element, LawKind, Place, Precision, Threads};
+use crate::clock::{Clocked, ClockedOnDevice, Spread, Timed};
+use crate::report::{Cube, Fit, Limit, Measured, OnDevice, Refused, Report, Row};
 use crate::{Machine, Rates, Specimen};
 
 /// Displacement of `x-max` [m]; that of a node at x is x/[`EDGE`] of it.
@@ -66,6 +67,13 @@ pub enum BenchError {
     /// No threads.
     #[error("{0}")]
     Threads(#[from] ThreadPoolBuildError),
+    /// No device, or it failed.
+    #[error("{source}; {}", source.remedy())]
+    Device {
+        /// Why.
+        #[from]
+        source: GpuError,
+    },
 }
 
 /// Measures cases in their order. Where the series of a cube has three meshes or more, its linear cost is found, and
@@ -78,11 +86,20 @@ pub fn measure(
     settings: Settings,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Report, BenchError> {
-    let mut bench = Bench { machine: Machine::this(), settings, pools: Vec::new(), limits: Vec::new() };
+    let mut bench =
+        Bench { machine: Machine::this(), settings, pools: Vec::new(), device: None, limits: Vec::new() };
     let mut rows = Vec::new();
+    let mut refused = Vec::new();
     for (done, case) in cases.iter().enumerate() {
         progress(Progress { part: done as f64 / cases.len() as f64, now: case.id() });
-        rows.push(bench.row(case, CELLS_OF_TRUE_LIMIT)?);
+        match bench.row(case, CELLS_OF_TRUE_LIMIT) {
+            Ok(row) => rows.push(row),
+            // The other meshes can still be measured.
+            Err(BenchError::Device { source }) if source.is_about_the_model() => {
+                refused.push(Refused { id: case.id(), reason: source.to_string() });
+            }
+            Err(error) => return Err(error),
+        }
     }
     progress(Progress { part: 1.0, now: "largest cubes in real time".into() });
     let fits = Fit::all(&rows);
@@ -93,7 +110,8 @@ pub fn measure(
         }
     }
     let rates = bench.pools.iter().map(|(_, rates)| *rates).collect();
-    Ok(Report { machine: bench.machine, settings, rates, rows, fits, cubes })
+    let device = bench.device.map(|(device, rates)| OnDevice { adapter: device.adapter().clone(), rates });
+    Ok(Report { machine: bench.machine, settings, rates, device, rows, refused, fits, cubes })
 }
 
 /// The cube of n³ grid cells whose step is predicted to take as long as it simulates: with T = b k n³ for k cells in a
@@ -101,7 +119,8 @@ pub fn measure(
 fn largest_in_real_time(fit: &Fit, rows: &[Row]) -> Option<Case> {
     let thesis = matches!(fit.case.element, Element::Tet4 | Element::Hex8)
         && matches!(fit.case.law, LawKind::NeoHookean | LawKind::FibresProny)
-        && (fit.case.precision, fit.case.threads) == (Precision::Single, Threads::All);
+        && fit.case.precision == Precision::Single
+        && fit.case.place != Place::Processor(Threads::One);
     // Of the finest mesh whose true limit is known; else of the finest.
     let known = rows.iter().filter(|row| fit.covers(&row.case));
     let finest = known.max_by_key(|row| (row.critical_step_from == Limit::True, row.cells))?;
@@ -116,6 +135,7 @@ struct Bench {
     machine: Machine,
     settings: Settings,
     pools: Vec<(ThreadPool, Rates)>,
+    device: Option<(Device, DeviceRates)>,
     /// Known limits [s]: they do not depend on precision, threads and relaxation.
     limits: Vec<((Element, bool, usize), f64)>,
 }
@@ -137,18 +157,48 @@ impl Bench {
         Ok(&self.pools[index])
     }
 
+    /// The device and what it can do, opened and measured when it is first needed.
+    fn device(&mut self) -> Result<&(Device, DeviceRates), BenchError> {
+        if self.device.is_none() {
+            let device = Device::open(None)?;
+            let rates = DeviceRates::measure(&device, self.settings.repeats)?;
+            self.device = Some((device, rates));
+        }
+        self.device.as_ref().ok_or(GpuError::NoAdapter.into())
+    }
+
     /// Measures a case; `most` is the number of cells up to which its true limit is found.
     fn row(&mut self, case: &Case, most: usize) -> Result<Row, BenchError> {
         let specimen = squeezed(case.specimen());
         let (limit, from) = self.limit(case, &specimen, most);
         let (step, settings) = (PART_UNDER_THE_CLOCK * limit, self.settings);
-        let (pool, rates) = self.pool(case.threads)?;
-        let repeats = pool.install(|| match case.precision {
-            Precision::Single => repeats::<f32>(case, &specimen, step, settings),
-            Precision::Double => repeats::<f64>(case, &specimen, step, settings),
-        })?;
-        let rates = *rates;
-        Ok(Row::new(*case, &self.machine, &rates, Spread::of(repeats), (PART_OF_LIMIT * limit, from)))
+        let model = &specimen.model;
+        let (seconds, place) = match case.place {
+            Place::Processor(threads) => {
+                let processor = self.machine.processor.clone();
+                let (pool, rates) = self.pool(threads)?;
+                let seconds = pool.install(|| match case.precision {
+                    Precision::Single => on_processor::<f32>(case, model, step, settings),
+                    Precision::Double => on_processor::<f64>(case, model, step, settings),
+                })?;
+                let multiply_add = rates.multiply_add(case.precision);
+                let threads = Some(rates.threads);
+                let design = "cpu".to_owned();
+                (seconds, Measured { adapter: processor, threads, design, copy: rates.copy, multiply_add })
+            }
+            Place::Device(design) => {
+                let (device, rates) = self.device()?;
+                let mut clocked = ClockedOnDevice::new(device, model, step, design, start::<f32>(model))?;
+                let seconds = repeats(&mut clocked, settings).map_err(|failure| match failure {
+                    StepFailure::Step(source) => BenchError::Step { id: case.id(), source },
+                    StepFailure::Device(error) => error.into(),
+                })?;
+                let (adapter, design) = (device.adapter().name.clone(), design.to_string());
+                let DeviceRates { copy, multiply_add, .. } = *rates;
+                (seconds, Measured { adapter, threads: None, design, copy, multiply_add })
+            }
+        };
+        Ok(Row::new(*case, place, Spread::of(seconds), (PART_OF_LIMIT * limit, from)))
     }
 
     /// Measures a cube of a predicted size, and of the size that its measurement tells, three at the most.
@@ -194,17 +244,21 @@ fn start<R: Real>(model: &Model) -> State<R> {
     State { displacement, ..State::at_rest(model) }
 }
 
-/// Wall times of a step [s].
-fn repeats<R: Real>(
+/// Wall times of a step on the current pool [s].
+fn on_processor<R: Real>(
     case: &Case,
-    specimen: &Specimen,
+    model: &Model,
     step: f64,
     settings: Settings,
 ) -> Result<Vec<f64>, BenchError> {
-    let mut clocked = Clocked::new(&specimen.model, step, start::<R>(&specimen.model))?;
-    let named = |source| BenchError::Step { id: case.id(), source };
-    let steps = clocked.steps_within(settings.seconds).map_err(named)?;
-    (0..settings.repeats.max(1)).map(|_| clocked.seconds_per_step(steps).map_err(named)).collect()
+    let mut clocked = Clocked::new(model, step, start::<R>(model))?;
+    repeats(&mut clocked, settings).map_err(|source| BenchError::Step { id: case.id(), source })
+}
+
+/// Wall times of a step [s], once it is warm.
+fn repeats<T: Timed>(clocked: &mut T, settings: Settings) -> Result<Vec<f64>, T::Error> {
+    let steps = clocked.steps_within(settings.seconds)?;
+    (0..settings.repeats.max(1)).map(|_| clocked.seconds_per_step(steps)).collect()
 }
 
 #[cfg(test)]
@@ -214,11 +268,18 @@ mod tests {
 
     fn row(id: &str, ns: f64) -> Row {
         let case = find(id).unwrap();
-        let rates = Rates { threads: case.threads.count(), copy: 1e10, single: 1e11, double: 5e10 };
+        let threads = (case.place == Place::Processor(Threads::All)).then(|| Threads::All.count());
+        let place = Measured {
+            adapter: String::new(),
+            threads,
+            design: "cpu".into(),
+            copy: 1e10,
+            multiply_add: 1e11,
+        };
         let seconds = 1e-9 * ns * case.cells() as f64;
         let spread = Spread { median: seconds, least: seconds, most: seconds };
         // Δt = 5 ms/n.
-        Row::new(case, &Machine::this(), &rates, spread, (5e-3 / case.edge as f64, Limit::True))
+        Row::new(case, place, spread, (5e-3 / case.edge as f64, Limit::True))
     }
 
     #[test]
@@ -247,7 +308,7 @@ mod tests {
         let specimen = squeezed(case.specimen());
         let step = 0.5 * specimen.element_bound();
         let settings = Settings { repeats: 1, seconds: 0.0 };
-        assert!(repeats::<f32>(&case, &specimen, step, settings).unwrap()[0] > 0.0);
+        assert!(on_processor::<f32>(&case, &specimen.model, step, settings).unwrap()[0] > 0.0);
         let displacement = start::<f64>(&specimen.model).displacement;
         let rest = State::<f64>::at_rest(&specimen.model).displacement;
         assert!(

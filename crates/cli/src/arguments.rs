@@ -87,6 +87,7 @@ const BENCH_HELP: &str = "\
 Examples:
   pliant bench                                   two minutes: all laws and elements, the thesis's series of meshes
   pliant bench --full                            on to meshes of two million elements
+  pliant bench --designs                         the designs of the kernels on a graphics processor
   pliant bench --list
   pliant bench --only tet4-nh-55566 --only tet4-nh-55566-all
   pliant bench --json > bench.json
@@ -99,6 +100,9 @@ pub struct Bench {
     /// Measure everything, not just the default selection.
     #[arg(long, conflicts_with = "only")]
     pub full: bool,
+    /// Measure the designs of the kernels on the best graphics processor instead; with `--full` on large meshes, too.
+    #[arg(long, conflicts_with = "only")]
+    pub designs: bool,
     /// Say what there is, and measure nothing.
     #[arg(long)]
     pub list: bool,

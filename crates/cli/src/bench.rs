@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use pliant_bench::{Case, Settings, cases, find, measure};
+use pliant_bench::{Case, Place, Settings, cases, find, measure};
 use serde_json::json;
 
 use crate::arguments::Bench;
@@ -41,6 +41,9 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// The most cells on a graphics processor that are measured without being asked for.
+const SMALL: usize = 100_000;
+
 /// The rows asked for, in the order of the table.
 fn chosen(arguments: &Bench) -> Result<Vec<Case>, Failure> {
     let mut asked = Vec::new();
@@ -51,7 +54,8 @@ fn chosen(arguments: &Bench) -> Result<Vec<Case>, Failure> {
         })?);
     }
     let wanted = |case: &Case| match asked.as_slice() {
-        [] => arguments.full || case.is_default(),
+        [] if arguments.designs => case.is_on_device() && (arguments.full || case.cells() <= SMALL),
+        [] => !case.is_on_device() && (arguments.full || case.is_default()),
         asked => asked.contains(case),
     };
     Ok(cases().into_iter().filter(wanted).collect())
@@ -59,15 +63,23 @@ fn chosen(arguments: &Bench) -> Result<Vec<Case>, Failure> {
 
 fn list() -> String {
     let line = |case: Case| {
-        let selection = if case.is_default() { "default" } else { "--full" };
+        let selection = match (case.is_on_device(), case.is_default()) {
+            (true, _) if case.cells() <= SMALL => "--designs",
+            (true, _) => "--designs --full",
+            (false, true) => "default",
+            (false, false) => "--full",
+        };
+        let place = match case.place {
+            Place::Processor(threads) => format!("threads: {}", threads.count()),
+            Place::Device(design) => format!("design: {design}"),
+        };
         format!(
-            "{:<32} {selection:<8} {} {}, cube of {} elements, {} precision, threads: {}",
+            "{:<36} {selection:<16} {} {}, cube of {} elements, {} precision, {place}",
             case.id(),
             case.element.name(),
             case.law.name(),
             case.cells(),
             case.precision.name(),
-            case.threads.count()
         )
     };
     cases().into_iter().map(line).collect::<Vec<_>>().join("\n")

@@ -28,7 +28,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 19] = [
+const KEYS: [&str; 21] = [
     "status",
     "error",
     "bodies",

@@ -74,6 +74,11 @@ pub enum GpuError {
 }
 
 impl GpuError {
+    /// Whether another model could run on the device.
+    pub fn is_about_the_model(&self) -> bool {
+        matches!(self, Self::TooLarge { .. } | Self::OutOfMemory { .. } | Self::Unsupported { .. })
+    }
+
     /// What to try.
     pub fn remedy(&self) -> &'static str {
         match self {

@@ -1,5 +1,6 @@
 //! One result of the literature: what it shows, what was corrected in it, and what comes out here.
 
+use pliant_gpu::{GpuError, StepFailure};
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::{RelaxationError, StepError};
 use pliant_scene::diagnostic::SceneErrors;
@@ -160,6 +161,12 @@ pub enum CaseError {
         /// Movement in a tenth of a second at the present speed, over the largest displacement.
         creep: f64,
     },
+    /// A device failed.
+    #[error(transparent)]
+    Device(#[from] GpuError),
+    /// A step on a device failed.
+    #[error(transparent)]
+    OnDevice(#[from] StepFailure),
     /// A scene could not be run.
     #[error("{0}")]
     Run(String),

@@ -2,7 +2,8 @@
 //! hexahedra, single precision, all cores. Repeats of all models are interleaved, so that what else the machine does
 //! meets all alike; the median counts.
 
-use pliant_bench::{Clocked, Spread};
+use pliant_bench::{Clocked, ClockedOnDevice, Spread, Timed};
+use pliant_gpu::{Design, Device, GpuError, Kind};
 use pliant_mechanics::State;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::model::Material;
@@ -18,6 +19,8 @@ use crate::{Specimen, elastic, law, liver, liver_matrix, liver_relaxation};
 const CELLS: [usize; 4] = [10, 16, 25, 38];
 /// Repeats of every model.
 const REPEATS: usize = 21;
+/// Those on a graphics processor.
+const REPEATS_ON_DEVICE: usize = 5;
 /// Elements stepped in a repeat.
 const ELEMENT_STEPS: usize = 110_000;
 /// Names of the models, as in the thesis: neo-Hookean elastic, transversely isotropic elastic and viscoelastic; and
@@ -58,20 +61,38 @@ fn materials() -> [Material; 4] {
     .map(|(law, prony)| Material { law, prony, density: 1000.0 })
 }
 
-/// Wall times of a step [s] of each model, repeat by repeat.
-fn measure(cells: usize) -> Result<Vec<[f64; 4]>, CaseError> {
+/// Wall times of a step [s] of each model, repeat by repeat, all by steps of the stiffest.
+fn measure(cells: usize, device: Option<&Device>) -> Result<Vec<[f64; 4]>, CaseError> {
     let cubes = materials().map(|material| cube(cells, &material));
-    // One step for all: that of the stiffest.
     let step = cubes.iter().map(|cube| 0.9 * cube.element_bound()).fold(f64::INFINITY, f64::min);
-    let mut running = Vec::new();
-    for Specimen { model, .. } in &cubes {
-        running.push(Clocked::<f32>::new(model, step, State::at_rest(model))?);
+    let steps = (ELEMENT_STEPS / cells.pow(3)).max(2);
+    match device {
+        None => {
+            let mut running = Vec::new();
+            for Specimen { model, .. } in &cubes {
+                running.push(Clocked::<f32>::new(model, step, State::at_rest(model))?);
+            }
+            interleaved(&mut running, REPEATS, steps)
+        }
+        Some(device) => {
+            let mut running = Vec::new();
+            for Specimen { model, .. } in &cubes {
+                let (design, state) = (Design::default(), State::at_rest(model));
+                running.push(ClockedOnDevice::new(device, model, step, design, state)?);
+            }
+            interleaved(&mut running, REPEATS_ON_DEVICE, steps)
+        }
     }
-    let steps = ELEMENT_STEPS / cells.pow(3);
-    let mut times = vec![[0.0; 4]; REPEATS + 1];
+}
+
+fn interleaved<T: Timed>(running: &mut [T], repeats: usize, steps: usize) -> Result<Vec<[f64; 4]>, CaseError>
+where
+    CaseError: From<T::Error>,
+{
+    let mut times = vec![[0.0; 4]; repeats + 1];
     for repeat in &mut times {
         for (cube, time) in running.iter_mut().zip(repeat) {
-            *time = cube.seconds_per_step(steps.max(2))?;
+            *time = cube.seconds_per_step(steps)?;
         }
     }
     // The first warms up and does not count.
@@ -83,55 +104,98 @@ fn median(repeats: &[[f64; 4]], of: impl Fn(&[f64; 4]) -> f64) -> f64 {
     Spread::of(repeats.iter().map(of)).median
 }
 
+/// The series of meshes in one place.
+struct Series {
+    /// The place, in words …
+    place: &'static str,
+    /// … and which one it is here.
+    detail: String,
+    /// Of each mesh.
+    times: Vec<Vec<[f64; 4]>>,
+}
+
+impl Series {
+    fn measure(place: &'static str, detail: String, device: Option<&Device>) -> Result<Self, CaseError> {
+        let times = CELLS.into_iter().map(|cells| measure(cells, device)).collect::<Result<_, _>>()?;
+        Ok(Self { place, detail, times })
+    }
+
+    /// For each mesh its elements and the median of what is made of the times.
+    fn points(&self, of: impl Fn(&[f64; 4]) -> f64) -> Vec<(f64, f64)> {
+        let median = |(cells, times): (usize, &Vec<_>)| (cells.pow(3) as f64, median(times, &of));
+        CELLS.into_iter().zip(&self.times).map(median).collect()
+    }
+
+    /// Times of the models, and ratios of them.
+    fn add_figures(&self, findings: &mut Findings) -> Result<(), CaseError> {
+        let mut curves = Vec::new();
+        for (model, name) in MODELS.into_iter().enumerate() {
+            let points = self.points(|t| 1e3 * t[model]);
+            curves.push(Curve::new(name, model, Pen::Line, points.clone()));
+            curves.push(Curve::new("", model, Pen::Markers, points));
+        }
+        let caption = format!(
+            "On the {}{}: median of the repeats, interleaved; single precision.",
+            self.place, self.detail
+        );
+        findings.figures.push(plot("Time of a step", "time [ms]", &curves).figure(caption)?);
+        let mut curves = Vec::new();
+        let ratios = [("TIE / NHE", 1, 0), ("TIV / TIE", 3, 1), ("TIV / NHE", 3, 0)];
+        for (colour, (name, above, below)) in ratios.into_iter().enumerate() {
+            let points = self.points(|t| t[above] / t[below]);
+            curves.push(Curve::new(name, colour, Pen::Line, points.clone()));
+            curves.push(Curve::new("", colour, Pen::Markers, points));
+        }
+        let figure = Plot { logarithmic: false, ..plot("Ratio of times", "ratio", &curves) };
+        let caption = format!("On the {}{}: medians of the ratios within a repeat.", self.place, self.detail);
+        findings.figures.push(figure.figure(caption)?);
+        Ok(())
+    }
+
+    /// Times and ratios on the finest mesh.
+    fn add_rows(&self, findings: &mut Findings) {
+        let finest = self.times.last().map(Vec::as_slice).unwrap_or_default();
+        let elements = CELLS[CELLS.len() - 1].pow(3);
+        for (model, name) in MODELS.into_iter().enumerate() {
+            let quantity = format!("{}, {name}: a step of {elements} hexahedra", self.place);
+            findings.rows.push(Row::timed(quantity, "ms", None, median(finest, |t| 1e3 * t[model]), ""));
+        }
+        let source = "thesis, largest on a GeForce 8800 GTX";
+        for (name, reference, [above, below]) in [
+            ("TIE to NHE: anisotropy", Some(1.013), [1, 0]),
+            ("TIV to TIE: viscoelasticity", Some(1.043), [3, 1]),
+            ("TIV to NHE: both", Some(1.051), [3, 0]),
+            ("NHV to NHE: viscoelasticity without fibres", None, [2, 0]),
+        ] {
+            let ratio = median(finest, |t| t[above] / t[below]);
+            let source = if reference.is_some() { source } else { "" };
+            let quantity = format!("{}, {name}", self.place);
+            findings.rows.push(Row::timed(quantity, "", reference, ratio, source));
+        }
+    }
+}
+
+fn plot<'a>(title: &'a str, axis: &'a str, curves: &'a [Curve]) -> Plot<'a> {
+    Plot { title, axes: ["elements", axis], logarithmic: true, key: Key::UpperLeft, curves }
+}
+
 fn compute() -> Result<Findings, CaseError> {
     let mut findings = Findings::default();
-    let elements = CELLS.map(|cells| cells.pow(3) as f64);
-    let mut times = Vec::new();
-    for cells in CELLS {
-        times.push(measure(cells)?);
-    }
-    let pairs = |value: &dyn Fn(&[f64; 4]) -> f64| -> Vec<(f64, f64)> {
-        elements.into_iter().zip(times.iter().map(|repeats| median(repeats, value))).collect()
-    };
-    let mut curves = Vec::new();
-    for (model, name) in MODELS.into_iter().enumerate() {
-        curves.push(Curve::new(name, model, Pen::Line, pairs(&|t| 1e3 * t[model])));
-        curves.push(Curve::new("", model, Pen::Markers, pairs(&|t| 1e3 * t[model])));
-    }
-    let plot = |title, axis, curves| {
-        let axes = ["elements", axis];
-        Plot { title, axes, logarithmic: true, key: Key::UpperLeft, curves }
-    };
-    let caption = "Median of 21 repeats, interleaved; single precision, all cores.";
-    findings.figures.push(plot("Time of a step", "time [ms]", &curves).figure(caption)?);
-    let ratios = [("TIE / NHE", 1, 0), ("TIV / TIE", 3, 1), ("TIV / NHE", 3, 0)].iter().enumerate().flat_map(
-        |(colour, &(name, above, below))| {
-            let points = pairs(&|t| t[above] / t[below]);
-            [
-                Curve::new(name, colour, Pen::Line, points.clone()),
-                Curve::new("", colour, Pen::Markers, points),
-            ]
-        },
-    );
-    let ratios: Vec<Curve> = ratios.collect();
-    let figure = Plot { logarithmic: false, ..plot("Ratio of times", "ratio", &ratios) };
-    findings.figures.push(figure.figure("Medians of the ratios within a repeat.")?);
-
-    let finest = times.last().map(Vec::as_slice).unwrap_or_default();
-    for (model, name) in MODELS.into_iter().enumerate() {
-        let quantity = format!("{name}: a step of {} hexahedra", elements[3]);
-        findings.rows.push(Row::timed(quantity, "ms", None, median(finest, |t| 1e3 * t[model]), ""));
-    }
-    let source = "thesis, largest on a GeForce 8800 GTX";
-    for (name, reference, [above, below]) in [
-        ("TIE to NHE: anisotropy", Some(1.013), [1, 0]),
-        ("TIV to TIE: viscoelasticity", Some(1.043), [3, 1]),
-        ("TIV to NHE: both", Some(1.051), [3, 0]),
-        ("NHV to NHE: viscoelasticity without fibres", None, [2, 0]),
-    ] {
-        let ratio = median(finest, |t| t[above] / t[below]);
-        let source = if reference.is_some() { source } else { "" };
-        findings.rows.push(Row::timed(name, "", reference, ratio, source));
+    let processor = Series::measure("processor", ", all cores".into(), None)?;
+    processor.add_figures(&mut findings)?;
+    processor.add_rows(&mut findings);
+    match Device::open(None) {
+        Ok(device) => {
+            let adapter = device.adapter();
+            let software = if adapter.kind == Kind::Software { ", the processor in disguise" } else { "" };
+            let detail = format!(" ({}{software})", adapter.name);
+            let on_device = Series::measure("graphics processor", detail, Some(&device))?;
+            on_device.add_figures(&mut findings)?;
+            on_device.add_rows(&mut findings);
+            add_ratio(&mut findings, &processor, &on_device)?;
+        }
+        Err(GpuError::NoAdapter) => {}
+        Err(error) => return Err(error.into()),
     }
 
     let critical = |material: &Material, cells: usize| 1e3 * cube(cells, material).element_bound();
@@ -144,8 +208,7 @@ fn compute() -> Result<Findings, CaseError> {
     ];
     let curves: Vec<Curve> = (tissues.iter().enumerate())
         .map(|(colour, (name, material))| {
-            let steps =
-                CELLS.into_iter().zip(elements).map(|(cells, count)| (count, critical(material, cells)));
+            let steps = CELLS.into_iter().map(|cells| (cells.pow(3) as f64, critical(material, cells)));
             Curve::new(*name, colour, Pen::Line, steps.collect())
         })
         .collect();
@@ -155,4 +218,20 @@ fn compute() -> Result<Findings, CaseError> {
     let quantity = "critical step at ν = 0.45 over that at ν = 0.49";
     findings.rows.push(Row::judged(quantity, "", [2.12, 0.005], at_45 / at_49, "thesis, as printed"));
     Ok(findings)
+}
+
+/// How many times faster the graphics processor is, on the model with all there is.
+fn add_ratio(findings: &mut Findings, processor: &Series, on_device: &Series) -> Result<(), CaseError> {
+    let (slow, fast) = (processor.points(|t| t[3]), on_device.points(|t| t[3]));
+    let points: Vec<_> = slow.iter().zip(&fast).map(|(slow, fast)| (slow.0, slow.1 / fast.1)).collect();
+    let largest = points.iter().map(|point| point.1).fold(0.0, f64::max);
+    let curves = [Curve::new("TIV", 3, Pen::Line, points.clone()), Curve::new("", 3, Pen::Markers, points)];
+    let figure = Plot { logarithmic: false, ..plot("Processor over graphics processor", "ratio", &curves) };
+    let caption =
+        format!("Time of a step on all cores over that on the {}{}.", on_device.place, on_device.detail);
+    findings.figures.push(figure.figure(caption)?);
+    let quantity = format!("TIV, processor over {}, largest ratio", on_device.place);
+    let source = "thesis, one core of 2006 over a GeForce 8800 GTX";
+    findings.rows.push(Row::timed(quantity, "", Some(56.3), largest, source));
+    Ok(())
 }

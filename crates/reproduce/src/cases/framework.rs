@@ -2,7 +2,7 @@
 //! this machine: single precision, all cores. Both begin at rest and take the same steps of the same model; repeats are
 //! interleaved, so that what else the machine does meets both alike.
 
-use pliant_bench::{Clocked, Spread};
+use pliant_bench::{Clocked, Spread, Timed};
 use pliant_mechanics::State;
 use pliant_scene::source::Source;
 use pliant_scene::{Built, OutputFolder, Plan, Scene};
