@@ -18,8 +18,11 @@ use crate::solids::{DeviceSolid, Four, Slots, Way};
 use crate::transfer::Transfer;
 use crate::{Design, Device, GpuError};
 
-/// Steps between two instants that are looked at: the energies, how far cells are deformed, whether all is sound.
+/// Most steps between two instants that are looked at: the energies, how far cells are deformed, whether all is sound.
 const LOOK_EVERY: u64 = 100;
+
+/// Looks come closer together where the deformation changes by more than this factor from one to the next.
+const CALM: f64 = 1.02;
 
 /// Steps between two looks at the largest stable step, unless the deformation has changed: for each the displacements come
 /// back, and the processor ranks all cells.
@@ -87,6 +90,9 @@ pub struct GpuStepper<'m> {
     since: u32,
     /// Whether the work of the instants since then is entered.
     entered: bool,
+    /// How far cells were deformed at the last look, and steps to the next one.
+    deformed: Deformed,
+    stride: u64,
     /// Time an instant takes [s], once known.
     pace: Option<f64>,
     energies: Energies,
@@ -188,6 +194,8 @@ impl<'m> GpuStepper<'m> {
             origin: None,
             since: 0,
             entered: true,
+            deformed: Deformed::default(),
+            stride: 1,
             pace: None,
             energies: Energies::default(),
             reactions: vec![[0.0; 3]; model.constraints.len()],
@@ -273,6 +281,9 @@ impl<'m> GpuStepper<'m> {
         }
         self.enter_passed(state, &results, self.lengths.before);
         let below = if state.is_between_steps() { self.watch(state, &results.deformed)? } else { Ok(()) };
+        let calm = !results.deformed.differs(&self.deformed, CALM);
+        self.stride = if calm { (2 * self.stride).min(LOOK_EVERY) } else { (self.stride / 2).max(1) };
+        self.deformed = results.deformed;
         if self.lengths != self.control.lengths(state) {
             self.lengths = self.control.lengths(state);
             let shock = results.shock;
@@ -310,7 +321,7 @@ impl<'m> GpuStepper<'m> {
         while left > 0 {
             self.evaluate(state, Wanted::Energies)?;
             // Where energies are off balance each step counts.
-            let stride = if state.work.is_off_balance() { 1 } else { left.min(LOOK_EVERY) };
+            let stride = if state.work.is_off_balance() { 1 } else { left.min(self.stride) };
             self.go(state, stride)?;
             left -= stride;
         }
