@@ -12,6 +12,7 @@ mod error;
 mod kernel;
 mod loads;
 mod nodes;
+mod paths;
 mod run;
 mod solids;
 mod stepper;

@@ -93,11 +93,30 @@ fn compare(device: &Device, what: &str, model: &Model, design: Design) {
 #[test]
 fn every_element_in_every_design() {
     let Some(device) = support::device() else { return };
-    for &design in Design::ALL {
+    for design in designs(&device) {
         for element in ELEMENTS {
             compare(&device, element, &moved_cube(element, elastic(neo_hookean())), design);
+            compare(&device, &format!("{element}, relaxing"), &relaxing_cube(element), design);
         }
     }
+}
+
+/// Those the device can run.
+fn designs(device: &Device) -> impl Iterator<Item = Design> {
+    let atomics = device.adapter().float_atomics;
+    Design::ALL.iter().copied().filter(move |design| atomics || *design != Design::FloatAtomics)
+}
+
+#[test]
+fn a_force_out_of_the_range_of_whole_numbers_is_told_and_never_wraps() {
+    let Some(device) = support::device() else { return };
+    let mut model = moved_cube("tet4", elastic(every_law().remove(9)));
+    model.constraints[1].motion = Motion::Displacement([0.0, 0.0, 3.0 * EDGE], smooth(0.5));
+    let mut state = State::<f32>::at_rest(&model);
+    let mut stepper = stepper(&device, &model, 0.1 * step_of(&model), Design::FixedAtomics);
+    let error = stepper.advance(&mut state, 4000).expect_err("the force is too large");
+    let StepFailure::Device(GpuError::Overflow { time, .. }) = &error else { panic!("{error:?}") };
+    assert!(*time > 0.0 && *time == state.time, "{error}");
 }
 
 #[test]
@@ -214,9 +233,9 @@ fn every_motion_damping_mass_scaling_and_initial_velocities() {
 fn deterministic_designs_give_the_same_bits_however_the_steps_are_divided() {
     let Some(device) = support::device() else { return };
     let model = moved_cube("tet4-anp", elastic(neo_hookean()));
-    let run = |strides: &[u64]| {
+    let run = |design: Design, strides: &[u64]| {
         let mut state = State::<f32>::at_rest(&model);
-        let mut stepper = stepper(&device, &model, step_of(&model), Design::Gather);
+        let mut stepper = stepper(&device, &model, step_of(&model), design);
         for &stride in strides {
             stepper.evaluate(&mut state, Wanted::Energies).unwrap();
             stepper.advance(&mut state, stride).unwrap();
@@ -224,12 +243,14 @@ fn deterministic_designs_give_the_same_bits_however_the_steps_are_divided() {
         stepper.evaluate(&mut state, Wanted::Everything).unwrap();
         (state.displacement, state.increment, *stepper.energies())
     };
-    let (u, du, energies) = run(&[210]);
-    assert_eq!(run(&[210]), (u.clone(), du.clone(), energies));
-    let (divided, increments, other) = run(&[1, 2, 97, 110]);
-    assert_eq!((divided, increments), (u, du));
-    for (a, b) in numbers(&energies).into_iter().zip(numbers(&other)) {
-        assert!((a - b).abs() < 1e-6 * energies.external, "{a} {b}");
+    for design in designs(&device).filter(|&design| design != Design::FloatAtomics) {
+        let (u, du, energies) = run(design, &[210]);
+        assert_eq!(run(design, &[210]), (u.clone(), du.clone(), energies));
+        let (divided, increments, other) = run(design, &[1, 2, 97, 110]);
+        assert_eq!((divided, increments), (u, du), "{design}");
+        for (a, b) in numbers(&energies).into_iter().zip(numbers(&other)) {
+            assert!((a - b).abs() < 1e-6 * energies.external, "{a} {b}");
+        }
     }
 }
 
