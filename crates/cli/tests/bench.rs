@@ -63,6 +63,35 @@ fn a_row_has_the_promised_keys_with_numbers_that_agree() {
 }
 
 #[test]
+fn a_design_is_measured_on_the_device_and_named_with_it() {
+    let Some(best) = pliant_gpu::adapters().into_iter().next() else {
+        assert_ne!(std::env::var("PLIANT_REQUIRE_GPU").as_deref(), Ok("1"), "no graphics processor was found");
+        eprintln!("skipped: no graphics processor was found");
+        return;
+    };
+    let told =
+        Workshop::new("").pliant(&["bench", "--only", "hex8-nh-27000-gather", "--repeats", "1", "--json"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let report = told.json();
+    let row = report["rows"][0].as_object().unwrap();
+    assert!(KEYS.iter().all(|key| row.contains_key(*key)), "{row:?}");
+    assert_eq!((&row["adapter"], &row["design"]), (&best.name.into(), &"gather".into()));
+    assert!(row["threads"].is_null());
+    assert!(row["flop_fraction"].as_f64().is_some_and(|part| part > 0.0 && part < 1.0), "{row:?}");
+    assert!(report["device"]["launch"].as_f64().is_some_and(|seconds| seconds > 0.0), "{report}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn designs_without_a_device_are_answered_with_the_packages() {
+    // None answers to Direct3D there.
+    let mut command = Workshop::new("").command(&["bench", "--designs", "--repeats", "1"]);
+    let told: support::Told = command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into();
+    assert_eq!(told.code, 1, "{}", told.out);
+    assert!(told.words().contains("mesa-vulkan-drivers"), "{}", told.err);
+}
+
+#[test]
 fn several_rows_make_a_table_and_three_meshes_a_line() {
     let ids = ["hex8-nh-1000", "hex8-nh-4096", "hex8-nh-15625"].map(|id| ["--only", id]).concat();
     let workshop = Workshop::new("");

@@ -13,17 +13,24 @@ pub enum Design {
     /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every time.
     #[default]
     Gather,
+    /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits vary from run to
+    /// run.
+    FloatAtomics,
+    /// Cells add their forces as whole multiples of a small force: the same bits every time, forces of a limited range.
+    FixedAtomics,
 }
 
 impl Design {
     /// All of them.
-    pub const ALL: &[Self] = &[Self::Gather];
+    pub const ALL: &[Self] = &[Self::Gather, Self::FloatAtomics, Self::FixedAtomics];
 }
 
 impl fmt::Display for Design {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Gather => "gather",
+            Self::FloatAtomics => "float-atomics",
+            Self::FixedAtomics => "fixed-atomics",
         })
     }
 }

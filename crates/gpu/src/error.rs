@@ -60,6 +60,14 @@ pub enum GpuError {
         /// What it is.
         what: String,
     },
+    /// A force is too large for a design that adds forces up as whole numbers.
+    #[error("a force at t = {time:.6} s is out of the range of the design `{design}`")]
+    Overflow {
+        /// The design.
+        design: String,
+        /// Time [s].
+        time: f64,
+    },
     /// Constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
@@ -98,6 +106,7 @@ impl GpuError {
                 "take a coarser mesh, an adapter with more memory (`pliant devices`) or `device = \"cpu\"`"
             }
             Self::Unsupported { .. } => "take `device = \"cpu\"`",
+            Self::Overflow { .. } => "take the design `gather`, whose forces are floating-point numbers",
             Self::Contradiction(_) => "leave the node out of one of the two, or give both the same motion",
             Self::Internal { .. } => {
                 "take `device = \"cpu\"`, and report this: it is a fault of Pliant or of the driver"

@@ -12,7 +12,11 @@ mod error;
 mod kernel;
 mod loads;
 mod nodes;
+<<<<<<< HEAD
 mod rates;
+=======
+mod paths;
+>>>>>>> gpucore
 mod run;
 mod solids;
 mod stepper;

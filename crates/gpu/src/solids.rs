@@ -1,11 +1,12 @@
 //! Cells on the device: constants at rest, histories, and the kernels that find their forces.
 
-use pliant_mechanics::model::{Averaging, CellBlock, Cells, LocalNodes, Model, Solid};
+use pliant_mechanics::model::{Averaging, CellBlock, Cells, LocalNodes, Solid};
 use pliant_mechanics::prony::Relaxation;
 use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{History, PACK};
 
 use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::paths::{CORNERS, EACH_CELL, Paths};
 use crate::transfer::Transfer;
 use crate::{Device, GpuError};
 
@@ -13,6 +14,7 @@ const INSTANT: &str = include_str!("shaders/instant.wgsl");
 const CELLS: &str = include_str!("shaders/cells.wgsl");
 const PRONY: &str = include_str!("shaders/prony.wgsl");
 const PRESSURE_HISTORY: &str = include_str!("shaders/pressure_history.wgsl");
+const SHAPE: &str = include_str!("shaders/stored_shape.wgsl");
 const TET: &str = include_str!("shaders/tet.wgsl");
 const AVERAGES: &str = include_str!("shaders/averages.wgsl");
 
@@ -35,15 +37,6 @@ pub(crate) struct DeviceSolid {
     series: u64,
 }
 
-/// What a design adds to the kernels of cells.
-pub(crate) struct Way<'a> {
-    /// Gives `displacement_of` and `give`.
-    pub snippet: &'a str,
-    pub bound: &'a Bound,
-    /// Numbers of the solid that the snippet needs.
-    pub constants: Vec<(&'static str, usize)>,
-}
-
 impl DeviceSolid {
     /// # Errors
     /// If an array is too large, or an element averages pressures and the law has none.
@@ -51,8 +44,8 @@ impl DeviceSolid {
         memory: &Memory<'_>,
         device: &Device,
         instant: &Bound,
-        solid: &Solid,
-        way: &Way<'_>,
+        (index, solid): (usize, &Solid),
+        paths: &Paths,
     ) -> Result<Self, GpuError> {
         let (cells, law) = (&solid.cells, &solid.material.law);
         if cells.averages_pressure() && !law.has_volumetric_energy() {
@@ -116,53 +109,61 @@ impl DeviceSolid {
             ("SLOTS", slots),
             ("LOCAL_NODES", averages.as_ref().map_or(0, |averages| averages.count)),
         ];
-        numbers.extend(way.constants.iter().copied());
-        let kernel = |name: &str, more: &[&str], count: usize| {
-            let common = [INSTANT, &shader.source, CELLS, PRONY, way.snippet];
-            let snippets = [&common, more].concat();
-            Kernel::new(device, name, &numbers, &snippets, &[instant, &bound, way.bound], count)
+        numbers.push(("FIBRES", fibre_row(cells)));
+        numbers.push(("FIRST_SLOT", paths.first_slot[index]));
+        let kernel = |name: &str, snippets: &[&str], count: usize| {
+            let snippets = [&[INSTANT, &shader.source, CELLS, PRONY], snippets].concat();
+            Kernel::new(device, name, &numbers, &snippets, &[instant, &bound, &paths.cells], count)
         };
-        let count = cells.len();
+        let forces = |name: &str, snippets: &[&str]| {
+            kernel(name, &[snippets, &[paths.cell_snippet.as_str()]].concat(), cells.len())
+        };
+        let tets = |name: &str, snippets: &[&str]| {
+            forces(name, &[&[SHAPE, TET, include_str!("shaders/tet_forces.wgsl")], snippets].concat())
+        };
         let kernels = match cells {
-            Cells::Tet4(_) => vec![kernel("tet4", &[TET, include_str!("shaders/tet4.wgsl")], count)],
-            Cells::Hex8(_) => vec![kernel("hex8", &[include_str!("shaders/hex8.wgsl")], count)],
+            Cells::Tet4(_) => vec![tets("tet4", &[include_str!("shaders/tet4.wgsl")])],
+            Cells::Hex8(_) => vec![forces("hex8", &[include_str!("shaders/hex8.wgsl")])],
             Cells::FullHex8(..) => {
-                let own = include_str!("shaders/full_hex8.wgsl");
-                vec![kernel("hex8-full", &[PRESSURE_HISTORY, own], count)]
+                vec![forces("hex8-full", &[PRESSURE_HISTORY, include_str!("shaders/full_hex8.wgsl")])]
             }
             Cells::AveragedTet4(_, averaging) => {
-                let averaging_kernel = |name: &str, more: &[&str], count: usize| {
-                    kernel(name, &[&[TET, AVERAGES], more].concat(), count)
+                let of_cells = |name: &str, snippets: &[&str]| {
+                    kernel(
+                        name,
+                        &[&[CORNERS, SHAPE, TET, AVERAGES], snippets, &[EACH_CELL]].concat(),
+                        cells.len(),
+                    )
                 };
                 let local = averages.as_ref().map_or(0, |averages| averages.count);
-                let to_nodes = include_str!("shaders/node_averages.wgsl");
-                let means = [include_str!("shaders/node_means.wgsl"), to_nodes];
-                let node_pressures =
-                    [PRESSURE_HISTORY, include_str!("shaders/node_pressures.wgsl"), to_nodes];
-                let cell_pressures = [PRESSURE_HISTORY, include_str!("shaders/cell_pressures.wgsl")];
-                let forces = include_str!("shaders/averaged_tet4.wgsl");
-                let of_pressure = [include_str!("shaders/averaged_pressure.wgsl"), forces];
-                let of_deformation = [include_str!("shaders/averaged_deformation.wgsl"), forces];
-                let changes =
-                    averaging_kernel("volume changes", &[include_str!("shaders/volume_changes.wgsl")], count);
+                let of_nodes = |name: &str, snippets: &[&str]| {
+                    let own = include_str!("shaders/node_averages.wgsl");
+                    kernel(name, &[&[AVERAGES], snippets, &[own]].concat(), local)
+                };
+                let changes = of_cells("volume changes", &[include_str!("shaders/volume_changes.wgsl")]);
+                let means = || of_nodes("means at nodes", &[include_str!("shaders/node_means.wgsl")]);
+                let averaged = |snippet: &str| {
+                    tets(cells.element(), &[AVERAGES, snippet, include_str!("shaders/averaged_tet4.wgsl")])
+                };
+                let of_pressure = include_str!("shaders/averaged_pressure.wgsl");
                 match averaging {
-                    Averaging::Nodal => vec![
-                        changes,
-                        averaging_kernel("nodal pressures", &node_pressures, local),
-                        averaging_kernel("tet4-anp", &of_pressure, count),
-                    ],
-                    Averaging::Variational => vec![
-                        changes,
-                        averaging_kernel("nodal averages", &means, local),
-                        averaging_kernel("pressures", &cell_pressures, count),
-                        averaging_kernel("nodal averages", &means, local),
-                        averaging_kernel("tet4-ianp", &of_pressure, count),
-                    ],
-                    Averaging::NiftySim => vec![
-                        changes,
-                        averaging_kernel("nodal averages", &means, local),
-                        averaging_kernel("tet4-ianp-niftysim", &of_deformation, count),
-                    ],
+                    Averaging::Nodal => {
+                        let own = [PRESSURE_HISTORY, include_str!("shaders/node_pressures.wgsl")];
+                        vec![changes, of_nodes("pressures at nodes", &own), averaged(of_pressure)]
+                    }
+                    Averaging::Variational => {
+                        let own = [PRESSURE_HISTORY, include_str!("shaders/cell_pressures.wgsl")];
+                        vec![
+                            changes,
+                            means(),
+                            of_cells("pressures of cells", &own),
+                            means(),
+                            averaged(of_pressure),
+                        ]
+                    }
+                    Averaging::NiftySim => {
+                        vec![changes, means(), averaged(include_str!("shaders/averaged_deformation.wgsl"))]
+                    }
                 }
             }
         };
@@ -222,6 +223,15 @@ fn rows_of_nodes(cells: &Cells) -> Vec<[u32; 4]> {
             (0..cells.len()).map(move |cell| [0, 1, 2, 3].map(|a| cells.nodes(cell)[4 * row + a]))
         })
         .collect()
+}
+
+/// The first row of fibres in [`rows_at_rest`].
+fn fibre_row(cells: &Cells) -> usize {
+    match cells {
+        Cells::Tet4(_) | Cells::AveragedTet4(..) => 3,
+        Cells::Hex8(_) => 16,
+        Cells::FullHex8(..) => 64,
+    }
 }
 
 /// What the element needs of the shape at rest, then the directions of the fibres; row by row of all cells.
@@ -321,45 +331,5 @@ impl Averages {
             Binding::Read(&self.inverse_volume),
             Binding::Write(pressures),
         ]
-    }
-}
-
-/// The slots of all cells, and for each node those that are its own, in the order of solids and cells.
-pub(crate) struct Slots {
-    /// First slot of each solid, one more than there are solids. Slots of a solid lie node by node of the cells.
-    pub first: Vec<usize>,
-    /// First entry of `of_node` of each node.
-    pub offsets: Vec<u32>,
-    pub of_node: Vec<u32>,
-}
-
-impl Slots {
-    pub(crate) fn new(model: &Model) -> Self {
-        let mut first = vec![0];
-        let mut offsets = vec![0_u32; model.node_count() + 1];
-        let each = |visit: &mut dyn FnMut(usize, usize, usize, u32)| {
-            for (index, solid) in model.solids.iter().enumerate() {
-                for cell in 0..solid.cells.len() {
-                    for (a, &node) in solid.cells.nodes(cell).iter().enumerate() {
-                        visit(index, cell, a, node);
-                    }
-                }
-            }
-        };
-        for solid in &model.solids {
-            first.push(first[first.len() - 1] + solid.cells.len() * solid.cells.nodes_per_cell());
-        }
-        each(&mut |_, _, _, node| offsets[node as usize + 1] += 1);
-        for node in 0..model.node_count() {
-            offsets[node + 1] += offsets[node];
-        }
-        let mut next = offsets.clone();
-        let mut of_node = vec![0; first[first.len() - 1]];
-        each(&mut |solid, cell, a, node| {
-            let place = &mut next[node as usize];
-            of_node[*place as usize] = (first[solid] + a * model.solids[solid].cells.len() + cell) as u32;
-            *place += 1;
-        });
-        Self { first, offsets, of_node }
     }
 }

@@ -10,16 +10,20 @@ use pliant_mechanics::{
     model_balance_floor,
 };
 
-use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::kernel::{Kernel, Memory};
 use crate::loads::DeviceLoads;
 use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
+use crate::paths::Paths;
 use crate::run::{Instant, Instants, MOST, StepFailure, flags, table_constants};
-use crate::solids::{DeviceSolid, Four, Slots, Way};
+use crate::solids::{DeviceSolid, Four};
 use crate::transfer::Transfer;
 use crate::{Design, Device, GpuError};
 
-/// Steps between two instants that are looked at: the energies, how far cells are deformed, whether all is sound.
+/// Most steps between two instants that are looked at: the energies, how far cells are deformed, whether all is sound.
 const LOOK_EVERY: u64 = 100;
+
+/// Looks come closer together where the deformation changes by more than this factor from one to the next.
+const CALM: f64 = 1.02;
 
 /// Steps between two looks at the largest stable step, unless the deformation has changed: for each the displacements come
 /// back, and the processor ranks all cells.
@@ -52,8 +56,9 @@ struct Results {
     shock: f64,
     /// Internal and external work and damping power of the instants passed over.
     passed: [f64; 3],
-    /// The first instant that is not sound.
+    /// The first instant at which a cell is broken, and the first at which a force is out of range.
     broken: Option<u32>,
+    overflown: Option<u32>,
     deformed: Deformed,
     reactions: Vec<Four>,
 }
@@ -71,6 +76,7 @@ pub struct GpuStepper<'m> {
     lengths: Lengths,
     balance_floor: f64,
     solids: Vec<DeviceSolid>,
+    paths: Paths,
     nodes: DeviceNodes,
     kernels: NodeKernels,
     loads: Option<DeviceLoads>,
@@ -87,6 +93,9 @@ pub struct GpuStepper<'m> {
     since: u32,
     /// Whether the work of the instants since then is entered.
     entered: bool,
+    /// How far cells were deformed at the last look, and steps to the next one.
+    deformed: Deformed,
+    stride: u64,
     /// Time an instant takes [s], once known.
     pace: Option<f64>,
     energies: Energies,
@@ -154,20 +163,11 @@ impl<'m> GpuStepper<'m> {
         } else {
             Some(DeviceLoads::new(memory, device, &instants.bound, model, &nodes.displacement, &constants)?)
         };
-        let slots = Slots::new(model);
-        let forces = memory.zeros("the forces of cells", slots.of_node.len() * size_of::<Four>())?;
-        let offsets = memory.filled("the cells at nodes", &slots.offsets)?;
-        let of_node = memory.filled("the cells at nodes", &slots.of_node)?;
-        let gathered = Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read));
-        let given = Bound::new(device, &[Binding::Read(&nodes.displacement), Binding::Write(&forces)]);
-        let solids = (model.solids.iter().zip(&slots.first))
-            .map(|(solid, &first)| {
-                let snippet = include_str!("shaders/gather_cells.wgsl");
-                let way = Way { snippet, bound: &given, constants: vec![("FIRST_SLOT", first)] };
-                DeviceSolid::new(memory, device, &instants.bound, solid, &way)
-            })
+        let paths = Paths::new(design, memory, device, model, &nodes.displacement)?;
+        let solids = (model.solids.iter().enumerate())
+            .map(|solid| DeviceSolid::new(memory, device, &instants.bound, solid, &paths))
             .collect::<Result<Vec<_>, _>>()?;
-        let gather = (include_str!("shaders/gather_nodes.wgsl"), &gathered);
+        let gather = (paths.node_snippet.as_str(), &paths.nodes);
         let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), &constants);
         let control = StepControl::new(step);
         Ok(Self {
@@ -178,6 +178,7 @@ impl<'m> GpuStepper<'m> {
             lengths: Lengths { before: step, next: step },
             balance_floor: model_balance_floor::<f32>(model),
             solids,
+            paths,
             kernels,
             loads,
             instants,
@@ -188,6 +189,8 @@ impl<'m> GpuStepper<'m> {
             origin: None,
             since: 0,
             entered: true,
+            deformed: Deformed::default(),
+            stride: 1,
             pace: None,
             energies: Energies::default(),
             reactions: vec![[0.0; 3]; model.constraints.len()],
@@ -238,6 +241,7 @@ impl<'m> GpuStepper<'m> {
         for (solid, history) in self.solids.iter().zip(&state.history) {
             solid.upload(&self.device, history);
         }
+        self.paths.clear(&self.device);
         self.instants.forget(&self.device);
         self.entered = true;
         (self.loaded, self.evaluated, self.origin, self.since) = (true, false, None, 0);
@@ -268,11 +272,12 @@ impl<'m> GpuStepper<'m> {
         self.instants.forget_deformation(&self.device);
         let starts = if state.is_at_start() { flags::STARTS } else { 0 };
         let mut results = self.submit_evaluation(state.time, flags::MEASURES | starts, true)?;
-        if let Some(broken) = results.broken {
-            return Err(self.fail(state, broken));
-        }
+        self.check(state, &results)?;
         self.enter_passed(state, &results, self.lengths.before);
         let below = if state.is_between_steps() { self.watch(state, &results.deformed)? } else { Ok(()) };
+        let calm = !results.deformed.differs(&self.deformed, CALM);
+        self.stride = if calm { (2 * self.stride).min(LOOK_EVERY) } else { (self.stride / 2).max(1) };
+        self.deformed = results.deformed;
         if self.lengths != self.control.lengths(state) {
             self.lengths = self.control.lengths(state);
             let shock = results.shock;
@@ -310,7 +315,7 @@ impl<'m> GpuStepper<'m> {
         while left > 0 {
             self.evaluate(state, Wanted::Energies)?;
             // Where energies are off balance each step counts.
-            let stride = if state.work.is_off_balance() { 1 } else { left.min(LOOK_EVERY) };
+            let stride = if state.work.is_off_balance() { 1 } else { left.min(self.stride) };
             self.go(state, stride)?;
             left -= stride;
         }
@@ -327,9 +332,7 @@ impl<'m> GpuStepper<'m> {
         }
         if !self.evaluated && self.since > 0 {
             let results = self.results()?;
-            if let Some(broken) = results.broken {
-                return Err(self.fail(state, broken));
-            }
+            self.check(state, &results)?;
             self.enter_passed(state, &results, self.lengths.next);
         }
         Ok(self.bring_arrays_back(state)?)
@@ -488,7 +491,7 @@ impl<'m> GpuStepper<'m> {
                 bytemuck::cast_slice(parts[2]).to_vec(),
             ));
         })?;
-        let (sums, [broken, _, least, largest], reactions) = read.unwrap_or_default();
+        let (sums, [broken, overflown, least, largest], reactions) = read.unwrap_or_default();
         Ok(Results {
             sums: Sums {
                 kinetic: sums[0],
@@ -502,6 +505,7 @@ impl<'m> GpuStepper<'m> {
             shock: sums[7],
             passed: [sums[8], sums[9], sums[10]],
             broken: (broken != u32::MAX).then_some(broken),
+            overflown: (overflown != u32::MAX).then_some(overflown),
             deformed: Deformed {
                 least_volume_ratio: f64::from(f32::from_bits(least)),
                 largest_strain: f64::from(f32::from_bits(largest)),
@@ -540,16 +544,37 @@ impl<'m> GpuStepper<'m> {
         self.model.initial_velocity.iter().take(self.nodes.count).enumerate().map(of_node).sum()
     }
 
-    /// Brings back the state as it stood at an instant that is not sound, where the device stopped. The processor finds
-    /// out what is wrong with it.
-    fn fail(&mut self, state: &mut State<f32>, at: u32) -> StepFailure {
+    /// # Errors
+    /// If something was not sound at an instant, where the device then stopped.
+    fn check(&mut self, state: &mut State<f32>, results: &Results) -> Result<(), StepFailure> {
+        match (results.broken, results.overflown) {
+            // The forces of a broken cell may be of any size.
+            (Some(broken), overflown) if overflown.is_none_or(|other| broken <= other) => {
+                Err(self.fail(state, broken))
+            }
+            (_, Some(overflown)) => {
+                self.go_back(state, overflown);
+                self.bring_arrays_back(state)?;
+                Err(GpuError::Overflow { design: self.design.to_string(), time: state.time }.into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Sets the clock to one of the instants since the last look.
+    fn go_back(&mut self, state: &mut State<f32>, to: u32) {
         if let Some(Origin { steps, time, stability }) = self.origin {
             (state.steps, state.time, state.stability) = (steps, time, stability);
             self.since = 0;
-            while self.since < at {
+            while self.since < to {
                 self.count(state);
             }
         }
+    }
+
+    /// Brings back the state as it stood at an instant that is not sound. The processor finds out what is wrong with it.
+    fn fail(&mut self, state: &mut State<f32>, at: u32) -> StepFailure {
+        self.go_back(state, at);
         if let Err(error) = self.bring_arrays_back(state) {
             return error.into();
         }

@@ -1,17 +1,9 @@
 // Forces of tetrahedra whose pressure is averaged.
 
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = number(group, groups, local);
-    if cell >= CELLS || end() < instant.index {
-        return;
-    }
-    let h = displacement_gradient(cell);
+fn compute(cell: u32) {
+    let shape = shape_of(cell);
+    let h = displacement_gradient(cell, shape);
     let d = deformation(h);
-    let force = give_forces(cell, averaged_piola(cell, h, d));
+    let force = give_forces(cell, averaged_piola(cell, h, d), shape);
     note(d.volume_ratio, d.strain_twice, force);
 }

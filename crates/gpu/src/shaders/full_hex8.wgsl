@@ -1,28 +1,14 @@
 // Forces of hexahedra with eight Gauss points and one mean dilatation. Rows at rest: the eight B_a of each point, with the
 // point's volume beside the first; 1/V beside the second of the first point.
 
-const FIBRES = 64u;
-
 @group(1) @binding(4) var<storage, read_write> pressures: array<f32>;
 
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = number(group, groups, local);
-    if cell >= CELLS || end() < instant.index {
-        return;
+fn compute(cell: u32) {
+    var u: array<vec3f, 8>;
+    let origin = displacement_of(cell, 0u);
+    for (var a = 1u; a < 8u; a++) {
+        u[a] = displacement_of(cell, a) - origin;
     }
-    let low = cell_nodes[cell];
-    let high = cell_nodes[CELLS + cell];
-    let origin = displacement_of(low.x);
-    var u = array<vec3f, 8>(
-        vec3f(0.0), displacement_of(low.y) - origin, displacement_of(low.z) - origin, displacement_of(low.w) - origin,
-        displacement_of(high.x) - origin, displacement_of(high.y) - origin, displacement_of(high.z) - origin,
-        displacement_of(high.w) - origin,
-    );
     var gradient: array<mat3x3f, 8>;
     var change = 0.0;
     for (var point = 0u; point < 8u; point++) {
@@ -47,6 +33,6 @@ fn main(
         note(d.volume_ratio, d.strain_twice, abs(force[0]) + abs(force[7]));
     }
     for (var a = 0u; a < 8u; a++) {
-        give(cell, a, cell_nodes[a / 4u * CELLS + cell][a % 4u], vec4f(force[a], 0.0));
+        give(cell, a, vec4f(force[a], 0.0));
     }
 }

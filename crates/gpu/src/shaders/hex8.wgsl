@@ -1,30 +1,15 @@
 // Forces of uniform-strain hexahedra with hourglass control. Rows at rest: the eight B_a, with the volume and the stiffness
 // k [N/m] of the control beside the first two; the four patterns γ at each node.
 
-const FIBRES = 16u;
-
-fn node(cell: u32, corner: u32) -> u32 {
-    return cell_nodes[corner / 4u * CELLS + cell][corner % 4u];
-}
-
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = number(group, groups, local);
-    if cell >= CELLS || end() < instant.index {
-        return;
-    }
+fn compute(cell: u32) {
     let volume = row(0u, cell).w;
     let stiffness = row(1u, cell).w;
-    let origin = displacement_of(node(cell, 0u));
+    let origin = displacement_of(cell, 0u);
     var h = mat3x3f();
     // Columns: q_c = Σ γ_ca u_a.
     var q = mat4x3f();
     for (var a = 1u; a < 8u; a++) {
-        let u = displacement_of(node(cell, a)) - origin;
+        let u = displacement_of(cell, a) - origin;
         h += outer(u, row(a, cell).xyz);
         let gamma = row(8u + a, cell);
         q += mat4x3f(u * gamma.x, u * gamma.y, u * gamma.z, u * gamma.w);
@@ -41,8 +26,8 @@ fn main(
         first -= f;
         let whole = f + q * row(8u + a, cell);
         size += abs(whole);
-        give(cell, a, node(cell, a), vec4f(whole, 0.0));
+        give(cell, a, vec4f(whole, 0.0));
     }
-    give(cell, 0u, node(cell, 0u), vec4f(first + q * row(8u, cell), energy));
+    give(cell, 0u, vec4f(first + q * row(8u, cell), energy));
     note(d.volume_ratio, d.strain_twice, size);
 }

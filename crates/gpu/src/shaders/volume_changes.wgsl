@@ -1,14 +1,6 @@
 // J − 1 of tetrahedra, as their share in the average.
 
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = number(group, groups, local);
-    if cell >= CELLS || end() < instant.index {
-        return;
-    }
-    cell_values[cell] = 0.25 * row(0u, cell).w * volume_change(displacement_gradient(cell));
+fn compute(cell: u32) {
+    let shape = shape_of(cell);
+    cell_values[cell] = 0.25 * shape.volume * volume_change(displacement_gradient(cell, shape));
 }

@@ -120,3 +120,50 @@ pub fn moved_cube(element: &str, material: Material) -> Model {
     });
     model
 }
+
+/// Every law, with a choice of volumetric energies.
+pub fn every_law() -> Vec<AnyLaw> {
+    let matrix = |extra: Value| merged(json!({ "shear-modulus": 700.0, "bulk-modulus": 5000.0 }), extra);
+    let bulk = |extra: Value| merged(json!({ "bulk-modulus": 5000.0 }), extra);
+    let laws = vec![
+        ("neo-hookean", matrix(json!({ "volumetric": "quad-log" }))),
+        ("coupled-neo-hookean", matrix(json!({}))),
+        ("logarithmic-neo-hookean", matrix(json!({}))),
+        ("st-venant-kirchhoff", matrix(json!({}))),
+        ("mooney-rivlin", bulk(json!({ "c10": 300.0, "c01": 150.0, "volumetric": "ln-squared" }))),
+        ("polynomial", bulk(json!({ "c10": 300.0, "c01": 100.0, "c20": 50.0, "c11": 30.0, "c02": 20.0 }))),
+        ("yeoh", bulk(json!({ "c1": 300.0, "c2": 100.0, "c3": 50.0, "volumetric": "j-ln-j" }))),
+        ("arruda-boyce", bulk(json!({ "shear-modulus": 700.0, "locking-stretch": 1.8 }))),
+        ("gent", matrix(json!({ "limit": 4.0 }))),
+        ("demiray", matrix(json!({ "exponent": 2.0 }))),
+        ("veronda-westmann", bulk(json!({ "c1": 250.0, "c2": 1.5 }))),
+        ("ogden", bulk(json!({ "terms": [term(500.0, 2.5), term(200.0, -3.0)] }))),
+        ("transversely-isotropic", matrix(json!({ "fibre-modulus": 1100.0 }))),
+        ("orthotropic", matrix(json!({ "e4": 1100.0, "e5": 300.0, "e6": 600.0, "e7": 200.0 }))),
+        (
+            "holzapfel-gasser-ogden",
+            matrix(
+                json!({ "fibre-modulus": 900.0, "fibre-exponent": 0.8, "dispersion": 0.12, "families": 2 }),
+            ),
+        ),
+        (
+            "fung-orthotropic",
+            bulk(json!({
+                "modulus": 400.0, "normal": [[1.2, 0.3, 0.25], [0.3, 0.9, 0.2], [0.25, 0.2, 0.7]],
+                "shear": [0.8, 0.6, 0.5], "axes": [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]
+            })),
+        ),
+    ];
+    assert_eq!(laws.iter().map(|(name, _)| *name).collect::<Vec<_>>(), AnyLaw::NAMES);
+    laws.into_iter().map(|(name, parameters)| law(name, parameters)).collect()
+}
+
+fn merged(mut parameters: Value, extra: Value) -> Value {
+    let (Value::Object(all), Value::Object(extra)) = (&mut parameters, extra) else { panic!("not a table") };
+    all.extend(extra);
+    parameters
+}
+
+fn term(modulus: f64, exponent: f64) -> Value {
+    json!({ "shear-modulus": modulus, "exponent": exponent })
+}

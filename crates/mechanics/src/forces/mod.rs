@@ -81,7 +81,7 @@ impl Deformed {
     }
 
     /// Whether the least J or the largest stretch, taken as √(1 + |C − I|), differ by more than a factor.
-    pub(crate) fn differs(&self, other: &Self, factor: f64) -> bool {
+    pub fn differs(&self, other: &Self, factor: f64) -> bool {
         let stretch = |d: &Self| (1.0 + d.largest_strain.sqrt()).sqrt();
         let apart = |a: f64, b: f64| a > factor * b || b > factor * a;
         apart(self.least_volume_ratio, other.least_volume_ratio) || apart(stretch(self), stretch(other))

@@ -1,0 +1,17 @@
+// The forces of cells are added up already; the next instant begins at zero.
+
+@group(2) @binding(0) var<storage, read_write> forces: array<atomic<f32>>;
+
+fn internal_force(node: u32) -> vec4f {
+    let place = 4u * node;
+    return vec4f(
+        atomicLoad(&forces[place]), atomicLoad(&forces[place + 1u]), atomicLoad(&forces[place + 2u]),
+        atomicLoad(&forces[place + 3u]),
+    );
+}
+
+fn clear(node: u32) {
+    for (var c = 0u; c < 4u; c++) {
+        atomicStore(&forces[4u * node + c], 0.0);
+    }
+}
