@@ -65,7 +65,11 @@ fn a_row_has_the_promised_keys_with_numbers_that_agree() {
 #[test]
 fn a_design_is_measured_on_the_device_and_named_with_it() {
     let Some(best) = pliant_gpu::adapters().into_iter().next() else {
-        assert_ne!(std::env::var("PLIANT_REQUIRE_GPU").as_deref(), Ok("1"), "no graphics processor was found");
+        assert_ne!(
+            std::env::var("PLIANT_REQUIRE_GPU").as_deref(),
+            Ok("1"),
+            "no graphics processor was found"
+        );
         eprintln!("skipped: no graphics processor was found");
         return;
     };

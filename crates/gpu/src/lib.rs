@@ -12,11 +12,8 @@ mod error;
 mod kernel;
 mod loads;
 mod nodes;
-<<<<<<< HEAD
-mod rates;
-=======
 mod paths;
->>>>>>> gpucore
+mod rates;
 mod run;
 mod solids;
 mod stepper;
