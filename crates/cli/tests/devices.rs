@@ -3,7 +3,7 @@
 
 mod support;
 
-use support::{BLOCK, Told, Workshop, changed};
+use support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
 
 /// [`BLOCK`] on a device.
 fn on(device: &str) -> Workshop {
@@ -16,20 +16,9 @@ fn without_adapters(workshop: &Workshop, arguments: &[&str]) -> Told {
     command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into()
 }
 
-/// Whether there is an adapter.
-fn is_there() -> bool {
-    let found = !pliant_gpu::adapters().is_empty();
-    let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
-    assert!(found || !required, "no graphics processor was found, and PLIANT_REQUIRE_GPU=1 asks for one");
-    if !found {
-        eprintln!("skipped: no graphics processor was found");
-    }
-    found
-}
-
 #[test]
 fn devices_are_listed_with_what_matters() {
-    if !is_there() {
+    if !has_graphics_processor() {
         return;
     }
     let workshop = Workshop::new(BLOCK);
@@ -92,7 +81,7 @@ fn an_adapter_that_is_not_there_or_not_used_is_refused_in_the_users_line() {
     let unused = on("device = \"cpu\"\nadapter = \"x\"").run(&[]);
     assert_eq!(unused.code, 2);
     assert!(unused.underlines("adapter = \"x\"") && unused.words().contains("runs on the processor"));
-    if !is_there() {
+    if !has_graphics_processor() {
         return;
     }
     let unknown = on("device = \"gpu\"\nadapter = \"no such adapter\"").run(&[]);
@@ -120,7 +109,7 @@ const STEP: [&str; 2] = ["--step", "1e-3"];
 
 #[test]
 fn a_scene_of_every_kind_of_part_runs_on_a_device_as_on_the_processor() {
-    if !is_there() {
+    if !has_graphics_processor() {
         return;
     }
     let [cpu, gpu] = ["device = \"cpu\"", "device = \"gpu\""].map(on);
@@ -149,7 +138,7 @@ fn a_scene_of_every_kind_of_part_runs_on_a_device_as_on_the_processor() {
 
 #[test]
 fn a_checkpoint_goes_from_device_to_processor_and_back() {
-    if !is_there() {
+    if !has_graphics_processor() {
         return;
     }
     let with = |device: &str| {
@@ -176,7 +165,7 @@ fn a_checkpoint_goes_from_device_to_processor_and_back() {
 
 #[test]
 fn a_failed_run_on_a_device_names_element_and_time() {
-    if !is_there() {
+    if !has_graphics_processor() {
         return;
     }
     let crushed = changed(BLOCK, "by = [0, 0, 0.001]", "by = [0, 0, -0.12]");

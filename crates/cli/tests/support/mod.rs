@@ -4,6 +4,7 @@
 #![allow(dead_code)]
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -230,6 +231,18 @@ impl Workshop {
 pub fn changed(text: &str, good: &str, other: &str) -> String {
     assert!(text.contains(good), "`{good}` is not in the scene");
     text.replacen(good, other, 1)
+}
+
+/// Whether there is a graphics processor. Without any a notice is printed, or the test fails where `PLIANT_REQUIRE_GPU=1`.
+pub fn has_graphics_processor() -> bool {
+    let found = !pliant_gpu::adapters().is_empty();
+    let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
+    assert!(found || !required, "no graphics processor was found, and PLIANT_REQUIRE_GPU=1 asks for one");
+    if !found {
+        // Past the capture of what passing tests print. A notice that can't be written is none.
+        let _ = writeln!(std::io::stderr(), "skipped: no graphics processor was found");
+    }
+    found
 }
 
 /// Reads a ParaView series: the times, and each frame it lists.
