@@ -46,11 +46,9 @@ impl Paths {
             Design::Fast => Self::fast(memory, device, model, displacement),
             Design::FloatAtomics => {
                 if !device.adapter().float_atomics {
-                    let what = format!(
-                        "`{design}` needs floating-point atomics, which `{}` lacks; it",
-                        device.adapter().name
-                    );
-                    return Err(GpuError::Unsupported { what });
+                    let (adapter, what) =
+                        (device.adapter().name.clone(), "floating-point atomics".to_owned());
+                    return Err(GpuError::Lacks { adapter, what });
                 }
                 let snippets =
                     [include_str!("shaders/float_cells.wgsl"), include_str!("shaders/float_nodes.wgsl")];
