@@ -1,7 +1,13 @@
 //! The stepper on a device against the one of the processor in double precision.
 
+#[path = "support/cube.rs"]
+mod cube;
 mod support;
 
+use cube::{
+    CELLS, EDGE, ELEMENTS, elastic, every_law, free_cube, held_cube, layer, moved_cube, neo_hookean, smooth,
+    top_quads,
+};
 use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure, Wanted};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
@@ -11,10 +17,6 @@ use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::stability::{Monitor, OnUnstable};
 use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{CentralDifference, Energies, Observable, State, StepError, critical_step};
-use support::cube::{
-    CELLS, EDGE, ELEMENTS, elastic, every_law, free_cube, held_cube, layer, moved_cube, neo_hookean, smooth,
-    top_quads,
-};
 
 const STEPS: u64 = 200;
 

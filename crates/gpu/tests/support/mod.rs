@@ -1,9 +1,5 @@
 //! The device tests run on.
 
-#![allow(dead_code)]
-
-pub mod cube;
-
 use pliant_gpu::{Device, GpuError};
 
 /// The best device. Without any a test is skipped with a notice, or fails where `PLIANT_REQUIRE_GPU=1`.

@@ -4,7 +4,7 @@
 use super::*;
 use crate::State;
 use crate::lanes::Processor;
-use crate::law::battery::every_law;
+use crate::law::samples::every_law;
 use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
 use crate::model::{Averaging, Body, Cells, LocalNodes, Material};
 use crate::prony::{Part, Prony, PronyTerm, PronyUpdate};

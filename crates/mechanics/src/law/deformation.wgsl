@@ -66,8 +66,10 @@ fn cofactor(f: mat3x3f) -> mat3x3f {
 
 // J − 1 of F = I + H, without cancellation.
 fn volume_change(h: mat3x3f) -> f32 {
-    let second = h[0].x * h[1].y - h[1].x * h[0].y + h[1].y * h[2].z - h[2].y * h[1].z + h[0].x * h[2].z - h[2].x * h[0].z;
-    return h[0].x + h[1].y + h[2].z + second + dot(h[0], cross(h[1], h[2]));
+    let minors = fma(h[0].x, h[1].y, -h[1].x * h[0].y)
+        + fma(h[1].y, h[2].z, -h[2].y * h[1].z)
+        + fma(h[0].x, h[2].z, -h[2].x * h[0].z);
+    return h[0].x + h[1].y + h[2].z + minors + dot(h[0], cross(h[1], h[2]));
 }
 
 // C − I = H + Hᵀ + Hᵀ H.

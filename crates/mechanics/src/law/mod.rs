@@ -3,7 +3,8 @@
 //! A law is a small struct of parameters, its methods generic over the number type, so that the same lines
 //! run as reference and as fast path. Most laws are a sum of an isochoric and a volumetric energy and implement
 //! [`SplitLaw`], the others [`Law`] itself. The history of viscoelasticity wraps a law (see [`prony`](crate::prony));
-//! it is not a law of its own. To add a law: its file here, its line in the registry below, its line in the battery.
+//! it is not a law of its own. To add a law: its file and that of its WGSL twin here, its line in
+//! the registry below, its line in the samples that tests run.
 
 mod arruda_boyce;
 mod check;
@@ -30,7 +31,9 @@ mod volumetric;
 mod yeoh;
 
 #[cfg(test)]
-pub(crate) mod battery;
+mod battery;
+#[cfg(test)]
+pub(crate) mod samples;
 
 pub use arruda_boyce::ArrudaBoyce;
 pub use coupled_neo_hookean::CoupledNeoHookean;
@@ -230,7 +233,11 @@ impl AnyLaw {
     }
 
     /// Second Piola–Kirchhoff stress [Pa]; see [`Law::stress`].
-    pub fn stress(&self, deformation: &Deformation<f64>, fibres: &[Vector<f64>]) -> Split<Symmetric<f64>> {
+    pub fn stress<R: Number>(
+        &self,
+        deformation: &Deformation<R>,
+        fibres: &[Vector<R>],
+    ) -> Split<Symmetric<R>> {
         with_law!(self, law => law.stress(deformation, fibres))
     }
 

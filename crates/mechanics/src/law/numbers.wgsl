@@ -43,7 +43,8 @@ fn power_and_rest(x: f32) -> vec2f {
     // ln 2 in two parts, the first 22713/2¹⁵: the product is exact, and whole, so that no compiler adds the parts up again.
     let r = (select(x, -87.0, x < -87.0) - f32(n * 22713) / 32768.0) - f32(n) * 1.4286068e-6;
     // Taylor: what follows r⁷ is below 2e-9 r.
-    let series = fma(r, fma(r, fma(r, fma(r, fma(r, 1.0 / 5040.0, 1.0 / 720.0), 1.0 / 120.0), 1.0 / 24.0), 1.0 / 6.0), 0.5);
+    let high = fma(r, fma(r, fma(r, 1.0 / 5040.0, 1.0 / 720.0), 1.0 / 120.0), 1.0 / 24.0);
+    let series = fma(r, fma(r, high, 1.0 / 6.0), 0.5);
     return vec2f(bitcast<f32>((n + 127) << 23u), fma(r * r, series, r));
 }
 
