@@ -18,11 +18,14 @@ pub enum Design {
     FloatAtomics,
     /// Cells add their forces as whole multiples of a small force: the same bits every time, forces of a limited range.
     FixedAtomics,
+    /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their blocks; shapes of
+    /// plain tetrahedra at rest are found again from their nodes. The same bits every time.
+    Fast,
 }
 
 impl Design {
     /// All of them.
-    pub const ALL: &[Self] = &[Self::Gather, Self::FloatAtomics, Self::FixedAtomics];
+    pub const ALL: &[Self] = &[Self::Gather, Self::FloatAtomics, Self::FixedAtomics, Self::Fast];
 }
 
 impl fmt::Display for Design {
@@ -31,6 +34,7 @@ impl fmt::Display for Design {
             Self::Gather => "gather",
             Self::FloatAtomics => "float-atomics",
             Self::FixedAtomics => "fixed-atomics",
+            Self::Fast => "fast",
         })
     }
 }

@@ -184,12 +184,32 @@ impl Device {
         }
     }
 
+    /// # Errors
+    /// If a kernel can't work on so many arrays.
+    pub(crate) fn needs(&self, arrays: u32) -> Result<(), GpuError> {
+        let most = self.device.limits().max_storage_buffers_per_shader_stage;
+        if most < arrays {
+            let what = format!("{arrays} arrays a kernel (it has {most})");
+            return Err(GpuError::Lacks { adapter: self.adapter.name.clone(), what });
+        }
+        Ok(())
+    }
+
     /// Waits until everything submitted is done.
     ///
     /// # Errors
     /// If the device fails meanwhile.
     pub fn wait(&self) -> Result<(), GpuError> {
-        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.poll(wgpu::PollType::wait_indefinitely())
+    }
+
+    /// Waits until a submission is done.
+    pub(crate) fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
+        self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })
+    }
+
+    fn poll(&self, how: wgpu::PollType) -> Result<(), GpuError> {
+        let waited = self.device.poll(how);
         self.check()?;
         waited
             .map(|_| ())

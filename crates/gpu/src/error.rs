@@ -54,6 +54,14 @@ pub enum GpuError {
         /// The most that is allowed [B].
         limit: u64,
     },
+    /// The adapter lacks something.
+    #[error("`{adapter}` lacks {what}")]
+    Lacks {
+        /// The adapter.
+        adapter: String,
+        /// What it lacks.
+        what: String,
+    },
     /// Something that runs on the processor only.
     #[error("{what} can't run on a graphics processor")]
     Unsupported {
@@ -104,6 +112,9 @@ impl GpuError {
             }
             Self::OutOfMemory { .. } | Self::TooLarge { .. } => {
                 "take a coarser mesh, an adapter with more memory (`pliant devices`) or `device = \"cpu\"`"
+            }
+            Self::Lacks { .. } => {
+                "update the driver, or take another adapter of `pliant devices` or `device = \"cpu\"`"
             }
             Self::Unsupported { .. } => "take `device = \"cpu\"`",
             Self::Overflow { .. } => "take the design `gather`, whose forces are floating-point numbers",

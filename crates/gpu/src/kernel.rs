@@ -210,3 +210,26 @@ impl Kernel {
         pass.dispatch_workgroups(self.dispatch[0], self.dispatch[1], 1);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_array_beyond_what_the_adapter_allows_is_refused_with_its_size() {
+        let Ok(device) = Device::open(None) else { return };
+        let limit = device.adapter().largest_buffer;
+        let refused = Memory::new(&device).zeros("the cells", limit as usize + 16).err();
+        let adapter = device.adapter().name.clone();
+        let needed = (limit + 16).next_multiple_of(16);
+        assert_eq!(refused, Some(GpuError::TooLarge { adapter, what: "the cells", needed, limit }));
+        assert_eq!(device.check(), Ok(()));
+    }
+
+    #[test]
+    fn groups_fill_two_dimensions() {
+        assert_eq!((groups(0), groups(128), groups(129)), ([1, 1], [1, 1], [2, 1]));
+        let [columns, rows] = groups(65_536 * 128);
+        assert!(columns <= MOST_GROUPS && columns * rows >= 65_536);
+    }
+}

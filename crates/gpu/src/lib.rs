@@ -6,6 +6,7 @@
 //! }
 //! ```
 
+mod blocks;
 mod design;
 mod device;
 mod error;

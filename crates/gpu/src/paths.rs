@@ -3,6 +3,7 @@
 use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
 use pliant_mechanics::tensor::dot;
 
+use crate::blocks::DeviceBlocks;
 use crate::kernel::{Binding, Bound, Memory};
 use crate::solids::Four;
 use crate::{Design, Device, GpuError};
@@ -24,6 +25,8 @@ pub(crate) struct Paths {
     pub node_snippet: String,
     /// First slot of each solid.
     pub first_slot: Vec<usize>,
+    /// Blocks of the cells of each solid, if the design has some.
+    pub blocks: Vec<DeviceBlocks>,
     /// Forces that have to be zero before an instant.
     sums: Option<wgpu::Buffer>,
 }
@@ -40,13 +43,12 @@ impl Paths {
     ) -> Result<Self, GpuError> {
         match design {
             Design::Gather => Self::gather(memory, device, model, displacement),
+            Design::Fast => Self::fast(memory, device, model, displacement),
             Design::FloatAtomics => {
                 if !device.adapter().float_atomics {
-                    let what = format!(
-                        "`{design}` needs floating-point atomics, which `{}` lacks; it",
-                        device.adapter().name
-                    );
-                    return Err(GpuError::Unsupported { what });
+                    let (adapter, what) =
+                        (device.adapter().name.clone(), "floating-point atomics".to_owned());
+                    return Err(GpuError::Lacks { adapter, what });
                 }
                 let snippets =
                     [include_str!("shaders/float_cells.wgsl"), include_str!("shaders/float_nodes.wgsl")];
@@ -66,16 +68,59 @@ impl Paths {
         model: &Model,
         displacement: &wgpu::Buffer,
     ) -> Result<Self, GpuError> {
-        let slots = Slots::new(model);
-        let forces = memory.zeros("the forces of cells", slots.of_node.len() * size_of::<Four>())?;
-        let offsets = memory.filled("the cells at nodes", &slots.offsets)?;
-        let of_node = memory.filled("the cells at nodes", &slots.of_node)?;
+        // A slot for each corner of each cell, corner by corner.
+        let mut first_slot = vec![0];
+        for solid in &model.solids {
+            let count = solid.cells.len() * solid.cells.nodes_per_cell();
+            first_slot.push(first_slot[first_slot.len() - 1] + count);
+        }
+        let slots = model.solids.iter().zip(&first_slot).flat_map(|(solid, first)| {
+            let cells = &solid.cells;
+            (0..cells.len()).flat_map(move |cell| {
+                let slot = move |a: usize| (first + a * cells.len() + cell) as u32;
+                cells.nodes(cell).iter().enumerate().map(move |(a, &node)| (slot(a), node))
+            })
+        });
+        let (offsets, of_node) = by_node(model, slots);
+        let forces = memory.zeros("the forces of cells", of_node.len() * size_of::<Four>())?;
+        let offsets = memory.filled("the cells at nodes", &offsets)?;
+        let of_node = memory.filled("the cells at nodes", &of_node)?;
         Ok(Self {
             cells: Bound::new(device, &[Binding::Read(displacement), Binding::Write(&forces)]),
             cell_snippet: [CORNERS, include_str!("shaders/gather_cells.wgsl"), EACH_CELL].join("\n"),
             nodes: Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read)),
             node_snippet: include_str!("shaders/gather_nodes.wgsl").to_owned(),
-            first_slot: slots.first,
+            first_slot,
+            blocks: vec![],
+            sums: None,
+        })
+    }
+
+    fn fast(
+        memory: &Memory<'_>,
+        device: &Device,
+        model: &Model,
+        displacement: &wgpu::Buffer,
+    ) -> Result<Self, GpuError> {
+        let blocks = (model.solids.iter())
+            .map(|solid| DeviceBlocks::new(memory, device, model, solid))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut first_slot = vec![0];
+        for blocks in &blocks {
+            first_slot.push(first_slot[first_slot.len() - 1] + blocks.nodes.len());
+        }
+        let of_slots = blocks.iter().flat_map(|blocks| blocks.nodes.iter().copied()).enumerate();
+        let (offsets, of_node) = by_node(model, of_slots.map(|(slot, node)| (slot as u32, node)));
+        let forces = memory.zeros("the forces of blocks", of_node.len() * size_of::<Four>())?;
+        let offsets = memory.filled("the blocks at nodes", &offsets)?;
+        let of_node = memory.filled("the blocks at nodes", &of_node)?;
+        Ok(Self {
+            cells: Bound::new(device, &[Binding::Read(displacement), Binding::Write(&forces)]),
+            cell_snippet: include_str!("shaders/block_cells.wgsl").to_owned(),
+            nodes: Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read)),
+            node_snippet: include_str!("shaders/gather_nodes.wgsl").to_owned(),
+            first_slot,
+            blocks,
             sums: None,
         })
     }
@@ -95,6 +140,7 @@ impl Paths {
             nodes: Bound::new(device, &[Binding::Write(&forces)]),
             node_snippet: [constants, nodes].join("\n"),
             first_slot: vec![0; model.solids.len()],
+            blocks: vec![],
             sums: Some(forces),
         })
     }
@@ -157,42 +203,19 @@ fn force_at_unit_strain(solid: &Solid, cell: usize) -> f64 {
     area * solid.material.law.longitudinal_modulus()
 }
 
-/// The slots of all cells, and for each node those that are its own, in the order of solids and cells.
-struct Slots {
-    /// First slot of each solid, one more than there are solids. Slots of a solid lie node by node of the cells.
-    first: Vec<usize>,
-    /// First entry of `of_node` of each node.
-    offsets: Vec<u32>,
-    of_node: Vec<u32>,
-}
-
-impl Slots {
-    fn new(model: &Model) -> Self {
-        let mut first = vec![0];
-        let mut offsets = vec![0_u32; model.node_count() + 1];
-        let each = |visit: &mut dyn FnMut(usize, usize, usize, u32)| {
-            for (index, solid) in model.solids.iter().enumerate() {
-                for cell in 0..solid.cells.len() {
-                    for (a, &node) in solid.cells.nodes(cell).iter().enumerate() {
-                        visit(index, cell, a, node);
-                    }
-                }
-            }
-        };
-        for solid in &model.solids {
-            first.push(first[first.len() - 1] + solid.cells.len() * solid.cells.nodes_per_cell());
-        }
-        each(&mut |_, _, _, node| offsets[node as usize + 1] += 1);
-        for node in 0..model.node_count() {
-            offsets[node + 1] += offsets[node];
-        }
-        let mut next = offsets.clone();
-        let mut of_node = vec![0; first[first.len() - 1]];
-        each(&mut |solid, cell, a, node| {
-            let place = &mut next[node as usize];
-            of_node[*place as usize] = (first[solid] + a * model.solids[solid].cells.len() + cell) as u32;
-            *place += 1;
-        });
-        Self { first, offsets, of_node }
+/// First entry of each node, and the slots there in their order, from slots with their nodes.
+fn by_node(model: &Model, slots: impl Iterator<Item = (u32, u32)> + Clone) -> (Vec<u32>, Vec<u32>) {
+    let mut offsets = vec![0_u32; model.node_count() + 1];
+    slots.clone().for_each(|(_, node)| offsets[node as usize + 1] += 1);
+    for node in 0..model.node_count() {
+        offsets[node + 1] += offsets[node];
     }
+    let mut next = offsets.clone();
+    let mut of_node = vec![0; offsets[model.node_count()] as usize];
+    for (slot, node) in slots {
+        let place = &mut next[node as usize];
+        of_node[*place as usize] = slot;
+        *place += 1;
+    }
+    (offsets, of_node)
 }

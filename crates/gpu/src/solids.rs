@@ -5,7 +5,8 @@ use pliant_mechanics::prony::Relaxation;
 use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{History, PACK};
 
-use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::blocks::shared_sizes;
+use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory};
 use crate::paths::{CORNERS, EACH_CELL, Paths};
 use crate::transfer::Transfer;
 use crate::{Device, GpuError};
@@ -31,6 +32,8 @@ pub(crate) struct DeviceSolid {
     kernels: Vec<Kernel>,
     /// What relaxing laws remember of cells and of averaged pressures.
     histories: [wgpu::Buffer; 2],
+    /// The order of cells and of averaged pressures on the device, by their numbers in the solid.
+    orders: [Vec<u32>; 2],
     /// Parameters of the law, then coefficients of relaxation.
     constants: wgpu::Buffer,
     /// Where the coefficients begin [B].
@@ -80,8 +83,18 @@ impl DeviceSolid {
             memory.zeros("the histories", packs(cells.len(), 6 * slots))?,
             memory.zeros("the histories", packs(averaged, prony.volumetric_slots()))?,
         ];
-        let nodes = memory.filled("the cells", &rows_of_nodes(cells))?;
-        let rest = memory.filled("the shapes of cells at rest", &rows_at_rest(solid))?;
+        let blocks = paths.blocks.get(index);
+        let order = match blocks {
+            Some(blocks) => blocks.order.clone(),
+            None => (0..cells.len() as u32).collect(),
+        };
+        // Plain tetrahedra in blocks find theirs from their nodes.
+        let found_again = blocks.is_some() && matches!(cells, Cells::Tet4(_));
+        let shapes = if found_again { vec![] } else { rows_at_rest(cells, &order) };
+        let fibre_row = shapes.len() / cells.len().max(1);
+        let nodes = memory.filled("the cells", &rows_of_nodes(cells, &order))?;
+        let rest = memory
+            .filled("the shapes of cells at rest", &[shapes, rows_of_fibres(solid, &order)].concat())?;
         let mut bindings = vec![
             Binding::Read(&nodes),
             Binding::Read(&rest),
@@ -89,7 +102,7 @@ impl DeviceSolid {
             Binding::Uniform(&constants),
         ];
         let averages = match cells {
-            Cells::AveragedTet4(block, _) => Some(Averages::new(memory, block)?),
+            Cells::AveragedTet4(block, _) => Some(Averages::new(memory, block, &order)?),
             _ => None,
         };
         match &averages {
@@ -109,17 +122,29 @@ impl DeviceSolid {
             ("SLOTS", slots),
             ("LOCAL_NODES", averages.as_ref().map_or(0, |averages| averages.count)),
         ];
-        numbers.push(("FIBRES", fibre_row(cells)));
+        numbers.push(("FIBRES", fibre_row));
         numbers.push(("FIRST_SLOT", paths.first_slot[index]));
-        let kernel = |name: &str, snippets: &[&str], count: usize| {
+        numbers.extend(shared_sizes(cells));
+        let kernel = |name: &str, snippets: &[&str], bound: &[&Bound], count: usize| {
             let snippets = [&[INSTANT, &shader.source, CELLS, PRONY], snippets].concat();
-            Kernel::new(device, name, &numbers, &snippets, &[instant, &bound, &paths.cells], count)
+            Kernel::new(device, name, &numbers, &snippets, bound, count)
         };
+        let groups = [instant, &bound, &paths.cells];
         let forces = |name: &str, snippets: &[&str]| {
-            kernel(name, &[snippets, &[paths.cell_snippet.as_str()]].concat(), cells.len())
+            let own = paths.cell_snippet.as_str();
+            match blocks {
+                None => kernel(name, &[snippets, &[own]].concat(), &groups, cells.len()),
+                Some(blocks) => {
+                    let groups = [&groups[..], &[&blocks.bound]].concat();
+                    let rest = include_str!("shaders/block_stored.wgsl");
+                    let more: &[&str] = if found_again { &[own] } else { &[own, rest] };
+                    kernel(name, &[snippets, more].concat(), &groups, blocks.count * GROUP as usize)
+                }
+            }
         };
+        let force_shape = if found_again { include_str!("shaders/block_shape.wgsl") } else { SHAPE };
         let tets = |name: &str, snippets: &[&str]| {
-            forces(name, &[&[SHAPE, TET, include_str!("shaders/tet_forces.wgsl")], snippets].concat())
+            forces(name, &[&[force_shape, TET, include_str!("shaders/tet_forces.wgsl")], snippets].concat())
         };
         let kernels = match cells {
             Cells::Tet4(_) => vec![tets("tet4", &[include_str!("shaders/tet4.wgsl")])],
@@ -132,13 +157,14 @@ impl DeviceSolid {
                     kernel(
                         name,
                         &[&[CORNERS, SHAPE, TET, AVERAGES], snippets, &[EACH_CELL]].concat(),
+                        &groups,
                         cells.len(),
                     )
                 };
                 let local = averages.as_ref().map_or(0, |averages| averages.count);
                 let of_nodes = |name: &str, snippets: &[&str]| {
                     let own = include_str!("shaders/node_averages.wgsl");
-                    kernel(name, &[&[AVERAGES], snippets, &[own]].concat(), local)
+                    kernel(name, &[&[AVERAGES], snippets, &[own]].concat(), &groups, local)
                 };
                 let changes = of_cells("volume changes", &[include_str!("shaders/volume_changes.wgsl")]);
                 let means = || of_nodes("means at nodes", &[include_str!("shaders/node_means.wgsl")]);
@@ -168,7 +194,12 @@ impl DeviceSolid {
             }
         };
         let series = (parameters.len() * size_of::<Four>()) as u64;
-        Ok(Self { kernels, histories, constants, series })
+        let pressure_order = match cells {
+            Cells::AveragedTet4(_, Averaging::Nodal) => (0..averaged as u32).collect(),
+            _ if averaged > 0 => order.clone(),
+            _ => vec![],
+        };
+        Ok(Self { kernels, histories, orders: [order, pressure_order], constants, series })
     }
 
     /// Relaxes from now on over steps of `step` seconds.
@@ -188,8 +219,10 @@ impl DeviceSolid {
 
     /// Takes up the history of a state.
     pub(crate) fn upload(&self, device: &Device, history: &History<f32>) {
-        for (buffer, packs) in self.histories.iter().zip([&history.cells, &history.pressures]) {
-            let numbers: Vec<f32> = packs.iter().flat_map(|pack| pack.0).collect();
+        let packs = [&history.cells, &history.pressures];
+        for ((buffer, order), packs) in self.histories.iter().zip(&self.orders).zip(packs) {
+            let mut numbers = vec![0.0_f32; packs.len() * PACK];
+            for_each_number(order, packs.len(), |pack, lane, place| numbers[place] = packs[pack].0[lane]);
             device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&numbers));
         }
     }
@@ -204,87 +237,71 @@ impl DeviceSolid {
         device: &Device,
         history: &mut History<f32>,
     ) -> Result<(), GpuError> {
-        for (buffer, packs) in self.histories.iter().zip([&mut history.cells, &mut history.pressures]) {
+        let packs = [&mut history.cells, &mut history.pressures];
+        for ((buffer, order), packs) in self.histories.iter().zip(&self.orders).zip(packs) {
             if packs.is_empty() {
                 continue;
             }
-            transfer.read::<[f32; PACK]>(device, buffer, packs.len(), |numbers| {
-                packs.iter_mut().zip(numbers).for_each(|(pack, numbers)| pack.0 = *numbers);
+            transfer.read::<f32>(device, buffer, packs.len() * PACK, |numbers| {
+                for_each_number(order, packs.len(), |pack, lane, place| packs[pack].0[lane] = numbers[place]);
             })?;
         }
         Ok(())
     }
 }
 
-/// Nodes, four to a row of all cells.
-fn rows_of_nodes(cells: &Cells) -> Vec<[u32; 4]> {
-    (0..cells.nodes_per_cell() / 4)
-        .flat_map(|row| {
-            (0..cells.len()).map(move |cell| [0, 1, 2, 3].map(|a| cells.nodes(cell)[4 * row + a]))
-        })
-        .collect()
-}
-
-/// The first row of fibres in [`rows_at_rest`].
-fn fibre_row(cells: &Cells) -> usize {
-    match cells {
-        Cells::Tet4(_) | Cells::AveragedTet4(..) => 3,
-        Cells::Hex8(_) => 16,
-        Cells::FullHex8(..) => 64,
-    }
-}
-
-/// What the element needs of the shape at rest, then the directions of the fibres; row by row of all cells.
-fn rows_at_rest(solid: &Solid) -> Vec<Four> {
-    let mut rows = match &solid.cells {
-        Cells::Tet4(block) | Cells::AveragedTet4(block, _) => tets_at_rest(block),
-        Cells::Hex8(block) => hexes_at_rest(block),
-        Cells::FullHex8(block, points) => {
-            let row = |point: usize, a: usize| {
-                points.iter().zip(&block.rest).map(move |(points, rest)| {
-                    let beside = match (point, a) {
-                        (_, 0) => points.weight[point],
-                        (0, 1) => 1.0 / rest.volume,
-                        _ => 0.0,
-                    };
-                    four(points.gradient[point][a], beside)
-                })
-            };
-            (0..64).flat_map(|index| row(index / 8, index % 8)).collect()
+/// Visits the numbers in some packs of history: pack and lane in the order of the solid, and the place on the device.
+fn for_each_number(order: &[u32], packs: usize, mut visit: impl FnMut(usize, usize, usize)) {
+    let each = packs / order.len().div_ceil(PACK).max(1);
+    for (to, &from) in order.iter().enumerate() {
+        let from = from as usize;
+        for k in 0..each {
+            visit(from / PACK * each + k, from % PACK, (to / PACK * each + k) * PACK + to % PACK);
         }
-    };
-    for family in 0..solid.material.law.families() {
-        rows.extend((0..solid.cells.len()).map(|cell| four(solid.fibres(cell)[family], 0.0)));
     }
-    rows
 }
 
-fn tets_at_rest(block: &CellBlock<4>) -> Vec<Four> {
-    (1..4)
-        .flat_map(|a| {
-            block.rest.iter().map(move |rest| four(rest.gradient[a], if a == 1 { rest.volume } else { 0.0 }))
-        })
-        .collect()
+/// Nodes, four to a row of all cells.
+fn rows_of_nodes(cells: &Cells, order: &[u32]) -> Vec<[u32; 4]> {
+    let row = |row: usize| {
+        order.iter().map(move |&cell| [0, 1, 2, 3].map(|a| cells.nodes(cell as usize)[4 * row + a]))
+    };
+    (0..cells.nodes_per_cell() / 4).flat_map(row).collect()
 }
 
-fn hexes_at_rest(block: &CellBlock<8>) -> Vec<Four> {
-    let control = block.hourglass.as_ref();
-    let gradients = (0..8).flat_map(|a| {
-        block.rest.iter().enumerate().map(move |(cell, rest)| {
-            let beside = match a {
-                0 => rest.volume,
-                1 => control.map_or(0.0, |control| control.stiffness[cell]),
+/// What the element needs of the shape at rest, row by row of all cells.
+fn rows_at_rest(cells: &Cells, order: &[u32]) -> Vec<Four> {
+    let rows = |count: usize, of_cell: &dyn Fn(usize, usize) -> Four| {
+        (0..count).flat_map(|row| order.iter().map(move |&cell| of_cell(row, cell as usize))).collect()
+    };
+    match cells {
+        Cells::Tet4(block) | Cells::AveragedTet4(block, _) => rows(3, &|row, cell| {
+            let rest = &block.rest[cell];
+            four(rest.gradient[row + 1], if row == 0 { rest.volume } else { 0.0 })
+        }),
+        Cells::Hex8(block) => rows(16, &|row, cell| match (row, &block.hourglass) {
+            (0, _) => four(block.rest[cell].gradient[0], block.rest[cell].volume),
+            (1, Some(control)) => four(block.rest[cell].gradient[1], control.stiffness[cell]),
+            (..8, _) => four(block.rest[cell].gradient[row], 0.0),
+            (_, Some(control)) => control.patterns[cell].map(|gamma| gamma[row - 8] as f32),
+            (_, None) => Four::default(),
+        }),
+        Cells::FullHex8(block, points) => rows(64, &|row, cell| {
+            let (point, a) = (row / 8, row % 8);
+            let beside = match (point, a) {
+                (_, 0) => points[cell].weight[point],
+                (0, 1) => 1.0 / block.rest[cell].volume,
                 _ => 0.0,
             };
-            four(rest.gradient[a], beside)
-        })
-    });
-    let patterns = (0..8).flat_map(|a| {
-        (0..block.rest.len()).map(move |cell| {
-            control.map_or(Four::default(), |control| control.patterns[cell].map(|gamma| gamma[a] as f32))
-        })
-    });
-    gradients.chain(patterns).collect()
+            four(points[cell].gradient[point][a], beside)
+        }),
+    }
+}
+
+/// The directions of the fibres, row by row of all cells.
+fn rows_of_fibres(solid: &Solid, order: &[u32]) -> Vec<Four> {
+    let row = |family: usize| order.iter().map(move |&cell| four(solid.fibres(cell as usize)[family], 0.0));
+    (0..solid.material.law.families()).flat_map(row).collect()
 }
 
 /// What averaging over the nodes of a solid needs.
@@ -300,12 +317,14 @@ struct Averages {
 }
 
 impl Averages {
-    fn new(memory: &Memory<'_>, block: &CellBlock<4>) -> Result<Self, GpuError> {
+    fn new(memory: &Memory<'_>, block: &CellBlock<4>, order: &[u32]) -> Result<Self, GpuError> {
         let local = LocalNodes::new(block);
+        let mut place = vec![0; order.len()];
+        (0..).zip(order).for_each(|(to, &cell)| place[cell as usize] = to);
         let mut offsets = vec![0];
         let (mut cells, mut inverse_volume) = (Vec::new(), Vec::new());
         for node in 0..local.len() {
-            cells.extend(local.cells_at(node).map(|cell| cell as u32));
+            cells.extend(local.cells_at(node).map(|cell| place[cell]));
             offsets.push(cells.len() as u32);
             let volume: f64 = local.cells_at(node).map(|cell| 0.25 * block.rest[cell].volume).sum();
             inverse_volume.push((1.0 / volume) as f32);
@@ -314,7 +333,10 @@ impl Averages {
             count: local.len(),
             cell_values: memory.zeros("the averages", block.nodes.len() * size_of::<f32>())?,
             node_values: memory.zeros("the averages", local.len() * size_of::<f32>())?,
-            nodes: memory.filled("the cells", &local.nodes)?,
+            nodes: memory.filled(
+                "the cells",
+                &order.iter().map(|&cell| local.nodes[cell as usize]).collect::<Vec<_>>(),
+            )?,
             offsets: memory.filled("the cells at nodes", &offsets)?,
             cells: memory.filled("the cells at nodes", &cells)?,
             inverse_volume: memory.filled("the averages", &inverse_volume)?,

@@ -32,6 +32,9 @@ const LIMIT_EVERY: u64 = 1000;
 /// A submission takes no longer than this [s]: systems take a device away from a program that keeps it for seconds.
 const LONGEST_SUBMISSION: f64 = 0.2;
 
+/// The most arrays that a kernel reads and writes.
+const MOST_ARRAYS: u32 = 16;
+
 /// What comes back of an evaluated instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
@@ -135,6 +138,7 @@ impl<'m> GpuStepper<'m> {
         design: Option<Design>,
     ) -> Result<Self, GpuError> {
         let owners = model.constrained_components()?;
+        device.needs(MOST_ARRAYS)?;
         let memory = Memory::new(device);
         let full = device.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let stepper = Self::on_device(device, &memory, model, step, design.unwrap_or(Design::Gather), owners);
@@ -359,8 +363,9 @@ impl<'m> GpuStepper<'m> {
         let end = state.steps + steps;
         state.work.advance();
         (self.evaluated, self.entered) = (false, false);
-        let mut first = true;
-        let mut running = None;
+        let mut from_look = true;
+        let mut running: Option<(wgpu::SubmissionIndex, usize)> = None;
+        let mut begun = Clock::now();
         while state.steps < end {
             let most =
                 self.pace.map_or(16.0, |pace| LONGEST_SUBMISSION / pace).clamp(1.0, MOST as f64) as usize;
@@ -373,31 +378,33 @@ impl<'m> GpuStepper<'m> {
                 self.instants.push(self.model, state.time, lengths.next, instant);
                 self.count(state);
             }
-            if !first || self.instants.len() > 1 {
+            let count = self.instants.len();
+            if !from_look || count > 1 {
                 self.relax(self.lengths.next);
             }
-            let (begun, count) = (Clock::now(), self.instants.len());
-            let submitted = self.submit_steps(first);
-            first = false;
+            let submitted = self.submit_steps(from_look);
+            from_look = false;
             // One submission waits while another runs.
-            if let Some(earlier) = running.replace(submitted) {
-                self.wait_for(earlier)?;
+            if let Some((earlier, count)) = running.replace((submitted.clone(), count)) {
+                self.wait_for(earlier, &mut begun, count)?;
             } else if self.pace.is_none() {
-                self.device.wait()?;
-                self.pace = Some(begun.elapsed().as_secs_f64() / count as f64);
+                self.wait_for(submitted, &mut begun, count)?;
             }
         }
         self.device.check()
     }
 
-    fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
-        let waited = self.device.device.poll(wait);
-        self.device.check()?;
-        waited.map(|_| ()).map_err(|error| GpuError::Lost {
-            adapter: self.device.adapter().name.clone(),
-            reason: error.to_string(),
-        })
+    /// Waits for a submission of some instants, and notes how long one takes.
+    fn wait_for(
+        &mut self,
+        submission: wgpu::SubmissionIndex,
+        begun: &mut Clock,
+        instants: usize,
+    ) -> Result<(), GpuError> {
+        self.device.wait_for(submission)?;
+        self.pace = Some(begun.elapsed().as_secs_f64() / instants as f64);
+        *begun = Clock::now();
+        Ok(())
     }
 
     /// Moves the clock on by an instant. Whole steps that begin without a look are noted here.

@@ -1,9 +1,5 @@
 //! The device tests run on.
 
-#![allow(dead_code)]
-
-pub mod cube;
-
 use std::io::Write;
 
 use pliant_gpu::{Device, GpuError};

@@ -1,0 +1,2 @@
+// The shape at rest is stored.
+fn load_rest(to: u32, node: u32) {}
