@@ -111,7 +111,6 @@ fn every_element_in_every_design() {
     let designs: Vec<_> = designs(&device).collect();
     for element in ELEMENTS {
         compare(&device, element, &moved_cube(element, elastic(neo_hookean())), &designs);
-        compare(&device, &format!("{element}, relaxing"), &relaxing_cube(element), &designs);
     }
 }
 
@@ -189,7 +188,7 @@ fn relaxation_of_each_part_and_both_by_both_updates() {
         ("the volumetric part", &terms[2..], PronyUpdate::Exact),
     ];
     for (what, terms, update) in cases {
-        for element in ["tet4", "tet4-anp", "tet4-ianp", "hex8-full"] {
+        for element in ELEMENTS {
             let mut material = elastic(neo_hookean());
             material.prony = Prony::new(terms, update).unwrap();
             compare(&device, &format!("{element}, {what}"), &moved_cube(element, material), PLAIN);
@@ -310,7 +309,7 @@ fn relaxing_cube(element: &str) -> Model {
 #[test]
 fn a_state_goes_from_the_processor_to_the_device_and_back() {
     let Some(device) = support::device() else { return };
-    for element in ["tet4", "tet4-anp", "tet4-ianp", "hex8-full"] {
+    for element in ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"] {
         let model = relaxing_cube(element);
         let step = step_of(&model);
         let on_processor = |state: &mut State<f32>| {
