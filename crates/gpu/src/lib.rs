@@ -5,6 +5,22 @@
 //!     println!("{} ({}), {} MiB a buffer", adapter.name, adapter.backend, adapter.largest_buffer >> 20);
 //! }
 //! ```
+//!
+//! [`GpuStepper`] advances a state of a model as `CentralDifference` does on the processor, hundreds of steps at a time:
+//!
+//! ```
+//! use pliant_gpu::{Device, GpuStepper, StepFailure, Wanted};
+//! use pliant_mechanics::{Model, Observable, State};
+//!
+//! fn fall(device: &Device, model: &Model, step: f64) -> Result<State<f32>, StepFailure> {
+//!     let mut state = State::at_rest(model);
+//!     let mut stepper = GpuStepper::new(device, model, step, None)?;
+//!     stepper.advance(&mut state, 1000)?;
+//!     stepper.evaluate(&mut state, Wanted::Everything)?;
+//!     println!("{} J", stepper.energies().kinetic);
+//!     Ok(state)
+//! }
+//! ```
 
 mod blocks;
 mod design;
