@@ -49,6 +49,10 @@ pub trait Lanes<R>: Number {
     fn load(pack: &Pack<R>, at: usize) -> Self;
     /// Writes them into a pack from lane `at` on.
     fn store(self, pack: &mut Pack<R>, at: usize);
+    /// The four components of the vectors at some places, for lanes `at` and on.
+    fn gather(vectors: &[[R; 4]], places: &[u16; PACK], at: usize) -> [Self; 4];
+    /// Writes vectors lane by lane, from lane `at` on; the inverse of [`gather`](Self::gather) from places in a row.
+    fn spread(components: [Self; 4], to: &mut Pack<[R; 4]>, at: usize);
     /// Does the work in a function of its own, compiled for these lanes.
     fn call<W: Work<R>>(work: W) -> W::Output;
 }
@@ -150,10 +154,21 @@ unsafe fn proof<S: Simd>() -> S {
     unsafe { std::mem::transmute_copy(&()) }
 }
 
+/// Which lane a row of four numbers becomes where pulp turns four registers full of rows into components: the row at
+/// `place` among the `rows` of a register. Rows are loaded in this order, so that lanes come out in theirs.
+const fn single_lane(_rows: usize, register: usize, place: usize) -> usize {
+    4 * place + register
+}
+
+/// The same in double precision.
+const fn double_lane(rows: usize, register: usize, place: usize) -> usize {
+    if rows == 2 { register / 2 * 4 + 2 * place + register % 2 } else { register }
+}
+
 macro_rules! wide {
     ($wide:ident, $type:ty, $vector:ident, $guess:expr, $iterations:literal,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $mul_add:ident, $sqrt:ident, $max:ident, $abs:ident,
-     $and:ident, $or:ident, $splat:ident, $slice:ident, $slice_mut:ident) => {
+     $and:ident, $or:ident, $splat:ident, $slice:ident, $slice_mut:ident, $deinterleave:ident, $interleave:ident, $lane_of_row:ident) => {
         /// As many numbers as a register holds.
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -170,6 +185,33 @@ macro_rules! wide {
                 const { assert!(size_of::<S::$vector>() <= size_of::<Pack<$type>>()) };
                 // SAFETY: a vector is plain numbers (`Pod`), no longer than the array.
                 Self(unsafe { std::mem::transmute_copy(&[value; PACK]) })
+            }
+
+            /// Which lane a row of four numbers becomes where four registers full of rows are turned into components.
+            #[inline(always)]
+            const fn lane_of_row(row: usize) -> usize {
+                let per_register = Self::WIDTH.div_ceil(4);
+                let (register, place) = (row / per_register, row % per_register);
+                $lane_of_row(per_register, register, place)
+            }
+
+            /// The components of as many rows as there are lanes.
+            #[inline(always)]
+            fn to_components(rows: &[[$type; 4]; PACK]) -> [Self; 4] {
+                // SAFETY: vectors are plain numbers (`Pod`), four of them no longer than the rows.
+                let registers: [S::$vector; 4] = unsafe { std::mem::transmute_copy(rows) };
+                let [a, b, c, d] = Self::simd().$deinterleave(registers);
+                [Self(a), Self(b), Self(c), Self(d)]
+            }
+
+            /// The inverse.
+            #[inline(always)]
+            fn to_rows([a, b, c, d]: [Self; 4]) -> [[$type; 4]; PACK] {
+                let registers = Self::simd().$interleave([a.0, b.0, c.0, d.0]);
+                let mut rows = [[0.0; 4]; PACK];
+                // SAFETY: as above.
+                unsafe { std::ptr::write((&raw mut rows).cast(), registers) };
+                rows
             }
 
             /// Lane by lane in plain numbers.
@@ -197,6 +239,21 @@ macro_rules! wide {
             #[inline(always)]
             fn store(self, pack: &mut Pack<$type>, at: usize) {
                 S::$slice_mut(&mut pack.0).0[at / Self::WIDTH] = self.0;
+            }
+            #[inline(always)]
+            fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
+                let mut rows = [[0.0; 4]; PACK];
+                for (row, to) in rows[..Self::WIDTH].iter_mut().enumerate() {
+                    *to = vectors[usize::from(places[at + Self::lane_of_row(row)])];
+                }
+                Self::to_components(&rows)
+            }
+            #[inline(always)]
+            fn spread(components: [Self; 4], to: &mut Pack<[$type; 4]>, at: usize) {
+                let rows = Self::to_rows(components);
+                for (row, vector) in rows[..Self::WIDTH].iter().enumerate() {
+                    to.0[at + Self::lane_of_row(row)] = *vector;
+                }
             }
             #[inline(always)]
             fn call<W: Work<$type>>(work: W) -> W::Output {
@@ -300,6 +357,14 @@ macro_rules! wide {
             fn store(self, pack: &mut Pack<$type>, at: usize) {
                 pack.0[at] = self;
             }
+            #[inline(always)]
+            fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
+                vectors[usize::from(places[at])]
+            }
+            #[inline(always)]
+            fn spread(components: [Self; 4], to: &mut Pack<[$type; 4]>, at: usize) {
+                to.0[at] = components;
+            }
             #[inline(never)]
             fn call<W: Work<$type>>(work: W) -> W::Output {
                 work.run::<Self>()
@@ -336,7 +401,10 @@ wide!(
     or_f32s,
     splat_f32s,
     as_simd_f32s,
-    as_mut_simd_f32s
+    as_mut_simd_f32s,
+    deinterleave_shfl_f32s,
+    interleave_shfl_f32s,
+    single_lane
 );
 wide!(
     WideF64,
@@ -357,5 +425,8 @@ wide!(
     or_f64s,
     splat_f64s,
     as_simd_f64s,
-    as_mut_simd_f64s
+    as_mut_simd_f64s,
+    deinterleave_shfl_f64s,
+    interleave_shfl_f64s,
+    double_lane
 );

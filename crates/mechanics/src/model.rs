@@ -149,6 +149,8 @@ pub struct CellBlock<const N: usize> {
 pub struct Hourglass<R, const N: usize> {
     /// The patterns γ, four per cell.
     pub patterns: Vec<[[R; N]; 4]>,
+    /// The moments Y of their signs Γ [m], γ_ca = Γ_ca − B_a·Y_c.
+    pub moments: Vec<[Vector<R>; 4]>,
     /// k = c μ V ΣB²/8 [N/m], one per cell.
     pub stiffness: Vec<R>,
 }
@@ -170,6 +172,7 @@ impl Cells {
             rest: hexes.iter().map(|hex| hex.rest).collect(),
             hourglass: Some(Hourglass {
                 patterns: hexes.iter().map(|hex| hex.hourglass).collect(),
+                moments: hexes.iter().map(|hex| hex.moments).collect(),
                 stiffness: hexes.iter().map(stiffness).collect(),
             }),
         })

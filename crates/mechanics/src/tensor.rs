@@ -105,6 +105,13 @@ impl<R: Number> Tensor<R> {
         sum
     }
 
+    /// s T.
+    #[inline(always)]
+    pub fn scaled(&self, s: R) -> Self {
+        let t = &self.0;
+        Self([scale(t[0], s), scale(t[1], s), scale(t[2], s)])
+    }
+
     /// The sum of the principal minors of order two.
     #[inline(always)]
     pub fn second_invariant(&self) -> R {

@@ -8,7 +8,7 @@ use crate::law::battery::every_law;
 use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
 use crate::model::{Averaging, Body, Cells, LocalNodes, Material};
 use crate::prony::{Part, Prony, PronyTerm, PronyUpdate};
-use crate::tensor::{cast, cross, dot};
+use crate::tensor::{cross, dot, scale};
 
 /// Every element whose force is the gradient of an energy.
 const ELEMENTS: [&str; 5] = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"];
