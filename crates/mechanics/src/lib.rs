@@ -49,6 +49,7 @@ pub mod law;
 pub mod load;
 pub mod mapping;
 pub mod model;
+mod order;
 pub mod prony;
 mod real;
 pub mod recover;

@@ -16,7 +16,8 @@ mod tests;
 
 use averaged::AveragedTets;
 pub(crate) use batch::pressure;
-use blocks::{BLOCK, Blocks, Quad, Shares};
+pub(crate) use blocks::BLOCK;
+use blocks::{Blocks, Quad, Shares};
 use full_hex::FullHexes;
 use plain::SolidForces;
 
