@@ -11,6 +11,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
+use crate::real::closer_to_inverse_cbrt;
 use crate::tensor::{Symmetric, Tensor, Vector};
 use crate::{Number, Real};
 
@@ -51,8 +52,10 @@ pub trait Lanes<R>: Number {
     fn store(self, pack: &mut Pack<R>, at: usize);
     /// The four components of the vectors at some places, for lanes `at` and on.
     fn gather(vectors: &[[R; 4]], places: &[u16; PACK], at: usize) -> [Self; 4];
-    /// Writes vectors lane by lane, from lane `at` on; the inverse of [`gather`](Self::gather) from places in a row.
+    /// Writes vectors from lane `at` on, each where [`row_of_lane`](Self::row_of_lane) tells.
     fn spread(components: [Self; 4], to: &mut Pack<[R; 4]>, at: usize);
+    /// Where the vector of a lane of a pack is written: the order in which registers hold them.
+    fn row_of_lane(lane: usize) -> usize;
     /// Does the work in a function of its own, compiled for these lanes.
     fn call<W: Work<R>>(work: W) -> W::Output;
 }
@@ -165,10 +168,20 @@ const fn double_lane(rows: usize, register: usize, place: usize) -> usize {
     if rows == 2 { register / 2 * 4 + 2 * place + register % 2 } else { register }
 }
 
+/// The inverse of [`single_lane`].
+const fn single_row(rows: usize, lane: usize) -> usize {
+    lane % 4 * rows + lane / 4
+}
+
+/// The inverse of [`double_lane`].
+const fn double_row(rows: usize, lane: usize) -> usize {
+    if rows == 2 { lane / 4 * 4 + lane % 2 * 2 + lane / 2 % 2 } else { lane }
+}
+
 macro_rules! wide {
     ($wide:ident, $type:ty, $vector:ident, $guess:expr, $iterations:literal,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $mul_add:ident, $sqrt:ident, $max:ident, $abs:ident,
-     $and:ident, $or:ident, $splat:ident, $slice:ident, $slice_mut:ident, $deinterleave:ident, $interleave:ident, $lane_of_row:ident) => {
+     $and:ident, $or:ident, $splat:ident, $slice:ident, $slice_mut:ident, $deinterleave:ident, $interleave:ident, $lane_of_row:ident, $row_of_lane:ident) => {
         /// As many numbers as a register holds.
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -202,16 +215,6 @@ macro_rules! wide {
                 let registers: [S::$vector; 4] = unsafe { std::mem::transmute_copy(rows) };
                 let [a, b, c, d] = Self::simd().$deinterleave(registers);
                 [Self(a), Self(b), Self(c), Self(d)]
-            }
-
-            /// The inverse.
-            #[inline(always)]
-            fn to_rows([a, b, c, d]: [Self; 4]) -> [[$type; 4]; PACK] {
-                let registers = Self::simd().$interleave([a.0, b.0, c.0, d.0]);
-                let mut rows = [[0.0; 4]; PACK];
-                // SAFETY: as above.
-                unsafe { std::ptr::write((&raw mut rows).cast(), registers) };
-                rows
             }
 
             /// Lane by lane in plain numbers.
@@ -250,10 +253,16 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn spread(components: [Self; 4], to: &mut Pack<[$type; 4]>, at: usize) {
-                let rows = Self::to_rows(components);
-                for (row, vector) in rows[..Self::WIDTH].iter().enumerate() {
-                    to.0[at + Self::lane_of_row(row)] = *vector;
-                }
+                let [a, b, c, d] = components;
+                let registers = Self::simd().$interleave([a.0, b.0, c.0, d.0]);
+                let rows = &mut to.0[at..at + Self::WIDTH];
+                // SAFETY: vectors are plain numbers (`Pod`), four of them as long as the rows; their alignment is not asked for.
+                unsafe { std::ptr::write_unaligned(rows.as_mut_ptr().cast(), registers) };
+            }
+            #[inline(always)]
+            fn row_of_lane(lane: usize) -> usize {
+                let (at, lane) = (lane / Self::WIDTH * Self::WIDTH, lane % Self::WIDTH);
+                at + $row_of_lane(Self::WIDTH.div_ceil(4), lane)
             }
             #[inline(always)]
             fn call<W: Work<$type>>(work: W) -> W::Output {
@@ -273,7 +282,7 @@ macro_rules! wide {
                 Self(Self::simd().$mul_add(self.0, factor.0, term.0))
             }
             #[inline(always)]
-            fn cbrt(self) -> Self {
+            fn inverse_cbrt(self) -> Self {
                 // As in plain numbers; a third of the bits is their sum over 4, 16, 64, … in words of 32 bits each.
                 let simd = Self::simd();
                 let bits: S::u32s = pulp::cast(self.0);
@@ -282,11 +291,9 @@ macro_rules! wide {
                 let third = simd.add_u32s(third, over(third, 4));
                 let third = simd.add_u32s(third, over(third, 8));
                 let guess: S::u32s = pulp::cast(Self::splat(<$type>::from_bits($guess)).0);
-                let mut y = Self(pulp::cast(simd.add_u32s(third, guess)));
-                let twice = self + self;
+                let mut y = Self(pulp::cast(simd.sub_u32s(guess, third)));
                 for _ in 0..$iterations {
-                    let cube = y * y * y;
-                    y = y * (cube + twice) / (cube + cube + self);
+                    y = closer_to_inverse_cbrt(self, y);
                 }
                 y
             }
@@ -365,6 +372,10 @@ macro_rules! wide {
             fn spread(components: [Self; 4], to: &mut Pack<[$type; 4]>, at: usize) {
                 to.0[at] = components;
             }
+            #[inline(always)]
+            fn row_of_lane(lane: usize) -> usize {
+                lane
+            }
             #[inline(never)]
             fn call<W: Work<$type>>(work: W) -> W::Output {
                 work.run::<Self>()
@@ -386,7 +397,7 @@ wide!(
     WideF32,
     f32,
     f32s,
-    709_958_130,
+    1_419_916_000,
     2,
     add_f32s,
     sub_f32s,
@@ -404,13 +415,14 @@ wide!(
     as_mut_simd_f32s,
     deinterleave_shfl_f32s,
     interleave_shfl_f32s,
-    single_lane
+    single_lane,
+    single_row
 );
 wide!(
     WideF64,
     f64,
     f64s,
-    715_094_163 << 32,
+    1_430_188_294 << 32,
     3,
     add_f64s,
     sub_f64s,
@@ -428,5 +440,6 @@ wide!(
     as_mut_simd_f64s,
     deinterleave_shfl_f64s,
     interleave_shfl_f64s,
-    double_lane
+    double_lane,
+    double_row
 );

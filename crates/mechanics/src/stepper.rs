@@ -19,7 +19,7 @@ use crate::lanes::{Lanes, Processor, Work};
 use crate::model::{Contradiction, FREE, Model};
 use crate::stability::{CHANGE, CHECK_EVERY, Look, Monitor, OnUnstable, substeps};
 use crate::state::State;
-use crate::tensor::{Vector, add, cast};
+use crate::tensor::{Vector, cast};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -207,6 +207,8 @@ pub struct CentralDifference<'m, R> {
     relaxing: f64,
     forces: InternalForces<R>,
     owners: Vec<[u32; 3]>,
+    /// The nodes of which a component has an owner, increasing.
+    held: Vec<u32>,
     /// Mass of each component [kg].
     mass: Vec<Vector<R>>,
     /// α of each component [1/s].
@@ -281,35 +283,42 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Sums {
         let Self { stepper, first, before, next, reaction } = self;
+        let mut held = stepper.held_from(first).peekable();
         let mut sums = [[0.0; BLOCK]; 6];
-        let blocks = before.chunks(BLOCK).zip(next.chunks_mut(BLOCK)).zip(reaction.chunks_mut(BLOCK));
-        for (index, ((before, next), reaction)) in blocks.enumerate() {
+        let mut block = Block::at_rest();
+        for (index, (before, next)) in before.chunks(BLOCK).zip(next.chunks_mut(BLOCK)).enumerate() {
             let nodes = first + index * BLOCK..first + index * BLOCK + before.len();
-            let mut block = Block::at_rest();
-            for (to, node) in nodes.clone().enumerate() {
-                block.internal[to] = stepper.forces.at(node);
-                if stepper.loaded {
-                    block.external[to] = stepper.applied.at(node);
+            if before.len() < BLOCK {
+                block = Block::at_rest();
+            }
+            for (to, node) in block.internal.iter_mut().zip(nodes.clone()) {
+                *to = stepper.forces.at(node);
+            }
+            if stepper.loaded {
+                for (to, node) in block.external.iter_mut().zip(nodes.clone()) {
+                    *to = stepper.applied.at(node);
                 }
             }
             block.before[..before.len()].copy_from_slice(before);
             block.mass[..before.len()].copy_from_slice(&stepper.mass[nodes.clone()]);
             block.damping[..before.len()].copy_from_slice(&stepper.damping[nodes.clone()]);
             block.move_freely(stepper.lengths);
-            reaction.fill([R::ZERO; 3]);
-            for (to, node) in nodes.enumerate() {
-                let owner = stepper.owners[node];
-                if owner == [FREE; 3] {
-                    continue;
-                }
-                for c in (0..3).filter(|&c| owner[c] != FREE) {
+            let mut pushed = stepper.loaded;
+            while let Some(node) = held.next_if(|&node| node < nodes.end) {
+                let to = node - nodes.start;
+                for c in (0..3).filter(|&c| stepper.owners[node][c] != FREE) {
                     let (applied, internal) = (block.external[to][c], block.internal[to][c]);
-                    (block.next[to][c], reaction[to][c]) =
-                        stepper.prescribe(node, c, block.before[to][c], applied, internal);
-                    block.external[to][c] += reaction[to][c];
+                    let (moved, force) = stepper.prescribe(node, c, block.before[to][c], applied, internal);
+                    (block.next[to][c], reaction[node - first][c]) = (moved, force);
+                    block.external[to][c] += force;
                 }
+                pushed = true;
             }
-            block.add_to(&mut sums, stepper.lengths);
+            block.add_motion(&mut sums, stepper.lengths);
+            if pushed {
+                block.add_push(&mut sums);
+                block.external = [[R::ZERO; 3]; BLOCK];
+            }
             next.copy_from_slice(&block.next[..next.len()]);
         }
         let [kinetic, damping_power, internal_before, internal_after, external_before, external_after] =
@@ -323,6 +332,7 @@ struct Block<R> {
     before: [Vector<R>; BLOCK],
     next: [Vector<R>; BLOCK],
     internal: [Vector<R>; BLOCK],
+    /// Zero but for what pushes now.
     external: [Vector<R>; BLOCK],
     mass: [Vector<R>; BLOCK],
     damping: [Vector<R>; BLOCK],
@@ -346,32 +356,51 @@ impl<R: Real> Block<R> {
         let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
         for i in 0..3 * BLOCK {
             let a = damping[i] * half_mean;
-            let push = step / mass[i] * (external[i] - internal[i]);
-            next[i] = ((R::ONE - a) * (before[i] * ratio) + push) / (R::ONE + a);
+            let kept = (R::ONE - a) * (before[i] * ratio) * mass[i];
+            next[i] = (kept + step * (external[i] - internal[i])) / (mass[i] * (R::ONE + a));
         }
     }
 
-    /// Adds kinetic energy, damping power and the halves of the works to sums kept apart by lane.
+    /// Adds kinetic energy, damping power and the halves of the internal work to sums kept apart by lane. The products of
+    /// three components are summed as they come, in the precision of the forces; all else in double precision.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
-    fn add_to(&self, sums: &mut [[f64; BLOCK]; 6], lengths: Lengths) {
-        let (ratio, per_two_steps) = (lengths.ratio(), 0.5 / lengths.next);
-        let (before, next) = (self.before.as_flattened(), self.next.as_flattened());
-        let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
+    fn add_motion(&self, sums: &mut [[f64; BLOCK]; 6], lengths: Lengths) {
+        let (ratio, per_two_steps) = (R::of(lengths.ratio()), R::of(0.5 / lengths.next));
+        let (before, next, internal) =
+            (self.before.as_flattened(), self.next.as_flattened(), self.internal.as_flattened());
         let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
+        let mut parts = [[R::ZERO; BLOCK]; 4];
         for part in 0..3 {
             for lane in 0..BLOCK {
                 let i = part * BLOCK + lane;
-                let (before, next) = (before[i].to_f64(), next[i].to_f64());
-                let (internal, external) = (internal[i].to_f64(), external[i].to_f64());
-                let velocity = (before * ratio + next) * per_two_steps;
-                let twice_kinetic = mass[i].to_f64() * velocity * velocity;
-                sums[0][lane] += 0.5 * twice_kinetic;
-                sums[1][lane] += damping[i].to_f64() * twice_kinetic;
-                sums[2][lane] += 0.5 * internal * before;
-                sums[3][lane] += 0.5 * internal * next;
-                sums[4][lane] += 0.5 * external * before;
-                sums[5][lane] += 0.5 * external * next;
+                let velocity = (before[i] * ratio + next[i]) * per_two_steps;
+                let twice_kinetic = mass[i] * velocity * velocity;
+                parts[0][lane] += twice_kinetic;
+                parts[1][lane] += damping[i] * twice_kinetic;
+                parts[2][lane] += internal[i] * before[i];
+                parts[3][lane] += internal[i] * next[i];
+            }
+        }
+        for lane in 0..BLOCK {
+            sums[0][lane] += 0.5 * parts[0][lane].to_f64();
+            sums[1][lane] += parts[1][lane].to_f64();
+            sums[2][lane] += 0.5 * parts[2][lane].to_f64();
+            sums[3][lane] += 0.5 * parts[3][lane].to_f64();
+        }
+    }
+
+    /// Adds the halves of the external work.
+    #[allow(clippy::needless_range_loop)]
+    #[inline(always)]
+    fn add_push(&self, sums: &mut [[f64; BLOCK]; 6]) {
+        let (before, next) = (self.before.as_flattened(), self.next.as_flattened());
+        let external = self.external.as_flattened();
+        for part in 0..3 {
+            for lane in 0..BLOCK {
+                let i = part * BLOCK + lane;
+                sums[4][lane] += 0.5 * external[i].to_f64() * before[i].to_f64();
+                sums[5][lane] += 0.5 * external[i].to_f64() * next[i].to_f64();
             }
         }
     }
@@ -404,6 +433,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             relaxing: step,
             forces: InternalForces::new(model, step),
             amplitude: model.amplitudes(&owners),
+            held: (0..nodes as u32).filter(|&node| owners[node as usize] != [FREE; 3]).collect(),
             owners,
             mass: (0..nodes).map(|node| [R::of(model.inertia(node)); 3]).collect(),
             damping,
@@ -523,15 +553,19 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has gone before.
     pub fn advance(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
-        let (owners, amplitude, factor) = (&self.owners, &self.amplitude, &self.factor);
-        (state.displacement.par_iter_mut().zip(&state.increment).zip(owners).zip(amplitude))
-            .with_min_len(CHUNK)
-            .for_each(|(((u, du), owner), amplitude)| {
-                *u = add(*u, *du);
-                for component in (0..3).filter(|&c| owner[c] != FREE) {
-                    u[component] = R::of(amplitude[component] * factor[owner[component] as usize][1]);
+        let chunks = state.displacement.par_chunks_mut(CHUNK).zip(state.increment.par_chunks(CHUNK));
+        chunks.enumerate().for_each(|(task, (displacement, increment))| {
+            let (first, end) = (task * CHUNK, task * CHUNK + displacement.len());
+            for (u, du) in displacement.as_flattened_mut().iter_mut().zip(increment.as_flattened()) {
+                *u += *du;
+            }
+            for node in self.held_from(first).take_while(|&node| node < end) {
+                let (owner, amplitude) = (self.owners[node], self.amplitude[node]);
+                for c in (0..3).filter(|&c| owner[c] != FREE) {
+                    displacement[node - first][c] = R::of(amplitude[c] * self.factor[owner[c] as usize][1]);
                 }
-            });
+            }
+        });
         state.work.internal += state.work.pending_internal;
         state.work.external += state.work.pending_external;
         state.stability.substeps = self.substeps;
@@ -542,6 +576,13 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         }
         let part = f64::from(state.stability.done) / f64::from(self.substeps);
         state.time = (state.steps as f64 + part) * self.step;
+    }
+
+    /// The nodes from a first one on of which a component has an owner.
+    #[inline(always)]
+    fn held_from(&self, first: usize) -> impl Iterator<Item = usize> + '_ {
+        let at = self.held.partition_point(|&node| (node as usize) < first);
+        self.held[at..].iter().map(|&node| node as usize)
     }
 
     /// Energy [J] above which the balance is judged.

@@ -314,7 +314,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                     let piola = piola.scaled(L::load(&rest[pack].volume, at));
                     by_cell(&nodal_forces(&piola, &rest[pack].gradient, at), &mut forces, at);
                 }
-                add_up(&forces, &cells.nodes[pack], sums);
+                add_up::<R, L, 4>(&forces, &cells.nodes[pack], sums);
             }
         }
         findings

@@ -150,7 +150,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 }
                 by_cell(&own, &mut forces, at);
             }
-            add_up(&forces, &cells.nodes[pack], sums);
+            add_up::<R, L, 8>(&forces, &cells.nodes[pack], sums);
         }
         findings
     }

@@ -243,7 +243,7 @@ fn nodal_forces<R: Real, L: Lanes<R>, const M: usize>(
     forces
 }
 
-/// Writes the forces on all nodes cell by cell; the first node takes what makes the sum zero.
+/// Writes the forces on all nodes as vectors, [`Lanes::row_of_lane`] by lane; the first node takes what makes the sum zero.
 #[inline(always)]
 fn by_cell<R: Real, L: Lanes<R>, const N: usize, const M: usize>(
     forces: &[Vector<L>; M],
@@ -266,15 +266,16 @@ fn plus<R: Real>(a: Quad<R>, b: Quad<R>) -> Quad<R> {
 
 /// Adds the forces of a pack of cells to those of their block, cell by cell.
 #[inline(always)]
-fn add_up<R: Real, const N: usize>(
+fn add_up<R: Real, L: Lanes<R>, const N: usize>(
     forces: &[Pack<Quad<R>>; N],
     nodes: &[[u16; PACK]; N],
     sums: &mut [Quad<R>],
 ) {
     for lane in 0..PACK {
+        let row = L::row_of_lane(lane);
         for (forces, nodes) in forces.iter().zip(nodes) {
             let sum = &mut sums[usize::from(nodes[lane])];
-            *sum = plus(*sum, forces.0[lane]);
+            *sum = plus(*sum, forces.0[row]);
         }
     }
 }

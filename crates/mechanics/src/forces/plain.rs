@@ -108,7 +108,7 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                     }
                     by_cell(&nodal, &mut forces, at);
                 }
-                add_up(&forces, &cells.nodes[pack], sums);
+                add_up::<R, L, N>(&forces, &cells.nodes[pack], sums);
             }
         }
         findings
