@@ -194,6 +194,34 @@ impl Lengths {
     }
 }
 
+/// [`Lengths`] as the nodes need them.
+#[derive(Clone, Copy, Debug)]
+struct Pace<R> {
+    /// Δt⁺/Δt⁻.
+    ratio: R,
+    /// h/2 [s].
+    half_mean: R,
+    /// Δt⁺ h [s²].
+    step_squared: R,
+    /// 1/(Δt⁺ h) [1/s²].
+    per_step_squared: R,
+    /// 1/(2 Δt⁺) [1/s].
+    per_two_steps: R,
+}
+
+impl<R: Real> Pace<R> {
+    fn new(lengths: Lengths) -> Self {
+        let step_squared = lengths.next * lengths.mean();
+        Self {
+            ratio: R::of(lengths.ratio()),
+            half_mean: R::of(0.5 * lengths.mean()),
+            step_squared: R::of(step_squared),
+            per_step_squared: R::of(1.0 / step_squared),
+            per_two_steps: R::of(0.5 / lengths.next),
+        }
+    }
+}
+
 /// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that a restart
 /// would lose.
 pub struct CentralDifference<'m, R> {
@@ -284,6 +312,7 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
     fn run<L: Lanes<R>>(self) -> Sums {
         let Self { stepper, first, before, next, reaction } = self;
         let mut held = stepper.held_from(first).peekable();
+        let pace = Pace::new(stepper.lengths);
         let mut sums = [[0.0; BLOCK]; 6];
         let mut block = Block::at_rest();
         for (index, (before, next)) in before.chunks(BLOCK).zip(next.chunks_mut(BLOCK)).enumerate() {
@@ -291,9 +320,7 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
             if before.len() < BLOCK {
                 block = Block::at_rest();
             }
-            for (to, node) in block.internal.iter_mut().zip(nodes.clone()) {
-                *to = stepper.forces.at(node);
-            }
+            stepper.forces.at_nodes(nodes.clone(), &mut block.internal);
             if stepper.loaded {
                 for (to, node) in block.external.iter_mut().zip(nodes.clone()) {
                     *to = stepper.applied.at(node);
@@ -302,19 +329,19 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
             block.before[..before.len()].copy_from_slice(before);
             block.mass[..before.len()].copy_from_slice(&stepper.mass[nodes.clone()]);
             block.damping[..before.len()].copy_from_slice(&stepper.damping[nodes.clone()]);
-            block.move_freely(stepper.lengths);
+            block.move_freely(&pace);
             let mut pushed = stepper.loaded;
             while let Some(node) = held.next_if(|&node| node < nodes.end) {
                 let to = node - nodes.start;
                 for c in (0..3).filter(|&c| stepper.owners[node][c] != FREE) {
-                    let (applied, internal) = (block.external[to][c], block.internal[to][c]);
-                    let (moved, force) = stepper.prescribe(node, c, block.before[to][c], applied, internal);
+                    let forces = [block.external[to][c], block.internal[to][c]];
+                    let (moved, force) = stepper.prescribe([node, c], &pace, block.before[to][c], forces);
                     (block.next[to][c], reaction[node - first][c]) = (moved, force);
                     block.external[to][c] += force;
                 }
                 pushed = true;
             }
-            block.add_motion(&mut sums, stepper.lengths);
+            block.add_motion(&mut sums, &pace);
             if pushed {
                 block.add_push(&mut sums);
                 block.external = [[R::ZERO; 3]; BLOCK];
@@ -348,16 +375,14 @@ impl<R: Real> Block<R> {
 
     /// The increments of nodes that nothing holds.
     #[inline(always)]
-    fn move_freely(&mut self, lengths: Lengths) {
-        let (ratio, step, half_mean) =
-            (R::of(lengths.ratio()), R::of(lengths.next * lengths.mean()), R::of(0.5 * lengths.mean()));
+    fn move_freely(&mut self, &Pace { ratio, half_mean, step_squared, .. }: &Pace<R>) {
         let (before, next) = (self.before.as_flattened(), self.next.as_flattened_mut());
         let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
         let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
         for i in 0..3 * BLOCK {
             let a = damping[i] * half_mean;
             let kept = (R::ONE - a) * (before[i] * ratio) * mass[i];
-            next[i] = (kept + step * (external[i] - internal[i])) / (mass[i] * (R::ONE + a));
+            next[i] = (kept + step_squared * (external[i] - internal[i])) / (mass[i] * (R::ONE + a));
         }
     }
 
@@ -365,8 +390,7 @@ impl<R: Real> Block<R> {
     /// three components are summed as they come, in the precision of the forces; all else in double precision.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
-    fn add_motion(&self, sums: &mut [[f64; BLOCK]; 6], lengths: Lengths) {
-        let (ratio, per_two_steps) = (R::of(lengths.ratio()), R::of(0.5 / lengths.next));
+    fn add_motion(&self, sums: &mut [[f64; BLOCK]; 6], &Pace { ratio, per_two_steps, .. }: &Pace<R>) {
         let (before, next, internal) =
             (self.before.as_flattened(), self.next.as_flattened(), self.internal.as_flattened());
         let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
@@ -642,15 +666,21 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     }
 
     /// The increment and the reaction [N] of a component that moves as prescribed.
-    fn prescribe(&self, node: usize, c: usize, before: R, applied: R, internal: R) -> (R, R) {
+    #[inline(always)]
+    fn prescribe(
+        &self,
+        [node, c]: [usize; 2],
+        pace: &Pace<R>,
+        before: R,
+        [applied, internal]: [R; 2],
+    ) -> (R, R) {
         let [now, then] = self.factor[self.owners[node][c] as usize];
         let amplitude = self.amplitude[node][c];
-        let (dt, mean) = (R::of(self.lengths.next), R::of(self.lengths.mean()));
-        let same_speed = before * R::of(self.lengths.ratio());
+        let same_speed = before * pace.ratio;
         let next = R::of(amplitude * then - amplitude * now);
-        let velocity = (same_speed + next) / (R::of(2.0) * dt);
-        let inertia =
-            self.mass[node][c] * ((next - same_speed) / (dt * mean) + self.damping[node][c] * velocity);
+        let velocity = (same_speed + next) * pace.per_two_steps;
+        let acceleration = (next - same_speed) * pace.per_step_squared;
+        let inertia = self.mass[node][c] * (acceleration + self.damping[node][c] * velocity);
         (next, inertia + internal - applied)
     }
 

@@ -14,11 +14,10 @@ use rayon::prelude::*;
 use super::batch::{Batch, PACKS, pressures};
 use super::blocks::{Blocks, Moved, Quad, Shares, Task};
 use super::{
-    Findings, ForceField, PackedCells, PackedRest, add_up, by_cell, displacement_gradient, nodal_forces,
-    relative,
+    Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, Processor, Work, entry, load_tensor};
+use crate::lanes::{Lanes, PACK, Pack, Processor, Work, add_at, entry, load_tensor};
 use crate::law::{AnyLaw, Split};
 use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
 use crate::prony::{Prony, Relaxation};
@@ -84,10 +83,11 @@ impl<R: Real> AveragedTets<R> {
     fn average_to_nodes(&mut self, sums: &[Quad<R>]) {
         let Constants { shares, inverse_volume, .. } = &self.constants;
         self.node_value.par_iter_mut().enumerate().with_min_len(32).for_each(|(pack, nodes)| {
-            let own = &inverse_volume[pack * PACK..inverse_volume.len().min((pack + 1) * PACK)];
-            for (lane, (value, &inverse)) in nodes.0.iter_mut().zip(own).enumerate() {
-                let places = shares.at(pack * PACK + lane).iter();
-                *value = places.fold(R::ZERO, |sum, &place| sum + sums[place as usize][0]) * inverse;
+            let own = pack * PACK..inverse_volume.len().min((pack + 1) * PACK);
+            let parts = shares.of(own.clone()).zip(&inverse_volume[own]);
+            for (value, (places, &inverse)) in nodes.0.iter_mut().zip(parts) {
+                let sum = places.iter().fold(R::ZERO, |sum, &place| sum + sums[place as usize][0]);
+                *value = sum * inverse;
             }
         });
     }
@@ -314,7 +314,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                     let piola = piola.scaled(L::load(&rest[pack].volume, at));
                     by_cell(&nodal_forces(&piola, &rest[pack].gradient, at), &mut forces, at);
                 }
-                add_up::<R, L, 4>(&forces, &cells.nodes[pack], sums);
+                add_at::<R, L, 4>(sums, &cells.nodes[pack], &forces);
             }
         }
         findings

@@ -110,10 +110,11 @@ impl Shares {
         Self { offsets, places }
     }
 
-    /// The places of a node's parts.
+    /// The places of the parts of some nodes.
     #[inline(always)]
-    pub(super) fn at(&self, node: usize) -> &[u32] {
-        &self.places[self.offsets[node] as usize..self.offsets[node + 1] as usize]
+    pub(super) fn of(&self, nodes: Range<usize>) -> impl Iterator<Item = &[u32]> {
+        let ends = self.offsets[nodes.start..=nodes.end].windows(2);
+        ends.map(|ends| &self.places[ends[0] as usize..ends[1] as usize])
     }
 }
 

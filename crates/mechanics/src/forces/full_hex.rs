@@ -4,10 +4,10 @@
 use super::averaged::{relaxed_pressures, volume_change};
 use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
-use super::{Findings, ForceField, PackedCells, add_up, by_cell, displacement_gradient, relative};
+use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
 use crate::Real;
 use crate::element::GaussPoints;
-use crate::lanes::{Lanes, PACK, Pack, Processor, Work, load_vector, store_vector};
+use crate::lanes::{Lanes, PACK, Pack, Processor, Work, add_at, load_vector, store_vector};
 use crate::law::AnyLaw;
 use crate::model::{CellBlock, Solid};
 use crate::prony::{Prony, Relaxation};
@@ -150,7 +150,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 }
                 by_cell(&own, &mut forces, at);
             }
-            add_up::<R, L, 8>(&forces, &cells.nodes[pack], sums);
+            add_at::<R, L, 8>(sums, &cells.nodes[pack], &forces);
         }
         findings
     }

@@ -26,7 +26,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, load_vector};
+use crate::lanes::{Lanes, PACK, Pack, load_vector, plus};
 use crate::model::{CellBlock, Cells, Model, Solid};
 use crate::prony::Prony;
 use crate::state::History;
@@ -258,28 +258,6 @@ fn by_cell<R: Real, L: Lanes<R>, const N: usize, const M: usize>(
     L::spread([-sum[0], -sum[1], -sum[2], L::ZERO], &mut to[0], at);
 }
 
-/// a + b. Both are read before anything is written, or the compiler takes number by number.
-#[inline(always)]
-fn plus<R: Real>(a: Quad<R>, b: Quad<R>) -> Quad<R> {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
-}
-
-/// Adds the forces of a pack of cells to those of their block, cell by cell.
-#[inline(always)]
-fn add_up<R: Real, L: Lanes<R>, const N: usize>(
-    forces: &[Pack<Quad<R>>; N],
-    nodes: &[[u16; PACK]; N],
-    sums: &mut [Quad<R>],
-) {
-    for lane in 0..PACK {
-        let row = L::row_of_lane(lane);
-        for (forces, nodes) in forces.iter().zip(nodes) {
-            let sum = &mut sums[usize::from(nodes[lane])];
-            *sum = plus(*sum, forces.0[row]);
-        }
-    }
-}
-
 /// The force field of a solid for steps of `step` seconds.
 pub(crate) fn force_field<R: Real>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
     match &solid.cells {
@@ -352,10 +330,20 @@ impl<R: Real> InternalForces<R> {
     /// The internal force [N] on a node from the last evaluation.
     #[inline(always)]
     pub(crate) fn at(&self, node: usize) -> Vector<R> {
-        let mut sum = [R::ZERO; 4];
-        for &place in self.shares.at(node) {
-            sum = plus(sum, self.forces[place as usize]);
+        let mut force = [[R::ZERO; 3]];
+        self.at_nodes(node..node + 1, &mut force);
+        force[0]
+    }
+
+    /// The same of some nodes.
+    #[inline(always)]
+    pub(crate) fn at_nodes(&self, nodes: Range<usize>, to: &mut [Vector<R>]) {
+        for (to, places) in to.iter_mut().zip(self.shares.of(nodes)) {
+            let mut sum = [R::ZERO; 4];
+            for &place in places {
+                sum = plus(sum, self.forces[place as usize]);
+            }
+            *to = [sum[0], sum[1], sum[2]];
         }
-        [sum[0], sum[1], sum[2]]
     }
 }

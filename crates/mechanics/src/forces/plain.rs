@@ -4,11 +4,10 @@ use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
 use super::hourglass::{PackedHourglass, Resistance};
 use super::{
-    Findings, ForceField, PackedCells, PackedRest, add_up, by_cell, displacement_gradient, nodal_forces,
-    relative,
+    Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, Processor, Work};
+use crate::lanes::{Lanes, PACK, Pack, Processor, Work, add_at};
 use crate::law::AnyLaw;
 use crate::model::{CellBlock, Solid};
 use crate::prony::{Prony, Relaxation};
@@ -108,7 +107,7 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                     }
                     by_cell(&nodal, &mut forces, at);
                 }
-                add_up::<R, L, N>(&forces, &cells.nodes[pack], sums);
+                add_at::<R, L, N>(sums, &cells.nodes[pack], &forces);
             }
         }
         findings

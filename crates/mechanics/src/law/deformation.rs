@@ -112,7 +112,7 @@ impl<R: Number> Deformation<R> {
     #[inline(always)]
     pub fn fibre_stress(&self, a: Vector<R>, w4: R) -> Symmetric<R> {
         let i4 = R::ONE + self.strain_twice.quadratic(a);
-        let direction = Symmetric::dyad(a) - self.inverse_cauchy_green * (i4 * R::of(1.0 / 3.0));
+        let direction = Symmetric::dyad(a).plus_scaled(&self.inverse_cauchy_green, i4 * R::of(-1.0 / 3.0));
         direction * (R::of(2.0) * w4 * self.isochoric_factor)
     }
 
@@ -129,7 +129,7 @@ impl<R: Number> Deformation<R> {
     #[inline(always)]
     fn inverse_times_deviator(&self, m: &Symmetric<R>) -> Symmetric<R> {
         let inverse = &self.inverse_cauchy_green;
-        inverse.commuting_product(m) - *inverse * (m.trace() * R::of(1.0 / 3.0))
+        inverse.commuting_product(m).plus_scaled(inverse, m.trace() * R::of(-1.0 / 3.0))
     }
 }
 
