@@ -186,7 +186,7 @@ pub(crate) fn add_at<R: Real, L: Lanes<R>, const N: usize>(
 
 /// a + b. Both are read before anything is written, or the compiler takes number by number.
 #[inline(always)]
-pub(crate) fn plus<R: Real>(a: [R; 4], b: [R; 4]) -> [R; 4] {
+fn plus<R: Real>(a: [R; 4], b: [R; 4]) -> [R; 4] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 

@@ -8,6 +8,8 @@
 //! at the current time, so that all that an observer sees belongs to one instant; [`CentralDifference::advance`] moves.
 //! Runs on the current rayon pool; sums go in the order of the nodes for any number of threads.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -194,6 +196,30 @@ impl Lengths {
     }
 }
 
+/// A node of which a component moves as prescribed.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    node: u32,
+    /// The constraint of each component, or [`FREE`].
+    owner: [u32; 3],
+    /// The amplitude of each component's motion.
+    amplitude: Vector<f64>,
+}
+
+impl Held {
+    /// The components that are prescribed, with their constraint.
+    #[inline(always)]
+    fn components(&self) -> impl Iterator<Item = (usize, usize)> {
+        let owner = self.owner;
+        (0..3).filter(move |&c| owner[c] != FREE).map(move |c| (c, owner[c] as usize))
+    }
+}
+
+fn held(owners: &[[u32; 3]], amplitudes: &[Vector<f64>]) -> Vec<Held> {
+    let nodes = owners.iter().zip(amplitudes).zip(0..).filter(|((owner, _), _)| **owner != [FREE; 3]);
+    nodes.map(|((&owner, &amplitude), node)| Held { node, owner, amplitude }).collect()
+}
+
 /// [`Lengths`] as the nodes need them.
 #[derive(Clone, Copy, Debug)]
 struct Pace<R> {
@@ -236,7 +262,7 @@ pub struct CentralDifference<'m, R> {
     forces: InternalForces<R>,
     owners: Vec<[u32; 3]>,
     /// The nodes of which a component has an owner, increasing.
-    held: Vec<u32>,
+    held: Vec<Held>,
     /// Mass of each component [kg].
     mass: Vec<Vector<R>>,
     /// α of each component [1/s].
@@ -245,8 +271,6 @@ pub struct CentralDifference<'m, R> {
     /// True if there is any load.
     loaded: bool,
     processor: Processor,
-    /// Amplitude of each prescribed component.
-    amplitude: Vec<Vector<f64>>,
     /// Factor on the amplitudes of each constraint now and after the step.
     factor: Vec<[f64; 2]>,
     next: Vec<Vector<R>>,
@@ -311,7 +335,7 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Sums {
         let Self { stepper, first, before, next, reaction } = self;
-        let mut held = stepper.held_from(first).peekable();
+        let mut held = stepper.held_in(first..first + before.len()).iter().peekable();
         let pace = Pace::new(stepper.lengths);
         let mut sums = [[0.0; BLOCK]; 6];
         let mut block = Block::at_rest();
@@ -331,13 +355,13 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
             block.damping[..before.len()].copy_from_slice(&stepper.damping[nodes.clone()]);
             block.move_freely(&pace);
             let mut pushed = stepper.loaded;
-            while let Some(node) = held.next_if(|&node| node < nodes.end) {
+            while let Some(held) = held.next_if(|held| (held.node as usize) < nodes.end) {
+                let node = held.node as usize;
                 let to = node - nodes.start;
-                for c in (0..3).filter(|&c| stepper.owners[node][c] != FREE) {
-                    let forces = [block.external[to][c], block.internal[to][c]];
-                    let (moved, force) = stepper.prescribe([node, c], &pace, block.before[to][c], forces);
-                    (block.next[to][c], reaction[node - first][c]) = (moved, force);
-                    block.external[to][c] += force;
+                for (c, constraint) in held.components() {
+                    let factor = stepper.factor[constraint].map(|factor| held.amplitude[c] * factor);
+                    (block.next[to][c], reaction[node - first][c]) = block.prescribe(to, c, &pace, factor);
+                    block.external[to][c] += reaction[node - first][c];
                 }
                 pushed = true;
             }
@@ -351,6 +375,23 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
         let [kinetic, damping_power, internal_before, internal_after, external_before, external_after] =
             sums.map(|lanes| lanes.iter().sum());
         Sums { kinetic, damping_power, internal_before, internal_after, external_before, external_after }
+    }
+}
+
+/// u += Δu.
+struct Add<'a, R> {
+    increment: &'a [Vector<R>],
+    to: &'a mut [Vector<R>],
+}
+
+impl<R: Real> Work<R> for Add<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) {
+        for (u, du) in self.to.as_flattened_mut().iter_mut().zip(self.increment.as_flattened()) {
+            *u += *du;
+        }
     }
 }
 
@@ -384,6 +425,17 @@ impl<R: Real> Block<R> {
             let kept = (R::ONE - a) * (before[i] * ratio) * mass[i];
             next[i] = (kept + step_squared * (external[i] - internal[i])) / (mass[i] * (R::ONE + a));
         }
+    }
+
+    /// The increment and the reaction [N] of a component whose displacement [m] is prescribed now and after the step.
+    #[inline(always)]
+    fn prescribe(&self, node: usize, c: usize, pace: &Pace<R>, [now, then]: [f64; 2]) -> (R, R) {
+        let same_speed = self.before[node][c] * pace.ratio;
+        let next = R::of(then - now);
+        let velocity = (same_speed + next) * pace.per_two_steps;
+        let acceleration = (next - same_speed) * pace.per_step_squared;
+        let inertia = self.mass[node][c] * (acceleration + self.damping[node][c] * velocity);
+        (next, inertia + self.internal[node][c] - self.external[node][c])
     }
 
     /// Adds kinetic energy, damping power and the halves of the internal work to sums kept apart by lane. The products of
@@ -456,8 +508,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             lengths: Lengths { before: step, next: step },
             relaxing: step,
             forces: InternalForces::new(model, step),
-            amplitude: model.amplitudes(&owners),
-            held: (0..nodes as u32).filter(|&node| owners[node as usize] != [FREE; 3]).collect(),
+            held: held(&owners, &model.amplitudes(&owners)),
             owners,
             mass: (0..nodes).map(|node| [R::of(model.inertia(node)); 3]).collect(),
             damping,
@@ -579,14 +630,12 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         std::mem::swap(&mut state.increment, &mut self.next);
         let chunks = state.displacement.par_chunks_mut(CHUNK).zip(state.increment.par_chunks(CHUNK));
         chunks.enumerate().for_each(|(task, (displacement, increment))| {
-            let (first, end) = (task * CHUNK, task * CHUNK + displacement.len());
-            for (u, du) in displacement.as_flattened_mut().iter_mut().zip(increment.as_flattened()) {
-                *u += *du;
-            }
-            for node in self.held_from(first).take_while(|&node| node < end) {
-                let (owner, amplitude) = (self.owners[node], self.amplitude[node]);
-                for c in (0..3).filter(|&c| owner[c] != FREE) {
-                    displacement[node - first][c] = R::of(amplitude[c] * self.factor[owner[c] as usize][1]);
+            let first = task * CHUNK;
+            self.processor.run(Add { increment, to: displacement });
+            for held in self.held_in(first..first + displacement.len()) {
+                for (c, constraint) in held.components() {
+                    let then = held.amplitude[c] * self.factor[constraint][1];
+                    displacement[held.node as usize - first][c] = R::of(then);
                 }
             }
         });
@@ -602,11 +651,11 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         state.time = (state.steps as f64 + part) * self.step;
     }
 
-    /// The nodes from a first one on of which a component has an owner.
+    /// Those of some nodes of which a component has an owner.
     #[inline(always)]
-    fn held_from(&self, first: usize) -> impl Iterator<Item = usize> + '_ {
-        let at = self.held.partition_point(|&node| (node as usize) < first);
-        self.held[at..].iter().map(|&node| node as usize)
+    fn held_in(&self, nodes: Range<usize>) -> &[Held] {
+        let before = |end: usize| self.held.partition_point(|held| (held.node as usize) < end);
+        &self.held[before(nodes.start)..before(nodes.end)]
     }
 
     /// Energy [J] above which the balance is judged.
@@ -663,25 +712,6 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 });
             });
         (self.next, self.reaction, self.sums) = (next, reaction, sums);
-    }
-
-    /// The increment and the reaction [N] of a component that moves as prescribed.
-    #[inline(always)]
-    fn prescribe(
-        &self,
-        [node, c]: [usize; 2],
-        pace: &Pace<R>,
-        before: R,
-        [applied, internal]: [R; 2],
-    ) -> (R, R) {
-        let [now, then] = self.factor[self.owners[node][c] as usize];
-        let amplitude = self.amplitude[node][c];
-        let same_speed = before * pace.ratio;
-        let next = R::of(amplitude * then - amplitude * now);
-        let velocity = (same_speed + next) * pace.per_two_steps;
-        let acceleration = (next - same_speed) * pace.per_step_squared;
-        let inertia = self.mass[node][c] * (acceleration + self.damping[node][c] * velocity);
-        (next, inertia + internal - applied)
     }
 
     fn check_state(

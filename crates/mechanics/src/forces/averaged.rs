@@ -68,7 +68,11 @@ impl<R: Real> AveragedTets<R> {
                 rest: PackedRest::of(&packed, cells),
                 cells: packed,
                 numbers: blocks.all_nodes().iter().map(|&node| number(node)).collect(),
-                shares: Shares::new(local.len(), blocks.places().map(|(node, place)| (number(node), place))),
+                shares: Shares::new(
+                    local.len(),
+                    u32::MAX,
+                    blocks.places().map(|(node, place)| (number(node), place)),
+                ),
                 inverse_volume: (0..local.len()).map(|node| R::of(1.0 / volume_at(node))).collect(),
                 relaxation: Relaxation::new(prony, step),
                 isochoric_slots: prony.isochoric_slots(),
@@ -84,10 +88,10 @@ impl<R: Real> AveragedTets<R> {
         let Constants { shares, inverse_volume, .. } = &self.constants;
         self.node_value.par_iter_mut().enumerate().with_min_len(32).for_each(|(pack, nodes)| {
             let own = pack * PACK..inverse_volume.len().min((pack + 1) * PACK);
-            let parts = shares.of(own.clone()).zip(&inverse_volume[own]);
-            for (value, (places, &inverse)) in nodes.0.iter_mut().zip(parts) {
-                let sum = places.iter().fold(R::ZERO, |sum, &place| sum + sums[place as usize][0]);
-                *value = sum * inverse;
+            let part = |place: usize| sums[place][0];
+            shares.visit(own.clone(), &mut nodes.0, part, |sum, place| *sum += part(place));
+            for (value, &inverse) in nodes.0.iter_mut().zip(&inverse_volume[own]) {
+                *value = *value * inverse;
             }
         });
     }

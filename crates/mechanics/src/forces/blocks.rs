@@ -85,36 +85,55 @@ impl Blocks {
     }
 }
 
-/// Where the parts of what is summed at each node lie, in the order in which they are added.
+/// Where the parts of what is summed at each node lie. Most nodes have one part: these come first, without a branch, then
+/// the others, in the order of the nodes and of adding.
 #[derive(Clone, Debug)]
 pub(super) struct Shares {
-    /// First entry of `places` of each node, one more than there are nodes.
-    offsets: Vec<u32>,
-    places: Vec<u32>,
+    /// The first part of each node; for a node without any, an entry beyond all parts.
+    first: Vec<u32>,
+    /// Further parts, as node and place.
+    further: Vec<[u32; 2]>,
+    /// Where in `further` those of every [`PACK`] nodes begin.
+    starts: Vec<u32>,
 }
 
 impl Shares {
-    /// Of `count` nodes, from pairs of node and place in the order of adding.
-    pub(super) fn new(count: usize, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> Self {
-        let mut offsets = vec![0_u32; count + 1];
-        pairs.clone().for_each(|(node, _)| offsets[node as usize + 1] += 1);
-        for node in 0..count {
-            offsets[node + 1] += offsets[node];
-        }
-        let mut next = offsets.clone();
-        let mut places = vec![0; offsets[count] as usize];
+    /// Of `count` nodes, from pairs of node and place in the order of adding. The place `none` holds nothing.
+    pub(super) fn new(count: usize, none: u32, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
+        let (mut first, mut further) = (vec![none; count], Vec::new());
         for (node, place) in pairs {
-            places[next[node as usize] as usize] = place;
-            next[node as usize] += 1;
+            match &mut first[node as usize] {
+                first if *first == none => *first = place,
+                _ => further.push([node, place]),
+            }
         }
-        Self { offsets, places }
+        // Stable: each node keeps the order of adding.
+        further.sort_by_key(|[node, _]| *node);
+        let start = |pack: usize| further.partition_point(|[node, _]| (*node as usize) < pack * PACK) as u32;
+        Self { starts: (0..=count / PACK).map(start).collect(), first, further }
     }
 
-    /// The places of the parts of some nodes.
+    /// Hands out the places of the parts of some nodes: `first` for each node, then `further` in order, each with the number
+    /// of the node among them.
     #[inline(always)]
-    pub(super) fn of(&self, nodes: Range<usize>) -> impl Iterator<Item = &[u32]> {
-        let ends = self.offsets[nodes.start..=nodes.end].windows(2);
-        ends.map(|ends| &self.places[ends[0] as usize..ends[1] as usize])
+    pub(super) fn visit<T>(
+        &self,
+        nodes: Range<usize>,
+        sums: &mut [T],
+        first: impl Fn(usize) -> T,
+        further: impl Fn(&mut T, usize),
+    ) {
+        for (sum, &place) in sums.iter_mut().zip(&self.first[nodes.clone()]) {
+            *sum = first(place as usize);
+        }
+        for &[node, place] in &self.further[self.starts[nodes.start / PACK] as usize..] {
+            if node as usize >= nodes.end {
+                break;
+            }
+            if node as usize >= nodes.start {
+                further(&mut sums[node as usize - nodes.start], place as usize);
+            }
+        }
     }
 }
 

@@ -26,7 +26,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, load_vector, plus};
+use crate::lanes::{Lanes, PACK, Pack, load_vector};
 use crate::model::{CellBlock, Cells, Model, Solid};
 use crate::prony::Prony;
 use crate::state::History;
@@ -273,7 +273,7 @@ pub(crate) struct InternalForces<R> {
     fields: Vec<Box<dyn ForceField<R>>>,
     /// First entry of `forces` of each field, one more than there are fields.
     field_offsets: Vec<usize>,
-    /// Forces [N] of the blocks of each field.
+    /// Forces [N] of the blocks of each field, and none for nodes without cells.
     forces: Vec<Quad<R>>,
     /// What each block of each field found.
     findings: Vec<Vec<Findings<R>>>,
@@ -288,12 +288,13 @@ impl<R: Real> InternalForces<R> {
         for field in &fields {
             field_offsets.push(field_offsets[field_offsets.len() - 1] + field.blocks().room());
         }
+        let count = field_offsets[fields.len()];
         let places = fields.iter().zip(&field_offsets).flat_map(|(field, &first)| {
             field.blocks().places().map(move |(node, place)| (node, first as u32 + place))
         });
         Self {
-            shares: Shares::new(model.node_count(), places),
-            forces: vec![[R::ZERO; 4]; field_offsets[fields.len()]],
+            shares: Shares::new(model.node_count(), count as u32, places),
+            forces: vec![[R::ZERO; 4]; count + 1],
             findings: fields.iter().map(|field| vec![Findings::default(); field.blocks().len()]).collect(),
             field_offsets,
             fields,
@@ -338,12 +339,10 @@ impl<R: Real> InternalForces<R> {
     /// The same of some nodes.
     #[inline(always)]
     pub(crate) fn at_nodes(&self, nodes: Range<usize>, to: &mut [Vector<R>]) {
-        for (to, places) in to.iter_mut().zip(self.shares.of(nodes)) {
-            let mut sum = [R::ZERO; 4];
-            for &place in places {
-                sum = plus(sum, self.forces[place as usize]);
-            }
-            *to = [sum[0], sum[1], sum[2]];
-        }
+        let part = |place: usize| {
+            let [x, y, z, _] = self.forces[place];
+            [x, y, z]
+        };
+        self.shares.visit(nodes, to, part, |sum, place| *sum = add(*sum, part(place)));
     }
 }
