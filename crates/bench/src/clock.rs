@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use pliant_mechanics::model::Contradiction;
-use pliant_mechanics::{CentralDifference, Model, Real, State, StepError};
+use pliant_mechanics::{CentralDifference, Instructions, MissingInstructions, Model, Real, State, StepError};
 
 /// A model under the clock: a stepper and the state that it steps.
 pub struct Clocked<'m, R> {
@@ -18,6 +18,14 @@ impl<'m, R: Real> Clocked<'m, R> {
     /// If constraints contradict each other.
     pub fn new(model: &'m Model, step: f64, state: State<R>) -> Result<Self, Contradiction> {
         Ok(Self { stepper: CentralDifference::new(model, step)?, state })
+    }
+
+    /// In the lanes of certain instructions instead of the widest.
+    ///
+    /// # Errors
+    /// If the processor does not have them.
+    pub fn in_lanes(self, instructions: Instructions) -> Result<Self, MissingInstructions> {
+        Ok(Self { stepper: self.stepper.in_lanes(instructions)?, ..self })
     }
 
     /// Takes some steps, at least one, on the current rayon pool; returns the wall time of one [s].

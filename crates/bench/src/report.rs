@@ -1,5 +1,6 @@
 //! What was measured, as a table and as JSON.
 
+use pliant_mechanics::Instructions;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -40,6 +41,8 @@ pub struct Row {
     pub adapter: String,
     /// The path that ran.
     pub design: &'static str,
+    /// The instructions it ran in.
+    pub lanes: &'static str,
     /// Wall time of a step per element [ns], the median of the repeats.
     pub ns_per_element_step: f64,
     /// The same of the fastest repeat.
@@ -73,6 +76,7 @@ impl Row {
         case: Case,
         machine: &Machine,
         rates: &Rates,
+        lanes: Instructions,
         seconds: Spread,
         (step, critical_step_from): (f64, Limit),
     ) -> Self {
@@ -89,6 +93,7 @@ impl Row {
             threads: rates.threads,
             adapter: machine.processor.clone(),
             design: "cpu",
+            lanes: lanes.name(),
             ns_per_element_step: ns(seconds.median),
             ns_least: ns(seconds.least),
             ns_most: ns(seconds.most),
@@ -230,8 +235,8 @@ impl Report {
         let mut parts = vec![
             format!("{processor}, {cores} cores, {system}; pliant {}, {}.", env!("CARGO_PKG_VERSION"), today()),
             format!(
-                "Whole steps; median of {} repeats of {} s or more, least and most beside it; design `cpu`.",
-                self.settings.repeats, self.settings.seconds
+                "Whole steps; median of {} repeats of {} s or more, least and most beside it; design `cpu`, lanes `{}`.",
+                self.settings.repeats, self.settings.seconds, self.settings.lanes
             ),
             self.rates_table(),
             "Bytes and operations are counted per element and step; \"copy\" and \"mul-add\" are the parts of the rates \

@@ -6,7 +6,7 @@
 
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::model::Contradiction;
-use pliant_mechanics::{Model, Real, State, StepError};
+use pliant_mechanics::{Instructions, MissingInstructions, Model, Real, State, StepError};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::case::{Case, EDGE, Element, LawKind, Precision, Threads};
@@ -32,11 +32,13 @@ pub struct Settings {
     pub repeats: usize,
     /// Wall time of a repeat [s].
     pub seconds: f64,
+    /// The instructions that the steps run in.
+    pub lanes: Instructions,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { repeats: 5, seconds: 0.2 }
+        Self { repeats: 5, seconds: 0.2, lanes: Instructions::widest() }
     }
 }
 
@@ -63,6 +65,9 @@ pub enum BenchError {
     /// Constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
+    /// The processor has not the instructions asked for.
+    #[error(transparent)]
+    Lanes(#[from] MissingInstructions),
     /// No threads.
     #[error("{0}")]
     Threads(#[from] ThreadPoolBuildError),
@@ -148,7 +153,8 @@ impl Bench {
             Precision::Double => repeats::<f64>(case, &specimen, step, settings),
         })?;
         let rates = *rates;
-        Ok(Row::new(*case, &self.machine, &rates, Spread::of(repeats), (PART_OF_LIMIT * limit, from)))
+        let step = (PART_OF_LIMIT * limit, from);
+        Ok(Row::new(*case, &self.machine, &rates, settings.lanes, Spread::of(repeats), step))
     }
 
     /// Measures a cube of a predicted size, and of the size that its measurement tells, three at the most.
@@ -201,7 +207,8 @@ fn repeats<R: Real>(
     step: f64,
     settings: Settings,
 ) -> Result<Vec<f64>, BenchError> {
-    let mut clocked = Clocked::new(&specimen.model, step, start::<R>(&specimen.model))?;
+    let clocked = Clocked::new(&specimen.model, step, start::<R>(&specimen.model))?;
+    let mut clocked = clocked.in_lanes(settings.lanes)?;
     let named = |source| BenchError::Step { id: case.id(), source };
     let steps = clocked.steps_within(settings.seconds).map_err(named)?;
     (0..settings.repeats.max(1)).map(|_| clocked.seconds_per_step(steps).map_err(named)).collect()
@@ -218,7 +225,8 @@ mod tests {
         let seconds = 1e-9 * ns * case.cells() as f64;
         let spread = Spread { median: seconds, least: seconds, most: seconds };
         // Δt = 5 ms/n.
-        Row::new(case, &Machine::this(), &rates, spread, (5e-3 / case.edge as f64, Limit::True))
+        let step = (5e-3 / case.edge as f64, Limit::True);
+        Row::new(case, &Machine::this(), &rates, Instructions::Plain, spread, step)
     }
 
     #[test]
@@ -246,7 +254,7 @@ mod tests {
         let case = find("tet4-nh-6000").unwrap();
         let specimen = squeezed(case.specimen());
         let step = 0.5 * specimen.element_bound();
-        let settings = Settings { repeats: 1, seconds: 0.0 };
+        let settings = Settings { repeats: 1, seconds: 0.0, ..Settings::default() };
         assert!(repeats::<f32>(&case, &specimen, step, settings).unwrap()[0] > 0.0);
         let displacement = start::<f64>(&specimen.model).displacement;
         let rest = State::<f64>::at_rest(&specimen.model).displacement;

@@ -1,14 +1,14 @@
 //! Numbers side by side: kernels written once, generic over [`Lanes`], run sixteen, eight or four cells at a time.
 //!
 //! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it. The processor
-//! is asked once, when a force field is made: AVX-512 (with the feature `avx512`), else AVX2 with FMA, or NEON; without
+//! is asked once, when a force field is made: AVX-512 (with the feature `avx512`), AVX2 with FMA, SSE4.2, or NEON; without
 //! any of them the kernels run in plain numbers. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
 //! (tested), elsewhere to round-off.
 #![allow(unsafe_code)]
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use crate::real::closer_to_inverse_cbrt;
@@ -99,37 +99,114 @@ pub trait Work<R> {
     fn run<L: Lanes<R>>(self) -> Self::Output;
 }
 
-/// The lanes of this processor.
+/// Instructions that kernels are compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instructions {
+    /// AVX-512: sixteen numbers in single precision.
+    Avx512,
+    /// AVX2 with FMA: eight.
+    Avx2,
+    /// SSE4.2, which any x86-64 processor since 2009 has: four.
+    Sse4,
+    /// NEON: four.
+    Neon,
+    /// One number at a time.
+    Plain,
+}
+
+impl Instructions {
+    /// All, the widest first.
+    pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Sse4, Self::Neon, Self::Plain];
+
+    /// The word for them.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Avx512 => "avx512",
+            Self::Avx2 => "avx2",
+            Self::Sse4 => "sse4",
+            Self::Neon => "neon",
+            Self::Plain => "plain",
+        }
+    }
+
+    /// The widest that this processor has and this build knows.
+    pub fn widest() -> Self {
+        Self::ALL.into_iter().find(|&known| Processor::with(known).is_ok()).unwrap_or(Self::Plain)
+    }
+}
+
+impl std::fmt::Display for Instructions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Instructions that this processor or this build does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "this processor has no `{wanted}` instructions that pliant was built for; the widest it has are `{widest}`"
+)]
+pub struct MissingInstructions {
+    /// What was asked for.
+    pub wanted: Instructions,
+    /// What there is.
+    pub widest: Instructions,
+}
+
+/// The lanes that kernels run in.
 #[derive(Clone, Copy, Debug)]
-pub struct Processor(Arch);
+pub enum Processor {
+    #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+    Avx512(pulp::x86::V4),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(pulp::x86::V3),
+    #[cfg(target_arch = "x86_64")]
+    Sse4(pulp::x86::V2),
+    #[cfg(target_arch = "aarch64")]
+    Neon(pulp::aarch64::Neon),
+    Plain,
+}
 
 impl Processor {
-    /// Asks the processor.
+    /// The widest lanes that this processor has.
     pub(crate) fn detect() -> Self {
-        Self(Arch::new())
+        Self::with(Instructions::widest()).unwrap_or(Self::Plain)
     }
 
-    /// Plain numbers, and the lanes that this processor has.
-    #[cfg(test)]
-    pub(crate) fn all() -> Vec<Self> {
-        #[allow(unused_mut)]
-        let mut all = vec![Self(Arch::Scalar), Self::detect()];
-        #[cfg(target_arch = "x86_64")]
-        all.extend(pulp::x86::V3::try_new().map(|v3| Self(Arch::V3(v3))));
-        all
+    /// The lanes of certain instructions.
+    ///
+    /// # Errors
+    /// If the processor does not have them.
+    pub(crate) fn with(wanted: Instructions) -> Result<Self, MissingInstructions> {
+        let found = match wanted {
+            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+            Instructions::Avx512 => pulp::x86::V4::try_new().map(Self::Avx512),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => pulp::x86::V3::try_new().map(Self::Avx2),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Sse4 => pulp::x86::V2::try_new().map(Self::Sse4),
+            #[cfg(target_arch = "aarch64")]
+            Instructions::Neon => pulp::aarch64::Neon::try_new().map(Self::Neon),
+            Instructions::Plain => Some(Self::Plain),
+            #[allow(unreachable_patterns)]
+            _ => None,
+        };
+        found.ok_or_else(|| MissingInstructions { wanted, widest: Instructions::widest() })
     }
 
-    /// Does the work in the widest lanes.
+    /// Does the work in these lanes.
     #[inline]
     pub(crate) fn run<R: Real, W: Work<R>>(self, work: W) -> W::Output {
-        match self.0 {
+        match self {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
-            Arch::V4(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            Self::Avx512(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
             #[cfg(target_arch = "x86_64")]
-            Arch::V3(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            Self::Avx2(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse4(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
             #[cfg(target_arch = "aarch64")]
-            Arch::Neon(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
-            _ => work.run::<R>(),
+            Self::Neon(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            Self::Plain => work.run::<R>(),
         }
     }
 }
@@ -314,6 +391,10 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn mul_add(self, factor: Self, term: Self) -> Self {
+                // SSE has no such instruction, and pulp asks the library for each number.
+                if cfg!(target_arch = "x86_64") && size_of::<S::$vector>() == 16 {
+                    return self * factor + term;
+                }
                 Self(Self::simd().$mul_add(self.0, factor.0, term.0))
             }
             #[inline(always)]

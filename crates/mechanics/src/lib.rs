@@ -63,7 +63,7 @@ pub use dynamic_relaxation::{
     Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings,
 };
 pub use fingerprint::fingerprint;
-pub use lanes::Pack;
+pub use lanes::{Instructions, MissingInstructions, Pack};
 pub use model::Model;
 pub use real::{Number, Real};
 pub use state::{History, State, Work};

@@ -17,7 +17,7 @@ use crate::Real;
 use crate::applied::AppliedForces;
 use crate::critical_step::limit_about;
 use crate::forces::{Deformed, InternalForces};
-use crate::lanes::{Lanes, Processor, Work};
+use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
 use crate::model::{Contradiction, FREE, Model};
 use crate::stability::{CHANGE, CHECK_EVERY, Look, Monitor, OnUnstable, substeps};
 use crate::state::State;
@@ -529,6 +529,16 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     pub fn watched(mut self, monitor: Monitor) -> Self {
         self.monitor = Some(monitor);
         self
+    }
+
+    /// Runs in the lanes of certain instructions instead of the widest.
+    ///
+    /// # Errors
+    /// If the processor does not have them.
+    pub fn in_lanes(mut self, instructions: Instructions) -> Result<Self, MissingInstructions> {
+        self.processor = Processor::with(instructions)?;
+        self.forces.set_processor(self.processor);
+        Ok(self)
     }
 
     /// The length [s] of a whole step.

@@ -97,7 +97,7 @@ impl<R: Real> AveragedTets<R> {
     }
 
     /// p_n from J_n − 1, relaxed where the law's volumetric part relaxes.
-    fn to_pressures(&mut self, history: &mut [Pack<R>]) {
+    fn find_pressures(&mut self, history: &mut [Pack<R>]) {
         let (processor, constants) = (self.processor, &self.constants);
         let values = self.node_value.par_chunks_mut(PACKS).with_min_len(8);
         let pass = |values: &mut [Pack<R>], history: &mut [Pack<R>]| {
@@ -282,12 +282,12 @@ impl<R: Real> Work<R> for Pass<'_, R> {
         let packs = cells.packs_of(block);
         for first in packs.clone().step_by(PACKS) {
             let count = PACKS.min(packs.end - first);
-            for index in 0..count {
+            for (index, average) in averages[..count].iter_mut().enumerate() {
                 let pack = first + index;
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let (u, beside) = relative::<R, L, 4, 3>(moved, &cells.nodes[pack], at);
                     batch.set(index, at, &displacement_gradient(&u, &rest[pack].gradient, at));
-                    (beside * L::of(0.25)).store(&mut averages[index], at);
+                    (beside * L::of(0.25)).store(average, at);
                 }
             }
             // A deformation that is averaged shows its own measures before, others theirs after.
@@ -303,7 +303,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 }
             }
             batch.evaluate::<L>(law, count, 1, cells.fibres(first, count));
-            for index in 0..count {
+            for (index, average) in averages[..count].iter().enumerate() {
                 let pack = first + index;
                 if !of_deformation {
                     batch.note(index, pack * PACK, &mut findings);
@@ -313,7 +313,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let elastic = batch.elastic::<L>(index, at);
                     let f = batch.deformation_gradient::<L>(index, at);
-                    let average = L::load(&averages[index], at);
+                    let average = L::load(average, at);
                     let piola = constants.piola(&f, elastic, average, &mut history[own.clone()], at);
                     let piola = piola.scaled(L::load(&rest[pack].volume, at));
                     by_cell(&nodal_forces(&piola, &rest[pack].gradient, at), &mut forces, at);
@@ -376,7 +376,7 @@ impl<R: Real> ForceField<R> for AveragedTets<R> {
         });
         self.average_to_nodes(forces);
         match self.constants.averaging {
-            Averaging::Nodal => self.to_pressures(&mut history.pressures),
+            Averaging::Nodal => self.find_pressures(&mut history.pressures),
             Averaging::Variational => {
                 let (constants, values) = (&self.constants, &self.node_value);
                 let pressures = (history.pressures.as_mut_slice(), constants.volumetric_slots);
@@ -398,7 +398,6 @@ impl<R: Real> ForceField<R> for AveragedTets<R> {
     fn set_step(&mut self, prony: &Prony, step: f64) {
         self.constants.relaxation.set_step(prony, step);
     }
-    #[cfg(test)]
     fn set_processor(&mut self, processor: Processor) {
         self.processor = processor;
     }

@@ -177,7 +177,6 @@ impl<R: Real> ForceField<R> for FullHexes<R> {
     fn set_step(&mut self, prony: &Prony, step: f64) {
         self.constants.relaxation.set_step(prony, step);
     }
-    #[cfg(test)]
     fn set_processor(&mut self, processor: Processor) {
         self.processor = processor;
     }

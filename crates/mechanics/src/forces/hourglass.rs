@@ -47,11 +47,10 @@ impl<R: Real> Resistance<R> {
     ) -> L {
         let stiffness = L::load(&control.stiffness, at);
         let mut energy = L::ZERO;
-        let signed = signed_sums(u);
-        for c in 0..4 {
-            let q = sub(signed[c], h.apply(load_vector(&control.moments[c], at)));
+        for ((signed, moment), kq) in signed_sums(u).into_iter().zip(&control.moments).zip(&mut self.0) {
+            let q = sub(signed, h.apply(load_vector(moment, at)));
             energy += dot(q, q);
-            store_vector(scale(q, stiffness), &mut self.0[c], at);
+            store_vector(scale(q, stiffness), kq, at);
         }
         L::of(0.5) * stiffness * energy
     }

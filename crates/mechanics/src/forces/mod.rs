@@ -26,7 +26,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, load_vector};
+use crate::lanes::{Lanes, PACK, Pack, Processor, load_vector};
 use crate::model::{CellBlock, Cells, Model, Solid};
 use crate::prony::Prony;
 use crate::state::History;
@@ -113,9 +113,8 @@ pub trait ForceField<R>: Send + Sync {
     /// Relaxes from now on over steps of `step` seconds.
     fn set_step(&mut self, prony: &Prony, step: f64);
 
-    /// Runs from now on as on another processor.
-    #[cfg(test)]
-    fn set_processor(&mut self, processor: crate::lanes::Processor);
+    /// Runs from now on in other lanes.
+    fn set_processor(&mut self, processor: Processor);
 }
 
 /// What all elements need of their cells, in packs.
@@ -326,6 +325,11 @@ impl<R: Real> InternalForces<R> {
         for (field, solid) in self.fields.iter_mut().zip(&model.solids) {
             field.set_step(&solid.material.prony, step);
         }
+    }
+
+    /// Runs from now on in other lanes.
+    pub(crate) fn set_processor(&mut self, processor: Processor) {
+        self.fields.iter_mut().for_each(|field| field.set_processor(processor));
     }
 
     /// The internal force [N] on a node from the last evaluation.

@@ -75,20 +75,20 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
         let packs = cells.packs_of(block);
         for first in packs.clone().step_by(PACKS) {
             let count = PACKS.min(packs.end - first);
-            for index in 0..count {
+            for (index, resistance) in resistance[..count].iter_mut().enumerate() {
                 let pack = first + index;
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let (u, _) = relative::<R, L, N, M>(moved, &cells.nodes[pack], at);
                     let h = displacement_gradient(&u, &rest[pack].gradient, at);
                     batch.set(index, at, &h);
                     if let Some(control) = hourglass {
-                        let energy = resistance[index].find(&control[pack], &u, &h, at);
+                        let energy = resistance.find(&control[pack], &u, &h, at);
                         (energy + L::load(&findings.hourglass, at)).store(&mut findings.hourglass, at);
                     }
                 }
             }
             batch.evaluate::<L>(law, count, 1, cells.fibres(first, count));
-            for index in 0..count {
+            for (index, resistance) in resistance[..count].iter().enumerate() {
                 let pack = first + index;
                 batch.note(index, pack * PACK, &mut findings);
                 let own = (pack - packs.start) * per_pack;
@@ -99,11 +99,11 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                     let piola = batch.deformation_gradient::<L>(index, at).times_symmetric(&stress);
                     let mut piola = piola.scaled(L::load(&rest[pack].volume, at));
                     if let Some(control) = hourglass {
-                        resistance[index].turn(&control[pack], &mut piola, at);
+                        resistance.turn(&control[pack], &mut piola, at);
                     }
                     let mut nodal = nodal_forces(&piola, &rest[pack].gradient, at);
                     if hourglass.is_some() {
-                        resistance[index].add_to(&mut nodal, at);
+                        resistance.add_to(&mut nodal, at);
                     }
                     by_cell(&nodal, &mut forces, at);
                 }
@@ -134,7 +134,6 @@ impl<R: Real, const N: usize, const M: usize> ForceField<R> for SolidForces<R, N
     fn set_step(&mut self, prony: &Prony, step: f64) {
         self.constants.relaxation.set_step(prony, step);
     }
-    #[cfg(test)]
     fn set_processor(&mut self, processor: Processor) {
         self.processor = processor;
     }
