@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure};
 use pliant_mechanics::model::Contradiction;
-use pliant_mechanics::{CentralDifference, Model, Real, State, StepError};
+use pliant_mechanics::{CentralDifference, Instructions, MissingInstructions, Model, Real, State, StepError};
 
 /// What can be stepped against the clock.
 pub trait Timed {
@@ -48,6 +48,14 @@ impl<'m, R: Real> Clocked<'m, R> {
     /// If constraints contradict each other.
     pub fn new(model: &'m Model, step: f64, state: State<R>) -> Result<Self, Contradiction> {
         Ok(Self { stepper: CentralDifference::new(model, step)?, state })
+    }
+
+    /// In the lanes of certain instructions instead of the widest.
+    ///
+    /// # Errors
+    /// If the processor does not have them.
+    pub fn in_lanes(self, instructions: Instructions) -> Result<Self, MissingInstructions> {
+        Ok(Self { stepper: self.stepper.in_lanes(instructions)?, ..self })
     }
 }
 

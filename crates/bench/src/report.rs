@@ -1,6 +1,7 @@
 //! What was measured, as a table and as JSON.
 
 use pliant_gpu::{Adapter, DeviceRates};
+use pliant_mechanics::Instructions;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -41,6 +42,8 @@ pub struct Row {
     pub adapter: String,
     /// The path that ran: `cpu`, or the design on a graphics processor.
     pub design: String,
+    /// The instructions it ran in; `null` on a graphics processor.
+    pub lanes: Option<&'static str>,
     /// Wall time of a step per element [ns], the median of the repeats.
     pub ns_per_element_step: f64,
     /// The same of the fastest repeat.
@@ -74,6 +77,7 @@ pub(crate) struct Measured {
     pub adapter: String,
     pub threads: Option<usize>,
     pub design: String,
+    pub lanes: Option<Instructions>,
     /// Bytes read and written in copying [1/s].
     pub copy: f64,
     /// Operations in multiply-adds [1/s].
@@ -101,6 +105,7 @@ impl Row {
             threads: place.threads,
             adapter: place.adapter,
             design: place.design,
+            lanes: place.lanes.map(Instructions::name),
             ns_per_element_step: ns(seconds.median),
             ns_least: ns(seconds.least),
             ns_most: ns(seconds.most),
@@ -291,8 +296,8 @@ impl Report {
         let mut parts = vec![
             format!("{processor}, {cores} cores, {system}; pliant {}, {}.", env!("CARGO_PKG_VERSION"), today()),
             format!(
-                "Whole steps; median of {} repeats of {} s or more, least and most beside it.",
-                self.settings.repeats, self.settings.seconds
+                "Whole steps; median of {} repeats of {} s or more, least and most beside it; lanes `{}`.",
+                self.settings.repeats, self.settings.seconds, self.settings.lanes
             ),
             self.rates_table(),
             "Bytes and operations are counted per element and step; \"copy\" and \"mul-add\" are the parts of the rates \

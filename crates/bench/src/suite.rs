@@ -7,7 +7,7 @@
 use pliant_gpu::{Device, DeviceRates, GpuError, StepFailure};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::model::Contradiction;
-use pliant_mechanics::{Model, Real, State, StepError};
+use pliant_mechanics::{Instructions, MissingInstructions, Model, Real, State, StepError};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::case::{Case, EDGE, Element, LawKind, Place, Precision, Threads};
@@ -33,11 +33,13 @@ pub struct Settings {
     pub repeats: usize,
     /// Wall time of a repeat [s].
     pub seconds: f64,
+    /// The instructions that the steps run in.
+    pub lanes: Instructions,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { repeats: 5, seconds: 0.2 }
+        Self { repeats: 5, seconds: 0.2, lanes: Instructions::widest() }
     }
 }
 
@@ -64,6 +66,9 @@ pub enum BenchError {
     /// Constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
+    /// The processor has not the instructions asked for.
+    #[error(transparent)]
+    Lanes(#[from] MissingInstructions),
     /// No threads.
     #[error("{0}")]
     Threads(#[from] ThreadPoolBuildError),
@@ -184,7 +189,8 @@ impl Bench {
                 let multiply_add = rates.multiply_add(case.precision);
                 let threads = Some(rates.threads);
                 let design = "cpu".to_owned();
-                (seconds, Measured { adapter: processor, threads, design, copy: rates.copy, multiply_add })
+                let (lanes, copy) = (Some(settings.lanes), rates.copy);
+                (seconds, Measured { adapter: processor, threads, design, lanes, copy, multiply_add })
             }
             Place::Device(design) => {
                 let (device, rates) = self.device()?;
@@ -195,7 +201,7 @@ impl Bench {
                 })?;
                 let (adapter, design) = (device.adapter().name.clone(), design.to_string());
                 let DeviceRates { copy, multiply_add, .. } = *rates;
-                (seconds, Measured { adapter, threads: None, design, copy, multiply_add })
+                (seconds, Measured { adapter, threads: None, design, lanes: None, copy, multiply_add })
             }
         };
         Ok(Row::new(*case, place, Spread::of(seconds), (PART_OF_LIMIT * limit, from)))
@@ -251,7 +257,8 @@ fn on_processor<R: Real>(
     step: f64,
     settings: Settings,
 ) -> Result<Vec<f64>, BenchError> {
-    let mut clocked = Clocked::new(model, step, start::<R>(model))?;
+    let clocked = Clocked::new(model, step, start::<R>(model))?;
+    let mut clocked = clocked.in_lanes(settings.lanes)?;
     repeats(&mut clocked, settings).map_err(|source| BenchError::Step { id: case.id(), source })
 }
 
@@ -275,6 +282,7 @@ mod tests {
             adapter: String::new(),
             threads,
             design: "cpu".into(),
+            lanes: Some(Instructions::Plain),
             copy: 1e10,
             multiply_add: 1e11,
         };
@@ -309,7 +317,7 @@ mod tests {
         let case = find("tet4-nh-6000").unwrap();
         let specimen = squeezed(case.specimen());
         let step = 0.5 * specimen.element_bound();
-        let settings = Settings { repeats: 1, seconds: 0.0 };
+        let settings = Settings { repeats: 1, seconds: 0.0, ..Settings::default() };
         assert!(on_processor::<f32>(&case, &specimen.model, step, settings).unwrap()[0] > 0.0);
         let displacement = start::<f64>(&specimen.model).displacement;
         let rest = State::<f64>::at_rest(&specimen.model).displacement;

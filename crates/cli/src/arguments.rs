@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand, ValueEnum};
+use pliant_bench::Instructions;
 
 /// Real-time simulation of soft organs.
 #[derive(Debug, Parser)]
@@ -112,12 +114,21 @@ pub struct Bench {
     /// Repeats of each row; the median counts.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub repeats: u16,
+    /// Instructions to run in, instead of the widest there are; `plain` is one number at a time.
+    #[arg(long, value_name = "WORD", value_parser = instructions())]
+    pub lanes: Option<Instructions>,
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
     /// Also renew the tables in a Markdown file, between its two marks.
     #[arg(long, value_name = "FILE")]
     pub table: Option<PathBuf>,
+}
+
+fn instructions() -> impl TypedValueParser<Value = Instructions> {
+    let of = |word: &String| Instructions::ALL.into_iter().find(|known| known.name() == word);
+    PossibleValuesParser::new(Instructions::ALL.map(Instructions::name))
+        .try_map(move |word| of(&word).ok_or_else(|| format!("no instructions are called `{word}`")))
 }
 
 #[derive(Debug, clap::Args)]

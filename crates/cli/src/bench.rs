@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use pliant_bench::{Case, Place, Settings, cases, find, measure};
+use pliant_bench::{BenchError, Case, Place, Settings, cases, find, measure};
 use serde_json::json;
 
 use crate::arguments::Bench;
@@ -17,11 +17,16 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
     let cases = chosen(arguments)?;
     let page = arguments.table.as_deref().map(|path| Page::read(path, "bench")).transpose()?;
     let bar = Bar::new();
-    let settings = Settings { repeats: arguments.repeats.into(), ..Settings::default() };
+    let mut settings = Settings { repeats: arguments.repeats.into(), ..Settings::default() };
+    settings.lanes = arguments.lanes.unwrap_or(settings.lanes);
     let result = measure(&cases, settings, &mut |progress| bar.update_bench(&progress));
     bar.finish();
     let report = match result {
         Ok(report) => report,
+        Err(BenchError::Lanes(missing)) => {
+            let help = format!("leave `--lanes` out, or take `--lanes {}`", missing.widest);
+            return Err(Failure::plain(missing.to_string(), help));
+        }
         Err(error) => {
             eprintln!("error: {error}");
             if arguments.json {

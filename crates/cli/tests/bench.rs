@@ -92,6 +92,30 @@ fn designs_without_a_device_are_answered_with_the_packages() {
 }
 
 #[test]
+fn lanes_are_chosen_by_word_and_missing_ones_are_refused() {
+    let workshop = Workshop::new("");
+    let run = |word: &str| {
+        let row = ["bench", "--only", "hex8-nh-1000", "--repeats", "1", "--json", "--lanes", word];
+        workshop.pliant(&row)
+    };
+    let told = run("plain");
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert_eq!(told.json()["rows"][0]["lanes"], "plain");
+    let foreign = if cfg!(target_arch = "x86_64") { "neon" } else { "avx512" };
+    let told = run(foreign);
+    assert_eq!(told.code, 2);
+    assert!(
+        told.words().contains(&format!("this processor has no `{foreign}` instructions")),
+        "{}",
+        told.err
+    );
+    assert!(told.words().contains("leave `--lanes` out"), "{}", told.err);
+    let told = run("mmx");
+    assert_eq!(told.code, 2);
+    assert!(told.err.contains("avx2"), "{}", told.err);
+}
+
+#[test]
 fn several_rows_make_a_table_and_three_meshes_a_line() {
     let ids = ["hex8-nh-1000", "hex8-nh-4096", "hex8-nh-15625"].map(|id| ["--only", id]).concat();
     let workshop = Workshop::new("");

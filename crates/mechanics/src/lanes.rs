@@ -1,16 +1,17 @@
 //! Numbers side by side: kernels written once, generic over [`Lanes`], run sixteen, eight or four cells at a time.
 //!
 //! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it. The processor
-//! is asked once, when a force field is made: AVX-512 (with the feature `avx512`), else AVX2 with FMA, or NEON; without
+//! is asked once, when a force field is made: AVX-512 (with the feature `avx512`), AVX2 with FMA, SSE4.2, or NEON; without
 //! any of them the kernels run in plain numbers. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
 //! (tested), elsewhere to round-off.
 #![allow(unsafe_code)]
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
+use crate::real::closer_to_inverse_cbrt;
 use crate::tensor::{Symmetric, Tensor, Vector};
 use crate::{Number, Real};
 
@@ -49,6 +50,12 @@ pub trait Lanes<R>: Number {
     fn load(pack: &Pack<R>, at: usize) -> Self;
     /// Writes them into a pack from lane `at` on.
     fn store(self, pack: &mut Pack<R>, at: usize);
+    /// The four components of the vectors at some places, for lanes `at` and on.
+    fn gather(vectors: &[[R; 4]], places: &[u16; PACK], at: usize) -> [Self; 4];
+    /// Writes vectors from lane `at` on, each where [`row_of_lane`](Self::row_of_lane) tells.
+    fn spread(components: [Self; 4], to: &mut Pack<[R; 4]>, at: usize);
+    /// Where the vector of a lane of a pack is written: the order in which registers hold them.
+    fn row_of_lane(lane: usize) -> usize;
     /// Does the work in a function of its own, compiled for these lanes.
     fn call<W: Work<R>>(work: W) -> W::Output;
 }
@@ -92,37 +99,114 @@ pub trait Work<R> {
     fn run<L: Lanes<R>>(self) -> Self::Output;
 }
 
-/// The lanes of this processor.
+/// Instructions that kernels are compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instructions {
+    /// AVX-512: sixteen numbers in single precision.
+    Avx512,
+    /// AVX2 with FMA: eight.
+    Avx2,
+    /// SSE4.2, which any x86-64 processor since 2009 has: four.
+    Sse4,
+    /// NEON: four.
+    Neon,
+    /// One number at a time.
+    Plain,
+}
+
+impl Instructions {
+    /// All, the widest first.
+    pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Sse4, Self::Neon, Self::Plain];
+
+    /// The word for them.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Avx512 => "avx512",
+            Self::Avx2 => "avx2",
+            Self::Sse4 => "sse4",
+            Self::Neon => "neon",
+            Self::Plain => "plain",
+        }
+    }
+
+    /// The widest that this processor has and this build knows.
+    pub fn widest() -> Self {
+        Self::ALL.into_iter().find(|&known| Processor::with(known).is_ok()).unwrap_or(Self::Plain)
+    }
+}
+
+impl std::fmt::Display for Instructions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Instructions that this processor or this build does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "this processor has no `{wanted}` instructions that pliant was built for; the widest it has are `{widest}`"
+)]
+pub struct MissingInstructions {
+    /// What was asked for.
+    pub wanted: Instructions,
+    /// What there is.
+    pub widest: Instructions,
+}
+
+/// The lanes that kernels run in.
 #[derive(Clone, Copy, Debug)]
-pub struct Processor(Arch);
+pub enum Processor {
+    #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+    Avx512(pulp::x86::V4),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(pulp::x86::V3),
+    #[cfg(target_arch = "x86_64")]
+    Sse4(pulp::x86::V2),
+    #[cfg(target_arch = "aarch64")]
+    Neon(pulp::aarch64::Neon),
+    Plain,
+}
 
 impl Processor {
-    /// Asks the processor.
+    /// The widest lanes that this processor has.
     pub(crate) fn detect() -> Self {
-        Self(Arch::new())
+        Self::with(Instructions::widest()).unwrap_or(Self::Plain)
     }
 
-    /// Plain numbers, and the lanes that this processor has.
-    #[cfg(test)]
-    pub(crate) fn all() -> Vec<Self> {
-        #[allow(unused_mut)]
-        let mut all = vec![Self(Arch::Scalar), Self::detect()];
-        #[cfg(target_arch = "x86_64")]
-        all.extend(pulp::x86::V3::try_new().map(|v3| Self(Arch::V3(v3))));
-        all
+    /// The lanes of certain instructions.
+    ///
+    /// # Errors
+    /// If the processor does not have them.
+    pub(crate) fn with(wanted: Instructions) -> Result<Self, MissingInstructions> {
+        let found = match wanted {
+            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+            Instructions::Avx512 => pulp::x86::V4::try_new().map(Self::Avx512),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => pulp::x86::V3::try_new().map(Self::Avx2),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Sse4 => pulp::x86::V2::try_new().map(Self::Sse4),
+            #[cfg(target_arch = "aarch64")]
+            Instructions::Neon => pulp::aarch64::Neon::try_new().map(Self::Neon),
+            Instructions::Plain => Some(Self::Plain),
+            #[allow(unreachable_patterns)]
+            _ => None,
+        };
+        found.ok_or_else(|| MissingInstructions { wanted, widest: Instructions::widest() })
     }
 
-    /// Does the work in the widest lanes.
+    /// Does the work in these lanes.
     #[inline]
     pub(crate) fn run<R: Real, W: Work<R>>(self, work: W) -> W::Output {
-        match self.0 {
+        match self {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
-            Arch::V4(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            Self::Avx512(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
             #[cfg(target_arch = "x86_64")]
-            Arch::V3(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            Self::Avx2(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse4(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
             #[cfg(target_arch = "aarch64")]
-            Arch::Neon(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
-            _ => work.run::<R>(),
+            Self::Neon(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
+            Self::Plain => work.run::<R>(),
         }
     }
 }
@@ -150,10 +234,64 @@ unsafe fn proof<S: Simd>() -> S {
     unsafe { std::mem::transmute_copy(&()) }
 }
 
+/// # Panics
+/// If a place lies at the end or beyond. One comparison for a pack of places instead of one for each, which cost a tet 1 ns of 9.
+#[inline(always)]
+fn assert_inside(places: &[u16; PACK], end: usize) {
+    assert!(usize::from(places.iter().fold(0, |most, &place| most.max(place))) < end);
+}
+
+/// Adds the vectors of packs, as [`Lanes::spread`] has written them, to those at some places: lane by lane.
+#[inline(always)]
+pub(crate) fn add_at<R: Real, L: Lanes<R>, const N: usize>(
+    sums: &mut [[R; 4]],
+    places: &[[u16; PACK]; N],
+    vectors: &[Pack<[R; 4]>; N],
+) {
+    for places in places {
+        assert_inside(places, sums.len());
+    }
+    for lane in 0..PACK {
+        let row = L::row_of_lane(lane);
+        for (vectors, places) in vectors.iter().zip(places) {
+            // SAFETY: all places lie inside.
+            let sum = unsafe { sums.get_unchecked_mut(usize::from(places[lane])) };
+            *sum = plus(*sum, vectors.0[row]);
+        }
+    }
+}
+
+/// a + b. Both are read before anything is written, or the compiler takes number by number.
+#[inline(always)]
+fn plus<R: Real>(a: [R; 4], b: [R; 4]) -> [R; 4] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
+}
+
+/// Which lane a row of four numbers becomes where pulp turns four registers full of rows into components: the row at
+/// `place` among the `rows` of a register. Rows are loaded in this order, so that lanes come out in theirs.
+const fn single_lane(_rows: usize, register: usize, place: usize) -> usize {
+    4 * place + register
+}
+
+/// The same in double precision.
+const fn double_lane(rows: usize, register: usize, place: usize) -> usize {
+    if rows == 2 { register / 2 * 4 + 2 * place + register % 2 } else { register }
+}
+
+/// The inverse of [`single_lane`].
+const fn single_row(rows: usize, lane: usize) -> usize {
+    lane % 4 * rows + lane / 4
+}
+
+/// The inverse of [`double_lane`].
+const fn double_row(rows: usize, lane: usize) -> usize {
+    if rows == 2 { lane / 4 * 4 + lane % 2 * 2 + lane / 2 % 2 } else { lane }
+}
+
 macro_rules! wide {
     ($wide:ident, $type:ty, $vector:ident, $guess:expr, $iterations:literal,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $mul_add:ident, $sqrt:ident, $max:ident, $abs:ident,
-     $and:ident, $or:ident, $splat:ident, $slice:ident, $slice_mut:ident) => {
+     $and:ident, $or:ident, $splat:ident, $slice:ident, $slice_mut:ident, $deinterleave:ident, $interleave:ident, $lane_of_row:ident, $row_of_lane:ident) => {
         /// As many numbers as a register holds.
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -170,6 +308,23 @@ macro_rules! wide {
                 const { assert!(size_of::<S::$vector>() <= size_of::<Pack<$type>>()) };
                 // SAFETY: a vector is plain numbers (`Pod`), no longer than the array.
                 Self(unsafe { std::mem::transmute_copy(&[value; PACK]) })
+            }
+
+            /// Which lane a row of four numbers becomes where four registers full of rows are turned into components.
+            #[inline(always)]
+            const fn lane_of_row(row: usize) -> usize {
+                let per_register = Self::WIDTH.div_ceil(4);
+                let (register, place) = (row / per_register, row % per_register);
+                $lane_of_row(per_register, register, place)
+            }
+
+            /// The components of as many rows as there are lanes.
+            #[inline(always)]
+            fn to_components(rows: &[[$type; 4]; PACK]) -> [Self; 4] {
+                // SAFETY: vectors are plain numbers (`Pod`), four of them no longer than the rows.
+                let registers: [S::$vector; 4] = unsafe { std::mem::transmute_copy(rows) };
+                let [a, b, c, d] = Self::simd().$deinterleave(registers);
+                [Self(a), Self(b), Self(c), Self(d)]
             }
 
             /// Lane by lane in plain numbers.
@@ -199,6 +354,29 @@ macro_rules! wide {
                 S::$slice_mut(&mut pack.0).0[at / Self::WIDTH] = self.0;
             }
             #[inline(always)]
+            fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
+                assert_inside(places, vectors.len());
+                let mut rows = [[0.0; 4]; PACK];
+                for (row, to) in rows[..Self::WIDTH].iter_mut().enumerate() {
+                    // SAFETY: all places lie inside.
+                    *to = unsafe { *vectors.get_unchecked(usize::from(places[at + Self::lane_of_row(row)])) };
+                }
+                Self::to_components(&rows)
+            }
+            #[inline(always)]
+            fn spread(components: [Self; 4], to: &mut Pack<[$type; 4]>, at: usize) {
+                let [a, b, c, d] = components;
+                let registers = Self::simd().$interleave([a.0, b.0, c.0, d.0]);
+                let rows = &mut to.0[at..at + Self::WIDTH];
+                // SAFETY: vectors are plain numbers (`Pod`), four of them as long as the rows; their alignment is not asked for.
+                unsafe { std::ptr::write_unaligned(rows.as_mut_ptr().cast(), registers) };
+            }
+            #[inline(always)]
+            fn row_of_lane(lane: usize) -> usize {
+                let (at, lane) = (lane / Self::WIDTH * Self::WIDTH, lane % Self::WIDTH);
+                at + $row_of_lane(Self::WIDTH.div_ceil(4), lane)
+            }
+            #[inline(always)]
             fn call<W: Work<$type>>(work: W) -> W::Output {
                 Self::simd().vectorize(InLanes(work, std::marker::PhantomData::<$type>))
             }
@@ -213,10 +391,14 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn mul_add(self, factor: Self, term: Self) -> Self {
+                // SSE has no such instruction, and pulp asks the library for each number.
+                if cfg!(target_arch = "x86_64") && size_of::<S::$vector>() == 16 {
+                    return self * factor + term;
+                }
                 Self(Self::simd().$mul_add(self.0, factor.0, term.0))
             }
             #[inline(always)]
-            fn cbrt(self) -> Self {
+            fn inverse_cbrt(self) -> Self {
                 // As in plain numbers; a third of the bits is their sum over 4, 16, 64, … in words of 32 bits each.
                 let simd = Self::simd();
                 let bits: S::u32s = pulp::cast(self.0);
@@ -225,11 +407,9 @@ macro_rules! wide {
                 let third = simd.add_u32s(third, over(third, 4));
                 let third = simd.add_u32s(third, over(third, 8));
                 let guess: S::u32s = pulp::cast(Self::splat(<$type>::from_bits($guess)).0);
-                let mut y = Self(pulp::cast(simd.add_u32s(third, guess)));
-                let twice = self + self;
+                let mut y = Self(pulp::cast(simd.sub_u32s(guess, third)));
                 for _ in 0..$iterations {
-                    let cube = y * y * y;
-                    y = y * (cube + twice) / (cube + cube + self);
+                    y = closer_to_inverse_cbrt(self, y);
                 }
                 y
             }
@@ -300,6 +480,18 @@ macro_rules! wide {
             fn store(self, pack: &mut Pack<$type>, at: usize) {
                 pack.0[at] = self;
             }
+            #[inline(always)]
+            fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
+                vectors[usize::from(places[at])]
+            }
+            #[inline(always)]
+            fn spread(components: [Self; 4], to: &mut Pack<[$type; 4]>, at: usize) {
+                to.0[at] = components;
+            }
+            #[inline(always)]
+            fn row_of_lane(lane: usize) -> usize {
+                lane
+            }
             #[inline(never)]
             fn call<W: Work<$type>>(work: W) -> W::Output {
                 work.run::<Self>()
@@ -321,7 +513,7 @@ wide!(
     WideF32,
     f32,
     f32s,
-    709_958_130,
+    1_419_916_000,
     2,
     add_f32s,
     sub_f32s,
@@ -336,13 +528,17 @@ wide!(
     or_f32s,
     splat_f32s,
     as_simd_f32s,
-    as_mut_simd_f32s
+    as_mut_simd_f32s,
+    deinterleave_shfl_f32s,
+    interleave_shfl_f32s,
+    single_lane,
+    single_row
 );
 wide!(
     WideF64,
     f64,
     f64s,
-    715_094_163 << 32,
+    1_430_188_294 << 32,
     3,
     add_f64s,
     sub_f64s,
@@ -357,5 +553,9 @@ wide!(
     or_f64s,
     splat_f64s,
     as_simd_f64s,
-    as_mut_simd_f64s
+    as_mut_simd_f64s,
+    deinterleave_shfl_f64s,
+    interleave_shfl_f64s,
+    double_lane,
+    double_row
 );

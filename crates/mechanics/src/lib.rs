@@ -50,6 +50,7 @@ pub mod law;
 pub mod load;
 pub mod mapping;
 pub mod model;
+mod order;
 pub mod prony;
 mod real;
 pub mod recover;
@@ -67,7 +68,7 @@ pub use dynamic_relaxation::{
 pub use energies::{BALANCE_LIMIT, BALANCE_STEPS, Energies, Sums, balance_floor, model_balance_floor};
 pub use fingerprint::fingerprint;
 pub use forces::Deformed;
-pub use lanes::{PACK, Pack};
+pub use lanes::{Instructions, MissingInstructions, PACK, Pack};
 pub use model::Model;
 pub use real::{Number, Real};
 pub use state::{History, State, Work};

@@ -9,8 +9,9 @@ use crate::element::{GaussPoints, Hex8, Rest, gauss_points, hex8, tet4};
 use crate::law::AnyLaw;
 use crate::load::Load;
 use crate::mapping::Mapping;
+use crate::order::order;
 use crate::prony::Prony;
-use crate::tensor::Vector;
+use crate::tensor::{Vector, add, scale};
 
 /// Bodies, what holds and loads them, and the surfaces they carry.
 #[derive(Clone, Debug, Default)]
@@ -96,6 +97,27 @@ impl Solid {
         let families = self.material.law.families();
         &self.fibre[cell * families..(cell + 1) * families]
     }
+
+    /// The same solid with neighbouring cells one after another.
+    fn in_order(self, rest: &[Vector<f64>]) -> Self {
+        let centre = |cell: usize| {
+            let nodes = self.cells.nodes(cell);
+            nodes.iter().fold([0.0; 3], |sum, &n| add(sum, scale(rest[n as usize], 1.0 / nodes.len() as f64)))
+        };
+        let centres: Vec<Vector<f64>> = (0..self.cells.len()).map(centre).collect();
+        let order = order(&centres);
+        Self {
+            fibre: order.iter().flat_map(|&cell| self.fibres(cell as usize)).copied().collect(),
+            original: order.iter().map(|&cell| self.original[cell as usize]).collect(),
+            cells: self.cells.in_order(&order),
+            ..self
+        }
+    }
+}
+
+/// The values of some cells, one after another.
+fn picked<T: Clone>(values: &[T], cells: &[u32]) -> Vec<T> {
+    cells.iter().map(|&cell| values[cell as usize].clone()).collect()
 }
 
 /// Cells of one element type.
@@ -149,8 +171,24 @@ pub struct CellBlock<const N: usize> {
 pub struct Hourglass<R, const N: usize> {
     /// The patterns γ, four per cell.
     pub patterns: Vec<[[R; N]; 4]>,
+    /// The moments Y of their signs Γ [m], γ_ca = Γ_ca − B_a·Y_c.
+    pub moments: Vec<[Vector<R>; 4]>,
     /// k = c μ V ΣB²/8 [N/m], one per cell.
     pub stiffness: Vec<R>,
+}
+
+impl<const N: usize> CellBlock<N> {
+    fn in_order(&self, order: &[u32]) -> Self {
+        Self {
+            nodes: picked(&self.nodes, order),
+            rest: picked(&self.rest, order),
+            hourglass: self.hourglass.as_ref().map(|control| Hourglass {
+                patterns: picked(&control.patterns, order),
+                moments: picked(&control.moments, order),
+                stiffness: picked(&control.stiffness, order),
+            }),
+        }
+    }
 }
 
 impl Cells {
@@ -170,6 +208,7 @@ impl Cells {
             rest: hexes.iter().map(|hex| hex.rest).collect(),
             hourglass: Some(Hourglass {
                 patterns: hexes.iter().map(|hex| hex.hourglass).collect(),
+                moments: hexes.iter().map(|hex| hex.moments).collect(),
                 stiffness: hexes.iter().map(stiffness).collect(),
             }),
         })
@@ -187,6 +226,16 @@ impl Cells {
         let quantities = nodes.iter().map(|cell| hex8(&corners(cell)).rest).collect();
         let points = nodes.iter().map(|cell| gauss_points(&corners(cell))).collect();
         Self::FullHex8(CellBlock { nodes, rest: quantities, hourglass: None }, points)
+    }
+
+    /// The same cells in another order.
+    fn in_order(&self, order: &[u32]) -> Self {
+        match self {
+            Self::Tet4(block) => Self::Tet4(block.in_order(order)),
+            Self::AveragedTet4(block, averaging) => Self::AveragedTet4(block.in_order(order), *averaging),
+            Self::Hex8(block) => Self::Hex8(block.in_order(order)),
+            Self::FullHex8(block, points) => Self::FullHex8(block.in_order(order), picked(points, order)),
+        }
     }
 
     /// Points of a cell at which the law is evaluated.
@@ -420,13 +469,15 @@ fn mass_factor(solid: &Solid, cell: usize, target_step: f64) -> f64 {
 pub const FREE: u32 = u32::MAX;
 
 impl Model {
-    /// Adds ρV/N of every cell of a solid to its nodes.
+    /// Adds ρV/N of every cell of a solid to its nodes. The cells are brought into an order that is good for the caches;
+    /// [`Solid::original`] goes along.
     ///
     /// # Panics
     /// If not every cell has a direction for each of the law's families of fibres.
     pub fn add_solid(&mut self, solid: Solid) {
         let needed = solid.material.law.families() * solid.cells.len();
         assert_eq!(solid.fibre.len(), needed, "every cell has a direction for each family of fibres");
+        let solid = solid.in_order(&self.rest);
         for cell in 0..solid.cells.len() {
             let nodes = solid.cells.nodes(cell);
             let share = solid.material.density * solid.cells.volume(cell) / nodes.len() as f64;

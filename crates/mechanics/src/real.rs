@@ -36,8 +36,14 @@ pub trait Number:
     fn of(value: f64) -> Self;
     /// self × factor + term, rounded once where the processor can.
     fn mul_add(self, factor: Self, term: Self) -> Self;
-    /// Cube root of a positive number, to three units in the last place; meaningless for others.
-    fn cbrt(self) -> Self;
+    /// One over the cube root of a positive number, to three units in the last place; meaningless for others.
+    fn inverse_cbrt(self) -> Self;
+    /// Cube root of a positive number, to four units in the last place; meaningless for others.
+    #[inline(always)]
+    fn cbrt(self) -> Self {
+        let y = self.inverse_cbrt();
+        self * y * y
+    }
     /// Natural logarithm of 1 + self, accurate near zero.
     fn ln_1p(self) -> Self;
     /// Exponential function.
@@ -69,8 +75,16 @@ pub trait Real: Number + Lanes<Self> + Default + PartialOrd + Serialize + Deseri
     fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>>;
 }
 
+/// A step of Householder's method of third order: with r = 1 − x y³, y ← y (1 + r/3 + 2r²/9), which leaves 14/3 of the
+/// third power of the relative error.
+#[inline(always)]
+pub(crate) fn closer_to_inverse_cbrt<N: Number>(x: N, y: N) -> N {
+    let r = (x * y).mul_add(-(y * y), N::ONE);
+    (y * r).mul_add(r.mul_add(N::of(2.0 / 9.0), N::of(1.0 / 3.0)), y)
+}
+
 macro_rules! real {
-    ($type:ty, $wide:ident, $precision:literal, $cube_root_guess:expr, $iterations:literal) => {
+    ($type:ty, $wide:ident, $precision:literal, $guess:expr, $iterations:literal) => {
         impl Real for $type {
             const EPSILON: f64 = <$type>::EPSILON as f64;
             const PRECISION: &'static str = $precision;
@@ -97,13 +111,11 @@ macro_rules! real {
                 self * factor + term
             }
             #[inline(always)]
-            fn cbrt(self) -> Self {
-                // A third of the exponent as first guess (5 % off), then Halley's iteration, which triples the digits.
-                // Twice as fast as the library's, whose call also keeps the kernel from being one straight piece.
-                let mut y = Self::from_bits(self.to_bits() / 3 + $cube_root_guess);
+            fn inverse_cbrt(self) -> Self {
+                // Minus a third of the exponent as first guess (4 % off), then two or three steps without a division.
+                let mut y = Self::from_bits($guess - self.to_bits() / 3);
                 for _ in 0..$iterations {
-                    let cube = y * y * y;
-                    y = y * (cube + 2.0 * self) / (2.0 * cube + self);
+                    y = closer_to_inverse_cbrt(self, y);
                 }
                 y
             }
@@ -135,8 +147,8 @@ macro_rules! real {
     };
 }
 
-real!(f32, WideF32, "single", 709_958_130, 2);
-real!(f64, WideF64, "double", 715_094_163 << 32, 3);
+real!(f32, WideF32, "single", 1_419_916_000, 2);
+real!(f64, WideF64, "double", 1_430_188_294 << 32, 3);
 
 #[cfg(test)]
 mod tests {

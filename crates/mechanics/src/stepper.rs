@@ -8,19 +8,21 @@
 //! at the current time, so that all that an observer sees belongs to one instant; [`CentralDifference::advance`] moves.
 //! Runs on the current rayon pool; sums go in the order of the nodes for any number of threads.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::Real;
 use crate::applied::AppliedForces;
 use crate::energies::{Energies, Sums, model_balance_floor};
 use crate::forces::{Deformed, InternalForces};
-use crate::lanes::{Lanes, Processor, Work};
+use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
 use crate::model::{Contradiction, FREE, Model};
 use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
 use crate::step_control::{Lengths, StepControl};
 use crate::step_error::StepError;
-use crate::tensor::{Vector, add};
+use crate::tensor::Vector;
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -37,6 +39,58 @@ pub trait Observable<R> {
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64>;
 }
 
+/// A node of which a component moves as prescribed.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    node: u32,
+    /// The constraint of each component, or [`FREE`].
+    owner: [u32; 3],
+    /// The amplitude of each component's motion.
+    amplitude: Vector<f64>,
+}
+
+impl Held {
+    /// The components that are prescribed, with their constraint.
+    #[inline(always)]
+    fn components(&self) -> impl Iterator<Item = (usize, usize)> {
+        let owner = self.owner;
+        (0..3).filter(move |&c| owner[c] != FREE).map(move |c| (c, owner[c] as usize))
+    }
+}
+
+fn held(owners: &[[u32; 3]], amplitudes: &[Vector<f64>]) -> Vec<Held> {
+    let nodes = owners.iter().zip(amplitudes).zip(0..).filter(|((owner, _), _)| **owner != [FREE; 3]);
+    nodes.map(|((&owner, &amplitude), node)| Held { node, owner, amplitude }).collect()
+}
+
+/// [`Lengths`] as the nodes need them.
+#[derive(Clone, Copy, Debug)]
+struct Pace<R> {
+    /// Δt⁺/Δt⁻.
+    ratio: R,
+    /// h/2 [s].
+    half_mean: R,
+    /// Δt⁺ h [s²].
+    step_squared: R,
+    /// 1/(Δt⁺ h) [1/s²].
+    per_step_squared: R,
+    /// 1/(2 Δt⁺) [1/s].
+    per_two_steps: R,
+}
+
+impl<R: Real> Pace<R> {
+    fn new(lengths: Lengths) -> Self {
+        let step_squared = lengths.next * lengths.mean();
+        Self {
+            ratio: R::of(lengths.ratio()),
+            half_mean: R::of(0.5 * lengths.mean()),
+            step_squared: R::of(step_squared),
+            per_step_squared: R::of(1.0 / step_squared),
+            per_two_steps: R::of(0.5 / lengths.next),
+        }
+    }
+}
+
 /// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that a restart
 /// would lose.
 pub struct CentralDifference<'m, R> {
@@ -47,6 +101,8 @@ pub struct CentralDifference<'m, R> {
     relaxing: f64,
     forces: InternalForces<R>,
     owners: Vec<[u32; 3]>,
+    /// The nodes of which a component has an owner, increasing.
+    held: Vec<Held>,
     /// Mass of each component [kg].
     mass: Vec<Vector<R>>,
     /// α of each component [1/s].
@@ -55,8 +111,6 @@ pub struct CentralDifference<'m, R> {
     /// True if there is any load.
     loaded: bool,
     processor: Processor,
-    /// Amplitude of each prescribed component.
-    amplitude: Vec<Vector<f64>>,
     /// Factor on the amplitudes of each constraint now and after the step.
     factor: Vec<[f64; 2]>,
     next: Vec<Vector<R>>,
@@ -121,35 +175,41 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Sums {
         let Self { stepper, first, before, next, reaction } = self;
+        let mut held = stepper.held_in(first..first + before.len()).iter().peekable();
+        let pace = Pace::new(stepper.lengths);
         let mut sums = [[0.0; BLOCK]; 6];
-        let blocks = before.chunks(BLOCK).zip(next.chunks_mut(BLOCK)).zip(reaction.chunks_mut(BLOCK));
-        for (index, ((before, next), reaction)) in blocks.enumerate() {
+        let mut block = Block::at_rest();
+        for (index, (before, next)) in before.chunks(BLOCK).zip(next.chunks_mut(BLOCK)).enumerate() {
             let nodes = first + index * BLOCK..first + index * BLOCK + before.len();
-            let mut block = Block::at_rest();
-            for (to, node) in nodes.clone().enumerate() {
-                block.internal[to] = stepper.forces.at(node);
-                if stepper.loaded {
-                    block.external[to] = stepper.applied.at(node);
+            if before.len() < BLOCK {
+                block = Block::at_rest();
+            }
+            stepper.forces.at_nodes(nodes.clone(), &mut block.internal);
+            if stepper.loaded {
+                for (to, node) in block.external.iter_mut().zip(nodes.clone()) {
+                    *to = stepper.applied.at(node);
                 }
             }
             block.before[..before.len()].copy_from_slice(before);
             block.mass[..before.len()].copy_from_slice(&stepper.mass[nodes.clone()]);
             block.damping[..before.len()].copy_from_slice(&stepper.damping[nodes.clone()]);
-            block.move_freely(stepper.lengths);
-            reaction.fill([R::ZERO; 3]);
-            for (to, node) in nodes.enumerate() {
-                let owner = stepper.owners[node];
-                if owner == [FREE; 3] {
-                    continue;
+            block.move_freely(&pace);
+            let mut pushed = stepper.loaded;
+            while let Some(held) = held.next_if(|held| (held.node as usize) < nodes.end) {
+                let node = held.node as usize;
+                let to = node - nodes.start;
+                for (c, constraint) in held.components() {
+                    let factor = stepper.factor[constraint].map(|factor| held.amplitude[c] * factor);
+                    (block.next[to][c], reaction[node - first][c]) = block.prescribe(to, c, &pace, factor);
+                    block.external[to][c] += reaction[node - first][c];
                 }
-                for c in (0..3).filter(|&c| owner[c] != FREE) {
-                    let (applied, internal) = (block.external[to][c], block.internal[to][c]);
-                    (block.next[to][c], reaction[to][c]) =
-                        stepper.prescribe(node, c, block.before[to][c], applied, internal);
-                    block.external[to][c] += reaction[to][c];
-                }
+                pushed = true;
             }
-            block.add_to(&mut sums, stepper.lengths);
+            block.add_motion(&mut sums, &pace);
+            if pushed {
+                block.add_push(&mut sums);
+                block.external = [[R::ZERO; 3]; BLOCK];
+            }
             next.copy_from_slice(&block.next[..next.len()]);
         }
         let [kinetic, damping_power, internal_before, internal_after, external_before, external_after] =
@@ -158,11 +218,29 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
     }
 }
 
+/// u += Δu.
+struct Add<'a, R> {
+    increment: &'a [Vector<R>],
+    to: &'a mut [Vector<R>],
+}
+
+impl<R: Real> Work<R> for Add<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) {
+        for (u, du) in self.to.as_flattened_mut().iter_mut().zip(self.increment.as_flattened()) {
+            *u += *du;
+        }
+    }
+}
+
 /// What is known of a block of nodes; beyond the last node, of nodes at rest.
 struct Block<R> {
     before: [Vector<R>; BLOCK],
     next: [Vector<R>; BLOCK],
     internal: [Vector<R>; BLOCK],
+    /// Zero but for what pushes now.
     external: [Vector<R>; BLOCK],
     mass: [Vector<R>; BLOCK],
     damping: [Vector<R>; BLOCK],
@@ -178,40 +256,67 @@ impl<R: Real> Block<R> {
 
     /// The increments of nodes that nothing holds.
     #[inline(always)]
-    fn move_freely(&mut self, lengths: Lengths) {
-        let (ratio, step, half_mean) =
-            (R::of(lengths.ratio()), R::of(lengths.next * lengths.mean()), R::of(0.5 * lengths.mean()));
+    fn move_freely(&mut self, &Pace { ratio, half_mean, step_squared, .. }: &Pace<R>) {
         let (before, next) = (self.before.as_flattened(), self.next.as_flattened_mut());
         let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
         let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
         for i in 0..3 * BLOCK {
             let a = damping[i] * half_mean;
-            let push = step / mass[i] * (external[i] - internal[i]);
-            next[i] = ((R::ONE - a) * (before[i] * ratio) + push) / (R::ONE + a);
+            let kept = (R::ONE - a) * (before[i] * ratio) * mass[i];
+            next[i] = (kept + step_squared * (external[i] - internal[i])) / (mass[i] * (R::ONE + a));
         }
     }
 
-    /// Adds kinetic energy, damping power and the halves of the works to sums kept apart by lane.
+    /// The increment and the reaction [N] of a component whose displacement [m] is prescribed now and after the step.
+    #[inline(always)]
+    fn prescribe(&self, node: usize, c: usize, pace: &Pace<R>, [now, then]: [f64; 2]) -> (R, R) {
+        let same_speed = self.before[node][c] * pace.ratio;
+        let next = R::of(then - now);
+        let velocity = (same_speed + next) * pace.per_two_steps;
+        let acceleration = (next - same_speed) * pace.per_step_squared;
+        let inertia = self.mass[node][c] * (acceleration + self.damping[node][c] * velocity);
+        (next, inertia + self.internal[node][c] - self.external[node][c])
+    }
+
+    /// Adds kinetic energy, damping power and the halves of the internal work to sums kept apart by lane. The products of
+    /// three components are summed as they come, in the precision of the forces; all else in double precision.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
-    fn add_to(&self, sums: &mut [[f64; BLOCK]; 6], lengths: Lengths) {
-        let (ratio, per_two_steps) = (lengths.ratio(), 0.5 / lengths.next);
-        let (before, next) = (self.before.as_flattened(), self.next.as_flattened());
-        let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
+    fn add_motion(&self, sums: &mut [[f64; BLOCK]; 6], &Pace { ratio, per_two_steps, .. }: &Pace<R>) {
+        let (before, next, internal) =
+            (self.before.as_flattened(), self.next.as_flattened(), self.internal.as_flattened());
         let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
+        let mut parts = [[R::ZERO; BLOCK]; 4];
         for part in 0..3 {
             for lane in 0..BLOCK {
                 let i = part * BLOCK + lane;
-                let (before, next) = (before[i].to_f64(), next[i].to_f64());
-                let (internal, external) = (internal[i].to_f64(), external[i].to_f64());
-                let velocity = (before * ratio + next) * per_two_steps;
-                let twice_kinetic = mass[i].to_f64() * velocity * velocity;
-                sums[0][lane] += 0.5 * twice_kinetic;
-                sums[1][lane] += damping[i].to_f64() * twice_kinetic;
-                sums[2][lane] += 0.5 * internal * before;
-                sums[3][lane] += 0.5 * internal * next;
-                sums[4][lane] += 0.5 * external * before;
-                sums[5][lane] += 0.5 * external * next;
+                let velocity = (before[i] * ratio + next[i]) * per_two_steps;
+                let twice_kinetic = mass[i] * velocity * velocity;
+                parts[0][lane] += twice_kinetic;
+                parts[1][lane] += damping[i] * twice_kinetic;
+                parts[2][lane] += internal[i] * before[i];
+                parts[3][lane] += internal[i] * next[i];
+            }
+        }
+        for lane in 0..BLOCK {
+            sums[0][lane] += 0.5 * parts[0][lane].to_f64();
+            sums[1][lane] += parts[1][lane].to_f64();
+            sums[2][lane] += 0.5 * parts[2][lane].to_f64();
+            sums[3][lane] += 0.5 * parts[3][lane].to_f64();
+        }
+    }
+
+    /// Adds the halves of the external work.
+    #[allow(clippy::needless_range_loop)]
+    #[inline(always)]
+    fn add_push(&self, sums: &mut [[f64; BLOCK]; 6]) {
+        let (before, next) = (self.before.as_flattened(), self.next.as_flattened());
+        let external = self.external.as_flattened();
+        for part in 0..3 {
+            for lane in 0..BLOCK {
+                let i = part * BLOCK + lane;
+                sums[4][lane] += 0.5 * external[i].to_f64() * before[i].to_f64();
+                sums[5][lane] += 0.5 * external[i].to_f64() * next[i].to_f64();
             }
         }
     }
@@ -235,7 +340,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             lengths: Lengths { before: step, next: step },
             relaxing: step,
             forces: InternalForces::new(model, step),
-            amplitude: model.amplitudes(&owners),
+            held: held(&owners, &model.amplitudes(&owners)),
             owners,
             mass: (0..nodes).map(|node| [R::of(model.inertia(node)); 3]).collect(),
             damping,
@@ -256,6 +361,16 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     pub fn watched(mut self, monitor: Monitor) -> Self {
         self.control.watch(monitor);
         self
+    }
+
+    /// Runs in the lanes of certain instructions instead of the widest.
+    ///
+    /// # Errors
+    /// If the processor does not have them.
+    pub fn in_lanes(mut self, instructions: Instructions) -> Result<Self, MissingInstructions> {
+        self.processor = Processor::with(instructions)?;
+        self.forces.set_processor(self.processor);
+        Ok(self)
     }
 
     /// The length [s] of a whole step.
@@ -306,17 +421,26 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has gone before.
     pub fn advance(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
-        let (owners, amplitude, factor) = (&self.owners, &self.amplitude, &self.factor);
-        (state.displacement.par_iter_mut().zip(&state.increment).zip(owners).zip(amplitude))
-            .with_min_len(CHUNK)
-            .for_each(|(((u, du), owner), amplitude)| {
-                *u = add(*u, *du);
-                for component in (0..3).filter(|&c| owner[c] != FREE) {
-                    u[component] = R::of(amplitude[component] * factor[owner[component] as usize][1]);
+        let chunks = state.displacement.par_chunks_mut(CHUNK).zip(state.increment.par_chunks(CHUNK));
+        chunks.enumerate().for_each(|(task, (displacement, increment))| {
+            let first = task * CHUNK;
+            self.processor.run(Add { increment, to: displacement });
+            for held in self.held_in(first..first + displacement.len()) {
+                for (c, constraint) in held.components() {
+                    let then = held.amplitude[c] * self.factor[constraint][1];
+                    displacement[held.node as usize - first][c] = R::of(then);
                 }
-            });
+            }
+        });
         state.work.advance();
         self.control.count(state);
+    }
+
+    /// Those of some nodes of which a component has an owner.
+    #[inline(always)]
+    fn held_in(&self, nodes: Range<usize>) -> &[Held] {
+        let before = |end: usize| self.held.partition_point(|held| (held.node as usize) < end);
+        &self.held[before(nodes.start)..before(nodes.end)]
     }
 
     /// Energy [J] above which the balance is judged.
@@ -373,19 +497,6 @@ impl<'m, R: Real> CentralDifference<'m, R> {
                 });
             });
         (self.next, self.reaction, self.sums) = (next, reaction, sums);
-    }
-
-    /// The increment and the reaction [N] of a component that moves as prescribed.
-    fn prescribe(&self, node: usize, c: usize, before: R, applied: R, internal: R) -> (R, R) {
-        let [now, then] = self.factor[self.owners[node][c] as usize];
-        let amplitude = self.amplitude[node][c];
-        let (dt, mean) = (R::of(self.lengths.next), R::of(self.lengths.mean()));
-        let same_speed = before * R::of(self.lengths.ratio());
-        let next = R::of(amplitude * then - amplitude * now);
-        let velocity = (same_speed + next) / (R::of(2.0) * dt);
-        let inertia =
-            self.mass[node][c] * ((next - same_speed) / (dt * mean) + self.damping[node][c] * velocity);
-        (next, inertia + internal - applied)
     }
 
     fn check_state(

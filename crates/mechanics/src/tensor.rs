@@ -38,7 +38,13 @@ pub fn dot<R: Number>(a: Vector<R>, b: Vector<R>) -> R {
 /// a × b.
 #[inline(always)]
 pub fn cross<R: Number>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [minor(a[1], b[2], a[2], b[1]), minor(a[2], b[0], a[0], b[2]), minor(a[0], b[1], a[1], b[0])]
+}
+
+/// a b − c d.
+#[inline(always)]
+fn minor<R: Number>(a: R, b: R, c: R, d: R) -> R {
+    a.mul_add(b, -(c * d))
 }
 
 /// A vector in another number type.
@@ -100,17 +106,25 @@ impl<R: Number> Tensor<R> {
     pub fn plus_scaled(&self, a: &Self, s: R) -> Self {
         let mut sum = *self;
         for (row, other) in sum.0.iter_mut().zip(a.0) {
-            *row = add(*row, scale(other, s));
+            *row = [other[0].mul_add(s, row[0]), other[1].mul_add(s, row[1]), other[2].mul_add(s, row[2])];
         }
         sum
+    }
+
+    /// s T.
+    #[inline(always)]
+    pub fn scaled(&self, s: R) -> Self {
+        let t = &self.0;
+        Self([scale(t[0], s), scale(t[1], s), scale(t[2], s)])
     }
 
     /// The sum of the principal minors of order two.
     #[inline(always)]
     pub fn second_invariant(&self) -> R {
         let t = &self.0;
-        t[0][0] * t[1][1] - t[0][1] * t[1][0] + t[1][1] * t[2][2] - t[1][2] * t[2][1] + t[0][0] * t[2][2]
-            - t[0][2] * t[2][0]
+        minor(t[0][0], t[1][1], t[0][1], t[1][0])
+            + minor(t[1][1], t[2][2], t[1][2], t[2][1])
+            + minor(t[0][0], t[2][2], t[0][2], t[2][0])
     }
 
     /// The trace.
@@ -181,12 +195,12 @@ impl<R: Number> Symmetric<R> {
     pub fn cofactor(&self) -> Self {
         let [xx, yy, zz, xy, yz, xz] = self.0;
         Self([
-            yy * zz - yz * yz,
-            xx * zz - xz * xz,
-            xx * yy - xy * xy,
-            xz * yz - xy * zz,
-            xy * xz - xx * yz,
-            xy * yz - xz * yy,
+            minor(yy, zz, yz, yz),
+            minor(xx, zz, xz, xz),
+            minor(xx, yy, xy, xy),
+            minor(xz, yz, xy, zz),
+            minor(xy, xz, xx, yz),
+            minor(xy, yz, xz, yy),
         ])
     }
 
@@ -196,13 +210,23 @@ impl<R: Number> Symmetric<R> {
         let [a0, a1, a2, a3, a4, a5] = self.0;
         let [b0, b1, b2, b3, b4, b5] = b.0;
         Self([
-            a0 * b0 + a3 * b3 + a5 * b5,
-            a3 * b3 + a1 * b1 + a4 * b4,
-            a5 * b5 + a4 * b4 + a2 * b2,
-            a0 * b3 + a3 * b1 + a5 * b4,
-            a3 * b5 + a1 * b4 + a4 * b2,
-            a0 * b5 + a3 * b4 + a5 * b2,
+            dot([a0, a3, a5], [b0, b3, b5]),
+            dot([a3, a1, a4], [b3, b1, b4]),
+            dot([a5, a4, a2], [b5, b4, b2]),
+            dot([a0, a3, a5], [b3, b1, b4]),
+            dot([a3, a1, a4], [b5, b4, b2]),
+            dot([a0, a3, a5], [b5, b4, b2]),
         ])
+    }
+
+    /// S + s A.
+    #[inline(always)]
+    pub fn plus_scaled(&self, a: &Self, s: R) -> Self {
+        let mut sum = *self;
+        for (entry, other) in sum.0.iter_mut().zip(a.0) {
+            *entry = other.mul_add(s, *entry);
+        }
+        sum
     }
 
     /// As a full tensor.

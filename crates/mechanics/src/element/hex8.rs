@@ -3,7 +3,7 @@
 //! and stiffness against the four hourglass patterns, scaled by the shear modulus so that it does not lock.
 
 use super::Rest;
-use crate::tensor::{Vector, dot};
+use crate::tensor::{Vector, add, dot, scale, sub};
 
 /// Reference coordinates (ξ, η, ζ) of the corners, in the node order of VTK.
 pub const HEX_CORNERS: [[f64; 3]; 8] = [
@@ -24,6 +24,8 @@ pub struct Hex8 {
     pub rest: Rest<8>,
     /// The four hourglass vectors γ: orthogonal to every linear field.
     pub hourglass: [[f64; 8]; 4],
+    /// The moments Y_c = Σ_a Γ_ca X_a of the patterns' signs [m], about the first node: γ_ca = Γ_ca − B_a·Y_c.
+    pub moments: [Vector<f64>; 4],
     /// Smallest Jacobian determinant at the corners over the mean one; ≤ 0 for a folded cell.
     pub worst_corner: f64,
 }
@@ -45,10 +47,12 @@ pub fn hex8(x: &[Vector<f64>; 8]) -> Hex8 {
     for b in gradient.iter_mut().flatten() {
         *b /= volume;
     }
+    let moments = hourglass_moments(x);
     let worst = HEX_CORNERS.iter().map(|&c| shape_derivatives(x, c).0).fold(f64::INFINITY, f64::min);
     Hex8 {
         rest: Rest { volume, gradient },
-        hourglass: hourglass_vectors(x, &gradient),
+        hourglass: hourglass_vectors(&moments, &gradient),
+        moments,
         worst_corner: worst * 8.0 / volume.abs(),
     }
 }
@@ -95,26 +99,39 @@ fn shape_derivatives(x: &[Vector<f64>; 8], at: Vector<f64>) -> (f64, [Vector<f64
     (determinant, gradient)
 }
 
-/// γ_ca = Γ_ca − B_a · Σ_b X_b Γ_cb.
-fn hourglass_vectors(x: &[Vector<f64>; 8], gradient: &[Vector<f64>; 8]) -> [[f64; 8]; 4] {
-    let patterns: [fn([f64; 3]) -> f64; 4] = [
-        |[_, eta, zeta]| eta * zeta,
-        |[xi, _, zeta]| xi * zeta,
-        |[xi, eta, _]| xi * eta,
-        |[xi, eta, zeta]| xi * eta * zeta,
-    ];
-    patterns.map(|pattern| {
-        let gamma = HEX_CORNERS.map(pattern);
+/// Γ_ca: the patterns ηζ, ξζ, ξη and ξηζ at the corners.
+const SIGNS: [[f64; 8]; 4] = {
+    let mut signs = [[0.0; 8]; 4];
+    let mut corner = 0;
+    while corner < 8 {
+        let [xi, eta, zeta] = HEX_CORNERS[corner];
+        signs[0][corner] = eta * zeta;
+        signs[1][corner] = xi * zeta;
+        signs[2][corner] = xi * eta;
+        signs[3][corner] = xi * eta * zeta;
+        corner += 1;
+    }
+    signs
+};
+
+/// Y_c = Σ_a Γ_ca X_a; the signs sum to zero, so that places can be taken relative to the first node.
+fn hourglass_moments(x: &[Vector<f64>; 8]) -> [Vector<f64>; 4] {
+    SIGNS.map(|signs| {
         let mut moment = [0.0; 3];
-        for (node, g) in x.iter().zip(gamma) {
-            for (m, xi) in moment.iter_mut().zip(node) {
-                *m += g * xi;
-            }
+        for (node, sign) in x.iter().zip(signs) {
+            moment = add(moment, scale(sub(*node, x[0]), sign));
         }
-        let mut vector = gamma;
-        for (v, &b) in vector.iter_mut().zip(gradient) {
-            *v -= dot(b, moment);
-        }
-        vector
+        moment
     })
+}
+
+/// γ_ca = Γ_ca − B_a · Y_c.
+fn hourglass_vectors(moments: &[Vector<f64>; 4], gradient: &[Vector<f64>; 8]) -> [[f64; 8]; 4] {
+    let mut vectors = SIGNS;
+    for (vector, moment) in vectors.iter_mut().zip(moments) {
+        for (v, &b) in vector.iter_mut().zip(gradient) {
+            *v -= dot(b, *moment);
+        }
+    }
+    vectors
 }

@@ -12,35 +12,42 @@
 use rayon::prelude::*;
 
 use super::batch::{Batch, PACKS, pressures};
+use super::blocks::{Blocks, Moved, Quad, Shares, Task};
 use super::{
-    Findings, ForceField, PackedCells, Places, Slot, by_cell, by_component, displacement_gradient,
-    for_each_task, gather, relative, scatter,
+    Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, Processor, Work, entry, load_tensor};
+use crate::lanes::{Lanes, PACK, Pack, Processor, Work, add_at, entry, load_tensor};
 use crate::law::{AnyLaw, Split};
 use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
 use crate::prony::{Prony, Relaxation};
 use crate::state::History;
-use crate::tensor::{Symmetric, Tensor};
+use crate::tensor::{Symmetric, Tensor, Vector};
 
 pub(super) struct AveragedTets<R> {
     processor: Processor,
+    /// Displacements of the nodes of each block, and their average beside them.
+    moved: Moved<R>,
+    constants: Constants<R>,
+    /// J_n − 1, then p_n [Pa].
+    node_value: Vec<Pack<R>>,
+}
+
+/// What does not change from step to step.
+struct Constants<R> {
     law: AnyLaw,
     averaging: Averaging,
     cells: PackedCells<R, 4>,
-    /// Local nodes of packs of cells.
-    local_nodes: Vec<[[u32; PACK]; 4]>,
-    local: LocalNodes,
+    rest: Vec<PackedRest<R, 3>>,
+    /// The nodes of all blocks, one block after another, numbered among those of the solid.
+    numbers: Vec<u32>,
+    /// Where the blocks' shares in the average of each node lie.
+    shares: Shares,
     /// 1/V_n with V_n = Σ V_e/4 [1/m³].
     inverse_volume: Vec<R>,
     relaxation: Relaxation<R>,
     isochoric_slots: usize,
     volumetric_slots: usize,
-    /// V_e/4 times J_e − 1, or what a cell gives its nodes in a further average.
-    cell_value: Vec<Pack<R>>,
-    /// J_n − 1, then p_n [Pa].
-    node_value: Vec<Pack<R>>,
 }
 
 impl<R: Real> AveragedTets<R> {
@@ -48,120 +55,163 @@ impl<R: Real> AveragedTets<R> {
         let local = LocalNodes::new(cells);
         let volume_at = |node| local.cells_at(node).map(|cell| 0.25 * cells.rest[cell].volume).sum::<f64>();
         let prony = &solid.material.prony;
-        let packed = PackedCells::new(solid, cells);
-        let last = cells.nodes.len().saturating_sub(1);
-        let local_node = |pack: usize, a: usize, lane: usize| local.nodes[last.min(pack * PACK + lane)][a];
+        let (packed, blocks) = PackedCells::new(solid, cells);
+        let mut known = blocks.all_nodes().to_vec();
+        known.sort_unstable();
+        known.dedup();
+        let number = |node: u32| known.partition_point(|&other| other < node) as u32;
         Self {
             processor: Processor::detect(),
-            law: solid.material.law,
-            averaging,
-            local_nodes: (packed.packs())
-                .map(|pack| [0, 1, 2, 3].map(|a| std::array::from_fn(|lane| local_node(pack, a, lane))))
-                .collect(),
-            inverse_volume: (0..local.len()).map(|node| R::of(1.0 / volume_at(node))).collect(),
-            relaxation: Relaxation::new(prony, step),
-            isochoric_slots: prony.isochoric_slots(),
-            volumetric_slots: prony.volumetric_slots(),
-            cell_value: vec![Pack::ZERO; packed.packs().len()],
+            constants: Constants {
+                law: solid.material.law,
+                averaging,
+                rest: PackedRest::of(&packed, cells),
+                cells: packed,
+                numbers: blocks.all_nodes().iter().map(|&node| number(node)).collect(),
+                shares: Shares::new(
+                    local.len(),
+                    u32::MAX,
+                    blocks.places().map(|(node, place)| (number(node), place)),
+                ),
+                inverse_volume: (0..local.len()).map(|node| R::of(1.0 / volume_at(node))).collect(),
+                relaxation: Relaxation::new(prony, step),
+                isochoric_slots: prony.isochoric_slots(),
+                volumetric_slots: prony.volumetric_slots(),
+            },
             node_value: vec![Pack::ZERO; local.len().div_ceil(PACK)],
-            cells: packed,
-            local,
+            moved: Moved::new(blocks),
         }
     }
 
-    /// J_e − 1 of all cells, as their share in the average.
-    fn volume_changes(&mut self, displacement: &Places<R>) {
-        let mut values = std::mem::take(&mut self.cell_value);
-        values.par_chunks_mut(PACKS).enumerate().with_min_len(4).for_each(|(task, values)| {
-            let first = task * PACKS;
-            self.processor.run(VolumeChanges { cells: &self.cells, first, displacement, values });
-        });
-        self.cell_value = values;
-    }
-
-    /// The mean of the cells' values at each node, weighted by volume.
-    fn average_to_nodes(&mut self) {
-        let (local, values, inverse_volume) = (&self.local, &self.cell_value, &self.inverse_volume);
-        self.node_value.par_iter_mut().enumerate().with_min_len(16).for_each(|(pack, nodes)| {
-            for (lane, value) in nodes.0.iter_mut().enumerate() {
-                let node = pack * PACK + lane;
-                if node < local.len() {
-                    let sum = local.cells_at(node).fold(R::ZERO, |sum, cell| sum + entry(values, cell));
-                    *value = sum * inverse_volume[node];
-                }
+    /// The mean of the cells' values at each node, weighted by volume, from the sums of the blocks.
+    fn average_to_nodes(&mut self, sums: &[Quad<R>]) {
+        let Constants { shares, inverse_volume, .. } = &self.constants;
+        self.node_value.par_iter_mut().enumerate().with_min_len(32).for_each(|(pack, nodes)| {
+            let own = pack * PACK..inverse_volume.len().min((pack + 1) * PACK);
+            let part = |place: usize| sums[place][0];
+            shares.visit(own.clone(), &mut nodes.0, part, |sum, place| *sum += part(place));
+            for (value, &inverse) in nodes.0.iter_mut().zip(&inverse_volume[own]) {
+                *value = *value * inverse;
             }
         });
     }
 
-    /// p from J − 1, relaxed where the law's volumetric part relaxes.
-    fn to_pressures(&self, values: &mut [Pack<R>], history: &mut [Pack<R>]) {
+    /// p_n from J_n − 1, relaxed where the law's volumetric part relaxes.
+    fn find_pressures(&mut self, history: &mut [Pack<R>]) {
+        let (processor, constants) = (self.processor, &self.constants);
+        let values = self.node_value.par_chunks_mut(PACKS).with_min_len(8);
         let pass = |values: &mut [Pack<R>], history: &mut [Pack<R>]| {
-            let (law, relaxation, slots) = (&self.law, &self.relaxation, self.volumetric_slots);
-            self.processor.run(Pressures { law, relaxation, slots, values, history });
+            processor.run(NodePressures { constants, values, history });
         };
-        for_each_pressure(values, history, self.volumetric_slots, pass);
-    }
-
-    /// p_n of all nodes by way of the cells' own pressures.
-    fn pressures_by_cells(&mut self, history: &mut [Pack<R>]) {
-        let mut values = std::mem::take(&mut self.cell_value);
-        values.par_iter_mut().enumerate().with_min_len(16).for_each(|(pack, value)| {
-            *value = self.average_to_pack(pack);
-        });
-        self.to_pressures(&mut values, history);
-        values.par_iter_mut().zip(&self.cells.volume).with_min_len(16).for_each(|(value, volume)| {
-            *value = Pack::from_fn(|lane| R::of(0.25) * volume.0[lane] * value.0[lane]);
-        });
-        self.cell_value = values;
-        self.average_to_nodes();
-    }
-
-    /// The means of the four nodal values of the cells of a pack.
-    #[inline(always)]
-    fn average_to_pack(&self, pack: usize) -> Pack<R> {
-        let nodes = &self.local_nodes[pack];
-        let value = |a: usize, lane: usize| entry(&self.node_value, nodes[a][lane] as usize);
-        let mut mean = Pack::ZERO;
-        for (lane, mean) in mean.0.iter_mut().enumerate() {
-            *mean = (value(0, lane) + value(1, lane) + value(2, lane) + value(3, lane)) * R::of(0.25);
+        if history.is_empty() {
+            values.for_each(|values| pass(values, &mut []));
+        } else {
+            let history = history.par_chunks_mut(PACKS * constants.volumetric_slots);
+            values.zip(history).for_each(|(values, history)| pass(values, history));
         }
-        mean
     }
+}
 
+impl<R: Real> Constants<R> {
     /// Tensors of history per cell.
     fn cell_slots(&self) -> usize {
         self.isochoric_slots + if self.averaging == Averaging::NiftySim { self.volumetric_slots } else { 0 }
     }
+
+    /// Copies the averages of a block's nodes in.
+    #[inline(always)]
+    fn copy_in(&self, blocks: &Blocks, node_value: &[Pack<R>], task: &mut Task<'_, R>) {
+        for (to, &number) in task.moved.iter_mut().zip(&self.numbers[blocks.entries(task.block)]) {
+            to[3] = entry(node_value, number as usize);
+        }
+    }
 }
 
-/// J_e − 1 of up to [`PACKS`] packs of cells, times V_e/4.
+/// Adds numbers of a pack of cells to those of their nodes, cell by cell.
+#[inline(always)]
+fn add_to_nodes<R: Real>(values: &Pack<R>, nodes: &[[u16; PACK]; 4], sums: &mut [Quad<R>]) {
+    for lane in 0..PACK {
+        for nodes in nodes {
+            sums[usize::from(nodes[lane])][0] += values.0[lane];
+        }
+    }
+}
+
+/// The shares of the cells of a block in Σ V_e (J_e − 1)/4 of its nodes.
 struct VolumeChanges<'a, R> {
-    cells: &'a PackedCells<R, 4>,
-    first: usize,
-    displacement: &'a Places<R>,
-    values: &'a mut [Pack<R>],
+    constants: &'a Constants<R>,
+    displacement: &'a [Vector<R>],
+    task: Task<'a, R>,
 }
 
 impl<R: Real> Work<R> for VolumeChanges<'_, R> {
-    type Output = ();
+    type Output = Findings<R>;
 
     #[inline(always)]
-    fn run<L: Lanes<R>>(self) {
-        let Self { cells, first, displacement, values } = self;
-        let mut gathered = [[Pack([[R::ZERO; 4]; PACK]); 4]; PACKS];
-        let mut moved = [[Pack::ZERO; 3]; 4];
-        for (pack, gathered) in gathered[..values.len()].iter_mut().enumerate() {
-            gather(&cells.nodes[first + pack], displacement, gathered);
-        }
-        for ((pack, value), gathered) in values.iter_mut().enumerate().zip(&gathered) {
-            by_component(gathered, &mut moved);
+    fn run<L: Lanes<R>>(self) -> Findings<R> {
+        let Self { constants: Constants { cells, rest, .. }, displacement, mut task } = self;
+        task.copy_in(displacement);
+        task.forces.fill([R::ZERO; 4]);
+        let mut values = Pack::ZERO;
+        for pack in cells.packs_of(task.block) {
             for at in (0..PACK).step_by(L::WIDTH) {
-                let u = relative::<R, L, 4>(&moved, at);
-                let change = volume_change(&displacement_gradient(&u, &cells.gradient[first + pack], at));
-                (change * L::of(0.25) * L::load(&cells.volume[first + pack], at)).store(value, at);
+                let (u, _) = relative::<R, L, 4, 3>(task.moved, &cells.nodes[pack], at);
+                let change = volume_change(&displacement_gradient(&u, &rest[pack].gradient, at));
+                (change * L::of(0.25) * L::load(&rest[pack].volume, at)).store(&mut values, at);
+            }
+            add_to_nodes(&values, &cells.nodes[pack], task.forces);
+        }
+        Findings::default()
+    }
+}
+
+/// The shares of the cells of a block in Σ V_e p_e/4 of its nodes, with p_e = U'(J̄_e).
+struct CellPressures<'a, R> {
+    constants: &'a Constants<R>,
+    task: Task<'a, R>,
+}
+
+impl<R: Real> Work<R> for CellPressures<'_, R> {
+    type Output = Findings<R>;
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) -> Findings<R> {
+        let Self { constants, task } = self;
+        let Constants { law, cells, rest, relaxation, volumetric_slots: slots, .. } = constants;
+        let Task { block, moved, forces: sums, pressures: history, .. } = task;
+        sums.fill([R::ZERO; 4]);
+        let mut batch = Batch::new();
+        let packs = cells.packs_of(block);
+        for first in packs.clone().step_by(PACKS) {
+            let mut values = [Pack::ZERO; PACKS];
+            let values = &mut values[..PACKS.min(packs.end - first)];
+            for (value, nodes) in values.iter_mut().zip(&cells.nodes[first..]) {
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    average::<R, L>(moved, nodes, at).store(value, at);
+                }
+            }
+            let own = (first - packs.start) * slots;
+            let own = own.min(history.len())..(own + values.len() * slots).min(history.len());
+            relaxed_pressures::<R, L>(law, relaxation, *slots, values, &mut history[own], &mut batch);
+            for ((value, nodes), rest) in values.iter_mut().zip(&cells.nodes[first..]).zip(&rest[first..]) {
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    (L::load(value, at) * L::of(0.25) * L::load(&rest.volume, at)).store(value, at);
+                }
+                add_to_nodes(value, nodes, sums);
             }
         }
+        Findings::default()
     }
+}
+
+/// The means of what the four nodes of cells carry beside their displacements.
+#[inline(always)]
+fn average<R: Real, L: Lanes<R>>(moved: &[Quad<R>], nodes: &[[u16; PACK]; 4], at: usize) -> L {
+    let mut sum = L::ZERO;
+    for nodes in nodes {
+        sum += L::gather(moved, nodes, at)[3];
+    }
+    sum * L::of(0.25)
 }
 
 /// J − 1, without cancellation.
@@ -170,55 +220,48 @@ pub(super) fn volume_change<L: crate::Number>(h: &Tensor<L>) -> L {
     h.trace() + h.second_invariant() + h.determinant()
 }
 
-/// Does `pass` in parallel for every [`PACKS`] packs of pressures and their history.
-pub(super) fn for_each_pressure<R: Real>(
-    values: &mut [Pack<R>],
-    history: &mut [Pack<R>],
-    slots: usize,
-    pass: impl Fn(&mut [Pack<R>], &mut [Pack<R>]) + Sync,
-) {
-    let values = values.par_chunks_mut(PACKS).with_min_len(4);
-    if history.is_empty() {
-        values.for_each(|values| pass(values, &mut []));
-    } else {
-        values.zip(history.par_chunks_mut(PACKS * slots)).for_each(|(values, history)| pass(values, history));
-    }
+/// Up to [`PACKS`] packs of J − 1 at nodes become pressures [Pa].
+struct NodePressures<'a, R> {
+    constants: &'a Constants<R>,
+    values: &'a mut [Pack<R>],
+    history: &'a mut [Pack<R>],
 }
 
-/// Up to [`PACKS`] packs of J − 1 become pressures [Pa].
-pub(super) struct Pressures<'a, R> {
-    pub law: &'a AnyLaw,
-    pub relaxation: &'a Relaxation<R>,
-    pub slots: usize,
-    pub values: &'a mut [Pack<R>],
-    pub history: &'a mut [Pack<R>],
-}
-
-impl<R: Real> Work<R> for Pressures<'_, R> {
+impl<R: Real> Work<R> for NodePressures<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes<R>>(self) {
-        let Self { law, relaxation, slots, values, history } = self;
-        pressures::<R, L>(law, values, &mut Batch::new());
-        if history.is_empty() {
-            return;
-        }
-        for (value, history) in values.iter_mut().zip(history.chunks_exact_mut(slots)) {
-            for at in (0..PACK).step_by(L::WIDTH) {
-                relaxation.advance_pressure(L::load(value, at), history, at).store(value, at);
-            }
+        let Self { constants: Constants { law, relaxation, volumetric_slots, .. }, values, history } = self;
+        relaxed_pressures::<R, L>(law, relaxation, *volumetric_slots, values, history, &mut Batch::new());
+    }
+}
+
+/// Up to [`PACKS`] packs of J − 1 become pressures [Pa], which relax where there is a history.
+#[inline(always)]
+pub(super) fn relaxed_pressures<R: Real, L: Lanes<R>>(
+    law: &AnyLaw,
+    relaxation: &Relaxation<R>,
+    slots: usize,
+    values: &mut [Pack<R>],
+    history: &mut [Pack<R>],
+    batch: &mut Batch<R>,
+) {
+    pressures::<R, L>(law, values, batch);
+    if history.is_empty() {
+        return;
+    }
+    for (value, history) in values.iter_mut().zip(history.chunks_exact_mut(slots)) {
+        for at in (0..PACK).step_by(L::WIDTH) {
+            relaxation.advance_pressure(L::load(value, at), history, at).store(value, at);
         }
     }
 }
 
-/// A pass over the packs from `first` on, as many as `slots` has room for.
+/// A pass over the cells of a block.
 struct Pass<'a, R> {
-    field: &'a AveragedTets<R>,
-    first: usize,
-    displacement: &'a Places<R>,
-    history: &'a mut [Pack<R>],
-    slots: &'a mut [Slot<R>],
+    constants: &'a Constants<R>,
+    task: Task<'a, R>,
 }
 
 impl<R: Real> Work<R> for Pass<'_, R> {
@@ -226,58 +269,56 @@ impl<R: Real> Work<R> for Pass<'_, R> {
 
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Findings<R> {
-        let Self { field, first, displacement, history, slots } = self;
-        let cells = &field.cells;
-        let per_pack = 6 * field.cell_slots();
+        let Self { constants, task } = self;
+        let Constants { law, cells, rest, .. } = constants;
+        let Task { block, moved, forces: sums, history, .. } = task;
+        let per_pack = 6 * constants.cell_slots();
+        let of_deformation = constants.averaging == Averaging::NiftySim;
+        sums.fill([R::ZERO; 4]);
         let mut findings = Findings::default();
         let mut batch = Batch::new();
-        let mut gathered = [[Pack([[R::ZERO; 4]; PACK]); 4]; PACKS];
-        let mut moved = [[Pack::ZERO; 3]; 4];
-        let mut forces = [[Pack::ZERO; 3]; 4];
         let mut averages = [Pack::ZERO; PACKS];
-        for (index, slots) in slots.chunks_mut(PACKS * 4).enumerate() {
-            let first = first + index * PACKS;
-            let packs = slots.len() / 4;
-            for (pack, (gathered, average)) in gathered.iter_mut().zip(&mut averages).take(packs).enumerate()
-            {
-                gather(&cells.nodes[first + pack], displacement, gathered);
-                *average = field.average_to_pack(first + pack);
-            }
-            // A deformation that is averaged shows its own measures before, others theirs after.
-            for (pack, gathered) in gathered[..packs].iter().enumerate() {
-                by_component(gathered, &mut moved);
+        let mut forces = [Pack([[R::ZERO; 4]; PACK]); 4];
+        let packs = cells.packs_of(block);
+        for first in packs.clone().step_by(PACKS) {
+            let count = PACKS.min(packs.end - first);
+            for (index, average) in averages[..count].iter_mut().enumerate() {
+                let pack = first + index;
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let u = relative::<R, L, 4>(&moved, at);
-                    batch.set(pack, at, &displacement_gradient(&u, &cells.gradient[first + pack], at));
+                    let (u, beside) = relative::<R, L, 4, 3>(moved, &cells.nodes[pack], at);
+                    batch.set(index, at, &displacement_gradient(&u, &rest[pack].gradient, at));
+                    (beside * L::of(0.25)).store(average, at);
                 }
             }
-            if field.averaging == Averaging::NiftySim {
-                batch.measure::<L>(packs);
-                for (pack, average) in averages[..packs].iter().enumerate() {
-                    batch.note(pack, (first + pack) * PACK, &mut findings);
+            // A deformation that is averaged shows its own measures before, others theirs after.
+            if of_deformation {
+                batch.measure::<L>(count);
+                for (index, average) in averages[..count].iter().enumerate() {
+                    batch.note(index, (first + index) * PACK, &mut findings);
                     for at in (0..PACK).step_by(L::WIDTH) {
-                        let h: Tensor<L> = load_tensor(&batch.gradient[pack], at);
-                        let own = L::load(&batch.volume_ratio[pack], at);
-                        batch.set(pack, at, &dilated(&h, own, L::load(average, at)));
+                        let h: Tensor<L> = load_tensor(&batch.gradient[index], at);
+                        let own = L::load(&batch.volume_ratio[index], at);
+                        batch.set(index, at, &dilated(&h, own, L::load(average, at)));
                     }
                 }
             }
-            batch.evaluate::<L>(&field.law, packs, 1, cells.fibres(first, packs));
-            for (pack, slots) in slots.chunks_exact_mut(4).enumerate() {
-                if field.averaging != Averaging::NiftySim {
-                    batch.note(pack, (first + pack) * PACK, &mut findings);
+            batch.evaluate::<L>(law, count, 1, cells.fibres(first, count));
+            for (index, average) in averages[..count].iter().enumerate() {
+                let pack = first + index;
+                if !of_deformation {
+                    batch.note(index, pack * PACK, &mut findings);
                 }
-                let own = (index * PACKS + pack) * per_pack;
+                let own = (pack - packs.start) * per_pack;
                 let own = own.min(history.len())..(own + per_pack).min(history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let elastic = batch.elastic::<L>(pack, at);
-                    let f = batch.deformation_gradient::<L>(pack, at);
-                    let piola =
-                        field.piola(&f, elastic, L::load(&averages[pack], at), &mut history[own.clone()], at);
-                    let volume = L::load(&cells.volume[first + pack], at);
-                    scatter(&piola, &cells.gradient[first + pack], volume, &mut forces, at);
+                    let elastic = batch.elastic::<L>(index, at);
+                    let f = batch.deformation_gradient::<L>(index, at);
+                    let average = L::load(average, at);
+                    let piola = constants.piola(&f, elastic, average, &mut history[own.clone()], at);
+                    let piola = piola.scaled(L::load(&rest[pack].volume, at));
+                    by_cell(&nodal_forces(&piola, &rest[pack].gradient, at), &mut forces, at);
                 }
-                by_cell(&forces, slots);
+                add_at::<R, L, 4>(sums, &cells.nodes[pack], &forces);
             }
         }
         findings
@@ -298,7 +339,7 @@ fn dilated<L: crate::Number>(h: &Tensor<L>, volume_ratio: L, change: L) -> Tenso
     scaled
 }
 
-impl<R: Real> AveragedTets<R> {
+impl<R: Real> Constants<R> {
     /// The first Piola–Kirchhoff stress: of the law where the deformation is averaged, else of its isochoric part and the
     /// pressure of the nodes, F S_iso + p cof F.
     #[inline(always)]
@@ -319,34 +360,44 @@ impl<R: Real> AveragedTets<R> {
 }
 
 impl<R: Real> ForceField<R> for AveragedTets<R> {
+    fn blocks(&self) -> &Blocks {
+        &self.moved.blocks
+    }
     fn evaluate(
         &mut self,
-        displacement: &Places<R>,
+        displacement: &[Vector<R>],
         history: &mut History<R>,
-        slots: &mut [Slot<R>],
+        forces: &mut [Quad<R>],
         findings: &mut [Findings<R>],
     ) {
-        self.volume_changes(displacement);
-        self.average_to_nodes();
-        match self.averaging {
-            Averaging::Nodal => {
-                let mut values = std::mem::take(&mut self.node_value);
-                self.to_pressures(&mut values, &mut history.pressures);
-                self.node_value = values;
+        let (processor, constants) = (self.processor, &self.constants);
+        self.moved.for_each(forces, (&mut [], 0), (&mut [], 0), findings, |_, task| {
+            processor.run(VolumeChanges { constants, displacement, task })
+        });
+        self.average_to_nodes(forces);
+        match self.constants.averaging {
+            Averaging::Nodal => self.find_pressures(&mut history.pressures),
+            Averaging::Variational => {
+                let (constants, values) = (&self.constants, &self.node_value);
+                let pressures = (history.pressures.as_mut_slice(), constants.volumetric_slots);
+                self.moved.for_each(forces, (&mut [], 0), pressures, findings, |blocks, mut task| {
+                    constants.copy_in(blocks, values, &mut task);
+                    processor.run(CellPressures { constants, task })
+                });
+                self.average_to_nodes(forces);
             }
-            Averaging::Variational => self.pressures_by_cells(&mut history.pressures),
             Averaging::NiftySim => {}
         }
-        let this = &*self;
-        let per_pack = 6 * this.cell_slots();
-        for_each_task(slots, 4, &mut history.cells, per_pack, findings, |first, slots, history| {
-            this.processor.run(Pass { field: this, first, displacement, history, slots })
+        let (constants, values) = (&self.constants, &self.node_value);
+        let history = (history.cells.as_mut_slice(), 6 * constants.cell_slots());
+        self.moved.for_each(forces, history, (&mut [], 0), findings, |blocks, mut task| {
+            constants.copy_in(blocks, values, &mut task);
+            processor.run(Pass { constants, task })
         });
     }
     fn set_step(&mut self, prony: &Prony, step: f64) {
-        self.relaxation.set_step(prony, step);
+        self.constants.relaxation.set_step(prony, step);
     }
-    #[cfg(test)]
     fn set_processor(&mut self, processor: Processor) {
         self.processor = processor;
     }

@@ -1,123 +1,78 @@
 //! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation, W = Σ w W_iso(F_g) + V U(v/V):
 //! no hourglass patterns, no locking, eight stresses a cell. The in-house reference for `hex8`.
 
-use rayon::prelude::*;
-
-use super::averaged::{Pressures, for_each_pressure, volume_change};
+use super::averaged::{relaxed_pressures, volume_change};
 use super::batch::{Batch, PACKS};
-use super::{
-    Findings, ForceField, PackedCells, Places, Slot, by_cell, by_component, displacement_gradient,
-    for_each_task, gather, relative,
-};
+use super::blocks::{Blocks, Moved, Quad, Task};
+use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
 use crate::Real;
 use crate::element::GaussPoints;
-use crate::lanes::{Lanes, PACK, Pack, Processor, Work, load_vector, store_vector};
+use crate::lanes::{Lanes, PACK, Pack, Processor, Work, add_at, load_vector, store_vector};
 use crate::law::AnyLaw;
 use crate::model::{CellBlock, Solid};
 use crate::prony::{Prony, Relaxation};
 use crate::state::History;
-use crate::tensor::{Vector, add, cast, scale};
+use crate::tensor::{Vector, add, cast};
 
 pub(super) struct FullHexes<R> {
     processor: Processor,
+    moved: Moved<R>,
+    constants: Constants<R>,
+}
+
+/// What does not change from step to step.
+struct Constants<R> {
     law: AnyLaw,
     cells: PackedCells<R, 8>,
-    /// Gradients of the shape functions at the eight points [1/m].
-    gradient: Vec<[[Vector<Pack<R>>; 8]; 8]>,
-    /// Volumes of the points [m³].
-    weight: Vec<[Pack<R>; 8]>,
+    points: Vec<[Point<R>; 8]>,
     /// 1/V [1/m³]; zero beyond the last cell.
     inverse_volume: Vec<Pack<R>>,
     relaxation: Relaxation<R>,
     isochoric_slots: usize,
     volumetric_slots: usize,
-    /// U'(v/V) of each cell [Pa].
-    pressure: Vec<Pack<R>>,
+}
+
+/// One of the eight points of packs of cells.
+struct Point<R> {
+    /// Gradients of the shape functions [1/m], of all nodes but the first.
+    gradient: [Vector<Pack<R>>; 7],
+    /// Its volume [m³].
+    weight: Pack<R>,
 }
 
 impl<R: Real> FullHexes<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<8>, points: &[GaussPoints], step: f64) -> Self {
         let prony = &solid.material.prony;
-        let packed = PackedCells::new(solid, cells);
-        let eight = [0, 1, 2, 3, 4, 5, 6, 7];
+        let (packed, blocks) = PackedCells::new(solid, cells);
+        let point = |pack: usize, g: usize| Point {
+            gradient: std::array::from_fn(|a| {
+                packed.vector(pack, |cell| cast(points[cell].gradient[g][a + 1]))
+            }),
+            weight: packed.pack(pack, |cell| R::of(points[cell].weight[g])),
+        };
         Self {
             processor: Processor::detect(),
-            law: solid.material.law,
-            gradient: (packed.packs())
-                .map(|pack| {
-                    eight
-                        .map(|g| eight.map(|a| packed.vector(pack, |cell| cast(points[cell].gradient[g][a]))))
-                })
-                .collect(),
-            weight: (packed.packs())
-                .map(|pack| eight.map(|g| packed.pack(pack, |cell| R::of(points[cell].weight[g]))))
-                .collect(),
-            inverse_volume: (packed.packs())
-                .map(|pack| packed.pack(pack, |cell| R::of(1.0 / cells.rest[cell].volume)))
-                .collect(),
-            relaxation: Relaxation::new(prony, step),
-            isochoric_slots: prony.isochoric_slots(),
-            volumetric_slots: prony.volumetric_slots(),
-            pressure: vec![Pack::ZERO; packed.packs().len()],
-            cells: packed,
-        }
-    }
-
-    /// Packs of history for a pack of cells.
-    fn per_pack(&self) -> usize {
-        8 * 6 * self.isochoric_slots
-    }
-
-    /// U'(v/V) of all cells, relaxed where the law's volumetric part relaxes.
-    fn pressures(&mut self, displacement: &Places<R>, history: &mut [Pack<R>]) {
-        let mut values = std::mem::take(&mut self.pressure);
-        values.par_iter_mut().enumerate().with_min_len(8).for_each(|(pack, value)| {
-            self.processor.run(MeanChange { field: self, pack, displacement, value });
-        });
-        let (law, relaxation, slots) = (&self.law, &self.relaxation, self.volumetric_slots);
-        for_each_pressure(&mut values, history, slots, |values, history| {
-            self.processor.run(Pressures { law, relaxation, slots, values, history });
-        });
-        self.pressure = values;
-    }
-}
-
-/// v/V − 1 of a pack of cells.
-struct MeanChange<'a, R> {
-    field: &'a FullHexes<R>,
-    pack: usize,
-    displacement: &'a Places<R>,
-    value: &'a mut Pack<R>,
-}
-
-impl<R: Real> Work<R> for MeanChange<'_, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes<R>>(self) {
-        let Self { field, pack, displacement, value } = self;
-        let mut gathered = [Pack([[R::ZERO; 4]; PACK]); 8];
-        let mut moved = [[Pack::ZERO; 3]; 8];
-        gather(&field.cells.nodes[pack], displacement, &mut gathered);
-        by_component(&gathered, &mut moved);
-        for at in (0..PACK).step_by(L::WIDTH) {
-            let u = relative::<R, L, 8>(&moved, at);
-            let mut change = L::ZERO;
-            for (gradient, weight) in field.gradient[pack].iter().zip(&field.weight[pack]) {
-                change += L::load(weight, at) * volume_change(&displacement_gradient(&u, gradient, at));
-            }
-            (change * L::load(&field.inverse_volume[pack], at)).store(value, at);
+            moved: Moved::new(blocks),
+            constants: Constants {
+                law: solid.material.law,
+                points: packed.packs().map(|pack| std::array::from_fn(|g| point(pack, g))).collect(),
+                inverse_volume: (packed.packs())
+                    .map(|pack| packed.pack(pack, |cell| R::of(1.0 / cells.rest[cell].volume)))
+                    .collect(),
+                cells: packed,
+                relaxation: Relaxation::new(prony, step),
+                isochoric_slots: prony.isochoric_slots(),
+                volumetric_slots: prony.volumetric_slots(),
+            },
         }
     }
 }
 
-/// A pass over the packs from `first` on, as many as `slots` has room for.
+/// A pass over the cells of a block.
 struct Pass<'a, R> {
-    field: &'a FullHexes<R>,
-    first: usize,
-    displacement: &'a Places<R>,
-    history: &'a mut [Pack<R>],
-    slots: &'a mut [Slot<R>],
+    constants: &'a Constants<R>,
+    displacement: &'a [Vector<R>],
+    task: Task<'a, R>,
 }
 
 impl<R: Real> Work<R> for Pass<'_, R> {
@@ -125,71 +80,103 @@ impl<R: Real> Work<R> for Pass<'_, R> {
 
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Findings<R> {
-        let Self { field, first, displacement, history, slots } = self;
+        let Self { constants, displacement, mut task } = self;
+        let Constants { law, cells, points, inverse_volume, relaxation, .. } = constants;
+        task.copy_in(displacement);
+        let Task { block, moved, forces: sums, history, pressures, .. } = task;
+        sums.fill([R::ZERO; 4]);
+        let per_point = 6 * constants.isochoric_slots;
         let mut findings = Findings::default();
         let mut batch = Batch::new();
-        let mut gathered = [Pack([[R::ZERO; 4]; PACK]); 8];
-        let mut moved = [[Pack::ZERO; 3]; 8];
-        let mut forces = [[Pack::ZERO; 3]; 8];
-        let per_point = 6 * field.isochoric_slots;
-        for (index, slots) in slots.chunks_exact_mut(8).enumerate() {
-            let cells = first + index;
-            gather(&field.cells.nodes[cells], displacement, &mut gathered);
-            by_component(&gathered, &mut moved);
-            forces.fill([Pack::ZERO; 3]);
-            for points in [0, PACKS] {
-                for pack in 0..PACKS {
+        let mut u = [[Pack::ZERO; 3]; 7];
+        let mut nodal = [[Pack::ZERO; 3]; 7];
+        let mut forces = [Pack([[R::ZERO; 4]; PACK]); 8];
+        let packs = cells.packs_of(block);
+        for pack in packs.clone() {
+            let mut pressure = Pack::ZERO;
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let (relative, _) = relative::<R, L, 8, 7>(moved, &cells.nodes[pack], at);
+                for (u, relative) in u.iter_mut().zip(relative) {
+                    store_vector(relative, u, at);
+                }
+                // v/V − 1.
+                let mut change = L::ZERO;
+                for Point { gradient, weight } in &points[pack] {
+                    let h = displacement_gradient(&relative, gradient, at);
+                    change += L::load(weight, at) * volume_change(&h);
+                }
+                (change * L::load(&inverse_volume[pack], at)).store(&mut pressure, at);
+            }
+            // U'(v/V), relaxed where the law's volumetric part relaxes.
+            let slots = constants.volumetric_slots;
+            let own = (pack - packs.start) * slots;
+            let own = own.min(pressures.len())..(own + slots).min(pressures.len());
+            let values = std::slice::from_mut(&mut pressure);
+            relaxed_pressures::<R, L>(law, relaxation, slots, values, &mut pressures[own], &mut batch);
+            nodal.fill([Pack::ZERO; 3]);
+            for (part, points) in points[pack].chunks(PACKS).enumerate() {
+                for (index, point) in points.iter().enumerate() {
                     for at in (0..PACK).step_by(L::WIDTH) {
-                        let u = relative::<R, L, 8>(&moved, at);
-                        let gradient = &field.gradient[cells][points + pack];
-                        batch.set(pack, at, &displacement_gradient(&u, gradient, at));
+                        let mut relative = [[L::ZERO; 3]; 7];
+                        for (relative, u) in relative.iter_mut().zip(&u) {
+                            *relative = load_vector(u, at);
+                        }
+                        batch.set(index, at, &displacement_gradient(&relative, &point.gradient, at));
                     }
                 }
-                batch.evaluate::<L>(&field.law, PACKS, PACKS, field.cells.fibres(cells, 1));
-                for pack in 0..PACKS {
-                    batch.note(pack, cells * PACK, &mut findings);
-                    let point = points + pack;
-                    let own = (index * 8 + point) * per_point;
+                batch.evaluate::<L>(law, PACKS, PACKS, cells.fibres(pack, 1));
+                for (index, point) in points.iter().enumerate() {
+                    batch.note(index, pack * PACK, &mut findings);
+                    let own = ((pack - packs.start) * 8 + part * PACKS + index) * per_point;
                     let own = own.min(history.len())..(own + per_point).min(history.len());
                     for at in (0..PACK).step_by(L::WIDTH) {
-                        let isochoric = batch.elastic::<L>(pack, at).isochoric;
-                        let stress =
-                            field.relaxation.advance_isochoric(isochoric, &mut history[own.clone()], at);
-                        let f = batch.deformation_gradient::<L>(pack, at);
-                        let pressure = L::load(&field.pressure[cells], at);
-                        let piola = f.times_symmetric(&stress).plus_scaled(&f.cofactor(), pressure);
-                        let weight = L::load(&field.weight[cells][point], at);
-                        for (force, b) in forces.iter_mut().zip(&field.gradient[cells][point]) {
-                            let own = scale(piola.apply(load_vector(b, at)), weight);
+                        let isochoric = batch.elastic::<L>(index, at).isochoric;
+                        let stress = relaxation.advance_isochoric(isochoric, &mut history[own.clone()], at);
+                        let f = batch.deformation_gradient::<L>(index, at);
+                        let piola = f.times_symmetric(&stress);
+                        let piola = piola.plus_scaled(&f.cofactor(), L::load(&pressure, at));
+                        let piola = piola.scaled(L::load(&point.weight, at));
+                        for (force, b) in nodal.iter_mut().zip(&point.gradient) {
+                            let own = piola.apply(load_vector(b, at));
                             store_vector(add(load_vector(force, at), own), force, at);
                         }
                     }
                 }
             }
-            by_cell(&forces, slots);
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let mut own = [[L::ZERO; 3]; 7];
+                for (own, force) in own.iter_mut().zip(&nodal) {
+                    *own = load_vector(force, at);
+                }
+                by_cell(&own, &mut forces, at);
+            }
+            add_at::<R, L, 8>(sums, &cells.nodes[pack], &forces);
         }
         findings
     }
 }
 
 impl<R: Real> ForceField<R> for FullHexes<R> {
+    fn blocks(&self) -> &Blocks {
+        &self.moved.blocks
+    }
     fn evaluate(
         &mut self,
-        displacement: &Places<R>,
+        displacement: &[Vector<R>],
         history: &mut History<R>,
-        slots: &mut [Slot<R>],
+        forces: &mut [Quad<R>],
         findings: &mut [Findings<R>],
     ) {
-        self.pressures(displacement, &mut history.pressures);
-        let this = &*self;
-        for_each_task(slots, 8, &mut history.cells, this.per_pack(), findings, |first, slots, history| {
-            this.processor.run(Pass { field: this, first, displacement, history, slots })
+        let Self { processor, moved, constants } = self;
+        let pressures = (history.pressures.as_mut_slice(), constants.volumetric_slots);
+        let history = (history.cells.as_mut_slice(), 8 * 6 * constants.isochoric_slots);
+        moved.for_each(forces, history, pressures, findings, |_, task| {
+            processor.run(Pass { constants, displacement, task })
         });
     }
     fn set_step(&mut self, prony: &Prony, step: f64) {
-        self.relaxation.set_step(prony, step);
+        self.constants.relaxation.set_step(prony, step);
     }
-    #[cfg(test)]
     fn set_processor(&mut self, processor: Processor) {
         self.processor = processor;
     }

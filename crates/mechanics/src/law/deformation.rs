@@ -40,11 +40,13 @@ impl<R: Number> Deformation<R> {
         let x = h.trace() + h.second_invariant() + h.determinant();
         let j = R::ONE + x;
         let cauchy_green = strain_twice + Symmetric::IDENTITY;
-        let inverse_cauchy_green = cauchy_green.cofactor() * (R::ONE / (j * j));
-        // c = J^(1/3), c − 1 = x/(c² + c + 1), hence q − 1 = (1 − c²)/c² = −x (c + 1)/(c² (c² + c + 1)).
-        let c = j.cbrt();
-        let c2 = c * c;
-        let isochoric_change = -x * (c + R::ONE) / (c2 * (c2 + c + R::ONE));
+        // y = J^(−1/3), and 1/J from its cube, once corrected.
+        let y = j.inverse_cbrt();
+        let cube = y * y * y;
+        let inverse = cube * (-j).mul_add(cube, R::of(2.0));
+        let inverse_cauchy_green = cauchy_green.cofactor() * (inverse * inverse);
+        // y³ − 1 = −x y³, hence q − 1 = (y − 1)(y + 1) = −x y³ (y + 1)/(y² + y + 1).
+        let isochoric_change = -x * inverse * (y + R::ONE) / (y * y + y + R::ONE);
         Self {
             gradient,
             strain_twice,
@@ -110,7 +112,7 @@ impl<R: Number> Deformation<R> {
     #[inline(always)]
     pub fn fibre_stress(&self, a: Vector<R>, w4: R) -> Symmetric<R> {
         let i4 = R::ONE + self.strain_twice.quadratic(a);
-        let direction = Symmetric::dyad(a) - self.inverse_cauchy_green * (i4 * R::of(1.0 / 3.0));
+        let direction = Symmetric::dyad(a).plus_scaled(&self.inverse_cauchy_green, i4 * R::of(-1.0 / 3.0));
         direction * (R::of(2.0) * w4 * self.isochoric_factor)
     }
 
@@ -127,7 +129,7 @@ impl<R: Number> Deformation<R> {
     #[inline(always)]
     fn inverse_times_deviator(&self, m: &Symmetric<R>) -> Symmetric<R> {
         let inverse = &self.inverse_cauchy_green;
-        inverse.commuting_product(m) - *inverse * (m.trace() * R::of(1.0 / 3.0))
+        inverse.commuting_product(m).plus_scaled(inverse, m.trace() * R::of(-1.0 / 3.0))
     }
 }
 

@@ -5,7 +5,7 @@
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_mechanics::State;
 use pliant_scene::source::Source;
-use pliant_scene::{Built, OutputFolder, Plan, Scene};
+use pliant_scene::{Built, OutputFolder, Plan, SAFETY, Scene};
 use rayon::ThreadPoolBuilder;
 
 use crate::case::{Case, CaseError, Findings, Row};
@@ -55,7 +55,7 @@ impl Program {
         let short = scene(cells, 1e-3)?;
         let built = pliant_scene::build(&short)?;
         // The duration that takes as many steps as are to be timed.
-        let step = pliant_scene::plan(&short, &built)?.step;
+        let step = SAFETY * pliant_scene::plan(&short, &built)?.limit.step;
         let scene = scene(cells, step * (ELEMENT_STEPS / cells.pow(3)) as f64)?;
         let built = pliant_scene::build(&scene)?;
         let plan = pliant_scene::plan(&scene, &built)?;

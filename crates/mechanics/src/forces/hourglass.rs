@@ -1,0 +1,94 @@
+//! Resistance of uniform-strain hexahedra to hourglass patterns, f_a = k Σ_c γ_ca q_c with q_c = Σ_b γ_cb u_b. With
+//! γ_ca = Γ_ca − B_a·Y_c, the signs Γ_ca = ±1 of the patterns ηζ, ξζ, ξη, ξηζ and their moments Y_c = Σ_a Γ_ca X_a it is
+//! q_c = Σ_b Γ_cb u_b − H Y_c and f_a = Σ_c Γ_ca k q_c − (k Σ_c q_c ⊗ Y_c) B_a: thirteen numbers a cell, and the second term
+//! of the force goes along with the stress.
+
+use super::PackedCells;
+use crate::Real;
+use crate::lanes::{Lanes, Pack, load_vector, store_vector};
+use crate::model::Hourglass;
+use crate::tensor::{Tensor, Vector, add, cast, dot, scale, sub};
+
+/// Hourglass control of packs of cells; see [`Hourglass`].
+pub(super) struct PackedHourglass<R> {
+    /// Y_c [m].
+    moments: [Vector<Pack<R>>; 4],
+    /// k [N/m].
+    stiffness: Pack<R>,
+}
+
+impl<R: Real> PackedHourglass<R> {
+    pub(super) fn of<const N: usize>(packed: &PackedCells<R, N>, control: &Hourglass<f64, N>) -> Vec<Self> {
+        let of_pack = |pack: usize| Self {
+            moments: [0, 1, 2, 3].map(|c| packed.vector(pack, |cell| cast(control.moments[cell][c]))),
+            stiffness: packed.pack(pack, |cell| R::of(control.stiffness[cell])),
+        };
+        packed.packs().map(of_pack).collect()
+    }
+}
+
+/// k q_c [N] of a pack of cells.
+#[derive(Clone, Copy)]
+pub(super) struct Resistance<R>([Vector<Pack<R>>; 4]);
+
+impl<R: Real> Resistance<R> {
+    pub(super) fn new() -> Self {
+        Self([[Pack::ZERO; 3]; 4])
+    }
+
+    /// Finds k q_c from the displacements relative to the first node and their gradient; returns the energy ½ k Σ |q_c|² [J].
+    #[inline(always)]
+    pub(super) fn find<L: Lanes<R>, const M: usize>(
+        &mut self,
+        control: &PackedHourglass<R>,
+        u: &[Vector<L>; M],
+        h: &Tensor<L>,
+        at: usize,
+    ) -> L {
+        let stiffness = L::load(&control.stiffness, at);
+        let mut energy = L::ZERO;
+        for ((signed, moment), kq) in signed_sums(u).into_iter().zip(&control.moments).zip(&mut self.0) {
+            let q = sub(signed, h.apply(load_vector(moment, at)));
+            energy += dot(q, q);
+            store_vector(scale(q, stiffness), kq, at);
+        }
+        L::of(0.5) * stiffness * energy
+    }
+
+    /// Takes Σ_c k q_c ⊗ Y_c from V P.
+    #[inline(always)]
+    pub(super) fn turn<L: Lanes<R>>(&self, control: &PackedHourglass<R>, piola: &mut Tensor<L>, at: usize) {
+        for (kq, moment) in self.0.iter().zip(&control.moments) {
+            let [x, y, z] = load_vector::<R, L>(kq, at);
+            piola.add_outer([-x, -y, -z], load_vector(moment, at));
+        }
+    }
+
+    /// Adds Σ_c Γ_ca k q_c to the forces on all nodes but the first.
+    #[inline(always)]
+    pub(super) fn add_to<L: Lanes<R>, const M: usize>(&self, forces: &mut [Vector<L>; M], at: usize) {
+        let kq = |c: usize| load_vector::<R, L>(&self.0[c], at);
+        let (first, odd) = (kq(0), kq(3));
+        let (plus, minus) = (add(kq(1), kq(2)), sub(kq(1), kq(2)));
+        // The even part of nodes that lie opposite each other: 0 and 6, 1 and 7, 2 and 4, 3 and 5.
+        let even =
+            [add(first, plus), sub(first, plus), sub([L::ZERO; 3], add(first, minus)), sub(minus, first)];
+        let [a, b, c, d] = even;
+        forces[0] = add(forces[0], add(b, odd));
+        forces[1] = add(forces[1], sub(c, odd));
+        forces[2] = add(forces[2], add(d, odd));
+        forces[3] = add(forces[3], add(c, odd));
+        forces[4] = add(forces[4], sub(d, odd));
+        forces[5] = add(forces[5], add(a, odd));
+        forces[6] = add(forces[6], sub(b, odd));
+    }
+}
+
+/// Σ_b Γ_cb u_b of the nodes 1 to 7, with u_0 = 0: sums and differences of opposite nodes first.
+#[inline(always)]
+fn signed_sums<R: crate::Number, const M: usize>(u: &[Vector<R>; M]) -> [Vector<R>; 4] {
+    let (s0, s1, s2, s3) = (u[5], add(u[0], u[6]), add(u[1], u[3]), add(u[2], u[4]));
+    let odd = add(add(u[5], sub(u[0], u[6])), add(sub(u[3], u[1]), sub(u[2], u[4])));
+    let (a, b) = (sub(s0, s1), sub(s2, s3));
+    [sub(add(s0, s1), add(s2, s3)), sub(a, b), add(a, b), odd]
+}
