@@ -51,7 +51,10 @@ pub trait Lanes<R>: Number {
     /// Writes them into a pack from lane `at` on.
     fn store(self, pack: &mut Pack<R>, at: usize);
     /// The four components of the vectors at some places, for lanes `at` and on.
-    fn gather(vectors: &[[R; 4]], places: &[u16; PACK], at: usize) -> [Self; 4];
+    ///
+    /// # Safety
+    /// All places lie inside.
+    unsafe fn gather(vectors: &[[R; 4]], places: &[u16; PACK], at: usize) -> [Self; 4];
     /// Writes vectors from lane `at` on, each where [`row_of_lane`](Self::row_of_lane) tells.
     fn spread(components: [Self; 4], to: &mut Pack<[R; 4]>, at: usize);
     /// Where the vector of a lane of a pack is written: the order in which registers hold them.
@@ -234,29 +237,56 @@ unsafe fn proof<S: Simd>() -> S {
     unsafe { std::mem::transmute_copy(&()) }
 }
 
-/// # Panics
-/// If a place lies at the end or beyond. One comparison for a pack of places instead of one for each, which cost a tet 1 ns of 9.
-#[inline(always)]
-fn assert_inside(places: &[u16; PACK], end: usize) {
-    assert!(usize::from(places.iter().fold(0, |most, &place| most.max(place))) < end);
+/// The vectors and sums of some nodes, and packs of cells that know their nodes by their places among them. That all places
+/// lie inside is found once for all packs: a comparison for each access costs a tet 1 ns of 9.
+pub(crate) struct Local<'a, R, const N: usize> {
+    vectors: &'a [[R; 4]],
+    sums: &'a mut [[R; 4]],
+    places: &'a [[[u16; PACK]; N]],
 }
 
-/// Adds the vectors of packs, as [`Lanes::spread`] has written them, to those at some places: lane by lane.
-#[inline(always)]
-pub(crate) fn add_at<R: Real, L: Lanes<R>, const N: usize>(
-    sums: &mut [[R; 4]],
-    places: &[[u16; PACK]; N],
-    vectors: &[Pack<[R; 4]>; N],
-) {
-    for places in places {
-        assert_inside(places, sums.len());
+impl<'a, R: Real, const N: usize> Local<'a, R, N> {
+    /// # Panics
+    /// If there are not as many sums as vectors, or a place lies beyond.
+    #[inline(always)]
+    pub(crate) fn new(vectors: &'a [[R; 4]], sums: &'a mut [[R; 4]], places: &'a [[[u16; PACK]; N]]) -> Self {
+        assert_eq!(vectors.len(), sums.len());
+        let most = places.as_flattened().as_flattened().iter().fold(0, |most, &place| most.max(place));
+        assert!(usize::from(most) < vectors.len());
+        Self { vectors, sums, places }
     }
-    for lane in 0..PACK {
-        let row = L::row_of_lane(lane);
-        for (vectors, places) in vectors.iter().zip(places) {
-            // SAFETY: all places lie inside.
-            let sum = unsafe { sums.get_unchecked_mut(usize::from(places[lane])) };
-            *sum = plus(*sum, vectors.0[row]);
+
+    /// The vectors of a node of each cell of a pack, from lane `at` on, component by component.
+    #[inline(always)]
+    pub(crate) fn gather<L: Lanes<R>>(&self, pack: usize, node: usize, at: usize) -> [L; 4] {
+        // SAFETY: `new` has found all places inside.
+        unsafe { L::gather(self.vectors, &self.places[pack][node], at) }
+    }
+
+    /// Adds the vectors of a pack of cells, as [`Lanes::spread`] has written them, to the sums of their nodes, cell by cell.
+    #[inline(always)]
+    pub(crate) fn add<L: Lanes<R>>(&mut self, pack: usize, vectors: &[Pack<[R; 4]>; N]) {
+        let places = &self.places[pack];
+        for lane in 0..PACK {
+            let row = L::row_of_lane(lane);
+            for (vectors, places) in vectors.iter().zip(places) {
+                // SAFETY: `new` has found all places inside.
+                let sum = unsafe { self.sums.get_unchecked_mut(usize::from(places[lane])) };
+                *sum = plus(*sum, vectors.0[row]);
+            }
+        }
+    }
+
+    /// Adds a number of each cell of a pack to the first component of the sums of all its nodes, cell by cell.
+    #[inline(always)]
+    pub(crate) fn add_number(&mut self, pack: usize, numbers: &Pack<R>) {
+        let places = &self.places[pack];
+        for lane in 0..PACK {
+            for places in places {
+                // SAFETY: `new` has found all places inside.
+                let sum = unsafe { self.sums.get_unchecked_mut(usize::from(places[lane])) };
+                sum[0] += numbers.0[lane];
+            }
         }
     }
 }
@@ -354,11 +384,10 @@ macro_rules! wide {
                 S::$slice_mut(&mut pack.0).0[at / Self::WIDTH] = self.0;
             }
             #[inline(always)]
-            fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
-                assert_inside(places, vectors.len());
+            unsafe fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
                 let mut rows = [[0.0; 4]; PACK];
                 for (row, to) in rows[..Self::WIDTH].iter_mut().enumerate() {
-                    // SAFETY: all places lie inside.
+                    // SAFETY: the caller's.
                     *to = unsafe { *vectors.get_unchecked(usize::from(places[at + Self::lane_of_row(row)])) };
                 }
                 Self::to_components(&rows)
@@ -481,7 +510,7 @@ macro_rules! wide {
                 pack.0[at] = self;
             }
             #[inline(always)]
-            fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
+            unsafe fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
                 vectors[usize::from(places[at])]
             }
             #[inline(always)]

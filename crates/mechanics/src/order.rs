@@ -71,15 +71,14 @@ mod tests {
     fn blocks_are_compact_and_lanes_apart() {
         let centres = shuffled(16);
         let ordered = order(&centres);
-        let largest = |cells: &[u32]| {
-            let extent = |axis: usize| {
-                let along = cells.iter().map(|&cell| centres[cell as usize][axis]);
-                along.clone().fold(f64::MIN, f64::max) - along.fold(f64::MAX, f64::min) + 1.0
-            };
-            (0..3).map(extent).fold(0.0, f64::max)
+        let extent = |cells: &[u32], axis: usize| {
+            let along = cells.iter().map(|&cell| centres[cell as usize][axis]);
+            along.clone().fold(f64::MIN, f64::max) - along.fold(f64::MAX, f64::min) + 1.0
         };
-        // Eight blocks of 8³ cells.
-        assert!(ordered.chunks(BLOCK * PACK).all(|block| largest(block) == 8.0));
+        let largest = |cells: &[u32]| (0..3).map(|axis| extent(cells, axis)).fold(0.0, f64::max);
+        // A block fills its box.
+        let volume = |cells: &[u32]| (0..3).map(|axis| extent(cells, axis)).product::<f64>();
+        assert!(ordered.chunks(BLOCK * PACK).all(|block| volume(block) == (BLOCK * PACK) as f64));
         // Cells that share no node are two apart.
         let sharing =
             ordered.chunks(PACK).flat_map(|pack| pack.windows(2)).filter(|pair| largest(pair) < 3.0);

@@ -17,7 +17,7 @@ use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, Processor, Work, add_at, entry, load_tensor};
+use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, entry, load_tensor};
 use crate::law::{AnyLaw, Split};
 use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
 use crate::prony::{Prony, Relaxation};
@@ -127,16 +127,6 @@ impl<R: Real> Constants<R> {
     }
 }
 
-/// Adds numbers of a pack of cells to those of their nodes, cell by cell.
-#[inline(always)]
-fn add_to_nodes<R: Real>(values: &Pack<R>, nodes: &[[u16; PACK]; 4], sums: &mut [Quad<R>]) {
-    for lane in 0..PACK {
-        for nodes in nodes {
-            sums[usize::from(nodes[lane])][0] += values.0[lane];
-        }
-    }
-}
-
 /// The shares of the cells of a block in Σ V_e (J_e − 1)/4 of its nodes.
 struct VolumeChanges<'a, R> {
     constants: &'a Constants<R>,
@@ -152,14 +142,16 @@ impl<R: Real> Work<R> for VolumeChanges<'_, R> {
         let Self { constants: Constants { cells, rest, .. }, displacement, mut task } = self;
         task.copy_in(displacement);
         task.forces.fill([R::ZERO; 4]);
+        let packs = cells.packs_of(task.block);
+        let mut local = Local::new(task.moved, task.forces, &cells.nodes[packs.clone()]);
         let mut values = Pack::ZERO;
-        for pack in cells.packs_of(task.block) {
+        for pack in packs.clone() {
             for at in (0..PACK).step_by(L::WIDTH) {
-                let (u, _) = relative::<R, L, 4, 3>(task.moved, &cells.nodes[pack], at);
+                let (u, _) = relative::<R, L, 4, 3>(&local, pack - packs.start, at);
                 let change = volume_change(&displacement_gradient(&u, &rest[pack].gradient, at));
                 (change * L::of(0.25) * L::load(&rest[pack].volume, at)).store(&mut values, at);
             }
-            add_to_nodes(&values, &cells.nodes[pack], task.forces);
+            local.add_number(pack - packs.start, &values);
         }
         Findings::default()
     }
@@ -182,22 +174,23 @@ impl<R: Real> Work<R> for CellPressures<'_, R> {
         sums.fill([R::ZERO; 4]);
         let mut batch = Batch::new();
         let packs = cells.packs_of(block);
+        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
         for first in packs.clone().step_by(PACKS) {
             let mut values = [Pack::ZERO; PACKS];
             let values = &mut values[..PACKS.min(packs.end - first)];
-            for (value, nodes) in values.iter_mut().zip(&cells.nodes[first..]) {
+            for (value, pack) in values.iter_mut().zip(first - packs.start..) {
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    average::<R, L>(moved, nodes, at).store(value, at);
+                    average::<R, L>(&local, pack, at).store(value, at);
                 }
             }
             let own = (first - packs.start) * slots;
             let own = own.min(history.len())..(own + values.len() * slots).min(history.len());
             relaxed_pressures::<R, L>(law, relaxation, *slots, values, &mut history[own], &mut batch);
-            for ((value, nodes), rest) in values.iter_mut().zip(&cells.nodes[first..]).zip(&rest[first..]) {
+            for ((value, pack), rest) in values.iter_mut().zip(first - packs.start..).zip(&rest[first..]) {
                 for at in (0..PACK).step_by(L::WIDTH) {
                     (L::load(value, at) * L::of(0.25) * L::load(&rest.volume, at)).store(value, at);
                 }
-                add_to_nodes(value, nodes, sums);
+                local.add_number(pack, value);
             }
         }
         Findings::default()
@@ -206,10 +199,10 @@ impl<R: Real> Work<R> for CellPressures<'_, R> {
 
 /// The means of what the four nodes of cells carry beside their displacements.
 #[inline(always)]
-fn average<R: Real, L: Lanes<R>>(moved: &[Quad<R>], nodes: &[[u16; PACK]; 4], at: usize) -> L {
+fn average<R: Real, L: Lanes<R>>(local: &Local<'_, R, 4>, pack: usize, at: usize) -> L {
     let mut sum = L::ZERO;
-    for nodes in nodes {
-        sum += L::gather(moved, nodes, at)[3];
+    for node in 0..4 {
+        sum += local.gather::<L>(pack, node, at)[3];
     }
     sum * L::of(0.25)
 }
@@ -280,12 +273,13 @@ impl<R: Real> Work<R> for Pass<'_, R> {
         let mut averages = [Pack::ZERO; PACKS];
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); 4];
         let packs = cells.packs_of(block);
+        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
         for first in packs.clone().step_by(PACKS) {
             let count = PACKS.min(packs.end - first);
             for (index, average) in averages[..count].iter_mut().enumerate() {
                 let pack = first + index;
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let (u, beside) = relative::<R, L, 4, 3>(moved, &cells.nodes[pack], at);
+                    let (u, beside) = relative::<R, L, 4, 3>(&local, pack - packs.start, at);
                     batch.set(index, at, &displacement_gradient(&u, &rest[pack].gradient, at));
                     (beside * L::of(0.25)).store(average, at);
                 }
@@ -318,7 +312,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                     let piola = piola.scaled(L::load(&rest[pack].volume, at));
                     by_cell(&nodal_forces(&piola, &rest[pack].gradient, at), &mut forces, at);
                 }
-                add_at::<R, L, 4>(sums, &cells.nodes[pack], &forces);
+                local.add::<L>(pack - packs.start, &forces);
             }
         }
         findings

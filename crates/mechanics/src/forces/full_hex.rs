@@ -7,7 +7,7 @@ use super::blocks::{Blocks, Moved, Quad, Task};
 use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
 use crate::Real;
 use crate::element::GaussPoints;
-use crate::lanes::{Lanes, PACK, Pack, Processor, Work, add_at, load_vector, store_vector};
+use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector, store_vector};
 use crate::law::AnyLaw;
 use crate::model::{CellBlock, Solid};
 use crate::prony::{Prony, Relaxation};
@@ -92,10 +92,11 @@ impl<R: Real> Work<R> for Pass<'_, R> {
         let mut nodal = [[Pack::ZERO; 3]; 7];
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); 8];
         let packs = cells.packs_of(block);
+        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
         for pack in packs.clone() {
             let mut pressure = Pack::ZERO;
             for at in (0..PACK).step_by(L::WIDTH) {
-                let (relative, _) = relative::<R, L, 8, 7>(moved, &cells.nodes[pack], at);
+                let (relative, _) = relative::<R, L, 8, 7>(&local, pack - packs.start, at);
                 for (u, relative) in u.iter_mut().zip(relative) {
                     store_vector(relative, u, at);
                 }
@@ -150,7 +151,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 }
                 by_cell(&own, &mut forces, at);
             }
-            add_at::<R, L, 8>(sums, &cells.nodes[pack], &forces);
+            local.add::<L>(pack - packs.start, &forces);
         }
         findings
     }

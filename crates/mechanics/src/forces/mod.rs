@@ -26,7 +26,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, Processor, load_vector};
+use crate::lanes::{Lanes, Local, PACK, Pack, Processor, load_vector};
 use crate::model::{CellBlock, Cells, Model, Solid};
 use crate::prony::Prony;
 use crate::state::History;
@@ -200,14 +200,14 @@ impl<R: Real, const M: usize> PackedRest<R, M> {
 /// else the nodes carry, summed.
 #[inline(always)]
 fn relative<R: Real, L: Lanes<R>, const N: usize, const M: usize>(
-    moved: &[Quad<R>],
-    nodes: &[[u16; PACK]; N],
+    local: &Local<'_, R, N>,
+    pack: usize,
     at: usize,
 ) -> ([Vector<L>; M], L) {
-    let [x, y, z, mut sum] = L::gather(moved, &nodes[0], at);
+    let [x, y, z, mut sum] = local.gather(pack, 0, at);
     let mut relative = [[L::ZERO; 3]; M];
-    for (u, nodes) in relative.iter_mut().zip(&nodes[1..]) {
-        let [ux, uy, uz, beside] = L::gather(moved, nodes, at);
+    for (u, node) in relative.iter_mut().zip(1..) {
+        let [ux, uy, uz, beside] = local.gather(pack, node, at);
         *u = sub([ux, uy, uz], [x, y, z]);
         sum += beside;
     }

@@ -7,7 +7,7 @@ use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
 use crate::Real;
-use crate::lanes::{Lanes, PACK, Pack, Processor, Work, add_at};
+use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work};
 use crate::law::AnyLaw;
 use crate::model::{CellBlock, Solid};
 use crate::prony::{Prony, Relaxation};
@@ -73,12 +73,13 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
         let mut resistance = [Resistance::new(); PACKS];
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); N];
         let packs = cells.packs_of(block);
+        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
         for first in packs.clone().step_by(PACKS) {
             let count = PACKS.min(packs.end - first);
             for (index, resistance) in resistance[..count].iter_mut().enumerate() {
                 let pack = first + index;
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let (u, _) = relative::<R, L, N, M>(moved, &cells.nodes[pack], at);
+                    let (u, _) = relative::<R, L, N, M>(&local, pack - packs.start, at);
                     let h = displacement_gradient(&u, &rest[pack].gradient, at);
                     batch.set(index, at, &h);
                     if let Some(control) = hourglass {
@@ -107,7 +108,7 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                     }
                     by_cell(&nodal, &mut forces, at);
                 }
-                add_at::<R, L, N>(sums, &cells.nodes[pack], &forces);
+                local.add::<L>(pack - packs.start, &forces);
             }
         }
         findings
