@@ -1,0 +1,5 @@
+//! Co-rotational triangular shells.
+pub mod element;
+mod rotation;
+#[cfg(test)]
+mod testing;
