@@ -1,5 +1,7 @@
 //! Co-rotational triangular shells.
-pub mod element;
 mod rotation;
+pub mod element;
+mod facet;
 #[cfg(test)]
 mod testing;
+pub use facet::*;
