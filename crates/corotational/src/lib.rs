@@ -1,7 +1,20 @@
 //! Co-rotational triangular shells.
 mod rotation;
 pub mod element;
+mod error;
 mod facet;
+mod linear;
+mod model;
+mod sparse;
+mod state;
+mod statics;
+mod system;
 #[cfg(test)]
 mod testing;
-pub use facet::*;
+pub use error::{ModelError, SolveError};
+pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
+pub use linear::{LinearReport, LinearSolver, Preconditioner};
+pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spring};
+pub use state::State;
+pub use statics::{Control, Step, Statics, StaticSettings};
+pub use system::Phases;

@@ -27,6 +27,7 @@ mod extent;
 mod field;
 mod lattice;
 mod phantom;
+mod sheets;
 mod stencil;
 mod structured;
 mod stuffing;
@@ -39,6 +40,7 @@ pub use error::MeshingError;
 pub use field::{Ellipsoid, ImplicitField};
 pub use phantom::{Organ, Phantom, brain_label};
 pub use structured::{Block, Resolution, Tube, VolumeCell};
+pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use stuffing::Stuffing;
 pub use voxels::Voxels;
 

@@ -1,0 +1,423 @@
+//! Everything constant: rest positions, facets, masses, normals, loads, constraints.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use pliant_mechanics::curve::Curve;
+
+use crate::element::{Formulation, PlaneStress};
+use crate::error::ModelError;
+use crate::facet::Facet;
+
+/// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// Rest positions [m].
+    pub rest: Vec<Vector3<f64>>,
+    /// Shell elements of all shells.
+    pub facets: Vec<Facet>,
+    /// Nodal normals at rest, which turn with their nodes; several a node at creases.
+    pub normals: Vec<Normal>,
+    /// The normals at the corners of each facet.
+    pub corner_normals: Vec<[u32; 3]>,
+    /// Mass [kg], one per node.
+    pub mass: Vec<f64>,
+    /// Rotary inertia [kg m²], the same about every axis, one per node.
+    pub inertia: Vec<f64>,
+    /// Mass-proportional damping [1/s].
+    pub mass_damping: f64,
+    /// Stiffness-proportional damping [s].
+    pub stiffness_damping: f64,
+    /// Springs from nodes to points.
+    pub springs: Vec<Spring>,
+    /// Loads, which add up.
+    pub loads: Vec<Load>,
+    /// Constraints.
+    pub constraints: Vec<Constraint>,
+}
+
+/// A normal that a node carries.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Normal {
+    /// The node.
+    pub node: u32,
+    /// Unit vector at rest.
+    pub direction: Vector3<f64>,
+}
+
+/// Elasticity and density of a shell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Plane-stress elasticity.
+    pub elastic: PlaneStress,
+    /// Density [kg/m³].
+    pub density: f64,
+}
+
+/// Triangles that become a shell.
+#[derive(Clone, Debug)]
+pub struct Shell {
+    /// Its name in messages.
+    pub name: String,
+    /// Nodes of its triangles.
+    pub cells: Vec<[u32; 3]>,
+    /// Thickness [m]: one, or one a triangle.
+    pub thickness: Vec<f64>,
+    /// What it is made of.
+    pub material: Material,
+    /// Its elements.
+    pub formulation: Formulation,
+    /// Triangles that meet at a larger angle [rad] have normals of their own: a crease.
+    pub crease: f64,
+    /// Whether more than two triangles may meet in an edge.
+    pub branches: bool,
+}
+
+impl Shell {
+    /// A shell of one thickness with the default elements, creases above 45° and no branches.
+    pub fn new(name: &str, cells: Vec<[u32; 3]>, thickness: f64, material: Material) -> Self {
+        Self {
+            name: name.into(),
+            cells,
+            thickness: vec![thickness],
+            material,
+            formulation: Formulation::default(),
+            crease: std::f64::consts::FRAC_PI_4,
+            branches: false,
+        }
+    }
+}
+
+/// What was noticed when a shell was added.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Notes {
+    /// Triangles turned over so that all face the same side.
+    pub turned: usize,
+    /// Elements thicker than their smallest altitude: they answer as plates, but are none.
+    pub thick: usize,
+    /// Elements of Comas (2010), which depend on the numbering and converge to a wrong plate.
+    pub comas: usize,
+}
+
+/// A linear spring without rest length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    /// The node it pulls.
+    pub node: u32,
+    /// The point it pulls towards [m].
+    pub anchor: Vector3<f64>,
+    /// Stiffness [N/m].
+    pub stiffness: f64,
+}
+
+/// A load with its course over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Load {
+    /// Its name in messages.
+    pub name: String,
+    /// What acts.
+    pub kind: LoadKind,
+    /// Factor over time.
+    pub curve: Curve,
+    /// Whether it is multiplied by [`State::load_factor`](crate::State::load_factor), which a control finds.
+    pub controlled: bool,
+}
+
+/// What a load acts on and how.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoadKind {
+    /// A force [N] on each of some nodes.
+    Force {
+        /// The nodes.
+        nodes: Vec<u32>,
+        /// Force on each [N].
+        force: Vector3<f64>,
+    },
+    /// A moment [N m] on each of some nodes, with axes that stay in space.
+    Moment {
+        /// The nodes.
+        nodes: Vec<u32>,
+        /// Moment on each [N m].
+        moment: Vector3<f64>,
+    },
+    /// Weight of everything.
+    Gravity {
+        /// Acceleration [m/s²].
+        acceleration: Vector3<f64>,
+    },
+    /// A force per rest area that keeps its direction, a third to each corner.
+    Area {
+        /// Facets.
+        cells: Vec<u32>,
+        /// Force per area [Pa].
+        traction: Vector3<f64>,
+    },
+    /// A force per rest length along edges that keeps its direction, half to each end.
+    Edge {
+        /// Ends of the edges.
+        edges: Vec<[u32; 2]>,
+        /// Force per length [N/m].
+        traction: Vector3<f64>,
+    },
+    /// Pressure along the current normal of facets, a third of p A n to each corner.
+    Pressure {
+        /// Facets.
+        cells: Vec<u32>,
+        /// Pressure [Pa], positive along the normal.
+        pressure: f64,
+    },
+}
+
+/// Components of nodes that are held or moved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constraint {
+    /// Its name in messages.
+    pub name: String,
+    /// The nodes.
+    pub nodes: Vec<u32>,
+    /// Which of (x, y, z) and of the spins about x, y and z.
+    pub components: [bool; 6],
+    /// Held, or moved from where they start.
+    pub motion: Motion,
+}
+
+/// What constrained components do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Motion {
+    /// They stay where they start.
+    Fixed,
+    /// They move.
+    Moved {
+        /// Displacements [m] and rotations [rad] at a factor of 1; rotations about one axis only.
+        by: [f64; 6],
+        /// Factor over time.
+        curve: Curve,
+    },
+}
+
+impl Model {
+    /// A model of nodes at rest [m] and nothing else.
+    pub fn new(rest: Vec<Vector3<f64>>) -> Self {
+        let nodes = rest.len();
+        Self { rest, mass: vec![0.0; nodes], inertia: vec![0.0; nodes], ..Self::default() }
+    }
+
+    /// Adds a shell: its triangles are made to face one side (each connected part keeps the side of most of its triangles),
+    /// become facets, and give mass and normals to their nodes.
+    ///
+    /// # Errors
+    /// If a quantity is out of range, a triangle is degenerate, or an edge has too many triangles. The model then is as it
+    /// was.
+    pub fn add_shell(&mut self, shell: &Shell) -> Result<Notes, ModelError> {
+        self.check_quantities(shell)?;
+        let (cells, turned) = oriented(shell)?;
+        let mut notes = Notes { turned, ..Notes::default() };
+        let mut facets = Vec::with_capacity(cells.len());
+        for (number, &nodes) in cells.iter().enumerate() {
+            let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
+            let corners = nodes.map(|node| self.rest[node as usize]);
+            let facet = Facet::new(nodes, corners, thickness, shell.material.elastic, shell.formulation);
+            let facet = facet.ok_or_else(|| ModelError::Degenerate {
+                shell: shell.name.clone(),
+                cell: number,
+                what: "area",
+                value: 0.5 * (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm(),
+            })?;
+            notes.thick += usize::from(thickness > facet.altitude());
+            notes.comas += usize::from(shell.formulation.bending == crate::element::Bending::Comas2010);
+            facets.push(facet);
+        }
+        for facet in &facets {
+            let mass = shell.material.density * facet.thickness * facet.area / 3.0;
+            // At least A/12, so that rotations do not shorten the steps of an explicit solver.
+            let arm = (facet.thickness * facet.thickness).max(facet.area) / 12.0;
+            for node in facet.nodes {
+                self.mass[node as usize] += mass;
+                self.inertia[node as usize] += mass * arm;
+            }
+        }
+        self.add_normals(&facets, shell.crease);
+        self.facets.extend(facets);
+        Ok(notes)
+    }
+
+    fn check_quantities(&self, shell: &Shell) -> Result<(), ModelError> {
+        let out_of_range = |what: String, value: f64, range| {
+            Err(ModelError::OutOfRange { shell: shell.name.clone(), what, value, range })
+        };
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let Material { elastic, density } = shell.material;
+        if !positive(elastic.young) {
+            return out_of_range("Young's modulus".into(), elastic.young, "positive and finite");
+        }
+        if !(elastic.poisson > -1.0 && elastic.poisson < 1.0) {
+            return out_of_range("Poisson's ratio".into(), elastic.poisson, "between -1 and 1");
+        }
+        if !positive(density) {
+            return out_of_range("density".into(), density, "positive and finite");
+        }
+        let (cells, given) = (shell.cells.len(), shell.thickness.len());
+        if given != 1 && given != cells {
+            return Err(ModelError::Thicknesses { shell: shell.name.clone(), cells, given });
+        }
+        if let Some((cell, &value)) = shell.thickness.iter().enumerate().find(|(_, t)| !positive(**t)) {
+            let what = if given == 1 { "thickness".into() } else { format!("thickness of element {cell}") };
+            return out_of_range(what, value, "positive and finite");
+        }
+        for (cell, nodes) in shell.cells.iter().enumerate() {
+            if let Some(&node) = nodes.iter().find(|&&node| node as usize >= self.rest.len()) {
+                let nodes = self.rest.len();
+                return Err(ModelError::NoSuchNode { shell: shell.name.clone(), cell, node, nodes });
+            }
+        }
+        Ok(())
+    }
+
+    /// Angle-weighted normals, one for each fan of facets round a node that meet at less than the crease angle.
+    fn add_normals(&mut self, facets: &[Facet], crease: f64) {
+        let normal_of = |facet: &Facet| {
+            let [a, b, c] = facet.nodes.map(|node| self.rest[node as usize]);
+            (b - a).cross(&(c - a)).normalize()
+        };
+        let face_normals: Vec<Vector3<f64>> = facets.iter().map(normal_of).collect();
+        let mut around: BTreeMap<u32, Vec<(usize, usize)>> = BTreeMap::new();
+        for (number, facet) in facets.iter().enumerate() {
+            for (corner, &node) in facet.nodes.iter().enumerate() {
+                around.entry(node).or_default().push((number, corner));
+            }
+        }
+        let mut corner_normals = vec![[0; 3]; facets.len()];
+        for (&node, corners) in &around {
+            for fan in fans(facets, corners, &face_normals, crease.cos()) {
+                let mut sum = Vector3::zeros();
+                for &(facet, corner) in &fan {
+                    let [at, next, last] =
+                        [0, 1, 2].map(|i| self.rest[facets[facet].nodes[(corner + i) % 3] as usize]);
+                    sum += face_normals[facet] * (next - at).angle(&(last - at));
+                    corner_normals[facet][corner] = self.normals.len() as u32;
+                }
+                self.normals.push(Normal { node, direction: sum.normalize() });
+            }
+        }
+        self.corner_normals.extend(corner_normals);
+    }
+
+    /// The volume [m³] that closed facets enclose at some positions, positive with normals outwards.
+    pub fn enclosed_volume(&self, cells: &[u32], position: &[Vector3<f64>]) -> f64 {
+        let tet = |&cell: &u32| {
+            let [a, b, c] = self.facets[cell as usize].nodes.map(|node| position[node as usize]);
+            a.dot(&b.cross(&c)) / 6.0
+        };
+        cells.iter().map(tet).sum()
+    }
+
+    /// # Errors
+    /// If facets do not close: their edges of one triangle.
+    pub fn check_closed(&self, cells: &[u32]) -> Result<(), ModelError> {
+        let nodes: Vec<[u32; 3]> = cells.iter().map(|&cell| self.facets[cell as usize].nodes).collect();
+        let open: Vec<[u32; 2]> = edges(&nodes)
+            .into_iter()
+            .filter_map(|(edge, sides)| (sides.len() == 1).then_some(edge))
+            .collect();
+        if open.is_empty() { Ok(()) } else { Err(ModelError::Open { edges: open }) }
+    }
+
+    /// The mean length of the facets' and other cells' edges at rest [m]; 1 without any.
+    pub(crate) fn mean_edge(&self) -> f64 {
+        let mut sum = 0.0;
+        for facet in &self.facets {
+            let [a, b, c] = facet.nodes.map(|node| self.rest[node as usize]);
+            sum += (b - a).norm() + (c - b).norm() + (a - c).norm();
+        }
+        if sum > 0.0 { sum / (3 * self.facets.len()) as f64 } else { 1.0 }
+    }
+}
+
+/// Each edge (lower node first) with the triangles at it, and whether they run along it from the lower node.
+fn edges(cells: &[[u32; 3]]) -> BTreeMap<[u32; 2], Vec<(usize, bool)>> {
+    let mut edges: BTreeMap<[u32; 2], Vec<(usize, bool)>> = BTreeMap::new();
+    for (number, nodes) in cells.iter().enumerate() {
+        for i in 0..3 {
+            let (a, b) = (nodes[i], nodes[(i + 1) % 3]);
+            edges.entry([a.min(b), a.max(b)]).or_default().push((number, a < b));
+        }
+    }
+    edges
+}
+
+/// The triangles of a shell facing one side, and how many were turned over.
+fn oriented(shell: &Shell) -> Result<(Vec<[u32; 3]>, usize), ModelError> {
+    let edges = edges(&shell.cells);
+    let mut neighbours: Vec<Vec<(usize, bool, [u32; 2])>> = vec![Vec::new(); shell.cells.len()];
+    for (&edge, sides) in &edges {
+        match sides[..] {
+            [(a, along), (b, same)] => {
+                neighbours[a].push((b, along == same, edge));
+                neighbours[b].push((a, along == same, edge));
+            }
+            [_] => {}
+            _ if shell.branches => {}
+            _ => return Err(ModelError::Branch { shell: shell.name.clone(), edge, count: sides.len() }),
+        }
+    }
+    let mut turn: Vec<Option<bool>> = vec![None; shell.cells.len()];
+    let mut total = 0;
+    for start in 0..shell.cells.len() {
+        if turn[start].is_some() {
+            continue;
+        }
+        turn[start] = Some(false);
+        let mut part = vec![start];
+        let mut next = 0;
+        while let Some(&cell) = part.get(next) {
+            next += 1;
+            for &(other, opposed, edge) in &neighbours[cell] {
+                let wanted = turn[cell].map(|turned| turned != opposed);
+                match turn[other] {
+                    None => {
+                        turn[other] = wanted;
+                        part.push(other);
+                    }
+                    found if found == wanted => {}
+                    _ => return Err(ModelError::OneSided { shell: shell.name.clone(), edge }),
+                }
+            }
+        }
+        let turned = part.iter().filter(|&&cell| turn[cell] == Some(true)).count();
+        if 2 * turned > part.len() {
+            part.iter().for_each(|&cell| turn[cell] = turn[cell].map(|turned| !turned));
+        }
+        total += turned.min(part.len() - turned);
+    }
+    let cells = shell.cells.iter().zip(&turn);
+    Ok((cells.map(|(&[a, b, c], turn)| if *turn == Some(true) { [a, c, b] } else { [a, b, c] }).collect(), total))
+}
+
+/// The corners of facets at one node, parted where facets that share an edge meet at a crease.
+fn fans(
+    facets: &[Facet],
+    corners: &[(usize, usize)],
+    normals: &[Vector3<f64>],
+    crease: f64,
+) -> Vec<Vec<(usize, usize)>> {
+    let mut left = corners.to_vec();
+    let mut fans = Vec::new();
+    while let Some(first) = left.pop() {
+        let mut fan = vec![first];
+        let mut next = 0;
+        while let Some(&(facet, corner)) = fan.get(next) {
+            next += 1;
+            let ends = [1, 2].map(|i| facets[facet].nodes[(corner + i) % 3]);
+            left.retain(|&(other, at)| {
+                let shares = [1, 2].iter().any(|i| ends.contains(&facets[other].nodes[(at + i) % 3]));
+                let smooth = shares && normals[facet].dot(&normals[other]) > crease;
+                if smooth {
+                    fan.push((other, at));
+                }
+                !smooth
+            });
+        }
+        fans.push(fan);
+    }
+    fans
+}

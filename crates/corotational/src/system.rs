@@ -1,0 +1,342 @@
+//! Forces and stiffness of a model at a state: cells side by side, then added up in their order, so that the number of
+//! threads changes no bit.
+
+use std::time::{Duration, Instant};
+
+use nalgebra::{SMatrix, SVector, Vector3};
+use rayon::prelude::*;
+
+use crate::error::SolveError;
+use crate::facet::{Broken, Matrix18, Tangent, Vector18};
+use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
+use crate::model::{LoadKind, Model, Motion};
+use crate::rotation::skew;
+use crate::sparse::{Equations, LowerMatrix, NONE};
+use crate::state::State;
+
+/// Cells computed side by side before they are added up.
+const CHUNK: usize = 256;
+
+/// Time spent so far in the parts of a solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Phases {
+    /// Forces and stiffness of the cells, and adding them up.
+    pub cells: Duration,
+    /// Factorisation, or inverting the blocks of the preconditioner.
+    pub preparation: Duration,
+    /// Solution of the linear equations.
+    pub solution: Duration,
+    /// Linear equations solved.
+    pub solutions: usize,
+    /// Iterations of conjugate gradients.
+    pub iterations: usize,
+}
+
+/// A model's equations with the forces and the stiffness last found.
+pub(crate) struct System<'m> {
+    pub(crate) model: &'m Model,
+    pub(crate) equations: Equations,
+    pub(crate) matrix: LowerMatrix,
+    places: Vec<Vec<u32>>,
+    workspace: Workspace,
+    /// Internal forces and moments, six a node [N, N m].
+    pub(crate) internal: Vec<f64>,
+    /// Loads, without their controlled part.
+    pub(crate) external: Vec<f64>,
+    /// Loads for a factor of 1.
+    pub(crate) controlled: Vec<f64>,
+    /// What prescribed increments make of forces on free components: K_fc d_c.
+    pub(crate) coupling: Vec<f64>,
+    /// Pressures on facets [Pa]: fixed, controlled.
+    pressure: Vec<[f64; 2]>,
+    /// Strain energy [J].
+    pub(crate) energy: f64,
+    /// Largest force on a node of a cell [N].
+    pub(crate) largest: f64,
+    results: Vec<FacetResult>,
+    pub(crate) phases: Phases,
+    pub(crate) last_solution: LinearReport,
+}
+
+#[derive(Clone)]
+struct FacetResult {
+    energy: f64,
+    force: Vector18,
+    tangent: Matrix18,
+    broken: Option<Broken>,
+}
+
+impl<'m> System<'m> {
+    pub(crate) fn new(model: &'m Model, solver: LinearSolver) -> Result<Self, SolveError> {
+        let nodes = model.rest.len();
+        let mut free = vec![false; 6 * nodes];
+        for facet in &model.facets {
+            for node in facet.nodes {
+                free[6 * node as usize..6 * node as usize + 6].fill(true);
+            }
+        }
+        for constraint in &model.constraints {
+            for &node in &constraint.nodes {
+                for (c, &held) in constraint.components.iter().enumerate() {
+                    free[6 * node as usize + c] &= !held;
+                }
+            }
+        }
+        let equations = Equations::new(&free);
+        let matrix = LowerMatrix::new(&equations, model.facets.iter().map(|facet| &facet.nodes[..]));
+        let places = model.facets.iter().map(|f| matrix.places(&equations, &f.nodes, 6)).collect();
+        let workspace = Workspace::new(solver, &equations, &matrix)
+            .ok_or(SolveError::Control("the equations are too many for the direct solver; use conjugate gradients"))?;
+        Ok(Self {
+            model,
+            matrix,
+            places,
+            workspace,
+            internal: vec![0.0; 6 * nodes],
+            external: vec![0.0; 6 * nodes],
+            controlled: vec![0.0; 6 * nodes],
+            coupling: vec![0.0; equations.len()],
+            pressure: vec![[0.0; 2]; model.facets.len()],
+            energy: 0.0,
+            largest: 0.0,
+            results: vec![FacetResult::none(); CHUNK.min(model.facets.len())],
+            phases: Phases::default(),
+            last_solution: LinearReport::default(),
+            equations,
+        })
+    }
+
+    /// Forces at a state and time; with a tangent also the stiffness, and what prescribed increments (six a node) make of it.
+    pub(crate) fn evaluate(
+        &mut self,
+        state: &State,
+        time: f64,
+        tangent: Option<(Tangent, &[f64])>,
+    ) -> Result<(), SolveError> {
+        let start = Instant::now();
+        self.nodal_loads(time);
+        self.internal.fill(0.0);
+        self.energy = 0.0;
+        self.largest = 0.0;
+        if tangent.is_some() {
+            self.matrix.value.fill(0.0);
+            self.coupling.fill(0.0);
+        }
+        let kind = tangent.map(|(kind, _)| kind);
+        let model = self.model;
+        let mut results = std::mem::take(&mut self.results);
+        for first in (0..model.facets.len()).step_by(CHUNK) {
+            let last = (first + CHUNK).min(model.facets.len());
+            let factor = state.load_factor;
+            let pressure = &self.pressure;
+            results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
+                let number = first + at;
+                result.broken = result.fill(model, state, number, pressure[number], factor, kind).err();
+            });
+            for (number, result) in (first..last).zip(&results) {
+                if let Some(why) = result.broken {
+                    self.results = results;
+                    return Err(SolveError::Broken { cell: number, why });
+                }
+                self.add_facet(state, number, result, tangent.map(|(_, moved)| moved));
+            }
+        }
+        self.results = results;
+        for spring in &model.springs {
+            let at = 6 * spring.node as usize;
+            let stretch = state.position[spring.node as usize] - spring.anchor;
+            self.energy += 0.5 * spring.stiffness * stretch.norm_squared();
+            for c in 0..3 {
+                self.internal[at + c] += spring.stiffness * stretch[c];
+                if tangent.is_some() && self.equations.number[at + c] != NONE {
+                    self.matrix.add_diagonal(self.equations.number[at + c] as usize, spring.stiffness);
+                }
+            }
+        }
+        self.phases.cells += start.elapsed();
+        Ok(())
+    }
+
+    /// Loads that do not depend on the cells' places, and the pressures of those that do.
+    fn nodal_loads(&mut self, time: f64) {
+        let model = self.model;
+        self.external.fill(0.0);
+        self.controlled.fill(0.0);
+        self.pressure.fill([0.0; 2]);
+        for load in &model.loads {
+            let factor = load.curve.value(time);
+            let target = if load.controlled { &mut self.controlled } else { &mut self.external };
+            let mut add = |node: u32, first: usize, force: Vector3<f64>| {
+                for c in 0..3 {
+                    target[6 * node as usize + first + c] += factor * force[c];
+                }
+            };
+            match &load.kind {
+                LoadKind::Force { nodes, force } => nodes.iter().for_each(|&node| add(node, 0, *force)),
+                LoadKind::Moment { nodes, moment } => nodes.iter().for_each(|&node| add(node, 3, *moment)),
+                LoadKind::Gravity { acceleration } => {
+                    for (node, &mass) in model.mass.iter().enumerate() {
+                        add(node as u32, 0, acceleration * mass);
+                    }
+                }
+                LoadKind::Area { cells, traction } => {
+                    for facet in cells.iter().map(|&cell| &model.facets[cell as usize]) {
+                        facet.nodes.iter().for_each(|&node| add(node, 0, traction * (facet.area / 3.0)));
+                    }
+                }
+                LoadKind::Edge { edges, traction } => {
+                    for ends in edges {
+                        let [a, b] = ends.map(|node| model.rest[node as usize]);
+                        ends.iter().for_each(|&node| add(node, 0, traction * (0.5 * (b - a).norm())));
+                    }
+                }
+                LoadKind::Pressure { cells, pressure } => {
+                    for &cell in cells {
+                        self.pressure[cell as usize][usize::from(load.controlled)] += factor * pressure;
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_facet(&mut self, state: &State, number: usize, result: &FacetResult, moved: Option<&[f64]>) {
+        let facet = &self.model.facets[number];
+        self.energy += result.energy;
+        let pressure = self.pressure[number];
+        let third = if pressure == [0.0; 2] { Vector3::zeros() } else { third_of_area(state, facet.nodes) };
+        for (i, &node) in facet.nodes.iter().enumerate() {
+            let at = 6 * node as usize;
+            for c in 0..6 {
+                self.internal[at + c] += result.force[6 * i + c];
+            }
+            for c in 0..3 {
+                self.largest = self.largest.max(result.force[6 * i + c].abs());
+                self.external[at + c] += pressure[0] * third[c];
+                self.controlled[at + c] += pressure[1] * third[c];
+            }
+        }
+        let Some(moved) = moved else { return };
+        self.matrix.add(&self.equations, &facet.nodes, 6, &self.places[number], result.tangent.as_slice());
+        let own = Vector18::from_fn(|i, _| moved[6 * facet.nodes[i / 6] as usize + i % 6]);
+        if own != Vector18::zeros() {
+            let change: SVector<f64, 18> = result.tangent * own;
+            for (i, &value) in change.iter().enumerate() {
+                let equation = self.equations.number[6 * facet.nodes[i / 6] as usize + i % 6];
+                if equation != NONE {
+                    self.coupling[equation as usize] += value;
+                }
+            }
+        }
+    }
+
+    /// Takes the matrix as it now is for the coming solutions; returns its negative pivots.
+    pub(crate) fn prepare(&mut self) -> Result<usize, SolveError> {
+        let start = Instant::now();
+        let pivots = self.workspace.prepare(&self.matrix).map_err(linear_error)?;
+        self.phases.preparation += start.elapsed();
+        if pivots.smallest < ZERO_PIVOT {
+            let component = self.equations.component[pivots.weakest] as usize;
+            const NAMES: [&str; 6] = ["x", "y", "z", "rotation about x", "rotation about y", "rotation about z"];
+            return Err(SolveError::Singular {
+                node: (component / 6) as u32,
+                component: NAMES[component % 6],
+                pivot: pivots.smallest,
+            });
+        }
+        Ok(pivots.negative)
+    }
+
+    /// Solves with the matrix prepared.
+    pub(crate) fn solve(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
+        let start = Instant::now();
+        self.last_solution = self.workspace.solve(&self.matrix, right, solution).map_err(linear_error)?;
+        self.phases.solution += start.elapsed();
+        self.phases.solutions += 1;
+        self.phases.iterations += self.last_solution.iterations;
+        Ok(())
+    }
+
+    /// Increments of constrained components between two times, six a node.
+    pub(crate) fn prescribed(&self, from: f64, to: f64, increments: &mut [f64]) {
+        increments.fill(0.0);
+        for constraint in &self.model.constraints {
+            let Motion::Moved { by, curve } = &constraint.motion else { continue };
+            let change = curve.value(to) - curve.value(from);
+            for &node in &constraint.nodes {
+                for c in (0..6).filter(|&c| constraint.components[c]) {
+                    increments[6 * node as usize + c] = by[c] * change;
+                }
+            }
+        }
+    }
+
+    /// A vector of equations spread over all components; the others stay as they are.
+    pub(crate) fn spread(&self, equations: &[f64], components: &mut [f64]) {
+        for (&component, &value) in self.equations.component.iter().zip(equations) {
+            components[component as usize] = value;
+        }
+    }
+
+    /// The values of the free components.
+    pub(crate) fn gather(&self, components: &[f64], equations: &mut [f64]) {
+        for (&component, value) in self.equations.component.iter().zip(equations) {
+            *value = components[component as usize];
+        }
+    }
+}
+
+fn linear_error(error: LinearError) -> SolveError {
+    match error {
+        LinearError::NotFinite => SolveError::Control("the stiffness is not finite; use smaller steps"),
+        LinearError::Indefinite(iterations) => SolveError::Indefinite { iterations },
+        LinearError::Stalled(LinearReport { iterations, residual }) => SolveError::Stalled { iterations, residual },
+    }
+}
+
+/// A third of the area times the normal, now [m²].
+fn third_of_area(state: &State, nodes: [u32; 3]) -> Vector3<f64> {
+    let [a, b, c] = nodes.map(|node| state.position[node as usize]);
+    (b - a).cross(&(c - a)) / 6.0
+}
+
+impl FacetResult {
+    fn none() -> Self {
+        Self { energy: 0.0, force: Vector18::zeros(), tangent: Matrix18::zeros(), broken: None }
+    }
+
+    fn fill(
+        &mut self,
+        model: &Model,
+        state: &State,
+        number: usize,
+        pressure: [f64; 2],
+        factor: f64,
+        kind: Option<Tangent>,
+    ) -> Result<(), Broken> {
+        let facet = &model.facets[number];
+        let (x, rotation) = state.corners(facet.nodes);
+        let placed = facet.place(&x, &rotation)?;
+        (self.energy, self.force) = facet.force(&placed);
+        if let Some(kind) = kind {
+            self.tangent = facet.tangent(&placed, kind);
+            let pressure = pressure[0] + factor * pressure[1];
+            if pressure != 0.0 {
+                follow(&mut self.tangent, &x, pressure);
+            }
+            // Only the symmetric part is assembled: the rest vanishes at equilibrium of conservative loads.
+            self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
+        }
+        Ok(())
+    }
+}
+
+/// Takes from a stiffness how p A n/3 changes with the corners.
+fn follow(k: &mut Matrix18, x: &[Vector3<f64>; 3], pressure: f64) {
+    for j in 0..3 {
+        let opposite: SMatrix<f64, 3, 3> = skew(&(x[(j + 2) % 3] - x[(j + 1) % 3])) * (pressure / 6.0);
+        for i in 0..3 {
+            let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * j);
+            block -= opposite;
+        }
+    }
+}
