@@ -357,6 +357,11 @@ impl Facet {
         }
     }
 
+    /// E t [N/m].
+    pub(crate) fn membrane_modulus(&self) -> f64 {
+        self.elastic.young * self.thickness
+    }
+
     /// The smallest altitude at rest [m].
     pub fn altitude(&self) -> f64 {
         let longest = (0..3).map(|i| (self.corners[i] - self.corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);

@@ -18,3 +18,5 @@ pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Not
 pub use state::State;
 pub use statics::{Control, Step, Statics, StaticSettings};
 pub use system::Phases;
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,5 @@
-//! Linear equations with a symmetric sparse matrix: factors L D Lᵀ (faer; the symbolic part once a pattern), or conjugate
-//! gradients with inverted diagonal blocks or an older factorisation as preconditioner.
+//! Linear equations with a sparse matrix: factors L D Lᵀ or L U (faer; the symbolic part once a pattern), or conjugate gradients
+//! with inverted diagonal blocks or an older factorisation as preconditioner.
 //! All sums run in one order on one thread, so results do not depend on the number of threads.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
@@ -8,6 +8,7 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal::SupernodalLdltRef,
 };
+use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 use nalgebra::{Cholesky, SMatrix};
@@ -20,6 +21,9 @@ pub enum LinearSolver {
     /// Factors of the matrix: robust, and fastest up to some ten thousand shells.
     #[default]
     Direct,
+    /// Factors L U with the unsymmetric stiffness of loads: several times the work. Newton's method keeps its quadratic
+    /// convergence under moments about fixed axes and pressures on open surfaces.
+    Unsymmetric,
     /// Conjugate gradients: for positive definite matrices only.
     ConjugateGradients {
         /// Residual over the right-hand side at which to stop.
@@ -178,6 +182,81 @@ impl Factors {
     }
 }
 
+/// L U of the whole matrix.
+struct LuFactors {
+    symbolic: SymbolicLu<u32>,
+    numeric: NumericLu<u32, f64>,
+    column_start: Vec<u32>,
+    row: Vec<u32>,
+    value: Vec<f64>,
+    /// Where each entry comes from: a place in the lower half, or a mirrored one.
+    source: Vec<(u32, bool)>,
+    memory: MemBuffer,
+}
+
+impl LuFactors {
+    fn new(matrix: &LowerMatrix) -> Result<Self, faer::sparse::FaerError> {
+        let mut columns: Vec<Vec<(u32, (u32, bool))>> = vec![Vec::new(); matrix.len()];
+        // Columns to the left are done first, so rows above the diagonal come in order.
+        for column in 0..matrix.len() {
+            for at in matrix.column_start[column]..matrix.column_start[column + 1] {
+                let row = matrix.row[at as usize];
+                columns[column].push((row, (at, false)));
+                if row as usize != column {
+                    columns[row as usize].push((column as u32, (at, true)));
+                }
+            }
+        }
+        let mut column_start = vec![0];
+        let (mut row, mut source) = (Vec::new(), Vec::new());
+        for column in columns {
+            for (r, from) in column {
+                row.push(r);
+                source.push(from);
+            }
+            column_start.push(row.len() as u32);
+        }
+        let size = matrix.len();
+        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &column_start, None, &row);
+        let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default())?;
+        let memory = MemBuffer::new(StackReq::any_of(&[
+            symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Spec::default()),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+        ]));
+        let value = vec![0.0; row.len()];
+        Ok(Self { symbolic, numeric: NumericLu::new(), column_start, row, value, source, memory })
+    }
+
+    /// Factors a matrix; `None` if it holds a number that is not finite.
+    fn factorise(&mut self, matrix: &LowerMatrix) -> Option<()> {
+        for (value, &(at, mirrored)) in self.value.iter_mut().zip(&self.source) {
+            *value = if mirrored { matrix.mirror[at as usize] } else { matrix.value[at as usize] };
+            if !value.is_finite() {
+                return None;
+            }
+        }
+        let size = matrix.len();
+        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &self.column_start, None, &self.row);
+        let whole = SparseColMatRef::new(pattern, &self.value[..]);
+        let stack = MemStack::new(&mut self.memory);
+        self.symbolic
+            .factorize_numeric_lu(&mut self.numeric, whole, Par::Seq, stack, Spec::default())
+            .ok()
+            .map(|_| ())
+    }
+
+    /// x ← A⁻¹ x.
+    fn solve(&mut self, x: &mut [f64]) {
+        let size = x.len();
+        LuRef::new_unchecked(&self.symbolic, &self.numeric).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(x, size, 1),
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+        );
+    }
+}
+
 fn pattern(matrix: &LowerMatrix) -> SymbolicSparseColMatRef<'_, u32> {
     let size = matrix.len();
     SymbolicSparseColMatRef::new_checked(size, size, &matrix.column_start, None, &matrix.row)
@@ -252,6 +331,7 @@ pub(crate) enum LinearError {
 pub(crate) struct Workspace {
     solver: LinearSolver,
     factors: Option<Factors>,
+    unsymmetric: Option<LuFactors>,
     /// Whether the factors are of some matrix, and so may serve as preconditioner; of the matrix prepared.
     current: bool,
     fresh: bool,
@@ -267,10 +347,12 @@ impl Workspace {
             solver,
             LinearSolver::ConjugateGradients { preconditioner: Preconditioner::BlockJacobi, .. }
         );
-        let factors = if block || matrix.len() == 0 { None } else { Some(Factors::new(matrix).ok()?) };
+        let whole = solver == LinearSolver::Unsymmetric;
+        let empty = matrix.len() == 0;
         Some(Self {
             solver,
-            factors,
+            factors: if block || whole || empty { None } else { Some(Factors::new(matrix).ok()?) },
+            unsymmetric: if whole && !empty { Some(LuFactors::new(matrix).ok()?) } else { None },
             current: false,
             fresh: false,
             jacobi: if block { BlockJacobi::new(equations) } else { BlockJacobi::default() },
@@ -283,7 +365,9 @@ impl Workspace {
     pub(crate) fn prepare(&mut self, matrix: &LowerMatrix) -> Result<Pivots, LinearError> {
         let iterative = matches!(self.solver, LinearSolver::ConjugateGradients { .. });
         self.fresh = false;
-        if self.factors.is_some() {
+        if let Some(factors) = &mut self.unsymmetric {
+            factors.factorise(matrix).ok_or(LinearError::NotFinite)?;
+        } else if self.factors.is_some() {
             if !(iterative && self.current) {
                 self.factorise(matrix)?;
             }
@@ -316,6 +400,13 @@ impl Workspace {
                     factors.solve(x);
                 }
                 Ok(LinearReport::default())
+            }
+            LinearSolver::Unsymmetric => {
+                x.copy_from_slice(b);
+                if let Some(factors) = &mut self.unsymmetric {
+                    factors.solve(x);
+                }
+                if x.iter().all(|x| x.is_finite()) { Ok(LinearReport::default()) } else { Err(LinearError::NotFinite) }
             }
             LinearSolver::ConjugateGradients { tolerance, iterations, preconditioner } => {
                 let Preconditioner::LaggedFactors { renew_after } = preconditioner else {

@@ -9,6 +9,8 @@ pub(crate) struct LowerMatrix {
     pub(crate) column_start: Vec<u32>,
     pub(crate) row: Vec<u32>,
     pub(crate) value: Vec<f64>,
+    /// The entries mirrored at the diagonal, for matrices that are not symmetric; else empty.
+    pub(crate) mirror: Vec<f64>,
 }
 
 /// The equations of a model: components of nodes that are free, numbered node by node.
@@ -53,7 +55,7 @@ impl LowerMatrix {
                 above[a as usize].extend(cell.iter().filter(|&&b| b > a));
             }
         }
-        let mut matrix = Self { column_start: vec![0], row: Vec::new(), value: Vec::new() };
+        let mut matrix = Self { column_start: vec![0], row: Vec::new(), value: Vec::new(), mirror: Vec::new() };
         for (node, above) in above.iter_mut().enumerate() {
             above.sort_unstable();
             above.dedup();
@@ -71,6 +73,16 @@ impl LowerMatrix {
 
     pub(crate) fn len(&self) -> usize {
         self.column_start.len() - 1
+    }
+
+    /// Keeps both halves from now on.
+    pub(crate) fn keep_mirror(&mut self) {
+        self.mirror = vec![0.0; self.value.len()];
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.value.fill(0.0);
+        self.mirror.fill(0.0);
     }
 
     /// Where in the values the rows of node `row` in an equation's column start, had the row node's first equation a place
@@ -101,7 +113,7 @@ impl LowerMatrix {
         places
     }
 
-    /// Adds the lower half of a cell's symmetric matrix, stored column by column.
+    /// Adds a cell's matrix, stored column by column; of a symmetric one the lower half.
     pub(crate) fn add(&mut self, equations: &Equations, nodes: &[u32], components: usize, places: &[u32], cell: &[f64]) {
         let size = nodes.len() * components;
         for (a, &row_node) in nodes.iter().enumerate() {
@@ -120,7 +132,11 @@ impl LowerMatrix {
                     for (r, &row) in rows.iter().enumerate() {
                         if row != NONE && row >= column {
                             let at = base.wrapping_add(row - first) as usize;
-                            self.value[at] += cell[(b * components + c) * size + a * components + r];
+                            let (i, j) = (a * components + r, b * components + c);
+                            self.value[at] += cell[j * size + i];
+                            if !self.mirror.is_empty() {
+                                self.mirror[at] += cell[i * size + j];
+                            }
                         }
                     }
                 }
@@ -130,7 +146,25 @@ impl LowerMatrix {
 
     /// Adds to a diagonal entry.
     pub(crate) fn add_diagonal(&mut self, equation: usize, value: f64) {
-        self.value[self.column_start[equation] as usize] += value;
+        let at = self.column_start[equation] as usize;
+        self.value[at] += value;
+        if !self.mirror.is_empty() {
+            self.mirror[at] += value;
+        }
+    }
+
+    /// Adds to an entry of a matrix that is not symmetric, if the pattern has it.
+    pub(crate) fn add_entry(&mut self, row: u32, column: u32, value: f64) {
+        let (low, high) = (row.min(column), row.max(column));
+        let (start, end) = (self.column_start[low as usize] as usize, self.column_start[low as usize + 1] as usize);
+        if let Ok(at) = self.row[start..end].binary_search(&high) {
+            if row >= column {
+                self.value[start + at] += value;
+            }
+            if row <= column {
+                self.mirror[start + at] += value;
+            }
+        }
     }
 
     pub(crate) fn diagonal(&self, equation: usize) -> f64 {

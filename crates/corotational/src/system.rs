@@ -83,7 +83,10 @@ impl<'m> System<'m> {
             }
         }
         let equations = Equations::new(&free);
-        let matrix = LowerMatrix::new(&equations, model.facets.iter().map(|facet| &facet.nodes[..]));
+        let mut matrix = LowerMatrix::new(&equations, model.facets.iter().map(|facet| &facet.nodes[..]));
+        if solver == LinearSolver::Unsymmetric {
+            matrix.keep_mirror();
+        }
         let places = model.facets.iter().map(|f| matrix.places(&equations, &f.nodes, 6)).collect();
         let workspace = Workspace::new(solver, &equations, &matrix)
             .ok_or(SolveError::Control("the equations are too many for the direct solver; use conjugate gradients"))?;
@@ -119,7 +122,7 @@ impl<'m> System<'m> {
         self.energy = 0.0;
         self.largest = 0.0;
         if tangent.is_some() {
-            self.matrix.value.fill(0.0);
+            self.matrix.clear();
             self.coupling.fill(0.0);
         }
         let kind = tangent.map(|(kind, _)| kind);
@@ -129,9 +132,10 @@ impl<'m> System<'m> {
             let last = (first + CHUNK).min(model.facets.len());
             let factor = state.load_factor;
             let pressure = &self.pressure;
+            let symmetric = self.matrix.mirror.is_empty();
             results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
                 let number = first + at;
-                result.broken = result.fill(model, state, number, pressure[number], factor, kind).err();
+                result.broken = result.fill(model, state, number, pressure[number], factor, kind, symmetric).err();
             });
             for (number, result) in (first..last).zip(&results) {
                 if let Some(why) = result.broken {
@@ -153,8 +157,29 @@ impl<'m> System<'m> {
                 }
             }
         }
+        if tangent.is_some() && !self.matrix.mirror.is_empty() {
+            self.turn_moments(state.load_factor);
+        }
         self.phases.cells += start.elapsed();
         Ok(())
+    }
+
+    /// Subtracts S(m)/2 for the moments m on nodes, whose axes stay in space: their covariant derivative.
+    fn turn_moments(&mut self, factor: f64) {
+        for node in 0..self.model.rest.len() {
+            let at = 6 * node + 3;
+            let moment = Vector3::from_fn(|c, _| self.external[at + c] + factor * self.controlled[at + c]);
+            if moment == Vector3::zeros() {
+                continue;
+            }
+            let half = skew(&moment) * 0.5;
+            let equation = |c: usize| self.equations.number[at + c];
+            for (row, column) in [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)] {
+                if equation(row) != NONE && equation(column) != NONE {
+                    self.matrix.add_entry(equation(row), equation(column), -half[(row, column)]);
+                }
+            }
+        }
     }
 
     /// Loads that do not depend on the cells' places, and the pressures of those that do.
@@ -312,6 +337,7 @@ impl FacetResult {
         pressure: [f64; 2],
         factor: f64,
         kind: Option<Tangent>,
+        symmetric: bool,
     ) -> Result<(), Broken> {
         let facet = &model.facets[number];
         let (x, rotation) = state.corners(facet.nodes);
@@ -319,12 +345,16 @@ impl FacetResult {
         (self.energy, self.force) = facet.force(&placed);
         if let Some(kind) = kind {
             self.tangent = facet.tangent(&placed, kind);
+            // Only the symmetric part: it is the Hessian on the group of rotations (Simo 1992, CMAME 96:189), and the rest vanishes
+            // at equilibrium without moments.
+            self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
             let pressure = pressure[0] + factor * pressure[1];
             if pressure != 0.0 {
                 follow(&mut self.tangent, &x, pressure);
+                if symmetric {
+                    self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
+                }
             }
-            // Only the symmetric part is assembled: the rest vanishes at equilibrium of conservative loads.
-            self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
         }
         Ok(())
     }

@@ -13,9 +13,11 @@ use crate::extent::allowed;
 /// How the cells of a grid become triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pattern {
-    /// Two triangles, all diagonals one way.
+    /// Two triangles, all diagonals from the start of both axes to their ends.
     #[default]
     Diagonal,
+    /// Two triangles, all diagonals the other way.
+    Antidiagonal,
     /// Two triangles, diagonals mirrored from cell to cell.
     UnionJack,
     /// Four triangles round the middle.
@@ -246,8 +248,9 @@ impl Grid {
             let [a, b, c, d] =
                 [self.point(i, j), self.point(i + 1, j), self.point(i + 1, j + 1), self.point(i, j + 1)];
             match pattern {
-                Pattern::UnionJack if (i + j) % 2 == 1 => nodes.extend([a, b, d, b, c, d]),
-                Pattern::Diagonal | Pattern::UnionJack => nodes.extend([a, b, c, a, c, d]),
+                Pattern::UnionJack if (i + j) % 2 == 0 => nodes.extend([a, b, c, a, c, d]),
+                Pattern::Diagonal => nodes.extend([a, b, c, a, c, d]),
+                Pattern::Antidiagonal | Pattern::UnionJack => nodes.extend([a, b, d, b, c, d]),
                 Pattern::Crossed => {
                     let middle = (px * py + cell) as u32;
                     nodes.extend([a, b, middle, b, c, middle, c, d, middle, d, a, middle]);
@@ -373,7 +376,7 @@ mod tests {
     #[test]
     fn sheets_have_their_area_and_edges() {
         for (sheet, exact) in all() {
-            for pattern in [Pattern::Diagonal, Pattern::UnionJack, Pattern::Crossed] {
+            for pattern in [Pattern::Diagonal, Pattern::Antidiagonal, Pattern::UnionJack, Pattern::Crossed] {
                 for distortion in [None, Some(Distortion { amount: 0.25, seed: 5 })] {
                     let mesh = sheet.mesh([40, 40], pattern, distortion, DEFAULT_CELL_LIMIT).unwrap();
                     assert!((area(&mesh) / exact - 1.0).abs() < 1e-2, "{sheet:?} {pattern:?}");

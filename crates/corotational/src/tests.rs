@@ -1,0 +1,399 @@
+//! Models and solvers together, on small specimens.
+
+use nalgebra::Vector3;
+use pliant_mechanics::curve::{Curve, Shape};
+
+use crate::element::{Formulation, Membrane, PlaneStress};
+use crate::facet::Tangent;
+use crate::linear::{LinearSolver, Preconditioner};
+use crate::rotation::exponential;
+use crate::system::System;
+use crate::testing::Random;
+use crate::*;
+
+const MATERIAL: Material = Material { elastic: PlaneStress { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+
+/// Points and triangles of an octahedron of radius 1 facing outwards, each triangle cut in four some times.
+fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+    let mut points: Vec<Vector3<f64>> =
+        [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+            .map(|p: [i32; 3]| Vector3::from(p.map(f64::from)))
+            .to_vec();
+    let mut cells: Vec<[u32; 3]> =
+        vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    for _ in 0..cuts {
+        let mut finer = Vec::new();
+        for [a, b, c] in cells {
+            let mut middle = |p: u32, q: u32| {
+                let at = (points[p as usize] + points[q as usize]).normalize();
+                let known = points.iter().position(|x| (x - at).norm() < 1e-9);
+                known.unwrap_or_else(|| {
+                    points.push(at);
+                    points.len() - 1
+                }) as u32
+            };
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        cells = finer;
+    }
+    (points, cells)
+}
+
+/// A strip of 8 × 2 cells of side 1.
+fn strip() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+    let points = (0..27).map(|i| Vector3::new(f64::from(i % 9), f64::from(i / 9), 0.0)).collect();
+    let cell = |i: u32| {
+        let a = i % 8 + 9 * (i / 8);
+        [[a, a + 1, a + 10], [a, a + 10, a + 9]]
+    };
+    (points, (0..16).flat_map(cell).collect())
+}
+
+fn hold() -> Curve {
+    Curve { shape: Shape::Hold, from: 0.0, to: 1.0 }
+}
+
+fn ramp() -> Curve {
+    Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 }
+}
+
+fn fix(nodes: Vec<u32>, components: [bool; 6]) -> Constraint {
+    Constraint { name: "fixed".into(), nodes, components, motion: Motion::Fixed }
+}
+
+fn model((points, cells): (Vec<Vector3<f64>>, Vec<[u32; 3]>), thickness: f64) -> Model {
+    let mut model = Model::new(points);
+    model.add_shell(&Shell::new("shell", cells, thickness, MATERIAL)).unwrap();
+    model
+}
+
+/// The strip clamped at one end with a force at the other.
+fn cantilever() -> Model {
+    let mut model = model(strip(), 0.1);
+    model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
+    let kind = LoadKind::Force { nodes: vec![8, 17, 26], force: Vector3::new(0.0, 0.0, 0.5) };
+    model.loads.push(Load { name: "pull".into(), kind, curve: ramp(), controlled: false });
+    model
+}
+
+/// The ball with six components held, so that nothing resists its breathing.
+fn balloon(cuts: usize, pressure: f64) -> Model {
+    let mut model = model(ball(cuts), 0.02);
+    model.constraints.push(fix(vec![0], [true, true, true, false, false, false]));
+    model.constraints.push(fix(vec![1], [false, true, true, false, false, false]));
+    model.constraints.push(fix(vec![2], [false, false, true, false, false, false]));
+    let cells = (0..model.facets.len() as u32).collect();
+    let kind = LoadKind::Pressure { cells, pressure };
+    model.loads.push(Load { name: "pressure".into(), kind, curve: hold(), controlled: true });
+    model
+}
+
+#[test]
+fn triangles_are_turned_to_one_side_and_counted() {
+    let (points, mut cells) = ball(2);
+    for cell in [3, 17, 90] {
+        cells[cell].swap(1, 2);
+    }
+    let mut model = Model::new(points);
+    let notes = model.add_shell(&Shell::new("ball", cells, 0.01, MATERIAL)).unwrap();
+    assert_eq!(notes, Notes { turned: 3, thick: 0, comas: 0 });
+    let all: Vec<u32> = (0..128).collect();
+    // Of an inscribed polyhedron of 128 faces.
+    let volume = model.enclosed_volume(&all, &model.rest);
+    assert!((3.7..4.19).contains(&volume), "{volume}");
+    assert!(model.check_closed(&all).is_ok());
+    let Err(ModelError::Open { edges }) = model.check_closed(&all[1..]) else { panic!("closed") };
+    assert_eq!(edges.len(), 3);
+}
+
+/// Normals of a smooth ball point outwards to 3°; a cube's corner has three.
+#[test]
+fn nodes_carry_one_normal_for_each_smooth_fan() {
+    let ball = model(ball(2), 0.01);
+    assert_eq!(ball.normals.len(), ball.rest.len());
+    for normal in &ball.normals {
+        let angle = normal.direction.angle(&ball.rest[normal.node as usize]);
+        assert!(angle < 0.052, "{angle}");
+    }
+    let points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|p: [i32; 3]| Vector3::from(p.map(f64::from)));
+    let corner = model((points.to_vec(), vec![[0, 1, 2], [0, 2, 3], [0, 3, 1]]), 0.01);
+    assert_eq!(corner.normals.iter().filter(|normal| normal.node == 0).count(), 3);
+    for (facet, normals) in corner.facets.iter().zip(&corner.corner_normals) {
+        for (node, &normal) in facet.nodes.iter().zip(normals) {
+            assert_eq!(corner.normals[normal as usize].node, *node);
+        }
+    }
+}
+
+#[test]
+fn bad_shells_are_told_with_their_element() {
+    let (points, cells) = strip();
+    let good = Shell::new("skin", cells.clone(), 0.1, MATERIAL);
+    let refuse = |shell: &Shell| Model::new(points.clone()).add_shell(shell).unwrap_err().to_string();
+    let mut thin = good.clone();
+    thin.thickness = vec![0.1; 32];
+    thin.thickness[7] = -0.1;
+    assert!(refuse(&thin).contains("thickness of element 7"), "{}", refuse(&thin));
+    thin.thickness = vec![0.1; 5];
+    assert!(refuse(&thin).contains("32 elements and 5"));
+    let mut soft = good.clone();
+    soft.material.elastic.young = 0.0;
+    assert!(refuse(&soft).contains("Young's modulus"));
+    soft.material.elastic = PlaneStress { young: 1.0, poisson: 1.0 };
+    assert!(refuse(&soft).contains("Poisson's ratio"));
+    soft.material = Material { density: f64::NAN, ..MATERIAL };
+    assert!(refuse(&soft).contains("density"));
+    let with = |cell: [u32; 3]| Shell { cells: [cells.clone(), vec![cell]].concat(), ..good.clone() };
+    assert!(refuse(&with([3, 4, 5])).contains("element 32") && refuse(&with([3, 4, 5])).contains("degenerate"));
+    assert!(refuse(&with([3, 4, 99])).contains("node 99"));
+    assert!(refuse(&with([1, 10, 26])).contains("3 triangles"), "{}", refuse(&with([1, 10, 26])));
+    let branched = Shell { branches: true, ..with([1, 10, 26]) };
+    assert!(Model::new(points.clone()).add_shell(&branched).is_ok());
+    // Möbius.
+    let ring = (0..5).map(|i| [i, (i + 1) % 5, (i + 2) % 5]).collect();
+    let around = (0..5).map(|i| {
+        let (sine, cosine) = (f64::from(i) * 1.2566).sin_cos();
+        Vector3::new(cosine, sine, 0.1 * f64::from(i * i))
+    });
+    let band = Shell::new("band", ring, 0.1, MATERIAL);
+    assert!(matches!(Model::new(around.collect()).add_shell(&band), Err(ModelError::OneSided { .. })));
+    let thick = Shell::new("skin", cells, 0.8, MATERIAL);
+    assert_eq!(Model::new(points).add_shell(&thick).unwrap().thick, 32);
+}
+
+#[test]
+fn a_body_that_nothing_holds_is_named_with_its_free_modes() {
+    let mut model = model(strip(), 0.1);
+    let free = |model: &Model| match Statics::new(model, StaticSettings::default()) {
+        Err(SolveError::FreeBody { free_modes, .. }) => free_modes,
+        Err(error) => panic!("{error}"),
+        Ok(_) => 0,
+    };
+    assert_eq!(free(&model), 6);
+    model.constraints.push(fix(vec![0], [true, true, true, false, false, false]));
+    assert_eq!(free(&model), 3);
+    model.constraints.push(fix(vec![8], [false, true, true, false, false, false]));
+    assert_eq!(free(&model), 1);
+    model.springs.push(Spring { node: 22, anchor: Vector3::new(4.0, 2.0, 1.0), stiffness: 1.0 });
+    assert_eq!(free(&model), 0);
+}
+
+/// Without stiffness against drilling a flat sheet is singular, and the node is named.
+#[test]
+fn a_singular_stiffness_names_its_node() {
+    let (points, cells) = strip();
+    let mut model = Model::new(points);
+    let formulation = Formulation { membrane: Membrane::Cst { drilling: 0.0 }, ..Formulation::default() };
+    model.add_shell(&Shell { formulation, ..Shell::new("skin", cells, 0.1, MATERIAL) }).unwrap();
+    model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let error = solver.linear(&State::at_rest(&model), 1.0).unwrap_err();
+    assert!(matches!(error, SolveError::Singular { component: "rotation about z", .. }), "{error}");
+}
+
+/// ∂(internal − loads)/∂q of a whole balloon by differences against the assembled matrix; the whole matrix of the unsymmetric solver
+/// at rest, where no moments are left: 1e-6.
+#[test]
+fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
+    let mut model = balloon(2, 100.0);
+    model.springs.push(Spring { node: 5, anchor: Vector3::new(0.0, 0.0, -2.0), stiffness: 30.0 });
+    let mut system = System::new(&model, LinearSolver::Unsymmetric).unwrap();
+    let mut state = State::at_rest(&model);
+    state.load_factor = 2.0;
+    let none = vec![0.0; 6 * model.rest.len()];
+    system.evaluate(&state, 0.0, Some((Tangent::Full, &none))).unwrap();
+    let mut random = Random::new(3);
+    let size = system.equations.len();
+    let direction: Vec<f64> = (0..size).map(|_| random.number()).collect();
+    let mut product = vec![0.0; size];
+    for column in 0..size {
+        let (start, end) =
+            (system.matrix.column_start[column] as usize, system.matrix.column_start[column + 1] as usize);
+        for at in start..end {
+            let row = system.matrix.row[at] as usize;
+            product[row] += system.matrix.value[at] * direction[column];
+            if row != column {
+                product[column] += system.matrix.mirror[at] * direction[row];
+            }
+        }
+    }
+    let mut increment = none.clone();
+    system.spread(&direction, &mut increment);
+    let mut force = |h: f64| {
+        let mut moved = state.clone();
+        moved.advance(&increment, h);
+        system.evaluate(&moved, 0.0, None).unwrap();
+        let all: Vec<f64> = (0..6 * model.rest.len())
+            .map(|c| system.internal[c] - system.external[c] - 2.0 * system.controlled[c])
+            .collect();
+        let mut free = vec![0.0; size];
+        system.gather(&all, &mut free);
+        free
+    };
+    let h = 1e-6;
+    let (ahead, behind) = (force(h), force(-h));
+    let largest = product.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
+    for ((ahead, behind), product) in ahead.iter().zip(&behind).zip(&product) {
+        let off = ((ahead - behind) / (2.0 * h) - product).abs() / largest;
+        assert!(off < 1e-6, "{off:e}");
+    }
+}
+
+fn iterative(preconditioner: Preconditioner) -> LinearSolver {
+    LinearSolver::ConjugateGradients { tolerance: 1e-12, iterations: 5000, preconditioner }
+}
+
+#[test]
+fn all_linear_solvers_find_the_same_equilibrium() {
+    let model = cantilever();
+    let mut found: Vec<State> = Vec::new();
+    for linear in [
+        LinearSolver::Direct,
+        LinearSolver::Unsymmetric,
+        iterative(Preconditioner::BlockJacobi),
+        iterative(Preconditioner::LaggedFactors { renew_after: 20 }),
+    ] {
+        let mut state = State::at_rest(&model);
+        let mut solver = Statics::new(&model, StaticSettings { linear, ..StaticSettings::default() }).unwrap();
+        let step = solver.solve(&mut state, 1.0).unwrap();
+        assert!(step.residuals.len() < 15, "{linear:?}: {:?}", step.residuals);
+        found.push(state);
+    }
+    let tip = found[0].position[26];
+    assert!(tip.z > 1.0, "{tip}");
+    for other in &found[1..] {
+        let off = other.position.iter().zip(&found[0].position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(off < 1e-6, "{off:e}");
+    }
+}
+
+/// The same bits with one thread and with three.
+#[test]
+fn threads_change_no_bit() {
+    let model = cantilever();
+    let solve = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut state = State::at_rest(&model);
+            Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+            state
+        })
+    };
+    assert_eq!(solve(1), solve(3));
+}
+
+/// Moved supports: a rigid rotation of the clamped end carries the strip along without strain.
+#[test]
+fn a_turned_support_turns_the_whole_strip() {
+    let mut model = model(strip(), 0.1);
+    let by = [0.0, 0.0, 0.0, 1.2, 0.0, 0.0];
+    // Turned about the x axis through node 0.
+    model.constraints.push(Constraint {
+        name: "turned".into(),
+        nodes: vec![0],
+        components: [true; 6],
+        motion: Motion::Moved { by, curve: ramp() },
+    });
+    let mut state = State::at_rest(&model);
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    for step in 1..=4 {
+        solver.solve(&mut state, f64::from(step) / 4.0).unwrap();
+    }
+    let turn = exponential(&Vector3::new(1.2, 0.0, 0.0));
+    for (x, rest) in state.position.iter().zip(&model.rest) {
+        assert!((x - turn * rest).norm() < 1e-6, "{x} {rest}");
+    }
+    assert!(state.shell_energy(&model).unwrap().bending < 1e-9);
+}
+
+/// The reactions balance the loads.
+#[test]
+fn reactions_balance_the_loads() {
+    let model = cantilever();
+    let mut state = State::at_rest(&model);
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    solver.solve(&mut state, 1.0).unwrap();
+    let sum: f64 = solver.reactions().enumerate().filter(|(node, _)| node % 9 == 0).map(|(_, r)| r[2]).sum();
+    assert!((sum + 1.5).abs() < 1e-6, "{sum}");
+}
+
+/// A membrane sphere: p = 2 E t u/((1 − ν) r²). Facets are softer; halving them halves what is missing.
+#[test]
+fn a_balloon_takes_the_volume_it_is_told() {
+    let growth = 1.0003_f64;
+    let missing = |cuts| {
+        let model = balloon(cuts, 1.0);
+        let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
+        let rest = model.enclosed_volume(&cells, &model.rest);
+        let mut state = State::at_rest(&model);
+        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        solver.control(&mut state, Control::Volume { volume: rest * growth.powi(3) }).unwrap();
+        let volume = model.enclosed_volume(&cells, &state.position);
+        assert!((volume / (rest * growth.powi(3)) - 1.0).abs() < 1e-8);
+        let radius = (3.0 * rest / (4.0 * std::f64::consts::PI)).cbrt();
+        let pressure = 2.0 * 1e6 * 0.02 * (growth - 1.0) / (0.7 * radius);
+        println!("pressure {} against {pressure}", state.load_factor);
+        1.0 - state.load_factor / pressure
+    };
+    let (coarse, fine) = (missing(2), missing(3));
+    assert!(coarse < 0.12 && fine > 0.0 && fine < 0.5 * coarse, "{coarse} {fine}");
+}
+
+#[test]
+fn a_balloon_doubles_its_volume() {
+    let model = balloon(2, 1.0);
+    let cells: Vec<u32> = (0..128).collect();
+    let rest = model.enclosed_volume(&cells, &model.rest);
+    let mut state = State::at_rest(&model);
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    for part in 1..=10 {
+        let volume = rest * (1.0 + 0.1 * f64::from(part));
+        solver.control(&mut state, Control::Volume { volume }).unwrap();
+    }
+    assert!((model.enclosed_volume(&cells, &state.position) / rest - 2.0).abs() < 1e-6);
+}
+
+/// Arc length and displacement control walk the same path.
+#[test]
+fn arc_length_and_displacement_control_agree() {
+    let mut model = cantilever();
+    model.loads[0].controlled = true;
+    model.loads[0].curve = hold();
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut state = State::at_rest(&model);
+    for _ in 0..4 {
+        solver.control(&mut state, Control::ArcLength { length: 1.0 }).unwrap();
+    }
+    let mut other = State::at_rest(&model);
+    let by = state.position[26].z;
+    solver.control(&mut other, Control::Displacement { node: 26, component: 2, by }).unwrap();
+    assert!(state.load_factor > 0.0);
+    assert!((state.load_factor / other.load_factor - 1.0).abs() < 1e-6, "{} {}", state.load_factor, other.load_factor);
+    let error = solver.control(&mut other, Control::Displacement { node: 0, component: 2, by: 1.0 }).unwrap_err();
+    assert!(matches!(error, SolveError::Control(_)), "{error}");
+}
+
+/// A load step that fails leaves the last equilibrium on the way, and tells its residuals.
+#[test]
+fn a_failed_load_step_keeps_what_was_found() {
+    let mut model = cantilever();
+    let kind = LoadKind::Force { nodes: vec![26], force: Vector3::new(-3e6, 0.0, 1e3) };
+    model.loads.push(Load { name: "crush".into(), kind, curve: ramp(), controlled: false });
+    let settings = StaticSettings { halvings: 3, iterations: 8, ..StaticSettings::default() };
+    let mut state = State::at_rest(&model);
+    let mut solver = Statics::new(&model, settings).unwrap();
+    let error = solver.solve(&mut state, 1.0).unwrap_err();
+    println!("{error}");
+    assert!(state.time < 1.0 && state.position.iter().all(|x| x.iter().all(|c| c.is_finite())));
+}
+
+/// Initial places other than rest are strained; a curved rest shape is not.
+#[test]
+fn only_the_difference_from_rest_costs_energy() {
+    let model = model(ball(2), 0.01);
+    let mut state = State::at_rest(&model);
+    assert!(state.shell_energy(&model).unwrap().bending < 1e-20);
+    state.position.iter_mut().for_each(|x| *x *= 1.1);
+    assert!(state.shell_energy(&model).unwrap().membrane > 1.0);
+}
