@@ -5,7 +5,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use pliant_corotational::element::{Bending, Formulation, Membrane};
-use pliant_corotational::{StaticSettings, State, Statics};
+use pliant_corotational::{State, StaticSettings, Statics};
 use pliant_geometry::Mesh;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Pattern, Sheet};
 use pliant_validation::claim;
@@ -229,7 +229,8 @@ fn straight_cantilever() {
             let mut total = [0.0; 3];
             total[component] = 1.0;
             let beam = beam.clone().pull_edge("x-max", total);
-            let tip = beam.edge("x-max").iter().map(|&n| displacement(&beam, n)[component]).sum::<f64>() / 2.0;
+            let tip =
+                beam.edge("x-max").iter().map(|&n| displacement(&beam, n)[component]).sum::<f64>() / 2.0;
             expect(&format!("cantilever of {name}, {what}"), tip / reference, expected, 0.01 * expected);
         }
     }
@@ -245,15 +246,20 @@ fn twisted_beam() {
     for (thickness, load, references, expected) in rows {
         for (at, across) in [2, 4, 8].into_iter().enumerate() {
             let sheet = Sheet::TwistedStrip { length: 12.0, width: 1.1, twist: FRAC_PI_2 };
-            let beam =
-                Specimen::new(mesh(sheet, [6 * across, across]), [2.9e7, 0.22], thickness, Formulation::default())
-                    .hold_edge("x-min", CLAMPED);
+            let beam = Specimen::new(
+                mesh(sheet, [6 * across, across]),
+                [2.9e7, 0.22],
+                thickness,
+                Formulation::default(),
+            )
+            .hold_edge("x-min", CLAMPED);
             let tip = beam.node(12.0, 0.0, 0.0);
             // At the tip the width lies along z.
             for (direction, component) in [2, 1].into_iter().enumerate() {
                 let mut force = [0.0; 3];
                 force[component] = load;
-                let ratio = displacement(&beam.clone().pull(tip, force), tip)[component] / references[direction];
+                let ratio =
+                    displacement(&beam.clone().pull(tip, force), tip)[component] / references[direction];
                 let name = ["in plane", "out of plane"][direction];
                 let expected = expected[direction][at];
                 expect(

@@ -40,7 +40,9 @@ pub enum ModelError {
         nodes: usize,
     },
     /// An element without area or volume, or turned inside out.
-    #[error("element {cell} of `{shell}` is degenerate: its {what} is {value:.3e}; merge or remove its nodes")]
+    #[error(
+        "element {cell} of `{shell}` is degenerate: its {what} is {value:.3e}; merge or remove its nodes"
+    )]
     Degenerate {
         /// Name of the part.
         shell: String,
@@ -123,7 +125,9 @@ pub enum SolveError {
         iterations: usize,
     },
     /// Conjugate gradients did not reach their tolerance.
-    #[error("conjugate gradients stand at a residual of {residual:.1e} after {iterations} iterations; allow more or use the direct solver")]
+    #[error(
+        "conjugate gradients stand at a residual of {residual:.1e} after {iterations} iterations; allow more or use the direct solver"
+    )]
     Stalled {
         /// Iterations done.
         iterations: usize,
@@ -160,7 +164,9 @@ fn broken(why: Broken) -> String {
     match why {
         Broken::Area(area) => format!("has collapsed: its area is {area:.1e} m²; use smaller steps"),
         Broken::Folded(angle) => {
-            format!("is folded over: a node has turned by {angle:.2} rad against it; use smaller steps or a finer mesh")
+            format!(
+                "is folded over: a node has turned by {angle:.2} rad against it; use smaller steps or a finer mesh"
+            )
         }
     }
 }

@@ -23,8 +23,11 @@ const MEMBRANE: [usize; 9] = [0, 1, 5, 6, 7, 11, 12, 13, 17];
 /// Places of (w, θx, θy).
 const BENDING: [usize; 9] = [2, 3, 4, 8, 9, 10, 14, 15, 16];
 
-/// Above this rotation [rad] of a node relative to its facet the facet is folded over, not deformed.
+/// Above this rotation [rad] of a node out of the plane of its facet the facet is folded over, not deformed.
 const FOLDED: f64 = 2.0;
+
+/// Above this rotation [rad], about any axis, the rotation vector is not safely one of its kind: at π it changes sign.
+const FULL: f64 = 3.0;
 
 /// A shell element: what its rest shape gives.
 #[derive(Clone, Debug)]
@@ -177,9 +180,11 @@ impl Facet {
             deformation[6 * i + 1] = moved.y;
             deformation.fixed_rows_mut::<3>(6 * i + 3).copy_from(&theta[i]);
         }
-        let angle = theta.iter().map(|t| t.norm()).fold(0.0, f64::max);
-        if !(angle < FOLDED) {
-            return Err(Broken::Folded(angle));
+        for turned in &theta {
+            // Written so that NaN is found too.
+            if !(turned.xy().norm() < FOLDED && turned.norm() < FULL) {
+                return Err(Broken::Folded(turned.norm()));
+            }
         }
         Ok(Placed { axes, local, trace: sum.hypot(difference), theta, deformation })
     }
@@ -241,7 +246,8 @@ impl Facet {
         };
         let rigid: [Matrix3<f64>; 6] =
             [0, 1, 2, 3, 4, 5].map(|a| turn(&k.fixed_rows::<3>(3 * a).into_owned()));
-        let mut twice = (0..3).fold(Matrix3::zeros(), |sum, i| sum + arm[i] * rigid[2 * i] + rigid[2 * i + 1]);
+        let mut twice =
+            (0..3).fold(Matrix3::zeros(), |sum, i| sum + arm[i] * rigid[2 * i] + rigid[2 * i + 1]);
         let mut corrections = [Matrix3::zeros(); 3];
         if kind == Tangent::Full {
             for (i, correction) in corrections.iter_mut().enumerate() {
@@ -265,7 +271,8 @@ impl Facet {
             }
             for i in 0..3 {
                 let mut both = k.fixed_view_mut::<3, 3>(6 * i, 6 * j);
-                both += g[i].transpose() * (twice * g[j] - rigid[2 * j].transpose() + force[j] + leverage * g[j]);
+                both +=
+                    g[i].transpose() * (twice * g[j] - rigid[2 * j].transpose() + force[j] + leverage * g[j]);
                 let mut turned = k.fixed_view_mut::<3, 3>(6 * i, 6 * j + 3);
                 turned -= g[i].transpose() * (rigid[2 * j + 1].transpose() + corrections[j]);
             }
@@ -364,7 +371,8 @@ impl Facet {
 
     /// The smallest altitude at rest [m].
     pub fn altitude(&self) -> f64 {
-        let longest = (0..3).map(|i| (self.corners[i] - self.corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
+        let longest =
+            (0..3).map(|i| (self.corners[i] - self.corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
         2.0 * self.area / longest
     }
 }
@@ -472,7 +480,8 @@ mod tests {
             let force = evaluate(&facet, &pose).1;
             let h = 1e-5;
             let slope = Vector18::from_fn(|i, _| {
-                (evaluate(&facet, &moved(&pose, i, h)).0 - evaluate(&facet, &moved(&pose, i, -h)).0) / (2.0 * h)
+                (evaluate(&facet, &moved(&pose, i, h)).0 - evaluate(&facet, &moved(&pose, i, -h)).0)
+                    / (2.0 * h)
             });
             let off = (slope - force).amax() / force.amax();
             println!("force against differences: {off:.1e}");
@@ -491,7 +500,8 @@ mod tests {
             let h = 1e-5;
             let mut slope = Matrix18::zeros();
             for j in 0..18 {
-                let change = evaluate(&facet, &moved(&pose, j, h)).1 - evaluate(&facet, &moved(&pose, j, -h)).1;
+                let change =
+                    evaluate(&facet, &moved(&pose, j, h)).1 - evaluate(&facet, &moved(&pose, j, -h)).1;
                 slope.set_column(j, &(change / (2.0 * h)));
             }
             for (kind, limit) in [(Tangent::Full, 1e-6), (Tangent::Symmetric, symmetric)] {

@@ -1,10 +1,10 @@
 //! Co-rotational triangular shells.
-mod rotation;
 pub mod element;
 mod error;
 mod facet;
 mod linear;
 mod model;
+mod rotation;
 mod sparse;
 mod state;
 mod statics;
@@ -16,7 +16,7 @@ pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
 pub use linear::{LinearReport, LinearSolver, Preconditioner};
 pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spring};
 pub use state::State;
-pub use statics::{Control, Step, Statics, StaticSettings};
+pub use statics::{Control, StaticSettings, Statics, Step};
 pub use system::Phases;
 #[cfg(test)]
 mod tests;

@@ -406,7 +406,11 @@ impl Workspace {
                 if let Some(factors) = &mut self.unsymmetric {
                     factors.solve(x);
                 }
-                if x.iter().all(|x| x.is_finite()) { Ok(LinearReport::default()) } else { Err(LinearError::NotFinite) }
+                if x.iter().all(|x| x.is_finite()) {
+                    Ok(LinearReport::default())
+                } else {
+                    Err(LinearError::NotFinite)
+                }
             }
             LinearSolver::ConjugateGradients { tolerance, iterations, preconditioner } => {
                 let Preconditioner::LaggedFactors { renew_after } = preconditioner else {

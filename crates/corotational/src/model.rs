@@ -390,7 +390,10 @@ fn oriented(shell: &Shell) -> Result<(Vec<[u32; 3]>, usize), ModelError> {
         total += turned.min(part.len() - turned);
     }
     let cells = shell.cells.iter().zip(&turn);
-    Ok((cells.map(|(&[a, b, c], turn)| if *turn == Some(true) { [a, c, b] } else { [a, b, c] }).collect(), total))
+    Ok((
+        cells.map(|(&[a, b, c], turn)| if *turn == Some(true) { [a, c, b] } else { [a, b, c] }).collect(),
+        total,
+    ))
 }
 
 /// The corners of facets at one node, parted where facets that share an edge meet at a crease.

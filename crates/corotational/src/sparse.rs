@@ -55,7 +55,8 @@ impl LowerMatrix {
                 above[a as usize].extend(cell.iter().filter(|&&b| b > a));
             }
         }
-        let mut matrix = Self { column_start: vec![0], row: Vec::new(), value: Vec::new(), mirror: Vec::new() };
+        let mut matrix =
+            Self { column_start: vec![0], row: Vec::new(), value: Vec::new(), mirror: Vec::new() };
         for (node, above) in above.iter_mut().enumerate() {
             above.sort_unstable();
             above.dedup();
@@ -105,7 +106,8 @@ impl LowerMatrix {
             for &column_node in nodes {
                 for c in 0..components {
                     let column = equations.number[6 * column_node as usize + c];
-                    let below = row_node >= column_node && column != NONE && equations.first(row_node) != NONE;
+                    let below =
+                        row_node >= column_node && column != NONE && equations.first(row_node) != NONE;
                     places.push(if below { self.base(equations, row_node, column) } else { NONE });
                 }
             }
@@ -114,7 +116,14 @@ impl LowerMatrix {
     }
 
     /// Adds a cell's matrix, stored column by column; of a symmetric one the lower half.
-    pub(crate) fn add(&mut self, equations: &Equations, nodes: &[u32], components: usize, places: &[u32], cell: &[f64]) {
+    pub(crate) fn add(
+        &mut self,
+        equations: &Equations,
+        nodes: &[u32],
+        components: usize,
+        places: &[u32],
+        cell: &[f64],
+    ) {
         let size = nodes.len() * components;
         for (a, &row_node) in nodes.iter().enumerate() {
             let first = equations.first(row_node);
@@ -156,7 +165,8 @@ impl LowerMatrix {
     /// Adds to an entry of a matrix that is not symmetric, if the pattern has it.
     pub(crate) fn add_entry(&mut self, row: u32, column: u32, value: f64) {
         let (low, high) = (row.min(column), row.max(column));
-        let (start, end) = (self.column_start[low as usize] as usize, self.column_start[low as usize + 1] as usize);
+        let (start, end) =
+            (self.column_start[low as usize] as usize, self.column_start[low as usize + 1] as usize);
         if let Ok(at) = self.row[start..end].binary_search(&high) {
             if row >= column {
                 self.value[start + at] += value;

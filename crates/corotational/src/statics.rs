@@ -229,9 +229,7 @@ impl<'m> Statics<'m> {
         let mut residuals: Vec<f64> = Vec::new();
         let mut negative_pivots = 0;
         for iteration in 0..=self.settings.iterations {
-            self.system
-                .evaluate(state, time, Some((self.settings.tangent, &self.pending)))
-                .map_err(fatal)?;
+            self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending))).map_err(fatal)?;
             let (norm, allowed) = self.find_residual(state);
             residuals.push(norm);
             let gap = control.map_or(0.0, |control| self.constraint(control, state, &start));

@@ -88,8 +88,9 @@ impl<'m> System<'m> {
             matrix.keep_mirror();
         }
         let places = model.facets.iter().map(|f| matrix.places(&equations, &f.nodes, 6)).collect();
-        let workspace = Workspace::new(solver, &equations, &matrix)
-            .ok_or(SolveError::Control("the equations are too many for the direct solver; use conjugate gradients"))?;
+        let workspace = Workspace::new(solver, &equations, &matrix).ok_or(SolveError::Control(
+            "the equations are too many for the direct solver; use conjugate gradients",
+        ))?;
         Ok(Self {
             model,
             matrix,
@@ -135,7 +136,8 @@ impl<'m> System<'m> {
             let symmetric = self.matrix.mirror.is_empty();
             results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
                 let number = first + at;
-                result.broken = result.fill(model, state, number, pressure[number], factor, kind, symmetric).err();
+                result.broken =
+                    result.fill(model, state, number, pressure[number], factor, kind, symmetric).err();
             });
             for (number, result) in (first..last).zip(&results) {
                 if let Some(why) = result.broken {
@@ -261,7 +263,8 @@ impl<'m> System<'m> {
         self.phases.preparation += start.elapsed();
         if pivots.smallest < ZERO_PIVOT {
             let component = self.equations.component[pivots.weakest] as usize;
-            const NAMES: [&str; 6] = ["x", "y", "z", "rotation about x", "rotation about y", "rotation about z"];
+            const NAMES: [&str; 6] =
+                ["x", "y", "z", "rotation about x", "rotation about y", "rotation about z"];
             return Err(SolveError::Singular {
                 node: (component / 6) as u32,
                 component: NAMES[component % 6],
@@ -314,7 +317,9 @@ fn linear_error(error: LinearError) -> SolveError {
     match error {
         LinearError::NotFinite => SolveError::Control("the stiffness is not finite; use smaller steps"),
         LinearError::Indefinite(iterations) => SolveError::Indefinite { iterations },
-        LinearError::Stalled(LinearReport { iterations, residual }) => SolveError::Stalled { iterations, residual },
+        LinearError::Stalled(LinearReport { iterations, residual }) => {
+            SolveError::Stalled { iterations, residual }
+        }
     }
 }
 

@@ -15,10 +15,9 @@ const MATERIAL: Material = Material { elastic: PlaneStress { young: 1e6, poisson
 
 /// Points and triangles of an octahedron of radius 1 facing outwards, each triangle cut in four some times.
 fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
-    let mut points: Vec<Vector3<f64>> =
-        [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
-            .map(|p: [i32; 3]| Vector3::from(p.map(f64::from)))
-            .to_vec();
+    let mut points: Vec<Vector3<f64>> = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+        .map(|p: [i32; 3]| Vector3::from(p.map(f64::from)))
+        .to_vec();
     let mut cells: Vec<[u32; 3]> =
         vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
     for _ in 0..cuts {
@@ -116,7 +115,8 @@ fn nodes_carry_one_normal_for_each_smooth_fan() {
         let angle = normal.direction.angle(&ball.rest[normal.node as usize]);
         assert!(angle < 0.052, "{angle}");
     }
-    let points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|p: [i32; 3]| Vector3::from(p.map(f64::from)));
+    let points =
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|p: [i32; 3]| Vector3::from(p.map(f64::from)));
     let corner = model((points.to_vec(), vec![[0, 1, 2], [0, 2, 3], [0, 3, 1]]), 0.01);
     assert_eq!(corner.normals.iter().filter(|normal| normal.node == 0).count(), 3);
     for (facet, normals) in corner.facets.iter().zip(&corner.corner_normals) {
@@ -145,7 +145,9 @@ fn bad_shells_are_told_with_their_element() {
     soft.material = Material { density: f64::NAN, ..MATERIAL };
     assert!(refuse(&soft).contains("density"));
     let with = |cell: [u32; 3]| Shell { cells: [cells.clone(), vec![cell]].concat(), ..good.clone() };
-    assert!(refuse(&with([3, 4, 5])).contains("element 32") && refuse(&with([3, 4, 5])).contains("degenerate"));
+    assert!(
+        refuse(&with([3, 4, 5])).contains("element 32") && refuse(&with([3, 4, 5])).contains("degenerate")
+    );
     assert!(refuse(&with([3, 4, 99])).contains("node 99"));
     assert!(refuse(&with([1, 10, 26])).contains("3 triangles"), "{}", refuse(&with([1, 10, 26])));
     let branched = Shell { branches: true, ..with([1, 10, 26]) };
@@ -255,7 +257,8 @@ fn all_linear_solvers_find_the_same_equilibrium() {
         iterative(Preconditioner::LaggedFactors { renew_after: 20 }),
     ] {
         let mut state = State::at_rest(&model);
-        let mut solver = Statics::new(&model, StaticSettings { linear, ..StaticSettings::default() }).unwrap();
+        let mut solver =
+            Statics::new(&model, StaticSettings { linear, ..StaticSettings::default() }).unwrap();
         let step = solver.solve(&mut state, 1.0).unwrap();
         assert!(step.residuals.len() < 15, "{linear:?}: {:?}", step.residuals);
         found.push(state);
@@ -263,7 +266,8 @@ fn all_linear_solvers_find_the_same_equilibrium() {
     let tip = found[0].position[26];
     assert!(tip.z > 1.0, "{tip}");
     for other in &found[1..] {
-        let off = other.position.iter().zip(&found[0].position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let off =
+            other.position.iter().zip(&found[0].position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         assert!(off < 1e-6, "{off:e}");
     }
 }
@@ -340,6 +344,8 @@ fn a_balloon_takes_the_volume_it_is_told() {
     assert!(coarse < 0.12 && fine > 0.0 && fine < 0.5 * coarse, "{coarse} {fine}");
 }
 
+/// Far beyond small strains. Its nodes turn about their normals by up to 2 rad: a facet under tension loads the drilling of its corners
+/// where the mesh is irregular, and thin shells hardly resist it.
 #[test]
 fn a_balloon_doubles_its_volume() {
     let model = balloon(2, 1.0);
@@ -369,8 +375,14 @@ fn arc_length_and_displacement_control_agree() {
     let by = state.position[26].z;
     solver.control(&mut other, Control::Displacement { node: 26, component: 2, by }).unwrap();
     assert!(state.load_factor > 0.0);
-    assert!((state.load_factor / other.load_factor - 1.0).abs() < 1e-6, "{} {}", state.load_factor, other.load_factor);
-    let error = solver.control(&mut other, Control::Displacement { node: 0, component: 2, by: 1.0 }).unwrap_err();
+    assert!(
+        (state.load_factor / other.load_factor - 1.0).abs() < 1e-6,
+        "{} {}",
+        state.load_factor,
+        other.load_factor
+    );
+    let error =
+        solver.control(&mut other, Control::Displacement { node: 0, component: 2, by: 1.0 }).unwrap_err();
     assert!(matches!(error, SolveError::Control(_)), "{error}");
 }
 

@@ -39,8 +39,8 @@ use pliant_geometry::Mesh;
 pub use error::MeshingError;
 pub use field::{Ellipsoid, ImplicitField};
 pub use phantom::{Organ, Phantom, brain_label};
-pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
+pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
 pub use voxels::Voxels;
 

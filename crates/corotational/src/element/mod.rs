@@ -25,7 +25,8 @@ pub use membrane::{andes_opt, constant_strain};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Membrane {
     /// Felippa's optimal ANDES triangle with its higher-order part scaled by min(1, κ t²/A), so that drilling does
-    /// not lock thin curved shells. κ = ∞ is Felippa's OPT.
+    /// not lock thin curved shells. κ = ∞ is Felippa's OPT. Where the mesh is irregular, large membrane strain turns nodes about
+    /// their normals by several times the strain; a larger κ holds them.
     Opt {
         /// κ; 10 by default.
         adaptation: f64,
