@@ -8,6 +8,7 @@ mod rotation;
 mod sparse;
 mod state;
 mod statics;
+mod surface;
 mod system;
 #[cfg(test)]
 mod testing;
@@ -17,6 +18,7 @@ pub use linear::{LinearReport, LinearSolver, Preconditioner};
 pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spring};
 pub use state::State;
 pub use statics::{Control, StaticSettings, Statics, Step};
+pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Picture, Place};
 pub use system::Phases;
 #[cfg(test)]
 mod tests;

@@ -344,20 +344,33 @@ fn a_balloon_takes_the_volume_it_is_told() {
     assert!(coarse < 0.12 && fine > 0.0 && fine < 0.5 * coarse, "{coarse} {fine}");
 }
 
-/// Far beyond small strains. Its nodes turn about their normals by up to 2 rad: a facet under tension loads the drilling of its corners
-/// where the mesh is irregular, and thin shells hardly resist it.
+/// Twice the volume, 26 % strain. Pressures of both membranes agree to 3 %. With ANDES the nodes of the thin shell tilt by more than 1 rad,
+/// though a sphere stays one: tension loads the drilling of unequal facets, and on a curved mesh drilling moments of
+/// neighbours leave a moment that tilts. It falls with the third power of the edge; without drilling in the strains there is none.
 #[test]
 fn a_balloon_doubles_its_volume() {
-    let model = balloon(2, 1.0);
-    let cells: Vec<u32> = (0..128).collect();
-    let rest = model.enclosed_volume(&cells, &model.rest);
-    let mut state = State::at_rest(&model);
-    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
-    for part in 1..=10 {
-        let volume = rest * (1.0 + 0.1 * f64::from(part));
-        solver.control(&mut state, Control::Volume { volume }).unwrap();
-    }
-    assert!((model.enclosed_volume(&cells, &state.position) / rest - 2.0).abs() < 1e-6);
+    let inflate = |membrane| {
+        let mut model = balloon(3, 1.0);
+        let mut shell = Model::new(model.rest.clone());
+        let formulation = Formulation { membrane, ..Formulation::default() };
+        shell.add_shell(&Shell { formulation, ..Shell::new("ball", ball(3).1, 0.02, MATERIAL) }).unwrap();
+        model.facets = shell.facets;
+        let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
+        let rest = model.enclosed_volume(&cells, &model.rest);
+        let mut state = State::at_rest(&model);
+        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        for part in 1..=10 {
+            let volume = rest * (1.0 + 0.1 * f64::from(part));
+            solver.control(&mut state, Control::Volume { volume }).unwrap();
+        }
+        assert!((model.enclosed_volume(&cells, &state.position) / rest - 2.0).abs() < 1e-6);
+        (state.load_factor, state.rotation.iter().map(|r| r.angle()).fold(0.0, f64::max))
+    };
+    let (andes, andes_turn) = inflate(Membrane::default());
+    let (cst, cst_turn) = inflate(Membrane::Cst { drilling: 1e-3 });
+    println!("pressure {andes:.0} and {cst:.0}, nodes turned by {andes_turn:.3} and {cst_turn:.3}");
+    assert!((andes / cst - 1.0).abs() < 0.03, "{andes} {cst}");
+    assert!(cst_turn < 0.05, "{cst_turn}");
 }
 
 /// Arc length and displacement control walk the same path.
@@ -408,4 +421,98 @@ fn only_the_difference_from_rest_costs_energy() {
     assert!(state.shell_energy(&model).unwrap().bending < 1e-20);
     state.position.iter_mut().for_each(|x| *x *= 1.1);
     assert!(state.shell_energy(&model).unwrap().membrane > 1.0);
+}
+
+/// Points of edges agree from both sides, bit for bit within 1e-15, in a strongly deformed state; also at a crease.
+#[test]
+fn the_curved_surface_is_watertight() {
+    let cube: (Vec<Vector3<f64>>, Vec<[u32; 3]>) = (
+        (0..8).map(|i| Vector3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect(),
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+            .into_iter()
+            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
+    );
+    let mut random = Random::new(9);
+    for (shape, size) in [(ball(2), 0.1), (cube, 0.3)] {
+        let model = model(shape, 0.01);
+        for rule in [EdgeRule::Arc, EdgeRule::Third] {
+            let surface = CurvedSurface::new(&model, rule);
+            let mut state = State::at_rest(&model);
+            let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| size * random.number()).collect();
+            state.advance(&shake, 1.0);
+            let mut at_edge: Vec<([u32; 2], Vector3<f64>)> = Vec::new();
+            for (number, facet) in model.facets.iter().enumerate() {
+                let patch = surface.patch(&model, &state, number as u32);
+                for i in 0..3 {
+                    let (a, b) = (facet.nodes[i], facet.nodes[(i + 1) % 3]);
+                    let mut weights = [0.0; 3];
+                    weights[i] = if a < b { 0.3 } else { 0.7 };
+                    weights[(i + 1) % 3] = 1.0 - weights[i];
+                    at_edge.push(([a.min(b), a.max(b)], patch.point(weights)));
+                }
+            }
+            at_edge.sort_by_key(|(edge, _)| *edge);
+            for pair in at_edge.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+                assert!((pair[0].1 - pair[1].1).norm() < 1e-14, "{:?}", pair[0].0);
+            }
+        }
+    }
+}
+
+/// 128 patches lie twenty times closer to the sphere than their facets; the picture shares the points of edges.
+#[test]
+fn the_curved_surface_of_a_ball_is_round() {
+    let model = {
+        let mut model = model(ball(2), 0.01);
+        model.normals.iter_mut().for_each(|normal| normal.direction = model.rest[normal.node as usize]);
+        model
+    };
+    let surface = CurvedSurface::new(&model, EdgeRule::Arc);
+    let state = State::at_rest(&model);
+    let picture = surface.picture(&model, 4);
+    assert_eq!(picture.triangles.len(), 128 * 16);
+    // A closed surface: V − E + F = 2 with E = 3F/2.
+    assert_eq!(picture.places.len(), 2 + 128 * 8);
+    let off =
+        |place: &Place| (surface.patch(&model, &state, place.facet).point(place.weights).norm() - 1.0).abs();
+    let curved = picture.places.iter().map(off).fold(0.0, f64::max);
+    let flat = model.facets.iter().map(|facet| {
+        let [a, b, c] = facet.nodes.map(|node| model.rest[node as usize]);
+        1.0 - ((a + b + c) / 3.0).norm()
+    });
+    let flat = flat.fold(0.0, f64::max);
+    println!("off the sphere: facets {flat:.1e}, patches {curved:.1e}");
+    assert!(curved < 0.05 * flat, "{curved:e} {flat:e}");
+}
+
+/// Points of a finer sphere find their feet, stay where they are at rest, and turn with the body.
+#[test]
+fn a_visual_mesh_is_carried() {
+    let model = model(ball(2), 0.01);
+    let surface = CurvedSurface::new(&model, EdgeRule::Arc);
+    let mut state = State::at_rest(&model);
+    let points: Vec<Vector3<f64>> = ball(3).0.iter().map(|p| 1.02 * p).collect();
+    let near = |point: &Vector3<f64>| {
+        let distance = |facet: &u32| {
+            let nodes = model.facets[*facet as usize].nodes.map(|node| model.rest[node as usize]);
+            ((nodes[0] + nodes[1] + nodes[2]) / 3.0 - point).norm()
+        };
+        (0..128_u32).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+    };
+    // Also from a facet somewhat off.
+    let carried: Vec<Carried> = points.iter().map(|p| surface.carry(&model, &state, *p, near(p))).collect();
+    for (point, carried) in points.iter().zip(&carried) {
+        assert!((surface.carried(&model, &state, carried) - point).norm() < 1e-12);
+        assert!(
+            (carried.height - 0.02).abs() < 0.01 && carried.aside[0].hypot(carried.aside[1]) < 2e-3,
+            "{carried:?}"
+        );
+    }
+    let turn = exponential(&Vector3::new(1.0, -0.5, 2.0));
+    state.position.iter_mut().for_each(|x| *x = turn * *x);
+    state.rotation.iter_mut().for_each(|r| *r = turn * *r);
+    for (point, carried) in points.iter().zip(&carried) {
+        assert!((surface.carried(&model, &state, carried) - turn * point).norm() < 1e-12);
+    }
 }

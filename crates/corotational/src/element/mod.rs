@@ -25,8 +25,9 @@ pub use membrane::{andes_opt, constant_strain};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Membrane {
     /// Felippa's optimal ANDES triangle with its higher-order part scaled by min(1, κ t²/A), so that drilling does
-    /// not lock thin curved shells. κ = ∞ is Felippa's OPT. Where the mesh is irregular, large membrane strain turns nodes about
-    /// their normals by several times the strain; a larger κ holds them.
+    /// not lock thin curved shells. κ = ∞ is Felippa's OPT. Under large membrane strain nodes of thin
+    /// curved shells tilt where facets are unequal (a balloon of 512 facets, R/t = 50, at 26 % strain: 1.2 rad), though positions and
+    /// forces stay right; the tilt falls with the third power of the edges, and with `Cst` there is none.
     Opt {
         /// κ; 10 by default.
         adaptation: f64,
