@@ -4,11 +4,14 @@
 //! Felippa and Haugen (2005), CMAME 194:2285; polar frame after Caselli and Bisegna (2013), IJNME 95:499.
 //! Leaves out: large strains (the energy is that of linear elasticity) and shear of the thickness.
 
-use nalgebra::{Matrix3, Matrix3x2, Rotation3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{
+    Matrix3, Matrix3x2, Rotation3, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector2, Vector3,
+};
 
 use crate::element::{
     Corners, Formulation, MIDSIDES, Matrix9, PlaneStress, andes_basic, area, curvature, gradients, strain,
 };
+use crate::model::Material;
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
 
 /// Numbers of (u, v, w, θx, θy, θz) of three nodes, node by node.
@@ -38,6 +41,11 @@ pub struct Facet {
     pub thickness: f64,
     /// Area at rest [m²].
     pub area: f64,
+    /// Mass that it gives to each node [kg].
+    pub mass: f64,
+    /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that rotations do not shorten the
+    /// steps of an explicit solver.
+    pub inertia: f64,
     elastic: PlaneStress,
     /// Corners at rest in the facet's axes, relative to the centroid [m].
     corners: Corners,
@@ -116,7 +124,7 @@ impl Facet {
         nodes: [u32; 3],
         rest: [Vector3<f64>; 3],
         thickness: f64,
-        elastic: PlaneStress,
+        Material { elastic, density }: Material,
         formulation: Formulation,
     ) -> Option<Self> {
         let [a, b, c] = rest;
@@ -131,10 +139,14 @@ impl Facet {
         let axes = Matrix3::from_columns(&[along, normal.cross(&along), normal]);
         let centroid = (a + b + c) / 3.0;
         let corners = rest.map(|x| (axes.transpose() * (x - centroid)).xy());
+        let area = area(&corners);
+        let mass = density * thickness * area / 3.0;
         Some(Self {
             nodes,
             thickness,
-            area: area(&corners),
+            area,
+            mass,
+            inertia: mass * (thickness * thickness).max(area) / 12.0,
             elastic,
             corners,
             gradient: gradients(&corners),
@@ -364,6 +376,14 @@ impl Facet {
         }
     }
 
+    /// The largest ω² [1/s²] of the element by itself about its rest shape, with its lumped masses: none of the model's is higher.
+    pub(crate) fn highest_frequency_squared(&self) -> f64 {
+        let scale = |i: usize| if i % 6 < 3 { self.mass } else { self.inertia }.sqrt();
+        let k = self.linear_stiffness();
+        let scaled = Matrix18::from_fn(|i, j| k[(i, j)] / (scale(i) * scale(j)));
+        SymmetricEigen::new(scaled).eigenvalues.max()
+    }
+
     /// E t [N/m].
     pub(crate) fn membrane_modulus(&self) -> f64 {
         self.elastic.young * self.thickness
@@ -428,6 +448,9 @@ mod tests {
     use crate::rotation::exponential;
     use crate::testing::Random;
 
+    const MATERIAL: Material =
+        Material { elastic: PlaneStress { young: 1e3, poisson: 0.3 }, density: 1000.0 };
+
     type Pose = ([Vector3<f64>; 3], [UnitQuaternion<f64>; 3]);
 
     fn vector(random: &mut Random) -> Vector3<f64> {
@@ -439,10 +462,9 @@ mod tests {
     }
 
     fn facet(order: [usize; 3]) -> Facet {
-        let elastic = PlaneStress { young: 1e3, poisson: 0.3 };
         let x = rest();
         let nodes = order.map(|i| i as u32);
-        Facet::new(nodes, order.map(|i| x[i]), 0.1, elastic, Formulation::default()).unwrap()
+        Facet::new(nodes, order.map(|i| x[i]), 0.1, MATERIAL, Formulation::default()).unwrap()
     }
 
     /// A large common rotation, stretch and shear of 5 %, nodes turned by up to 0.3 rad.
@@ -568,8 +590,7 @@ mod tests {
         let (x, rotation) = pose(&mut random, 1.0);
         for membrane in [Membrane::default(), Membrane::Opt { adaptation: f64::INFINITY }] {
             let formulation = Formulation { membrane, ..Formulation::default() };
-            let elastic = PlaneStress { young: 1e3, poisson: 0.3 };
-            let facet = Facet::new([0, 1, 2], rest(), 0.1, elastic, formulation).unwrap();
+            let facet = Facet::new([0, 1, 2], rest(), 0.1, MATERIAL, formulation).unwrap();
             let placed = facet.place(&x, &rotation).unwrap();
             let parts = facet.energy(&placed);
             let whole = facet.force(&placed).0;

@@ -1,4 +1,5 @@
 //! Co-rotational triangular shells.
+mod dynamics;
 pub mod element;
 mod error;
 mod facet;
@@ -12,6 +13,7 @@ mod surface;
 mod system;
 #[cfg(test)]
 mod testing;
+pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit};
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
 pub use linear::{LinearReport, LinearSolver, Preconditioner};

@@ -216,7 +216,7 @@ impl Model {
         for (number, &nodes) in cells.iter().enumerate() {
             let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
             let corners = nodes.map(|node| self.rest[node as usize]);
-            let facet = Facet::new(nodes, corners, thickness, shell.material.elastic, shell.formulation);
+            let facet = Facet::new(nodes, corners, thickness, shell.material, shell.formulation);
             let facet = facet.ok_or_else(|| ModelError::Degenerate {
                 shell: shell.name.clone(),
                 cell: number,
@@ -228,12 +228,9 @@ impl Model {
             facets.push(facet);
         }
         for facet in &facets {
-            let mass = shell.material.density * facet.thickness * facet.area / 3.0;
-            // At least A/12, so that rotations do not shorten the steps of an explicit solver.
-            let arm = (facet.thickness * facet.thickness).max(facet.area) / 12.0;
             for node in facet.nodes {
-                self.mass[node as usize] += mass;
-                self.inertia[node as usize] += mass * arm;
+                self.mass[node as usize] += facet.mass;
+                self.inertia[node as usize] += facet.inertia;
             }
         }
         self.add_normals(&facets, shell.crease);
@@ -320,6 +317,13 @@ impl Model {
             .filter_map(|(edge, sides)| (sides.len() == 1).then_some(edge))
             .collect();
         if open.is_empty() { Ok(()) } else { Err(ModelError::Open { edges: open }) }
+    }
+
+    /// What round-off leaves of the norm of a residual [N], 8 ε E t |x| √n: displacements are differences of positions, known to ε |x|.
+    pub(crate) fn round_off(&self) -> f64 {
+        let extent = self.rest.iter().map(|x| x.amax()).fold(0.0, f64::max);
+        let stiffness = self.facets.iter().map(|facet| facet.membrane_modulus()).fold(0.0, f64::max);
+        8.0 * f64::EPSILON * stiffness * extent * (self.rest.len() as f64).sqrt()
     }
 
     /// The mean length of the facets' and other cells' edges at rest [m]; 1 without any.

@@ -4,7 +4,7 @@
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Lower triangle with diagonal, column by column, rows increasing.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct LowerMatrix {
     pub(crate) column_start: Vec<u32>,
     pub(crate) row: Vec<u32>,
@@ -183,12 +183,17 @@ impl LowerMatrix {
 
     /// y = A x.
     pub(crate) fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        self.multiply_values(&self.value, x, y);
+    }
+
+    /// y = A x for another symmetric matrix of the same pattern.
+    pub(crate) fn multiply_values(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
         y.fill(0.0);
         for (column, bounds) in self.column_start.windows(2).enumerate() {
             let (start, end) = (bounds[0] as usize, bounds[1] as usize);
             let own = x[column];
-            let mut sum = self.value[start] * own;
-            for (&row, &value) in self.row[start + 1..end].iter().zip(&self.value[start + 1..end]) {
+            let mut sum = values[start] * own;
+            for (&row, &value) in self.row[start + 1..end].iter().zip(&values[start + 1..end]) {
                 sum += value * x[row as usize];
                 y[row as usize] += value * own;
             }

@@ -129,7 +129,7 @@ impl<'m> Statics<'m> {
         Ok(Self {
             settings,
             length: model.mean_edge(),
-            round_off: round_off(model),
+            round_off: model.round_off(),
             pending: vec![0.0; all],
             increment: vec![0.0; all],
             gradient: vec![0.0; all],
@@ -409,13 +409,6 @@ impl<'m> Statics<'m> {
         }
         Ok(factor)
     }
-}
-
-/// 8 ε E t |x| √n: displacements are differences of positions, known to ε |x|.
-fn round_off(model: &Model) -> f64 {
-    let extent = model.rest.iter().map(|x| x.amax()).fold(0.0, f64::max);
-    let stiffness = model.facets.iter().map(|facet| facet.membrane_modulus()).fold(0.0, f64::max);
-    8.0 * f64::EPSILON * stiffness * extent * (model.rest.len() as f64).sqrt()
 }
 
 /// Every part of the model must be held: of its six rigid motions none may leave constraints and springs unmoved.

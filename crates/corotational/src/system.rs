@@ -38,7 +38,8 @@ pub(crate) struct System<'m> {
     pub(crate) equations: Equations,
     pub(crate) matrix: LowerMatrix,
     places: Vec<Vec<u32>>,
-    workspace: Workspace,
+    /// None in a system of forces alone.
+    workspace: Option<Workspace>,
     /// Internal forces and moments, six a node [N, N m].
     pub(crate) internal: Vec<f64>,
     /// Loads, without their controlled part.
@@ -68,6 +69,25 @@ struct FacetResult {
 
 impl<'m> System<'m> {
     pub(crate) fn new(model: &'m Model, solver: LinearSolver) -> Result<Self, SolveError> {
+        let mut system = Self::forces_only(model);
+        let matrix = &mut system.matrix;
+        *matrix = LowerMatrix::new(&system.equations, model.facets.iter().map(|facet| &facet.nodes[..]));
+        if solver == LinearSolver::Unsymmetric {
+            matrix.keep_mirror();
+        }
+        system.places = model.facets.iter().map(|f| matrix.places(&system.equations, &f.nodes, 6)).collect();
+        system.coupling = vec![0.0; system.equations.len()];
+        system.workspace = Workspace::new(solver, &system.equations, matrix);
+        if system.workspace.is_none() {
+            return Err(SolveError::Control(
+                "the equations are too many for the direct solver; use conjugate gradients",
+            ));
+        }
+        Ok(system)
+    }
+
+    /// A system that has forces, but no stiffness.
+    pub(crate) fn forces_only(model: &'m Model) -> Self {
         let nodes = model.rest.len();
         let mut free = vec![false; 6 * nodes];
         for facet in &model.facets {
@@ -82,32 +102,23 @@ impl<'m> System<'m> {
                 }
             }
         }
-        let equations = Equations::new(&free);
-        let mut matrix = LowerMatrix::new(&equations, model.facets.iter().map(|facet| &facet.nodes[..]));
-        if solver == LinearSolver::Unsymmetric {
-            matrix.keep_mirror();
-        }
-        let places = model.facets.iter().map(|f| matrix.places(&equations, &f.nodes, 6)).collect();
-        let workspace = Workspace::new(solver, &equations, &matrix).ok_or(SolveError::Control(
-            "the equations are too many for the direct solver; use conjugate gradients",
-        ))?;
-        Ok(Self {
+        Self {
             model,
-            matrix,
-            places,
-            workspace,
+            equations: Equations::new(&free),
+            matrix: LowerMatrix::default(),
+            places: Vec::new(),
+            workspace: None,
             internal: vec![0.0; 6 * nodes],
             external: vec![0.0; 6 * nodes],
             controlled: vec![0.0; 6 * nodes],
-            coupling: vec![0.0; equations.len()],
+            coupling: Vec::new(),
             pressure: vec![[0.0; 2]; model.facets.len()],
             energy: 0.0,
             largest: 0.0,
             results: vec![FacetResult::none(); CHUNK.min(model.facets.len())],
             phases: Phases::default(),
             last_solution: LinearReport::default(),
-            equations,
-        })
+        }
     }
 
     /// Forces at a state and time; with a tangent also the stiffness, and what prescribed increments (six a node) make of it.
@@ -259,7 +270,8 @@ impl<'m> System<'m> {
     /// Takes the matrix as it now is for the coming solutions; returns its negative pivots.
     pub(crate) fn prepare(&mut self) -> Result<usize, SolveError> {
         let start = Instant::now();
-        let pivots = self.workspace.prepare(&self.matrix).map_err(linear_error)?;
+        let Some(workspace) = &mut self.workspace else { return Ok(0) };
+        let pivots = workspace.prepare(&self.matrix).map_err(linear_error)?;
         self.phases.preparation += start.elapsed();
         if pivots.smallest < ZERO_PIVOT {
             let component = self.equations.component[pivots.weakest] as usize;
@@ -277,7 +289,8 @@ impl<'m> System<'m> {
     /// Solves with the matrix prepared.
     pub(crate) fn solve(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         let start = Instant::now();
-        self.last_solution = self.workspace.solve(&self.matrix, right, solution).map_err(linear_error)?;
+        let Some(workspace) = &mut self.workspace else { return Ok(()) };
+        self.last_solution = workspace.solve(&self.matrix, right, solution).map_err(linear_error)?;
         self.phases.solution += start.elapsed();
         self.phases.solutions += 1;
         self.phases.iterations += self.last_solution.iterations;
