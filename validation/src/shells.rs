@@ -1,7 +1,7 @@
 //! Shells of the literature: a sheet becomes a model, its edges are held and loaded by name.
 
 use nalgebra::Vector3;
-use pliant_corotational::element::{Formulation, PlaneStress};
+use pliant_corotational::element::{Elasticity, Formulation};
 use pliant_corotational::{Constraint, Load, LoadKind, Material, Model, Motion, Shell};
 use pliant_geometry::Mesh;
 use pliant_mechanics::curve::{Curve, Shape};
@@ -66,7 +66,7 @@ impl Specimen {
     /// # Panics
     /// If the mesh is no sound shell.
     pub fn new(mesh: Mesh, [young, poisson]: [f64; 2], thickness: f64, formulation: Formulation) -> Self {
-        let material = Material { elastic: PlaneStress { young, poisson }, density: 1000.0 };
+        let material = Material { elastic: Elasticity { young, poisson }, density: 1000.0 };
         let mut model = Model::new(mesh.points.clone());
         let shell = Shell { formulation, ..Shell::new("shell", triangles(&mesh), thickness, material) };
         model.add_shell(&shell).unwrap_or_else(|error| panic!("{error}"));

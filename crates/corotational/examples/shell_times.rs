@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::time::Instant;
 
 use nalgebra::Vector3;
-use pliant_corotational::element::PlaneStress;
+use pliant_corotational::element::Elasticity;
 use pliant_corotational::{
     BackwardEuler, Constraint, DynamicSettings, LinearSolver, Load, LoadKind, Material, Model, Motion,
     Preconditioner, Shell, State,
@@ -28,7 +28,7 @@ fn tube(shells: usize) -> Model {
         [[a, b, c], [a, c, d]]
     };
     let mut model = Model::new((0..around * (along + 1)).map(point).collect());
-    let material = Material { elastic: PlaneStress { young: 1e5, poisson: 0.45 }, density: 1000.0 };
+    let material = Material { elastic: Elasticity { young: 1e5, poisson: 0.45 }, density: 1000.0 };
     let cells = (0..around * along).flat_map(cell).collect();
     model.add_shell(&Shell::new("tube", cells, 0.002, material)).expect("a tube is a sound shell");
     let last = (around * (along + 1)) as u32;

@@ -6,7 +6,7 @@ use crate::facet::Broken;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A quantity out of its range.
-    #[error("{what} of shell `{shell}` is {value}; it must be {range}")]
+    #[error("{what} of `{shell}` is {value}; it must be {range}")]
     OutOfRange {
         /// Name of the part.
         shell: String,
@@ -55,7 +55,7 @@ pub enum ModelError {
     },
     /// An edge of more than two triangles.
     #[error(
-        "{count} triangles of shell `{shell}` meet in the edge of nodes {} and {}; allow branches if that is \
+        "{count} triangles of `{shell}` meet in the edge of nodes {} and {}; allow branches if that is \
          meant, or remove the surplus", edge[0], edge[1]
     )]
     Branch {
@@ -162,6 +162,9 @@ pub enum SolveError {
 
 fn broken(why: Broken) -> String {
     match why {
+        Broken::Inverted(determinant) => {
+            format!("is inverted (det F = {determinant:.2e}); use smaller steps or smaller loads")
+        }
         Broken::Area(area) => format!("has collapsed: its area is {area:.1e} m²; use smaller steps"),
         Broken::Folded(angle) => {
             format!(

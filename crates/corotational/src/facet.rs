@@ -9,7 +9,7 @@ use nalgebra::{
 };
 
 use crate::element::{
-    Corners, Formulation, MIDSIDES, Matrix9, PlaneStress, andes_basic, area, curvature, gradients, strain,
+    Corners, Elasticity, Formulation, MIDSIDES, Matrix9, andes_basic, area, curvature, gradients, strain,
 };
 use crate::model::Material;
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
@@ -46,7 +46,7 @@ pub struct Facet {
     /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that rotations do not shorten the
     /// steps of an explicit solver.
     pub inertia: f64,
-    elastic: PlaneStress,
+    elastic: Elasticity,
     /// Corners at rest in the facet's axes, relative to the centroid [m].
     corners: Corners,
     /// Gradients of the shape functions there [1/m].
@@ -109,13 +109,15 @@ pub(crate) struct Placed {
     deformation: Vector18,
 }
 
-/// Why a facet has no force.
+/// Why a facet or a tetrahedron has no force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Broken {
     /// Its area is zero or not finite [m²].
     Area(f64),
     /// A node has turned by this angle [rad] against it.
     Folded(f64),
+    /// Of a tetrahedron: the determinant of its deformation gradient is not positive.
+    Inverted(f64),
 }
 
 impl Facet {
@@ -448,8 +450,7 @@ mod tests {
     use crate::rotation::exponential;
     use crate::testing::Random;
 
-    const MATERIAL: Material =
-        Material { elastic: PlaneStress { young: 1e3, poisson: 0.3 }, density: 1000.0 };
+    const MATERIAL: Material = Material { elastic: Elasticity { young: 1e3, poisson: 0.3 }, density: 1000.0 };
 
     type Pose = ([Vector3<f64>; 3], [UnitQuaternion<f64>; 3]);
 

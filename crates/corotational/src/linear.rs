@@ -290,11 +290,11 @@ impl BlockJacobi {
             let mut block = Block::identity();
             for (j, &column) in equations.iter().enumerate().filter(|(_, e)| **e != NONE) {
                 // A node's rows stand first in its columns.
-                let mut at = matrix.column_start[column as usize] as usize;
-                for (i, _) in equations.iter().enumerate().filter(|(_, e)| **e != NONE && **e >= column) {
+                let first = matrix.column_start[column as usize] as usize;
+                let below = (0..6).filter(|&i| equations[i] != NONE && equations[i] >= column);
+                for (at, i) in (first..).zip(below) {
                     block[(i, j)] = matrix.value[at];
                     block[(j, i)] = matrix.value[at];
-                    at += 1;
                 }
             }
             let Some(factor) = Cholesky::new(block) else { return false };

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use pliant_mechanics::curve::Curve;
 
-use crate::element::{Formulation, PlaneStress};
+use crate::element::{Elasticity, Formulation};
 use crate::error::ModelError;
 use crate::facet::Facet;
+use crate::tet::Tet;
 
 /// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
 #[derive(Clone, Debug, Default)]
@@ -16,6 +17,8 @@ pub struct Model {
     pub rest: Vec<Vector3<f64>>,
     /// Shell elements of all shells.
     pub facets: Vec<Facet>,
+    /// Tetrahedra of all solids.
+    pub tets: Vec<Tet>,
     /// Nodal normals at rest, which turn with their nodes; several a node at creases.
     pub normals: Vec<Normal>,
     /// The normals at the corners of each facet.
@@ -45,11 +48,11 @@ pub struct Normal {
     pub direction: Vector3<f64>,
 }
 
-/// Elasticity and density of a shell.
+/// Elasticity and density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// Plane-stress elasticity.
-    pub elastic: PlaneStress,
+    /// Isotropic elasticity.
+    pub elastic: Elasticity,
     /// Density [kg/m³].
     pub density: f64,
 }
@@ -238,21 +241,41 @@ impl Model {
         Ok(notes)
     }
 
+    /// Adds co-rotational tetrahedra, which give mass to their nodes. They may share nodes with shells.
+    ///
+    /// # Errors
+    /// If a quantity is out of range or a tetrahedron is degenerate or inverted. The model then is as it was.
+    pub fn add_solid(
+        &mut self,
+        name: &str,
+        cells: &[[u32; 4]],
+        material: Material,
+    ) -> Result<(), ModelError> {
+        check_material(name, material, 0.5, "between -1 and 0.5")?;
+        let mut tets = Vec::with_capacity(cells.len());
+        for (cell, &nodes) in cells.iter().enumerate() {
+            check_nodes(name, cell, &nodes, self.rest.len())?;
+            let corners = nodes.map(|node| self.rest[node as usize]);
+            tets.push(Tet::new(nodes, corners, material).map_err(|value| ModelError::Degenerate {
+                shell: name.into(),
+                cell,
+                what: "volume",
+                value,
+            })?);
+        }
+        for tet in &tets {
+            tet.nodes.iter().for_each(|&node| self.mass[node as usize] += tet.mass);
+        }
+        self.tets.extend(tets);
+        Ok(())
+    }
+
     fn check_quantities(&self, shell: &Shell) -> Result<(), ModelError> {
         let out_of_range = |what: String, value: f64, range| {
             Err(ModelError::OutOfRange { shell: shell.name.clone(), what, value, range })
         };
         let positive = |value: f64| value > 0.0 && value.is_finite();
-        let Material { elastic, density } = shell.material;
-        if !positive(elastic.young) {
-            return out_of_range("Young's modulus".into(), elastic.young, "positive and finite");
-        }
-        if !(elastic.poisson > -1.0 && elastic.poisson < 1.0) {
-            return out_of_range("Poisson's ratio".into(), elastic.poisson, "between -1 and 1");
-        }
-        if !positive(density) {
-            return out_of_range("density".into(), density, "positive and finite");
-        }
+        check_material(&shell.name, shell.material, 1.0, "between -1 and 1")?;
         let (cells, given) = (shell.cells.len(), shell.thickness.len());
         if given != 1 && given != cells {
             return Err(ModelError::Thicknesses { shell: shell.name.clone(), cells, given });
@@ -262,10 +285,7 @@ impl Model {
             return out_of_range(what, value, "positive and finite");
         }
         for (cell, nodes) in shell.cells.iter().enumerate() {
-            if let Some(&node) = nodes.iter().find(|&&node| node as usize >= self.rest.len()) {
-                let nodes = self.rest.len();
-                return Err(ModelError::NoSuchNode { shell: shell.name.clone(), cell, node, nodes });
-            }
+            check_nodes(&shell.name, cell, nodes, self.rest.len())?;
         }
         Ok(())
     }
@@ -322,18 +342,55 @@ impl Model {
     /// What round-off leaves of the norm of a residual [N], 8 ε E t |x| √n: displacements are differences of positions, known to ε |x|.
     pub(crate) fn round_off(&self) -> f64 {
         let extent = self.rest.iter().map(|x| x.amax()).fold(0.0, f64::max);
-        let stiffness = self.facets.iter().map(|facet| facet.membrane_modulus()).fold(0.0, f64::max);
+        let shells = self.facets.iter().map(|facet| facet.membrane_modulus());
+        let solids = self.tets.iter().map(|tet| tet.modulus() * tet.volume.cbrt());
+        let stiffness = shells.chain(solids).fold(0.0, f64::max);
         8.0 * f64::EPSILON * stiffness * extent * (self.rest.len() as f64).sqrt()
     }
 
     /// The mean length of the facets' and other cells' edges at rest [m]; 1 without any.
     pub(crate) fn mean_edge(&self) -> f64 {
-        let mut sum = 0.0;
+        let (mut sum, mut count) = (0.0, 0);
+        let mut add = |a: u32, b: u32| {
+            sum += (self.rest[a as usize] - self.rest[b as usize]).norm();
+            count += 1;
+        };
         for facet in &self.facets {
-            let [a, b, c] = facet.nodes.map(|node| self.rest[node as usize]);
-            sum += (b - a).norm() + (c - b).norm() + (a - c).norm();
+            (0..3).for_each(|i| add(facet.nodes[i], facet.nodes[(i + 1) % 3]));
         }
-        if sum > 0.0 { sum / (3 * self.facets.len()) as f64 } else { 1.0 }
+        for tet in &self.tets {
+            (0..4).for_each(|i| add(tet.nodes[i], tet.nodes[(i + 1) % 4]));
+        }
+        if count > 0 { sum / f64::from(count) } else { 1.0 }
+    }
+}
+
+fn check_material(
+    name: &str,
+    Material { elastic, density }: Material,
+    above: f64,
+    range: &'static str,
+) -> Result<(), ModelError> {
+    let out_of_range = |what: &str, value, range| {
+        Err(ModelError::OutOfRange { shell: name.into(), what: what.into(), value, range })
+    };
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    if !positive(elastic.young) {
+        return out_of_range("Young's modulus", elastic.young, "positive and finite");
+    }
+    if !(elastic.poisson > -1.0 && elastic.poisson < above) {
+        return out_of_range("Poisson's ratio", elastic.poisson, range);
+    }
+    if !positive(density) {
+        return out_of_range("density", density, "positive and finite");
+    }
+    Ok(())
+}
+
+fn check_nodes(name: &str, cell: usize, nodes: &[u32], count: usize) -> Result<(), ModelError> {
+    match nodes.iter().find(|&&node| node as usize >= count) {
+        Some(&node) => Err(ModelError::NoSuchNode { shell: name.into(), cell, node, nodes: count }),
+        None => Ok(()),
     }
 }
 

@@ -423,11 +423,11 @@ fn check_held(model: &Model) -> Result<(), SolveError> {
         node
     }
     let mut used = vec![false; nodes];
-    for facet in &model.facets {
-        let [a, b, c] = facet.nodes.map(|node| node as usize);
-        for node in [a, b, c] {
-            used[node] = true;
-            let (x, y) = (root(&mut part, a), root(&mut part, node));
+    let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
+    for nodes in facets.chain(model.tets.iter().map(|tet| &tet.nodes[..])) {
+        for &node in nodes {
+            used[node as usize] = true;
+            let (x, y) = (root(&mut part, nodes[0] as usize), root(&mut part, node as usize));
             part[x.max(y)] = x.min(y);
         }
     }

@@ -439,8 +439,8 @@ mod tests {
         let l = weights(&mut random);
         let (v, w) = (vector(&mut random), vector(&mut random));
         let mut all = Vector18::zeros();
-        for i in 0..3 {
-            all.fixed_rows_mut::<3>(6 * i).copy_from(&(v + w.cross(&p[i])));
+        for (i, p) in p.iter().enumerate() {
+            all.fixed_rows_mut::<3>(6 * i).copy_from(&(v + w.cross(p)));
             all.fixed_rows_mut::<3>(6 * i + 3).copy_from(&w);
         }
         let off = patch.jacobian(l) * all - v - w.cross(&patch.point(l));

@@ -7,12 +7,13 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use crate::error::SolveError;
-use crate::facet::{Broken, Matrix18, Tangent, Vector18};
+use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::model::{LoadKind, Model, Motion};
 use crate::rotation::skew;
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
+use crate::tet::{Matrix12, Vector12};
 
 /// Cells computed side by side before they are added up.
 const CHUNK: usize = 256;
@@ -38,6 +39,7 @@ pub(crate) struct System<'m> {
     pub(crate) equations: Equations,
     pub(crate) matrix: LowerMatrix,
     places: Vec<Vec<u32>>,
+    tet_places: Vec<Vec<u32>>,
     /// None in a system of forces alone.
     workspace: Option<Workspace>,
     /// Internal forces and moments, six a node [N, N m].
@@ -55,6 +57,7 @@ pub(crate) struct System<'m> {
     /// Largest force on a node of a cell [N].
     pub(crate) largest: f64,
     results: Vec<FacetResult>,
+    tet_results: Vec<TetResult>,
     pub(crate) phases: Phases,
     pub(crate) last_solution: LinearReport,
 }
@@ -71,11 +74,15 @@ impl<'m> System<'m> {
     pub(crate) fn new(model: &'m Model, solver: LinearSolver) -> Result<Self, SolveError> {
         let mut system = Self::forces_only(model);
         let matrix = &mut system.matrix;
-        *matrix = LowerMatrix::new(&system.equations, model.facets.iter().map(|facet| &facet.nodes[..]));
+        let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
+        let cells = facets.chain(model.tets.iter().map(|tet| &tet.nodes[..]));
+        *matrix = LowerMatrix::new(&system.equations, cells);
         if solver == LinearSolver::Unsymmetric {
             matrix.keep_mirror();
         }
         system.places = model.facets.iter().map(|f| matrix.places(&system.equations, &f.nodes, 6)).collect();
+        system.tet_places =
+            model.tets.iter().map(|tet| matrix.places(&system.equations, &tet.nodes, 3)).collect();
         system.coupling = vec![0.0; system.equations.len()];
         system.workspace = Workspace::new(solver, &system.equations, matrix);
         if system.workspace.is_none() {
@@ -95,6 +102,9 @@ impl<'m> System<'m> {
                 free[6 * node as usize..6 * node as usize + 6].fill(true);
             }
         }
+        for node in model.tets.iter().flat_map(|tet| tet.nodes) {
+            free[6 * node as usize..6 * node as usize + 3].fill(true);
+        }
         for constraint in &model.constraints {
             for &node in &constraint.nodes {
                 for (c, &held) in constraint.components.iter().enumerate() {
@@ -107,6 +117,8 @@ impl<'m> System<'m> {
             equations: Equations::new(&free),
             matrix: LowerMatrix::default(),
             places: Vec::new(),
+            tet_places: Vec::new(),
+            tet_results: vec![TetResult::none(); CHUNK.min(model.tets.len())],
             workspace: None,
             internal: vec![0.0; 6 * nodes],
             external: vec![0.0; 6 * nodes],
@@ -147,8 +159,9 @@ impl<'m> System<'m> {
             let symmetric = self.matrix.mirror.is_empty();
             results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
                 let number = first + at;
-                result.broken =
-                    result.fill(model, state, number, pressure[number], factor, kind, symmetric).err();
+                let [fixed, controlled] = pressure[number];
+                let pressure = fixed + factor * controlled;
+                result.broken = result.fill(&model.facets[number], state, kind, pressure, symmetric).err();
             });
             for (number, result) in (first..last).zip(&results) {
                 if let Some(why) = result.broken {
@@ -159,6 +172,7 @@ impl<'m> System<'m> {
             }
         }
         self.results = results;
+        self.evaluate_tets(state, tangent.map(|(_, moved)| moved))?;
         for spring in &model.springs {
             let at = 6 * spring.node as usize;
             let stretch = state.position[spring.node as usize] - spring.anchor;
@@ -267,6 +281,58 @@ impl<'m> System<'m> {
         }
     }
 
+    fn evaluate_tets(&mut self, state: &State, moved: Option<&[f64]>) -> Result<(), SolveError> {
+        let model = self.model;
+        let mut results = std::mem::take(&mut self.tet_results);
+        let mut broken = None;
+        for first in (0..model.tets.len()).step_by(CHUNK) {
+            let last = (first + CHUNK).min(model.tets.len());
+            results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
+                let stiffness = moved.is_some().then_some(&mut result.tangent);
+                match model.tets[first + at].force(state, stiffness) {
+                    Ok((energy, force)) => {
+                        (result.energy, result.force, result.broken) = (energy, force, None)
+                    }
+                    Err(why) => result.broken = Some(why),
+                }
+            });
+            for (number, result) in (first..last).zip(&results) {
+                broken = broken.or(result.broken.map(|why| (number, why)));
+                self.add_tet(number, result, moved);
+            }
+            if broken.is_some() {
+                break;
+            }
+        }
+        self.tet_results = results;
+        match broken {
+            Some((number, why)) => Err(SolveError::Broken { cell: model.facets.len() + number, why }),
+            None => Ok(()),
+        }
+    }
+
+    fn add_tet(&mut self, number: usize, result: &TetResult, moved: Option<&[f64]>) {
+        let nodes = self.model.tets[number].nodes;
+        let component = |i: usize| 6 * nodes[i / 3] as usize + i % 3;
+        self.energy += result.energy;
+        for (i, force) in result.force.iter().enumerate() {
+            self.internal[component(i)] += force;
+            self.largest = self.largest.max(force.abs());
+        }
+        let Some(moved) = moved else { return };
+        self.matrix.add(&self.equations, &nodes, 3, &self.tet_places[number], result.tangent.as_slice());
+        let own = Vector12::from_fn(|i, _| moved[component(i)]);
+        if own != Vector12::zeros() {
+            let change: Vector12 = result.tangent * own;
+            for (i, &value) in change.iter().enumerate() {
+                let equation = self.equations.number[component(i)];
+                if equation != NONE {
+                    self.coupling[equation as usize] += value;
+                }
+            }
+        }
+    }
+
     /// Takes the matrix as it now is for the coming solutions; returns its negative pivots.
     pub(crate) fn prepare(&mut self) -> Result<usize, SolveError> {
         let start = Instant::now();
@@ -342,22 +408,34 @@ fn third_of_area(state: &State, nodes: [u32; 3]) -> Vector3<f64> {
     (b - a).cross(&(c - a)) / 6.0
 }
 
+#[derive(Clone)]
+struct TetResult {
+    energy: f64,
+    force: Vector12,
+    tangent: Matrix12,
+    broken: Option<Broken>,
+}
+
+impl TetResult {
+    fn none() -> Self {
+        Self { energy: 0.0, force: Vector12::zeros(), tangent: Matrix12::zeros(), broken: None }
+    }
+}
+
 impl FacetResult {
     fn none() -> Self {
         Self { energy: 0.0, force: Vector18::zeros(), tangent: Matrix18::zeros(), broken: None }
     }
 
+    /// Force, and with a kind of tangent the stiffness under a pressure; its symmetric part if only that is wanted.
     fn fill(
         &mut self,
-        model: &Model,
+        facet: &Facet,
         state: &State,
-        number: usize,
-        pressure: [f64; 2],
-        factor: f64,
         kind: Option<Tangent>,
+        pressure: f64,
         symmetric: bool,
     ) -> Result<(), Broken> {
-        let facet = &model.facets[number];
         let (x, rotation) = state.corners(facet.nodes);
         let placed = facet.place(&x, &rotation)?;
         (self.energy, self.force) = facet.force(&placed);
@@ -366,7 +444,6 @@ impl FacetResult {
             // Only the symmetric part: it is the Hessian on the group of rotations (Simo 1992, CMAME 96:189), and the rest vanishes
             // at equilibrium without moments.
             self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
-            let pressure = pressure[0] + factor * pressure[1];
             if pressure != 0.0 {
                 follow(&mut self.tangent, &x, pressure);
                 if symmetric {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
 
-use crate::element::{Formulation, Membrane, PlaneStress};
+use crate::element::{Elasticity, Formulation, Membrane};
 use crate::facet::Tangent;
 use crate::linear::{LinearSolver, Preconditioner};
 use crate::rotation::exponential;
@@ -11,7 +11,7 @@ use crate::system::System;
 use crate::testing::Random;
 use crate::*;
 
-const MATERIAL: Material = Material { elastic: PlaneStress { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+const MATERIAL: Material = Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
 
 /// Points and triangles of an octahedron of radius 1 facing outwards, each triangle cut in four some times.
 fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
@@ -140,7 +140,7 @@ fn bad_shells_are_told_with_their_element() {
     let mut soft = good.clone();
     soft.material.elastic.young = 0.0;
     assert!(refuse(&soft).contains("Young's modulus"));
-    soft.material.elastic = PlaneStress { young: 1.0, poisson: 1.0 };
+    soft.material.elastic = Elasticity { young: 1.0, poisson: 1.0 };
     assert!(refuse(&soft).contains("Poisson's ratio"));
     soft.material = Material { density: f64::NAN, ..MATERIAL };
     assert!(refuse(&soft).contains("density"));
@@ -515,4 +515,114 @@ fn a_visual_mesh_is_carried() {
     for (point, carried) in points.iter().zip(&carried) {
         assert!((surface.carried(&model, &state, carried) - turn * point).norm() < 1e-12);
     }
+}
+
+/// Six tets a cell of a grid of unit cells.
+fn bar(counts: [usize; 3], size: [f64; 3]) -> (Vec<Vector3<f64>>, Vec<[u32; 4]>) {
+    let [nx, ny, nz] = counts;
+    let number = |i: usize, j: usize, k: usize| (i + (nx + 1) * (j + (ny + 1) * k)) as u32;
+    let mut points = Vec::new();
+    for k in 0..=nz {
+        for j in 0..=ny {
+            for i in 0..=nx {
+                let part = |at: usize, of: usize, size: f64| size * at as f64 / of as f64;
+                points.push(Vector3::new(part(i, nx, size[0]), part(j, ny, size[1]), part(k, nz, size[2])));
+            }
+        }
+    }
+    let mut cells = Vec::new();
+    for cell in 0..nx * ny * nz {
+        let corner = [cell % nx, cell / nx % ny, cell / nx / ny];
+        for path in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
+            let mut at = corner;
+            let mut tet = [number(at[0], at[1], at[2]); 4];
+            for (axis, node) in path.into_iter().zip(&mut tet[1..]) {
+                at[axis] += 1;
+                *node = number(at[0], at[1], at[2]);
+            }
+            if matches!(path, [0, 2, 1] | [2, 1, 0] | [1, 0, 2]) {
+                tet.swap(1, 2);
+            }
+            cells.push(tet);
+        }
+    }
+    (points, cells)
+}
+
+/// A block pulled by a small stress lengthens by σ/E and thins by ν σ/E, exactly for linear tets; turned by a quarter with its supports it
+/// does the same.
+#[test]
+fn a_block_of_tets_is_stretched_as_by_hooke() {
+    let (points, cells) = bar([3, 2, 2], [3.0, 2.0, 2.0]);
+    let mut model = Model::new(points);
+    model.add_solid("block", &cells, MATERIAL).unwrap();
+    let on = |f: &dyn Fn(&Vector3<f64>) -> bool| {
+        (0..model.rest.len() as u32).filter(|&n| f(&model.rest[n as usize])).collect::<Vec<u32>>()
+    };
+    let (left, floor, back) = (on(&|x| x.x == 0.0), on(&|x| x.y == 0.0), on(&|x| x.z == 0.0));
+    for (axis, nodes) in [left, floor, back].into_iter().enumerate() {
+        let mut components = [false; 6];
+        components[axis] = true;
+        model.constraints.push(fix(nodes, components));
+    }
+    // Uniform traction on x = 3: a third of the area of each face triangle to its corners.
+    let stress = 10.0;
+    for tet in &cells {
+        let face: Vec<u32> = tet.iter().copied().filter(|&n| model.rest[n as usize].x == 3.0).collect();
+        if face.len() == 3 {
+            let kind = LoadKind::Force { nodes: face, force: Vector3::new(stress * 0.5 / 3.0, 0.0, 0.0) };
+            model.loads.push(Load { name: "traction".into(), kind, curve: hold(), controlled: false });
+        }
+    }
+    let mut state = State::at_rest(&model);
+    Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+    for (x, rest) in state.position.iter().zip(&model.rest) {
+        let strain = stress / 1e6;
+        let exact = Vector3::new(
+            rest.x * (1.0 + strain),
+            rest.y * (1.0 - 0.3 * strain),
+            rest.z * (1.0 - 0.3 * strain),
+        );
+        assert!((x - exact).norm() < 1e-8, "{x} {exact}");
+    }
+}
+
+/// Tets and shells share nodes: a shell on a block stiffens it; implicit motion of both comes to rest at the static equilibrium.
+#[test]
+fn shells_and_tets_move_together() {
+    let (points, cells) = bar([8, 1, 1], [8.0, 1.0, 1.0]);
+    let top: Vec<[u32; 3]> = (0..8)
+        .flat_map(|i| {
+            let node = |i: u32, j: u32| i + 9 * (j + 2);
+            [[node(i, 0), node(i + 1, 0), node(i + 1, 1)], [node(i, 0), node(i + 1, 1), node(i, 1)]]
+        })
+        .collect();
+    let build = |skin: bool| {
+        let mut model = Model::new(points.clone());
+        model.add_solid("bar", &cells, Material { density: 10.0, ..MATERIAL }).unwrap();
+        if skin {
+            model.add_shell(&Shell::new("skin", top.clone(), 0.2, MATERIAL)).unwrap();
+        }
+        let held = (0..points.len() as u32).filter(|&n| points[n as usize].x == 0.0).collect();
+        model.constraints.push(fix(held, [true; 6]));
+        let kind = LoadKind::Force { nodes: vec![8], force: Vector3::new(0.0, 0.0, -300.0) };
+        model.loads.push(Load { name: "pull".into(), kind, curve: hold(), controlled: false });
+        model
+    };
+    let sag = |model: &Model| {
+        let mut state = State::at_rest(model);
+        Statics::new(model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+        state.position[8].z
+    };
+    let mut both = build(true);
+    let (bare, skinned) = (sag(&build(false)), sag(&both));
+    println!("sag {bare:.3}, with skin {skinned:.3}");
+    assert!(skinned < 0.0 && bare < 1.05 * skinned, "{bare} {skinned}");
+    both.mass_damping = 2.0;
+    let mut state = State::at_rest(&both);
+    let mut solver = BackwardEuler::new(&both, DynamicSettings::new(0.5)).unwrap();
+    for _ in 0..100 {
+        solver.advance(&mut state).unwrap();
+    }
+    assert!((state.position[8].z - skinned).abs() < 1e-4, "{}", state.position[8].z);
 }

@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::{Corners, Differences, Matrix9, PlaneStress, area, gradients};
+use super::{Corners, Differences, Elasticity, Matrix9, area, gradients};
 
 /// α_b: how much of the edges' normal displacement comes from drilling.
 const DRILLING_TO_EDGE: f64 = 1.5;
@@ -37,14 +37,14 @@ fn hierarchical(d: &Differences) -> SMatrix<f64, 3, 9> {
 }
 
 /// The basic part of the ANDES triangle: constant strain with the drilling of the edges, K = L D Lᵀ/(t A).
-pub(crate) fn andes_basic(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+pub(crate) fn andes_basic(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
     let d = Differences::new(corners);
     let l = lumping(&d, thickness);
     l * elastic.matrix() * l.transpose() / (thickness * 0.5 * d.double_area())
 }
 
 /// The ANDES triangle with β₀ = max((1 − 4ν²)/2, 0.01) min(1, κ t²/A).
-pub fn andes_opt(corners: &Corners, elastic: &PlaneStress, thickness: f64, adaptation: f64) -> Matrix9 {
+pub fn andes_opt(corners: &Corners, elastic: &Elasticity, thickness: f64, adaptation: f64) -> Matrix9 {
     let d = Differences::new(corners);
     let area = 0.5 * d.double_area();
     let optimal = (0.5 * (1.0 - 4.0 * elastic.poisson * elastic.poisson)).max(0.01);
@@ -89,7 +89,7 @@ pub(crate) fn strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
 }
 
 /// The constant-strain triangle; `drilling` G t A/3 holds each node's rotation to that of the triangle.
-pub fn constant_strain(corners: &Corners, elastic: &PlaneStress, thickness: f64, drilling: f64) -> Matrix9 {
+pub fn constant_strain(corners: &Corners, elastic: &Elasticity, thickness: f64, drilling: f64) -> Matrix9 {
     let volume = thickness * area(corners);
     let b = strain(corners);
     let t = hierarchical(&Differences::new(corners));

@@ -71,7 +71,7 @@ pub struct Formulation {
 
 impl Formulation {
     /// Stiffness against (u, v, θz).
-    pub fn membrane_stiffness(&self, corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+    pub fn membrane_stiffness(&self, corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
         match self.membrane {
             Membrane::Opt { adaptation } => andes_opt(corners, elastic, thickness, adaptation),
             Membrane::Cst { drilling } => constant_strain(corners, elastic, thickness, drilling),
@@ -80,7 +80,7 @@ impl Formulation {
     }
 
     /// Stiffness against (w, θx, θy).
-    pub fn bending_stiffness(&self, corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+    pub fn bending_stiffness(&self, corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
         match self.bending {
             Bending::Dkt => discrete_kirchhoff(corners, elastic, thickness),
             Bending::Comas2010 => comas_2010(corners, elastic, thickness),
@@ -89,17 +89,17 @@ impl Formulation {
     }
 }
 
-/// Linear elasticity in plane stress.
+/// Isotropic linear elasticity.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlaneStress {
+pub struct Elasticity {
     /// Young's modulus [Pa].
     pub young: f64,
     /// Poisson's ratio.
     pub poisson: f64,
 }
 
-impl PlaneStress {
-    /// Stress (σxx, σyy, σxy) over strain (εxx, εyy, γxy) [Pa].
+impl Elasticity {
+    /// Plane stress: (σxx, σyy, σxy) over (εxx, εyy, γxy) [Pa].
     pub fn matrix(&self) -> Matrix3<f64> {
         let nu = self.poisson;
         Matrix3::new(1.0, nu, 0.0, nu, 1.0, 0.0, 0.0, 0.0, 0.5 * (1.0 - nu)) * (self.young / (1.0 - nu * nu))

@@ -3,20 +3,20 @@ use nalgebra::{DMatrix, DVector, SVector, SymmetricEigen};
 use super::*;
 use crate::testing::Random;
 
-const ELASTIC: PlaneStress = PlaneStress { young: 1e6, poisson: 0.25 };
+const ELASTIC: Elasticity = Elasticity { young: 1e6, poisson: 0.25 };
 const THICKNESS: f64 = 0.03;
 
-type Stiffness = fn(&Corners, &PlaneStress, f64) -> Matrix9;
+type Stiffness = fn(&Corners, &Elasticity, f64) -> Matrix9;
 
-fn opta(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+fn opta(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
     andes_opt(corners, elastic, thickness, 10.0)
 }
 
-fn opt(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+fn opt(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
     andes_opt(corners, elastic, thickness, f64::INFINITY)
 }
 
-fn cst(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+fn cst(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
     constant_strain(corners, elastic, thickness, 1e-3)
 }
 
