@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use pliant_corotational::element::Elasticity;
 use pliant_corotational::{
     BackwardEuler, Constraint, DynamicSettings, LinearSolver, Load, LoadKind, Material, Model, Motion,
-    Preconditioner, Shell, State,
+    Preconditioner, Shell, Spread, State,
 };
 use pliant_mechanics::curve::{Curve, Shape};
 
@@ -39,7 +39,11 @@ fn tube(shells: usize) -> Model {
         components: [true; 6],
         motion: Motion::Fixed,
     });
-    let kind = LoadKind::Pressure { cells: (0..model.facets.len() as u32).collect(), pressure: 1000.0 };
+    let kind = LoadKind::Pressure {
+        cells: (0..model.facets.len() as u32).collect(),
+        pressure: 1000.0,
+        spread: Spread::Lumped,
+    };
     let pulse = (0..40).map(|i| (0.25 * f64::from(i), f64::from(i % 2))).collect();
     let curve = Curve { shape: Shape::Table(pulse), from: 0.0, to: 1.0 };
     model.loads.push(Load { name: "pressure".into(), kind, curve, controlled: false });

@@ -55,7 +55,7 @@ pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit};
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
 pub use linear::{LinearReport, LinearSolver, Preconditioner};
-pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spring};
+pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spread, Spring};
 pub use state::State;
 pub use statics::{Control, StaticSettings, Statics, Step};
 pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Picture, Place};

@@ -162,13 +162,25 @@ pub enum LoadKind {
         /// Force per length [N/m].
         traction: Vector3<f64>,
     },
-    /// Pressure along the current normal of facets, a third of p A n to each corner.
+    /// Pressure along the current normal.
     Pressure {
         /// Facets.
         cells: Vec<u32>,
         /// Pressure [Pa], positive along the normal.
         pressure: f64,
+        /// How it comes to the nodes.
+        spread: Spread,
     },
+}
+
+/// How a pressure on a shell comes to its nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Spread {
+    /// A third of p A n of the flat facet to each corner.
+    #[default]
+    Lumped,
+    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments. Stiffness comes from the flat facets.
+    Curved,
 }
 
 /// Components of nodes that are held or moved.

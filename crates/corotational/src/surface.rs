@@ -354,6 +354,23 @@ impl Patch {
         (g * by_e + slope * t * c_e, g * by_n + slope * t * c_n)
     }
 
+    /// Nodal forces [m²] and moments [m³] of a pressure of 1: ∫ Jᵀ n dA, with the rule of six points of Dunavant (1985), exact to the
+    /// fourth degree.
+    pub fn pressure_forces(&self) -> Vector18 {
+        const POINTS: [(f64, f64); 2] =
+            [(0.445_948_490_915_965, 0.223_381_589_678_011), (0.091_576_213_509_771, 0.109_951_743_655_322)];
+        let mut sum = Vector18::zeros();
+        for (a, weight) in POINTS {
+            for corner in 0..3 {
+                let mut at = [a; 3];
+                at[corner] = 1.0 - 2.0 * a;
+                let [along, across] = self.tangents(at);
+                sum += self.nodal_forces(at, &(0.5 * weight * along.cross(&across)));
+            }
+        }
+        sum
+    }
+
     /// Nodal forces and moments of a force on a point: Jᵀ f.
     pub fn nodal_forces(&self, weights: [f64; 3], force: &Vector3<f64>) -> Vector18 {
         self.jacobian(weights).tr_mul(force)

@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use crate::error::SolveError;
 use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
-use crate::model::{LoadKind, Model, Motion};
+use crate::model::{LoadKind, Model, Motion, Spread};
 use crate::rotation::skew;
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
+use crate::surface::{CurvedSurface, EdgeRule};
 use crate::tet::{Matrix12, Vector12};
 
 /// Cells computed side by side before they are added up.
@@ -52,6 +53,8 @@ pub(crate) struct System<'m> {
     pub(crate) coupling: Vec<f64>,
     /// Pressures on facets [Pa]: fixed, controlled.
     pressure: Vec<[f64; 2]>,
+    /// The curved surface, if a pressure acts on it.
+    surface: Option<CurvedSurface>,
     /// Strain energy [J].
     pub(crate) energy: f64,
     /// Largest force on a node of a cell [N].
@@ -125,6 +128,11 @@ impl<'m> System<'m> {
             controlled: vec![0.0; 6 * nodes],
             coupling: Vec::new(),
             pressure: vec![[0.0; 2]; model.facets.len()],
+            surface: model
+                .loads
+                .iter()
+                .any(|load| matches!(load.kind, LoadKind::Pressure { spread: Spread::Curved, .. }))
+                .then(|| CurvedSurface::new(model, EdgeRule::Arc)),
             energy: 0.0,
             largest: 0.0,
             results: vec![FacetResult::none(); CHUNK.min(model.facets.len())],
@@ -141,7 +149,7 @@ impl<'m> System<'m> {
         tangent: Option<(Tangent, &[f64])>,
     ) -> Result<(), SolveError> {
         let start = Instant::now();
-        self.nodal_loads(time);
+        self.nodal_loads(state, time);
         self.internal.fill(0.0);
         self.energy = 0.0;
         self.largest = 0.0;
@@ -209,8 +217,8 @@ impl<'m> System<'m> {
         }
     }
 
-    /// Loads that do not depend on the cells' places, and the pressures of those that do.
-    fn nodal_loads(&mut self, time: f64) {
+    /// Loads on nodes, and pressures on facets; those on the curved surface by what they differ from these.
+    fn nodal_loads(&mut self, state: &State, time: f64) {
         let model = self.model;
         self.external.fill(0.0);
         self.controlled.fill(0.0);
@@ -242,9 +250,17 @@ impl<'m> System<'m> {
                         ends.iter().for_each(|&node| add(node, 0, traction * (0.5 * (b - a).norm())));
                     }
                 }
-                LoadKind::Pressure { cells, pressure } => {
+                LoadKind::Pressure { cells, pressure, spread } => {
                     for &cell in cells {
                         self.pressure[cell as usize][usize::from(load.controlled)] += factor * pressure;
+                        if let (Spread::Curved, Some(surface)) = (spread, &self.surface) {
+                            let force = surface.patch(model, state, cell).pressure_forces()
+                                - flat_forces(state, model.facets[cell as usize].nodes);
+                            for (i, &node) in model.facets[cell as usize].nodes.iter().enumerate() {
+                                add(node, 0, force.fixed_rows::<3>(6 * i) * *pressure);
+                                add(node, 3, force.fixed_rows::<3>(6 * i + 3) * *pressure);
+                            }
+                        }
                     }
                 }
             }
@@ -400,6 +416,12 @@ fn linear_error(error: LinearError) -> SolveError {
             SolveError::Stalled { iterations, residual }
         }
     }
+}
+
+/// A third of the area times the normal on each corner, as six numbers a node [m²].
+fn flat_forces(state: &State, nodes: [u32; 3]) -> Vector18 {
+    let third = third_of_area(state, nodes);
+    Vector18::from_fn(|i, _| if i % 6 < 3 { third[i % 6] } else { 0.0 })
 }
 
 /// A third of the area times the normal, now [m²].

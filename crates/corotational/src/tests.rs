@@ -83,7 +83,7 @@ fn balloon(cuts: usize, pressure: f64) -> Model {
     model.constraints.push(fix(vec![1], [false, true, true, false, false, false]));
     model.constraints.push(fix(vec![2], [false, false, true, false, false, false]));
     let cells = (0..model.facets.len() as u32).collect();
-    let kind = LoadKind::Pressure { cells, pressure };
+    let kind = LoadKind::Pressure { cells, pressure, spread: Spread::Lumped };
     model.loads.push(Load { name: "pressure".into(), kind, curve: hold(), controlled: true });
     model
 }
@@ -625,4 +625,27 @@ fn shells_and_tets_move_together() {
         solver.advance(&mut state).unwrap();
     }
     assert!((state.position[8].z - skinned).abs() < 1e-4, "{}", state.position[8].z);
+}
+
+/// Pressure on the curved surface of a ball: no resultant, and p times the area of a circle on each half; the flat facets have less.
+#[test]
+fn pressure_on_the_curved_surface_acts_on_its_area() {
+    let mut model = balloon(2, 1.0);
+    model.normals.iter_mut().for_each(|normal| normal.direction = model.rest[normal.node as usize]);
+    let half = |model: &Model, spread| {
+        let mut model = model.clone();
+        let upper = (0..128).filter(|&cell: &u32| {
+            model.facets[cell as usize].nodes.iter().map(|&n| model.rest[n as usize].z).sum::<f64>() > 0.0
+        });
+        let cells = upper.collect();
+        model.loads[0].kind = LoadKind::Pressure { cells, pressure: 1.0, spread };
+        let mut system = System::new(&model, LinearSolver::Direct).unwrap();
+        system.evaluate(&State::at_rest(&model), 0.0, None).unwrap();
+        (0..3).map(|c| system.controlled.iter().skip(c).step_by(6).sum()).collect::<Vec<f64>>()
+    };
+    let (flat, curved) = (half(&model, Spread::Lumped), half(&model, Spread::Curved));
+    assert!(curved[0].abs() < 1e-12 && curved[1].abs() < 1e-12, "{curved:?}");
+    let circle = std::f64::consts::PI;
+    println!("half a ball under pressure: flat {:.4}, curved {:.4}, circle {circle:.4}", flat[2], curved[2]);
+    assert!((curved[2] / circle - 1.0).abs() < 2e-3 && flat[2] < 0.99 * circle, "{flat:?} {curved:?}");
 }
