@@ -289,12 +289,12 @@ impl<'m> Explicit<'m> {
     /// If the step is longer than is stable, or damping is proportional to stiffness.
     pub fn new(model: &'m Model, step: f64) -> Result<Self, SolveError> {
         if !(step > 0.0 && step <= Self::stable_step(model)) {
-            return Err(SolveError::Control(
+            return Err(SolveError::Impossible(
                 "the step is longer than the stable one (`Explicit::stable_step`); shorten it or use the implicit solver",
             ));
         }
         if model.stiffness_damping > 0.0 {
-            return Err(SolveError::Control(
+            return Err(SolveError::Impossible(
                 "damping by stiffness needs the implicit solver; damp by mass instead",
             ));
         }
@@ -441,7 +441,7 @@ mod tests {
         let model = clamped();
         let stable = Explicit::stable_step(&model);
         assert!(Explicit::new(&model, stable).is_ok());
-        assert!(matches!(Explicit::new(&model, 1.01 * stable), Err(SolveError::Control(_))));
+        assert!(matches!(Explicit::new(&model, 1.01 * stable), Err(SolveError::Impossible(_))));
     }
 
     /// Energy of explicit steps oscillates within 1 % in free vibration at large rotation.

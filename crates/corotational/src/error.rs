@@ -78,14 +78,22 @@ pub enum ModelError {
         edge: [u32; 2],
     },
     /// A surface that encloses nothing.
-    #[error(
-        "a balloon must be closed, but its surface has {} edges of one triangle; the first joins nodes {} and {}",
-        edges.len(), edges[0][0], edges[0][1]
-    )]
+    #[error("a balloon must be closed, but its surface has {} open borders: {}", loops.len(), borders(loops))]
     Open {
-        /// Edges of one triangle, as nodes; loops follow from them.
-        edges: Vec<[u32; 2]>,
+        /// Nodes along each border.
+        loops: Vec<Vec<u32>>,
     },
+}
+
+/// The first borders with their first nodes.
+fn borders(loops: &[Vec<u32>]) -> String {
+    let border = |nodes: &Vec<u32>| {
+        let first: Vec<String> = nodes.iter().take(5).map(u32::to_string).collect();
+        let more = if nodes.len() > 5 { ", …" } else { "" };
+        format!("{} nodes ({}{more})", nodes.len(), first.join(", "))
+    };
+    let told: Vec<String> = loops.iter().take(3).map(border).collect();
+    told.join("; ") + if loops.len() > 3 { "; …" } else { "" }
 }
 
 /// Why a solver stopped. The state holds all that was found before.
@@ -155,9 +163,12 @@ pub enum SolveError {
         /// Norm of the residual at each iteration of the last attempt [N].
         residuals: Vec<f64>,
     },
-    /// Control without a load to control, or of something that is held.
+    /// A balloon that is not closed.
+    #[error(transparent)]
+    Open(#[from] ModelError),
+    /// What was asked for cannot be done; the text says why and what to do instead.
     #[error("{0}")]
-    Control(&'static str),
+    Impossible(&'static str),
 }
 
 fn broken(why: Broken) -> String {

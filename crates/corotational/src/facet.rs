@@ -91,7 +91,7 @@ impl Resultants {
 pub enum Tangent {
     /// The derivative of the force.
     Full,
-    /// Its symmetric approximation for small strains, T sym(Pᵀ K P − Fnm G − Gᵀ Fnᵀ P) Tᵀ: half the work.
+    /// Its symmetric approximation for small strains, T sym(Pᵀ K P − Fnm G − Gᵀ Fnᵀ P) Tᵀ: less work.
     Symmetric,
 }
 

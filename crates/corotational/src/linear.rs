@@ -18,10 +18,10 @@ use crate::sparse::{Equations, LowerMatrix, NONE};
 /// How linear equations are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum LinearSolver {
-    /// Factors of the matrix: robust, and fastest up to some ten thousand shells.
+    /// Factors of the matrix: robust, and they tell unstable equilibria.
     #[default]
     Direct,
-    /// Factors L U with the unsymmetric stiffness of loads: several times the work. Newton's method keeps its quadratic
+    /// Factors L U with the unsymmetric stiffness of loads: more work, and no sign of instability. Newton's method keeps its quadratic
     /// convergence under moments about fixed axes and pressures on open surfaces.
     Unsymmetric,
     /// Conjugate gradients: for positive definite matrices only.

@@ -340,15 +340,34 @@ impl Model {
         cells.iter().map(tet).sum()
     }
 
+    /// Whether facets close.
+    ///
     /// # Errors
-    /// If facets do not close: their edges of one triangle.
+    /// If not: the borders that they leave open.
     pub fn check_closed(&self, cells: &[u32]) -> Result<(), ModelError> {
         let nodes: Vec<[u32; 3]> = cells.iter().map(|&cell| self.facets[cell as usize].nodes).collect();
-        let open: Vec<[u32; 2]> = edges(&nodes)
-            .into_iter()
-            .filter_map(|(edge, sides)| (sides.len() == 1).then_some(edge))
-            .collect();
-        if open.is_empty() { Ok(()) } else { Err(ModelError::Open { edges: open }) }
+        let open = edges(&nodes).into_iter().filter(|(_, sides)| sides.len() == 1);
+        // From the start of each open edge to its end, as its triangle runs.
+        let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for ([low, high], sides) in open {
+            let [from, to] = if sides[0].1 { [low, high] } else { [high, low] };
+            next.entry(from).or_default().push(to);
+        }
+        let mut loops = Vec::new();
+        while let Some((&start, _)) = next.iter().next() {
+            let mut border = Vec::new();
+            let mut at = start;
+            while let Some(ends) = next.get_mut(&at) {
+                border.push(at);
+                let to = ends.pop();
+                if ends.is_empty() {
+                    next.remove(&at);
+                }
+                at = to.unwrap_or(start);
+            }
+            loops.push(border);
+        }
+        if loops.is_empty() { Ok(()) } else { Err(ModelError::Open { loops }) }
     }
 
     /// What round-off leaves of the norm of a residual [N], 8 ε E t |x| √n: displacements are differences of positions, known to ε |x|.

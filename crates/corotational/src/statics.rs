@@ -203,10 +203,17 @@ impl<'m> Statics<'m> {
     /// The next equilibrium under a control, which finds the factor of the controlled loads, at the state's time.
     ///
     /// # Errors
-    /// If no load is controlled, the controlled component is held, or no equilibrium is found (the state then is as it was).
+    /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is found (the state then is as it was).
     pub fn control(&mut self, state: &mut State, control: Control) -> Result<Step, SolveError> {
         if !self.system.model.loads.iter().any(|load| load.controlled) {
-            return Err(SolveError::Control("no load is marked as controlled"));
+            return Err(SolveError::Impossible("no load is marked as controlled"));
+        }
+        if matches!(control, Control::Volume { .. }) {
+            for load in self.system.model.loads.iter().filter(|load| load.controlled) {
+                if let LoadKind::Pressure { cells, .. } = &load.kind {
+                    self.system.model.check_closed(cells)?;
+                }
+            }
         }
         let before = state.clone();
         let result = self.newton(state, before.time, Some(control));
@@ -223,13 +230,15 @@ impl<'m> Statics<'m> {
     }
 
     fn newton(&mut self, state: &mut State, time: f64, control: Option<Control>) -> Result<Step, Attempt> {
-        let fatal = |error| Attempt { error, retry: true };
+        let failed = |error| Attempt { error, retry: true };
         let start = state.clone();
         self.system.prescribed(state.time, time, &mut self.pending);
         let mut residuals: Vec<f64> = Vec::new();
         let mut negative_pivots = 0;
         for iteration in 0..=self.settings.iterations {
-            self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending))).map_err(fatal)?;
+            self.system
+                .evaluate(state, time, Some((self.settings.tangent, &self.pending)))
+                .map_err(failed)?;
             let (norm, allowed) = self.find_residual(state);
             residuals.push(norm);
             let gap = control.map_or(0.0, |control| self.constraint(control, state, &start));
@@ -242,8 +251,8 @@ impl<'m> Statics<'m> {
             if !norm.is_finite() || iteration == self.settings.iterations {
                 break;
             }
-            negative_pivots = self.system.prepare().map_err(fatal)?;
-            self.system.solve(&self.residual, &mut self.solution).map_err(fatal)?;
+            negative_pivots = self.system.prepare().map_err(failed)?;
+            self.system.solve(&self.residual, &mut self.solution).map_err(failed)?;
             let factor = match control {
                 Some(control) => self.controlled_factor(control, gap, iteration == 0)?,
                 None => 0.0,
@@ -400,7 +409,7 @@ impl<'m> Statics<'m> {
             }
         };
         if !factor.is_finite() {
-            return Err(fatal(SolveError::Control(
+            return Err(fatal(SolveError::Impossible(
                 "the controlled loads do not move what is controlled; control a node that they move and that is not held",
             )));
         }

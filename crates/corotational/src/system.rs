@@ -89,7 +89,7 @@ impl<'m> System<'m> {
         system.coupling = vec![0.0; system.equations.len()];
         system.workspace = Workspace::new(solver, &system.equations, matrix);
         if system.workspace.is_none() {
-            return Err(SolveError::Control(
+            return Err(SolveError::Impossible(
                 "the equations are too many for the direct solver; use conjugate gradients",
             ));
         }
@@ -410,7 +410,7 @@ impl<'m> System<'m> {
 
 fn linear_error(error: LinearError) -> SolveError {
     match error {
-        LinearError::NotFinite => SolveError::Control("the stiffness is not finite; use smaller steps"),
+        LinearError::NotFinite => SolveError::Impossible("the stiffness is not finite; use smaller steps"),
         LinearError::Indefinite(iterations) => SolveError::Indefinite { iterations },
         LinearError::Stalled(LinearReport { iterations, residual }) => {
             SolveError::Stalled { iterations, residual }

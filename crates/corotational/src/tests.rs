@@ -102,8 +102,8 @@ fn triangles_are_turned_to_one_side_and_counted() {
     let volume = model.enclosed_volume(&all, &model.rest);
     assert!((3.7..4.19).contains(&volume), "{volume}");
     assert!(model.check_closed(&all).is_ok());
-    let Err(ModelError::Open { edges }) = model.check_closed(&all[1..]) else { panic!("closed") };
-    assert_eq!(edges.len(), 3);
+    let Err(ModelError::Open { loops }) = model.check_closed(&all[1..127]) else { panic!("closed") };
+    assert_eq!(loops.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
 }
 
 /// Normals of a smooth ball point outwards to 3°; a cube's corner has three.
@@ -396,7 +396,7 @@ fn arc_length_and_displacement_control_agree() {
     );
     let error =
         solver.control(&mut other, Control::Displacement { node: 0, component: 2, by: 1.0 }).unwrap_err();
-    assert!(matches!(error, SolveError::Control(_)), "{error}");
+    assert!(matches!(error, SolveError::Impossible(_)), "{error}");
 }
 
 /// A load step that fails leaves the last equilibrium on the way, and tells its residuals.
@@ -648,4 +648,36 @@ fn pressure_on_the_curved_surface_acts_on_its_area() {
     let circle = std::f64::consts::PI;
     println!("half a ball under pressure: flat {:.4}, curved {:.4}, circle {circle:.4}", flat[2], curved[2]);
     assert!((curved[2] / circle - 1.0).abs() < 2e-3 && flat[2] < 0.99 * circle, "{flat:?} {curved:?}");
+}
+
+/// Conjugate gradients say why they stop: too few iterations, or a body that buckles.
+#[test]
+fn conjugate_gradients_tell_why_they_stop() {
+    let model = cantilever();
+    let solve = |iterations, squeeze: f64| {
+        let linear = LinearSolver::ConjugateGradients {
+            tolerance: 1e-10,
+            iterations,
+            preconditioner: Preconditioner::BlockJacobi,
+        };
+        let mut state = State::at_rest(&model);
+        state.position.iter_mut().for_each(|x| x.x *= squeeze);
+        let settings = StaticSettings { linear, ..StaticSettings::default() };
+        Statics::new(&model, settings).unwrap().linear(&state, 1.0).map(|_| ())
+    };
+    assert_eq!(solve(5000, 1.0), Ok(()));
+    assert!(matches!(solve(3, 1.0), Err(SolveError::Stalled { iterations: 3, .. })));
+    assert!(matches!(solve(5000, 0.9), Err(SolveError::Indefinite { .. })));
+}
+
+/// A balloon with a hole is refused with its border.
+#[test]
+fn a_balloon_must_be_closed() {
+    let mut model = balloon(2, 1.0);
+    let cells = (1..128).collect();
+    model.loads[0].kind = LoadKind::Pressure { cells, pressure: 1.0, spread: Spread::Lumped };
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut state = State::at_rest(&model);
+    let error = solver.control(&mut state, Control::Volume { volume: 5.0 }).unwrap_err();
+    assert!(error.to_string().contains("1 open borders: 3 nodes"), "{error}");
 }
