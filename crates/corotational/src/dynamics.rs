@@ -38,15 +38,15 @@ impl DynamicSettings {
             iterations: 20,
             tolerance: 1e-6,
             halvings: 6,
-            tangent: Tangent::Symmetric,
+            tangent: Tangent::Full,
             linear: LinearSolver::Direct,
         }
     }
 
-    /// One linear solution a step.
+    /// One linear solution a step, with the tangent that costs less. (Iterated, that one converges linearly under large moments.)
     #[must_use]
     pub fn real_time(self, linear: LinearSolver) -> Self {
-        Self { iterations: 1, linear, ..self }
+        Self { iterations: 1, tangent: Tangent::Symmetric, linear, ..self }
     }
 }
 
@@ -360,10 +360,10 @@ mod tests {
     use pliant_mechanics::curve::{Curve, Shape};
 
     const LENGTH: f64 = 1.0;
-    const THICKNESS: f64 = 0.01;
+    const THIN: f64 = 0.01;
 
-    /// A strip of 16 × 2 cells, 1 × 0.1 m, 10 mm thick; E = 1 MPa, ν = 0.
-    fn strip() -> Model {
+    /// A strip of 16 × 2 cells, 1 × 0.1 m; E = 1 MPa, ν = 0.
+    fn strip(thickness: f64) -> Model {
         let points = (0..51_u32)
             .map(|i| Vector3::new(f64::from(i % 17) / 16.0 * LENGTH, f64::from(i / 17) * 0.05, 0.0))
             .collect();
@@ -374,12 +374,12 @@ mod tests {
         let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.0 }, density: 1000.0 };
         let mut model = Model::new(points);
         let cells = (0..32).flat_map(cell).collect();
-        model.add_shell(&Shell::new("strip", cells, THICKNESS, material)).unwrap();
+        model.add_shell(&Shell::new("strip", cells, thickness, material)).unwrap();
         model
     }
 
-    fn clamped() -> Model {
-        let mut model = strip();
+    fn clamped(thickness: f64) -> Model {
+        let mut model = strip(thickness);
         let nodes = vec![0, 17, 34];
         model.constraints.push(Constraint {
             name: "clamp".into(),
@@ -397,8 +397,8 @@ mod tests {
     }
 
     /// First bending frequency of a cantilever, 1.8751² √(E I/(ρ A L⁴)) [rad/s].
-    fn first_frequency() -> f64 {
-        1.8751_f64.powi(2) * (1e6 * THICKNESS * THICKNESS / (12.0 * 1000.0)).sqrt() / LENGTH.powi(2)
+    fn first_frequency(thickness: f64) -> f64 {
+        1.8751_f64.powi(2) * (1e6 * thickness * thickness / (12.0 * 1000.0)).sqrt() / LENGTH.powi(2)
     }
 
     /// Period of the tip after a small push, from its zero crossings.
@@ -423,8 +423,8 @@ mod tests {
     /// Euler's cantilever to 1 %: explicit, and implicit with 400 steps a period.
     #[test]
     fn a_cantilever_vibrates_at_its_first_frequency() {
-        let model = clamped();
-        let exact = TAU / first_frequency();
+        let model = clamped(0.03);
+        let exact = TAU / first_frequency(0.03);
         let step = 0.9 * Explicit::stable_step(&model);
         let mut explicit = Explicit::new(&model, step).unwrap();
         let found = period(|state| explicit.advance(state).unwrap(), &model, step);
@@ -438,7 +438,7 @@ mod tests {
 
     #[test]
     fn explicit_steps_that_are_too_long_are_refused() {
-        let model = clamped();
+        let model = clamped(THIN);
         let stable = Explicit::stable_step(&model);
         assert!(Explicit::new(&model, stable).is_ok());
         assert!(matches!(Explicit::new(&model, 1.01 * stable), Err(SolveError::Impossible(_))));
@@ -447,7 +447,7 @@ mod tests {
     /// Energy of explicit steps oscillates within 1 % in free vibration at large rotation.
     #[test]
     fn explicit_motion_keeps_its_energy() {
-        let model = clamped();
+        let model = clamped(THIN);
         let mut state = State::at_rest(&model);
         for (v, x) in state.velocity.iter_mut().zip(&model.rest) {
             v.z = 1.5 * x.x * x.x;
@@ -477,7 +477,7 @@ mod tests {
     /// A free strip keeps its momentum and its moment of momentum in implicit steps, to the tolerance of the solution.
     #[test]
     fn a_free_body_keeps_its_momentum() {
-        let model = strip();
+        let model = strip(THIN);
         let mut state = State::at_rest(&model);
         for (v, x) in state.velocity.iter_mut().zip(&model.rest) {
             *v = Vector3::new(0.1, 0.2 * x.x, 0.5 * x.x * x.x);
@@ -504,17 +504,17 @@ mod tests {
     /// Damped, a sagging strip comes to rest where the static solver puts it; all linear solvers go the same way.
     #[test]
     fn damped_motion_ends_in_the_static_equilibrium() {
-        let mut model = clamped();
+        let mut model = clamped(THIN);
         weigh(&mut model, 0.5);
         let mut rest = State::at_rest(&model);
         Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut rest, 1.0).unwrap();
         assert!(rest.position[16].z < -0.2, "{}", rest.position[16]);
         // About critical.
-        model.mass_damping = 2.0 * first_frequency();
+        model.mass_damping = 2.0 * first_frequency(THIN);
         model.stiffness_damping = 0.01;
         let iterative = |preconditioner| LinearSolver::ConjugateGradients {
-            tolerance: 1e-10,
-            iterations: 2000,
+            tolerance: 1e-8,
+            iterations: 5000,
             preconditioner,
         };
         for linear in [
@@ -536,7 +536,7 @@ mod tests {
     /// One linear solution a step follows the converged motion to 2 % of the sag in small steps.
     #[test]
     fn real_time_steps_follow_the_converged_motion() {
-        let mut model = clamped();
+        let mut model = clamped(THIN);
         weigh(&mut model, 0.5);
         model.mass_damping = 1.0;
         let run = |settings: DynamicSettings| {
