@@ -5,6 +5,7 @@
 mod random;
 mod reference;
 mod run;
+pub mod shells;
 
 pub use pliant_reproduce::cases::brain_shift;
 pub use pliant_reproduce::{

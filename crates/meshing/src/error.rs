@@ -27,6 +27,12 @@ pub enum MeshingError {
         /// `x`, `y` or `z`.
         axis: char,
     },
+    /// Points moved so far that cells turn over.
+    #[error("points are moved by up to {amount} of a cell; below 0.5 cells stay sound")]
+    Distortion {
+        /// Largest shift as a part of a cell.
+        amount: f64,
+    },
     /// A tube without a wall.
     #[error("the inner radius {inner} m must be below the outer radius {outer} m")]
     NoWall {

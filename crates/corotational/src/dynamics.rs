@@ -1,0 +1,554 @@
+//! Motion in time: backward Euler, whose step is the minimum of elastic energy, loads and Σ m |u − h v|²/(2h²) (the same for rotation
+//! vectors of the step with the rotary inertia), and explicit central differences. Rayleigh damping: α M + β K, with K of the start of
+//! the step.
+//! Leaves out: gyroscopic moments (the lumped inertia of a node is the same about every axis) and step control by accuracy.
+
+use nalgebra::Vector3;
+
+use crate::error::SolveError;
+use crate::facet::Tangent;
+use crate::linear::{LinearReport, LinearSolver};
+use crate::model::Model;
+use crate::rotation::{exponential, logarithm, spin_to_vector};
+use crate::state::State;
+use crate::system::{Phases, System};
+
+/// How a step of backward Euler is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DynamicSettings {
+    /// Length of a step [s].
+    pub step: f64,
+    /// Iterations of Newton's method at the most. With 1 each step is one linear solution and nothing is checked: for real time.
+    pub iterations: usize,
+    /// Residual allowed, as a part of loads, internal or inertial forces, whichever are larger.
+    pub tolerance: f64,
+    /// How often a step that fails is halved.
+    pub halvings: usize,
+    /// Which stiffness.
+    pub tangent: Tangent,
+    /// Solver of the linear equations.
+    pub linear: LinearSolver,
+}
+
+impl DynamicSettings {
+    /// Steps of a length [s], solved to 1e-6 with factors.
+    pub fn new(step: f64) -> Self {
+        Self {
+            step,
+            iterations: 20,
+            tolerance: 1e-6,
+            halvings: 6,
+            tangent: Tangent::Full,
+            linear: LinearSolver::Direct,
+        }
+    }
+
+    /// One linear solution a step, with the tangent that costs less. (Iterated, that one converges linearly under large moments.)
+    #[must_use]
+    pub fn real_time(self, linear: LinearSolver) -> Self {
+        Self { iterations: 1, tangent: Tangent::Symmetric, linear, ..self }
+    }
+}
+
+/// A step that was made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DynamicStep {
+    /// Residual over the largest of loads, internal and inertial forces, before each iteration and, but for a single one, at the end.
+    pub residuals: Vec<f64>,
+    /// What the last linear solution took.
+    pub linear: LinearReport,
+    /// Steps that it took: 1, or more where it was halved.
+    pub parts: usize,
+}
+
+/// The implicit solver.
+pub struct BackwardEuler<'m> {
+    system: System<'m>,
+    settings: DynamicSettings,
+    length: f64,
+    round_off: f64,
+    pending: Vec<f64>,
+    /// Translations and rotation vectors since the start of the step, six a node.
+    moved: Vec<f64>,
+    increment: Vec<f64>,
+    residual: Vec<f64>,
+    solution: Vec<f64>,
+    /// Stiffness at the start of the step, for damping, and its product with the motion.
+    damper: Vec<f64>,
+    product: Vec<f64>,
+    start: State,
+}
+
+impl<'m> BackwardEuler<'m> {
+    /// A solver for a model.
+    ///
+    /// # Errors
+    /// If the equations are too many for the solver chosen.
+    pub fn new(model: &'m Model, settings: DynamicSettings) -> Result<Self, SolveError> {
+        let system = System::new(model, settings.linear)?;
+        let (all, free) = (6 * model.rest.len(), system.equations.len());
+        let damper = if model.stiffness_damping > 0.0 { system.matrix.value.len() } else { 0 };
+        Ok(Self {
+            settings,
+            length: model.mean_edge(),
+            round_off: model.round_off(),
+            pending: vec![0.0; all],
+            moved: vec![0.0; all],
+            increment: vec![0.0; all],
+            residual: vec![0.0; free],
+            solution: vec![0.0; free],
+            damper: vec![0.0; damper],
+            product: vec![0.0; free],
+            start: State::at_rest(model),
+            system,
+        })
+    }
+
+    /// Time spent in the parts of the solver so far.
+    pub fn phases(&self) -> Phases {
+        self.system.phases
+    }
+
+    /// Makes one step.
+    ///
+    /// # Errors
+    /// If it fails as often as it may be halved; the state then is at the last part of it that was made.
+    pub fn advance(&mut self, state: &mut State) -> Result<DynamicStep, SolveError> {
+        let until = state.time + self.settings.step;
+        let mut size = self.settings.step;
+        let (mut parts, mut halvings) = (0, 0);
+        loop {
+            let rest = until - state.time;
+            let last = size >= rest * (1.0 - 1e-9);
+            self.start.clone_from(state);
+            match self.newton(state, if last { rest } else { size }) {
+                Ok(step) => {
+                    parts += 1;
+                    if last {
+                        state.time = until;
+                        return Ok(DynamicStep { parts, ..step });
+                    }
+                }
+                Err(error) => {
+                    state.clone_from(&self.start);
+                    if halvings == self.settings.halvings {
+                        return Err(error);
+                    }
+                    halvings += 1;
+                    size *= 0.5;
+                }
+            }
+        }
+    }
+
+    fn newton(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
+        let time = state.time + h;
+        let model = self.system.model;
+        self.system.prescribed(state.time, time, &mut self.pending);
+        self.moved.fill(0.0);
+        let mut residuals = Vec::with_capacity(self.settings.iterations + 1);
+        for iteration in 0..=self.settings.iterations {
+            if iteration == 1 && self.settings.iterations == 1 {
+                break;
+            }
+            self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
+            if iteration == 0 {
+                let kept = self.damper.len();
+                self.damper.copy_from_slice(&self.system.matrix.value[..kept]);
+            }
+            let (norm, scale) = self.find_residual(state, h);
+            residuals.push(if scale > 0.0 { norm / scale } else { 0.0 });
+            let moving = self.pending.iter().any(|&p| p != 0.0);
+            if iteration > 0 && !moving && norm <= self.settings.tolerance * scale + self.round_off {
+                break;
+            }
+            if iteration == self.settings.iterations || !norm.is_finite() {
+                let node = self.worst_node();
+                return Err(SolveError::NotConverged { time, node, residuals });
+            }
+            self.add_inertia(h);
+            self.system.prepare()?;
+            self.system.solve(&self.residual, &mut self.solution)?;
+            self.increment.copy_from_slice(&self.pending);
+            self.system.spread(&self.solution, &mut self.increment);
+            self.pending.fill(0.0);
+            state.advance(&self.increment, 1.0);
+            self.find_motion(state);
+        }
+        for (node, moved) in self.moved.chunks_exact(6).enumerate() {
+            if model.mass[node] > 0.0 {
+                state.velocity[node] = Vector3::new(moved[0], moved[1], moved[2]) / h;
+                state.spin[node] = Vector3::new(moved[3], moved[4], moved[5]) / h;
+            }
+        }
+        state.time = time;
+        Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0 })
+    }
+
+    /// Translations and rotation vectors since the start of the step.
+    fn find_motion(&mut self, state: &State) {
+        for (node, moved) in self.moved.chunks_exact_mut(6).enumerate() {
+            moved[..3].copy_from_slice((state.position[node] - self.start.position[node]).as_slice());
+            let turn = state.rotation[node] * self.start.rotation[node].inverse();
+            moved[3..].copy_from_slice(logarithm(&turn).as_slice());
+        }
+    }
+
+    /// Loads less internal, inertial and damping forces on the free components; its norm and that of the largest of them.
+    fn find_residual(&mut self, state: &State, h: f64) -> (f64, f64) {
+        let model = self.system.model;
+        let system = &mut self.system;
+        let arm = 1.0 / (self.length * self.length);
+        let (mut loads, mut resistance, mut inertia) = (0.0, 0.0, 0.0);
+        for node in 0..model.rest.len() {
+            let at = 6 * node;
+            let part = |from: &[f64], first: usize| {
+                Vector3::new(from[at + first], from[at + first + 1], from[at + first + 2])
+            };
+            for first in [0, 3] {
+                let weight = if first == 0 { 1.0 } else { arm };
+                let load =
+                    part(&system.external, first) + state.load_factor * part(&system.controlled, first);
+                let internal = part(&system.internal, first);
+                let moved = part(&self.moved, first);
+                let (mass, before) = if first == 0 {
+                    (model.mass[node], self.start.velocity[node])
+                } else {
+                    (model.inertia[node], self.start.spin[node])
+                };
+                let mut momentum =
+                    (mass / (h * h)) * (moved - h * before) + (model.mass_damping * mass / h) * moved;
+                if first == 3 {
+                    momentum = spin_to_vector(&moved).tr_mul(&momentum);
+                }
+                loads += weight * load.norm_squared();
+                resistance += weight * internal.norm_squared();
+                inertia += weight * momentum.norm_squared();
+                let sum = load - internal - momentum;
+                for c in 0..3 {
+                    let equation = system.equations.number[at + first + c];
+                    if equation != crate::sparse::NONE {
+                        self.residual[equation as usize] = sum[c];
+                    }
+                }
+            }
+        }
+        if !self.damper.is_empty() {
+            system.gather(&self.moved, &mut self.solution);
+            system.matrix.multiply_values(&self.damper, &self.solution, &mut self.product);
+            let factor = model.stiffness_damping / h;
+            self.residual.iter_mut().zip(&self.product).for_each(|(r, p)| *r -= factor * p);
+        }
+        let mut norm = 0.0;
+        for (&component, residual) in system.equations.component.iter().zip(&self.residual) {
+            norm += residual * residual * if component % 6 < 3 { 1.0 } else { arm };
+        }
+        self.residual.iter_mut().zip(&system.coupling).for_each(|(r, c)| *r -= c);
+        (norm.sqrt(), f64::max(loads, f64::max(resistance, inertia)).sqrt())
+    }
+
+    /// K + (1/h² + α/h) M + β/h K.
+    fn add_inertia(&mut self, h: f64) {
+        let model = self.system.model;
+        let factor = model.stiffness_damping / h;
+        self.system.matrix.value.iter_mut().zip(&self.damper).for_each(|(k, d)| *k += factor * d);
+        let rate = 1.0 / (h * h) + model.mass_damping / h;
+        for (equation, &component) in self.system.equations.component.iter().enumerate() {
+            let node = component as usize / 6;
+            let mass = if component % 6 < 3 { model.mass[node] } else { model.inertia[node] };
+            self.system.matrix.add_diagonal(equation, rate * mass);
+        }
+    }
+
+    fn worst_node(&self) -> u32 {
+        let all = self.system.equations.component.iter().zip(&self.residual);
+        let largest = all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        largest.map_or(0, |(component, _)| component / 6)
+    }
+}
+
+/// Explicit central differences: velocities stand half a step before positions.
+pub struct Explicit<'m> {
+    system: System<'m>,
+    step: f64,
+    pending: Vec<f64>,
+}
+
+impl<'m> Explicit<'m> {
+    /// The longest stable step [s] about rest, 2/ω of the stiffest element: a lower bound of the model's.
+    pub fn stable_step(model: &Model) -> f64 {
+        let shells = model.facets.iter().map(|facet| facet.highest_frequency_squared());
+        let solids = model.tets.iter().map(|tet| tet.highest_frequency_squared());
+        let highest = shells.chain(solids).fold(0.0, f64::max);
+        2.0 / highest.sqrt()
+    }
+
+    /// A solver with steps of a length [s]. Springs and pressures shorten the stable step, and are not looked at.
+    ///
+    /// # Errors
+    /// If the step is longer than is stable, or damping is proportional to stiffness.
+    pub fn new(model: &'m Model, step: f64) -> Result<Self, SolveError> {
+        if !(step > 0.0 && step <= Self::stable_step(model)) {
+            return Err(SolveError::Impossible(
+                "the step is longer than the stable one (`Explicit::stable_step`); shorten it or use the implicit solver",
+            ));
+        }
+        if model.stiffness_damping > 0.0 {
+            return Err(SolveError::Impossible(
+                "damping by stiffness needs the implicit solver; damp by mass instead",
+            ));
+        }
+        let system = System::forces_only(model);
+        Ok(Self { pending: vec![0.0; 6 * model.rest.len()], system, step })
+    }
+
+    /// Makes one step.
+    ///
+    /// # Errors
+    /// If an element collapses or folds over.
+    pub fn advance(&mut self, state: &mut State) -> Result<(), SolveError> {
+        let (h, model) = (self.step, self.system.model);
+        self.system.evaluate(state, state.time, None)?;
+        self.system.prescribed(state.time, state.time + h, &mut self.pending);
+        let system = &self.system;
+        // (1 + αh/2) v⁺ = (1 − αh/2) v + h f/m.
+        let (kept, gained) = {
+            let half = 0.5 * model.mass_damping * h;
+            ((1.0 - half) / (1.0 + half), h / (1.0 + half))
+        };
+        for node in 0..model.rest.len() {
+            if model.mass[node] == 0.0 {
+                continue;
+            }
+            let velocity = |first: usize, now: Vector3<f64>, mass: f64| {
+                Vector3::from_fn(|c, _| {
+                    let at = 6 * node + first + c;
+                    if system.equations.number[at] == crate::sparse::NONE {
+                        return self.pending[at] / h;
+                    }
+                    let load = system.external[at] + state.load_factor * system.controlled[at];
+                    kept * now[c] + gained * (load - system.internal[at]) / mass
+                })
+            };
+            let (v, w) = (
+                velocity(0, state.velocity[node], model.mass[node]),
+                velocity(3, state.spin[node], model.inertia[node]),
+            );
+            (state.velocity[node], state.spin[node]) = (v, w);
+            state.position[node] += h * v;
+            state.rotation[node] = exponential(&(h * w)) * state.rotation[node];
+        }
+        state.time += h;
+        Ok(())
+    }
+
+    /// Strain energy at the last step's start [J].
+    pub fn strain_energy(&self) -> f64 {
+        self.system.energy
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::element::Elasticity;
+    use crate::{
+        Constraint, Load, LoadKind, Material, Motion, Preconditioner, Shell, StaticSettings, Statics,
+    };
+    use pliant_mechanics::curve::{Curve, Shape};
+
+    const LENGTH: f64 = 1.0;
+    const THIN: f64 = 0.01;
+
+    /// A strip of 16 × 2 cells, 1 × 0.1 m; E = 1 MPa, ν = 0.
+    fn strip(thickness: f64) -> Model {
+        let points = (0..51_u32)
+            .map(|i| Vector3::new(f64::from(i % 17) / 16.0 * LENGTH, f64::from(i / 17) * 0.05, 0.0))
+            .collect();
+        let cell = |i: u32| {
+            let a = i % 16 + 17 * (i / 16);
+            [[a, a + 1, a + 18], [a, a + 18, a + 17]]
+        };
+        let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.0 }, density: 1000.0 };
+        let mut model = Model::new(points);
+        let cells = (0..32).flat_map(cell).collect();
+        model.add_shell(&Shell::new("strip", cells, thickness, material)).unwrap();
+        model
+    }
+
+    fn clamped(thickness: f64) -> Model {
+        let mut model = strip(thickness);
+        let nodes = vec![0, 17, 34];
+        model.constraints.push(Constraint {
+            name: "clamp".into(),
+            nodes,
+            components: [true; 6],
+            motion: Motion::Fixed,
+        });
+        model
+    }
+
+    fn weigh(model: &mut Model, g: f64) {
+        let kind = LoadKind::Gravity { acceleration: Vector3::new(0.0, 0.0, -g) };
+        let curve = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
+        model.loads.push(Load { name: "weight".into(), kind, curve, controlled: false });
+    }
+
+    /// First bending frequency of a cantilever, 1.8751² √(E I/(ρ A L⁴)) [rad/s].
+    fn first_frequency(thickness: f64) -> f64 {
+        1.8751_f64.powi(2) * (1e6 * thickness * thickness / (12.0 * 1000.0)).sqrt() / LENGTH.powi(2)
+    }
+
+    /// Period of the tip after a small push, from its zero crossings.
+    fn period(mut advance: impl FnMut(&mut State), model: &Model, step: f64) -> f64 {
+        let mut state = State::at_rest(model);
+        for (v, x) in state.velocity.iter_mut().zip(&model.rest) {
+            v.z = 1e-3 * x.x * x.x;
+        }
+        let mut crossings = Vec::new();
+        let mut last = 0.0;
+        while crossings.len() < 3 {
+            advance(&mut state);
+            let now = state.position[16].z;
+            if last != 0.0 && (now < 0.0) != (last < 0.0) {
+                crossings.push(state.time - step * now / (now - last));
+            }
+            last = now;
+        }
+        crossings[2] - crossings[0]
+    }
+
+    /// Euler's cantilever to 1 %: explicit, and implicit with 400 steps a period.
+    #[test]
+    fn a_cantilever_vibrates_at_its_first_frequency() {
+        let model = clamped(0.03);
+        let exact = TAU / first_frequency(0.03);
+        let step = 0.9 * Explicit::stable_step(&model);
+        let mut explicit = Explicit::new(&model, step).unwrap();
+        let found = period(|state| explicit.advance(state).unwrap(), &model, step);
+        println!("period {found:.4} s, exact {exact:.4} s, explicit step {step:.1e} s");
+        assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
+        let step = exact / 400.0;
+        let mut implicit = BackwardEuler::new(&model, DynamicSettings::new(step)).unwrap();
+        let found = period(|state| drop(implicit.advance(state).unwrap()), &model, step);
+        assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
+    }
+
+    #[test]
+    fn explicit_steps_that_are_too_long_are_refused() {
+        let model = clamped(THIN);
+        let stable = Explicit::stable_step(&model);
+        assert!(Explicit::new(&model, stable).is_ok());
+        assert!(matches!(Explicit::new(&model, 1.01 * stable), Err(SolveError::Impossible(_))));
+    }
+
+    /// Energy of explicit steps oscillates within 1 % in free vibration at large rotation.
+    #[test]
+    fn explicit_motion_keeps_its_energy() {
+        let model = clamped(THIN);
+        let mut state = State::at_rest(&model);
+        for (v, x) in state.velocity.iter_mut().zip(&model.rest) {
+            v.z = 1.5 * x.x * x.x;
+        }
+        let kinetic = |state: &State| -> f64 {
+            let nodes = 0..model.rest.len();
+            nodes
+                .map(|i| {
+                    0.5 * model.mass[i] * state.velocity[i].norm_squared()
+                        + 0.5 * model.inertia[i] * state.spin[i].norm_squared()
+                })
+                .sum()
+        };
+        let mut solver = Explicit::new(&model, 0.5 * Explicit::stable_step(&model)).unwrap();
+        let first = kinetic(&state);
+        let mut largest = 0.0_f64;
+        for _ in 0..3000 {
+            let before = kinetic(&state);
+            solver.advance(&mut state).unwrap();
+            let energy = 0.5 * (before + kinetic(&state)) + solver.strain_energy();
+            largest = largest.max((energy / first - 1.0).abs());
+        }
+        println!("energy off by {largest:.1e}, tip at {}", state.position[16]);
+        assert!(largest < 0.01, "{largest}");
+    }
+
+    /// A free strip keeps its momentum and its moment of momentum in implicit steps, to the tolerance of the solution.
+    #[test]
+    fn a_free_body_keeps_its_momentum() {
+        let model = strip(THIN);
+        let mut state = State::at_rest(&model);
+        for (v, x) in state.velocity.iter_mut().zip(&model.rest) {
+            *v = Vector3::new(0.1, 0.2 * x.x, 0.5 * x.x * x.x);
+        }
+        let momentum = |state: &State| {
+            let nodes = 0..model.rest.len();
+            nodes.fold((Vector3::zeros(), Vector3::zeros()), |(p, l), i| {
+                let own = model.mass[i] * state.velocity[i];
+                (p + own, l + state.position[i].cross(&own) + model.inertia[i] * state.spin[i])
+            })
+        };
+        let settings = DynamicSettings { tolerance: 1e-10, ..DynamicSettings::new(2e-3) };
+        let mut solver = BackwardEuler::new(&model, settings).unwrap();
+        let first = momentum(&state);
+        for _ in 0..20 {
+            solver.advance(&mut state).unwrap();
+        }
+        let last = momentum(&state);
+        assert!((last.0 - first.0).norm() < 1e-7 * first.0.norm(), "{}", last.0 - first.0);
+        // Backward Euler takes x × v of the end: of second order in the step.
+        assert!((last.1 - first.1).norm() < 2e-2 * first.1.norm(), "{} {}", last.1, first.1);
+    }
+
+    /// Damped, a sagging strip comes to rest where the static solver puts it; all linear solvers go the same way.
+    #[test]
+    fn damped_motion_ends_in_the_static_equilibrium() {
+        let mut model = clamped(THIN);
+        weigh(&mut model, 0.5);
+        let mut rest = State::at_rest(&model);
+        Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut rest, 1.0).unwrap();
+        assert!(rest.position[16].z < -0.2, "{}", rest.position[16]);
+        // About critical.
+        model.mass_damping = 2.0 * first_frequency(THIN);
+        model.stiffness_damping = 0.01;
+        let iterative = |preconditioner| LinearSolver::ConjugateGradients {
+            tolerance: 1e-8,
+            iterations: 5000,
+            preconditioner,
+        };
+        for linear in [
+            LinearSolver::Direct,
+            iterative(Preconditioner::BlockJacobi),
+            iterative(Preconditioner::LaggedFactors { renew_after: 10 }),
+        ] {
+            let settings = DynamicSettings { linear, ..DynamicSettings::new(1.0) };
+            let mut solver = BackwardEuler::new(&model, settings).unwrap();
+            let mut state = State::at_rest(&model);
+            for _ in 0..60 {
+                solver.advance(&mut state).unwrap();
+            }
+            let off = (state.position[16] - rest.position[16]).norm();
+            assert!(off < 1e-5, "{linear:?}: {off:e}");
+        }
+    }
+
+    /// One linear solution a step follows the converged motion to 2 % of the sag in small steps.
+    #[test]
+    fn real_time_steps_follow_the_converged_motion() {
+        let mut model = clamped(THIN);
+        weigh(&mut model, 0.5);
+        model.mass_damping = 1.0;
+        let run = |settings: DynamicSettings| {
+            let mut solver = BackwardEuler::new(&model, settings).unwrap();
+            let mut state = State::at_rest(&model);
+            for _ in 0..100 {
+                solver.advance(&mut state).unwrap();
+            }
+            state.position[16]
+        };
+        let settings = DynamicSettings::new(0.01);
+        let (converged, quick) = (run(settings), run(settings.real_time(LinearSolver::Direct)));
+        assert!((converged - quick).norm() < 0.02 * converged.z.abs(), "{converged} {quick}");
+    }
+}

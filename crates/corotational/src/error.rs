@@ -1,0 +1,186 @@
+//! What can be wrong with a model and why a solver stops.
+
+use crate::facet::Broken;
+
+/// Why a part could not be added to a model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// A quantity out of its range.
+    #[error("{what} of `{shell}` is {value}; it must be {range}")]
+    OutOfRange {
+        /// Name of the part.
+        shell: String,
+        /// Which quantity, with the element where it is one of many.
+        what: String,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        range: &'static str,
+    },
+    /// Not one thickness and not one a cell.
+    #[error("shell `{shell}` has {cells} elements and {given} thicknesses; give one, or one an element")]
+    Thicknesses {
+        /// Name of the part.
+        shell: String,
+        /// Elements.
+        cells: usize,
+        /// Thicknesses given.
+        given: usize,
+    },
+    /// A node that does not exist.
+    #[error("element {cell} of `{shell}` uses node {node}, but there are {nodes} nodes")]
+    NoSuchNode {
+        /// Name of the part.
+        shell: String,
+        /// Element.
+        cell: usize,
+        /// Node asked for.
+        node: u32,
+        /// Nodes of the model.
+        nodes: usize,
+    },
+    /// An element without area or volume, or turned inside out.
+    #[error(
+        "element {cell} of `{shell}` is degenerate: its {what} is {value:.3e}; merge or remove its nodes"
+    )]
+    Degenerate {
+        /// Name of the part.
+        shell: String,
+        /// Element.
+        cell: usize,
+        /// Area [m²] or volume [m³].
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// An edge of more than two triangles.
+    #[error(
+        "{count} triangles of `{shell}` meet in the edge of nodes {} and {}; allow branches if that is \
+         meant, or remove the surplus", edge[0], edge[1]
+    )]
+    Branch {
+        /// Name of the part.
+        shell: String,
+        /// Nodes of the edge.
+        edge: [u32; 2],
+        /// Triangles at it.
+        count: usize,
+    },
+    /// A surface with one side only.
+    #[error(
+        "shell `{shell}` has no two sides: following its triangles round comes back reversed at the edge of nodes \
+         {} and {}; cut it there", edge[0], edge[1]
+    )]
+    OneSided {
+        /// Name of the part.
+        shell: String,
+        /// Nodes of the edge.
+        edge: [u32; 2],
+    },
+    /// A surface that encloses nothing.
+    #[error("a balloon must be closed, but its surface has {} open borders: {}", loops.len(), borders(loops))]
+    Open {
+        /// Nodes along each border.
+        loops: Vec<Vec<u32>>,
+    },
+}
+
+/// The first borders with their first nodes.
+fn borders(loops: &[Vec<u32>]) -> String {
+    let border = |nodes: &Vec<u32>| {
+        let first: Vec<String> = nodes.iter().take(5).map(u32::to_string).collect();
+        let more = if nodes.len() > 5 { ", …" } else { "" };
+        format!("{} nodes ({}{more})", nodes.len(), first.join(", "))
+    };
+    let told: Vec<String> = loops.iter().take(3).map(border).collect();
+    told.join("; ") + if loops.len() > 3 { "; …" } else { "" }
+}
+
+/// Why a solver stopped. The state holds all that was found before.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Nothing holds a part.
+    #[error(
+        "the part with node {node} is free in {free_modes} rigid motions; fix more of its nodes, or tie it to points \
+         with springs"
+    )]
+    FreeBody {
+        /// A node of the part.
+        node: u32,
+        /// Rigid motions without resistance, 1 to 6.
+        free_modes: usize,
+    },
+    /// No stiffness against some motion.
+    #[error(
+        "the stiffness is singular: node {node} can move in {component} without resistance (pivot {pivot:.1e} of the \
+         diagonal); hold it, or give its elements stiffness in that direction"
+    )]
+    Singular {
+        /// The node.
+        node: u32,
+        /// `x`, `y`, `z`, or a rotation about one of them.
+        component: &'static str,
+        /// The pivot over the diagonal entry.
+        pivot: f64,
+    },
+    /// Conjugate gradients met a direction of negative stiffness.
+    #[error(
+        "the stiffness is not positive definite (found after {iterations} iterations of conjugate gradients): the \
+         body buckles; use the direct solver, smaller load steps or a dynamic solver"
+    )]
+    Indefinite {
+        /// Iterations until then.
+        iterations: usize,
+    },
+    /// Conjugate gradients did not reach their tolerance.
+    #[error(
+        "conjugate gradients stand at a residual of {residual:.1e} after {iterations} iterations; allow more or use the direct solver"
+    )]
+    Stalled {
+        /// Iterations done.
+        iterations: usize,
+        /// Residual over the right-hand side.
+        residual: f64,
+    },
+    /// An element folded over, collapsed or not finite.
+    #[error("element {cell} {}", broken(*.why))]
+    Broken {
+        /// Element, facets before tetrahedra.
+        cell: usize,
+        /// What happened.
+        why: Broken,
+    },
+    /// No equilibrium, with load steps halved as often as allowed.
+    #[error(
+        "no equilibrium at t = {time:.6} after {} iterations: residual {:.3e}, largest at node {node}; try smaller \
+         load steps, displacement control or the dynamic solver", residuals.len(), residuals.last().copied().unwrap_or(f64::NAN)
+    )]
+    NotConverged {
+        /// Time of the load step that failed.
+        time: f64,
+        /// Node with the largest residual.
+        node: u32,
+        /// Norm of the residual at each iteration of the last attempt [N].
+        residuals: Vec<f64>,
+    },
+    /// A balloon that is not closed.
+    #[error(transparent)]
+    Open(#[from] ModelError),
+    /// What was asked for cannot be done; the text says why and what to do instead.
+    #[error("{0}")]
+    Impossible(&'static str),
+}
+
+fn broken(why: Broken) -> String {
+    match why {
+        Broken::Inverted(determinant) => {
+            format!("is inverted (det F = {determinant:.2e}); use smaller steps or smaller loads")
+        }
+        Broken::Area(area) => format!("has collapsed: its area is {area:.1e} m²; use smaller steps"),
+        Broken::Folded(angle) => {
+            format!(
+                "is folded over: a node has turned by {angle:.2} rad against it; use smaller steps or a finer mesh"
+            )
+        }
+    }
+}

@@ -1,0 +1,612 @@
+//! A flat triangular shell in large rotation: the linear element in a frame that turns with it. The frame is the facet's
+//! normal and the two-dimensional polar rotation in its plane, so it does not depend on the order of the corners;
+//! nodal forces are the exact gradient of the energy ½ dᵀ K d in that frame. Element-independent co-rotation after
+//! Felippa and Haugen (2005), CMAME 194:2285; polar frame after Caselli and Bisegna (2013), IJNME 95:499.
+//! Leaves out: large strains (the energy is that of linear elasticity) and shear of the thickness.
+
+use nalgebra::{
+    Matrix3, Matrix3x2, Rotation3, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector2, Vector3,
+};
+
+use crate::element::{
+    Corners, Elasticity, Formulation, MIDSIDES, Matrix9, andes_basic, area, curvature, gradients, strain,
+};
+use crate::model::Material;
+use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
+
+/// Numbers of (u, v, w, θx, θy, θz) of three nodes, node by node.
+pub type Vector18 = SVector<f64, 18>;
+
+/// Stiffness over them.
+pub type Matrix18 = SMatrix<f64, 18, 18>;
+
+/// Places of (u, v, θz) among the eighteen.
+const MEMBRANE: [usize; 9] = [0, 1, 5, 6, 7, 11, 12, 13, 17];
+
+/// Places of (w, θx, θy).
+const BENDING: [usize; 9] = [2, 3, 4, 8, 9, 10, 14, 15, 16];
+
+/// Above this rotation [rad] of a node out of the plane of its facet the facet is folded over, not deformed.
+const FOLDED: f64 = 2.0;
+
+/// Above this rotation [rad], about any axis, the rotation vector is not safely one of its kind: at π it changes sign.
+const FULL: f64 = 3.0;
+
+/// A shell element: what its rest shape gives.
+#[derive(Clone, Debug)]
+pub struct Facet {
+    /// Nodes, counter-clockwise about the normal.
+    pub nodes: [u32; 3],
+    /// Thickness [m].
+    pub thickness: f64,
+    /// Area at rest [m²].
+    pub area: f64,
+    /// Mass that it gives to each node [kg].
+    pub mass: f64,
+    /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that rotations do not shorten the
+    /// steps of an explicit solver.
+    pub inertia: f64,
+    elastic: Elasticity,
+    /// Corners at rest in the facet's axes, relative to the centroid [m].
+    corners: Corners,
+    /// Gradients of the shape functions there [1/m].
+    gradient: [Vector2<f64>; 3],
+    /// Axes at rest.
+    axes: UnitQuaternion<f64>,
+    membrane: Matrix9,
+    bending: Matrix9,
+}
+
+/// Energy of a shell in its parts [J].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ShellEnergy {
+    /// Stretch and shear of the middle surface.
+    pub membrane: f64,
+    /// Bending and twist.
+    pub bending: f64,
+    /// Nodes that turn about the normal otherwise than their facet.
+    pub drilling: f64,
+}
+
+/// Forces and moments per length in the axes of a facet, at its centroid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resultants {
+    /// (nxx, nyy, nxy) [N/m].
+    pub membrane: Vector3<f64>,
+    /// (mxx, myy, mxy) [N]; stress at a height z above the middle surface is n/t + 12 z m/t³.
+    pub moment: Vector3<f64>,
+    /// The axes as columns; the third is the normal.
+    pub axes: Matrix3<f64>,
+}
+
+impl Resultants {
+    /// Stress (σxx, σyy, σxy) [Pa] at a height [m] above the middle surface of a shell of this thickness.
+    pub fn stress(&self, thickness: f64, height: f64) -> Vector3<f64> {
+        self.membrane / thickness + self.moment * (12.0 * height / thickness.powi(3))
+    }
+}
+
+/// Which tangent stiffness.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tangent {
+    /// The derivative of the force.
+    Full,
+    /// Its symmetric approximation for small strains, T sym(Pᵀ K P − Fnm G − Gᵀ Fnᵀ P) Tᵀ: less work.
+    Symmetric,
+}
+
+/// A facet where it is now.
+pub(crate) struct Placed {
+    /// Axes as columns.
+    axes: Matrix3<f64>,
+    /// Corners in them, relative to the centroid.
+    local: [Vector2<f64>; 3],
+    /// F11 + F22 in them.
+    trace: f64,
+    /// Rotations of the nodes relative to the facet [rad].
+    theta: [Vector3<f64>; 3],
+    /// Displacements and rotations in the axes.
+    deformation: Vector18,
+}
+
+/// Why a facet or a tetrahedron has no force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Broken {
+    /// Its area is zero or not finite [m²].
+    Area(f64),
+    /// A node has turned by this angle [rad] against it.
+    Folded(f64),
+    /// Of a tetrahedron: the determinant of its deformation gradient is not positive.
+    Inverted(f64),
+}
+
+impl Facet {
+    /// A facet of corners at rest [m]; `None` if its area is below 1e-12 of its longest edge squared.
+    pub fn new(
+        nodes: [u32; 3],
+        rest: [Vector3<f64>; 3],
+        thickness: f64,
+        Material { elastic, density }: Material,
+        formulation: Formulation,
+    ) -> Option<Self> {
+        let [a, b, c] = rest;
+        let cross = (b - a).cross(&(c - a));
+        let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+        // Written so that NaN is degenerate too.
+        if !(0.5 * cross.norm() > 1e-12 * longest && longest > 0.0) {
+            return None;
+        }
+        let normal = cross.normalize();
+        let along = (b - a).normalize();
+        let axes = Matrix3::from_columns(&[along, normal.cross(&along), normal]);
+        let centroid = (a + b + c) / 3.0;
+        let corners = rest.map(|x| (axes.transpose() * (x - centroid)).xy());
+        let area = area(&corners);
+        let mass = density * thickness * area / 3.0;
+        Some(Self {
+            nodes,
+            thickness,
+            area,
+            mass,
+            inertia: mass * (thickness * thickness).max(area) / 12.0,
+            elastic,
+            corners,
+            gradient: gradients(&corners),
+            axes: quaternion(axes),
+            membrane: formulation.membrane_stiffness(&corners, &elastic, thickness),
+            bending: formulation.bending_stiffness(&corners, &elastic, thickness),
+        })
+    }
+
+    /// Where the facet is with its nodes at positions [m] and turned from rest by rotations.
+    pub(crate) fn place(
+        &self,
+        x: &[Vector3<f64>; 3],
+        rotation: &[UnitQuaternion<f64>; 3],
+    ) -> Result<Placed, Broken> {
+        let centroid = (x[0] + x[1] + x[2]) / 3.0;
+        let cross = (x[1] - x[0]).cross(&(x[2] - x[0]));
+        let double_area = cross.norm();
+        if !(double_area > 0.0 && double_area.is_finite()) {
+            return Err(Broken::Area(0.5 * double_area));
+        }
+        let normal = cross / double_area;
+        let side = (x[1] - x[0]).normalize();
+        let plane = Matrix3x2::from_columns(&[side, normal.cross(&side)]);
+        let flat = x.map(|x| plane.tr_mul(&(x - centroid)));
+        // F = Σ q ⊗ ∇N, and the rotation of its polar decomposition.
+        let f = |row: usize, column: usize| -> f64 {
+            (0..3).map(|i| flat[i][row] * self.gradient[i][column]).sum()
+        };
+        let (sum, difference) = (f(0, 0) + f(1, 1), f(1, 0) - f(0, 1));
+        let (sine, cosine) = difference.atan2(sum).sin_cos();
+        let e1 = plane * Vector2::new(cosine, sine);
+        let e2 = plane * Vector2::new(-sine, cosine);
+        let axes = Matrix3::from_columns(&[e1, e2, normal]);
+        let local = flat.map(|q| Vector2::new(cosine * q.x + sine * q.y, cosine * q.y - sine * q.x));
+
+        let back = quaternion(axes).inverse();
+        let theta = rotation.map(|r| logarithm(&(back * r * self.axes)));
+        let mut deformation = Vector18::zeros();
+        for i in 0..3 {
+            let moved = local[i] - self.corners[i];
+            deformation[6 * i] = moved.x;
+            deformation[6 * i + 1] = moved.y;
+            deformation.fixed_rows_mut::<3>(6 * i + 3).copy_from(&theta[i]);
+        }
+        for turned in &theta {
+            // Written so that NaN is found too.
+            if !(turned.xy().norm() < FOLDED && turned.norm() < FULL) {
+                return Err(Broken::Folded(turned.norm()));
+            }
+        }
+        Ok(Placed { axes, local, trace: sum.hypot(difference), theta, deformation })
+    }
+
+    /// K d in the facet's axes.
+    fn linear_force(&self, d: &Vector18) -> Vector18 {
+        let mut force = Vector18::zeros();
+        for (places, stiffness) in [(MEMBRANE, &self.membrane), (BENDING, &self.bending)] {
+            let own = stiffness * SVector::<f64, 9>::from_fn(|i, _| d[places[i]]);
+            for (&place, value) in places.iter().zip(&own) {
+                force[place] = *value;
+            }
+        }
+        force
+    }
+
+    /// K in the facet's axes.
+    fn linear_stiffness(&self) -> Matrix18 {
+        let mut all = Matrix18::zeros();
+        for (places, stiffness) in [(MEMBRANE, &self.membrane), (BENDING, &self.bending)] {
+            for j in 0..9 {
+                for i in 0..9 {
+                    all[(places[i], places[j])] = stiffness[(i, j)];
+                }
+            }
+        }
+        all
+    }
+
+    /// Energy [J] and internal nodal forces and moments, its gradient with respect to positions and spins.
+    pub(crate) fn force(&self, placed: &Placed) -> (f64, Vector18) {
+        let raw = self.linear_force(&placed.deformation);
+        let spun = placed.to_spins(&raw);
+        (0.5 * placed.deformation.dot(&raw), placed.to_space(&self.project(placed, &spun)))
+    }
+
+    /// The change of the force with positions and spins.
+    pub(crate) fn tangent(&self, placed: &Placed, kind: Tangent) -> Matrix18 {
+        let raw = self.linear_force(&placed.deformation);
+        let mut k = self.linear_stiffness();
+        let spun = match kind {
+            Tangent::Full => {
+                placed.spin_stiffness(&mut k);
+                placed.to_spins(&raw)
+            }
+            Tangent::Symmetric => raw,
+        };
+        let projected = self.project(placed, &spun);
+        let g = [0, 1, 2].map(|i| self.frame_spin(placed, i));
+        let arm = placed.local.map(|x| skew(&Vector3::new(x.x, x.y, 0.0)));
+        let translation = |v: &Vector18, i: usize| v.fixed_rows::<3>(6 * i).into_owned();
+        let rotation = |v: &Vector18, i: usize| v.fixed_rows::<3>(6 * i + 3).into_owned();
+
+        // Pᵀ K P; K does not resist translations, so of P only Ψ G counts.
+        let turn = |rows: &SMatrix<f64, 3, 18>| -> Matrix3<f64> {
+            (0..3).fold(Matrix3::zeros(), |sum, i| {
+                sum - rows.fixed_columns::<3>(6 * i) * arm[i] + rows.fixed_columns::<3>(6 * i + 3)
+            })
+        };
+        let rigid: [Matrix3<f64>; 6] =
+            [0, 1, 2, 3, 4, 5].map(|a| turn(&k.fixed_rows::<3>(3 * a).into_owned()));
+        let mut twice =
+            (0..3).fold(Matrix3::zeros(), |sum, i| sum + arm[i] * rigid[2 * i] + rigid[2 * i + 1]);
+        let mut corrections = [Matrix3::zeros(); 3];
+        if kind == Tangent::Full {
+            for (i, correction) in corrections.iter_mut().enumerate() {
+                *correction = moment_correction(&placed.theta[i], &rotation(&raw, i));
+                twice += *correction;
+            }
+        }
+        let force = [0, 1, 2].map(|i| skew(&translation(&spun, i)));
+        // Fnᵀ Ψ.
+        let leverage = (0..3).fold(Matrix3::zeros(), |sum, i| sum + force[i] * arm[i]);
+        for j in 0..3 {
+            for a in 0..6 {
+                let stress = if a % 2 == 0 {
+                    skew(&translation(&projected, a / 2))
+                } else {
+                    skew(&rotation(&projected, a / 2)) + corrections[a / 2]
+                };
+                let change = (rigid[a] + stress) * g[j];
+                let mut block = k.fixed_view_mut::<3, 3>(3 * a, 6 * j);
+                block -= change;
+            }
+            for i in 0..3 {
+                let mut both = k.fixed_view_mut::<3, 3>(6 * i, 6 * j);
+                both +=
+                    g[i].transpose() * (twice * g[j] - rigid[2 * j].transpose() + force[j] + leverage * g[j]);
+                let mut turned = k.fixed_view_mut::<3, 3>(6 * i, 6 * j + 3);
+                turned -= g[i].transpose() * (rigid[2 * j + 1].transpose() + corrections[j]);
+            }
+            let mut own = k.fixed_view_mut::<3, 3>(6 * j + 3, 6 * j + 3);
+            own += corrections[j];
+        }
+        match kind {
+            Tangent::Full => self.frame_change(placed, &spun, &g, &arm, &mut k),
+            Tangent::Symmetric => k = 0.5 * (k + k.transpose()),
+        }
+        for a in 0..6 {
+            for b in 0..6 {
+                let mut block = k.fixed_view_mut::<3, 3>(3 * a, 3 * b);
+                let turned = placed.axes * block.clone_owned() * placed.axes.transpose();
+                block.copy_from(&turned);
+            }
+        }
+        k
+    }
+
+    /// G of a node: the spin of the frame over its translation, in the frame.
+    fn frame_spin(&self, placed: &Placed, node: usize) -> Matrix3<f64> {
+        let now = gradients(&placed.local)[node];
+        let rest = self.gradient[node] / placed.trace;
+        Matrix3::new(0.0, 0.0, now.y, 0.0, 0.0, -now.x, -rest.y, rest.x, 0.0)
+    }
+
+    /// Pᵀ f: nodal forces whose resultants vanish.
+    fn project(&self, placed: &Placed, force: &Vector18) -> Vector18 {
+        let mean = (0..3).fold(Vector3::zeros(), |sum, i| sum + force.fixed_rows::<3>(6 * i) / 3.0);
+        let moment = placed.moment(force);
+        let mut projected = *force;
+        for i in 0..3 {
+            let mut own = projected.fixed_rows_mut::<3>(6 * i);
+            own -= mean + self.frame_spin(placed, i).tr_mul(&moment);
+        }
+        projected
+    }
+
+    /// Adds what comes from the change of G; matters at finite strain only.
+    fn frame_change(
+        &self,
+        placed: &Placed,
+        spun: &Vector18,
+        g: &[Matrix3<f64>; 3],
+        arm: &[Matrix3<f64>; 3],
+        k: &mut Matrix18,
+    ) {
+        let moment = placed.moment(spun);
+        let now = gradients(&placed.local);
+        for i in 0..3 {
+            let blocks = [0, 1, 2].map(|q| {
+                let tilt = moment.x * now[q].y - moment.y * now[q].x;
+                let out_of_plane = Vector3::z() * Vector3::new(now[i].x, now[i].y, 0.0).transpose() * tilt;
+                let stretch = Vector3::new(self.gradient[q].x, self.gradient[q].y, 0.0) / placed.trace;
+                out_of_plane + g[i].row(2).transpose() * stretch.transpose() * moment.z
+            });
+            let turned = (0..3).fold(Matrix3::zeros(), |sum, q| sum - blocks[q] * arm[q]);
+            for q in 0..3 {
+                let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * q);
+                block += blocks[q] - turned * g[q];
+            }
+        }
+    }
+
+    /// Energy in its parts.
+    pub(crate) fn energy(&self, placed: &Placed) -> ShellEnergy {
+        let of = |places: [usize; 9], stiffness: &Matrix9| {
+            let own = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[places[i]]);
+            0.5 * own.dot(&(stiffness * own))
+        };
+        let plane = of(MEMBRANE, &self.membrane);
+        // What an element without resistance in its plane has not, it cannot split.
+        let membrane = of(MEMBRANE, &andes_basic(&self.corners, &self.elastic, self.thickness)).min(plane);
+        ShellEnergy { membrane, bending: of(BENDING, &self.bending), drilling: plane - membrane }
+    }
+
+    /// Forces and moments per length: of the constant strain, and the mean of the curvatures in the middle of the edges.
+    pub(crate) fn resultants(&self, placed: &Placed) -> Resultants {
+        let of = |places: [usize; 9]| SVector::<f64, 9>::from_fn(|i, _| placed.deformation[places[i]]);
+        let elastic = self.elastic.matrix();
+        let mean = MIDSIDES
+            .iter()
+            .fold(Vector3::zeros(), |sum, &at| sum + curvature(&self.corners, at) * of(BENDING) / 3.0);
+        Resultants {
+            membrane: elastic * strain(&self.corners) * of(MEMBRANE) * self.thickness,
+            moment: elastic * mean * (self.thickness.powi(3) / 12.0),
+            axes: placed.axes,
+        }
+    }
+
+    /// The largest ω² [1/s²] of the element by itself about its rest shape, with its lumped masses: none of the model's is higher.
+    pub(crate) fn highest_frequency_squared(&self) -> f64 {
+        let scale = |i: usize| if i % 6 < 3 { self.mass } else { self.inertia }.sqrt();
+        let k = self.linear_stiffness();
+        let scaled = Matrix18::from_fn(|i, j| k[(i, j)] / (scale(i) * scale(j)));
+        SymmetricEigen::new(scaled).eigenvalues.max()
+    }
+
+    /// E t [N/m].
+    pub(crate) fn membrane_modulus(&self) -> f64 {
+        self.elastic.young * self.thickness
+    }
+
+    /// The smallest altitude at rest [m].
+    pub fn altitude(&self) -> f64 {
+        let longest =
+            (0..3).map(|i| (self.corners[i] - self.corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
+        2.0 * self.area / longest
+    }
+}
+
+impl Placed {
+    /// Moments conjugate to rotation vectors made conjugate to spins: Hᵀ f.
+    fn to_spins(&self, raw: &Vector18) -> Vector18 {
+        let mut spun = *raw;
+        for (i, theta) in self.theta.iter().enumerate() {
+            let moment = spin_to_vector(theta).tr_mul(&raw.fixed_rows::<3>(6 * i + 3));
+            spun.fixed_rows_mut::<3>(6 * i + 3).copy_from(&moment);
+        }
+        spun
+    }
+
+    /// K made one of spins: Hᵀ K H.
+    fn spin_stiffness(&self, k: &mut Matrix18) {
+        for (i, theta) in self.theta.iter().enumerate() {
+            let h = spin_to_vector(theta);
+            let columns = k.fixed_columns::<3>(6 * i + 3) * h;
+            k.fixed_columns_mut::<3>(6 * i + 3).copy_from(&columns);
+            let rows = h.tr_mul(&k.fixed_rows::<3>(6 * i + 3));
+            k.fixed_rows_mut::<3>(6 * i + 3).copy_from(&rows);
+        }
+    }
+
+    /// From the facet's axes to space.
+    fn to_space(&self, local: &Vector18) -> Vector18 {
+        let mut global = Vector18::zeros();
+        for a in 0..6 {
+            global.fixed_rows_mut::<3>(3 * a).copy_from(&(self.axes * local.fixed_rows::<3>(3 * a)));
+        }
+        global
+    }
+
+    /// Ψᵀ f: the moment of nodal forces and moments about the centroid.
+    fn moment(&self, force: &Vector18) -> Vector3<f64> {
+        (0..3).fold(Vector3::zeros(), |sum, i| {
+            let arm = Vector3::new(self.local[i].x, self.local[i].y, 0.0);
+            sum + arm.cross(&force.fixed_rows::<3>(6 * i)) + force.fixed_rows::<3>(6 * i + 3)
+        })
+    }
+}
+
+fn quaternion(axes: Matrix3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::Membrane;
+    use crate::rotation::exponential;
+    use crate::testing::Random;
+
+    const MATERIAL: Material = Material { elastic: Elasticity { young: 1e3, poisson: 0.3 }, density: 1000.0 };
+
+    type Pose = ([Vector3<f64>; 3], [UnitQuaternion<f64>; 3]);
+
+    fn vector(random: &mut Random) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| random.number())
+    }
+
+    fn rest() -> [Vector3<f64>; 3] {
+        [[0.1, -0.2, 0.3], [1.3, 0.1, 0.2], [0.3, 0.8, 0.7]].map(Vector3::from)
+    }
+
+    fn facet(order: [usize; 3]) -> Facet {
+        let x = rest();
+        let nodes = order.map(|i| i as u32);
+        Facet::new(nodes, order.map(|i| x[i]), 0.1, MATERIAL, Formulation::default()).unwrap()
+    }
+
+    /// A large common rotation, stretch and shear of 5 %, nodes turned by up to 0.3 rad.
+    fn pose(random: &mut Random, size: f64) -> Pose {
+        let common = exponential(&(vector(random) * 2.0));
+        let x = rest().map(|x| common * (x + vector(random) * 0.05 * size) + Vector3::new(1.0, 2.0, -3.0));
+        let rotation = [(); 3].map(|()| common * exponential(&(vector(random) * 0.3 * size)));
+        (x, rotation)
+    }
+
+    fn moved((x, rotation): &Pose, place: usize, by: f64) -> Pose {
+        let (mut x, mut rotation) = (*x, *rotation);
+        let (node, component) = (place / 6, place % 6);
+        if component < 3 {
+            x[node][component] += by;
+        } else {
+            let mut spin = Vector3::zeros();
+            spin[component - 3] = by;
+            rotation[node] = exponential(&spin) * rotation[node];
+        }
+        (x, rotation)
+    }
+
+    fn evaluate(facet: &Facet, (x, rotation): &Pose) -> (f64, Vector18) {
+        facet.force(&facet.place(x, rotation).unwrap())
+    }
+
+    /// Central differences with steps of 1e-5: 1e-7 of the largest force, as asked by the specification.
+    #[test]
+    fn force_is_the_gradient_of_the_energy() {
+        let mut random = Random::new(1);
+        let facet = facet([0, 1, 2]);
+        for size in [0.02, 1.0] {
+            let pose = pose(&mut random, size);
+            let force = evaluate(&facet, &pose).1;
+            let h = 1e-5;
+            let slope = Vector18::from_fn(|i, _| {
+                (evaluate(&facet, &moved(&pose, i, h)).0 - evaluate(&facet, &moved(&pose, i, -h)).0)
+                    / (2.0 * h)
+            });
+            let off = (slope - force).amax() / force.amax();
+            println!("force against differences: {off:.1e}");
+            assert!(off < 1e-7, "{off:e}");
+        }
+    }
+
+    /// The full tangent to 1e-6; the symmetric one without the terms of order strain.
+    #[test]
+    fn tangent_is_the_derivative_of_the_force() {
+        let mut random = Random::new(2);
+        let facet = facet([0, 1, 2]);
+        for (size, symmetric) in [(0.02, 5e-3), (1.0, 0.3)] {
+            let pose = pose(&mut random, size);
+            let placed = facet.place(&pose.0, &pose.1).unwrap();
+            let h = 1e-5;
+            let mut slope = Matrix18::zeros();
+            for j in 0..18 {
+                let change =
+                    evaluate(&facet, &moved(&pose, j, h)).1 - evaluate(&facet, &moved(&pose, j, -h)).1;
+                slope.set_column(j, &(change / (2.0 * h)));
+            }
+            for (kind, limit) in [(Tangent::Full, 1e-6), (Tangent::Symmetric, symmetric)] {
+                let k = facet.tangent(&placed, kind);
+                let off = (slope - k).amax() / k.amax();
+                println!("{kind:?} tangent against differences: {off:.1e}");
+                assert!(off < limit, "{kind:?}: {off:e}");
+            }
+            let k = facet.tangent(&placed, Tangent::Symmetric);
+            assert!((k - k.transpose()).amax() < 1e-12 * k.amax());
+        }
+    }
+
+    #[test]
+    fn forces_and_moments_of_a_facet_balance() {
+        let mut random = Random::new(3);
+        let facet = facet([0, 1, 2]);
+        let pose = pose(&mut random, 1.0);
+        let force = evaluate(&facet, &pose).1;
+        let part = |i: usize| force.fixed_rows::<3>(3 * i).into_owned();
+        let sum = part(0) + part(2) + part(4);
+        let moment =
+            (0..3).fold(Vector3::zeros(), |m, i| m + pose.0[i].cross(&part(2 * i)) + part(2 * i + 1));
+        assert!(sum.norm() < 1e-12 * force.norm(), "{sum}");
+        assert!(moment.norm() < 1e-12 * force.norm() * 5.0, "{moment}");
+    }
+
+    /// E(Q x, Q R) = E(x, R), f turns with Q; 1e-12.
+    #[test]
+    fn a_rotation_of_space_turns_the_forces_and_costs_nothing() {
+        let mut random = Random::new(4);
+        let facet = facet([0, 1, 2]);
+        let (x, rotation) = pose(&mut random, 1.0);
+        let (energy, force) = evaluate(&facet, &(x, rotation));
+        let q = exponential(&Vector3::new(2.0, -1.0, 1.5));
+        let turned = (x.map(|x| q * x + Vector3::new(5.0, 0.0, 1.0)), rotation.map(|r| q * r));
+        let (same, turned) = evaluate(&facet, &turned);
+        assert!((energy - same).abs() < 1e-12 * energy);
+        for a in 0..6 {
+            let off = turned.fixed_rows::<3>(3 * a) - q * force.fixed_rows::<3>(3 * a).into_owned();
+            assert!(off.norm() < 1e-12 * force.norm(), "{off}");
+        }
+        let rigid = evaluate(&facet, &(rest().map(|x| q * x), [q; 3]));
+        assert!(rigid.0 < 1e-24 * energy.max(1.0) && rigid.1.norm() < 1e-12 * force.norm());
+    }
+
+    #[test]
+    fn the_order_of_the_corners_changes_nothing() {
+        let mut random = Random::new(5);
+        let (x, rotation) = pose(&mut random, 1.0);
+        let (energy, force) = evaluate(&facet([0, 1, 2]), &(x, rotation));
+        let order = [1, 2, 0];
+        let (same, other) = evaluate(&facet(order), &(order.map(|i| x[i]), order.map(|i| rotation[i])));
+        assert!((energy - same).abs() < 1e-12 * energy);
+        for (place, &node) in order.iter().enumerate() {
+            let off = other.fixed_rows::<6>(6 * place) - force.fixed_rows::<6>(6 * node);
+            assert!(off.norm() < 1e-12 * force.norm(), "{off}");
+        }
+    }
+
+    #[test]
+    fn parts_of_the_energy_add_up() {
+        let mut random = Random::new(6);
+        let (x, rotation) = pose(&mut random, 1.0);
+        for membrane in [Membrane::default(), Membrane::Opt { adaptation: f64::INFINITY }] {
+            let formulation = Formulation { membrane, ..Formulation::default() };
+            let facet = Facet::new([0, 1, 2], rest(), 0.1, MATERIAL, formulation).unwrap();
+            let placed = facet.place(&x, &rotation).unwrap();
+            let parts = facet.energy(&placed);
+            let whole = facet.force(&placed).0;
+            assert!((parts.membrane + parts.bending + parts.drilling - whole).abs() < 1e-12 * whole);
+            assert!(parts.membrane > 0.0 && parts.bending > 0.0 && parts.drilling > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_facet_folded_over_or_without_area_is_found() {
+        let facet = facet([0, 1, 2]);
+        let none = [UnitQuaternion::identity(); 3];
+        let flat = [rest()[0], rest()[1], rest()[0]];
+        assert!(matches!(facet.place(&flat, &none), Err(Broken::Area(_))));
+        let [a, b, c] = rest();
+        assert!(matches!(facet.place(&[a, c, b], &none), Err(Broken::Folded(angle)) if angle > 2.0));
+    }
+}

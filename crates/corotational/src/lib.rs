@@ -1,0 +1,63 @@
+//! Thin structures in large rotation: co-rotational triangular shells with membrane, bending and twist, and co-rotational tetrahedra beside
+//! them, with static and implicit solvers. Knows nothing of files or windows. SI units throughout.
+//!
+//! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane (Felippa 2003), six degrees of
+//! freedom a node, in a frame that turns with the facet; its force is the gradient of its energy. [`Model`] is constant, [`State`]
+//! changes; [`Statics`] finds equilibria, [`BackwardEuler`] and [`Explicit`] move a state in time; [`CurvedSurface`] is the smooth
+//! surface of the shells for pictures and for forces on any of its points.
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use pliant_corotational::element::Elasticity;
+//! use pliant_corotational::{
+//!     Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
+//! };
+//! use pliant_mechanics::curve::{Curve, Shape};
+//!
+//! // A strip of 1 m × 0.1 m × 10 mm in ten squares, clamped at x = 0, lifted at its other end.
+//! let points = (0..22).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0)).collect();
+//! let cells = (0..10).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]).collect();
+//! let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+//! let mut model = Model::new(points);
+//! model.add_shell(&Shell::new("strip", cells, 0.01, material))?;
+//! let clamp = Constraint { name: "clamp".into(), nodes: vec![0, 1], components: [true; 6], motion: Motion::Fixed };
+//! model.constraints.push(clamp);
+//! let kind = LoadKind::Force { nodes: vec![20, 21], force: Vector3::new(0.0, 0.0, 0.02) };
+//! let curve = Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 };
+//! model.loads.push(Load { name: "lift".into(), kind, curve, controlled: false });
+//!
+//! let mut state = State::at_rest(&model);
+//! let step = Statics::new(&model, StaticSettings::default())?.solve(&mut state, 1.0)?;
+//! assert!(step.residuals.len() < 20 && step.negative_pivots == 0);
+//! assert!(state.displacement(&model, 21).z > 0.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod dynamics;
+pub mod element;
+mod error;
+mod facet;
+mod linear;
+mod model;
+mod rotation;
+mod sparse;
+mod state;
+mod statics;
+mod surface;
+mod system;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod tet;
+
+pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit};
+pub use error::{ModelError, SolveError};
+pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
+pub use linear::{LinearReport, LinearSolver, Preconditioner};
+pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spread, Spring};
+pub use state::State;
+pub use statics::{Control, StaticSettings, Statics, Step};
+pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Picture, Place};
+pub use system::Phases;
+pub use tet::Tet;

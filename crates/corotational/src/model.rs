@@ -1,0 +1,518 @@
+//! Everything constant: rest positions, facets, masses, normals, loads, constraints.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use pliant_mechanics::curve::Curve;
+
+use crate::element::{Elasticity, Formulation};
+use crate::error::ModelError;
+use crate::facet::Facet;
+use crate::tet::Tet;
+
+/// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// Rest positions [m].
+    pub rest: Vec<Vector3<f64>>,
+    /// Shell elements of all shells.
+    pub facets: Vec<Facet>,
+    /// Tetrahedra of all solids.
+    pub tets: Vec<Tet>,
+    /// Nodal normals at rest, which turn with their nodes; several a node at creases.
+    pub normals: Vec<Normal>,
+    /// The normals at the corners of each facet.
+    pub corner_normals: Vec<[u32; 3]>,
+    /// Mass [kg], one per node.
+    pub mass: Vec<f64>,
+    /// Rotary inertia [kg m²], the same about every axis, one per node.
+    pub inertia: Vec<f64>,
+    /// Mass-proportional damping [1/s].
+    pub mass_damping: f64,
+    /// Stiffness-proportional damping [s].
+    pub stiffness_damping: f64,
+    /// Springs from nodes to points.
+    pub springs: Vec<Spring>,
+    /// Loads, which add up.
+    pub loads: Vec<Load>,
+    /// Constraints.
+    pub constraints: Vec<Constraint>,
+}
+
+/// A normal that a node carries.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Normal {
+    /// The node.
+    pub node: u32,
+    /// Unit vector at rest.
+    pub direction: Vector3<f64>,
+}
+
+/// Elasticity and density.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Isotropic elasticity.
+    pub elastic: Elasticity,
+    /// Density [kg/m³].
+    pub density: f64,
+}
+
+/// Triangles that become a shell.
+#[derive(Clone, Debug)]
+pub struct Shell {
+    /// Its name in messages.
+    pub name: String,
+    /// Nodes of its triangles.
+    pub cells: Vec<[u32; 3]>,
+    /// Thickness [m]: one, or one a triangle.
+    pub thickness: Vec<f64>,
+    /// What it is made of.
+    pub material: Material,
+    /// Its elements.
+    pub formulation: Formulation,
+    /// Triangles that meet at a larger angle [rad] have normals of their own: a crease.
+    pub crease: f64,
+    /// Whether more than two triangles may meet in an edge.
+    pub branches: bool,
+}
+
+impl Shell {
+    /// A shell of one thickness with the default elements, creases above 45° and no branches.
+    pub fn new(name: &str, cells: Vec<[u32; 3]>, thickness: f64, material: Material) -> Self {
+        Self {
+            name: name.into(),
+            cells,
+            thickness: vec![thickness],
+            material,
+            formulation: Formulation::default(),
+            crease: std::f64::consts::FRAC_PI_4,
+            branches: false,
+        }
+    }
+}
+
+/// What was noticed when a shell was added.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Notes {
+    /// Triangles turned over so that all face the same side.
+    pub turned: usize,
+    /// Elements thicker than their smallest altitude: they answer as plates, but are none.
+    pub thick: usize,
+    /// Elements of Comas (2010), which depend on the numbering and converge to a wrong plate.
+    pub comas: usize,
+}
+
+/// A linear spring without rest length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    /// The node it pulls.
+    pub node: u32,
+    /// The point it pulls towards [m].
+    pub anchor: Vector3<f64>,
+    /// Stiffness [N/m].
+    pub stiffness: f64,
+}
+
+/// A load with its course over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Load {
+    /// Its name in messages.
+    pub name: String,
+    /// What acts.
+    pub kind: LoadKind,
+    /// Factor over time.
+    pub curve: Curve,
+    /// Whether it is multiplied by [`State::load_factor`](crate::State::load_factor), which a control finds.
+    pub controlled: bool,
+}
+
+/// What a load acts on and how.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoadKind {
+    /// A force [N] on each of some nodes.
+    Force {
+        /// The nodes.
+        nodes: Vec<u32>,
+        /// Force on each [N].
+        force: Vector3<f64>,
+    },
+    /// A moment [N m] on each of some nodes, with axes that stay in space.
+    Moment {
+        /// The nodes.
+        nodes: Vec<u32>,
+        /// Moment on each [N m].
+        moment: Vector3<f64>,
+    },
+    /// Weight of everything.
+    Gravity {
+        /// Acceleration [m/s²].
+        acceleration: Vector3<f64>,
+    },
+    /// A force per rest area that keeps its direction, a third to each corner.
+    Area {
+        /// Facets.
+        cells: Vec<u32>,
+        /// Force per area [Pa].
+        traction: Vector3<f64>,
+    },
+    /// A force per rest length along edges that keeps its direction, half to each end.
+    Edge {
+        /// Ends of the edges.
+        edges: Vec<[u32; 2]>,
+        /// Force per length [N/m].
+        traction: Vector3<f64>,
+    },
+    /// Pressure along the current normal.
+    Pressure {
+        /// Facets.
+        cells: Vec<u32>,
+        /// Pressure [Pa], positive along the normal.
+        pressure: f64,
+        /// How it comes to the nodes.
+        spread: Spread,
+    },
+}
+
+/// How a pressure on a shell comes to its nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Spread {
+    /// A third of p A n of the flat facet to each corner.
+    #[default]
+    Lumped,
+    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments. Stiffness comes from the flat facets.
+    Curved,
+}
+
+/// Components of nodes that are held or moved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constraint {
+    /// Its name in messages.
+    pub name: String,
+    /// The nodes.
+    pub nodes: Vec<u32>,
+    /// Which of (x, y, z) and of the spins about x, y and z.
+    pub components: [bool; 6],
+    /// Held, or moved from where they start.
+    pub motion: Motion,
+}
+
+/// What constrained components do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Motion {
+    /// They stay where they start.
+    Fixed,
+    /// They move.
+    Moved {
+        /// Displacements [m] and rotations [rad] at a factor of 1; rotations about one axis only.
+        by: [f64; 6],
+        /// Factor over time.
+        curve: Curve,
+    },
+}
+
+impl Model {
+    /// A model of nodes at rest [m] and nothing else.
+    pub fn new(rest: Vec<Vector3<f64>>) -> Self {
+        let nodes = rest.len();
+        Self { rest, mass: vec![0.0; nodes], inertia: vec![0.0; nodes], ..Self::default() }
+    }
+
+    /// Adds a shell: its triangles are made to face one side (each connected part keeps the side of most of its triangles),
+    /// become facets, and give mass and normals to their nodes.
+    ///
+    /// # Errors
+    /// If a quantity is out of range, a triangle is degenerate, or an edge has too many triangles. The model then is as it
+    /// was.
+    pub fn add_shell(&mut self, shell: &Shell) -> Result<Notes, ModelError> {
+        self.check_quantities(shell)?;
+        let (cells, turned) = oriented(shell)?;
+        let mut notes = Notes { turned, ..Notes::default() };
+        let mut facets = Vec::with_capacity(cells.len());
+        for (number, &nodes) in cells.iter().enumerate() {
+            let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
+            let corners = nodes.map(|node| self.rest[node as usize]);
+            let facet = Facet::new(nodes, corners, thickness, shell.material, shell.formulation);
+            let facet = facet.ok_or_else(|| ModelError::Degenerate {
+                shell: shell.name.clone(),
+                cell: number,
+                what: "area",
+                value: 0.5 * (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm(),
+            })?;
+            notes.thick += usize::from(thickness > facet.altitude());
+            notes.comas += usize::from(shell.formulation.bending == crate::element::Bending::Comas2010);
+            facets.push(facet);
+        }
+        for facet in &facets {
+            for node in facet.nodes {
+                self.mass[node as usize] += facet.mass;
+                self.inertia[node as usize] += facet.inertia;
+            }
+        }
+        self.add_normals(&facets, shell.crease);
+        self.facets.extend(facets);
+        Ok(notes)
+    }
+
+    /// Adds co-rotational tetrahedra, which give mass to their nodes. They may share nodes with shells.
+    ///
+    /// # Errors
+    /// If a quantity is out of range or a tetrahedron is degenerate or inverted. The model then is as it was.
+    pub fn add_solid(
+        &mut self,
+        name: &str,
+        cells: &[[u32; 4]],
+        material: Material,
+    ) -> Result<(), ModelError> {
+        check_material(name, material, 0.5, "between -1 and 0.5")?;
+        let mut tets = Vec::with_capacity(cells.len());
+        for (cell, &nodes) in cells.iter().enumerate() {
+            check_nodes(name, cell, &nodes, self.rest.len())?;
+            let corners = nodes.map(|node| self.rest[node as usize]);
+            tets.push(Tet::new(nodes, corners, material).map_err(|value| ModelError::Degenerate {
+                shell: name.into(),
+                cell,
+                what: "volume",
+                value,
+            })?);
+        }
+        for tet in &tets {
+            tet.nodes.iter().for_each(|&node| self.mass[node as usize] += tet.mass);
+        }
+        self.tets.extend(tets);
+        Ok(())
+    }
+
+    fn check_quantities(&self, shell: &Shell) -> Result<(), ModelError> {
+        let out_of_range = |what: String, value: f64, range| {
+            Err(ModelError::OutOfRange { shell: shell.name.clone(), what, value, range })
+        };
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        check_material(&shell.name, shell.material, 1.0, "between -1 and 1")?;
+        let (cells, given) = (shell.cells.len(), shell.thickness.len());
+        if given != 1 && given != cells {
+            return Err(ModelError::Thicknesses { shell: shell.name.clone(), cells, given });
+        }
+        if let Some((cell, &value)) = shell.thickness.iter().enumerate().find(|(_, t)| !positive(**t)) {
+            let what = if given == 1 { "thickness".into() } else { format!("thickness of element {cell}") };
+            return out_of_range(what, value, "positive and finite");
+        }
+        for (cell, nodes) in shell.cells.iter().enumerate() {
+            check_nodes(&shell.name, cell, nodes, self.rest.len())?;
+        }
+        Ok(())
+    }
+
+    /// Angle-weighted normals, one for each fan of facets round a node that meet at less than the crease angle.
+    fn add_normals(&mut self, facets: &[Facet], crease: f64) {
+        let normal_of = |facet: &Facet| {
+            let [a, b, c] = facet.nodes.map(|node| self.rest[node as usize]);
+            (b - a).cross(&(c - a)).normalize()
+        };
+        let face_normals: Vec<Vector3<f64>> = facets.iter().map(normal_of).collect();
+        let mut around: BTreeMap<u32, Vec<(usize, usize)>> = BTreeMap::new();
+        for (number, facet) in facets.iter().enumerate() {
+            for (corner, &node) in facet.nodes.iter().enumerate() {
+                around.entry(node).or_default().push((number, corner));
+            }
+        }
+        let mut corner_normals = vec![[0; 3]; facets.len()];
+        for (&node, corners) in &around {
+            for fan in fans(facets, corners, &face_normals, crease.cos()) {
+                let mut sum = Vector3::zeros();
+                for &(facet, corner) in &fan {
+                    let [at, next, last] =
+                        [0, 1, 2].map(|i| self.rest[facets[facet].nodes[(corner + i) % 3] as usize]);
+                    sum += face_normals[facet] * (next - at).angle(&(last - at));
+                    corner_normals[facet][corner] = self.normals.len() as u32;
+                }
+                self.normals.push(Normal { node, direction: sum.normalize() });
+            }
+        }
+        self.corner_normals.extend(corner_normals);
+    }
+
+    /// The volume [m³] that closed facets enclose at some positions, positive with normals outwards.
+    pub fn enclosed_volume(&self, cells: &[u32], position: &[Vector3<f64>]) -> f64 {
+        let tet = |&cell: &u32| {
+            let [a, b, c] = self.facets[cell as usize].nodes.map(|node| position[node as usize]);
+            a.dot(&b.cross(&c)) / 6.0
+        };
+        cells.iter().map(tet).sum()
+    }
+
+    /// Whether facets close.
+    ///
+    /// # Errors
+    /// If not: the borders that they leave open.
+    pub fn check_closed(&self, cells: &[u32]) -> Result<(), ModelError> {
+        let nodes: Vec<[u32; 3]> = cells.iter().map(|&cell| self.facets[cell as usize].nodes).collect();
+        let open = edges(&nodes).into_iter().filter(|(_, sides)| sides.len() == 1);
+        // From the start of each open edge to its end, as its triangle runs.
+        let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for ([low, high], sides) in open {
+            let [from, to] = if sides[0].1 { [low, high] } else { [high, low] };
+            next.entry(from).or_default().push(to);
+        }
+        let mut loops = Vec::new();
+        while let Some((&start, _)) = next.iter().next() {
+            let mut border = Vec::new();
+            let mut at = start;
+            while let Some(ends) = next.get_mut(&at) {
+                border.push(at);
+                let to = ends.pop();
+                if ends.is_empty() {
+                    next.remove(&at);
+                }
+                at = to.unwrap_or(start);
+            }
+            loops.push(border);
+        }
+        if loops.is_empty() { Ok(()) } else { Err(ModelError::Open { loops }) }
+    }
+
+    /// What round-off leaves of the norm of a residual [N], 8 ε E t |x| √n: displacements are differences of positions, known to ε |x|.
+    pub(crate) fn round_off(&self) -> f64 {
+        let extent = self.rest.iter().map(|x| x.amax()).fold(0.0, f64::max);
+        let shells = self.facets.iter().map(|facet| facet.membrane_modulus());
+        let solids = self.tets.iter().map(|tet| tet.modulus() * tet.volume.cbrt());
+        let stiffness = shells.chain(solids).fold(0.0, f64::max);
+        8.0 * f64::EPSILON * stiffness * extent * (self.rest.len() as f64).sqrt()
+    }
+
+    /// The mean length of the facets' and other cells' edges at rest [m]; 1 without any.
+    pub(crate) fn mean_edge(&self) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        let mut add = |a: u32, b: u32| {
+            sum += (self.rest[a as usize] - self.rest[b as usize]).norm();
+            count += 1;
+        };
+        for facet in &self.facets {
+            (0..3).for_each(|i| add(facet.nodes[i], facet.nodes[(i + 1) % 3]));
+        }
+        for tet in &self.tets {
+            (0..4).for_each(|i| add(tet.nodes[i], tet.nodes[(i + 1) % 4]));
+        }
+        if count > 0 { sum / f64::from(count) } else { 1.0 }
+    }
+}
+
+fn check_material(
+    name: &str,
+    Material { elastic, density }: Material,
+    above: f64,
+    range: &'static str,
+) -> Result<(), ModelError> {
+    let out_of_range = |what: &str, value, range| {
+        Err(ModelError::OutOfRange { shell: name.into(), what: what.into(), value, range })
+    };
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    if !positive(elastic.young) {
+        return out_of_range("Young's modulus", elastic.young, "positive and finite");
+    }
+    if !(elastic.poisson > -1.0 && elastic.poisson < above) {
+        return out_of_range("Poisson's ratio", elastic.poisson, range);
+    }
+    if !positive(density) {
+        return out_of_range("density", density, "positive and finite");
+    }
+    Ok(())
+}
+
+fn check_nodes(name: &str, cell: usize, nodes: &[u32], count: usize) -> Result<(), ModelError> {
+    match nodes.iter().find(|&&node| node as usize >= count) {
+        Some(&node) => Err(ModelError::NoSuchNode { shell: name.into(), cell, node, nodes: count }),
+        None => Ok(()),
+    }
+}
+
+/// Each edge (lower node first) with the triangles at it, and whether they run along it from the lower node.
+fn edges(cells: &[[u32; 3]]) -> BTreeMap<[u32; 2], Vec<(usize, bool)>> {
+    let mut edges: BTreeMap<[u32; 2], Vec<(usize, bool)>> = BTreeMap::new();
+    for (number, nodes) in cells.iter().enumerate() {
+        for i in 0..3 {
+            let (a, b) = (nodes[i], nodes[(i + 1) % 3]);
+            edges.entry([a.min(b), a.max(b)]).or_default().push((number, a < b));
+        }
+    }
+    edges
+}
+
+/// The triangles of a shell facing one side, and how many were turned over.
+fn oriented(shell: &Shell) -> Result<(Vec<[u32; 3]>, usize), ModelError> {
+    let edges = edges(&shell.cells);
+    let mut neighbours: Vec<Vec<(usize, bool, [u32; 2])>> = vec![Vec::new(); shell.cells.len()];
+    for (&edge, sides) in &edges {
+        match sides[..] {
+            [(a, along), (b, same)] => {
+                neighbours[a].push((b, along == same, edge));
+                neighbours[b].push((a, along == same, edge));
+            }
+            [_] => {}
+            _ if shell.branches => {}
+            _ => return Err(ModelError::Branch { shell: shell.name.clone(), edge, count: sides.len() }),
+        }
+    }
+    let mut turn: Vec<Option<bool>> = vec![None; shell.cells.len()];
+    let mut total = 0;
+    for start in 0..shell.cells.len() {
+        if turn[start].is_some() {
+            continue;
+        }
+        turn[start] = Some(false);
+        let mut part = vec![start];
+        let mut next = 0;
+        while let Some(&cell) = part.get(next) {
+            next += 1;
+            for &(other, opposed, edge) in &neighbours[cell] {
+                let wanted = turn[cell].map(|turned| turned != opposed);
+                match turn[other] {
+                    None => {
+                        turn[other] = wanted;
+                        part.push(other);
+                    }
+                    found if found == wanted => {}
+                    _ => return Err(ModelError::OneSided { shell: shell.name.clone(), edge }),
+                }
+            }
+        }
+        let turned = part.iter().filter(|&&cell| turn[cell] == Some(true)).count();
+        if 2 * turned > part.len() {
+            part.iter().for_each(|&cell| turn[cell] = turn[cell].map(|turned| !turned));
+        }
+        total += turned.min(part.len() - turned);
+    }
+    let cells = shell.cells.iter().zip(&turn);
+    Ok((
+        cells.map(|(&[a, b, c], turn)| if *turn == Some(true) { [a, c, b] } else { [a, b, c] }).collect(),
+        total,
+    ))
+}
+
+/// The corners of facets at one node, parted where facets that share an edge meet at a crease.
+fn fans(
+    facets: &[Facet],
+    corners: &[(usize, usize)],
+    normals: &[Vector3<f64>],
+    crease: f64,
+) -> Vec<Vec<(usize, usize)>> {
+    let mut left = corners.to_vec();
+    let mut fans = Vec::new();
+    while let Some(first) = left.pop() {
+        let mut fan = vec![first];
+        let mut next = 0;
+        while let Some(&(facet, corner)) = fan.get(next) {
+            next += 1;
+            let ends = [1, 2].map(|i| facets[facet].nodes[(corner + i) % 3]);
+            left.retain(|&(other, at)| {
+                let shares = [1, 2].iter().any(|i| ends.contains(&facets[other].nodes[(at + i) % 3]));
+                let smooth = shares && normals[facet].dot(&normals[other]) > crease;
+                if smooth {
+                    fan.push((other, at));
+                }
+                !smooth
+            });
+        }
+        fans.push(fan);
+    }
+    fans
+}

@@ -1,0 +1,203 @@
+//! The lower half of a symmetric sparse matrix, filled by cells whose places in it are found once.
+
+/// No equation: the component is held or has no stiffness.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Lower triangle with diagonal, column by column, rows increasing.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LowerMatrix {
+    pub(crate) column_start: Vec<u32>,
+    pub(crate) row: Vec<u32>,
+    pub(crate) value: Vec<f64>,
+    /// The entries mirrored at the diagonal, for matrices that are not symmetric; else empty.
+    pub(crate) mirror: Vec<f64>,
+}
+
+/// The equations of a model: components of nodes that are free, numbered node by node.
+#[derive(Clone, Debug)]
+pub(crate) struct Equations {
+    /// The equation of each component, six a node.
+    pub(crate) number: Vec<u32>,
+    /// The component of each equation.
+    pub(crate) component: Vec<u32>,
+}
+
+impl Equations {
+    /// Numbers the components that are free.
+    pub(crate) fn new(free: &[bool]) -> Self {
+        let component: Vec<u32> = (0..free.len() as u32).filter(|&i| free[i as usize]).collect();
+        let mut number = vec![NONE; free.len()];
+        for (equation, &component) in component.iter().enumerate() {
+            number[component as usize] = equation as u32;
+        }
+        Self { number, component }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.component.len()
+    }
+
+    /// The first equation of a node, if any.
+    fn first(&self, node: u32) -> u32 {
+        let own = &self.number[6 * node as usize..6 * node as usize + 6];
+        own.iter().copied().min().unwrap_or(NONE)
+    }
+}
+
+impl LowerMatrix {
+    /// The pattern of cells that couple all equations of their nodes.
+    pub(crate) fn new<'a>(equations: &Equations, cells: impl Iterator<Item = &'a [u32]>) -> Self {
+        let nodes = equations.number.len() / 6;
+        // Of each node, itself and the neighbours with higher numbers.
+        let mut above: Vec<Vec<u32>> = (0..nodes as u32).map(|node| vec![node]).collect();
+        for cell in cells {
+            for &a in cell {
+                above[a as usize].extend(cell.iter().filter(|&&b| b > a));
+            }
+        }
+        let mut matrix =
+            Self { column_start: vec![0], row: Vec::new(), value: Vec::new(), mirror: Vec::new() };
+        for (node, above) in above.iter_mut().enumerate() {
+            above.sort_unstable();
+            above.dedup();
+            for &column in equations.number[6 * node..6 * node + 6].iter().filter(|&&e| e != NONE) {
+                for &other in above.iter() {
+                    let rows = &equations.number[6 * other as usize..6 * other as usize + 6];
+                    matrix.row.extend(rows.iter().filter(|&&row| row != NONE && row >= column));
+                }
+                matrix.column_start.push(matrix.row.len() as u32);
+            }
+        }
+        matrix.value = vec![0.0; matrix.row.len()];
+        matrix
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.column_start.len() - 1
+    }
+
+    /// Keeps both halves from now on.
+    pub(crate) fn keep_mirror(&mut self) {
+        self.mirror = vec![0.0; self.value.len()];
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.value.fill(0.0);
+        self.mirror.fill(0.0);
+    }
+
+    /// Where in the values the rows of node `row` in an equation's column start, had the row node's first equation a place
+    /// there. Wraps below zero.
+    fn base(&self, equations: &Equations, row_node: u32, column: u32) -> u32 {
+        let start = self.column_start[column as usize];
+        let rows = &self.row[start as usize..self.column_start[column as usize + 1] as usize];
+        let first = equations.first(row_node);
+        match rows.binary_search(&first) {
+            Ok(at) => start + at as u32,
+            // The node of the column itself: its rows start at the diagonal.
+            Err(_) => start.wrapping_sub(column.wrapping_sub(first)),
+        }
+    }
+
+    /// The places of a cell: for each ordered pair of its nodes (row, column) and each component of the column.
+    pub(crate) fn places(&self, equations: &Equations, nodes: &[u32], components: usize) -> Vec<u32> {
+        let mut places = Vec::with_capacity(nodes.len() * nodes.len() * components);
+        for &row_node in nodes {
+            for &column_node in nodes {
+                for c in 0..components {
+                    let column = equations.number[6 * column_node as usize + c];
+                    let below =
+                        row_node >= column_node && column != NONE && equations.first(row_node) != NONE;
+                    places.push(if below { self.base(equations, row_node, column) } else { NONE });
+                }
+            }
+        }
+        places
+    }
+
+    /// Adds a cell's matrix, stored column by column; of a symmetric one the lower half.
+    pub(crate) fn add(
+        &mut self,
+        equations: &Equations,
+        nodes: &[u32],
+        components: usize,
+        places: &[u32],
+        cell: &[f64],
+    ) {
+        let size = nodes.len() * components;
+        for (a, &row_node) in nodes.iter().enumerate() {
+            let first = equations.first(row_node);
+            let rows = &equations.number[6 * row_node as usize..6 * row_node as usize + components];
+            for (b, &column_node) in nodes.iter().enumerate() {
+                if row_node < column_node {
+                    continue;
+                }
+                for c in 0..components {
+                    let column = equations.number[6 * column_node as usize + c];
+                    if column == NONE {
+                        continue;
+                    }
+                    let base = places[(a * nodes.len() + b) * components + c];
+                    for (r, &row) in rows.iter().enumerate() {
+                        if row != NONE && row >= column {
+                            let at = base.wrapping_add(row - first) as usize;
+                            let (i, j) = (a * components + r, b * components + c);
+                            self.value[at] += cell[j * size + i];
+                            if !self.mirror.is_empty() {
+                                self.mirror[at] += cell[i * size + j];
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds to a diagonal entry.
+    pub(crate) fn add_diagonal(&mut self, equation: usize, value: f64) {
+        let at = self.column_start[equation] as usize;
+        self.value[at] += value;
+        if !self.mirror.is_empty() {
+            self.mirror[at] += value;
+        }
+    }
+
+    /// Adds to an entry of a matrix that is not symmetric, if the pattern has it.
+    pub(crate) fn add_entry(&mut self, row: u32, column: u32, value: f64) {
+        let (low, high) = (row.min(column), row.max(column));
+        let (start, end) =
+            (self.column_start[low as usize] as usize, self.column_start[low as usize + 1] as usize);
+        if let Ok(at) = self.row[start..end].binary_search(&high) {
+            if row >= column {
+                self.value[start + at] += value;
+            }
+            if row <= column {
+                self.mirror[start + at] += value;
+            }
+        }
+    }
+
+    pub(crate) fn diagonal(&self, equation: usize) -> f64 {
+        self.value[self.column_start[equation] as usize]
+    }
+
+    /// y = A x.
+    pub(crate) fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        self.multiply_values(&self.value, x, y);
+    }
+
+    /// y = A x for another symmetric matrix of the same pattern.
+    pub(crate) fn multiply_values(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
+        for (column, bounds) in self.column_start.windows(2).enumerate() {
+            let (start, end) = (bounds[0] as usize, bounds[1] as usize);
+            let own = x[column];
+            let mut sum = values[start] * own;
+            for (&row, &value) in self.row[start + 1..end].iter().zip(&values[start + 1..end]) {
+                sum += value * x[row as usize];
+                y[row as usize] += value * own;
+            }
+            y[column] += sum;
+        }
+    }
+}

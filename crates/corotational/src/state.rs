@@ -1,0 +1,93 @@
+//! Everything that changes, as arrays over the nodes. A clone is a snapshot.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::facet::{Broken, Resultants, ShellEnergy};
+use crate::model::Model;
+use crate::rotation::exponential;
+
+/// Where a model is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Time [s], or the course of a quasi-static load.
+    pub time: f64,
+    /// Factor of controlled loads.
+    pub load_factor: f64,
+    /// Positions [m].
+    pub position: Vec<Vector3<f64>>,
+    /// Rotations from rest.
+    pub rotation: Vec<UnitQuaternion<f64>>,
+    /// Velocities [m/s].
+    pub velocity: Vec<Vector3<f64>>,
+    /// Spins [rad/s].
+    pub spin: Vec<Vector3<f64>>,
+}
+
+impl State {
+    /// At rest, where nothing is strained. To start elsewhere, change positions and rotations.
+    pub fn at_rest(model: &Model) -> Self {
+        let nodes = model.rest.len();
+        Self {
+            time: 0.0,
+            load_factor: 0.0,
+            position: model.rest.clone(),
+            rotation: vec![UnitQuaternion::identity(); nodes],
+            velocity: vec![Vector3::zeros(); nodes],
+            spin: vec![Vector3::zeros(); nodes],
+        }
+    }
+
+    /// Displacement of a node [m].
+    pub fn displacement(&self, model: &Model, node: usize) -> Vector3<f64> {
+        self.position[node] - model.rest[node]
+    }
+
+    /// Moves and turns all nodes by a part of (translation, spin) increments, six a node.
+    pub(crate) fn advance(&mut self, increment: &[f64], part: f64) {
+        let nodes = self.position.iter_mut().zip(&mut self.rotation).zip(increment.chunks_exact(6));
+        for ((position, rotation), d) in nodes {
+            *position += Vector3::new(d[0], d[1], d[2]) * part;
+            let spin = Vector3::new(d[3], d[4], d[5]) * part;
+            if spin != Vector3::zeros() {
+                *rotation = exponential(&spin) * *rotation;
+            }
+        }
+    }
+
+    /// The nodes of a facet: positions and rotations.
+    pub(crate) fn corners(&self, nodes: [u32; 3]) -> ([Vector3<f64>; 3], [UnitQuaternion<f64>; 3]) {
+        (nodes.map(|node| self.position[node as usize]), nodes.map(|node| self.rotation[node as usize]))
+    }
+
+    /// The current direction of a nodal normal.
+    pub fn normal(&self, model: &Model, number: usize) -> Vector3<f64> {
+        let normal = model.normals[number];
+        self.rotation[normal.node as usize] * normal.direction
+    }
+
+    /// Energy of all facets [J].
+    ///
+    /// # Errors
+    /// If a facet is collapsed or folded over.
+    pub fn shell_energy(&self, model: &Model) -> Result<ShellEnergy, Broken> {
+        let mut sum = ShellEnergy::default();
+        for facet in &model.facets {
+            let (x, rotation) = self.corners(facet.nodes);
+            let part = facet.energy(&facet.place(&x, &rotation)?);
+            sum.membrane += part.membrane;
+            sum.bending += part.bending;
+            sum.drilling += part.drilling;
+        }
+        Ok(sum)
+    }
+
+    /// Forces and moments per length in a facet.
+    ///
+    /// # Errors
+    /// If the facet is collapsed or folded over.
+    pub fn resultants(&self, model: &Model, facet: usize) -> Result<Resultants, Broken> {
+        let facet = &model.facets[facet];
+        let (x, rotation) = self.corners(facet.nodes);
+        Ok(facet.resultants(&facet.place(&x, &rotation)?))
+    }
+}

@@ -1,0 +1,477 @@
+//! Static equilibria: Newton's method with load steps; displacement control and arc length (Crisfield 1981) past limit
+//! points; a prescribed volume for balloons. A control finds the factor of the controlled loads as one more unknown.
+//! Leaves out: branch switching at bifurcations.
+
+use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
+
+use crate::error::SolveError;
+use crate::facet::Tangent;
+use crate::linear::{LinearSolver, dot};
+use crate::model::{LoadKind, Model};
+use crate::state::State;
+use crate::system::{Phases, System};
+
+/// How equilibria are sought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StaticSettings {
+    /// Iterations of Newton's method at the most in a load step.
+    pub iterations: usize,
+    /// How often a load step that fails is halved.
+    pub halvings: usize,
+    /// Residual allowed, as a part of the loads or the internal forces, whichever are larger.
+    pub tolerance: f64,
+    /// Residual allowed, as a part of the largest force on a node of an element: what round-off leaves.
+    pub floor: f64,
+    /// Largest rotation of a node in an iteration [rad].
+    pub rotation_limit: f64,
+    /// Whether iterations that make the residual along them ten times as large are shortened, but for the first two: thin
+    /// shells overshoot there and then converge quadratically.
+    pub line_search: bool,
+    /// Which stiffness.
+    pub tangent: Tangent,
+    /// Solver of the linear equations.
+    pub linear: LinearSolver,
+}
+
+impl Default for StaticSettings {
+    fn default() -> Self {
+        Self {
+            iterations: 40,
+            halvings: 8,
+            tolerance: 1e-8,
+            floor: 1e-7,
+            rotation_limit: 0.7,
+            line_search: true,
+            tangent: Tangent::Full,
+            linear: LinearSolver::Direct,
+        }
+    }
+}
+
+/// Growth of the residual along an increment above which it is shortened. With 1 the slit annulus takes a fifth more iterations.
+const GROWTH: f64 = 10.0;
+
+/// What fixes the factor of the controlled loads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// A component (0 to 2) of a node moves by a distance [m].
+    Displacement {
+        /// The node.
+        node: u32,
+        /// x, y or z as 0, 1, 2.
+        component: usize,
+        /// Distance [m] from where the node is.
+        by: f64,
+    },
+    /// All translations together move by a length [m], √Σ|Δx|², onwards from the last step.
+    ArcLength {
+        /// The length [m].
+        length: f64,
+    },
+    /// The facets of the controlled pressure enclose a volume [m³].
+    Volume {
+        /// The volume [m³].
+        volume: f64,
+    },
+}
+
+/// A load step that found its equilibrium.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Time at its end.
+    pub time: f64,
+    /// Norm of the residual [N] before each iteration and at the end; moments are divided by the mean edge.
+    pub residuals: Vec<f64>,
+    /// Negative pivots of the last stiffness: above 0 the equilibrium is unstable. Always 0 with conjugate gradients.
+    pub negative_pivots: usize,
+    /// Load steps that it took: 1, or more where it was halved.
+    pub parts: usize,
+}
+
+/// A static solver.
+pub struct Statics<'m> {
+    system: System<'m>,
+    settings: StaticSettings,
+    /// Mean edge [m]: makes forces of moments.
+    length: f64,
+    /// What round-off leaves of a residual, about ε E t |x| a node [N].
+    round_off: f64,
+    /// Increments of prescribed components still to come, six a node.
+    pending: Vec<f64>,
+    increment: Vec<f64>,
+    residual: Vec<f64>,
+    solution: Vec<f64>,
+    /// Solution for the controlled loads, and its right-hand side.
+    response: Vec<f64>,
+    controlled: Vec<f64>,
+    /// Gradient of what is controlled, six a node.
+    gradient: Vec<f64>,
+    /// The last step's translations, six a node: the direction in which arc length goes on.
+    direction: Vec<f64>,
+}
+
+/// An attempt that failed, with the residuals so far and the node of the largest.
+struct Attempt {
+    error: SolveError,
+    /// Whether smaller load steps may help.
+    retry: bool,
+}
+
+impl<'m> Statics<'m> {
+    /// A solver for a model.
+    ///
+    /// # Errors
+    /// If a part of the model is free to move as a rigid body.
+    pub fn new(model: &'m Model, settings: StaticSettings) -> Result<Self, SolveError> {
+        check_held(model)?;
+        let system = System::new(model, settings.linear)?;
+        let (all, free) = (6 * model.rest.len(), system.equations.len());
+        Ok(Self {
+            settings,
+            length: model.mean_edge(),
+            round_off: model.round_off(),
+            pending: vec![0.0; all],
+            increment: vec![0.0; all],
+            gradient: vec![0.0; all],
+            direction: vec![0.0; all],
+            residual: vec![0.0; free],
+            solution: vec![0.0; free],
+            response: vec![0.0; free],
+            controlled: vec![0.0; free],
+            system,
+        })
+    }
+
+    /// Time spent in the parts of the solver so far.
+    pub fn phases(&self) -> Phases {
+        self.system.phases
+    }
+
+    /// Forces and moments on each node of the model that its elements resist with, less its loads, at the last evaluation:
+    /// on held components these are the reactions [N, N m], six a node.
+    pub fn reactions(&self) -> impl Iterator<Item = [f64; 6]> {
+        let nodes = self.system.internal.chunks_exact(6).zip(self.system.external.chunks_exact(6));
+        nodes.map(|(internal, external)| [0, 1, 2, 3, 4, 5].map(|c| internal[c] - external[c]))
+    }
+
+    /// Displacements and rotations (six a node) by linear theory about a state: one solution.
+    ///
+    /// # Errors
+    /// If the stiffness is singular or conjugate gradients fail.
+    pub fn linear(&mut self, state: &State, time: f64) -> Result<Vec<[f64; 6]>, SolveError> {
+        self.system.prescribed(state.time, time, &mut self.pending);
+        self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
+        self.find_residual(state);
+        self.system.prepare()?;
+        self.system.solve(&self.residual, &mut self.solution)?;
+        let mut all = self.pending.clone();
+        self.system.spread(&self.solution, &mut all);
+        Ok(all.chunks_exact(6).map(|c| [c[0], c[1], c[2], c[3], c[4], c[5]]).collect())
+    }
+
+    /// The equilibrium at a time. A load step that fails is halved.
+    ///
+    /// # Errors
+    /// If a step fails as often as it may be halved; the state then is at the last equilibrium found on the way.
+    pub fn solve(&mut self, state: &mut State, until: f64) -> Result<Step, SolveError> {
+        let mut done = Step::default();
+        let mut size = until - state.time;
+        let mut halvings = 0;
+        loop {
+            let rest = until - state.time;
+            let target = if size >= rest * (1.0 - 1e-12) { until } else { state.time + size };
+            let before = state.clone();
+            match self.newton(state, target, None) {
+                Ok(step) => {
+                    done = Step { parts: done.parts + 1, ..step };
+                    if target == until {
+                        return Ok(done);
+                    }
+                }
+                Err(Attempt { error, retry }) => {
+                    *state = before;
+                    if !retry || halvings == self.settings.halvings {
+                        return Err(error);
+                    }
+                    halvings += 1;
+                    size *= 0.5;
+                }
+            }
+        }
+    }
+
+    /// The next equilibrium under a control, which finds the factor of the controlled loads, at the state's time.
+    ///
+    /// # Errors
+    /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is found (the state then is as it was).
+    pub fn control(&mut self, state: &mut State, control: Control) -> Result<Step, SolveError> {
+        if !self.system.model.loads.iter().any(|load| load.controlled) {
+            return Err(SolveError::Impossible("no load is marked as controlled"));
+        }
+        if matches!(control, Control::Volume { .. }) {
+            for load in self.system.model.loads.iter().filter(|load| load.controlled) {
+                if let LoadKind::Pressure { cells, .. } = &load.kind {
+                    self.system.model.check_closed(cells)?;
+                }
+            }
+        }
+        let before = state.clone();
+        let result = self.newton(state, before.time, Some(control));
+        let step = result.map_err(|attempt| {
+            *state = before.clone();
+            attempt.error
+        })?;
+        for (direction, (now, then)) in
+            self.direction.chunks_exact_mut(6).zip(state.position.iter().zip(&before.position))
+        {
+            direction[..3].copy_from_slice((now - then).as_slice());
+        }
+        Ok(Step { parts: 1, ..step })
+    }
+
+    fn newton(&mut self, state: &mut State, time: f64, control: Option<Control>) -> Result<Step, Attempt> {
+        let failed = |error| Attempt { error, retry: true };
+        let start = state.clone();
+        self.system.prescribed(state.time, time, &mut self.pending);
+        let mut residuals: Vec<f64> = Vec::new();
+        let mut negative_pivots = 0;
+        for iteration in 0..=self.settings.iterations {
+            self.system
+                .evaluate(state, time, Some((self.settings.tangent, &self.pending)))
+                .map_err(failed)?;
+            let (norm, allowed) = self.find_residual(state);
+            residuals.push(norm);
+            let gap = control.map_or(0.0, |control| self.constraint(control, state, &start));
+            let complete = self.pending.iter().all(|&p| p == 0.0);
+            let controlled = gap.abs() <= self.allowed_gap(control);
+            if iteration > 0 && complete && controlled && norm <= allowed {
+                state.time = time;
+                return Ok(Step { time, residuals, negative_pivots, parts: 0 });
+            }
+            if !norm.is_finite() || iteration == self.settings.iterations {
+                break;
+            }
+            negative_pivots = self.system.prepare().map_err(failed)?;
+            self.system.solve(&self.residual, &mut self.solution).map_err(failed)?;
+            let factor = match control {
+                Some(control) => self.controlled_factor(control, gap, iteration == 0)?,
+                None => 0.0,
+            };
+            self.increment.copy_from_slice(&self.pending);
+            self.system.spread(&self.solution, &mut self.increment);
+            let part = self.allowed_part();
+            state.advance(&self.increment, part);
+            state.load_factor += part * factor;
+            self.pending.iter_mut().for_each(|p| *p *= 1.0 - part);
+            if self.settings.line_search && iteration > 1 && control.is_none() && part == 1.0 {
+                self.shorten(state, time)?;
+            }
+        }
+        let node = self.worst_node();
+        Err(Attempt { error: SolveError::NotConverged { time, node, residuals }, retry: true })
+    }
+
+    /// Loads less internal forces on the free components; its norm and what is allowed [N].
+    fn find_residual(&mut self, state: &State) -> (f64, f64) {
+        let system = &mut self.system;
+        for (load, controlled) in system.external.iter_mut().zip(&system.controlled) {
+            *load += state.load_factor * controlled;
+        }
+        let arm = self.length;
+        let norm = |values: &mut dyn Iterator<Item = (usize, f64)>| {
+            values.map(|(c, v)| if c % 6 < 3 { v * v } else { v * v / (arm * arm) }).sum::<f64>().sqrt()
+        };
+        let external = norm(&mut system.external.iter().copied().enumerate());
+        let internal = norm(&mut system.internal.iter().copied().enumerate());
+        for (&component, residual) in system.equations.component.iter().zip(&mut self.residual) {
+            *residual = system.external[component as usize] - system.internal[component as usize];
+        }
+        let free = norm(
+            &mut system.equations.component.iter().map(|&c| c as usize).zip(self.residual.iter().copied()),
+        );
+        for (residual, coupling) in self.residual.iter_mut().zip(&system.coupling) {
+            *residual -= coupling;
+        }
+        let StaticSettings { tolerance, floor, .. } = self.settings;
+        let allowed = tolerance * external.max(internal) + floor * system.largest + self.round_off;
+        (free, allowed)
+    }
+
+    fn worst_node(&self) -> u32 {
+        let system = &self.system;
+        let size = |(&component, &residual): (&u32, &f64)| {
+            (if component % 6 < 3 { residual.abs() } else { residual.abs() / self.length }, component / 6)
+        };
+        let all = system.equations.component.iter().zip(&self.residual).map(size);
+        all.fold((f64::NEG_INFINITY, 0), |worst, next| if next.0 > worst.0 { next } else { worst }).1
+    }
+
+    /// The part of the increment that turns no node by more than the limit.
+    fn allowed_part(&self) -> f64 {
+        let turn = |c: &[f64]| Vector3::new(c[3], c[4], c[5]).norm();
+        let largest = self.increment.chunks_exact(6).map(turn).fold(0.0, f64::max);
+        (self.settings.rotation_limit / largest).min(1.0)
+    }
+
+    /// Halves the last increment up to three times while the residual along it, |Δ·r|, is far above what it was.
+    fn shorten(&mut self, state: &mut State, time: f64) -> Result<(), Attempt> {
+        let before = dot(&self.solution, &self.residual).abs();
+        let mut left = 1.0;
+        for _ in 0..3 {
+            let now = match self.system.evaluate(state, time, None) {
+                Ok(()) => {
+                    self.find_residual(state);
+                    dot(&self.solution, &self.residual).abs()
+                }
+                Err(SolveError::Broken { .. }) => f64::INFINITY,
+                Err(error) => return Err(Attempt { error, retry: true }),
+            };
+            if now <= GROWTH * before {
+                break;
+            }
+            left *= 0.5;
+            state.advance(&self.increment, -left);
+        }
+        Ok(())
+    }
+
+    /// How far what is controlled is from where it should be; sets its gradient.
+    fn constraint(&mut self, control: Control, state: &State, start: &State) -> f64 {
+        self.gradient.fill(0.0);
+        match control {
+            Control::Displacement { node, component, by } => {
+                self.gradient[6 * node as usize + component] = 1.0;
+                state.position[node as usize][component] - start.position[node as usize][component] - by
+            }
+            Control::ArcLength { length } => {
+                let mut squared = 0.0;
+                for (gradient, (now, then)) in
+                    self.gradient.chunks_exact_mut(6).zip(state.position.iter().zip(&start.position))
+                {
+                    let moved = now - then;
+                    squared += moved.norm_squared();
+                    gradient[..3].copy_from_slice((2.0 * moved).as_slice());
+                }
+                squared - length * length
+            }
+            Control::Volume { volume } => {
+                let model = self.system.model;
+                let mut now = 0.0;
+                for load in model.loads.iter().filter(|load| load.controlled) {
+                    let LoadKind::Pressure { cells, .. } = &load.kind else { continue };
+                    now += model.enclosed_volume(cells, &state.position);
+                    for &cell in cells {
+                        let nodes = model.facets[cell as usize].nodes;
+                        let x = nodes.map(|node| state.position[node as usize]);
+                        for i in 0..3 {
+                            let slope = x[(i + 1) % 3].cross(&x[(i + 2) % 3]) / 6.0;
+                            for c in 0..3 {
+                                self.gradient[6 * nodes[i] as usize + c] += slope[c];
+                            }
+                        }
+                    }
+                }
+                now - volume
+            }
+        }
+    }
+
+    fn allowed_gap(&self, control: Option<Control>) -> f64 {
+        1e-9 * match control {
+            None => f64::INFINITY,
+            Some(Control::Displacement { by, .. }) => by.abs(),
+            Some(Control::ArcLength { length }) => length * length,
+            Some(Control::Volume { volume }) => volume.abs(),
+        }
+    }
+
+    /// The change of the load factor that keeps the control; adds the response to it to the solution.
+    fn controlled_factor(&mut self, control: Control, gap: f64, first: bool) -> Result<f64, Attempt> {
+        let system = &mut self.system;
+        let fatal = |error| Attempt { error, retry: false };
+        system.gather(&system.controlled, &mut self.controlled);
+        system.solve(&self.controlled, &mut self.response).map_err(fatal)?;
+        let components = &system.equations.component;
+        let along = |x: &[f64], all: &[f64]| -> f64 {
+            components.iter().zip(x).map(|(&c, x)| all[c as usize] * x).sum()
+        };
+        let factor = match control {
+            Control::ArcLength { length } if first => {
+                // The predictor: along the response, onwards.
+                let translations = components.iter().zip(&self.response).filter(|(c, _)| **c % 6 < 3);
+                let size = translations.map(|(_, r)| r * r).sum::<f64>().sqrt();
+                let onwards = along(&self.response, &self.direction);
+                if onwards < 0.0 { -length / size } else { length / size }
+            }
+            _ => {
+                let slope = along(&self.response, &self.gradient);
+                -(gap + along(&self.solution, &self.gradient) + dot(&self.pending, &self.gradient)) / slope
+            }
+        };
+        if !factor.is_finite() {
+            return Err(fatal(SolveError::Impossible(
+                "the controlled loads do not move what is controlled; control a node that they move and that is not held",
+            )));
+        }
+        for (solution, response) in self.solution.iter_mut().zip(&self.response) {
+            *solution += factor * response;
+        }
+        Ok(factor)
+    }
+}
+
+/// Every part of the model must be held: of its six rigid motions none may leave constraints and springs unmoved.
+fn check_held(model: &Model) -> Result<(), SolveError> {
+    let nodes = model.rest.len();
+    let mut part: Vec<usize> = (0..nodes).collect();
+    fn root(part: &mut [usize], mut node: usize) -> usize {
+        while part[node] != node {
+            part[node] = part[part[node]];
+            node = part[node];
+        }
+        node
+    }
+    let mut used = vec![false; nodes];
+    let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
+    for nodes in facets.chain(model.tets.iter().map(|tet| &tet.nodes[..])) {
+        for &node in nodes {
+            used[node as usize] = true;
+            let (x, y) = (root(&mut part, nodes[0] as usize), root(&mut part, node as usize));
+            part[x.max(y)] = x.min(y);
+        }
+    }
+    // Per part: Σ of the squares of what its rigid motions (about the first node, in mean edges) do to what holds it.
+    let length = model.mean_edge();
+    let mut held = vec![Matrix6::zeros(); nodes];
+    let mut hold = |node: usize, component: usize, held: &mut Vec<Matrix6<f64>>| {
+        let first = root(&mut part, node);
+        let arm = (model.rest[node] - model.rest[first]) / length;
+        let row = if component < 3 {
+            let along = Vector3::ith(component, 1.0);
+            let turning = arm.cross(&along);
+            RowVector6::new(along.x, along.y, along.z, turning.x, turning.y, turning.z)
+        } else {
+            RowVector6::from_fn(|_, c| f64::from(u8::from(c == component)))
+        };
+        held[first] += row.transpose() * row;
+    };
+    for constraint in &model.constraints {
+        for &node in &constraint.nodes {
+            (0..6).filter(|&c| constraint.components[c]).for_each(|c| hold(node as usize, c, &mut held));
+        }
+    }
+    for spring in &model.springs {
+        (0..3).for_each(|c| hold(spring.node as usize, c, &mut held));
+    }
+    for node in 0..nodes {
+        if used[node] && root(&mut part, node) == node {
+            let values = SymmetricEigen::new(held[node]).eigenvalues;
+            let limit = 1e-10 * values.max().max(1.0);
+            let free_modes = values.iter().filter(|&&value| value < limit).count();
+            if free_modes > 0 {
+                return Err(SolveError::FreeBody { node: node as u32, free_modes });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,489 @@
+//! Forces and stiffness of a model at a state: cells side by side, then added up in their order, so that the number of
+//! threads changes no bit.
+
+use std::time::{Duration, Instant};
+
+use nalgebra::{SMatrix, SVector, Vector3};
+use rayon::prelude::*;
+
+use crate::error::SolveError;
+use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18};
+use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
+use crate::model::{LoadKind, Model, Motion, Spread};
+use crate::rotation::skew;
+use crate::sparse::{Equations, LowerMatrix, NONE};
+use crate::state::State;
+use crate::surface::{CurvedSurface, EdgeRule};
+use crate::tet::{Matrix12, Vector12};
+
+/// Cells computed side by side before they are added up.
+const CHUNK: usize = 256;
+
+/// Time spent so far in the parts of a solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Phases {
+    /// Forces and stiffness of the cells, and adding them up.
+    pub cells: Duration,
+    /// Factorisation, or inverting the blocks of the preconditioner.
+    pub preparation: Duration,
+    /// Solution of the linear equations.
+    pub solution: Duration,
+    /// Linear equations solved.
+    pub solutions: usize,
+    /// Iterations of conjugate gradients.
+    pub iterations: usize,
+}
+
+/// A model's equations with the forces and the stiffness last found.
+pub(crate) struct System<'m> {
+    pub(crate) model: &'m Model,
+    pub(crate) equations: Equations,
+    pub(crate) matrix: LowerMatrix,
+    places: Vec<Vec<u32>>,
+    tet_places: Vec<Vec<u32>>,
+    /// None in a system of forces alone.
+    workspace: Option<Workspace>,
+    /// Internal forces and moments, six a node [N, N m].
+    pub(crate) internal: Vec<f64>,
+    /// Loads, without their controlled part.
+    pub(crate) external: Vec<f64>,
+    /// Loads for a factor of 1.
+    pub(crate) controlled: Vec<f64>,
+    /// What prescribed increments make of forces on free components: K_fc d_c.
+    pub(crate) coupling: Vec<f64>,
+    /// Pressures on facets [Pa]: fixed, controlled.
+    pressure: Vec<[f64; 2]>,
+    /// The curved surface, if a pressure acts on it.
+    surface: Option<CurvedSurface>,
+    /// Strain energy [J].
+    pub(crate) energy: f64,
+    /// Largest force on a node of a cell [N].
+    pub(crate) largest: f64,
+    results: Vec<FacetResult>,
+    tet_results: Vec<TetResult>,
+    pub(crate) phases: Phases,
+    pub(crate) last_solution: LinearReport,
+}
+
+#[derive(Clone)]
+struct FacetResult {
+    energy: f64,
+    force: Vector18,
+    tangent: Matrix18,
+    broken: Option<Broken>,
+}
+
+impl<'m> System<'m> {
+    pub(crate) fn new(model: &'m Model, solver: LinearSolver) -> Result<Self, SolveError> {
+        let mut system = Self::forces_only(model);
+        let matrix = &mut system.matrix;
+        let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
+        let cells = facets.chain(model.tets.iter().map(|tet| &tet.nodes[..]));
+        *matrix = LowerMatrix::new(&system.equations, cells);
+        if solver == LinearSolver::Unsymmetric {
+            matrix.keep_mirror();
+        }
+        system.places = model.facets.iter().map(|f| matrix.places(&system.equations, &f.nodes, 6)).collect();
+        system.tet_places =
+            model.tets.iter().map(|tet| matrix.places(&system.equations, &tet.nodes, 3)).collect();
+        system.coupling = vec![0.0; system.equations.len()];
+        system.workspace = Workspace::new(solver, &system.equations, matrix);
+        if system.workspace.is_none() {
+            return Err(SolveError::Impossible(
+                "the equations are too many for the direct solver; use conjugate gradients",
+            ));
+        }
+        Ok(system)
+    }
+
+    /// A system that has forces, but no stiffness.
+    pub(crate) fn forces_only(model: &'m Model) -> Self {
+        let nodes = model.rest.len();
+        let mut free = vec![false; 6 * nodes];
+        for facet in &model.facets {
+            for node in facet.nodes {
+                free[6 * node as usize..6 * node as usize + 6].fill(true);
+            }
+        }
+        for node in model.tets.iter().flat_map(|tet| tet.nodes) {
+            free[6 * node as usize..6 * node as usize + 3].fill(true);
+        }
+        for constraint in &model.constraints {
+            for &node in &constraint.nodes {
+                for (c, &held) in constraint.components.iter().enumerate() {
+                    free[6 * node as usize + c] &= !held;
+                }
+            }
+        }
+        Self {
+            model,
+            equations: Equations::new(&free),
+            matrix: LowerMatrix::default(),
+            places: Vec::new(),
+            tet_places: Vec::new(),
+            tet_results: vec![TetResult::none(); CHUNK.min(model.tets.len())],
+            workspace: None,
+            internal: vec![0.0; 6 * nodes],
+            external: vec![0.0; 6 * nodes],
+            controlled: vec![0.0; 6 * nodes],
+            coupling: Vec::new(),
+            pressure: vec![[0.0; 2]; model.facets.len()],
+            surface: model
+                .loads
+                .iter()
+                .any(|load| matches!(load.kind, LoadKind::Pressure { spread: Spread::Curved, .. }))
+                .then(|| CurvedSurface::new(model, EdgeRule::Arc)),
+            energy: 0.0,
+            largest: 0.0,
+            results: vec![FacetResult::none(); CHUNK.min(model.facets.len())],
+            phases: Phases::default(),
+            last_solution: LinearReport::default(),
+        }
+    }
+
+    /// Forces at a state and time; with a tangent also the stiffness, and what prescribed increments (six a node) make of it.
+    pub(crate) fn evaluate(
+        &mut self,
+        state: &State,
+        time: f64,
+        tangent: Option<(Tangent, &[f64])>,
+    ) -> Result<(), SolveError> {
+        let start = Instant::now();
+        self.nodal_loads(state, time);
+        self.internal.fill(0.0);
+        self.energy = 0.0;
+        self.largest = 0.0;
+        if tangent.is_some() {
+            self.matrix.clear();
+            self.coupling.fill(0.0);
+        }
+        let kind = tangent.map(|(kind, _)| kind);
+        let model = self.model;
+        let mut results = std::mem::take(&mut self.results);
+        for first in (0..model.facets.len()).step_by(CHUNK) {
+            let last = (first + CHUNK).min(model.facets.len());
+            let factor = state.load_factor;
+            let pressure = &self.pressure;
+            let symmetric = self.matrix.mirror.is_empty();
+            results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
+                let number = first + at;
+                let [fixed, controlled] = pressure[number];
+                let pressure = fixed + factor * controlled;
+                result.broken = result.fill(&model.facets[number], state, kind, pressure, symmetric).err();
+            });
+            for (number, result) in (first..last).zip(&results) {
+                if let Some(why) = result.broken {
+                    self.results = results;
+                    return Err(SolveError::Broken { cell: number, why });
+                }
+                self.add_facet(state, number, result, tangent.map(|(_, moved)| moved));
+            }
+        }
+        self.results = results;
+        self.evaluate_tets(state, tangent.map(|(_, moved)| moved))?;
+        for spring in &model.springs {
+            let at = 6 * spring.node as usize;
+            let stretch = state.position[spring.node as usize] - spring.anchor;
+            self.energy += 0.5 * spring.stiffness * stretch.norm_squared();
+            for c in 0..3 {
+                self.internal[at + c] += spring.stiffness * stretch[c];
+                if tangent.is_some() && self.equations.number[at + c] != NONE {
+                    self.matrix.add_diagonal(self.equations.number[at + c] as usize, spring.stiffness);
+                }
+            }
+        }
+        if tangent.is_some() && !self.matrix.mirror.is_empty() {
+            self.turn_moments(state.load_factor);
+        }
+        self.phases.cells += start.elapsed();
+        Ok(())
+    }
+
+    /// Subtracts S(m)/2 for the moments m on nodes, whose axes stay in space: their covariant derivative.
+    fn turn_moments(&mut self, factor: f64) {
+        for node in 0..self.model.rest.len() {
+            let at = 6 * node + 3;
+            let moment = Vector3::from_fn(|c, _| self.external[at + c] + factor * self.controlled[at + c]);
+            if moment == Vector3::zeros() {
+                continue;
+            }
+            let half = skew(&moment) * 0.5;
+            let equation = |c: usize| self.equations.number[at + c];
+            for (row, column) in [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)] {
+                if equation(row) != NONE && equation(column) != NONE {
+                    self.matrix.add_entry(equation(row), equation(column), -half[(row, column)]);
+                }
+            }
+        }
+    }
+
+    /// Loads on nodes, and pressures on facets; those on the curved surface by what they differ from these.
+    fn nodal_loads(&mut self, state: &State, time: f64) {
+        let model = self.model;
+        self.external.fill(0.0);
+        self.controlled.fill(0.0);
+        self.pressure.fill([0.0; 2]);
+        for load in &model.loads {
+            let factor = load.curve.value(time);
+            let target = if load.controlled { &mut self.controlled } else { &mut self.external };
+            let mut add = |node: u32, first: usize, force: Vector3<f64>| {
+                for c in 0..3 {
+                    target[6 * node as usize + first + c] += factor * force[c];
+                }
+            };
+            match &load.kind {
+                LoadKind::Force { nodes, force } => nodes.iter().for_each(|&node| add(node, 0, *force)),
+                LoadKind::Moment { nodes, moment } => nodes.iter().for_each(|&node| add(node, 3, *moment)),
+                LoadKind::Gravity { acceleration } => {
+                    for (node, &mass) in model.mass.iter().enumerate() {
+                        add(node as u32, 0, acceleration * mass);
+                    }
+                }
+                LoadKind::Area { cells, traction } => {
+                    for facet in cells.iter().map(|&cell| &model.facets[cell as usize]) {
+                        facet.nodes.iter().for_each(|&node| add(node, 0, traction * (facet.area / 3.0)));
+                    }
+                }
+                LoadKind::Edge { edges, traction } => {
+                    for ends in edges {
+                        let [a, b] = ends.map(|node| model.rest[node as usize]);
+                        ends.iter().for_each(|&node| add(node, 0, traction * (0.5 * (b - a).norm())));
+                    }
+                }
+                LoadKind::Pressure { cells, pressure, spread } => {
+                    for &cell in cells {
+                        self.pressure[cell as usize][usize::from(load.controlled)] += factor * pressure;
+                        if let (Spread::Curved, Some(surface)) = (spread, &self.surface) {
+                            let force = surface.patch(model, state, cell).pressure_forces()
+                                - flat_forces(state, model.facets[cell as usize].nodes);
+                            for (i, &node) in model.facets[cell as usize].nodes.iter().enumerate() {
+                                add(node, 0, force.fixed_rows::<3>(6 * i) * *pressure);
+                                add(node, 3, force.fixed_rows::<3>(6 * i + 3) * *pressure);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_facet(&mut self, state: &State, number: usize, result: &FacetResult, moved: Option<&[f64]>) {
+        let facet = &self.model.facets[number];
+        self.energy += result.energy;
+        let pressure = self.pressure[number];
+        let third = if pressure == [0.0; 2] { Vector3::zeros() } else { third_of_area(state, facet.nodes) };
+        for (i, &node) in facet.nodes.iter().enumerate() {
+            let at = 6 * node as usize;
+            for c in 0..6 {
+                self.internal[at + c] += result.force[6 * i + c];
+            }
+            for c in 0..3 {
+                self.largest = self.largest.max(result.force[6 * i + c].abs());
+                self.external[at + c] += pressure[0] * third[c];
+                self.controlled[at + c] += pressure[1] * third[c];
+            }
+        }
+        let Some(moved) = moved else { return };
+        self.matrix.add(&self.equations, &facet.nodes, 6, &self.places[number], result.tangent.as_slice());
+        let own = Vector18::from_fn(|i, _| moved[6 * facet.nodes[i / 6] as usize + i % 6]);
+        if own != Vector18::zeros() {
+            let change: SVector<f64, 18> = result.tangent * own;
+            for (i, &value) in change.iter().enumerate() {
+                let equation = self.equations.number[6 * facet.nodes[i / 6] as usize + i % 6];
+                if equation != NONE {
+                    self.coupling[equation as usize] += value;
+                }
+            }
+        }
+    }
+
+    fn evaluate_tets(&mut self, state: &State, moved: Option<&[f64]>) -> Result<(), SolveError> {
+        let model = self.model;
+        let mut results = std::mem::take(&mut self.tet_results);
+        let mut broken = None;
+        for first in (0..model.tets.len()).step_by(CHUNK) {
+            let last = (first + CHUNK).min(model.tets.len());
+            results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
+                let stiffness = moved.is_some().then_some(&mut result.tangent);
+                match model.tets[first + at].force(state, stiffness) {
+                    Ok((energy, force)) => {
+                        (result.energy, result.force, result.broken) = (energy, force, None)
+                    }
+                    Err(why) => result.broken = Some(why),
+                }
+            });
+            for (number, result) in (first..last).zip(&results) {
+                broken = broken.or(result.broken.map(|why| (number, why)));
+                self.add_tet(number, result, moved);
+            }
+            if broken.is_some() {
+                break;
+            }
+        }
+        self.tet_results = results;
+        match broken {
+            Some((number, why)) => Err(SolveError::Broken { cell: model.facets.len() + number, why }),
+            None => Ok(()),
+        }
+    }
+
+    fn add_tet(&mut self, number: usize, result: &TetResult, moved: Option<&[f64]>) {
+        let nodes = self.model.tets[number].nodes;
+        let component = |i: usize| 6 * nodes[i / 3] as usize + i % 3;
+        self.energy += result.energy;
+        for (i, force) in result.force.iter().enumerate() {
+            self.internal[component(i)] += force;
+            self.largest = self.largest.max(force.abs());
+        }
+        let Some(moved) = moved else { return };
+        self.matrix.add(&self.equations, &nodes, 3, &self.tet_places[number], result.tangent.as_slice());
+        let own = Vector12::from_fn(|i, _| moved[component(i)]);
+        if own != Vector12::zeros() {
+            let change: Vector12 = result.tangent * own;
+            for (i, &value) in change.iter().enumerate() {
+                let equation = self.equations.number[component(i)];
+                if equation != NONE {
+                    self.coupling[equation as usize] += value;
+                }
+            }
+        }
+    }
+
+    /// Takes the matrix as it now is for the coming solutions; returns its negative pivots.
+    pub(crate) fn prepare(&mut self) -> Result<usize, SolveError> {
+        let start = Instant::now();
+        let Some(workspace) = &mut self.workspace else { return Ok(0) };
+        let pivots = workspace.prepare(&self.matrix).map_err(linear_error)?;
+        self.phases.preparation += start.elapsed();
+        if pivots.smallest < ZERO_PIVOT {
+            let component = self.equations.component[pivots.weakest] as usize;
+            const NAMES: [&str; 6] =
+                ["x", "y", "z", "rotation about x", "rotation about y", "rotation about z"];
+            return Err(SolveError::Singular {
+                node: (component / 6) as u32,
+                component: NAMES[component % 6],
+                pivot: pivots.smallest,
+            });
+        }
+        Ok(pivots.negative)
+    }
+
+    /// Solves with the matrix prepared.
+    pub(crate) fn solve(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
+        let start = Instant::now();
+        let Some(workspace) = &mut self.workspace else { return Ok(()) };
+        self.last_solution = workspace.solve(&self.matrix, right, solution).map_err(linear_error)?;
+        self.phases.solution += start.elapsed();
+        self.phases.solutions += 1;
+        self.phases.iterations += self.last_solution.iterations;
+        Ok(())
+    }
+
+    /// Increments of constrained components between two times, six a node.
+    pub(crate) fn prescribed(&self, from: f64, to: f64, increments: &mut [f64]) {
+        increments.fill(0.0);
+        for constraint in &self.model.constraints {
+            let Motion::Moved { by, curve } = &constraint.motion else { continue };
+            let change = curve.value(to) - curve.value(from);
+            for &node in &constraint.nodes {
+                for c in (0..6).filter(|&c| constraint.components[c]) {
+                    increments[6 * node as usize + c] = by[c] * change;
+                }
+            }
+        }
+    }
+
+    /// A vector of equations spread over all components; the others stay as they are.
+    pub(crate) fn spread(&self, equations: &[f64], components: &mut [f64]) {
+        for (&component, &value) in self.equations.component.iter().zip(equations) {
+            components[component as usize] = value;
+        }
+    }
+
+    /// The values of the free components.
+    pub(crate) fn gather(&self, components: &[f64], equations: &mut [f64]) {
+        for (&component, value) in self.equations.component.iter().zip(equations) {
+            *value = components[component as usize];
+        }
+    }
+}
+
+fn linear_error(error: LinearError) -> SolveError {
+    match error {
+        LinearError::NotFinite => SolveError::Impossible("the stiffness is not finite; use smaller steps"),
+        LinearError::Indefinite(iterations) => SolveError::Indefinite { iterations },
+        LinearError::Stalled(LinearReport { iterations, residual }) => {
+            SolveError::Stalled { iterations, residual }
+        }
+    }
+}
+
+/// A third of the area times the normal on each corner, as six numbers a node [m²].
+fn flat_forces(state: &State, nodes: [u32; 3]) -> Vector18 {
+    let third = third_of_area(state, nodes);
+    Vector18::from_fn(|i, _| if i % 6 < 3 { third[i % 6] } else { 0.0 })
+}
+
+/// A third of the area times the normal, now [m²].
+fn third_of_area(state: &State, nodes: [u32; 3]) -> Vector3<f64> {
+    let [a, b, c] = nodes.map(|node| state.position[node as usize]);
+    (b - a).cross(&(c - a)) / 6.0
+}
+
+#[derive(Clone)]
+struct TetResult {
+    energy: f64,
+    force: Vector12,
+    tangent: Matrix12,
+    broken: Option<Broken>,
+}
+
+impl TetResult {
+    fn none() -> Self {
+        Self { energy: 0.0, force: Vector12::zeros(), tangent: Matrix12::zeros(), broken: None }
+    }
+}
+
+impl FacetResult {
+    fn none() -> Self {
+        Self { energy: 0.0, force: Vector18::zeros(), tangent: Matrix18::zeros(), broken: None }
+    }
+
+    /// Force, and with a kind of tangent the stiffness under a pressure; its symmetric part if only that is wanted.
+    fn fill(
+        &mut self,
+        facet: &Facet,
+        state: &State,
+        kind: Option<Tangent>,
+        pressure: f64,
+        symmetric: bool,
+    ) -> Result<(), Broken> {
+        let (x, rotation) = state.corners(facet.nodes);
+        let placed = facet.place(&x, &rotation)?;
+        (self.energy, self.force) = facet.force(&placed);
+        if let Some(kind) = kind {
+            self.tangent = facet.tangent(&placed, kind);
+            // Only the symmetric part: it is the Hessian on the group of rotations (Simo 1992, CMAME 96:189), and the rest vanishes
+            // at equilibrium without moments.
+            self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
+            if pressure != 0.0 {
+                follow(&mut self.tangent, &x, pressure);
+                if symmetric {
+                    self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Takes from a stiffness how p A n/3 changes with the corners.
+fn follow(k: &mut Matrix18, x: &[Vector3<f64>; 3], pressure: f64) {
+    for j in 0..3 {
+        let opposite: SMatrix<f64, 3, 3> = skew(&(x[(j + 2) % 3] - x[(j + 1) % 3])) * (pressure / 6.0);
+        for i in 0..3 {
+            let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * j);
+            block -= opposite;
+        }
+    }
+}

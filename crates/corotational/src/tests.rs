@@ -1,0 +1,683 @@
+//! Models and solvers together, on small specimens.
+
+use nalgebra::Vector3;
+use pliant_mechanics::curve::{Curve, Shape};
+
+use crate::element::{Elasticity, Formulation, Membrane};
+use crate::facet::Tangent;
+use crate::linear::{LinearSolver, Preconditioner};
+use crate::rotation::exponential;
+use crate::system::System;
+use crate::testing::Random;
+use crate::*;
+
+const MATERIAL: Material = Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+
+/// Points and triangles of an octahedron of radius 1 facing outwards, each triangle cut in four some times.
+fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+    let mut points: Vec<Vector3<f64>> = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+        .map(|p: [i32; 3]| Vector3::from(p.map(f64::from)))
+        .to_vec();
+    let mut cells: Vec<[u32; 3]> =
+        vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    for _ in 0..cuts {
+        let mut finer = Vec::new();
+        for [a, b, c] in cells {
+            let mut middle = |p: u32, q: u32| {
+                let at = (points[p as usize] + points[q as usize]).normalize();
+                let known = points.iter().position(|x| (x - at).norm() < 1e-9);
+                known.unwrap_or_else(|| {
+                    points.push(at);
+                    points.len() - 1
+                }) as u32
+            };
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        cells = finer;
+    }
+    (points, cells)
+}
+
+/// A strip of 8 × 2 cells of side 1.
+fn strip() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+    let points = (0..27).map(|i| Vector3::new(f64::from(i % 9), f64::from(i / 9), 0.0)).collect();
+    let cell = |i: u32| {
+        let a = i % 8 + 9 * (i / 8);
+        [[a, a + 1, a + 10], [a, a + 10, a + 9]]
+    };
+    (points, (0..16).flat_map(cell).collect())
+}
+
+fn hold() -> Curve {
+    Curve { shape: Shape::Hold, from: 0.0, to: 1.0 }
+}
+
+fn ramp() -> Curve {
+    Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 }
+}
+
+fn fix(nodes: Vec<u32>, components: [bool; 6]) -> Constraint {
+    Constraint { name: "fixed".into(), nodes, components, motion: Motion::Fixed }
+}
+
+fn model((points, cells): (Vec<Vector3<f64>>, Vec<[u32; 3]>), thickness: f64) -> Model {
+    let mut model = Model::new(points);
+    model.add_shell(&Shell::new("shell", cells, thickness, MATERIAL)).unwrap();
+    model
+}
+
+/// The strip clamped at one end with a force at the other.
+fn cantilever() -> Model {
+    let mut model = model(strip(), 0.1);
+    model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
+    let kind = LoadKind::Force { nodes: vec![8, 17, 26], force: Vector3::new(0.0, 0.0, 0.5) };
+    model.loads.push(Load { name: "pull".into(), kind, curve: ramp(), controlled: false });
+    model
+}
+
+/// The ball with six components held, so that nothing resists its breathing.
+fn balloon(cuts: usize, pressure: f64) -> Model {
+    let mut model = model(ball(cuts), 0.02);
+    model.constraints.push(fix(vec![0], [true, true, true, false, false, false]));
+    model.constraints.push(fix(vec![1], [false, true, true, false, false, false]));
+    model.constraints.push(fix(vec![2], [false, false, true, false, false, false]));
+    let cells = (0..model.facets.len() as u32).collect();
+    let kind = LoadKind::Pressure { cells, pressure, spread: Spread::Lumped };
+    model.loads.push(Load { name: "pressure".into(), kind, curve: hold(), controlled: true });
+    model
+}
+
+#[test]
+fn triangles_are_turned_to_one_side_and_counted() {
+    let (points, mut cells) = ball(2);
+    for cell in [3, 17, 90] {
+        cells[cell].swap(1, 2);
+    }
+    let mut model = Model::new(points);
+    let notes = model.add_shell(&Shell::new("ball", cells, 0.01, MATERIAL)).unwrap();
+    assert_eq!(notes, Notes { turned: 3, thick: 0, comas: 0 });
+    let all: Vec<u32> = (0..128).collect();
+    // Of an inscribed polyhedron of 128 faces.
+    let volume = model.enclosed_volume(&all, &model.rest);
+    assert!((3.7..4.19).contains(&volume), "{volume}");
+    assert!(model.check_closed(&all).is_ok());
+    let Err(ModelError::Open { loops }) = model.check_closed(&all[1..127]) else { panic!("closed") };
+    assert_eq!(loops.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
+}
+
+/// Normals of a smooth ball point outwards to 3°; a cube's corner has three.
+#[test]
+fn nodes_carry_one_normal_for_each_smooth_fan() {
+    let ball = model(ball(2), 0.01);
+    assert_eq!(ball.normals.len(), ball.rest.len());
+    for normal in &ball.normals {
+        let angle = normal.direction.angle(&ball.rest[normal.node as usize]);
+        assert!(angle < 0.052, "{angle}");
+    }
+    let points =
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|p: [i32; 3]| Vector3::from(p.map(f64::from)));
+    let corner = model((points.to_vec(), vec![[0, 1, 2], [0, 2, 3], [0, 3, 1]]), 0.01);
+    assert_eq!(corner.normals.iter().filter(|normal| normal.node == 0).count(), 3);
+    for (facet, normals) in corner.facets.iter().zip(&corner.corner_normals) {
+        for (node, &normal) in facet.nodes.iter().zip(normals) {
+            assert_eq!(corner.normals[normal as usize].node, *node);
+        }
+    }
+}
+
+#[test]
+fn bad_shells_are_told_with_their_element() {
+    let (points, cells) = strip();
+    let good = Shell::new("skin", cells.clone(), 0.1, MATERIAL);
+    let refuse = |shell: &Shell| Model::new(points.clone()).add_shell(shell).unwrap_err().to_string();
+    let mut thin = good.clone();
+    thin.thickness = vec![0.1; 32];
+    thin.thickness[7] = -0.1;
+    assert!(refuse(&thin).contains("thickness of element 7"), "{}", refuse(&thin));
+    thin.thickness = vec![0.1; 5];
+    assert!(refuse(&thin).contains("32 elements and 5"));
+    let mut soft = good.clone();
+    soft.material.elastic.young = 0.0;
+    assert!(refuse(&soft).contains("Young's modulus"));
+    soft.material.elastic = Elasticity { young: 1.0, poisson: 1.0 };
+    assert!(refuse(&soft).contains("Poisson's ratio"));
+    soft.material = Material { density: f64::NAN, ..MATERIAL };
+    assert!(refuse(&soft).contains("density"));
+    let with = |cell: [u32; 3]| Shell { cells: [cells.clone(), vec![cell]].concat(), ..good.clone() };
+    assert!(
+        refuse(&with([3, 4, 5])).contains("element 32") && refuse(&with([3, 4, 5])).contains("degenerate")
+    );
+    assert!(refuse(&with([3, 4, 99])).contains("node 99"));
+    assert!(refuse(&with([1, 10, 26])).contains("3 triangles"), "{}", refuse(&with([1, 10, 26])));
+    let branched = Shell { branches: true, ..with([1, 10, 26]) };
+    assert!(Model::new(points.clone()).add_shell(&branched).is_ok());
+    // Möbius.
+    let ring = (0..5).map(|i| [i, (i + 1) % 5, (i + 2) % 5]).collect();
+    let around = (0..5).map(|i| {
+        let (sine, cosine) = (f64::from(i) * 1.2566).sin_cos();
+        Vector3::new(cosine, sine, 0.1 * f64::from(i * i))
+    });
+    let band = Shell::new("band", ring, 0.1, MATERIAL);
+    assert!(matches!(Model::new(around.collect()).add_shell(&band), Err(ModelError::OneSided { .. })));
+    let thick = Shell::new("skin", cells, 0.8, MATERIAL);
+    assert_eq!(Model::new(points).add_shell(&thick).unwrap().thick, 32);
+}
+
+#[test]
+fn a_body_that_nothing_holds_is_named_with_its_free_modes() {
+    let mut model = model(strip(), 0.1);
+    let free = |model: &Model| match Statics::new(model, StaticSettings::default()) {
+        Err(SolveError::FreeBody { free_modes, .. }) => free_modes,
+        Err(error) => panic!("{error}"),
+        Ok(_) => 0,
+    };
+    assert_eq!(free(&model), 6);
+    model.constraints.push(fix(vec![0], [true, true, true, false, false, false]));
+    assert_eq!(free(&model), 3);
+    model.constraints.push(fix(vec![8], [false, true, true, false, false, false]));
+    assert_eq!(free(&model), 1);
+    model.springs.push(Spring { node: 22, anchor: Vector3::new(4.0, 2.0, 1.0), stiffness: 1.0 });
+    assert_eq!(free(&model), 0);
+}
+
+/// Without stiffness against drilling a flat sheet is singular, and the node is named.
+#[test]
+fn a_singular_stiffness_names_its_node() {
+    let (points, cells) = strip();
+    let mut model = Model::new(points);
+    let formulation = Formulation { membrane: Membrane::Cst { drilling: 0.0 }, ..Formulation::default() };
+    model.add_shell(&Shell { formulation, ..Shell::new("skin", cells, 0.1, MATERIAL) }).unwrap();
+    model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let error = solver.linear(&State::at_rest(&model), 1.0).unwrap_err();
+    assert!(matches!(error, SolveError::Singular { component: "rotation about z", .. }), "{error}");
+}
+
+/// ∂(internal − loads)/∂q of a whole balloon by differences against the assembled matrix; the whole matrix of the unsymmetric solver
+/// at rest, where no moments are left: 1e-6.
+#[test]
+fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
+    let mut model = balloon(2, 100.0);
+    model.springs.push(Spring { node: 5, anchor: Vector3::new(0.0, 0.0, -2.0), stiffness: 30.0 });
+    let mut system = System::new(&model, LinearSolver::Unsymmetric).unwrap();
+    let mut state = State::at_rest(&model);
+    state.load_factor = 2.0;
+    let none = vec![0.0; 6 * model.rest.len()];
+    system.evaluate(&state, 0.0, Some((Tangent::Full, &none))).unwrap();
+    let mut random = Random::new(3);
+    let size = system.equations.len();
+    let direction: Vec<f64> = (0..size).map(|_| random.number()).collect();
+    let mut product = vec![0.0; size];
+    for column in 0..size {
+        let (start, end) =
+            (system.matrix.column_start[column] as usize, system.matrix.column_start[column + 1] as usize);
+        for at in start..end {
+            let row = system.matrix.row[at] as usize;
+            product[row] += system.matrix.value[at] * direction[column];
+            if row != column {
+                product[column] += system.matrix.mirror[at] * direction[row];
+            }
+        }
+    }
+    let mut increment = none.clone();
+    system.spread(&direction, &mut increment);
+    let mut force = |h: f64| {
+        let mut moved = state.clone();
+        moved.advance(&increment, h);
+        system.evaluate(&moved, 0.0, None).unwrap();
+        let all: Vec<f64> = (0..6 * model.rest.len())
+            .map(|c| system.internal[c] - system.external[c] - 2.0 * system.controlled[c])
+            .collect();
+        let mut free = vec![0.0; size];
+        system.gather(&all, &mut free);
+        free
+    };
+    let h = 1e-6;
+    let (ahead, behind) = (force(h), force(-h));
+    let largest = product.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
+    for ((ahead, behind), product) in ahead.iter().zip(&behind).zip(&product) {
+        let off = ((ahead - behind) / (2.0 * h) - product).abs() / largest;
+        assert!(off < 1e-6, "{off:e}");
+    }
+}
+
+fn iterative(preconditioner: Preconditioner) -> LinearSolver {
+    LinearSolver::ConjugateGradients { tolerance: 1e-12, iterations: 5000, preconditioner }
+}
+
+#[test]
+fn all_linear_solvers_find_the_same_equilibrium() {
+    let model = cantilever();
+    let mut found: Vec<State> = Vec::new();
+    for linear in [
+        LinearSolver::Direct,
+        LinearSolver::Unsymmetric,
+        iterative(Preconditioner::BlockJacobi),
+        iterative(Preconditioner::LaggedFactors { renew_after: 20 }),
+    ] {
+        let mut state = State::at_rest(&model);
+        let mut solver =
+            Statics::new(&model, StaticSettings { linear, ..StaticSettings::default() }).unwrap();
+        let step = solver.solve(&mut state, 1.0).unwrap();
+        assert!(step.residuals.len() < 15, "{linear:?}: {:?}", step.residuals);
+        found.push(state);
+    }
+    let tip = found[0].position[26];
+    assert!(tip.z > 1.0, "{tip}");
+    for other in &found[1..] {
+        let off =
+            other.position.iter().zip(&found[0].position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(off < 1e-6, "{off:e}");
+    }
+}
+
+/// The same bits with one thread and with three.
+#[test]
+fn threads_change_no_bit() {
+    let model = cantilever();
+    let solve = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut state = State::at_rest(&model);
+            Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+            state
+        })
+    };
+    assert_eq!(solve(1), solve(3));
+}
+
+/// Moved supports: a rigid rotation of the clamped end carries the strip along without strain.
+#[test]
+fn a_turned_support_turns_the_whole_strip() {
+    let mut model = model(strip(), 0.1);
+    let by = [0.0, 0.0, 0.0, 1.2, 0.0, 0.0];
+    // Turned about the x axis through node 0.
+    model.constraints.push(Constraint {
+        name: "turned".into(),
+        nodes: vec![0],
+        components: [true; 6],
+        motion: Motion::Moved { by, curve: ramp() },
+    });
+    let mut state = State::at_rest(&model);
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    for step in 1..=4 {
+        solver.solve(&mut state, f64::from(step) / 4.0).unwrap();
+    }
+    let turn = exponential(&Vector3::new(1.2, 0.0, 0.0));
+    for (x, rest) in state.position.iter().zip(&model.rest) {
+        assert!((x - turn * rest).norm() < 1e-6, "{x} {rest}");
+    }
+    assert!(state.shell_energy(&model).unwrap().bending < 1e-9);
+}
+
+/// The reactions balance the loads.
+#[test]
+fn reactions_balance_the_loads() {
+    let model = cantilever();
+    let mut state = State::at_rest(&model);
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    solver.solve(&mut state, 1.0).unwrap();
+    let sum: f64 = solver.reactions().enumerate().filter(|(node, _)| node % 9 == 0).map(|(_, r)| r[2]).sum();
+    assert!((sum + 1.5).abs() < 1e-6, "{sum}");
+}
+
+/// A membrane sphere: p = 2 E t u/((1 − ν) r²). Facets are softer; halving them halves what is missing.
+#[test]
+fn a_balloon_takes_the_volume_it_is_told() {
+    let growth = 1.0003_f64;
+    let missing = |cuts| {
+        let model = balloon(cuts, 1.0);
+        let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
+        let rest = model.enclosed_volume(&cells, &model.rest);
+        let mut state = State::at_rest(&model);
+        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        solver.control(&mut state, Control::Volume { volume: rest * growth.powi(3) }).unwrap();
+        let volume = model.enclosed_volume(&cells, &state.position);
+        assert!((volume / (rest * growth.powi(3)) - 1.0).abs() < 1e-8);
+        let radius = (3.0 * rest / (4.0 * std::f64::consts::PI)).cbrt();
+        let pressure = 2.0 * 1e6 * 0.02 * (growth - 1.0) / (0.7 * radius);
+        println!("pressure {} against {pressure}", state.load_factor);
+        1.0 - state.load_factor / pressure
+    };
+    let (coarse, fine) = (missing(2), missing(3));
+    assert!(coarse < 0.12 && fine > 0.0 && fine < 0.5 * coarse, "{coarse} {fine}");
+}
+
+/// Twice the volume, 26 % strain. Pressures of both membranes agree to 3 %. With ANDES the nodes of the thin shell tilt by more than 1 rad,
+/// though a sphere stays one: tension loads the drilling of unequal facets, and on a curved mesh drilling moments of
+/// neighbours leave a moment that tilts. It falls with the third power of the edge; without drilling in the strains there is none.
+#[test]
+fn a_balloon_doubles_its_volume() {
+    let inflate = |membrane| {
+        let mut model = balloon(3, 1.0);
+        let mut shell = Model::new(model.rest.clone());
+        let formulation = Formulation { membrane, ..Formulation::default() };
+        shell.add_shell(&Shell { formulation, ..Shell::new("ball", ball(3).1, 0.02, MATERIAL) }).unwrap();
+        model.facets = shell.facets;
+        let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
+        let rest = model.enclosed_volume(&cells, &model.rest);
+        let mut state = State::at_rest(&model);
+        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        for part in 1..=10 {
+            let volume = rest * (1.0 + 0.1 * f64::from(part));
+            solver.control(&mut state, Control::Volume { volume }).unwrap();
+        }
+        assert!((model.enclosed_volume(&cells, &state.position) / rest - 2.0).abs() < 1e-6);
+        (state.load_factor, state.rotation.iter().map(|r| r.angle()).fold(0.0, f64::max))
+    };
+    let (andes, andes_turn) = inflate(Membrane::default());
+    let (cst, cst_turn) = inflate(Membrane::Cst { drilling: 1e-3 });
+    println!("pressure {andes:.0} and {cst:.0}, nodes turned by {andes_turn:.3} and {cst_turn:.3}");
+    assert!((andes / cst - 1.0).abs() < 0.03, "{andes} {cst}");
+    assert!(cst_turn < 0.05, "{cst_turn}");
+}
+
+/// Arc length and displacement control walk the same path.
+#[test]
+fn arc_length_and_displacement_control_agree() {
+    let mut model = cantilever();
+    model.loads[0].controlled = true;
+    model.loads[0].curve = hold();
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut state = State::at_rest(&model);
+    for _ in 0..4 {
+        solver.control(&mut state, Control::ArcLength { length: 1.0 }).unwrap();
+    }
+    let mut other = State::at_rest(&model);
+    let by = state.position[26].z;
+    solver.control(&mut other, Control::Displacement { node: 26, component: 2, by }).unwrap();
+    assert!(state.load_factor > 0.0);
+    assert!(
+        (state.load_factor / other.load_factor - 1.0).abs() < 1e-6,
+        "{} {}",
+        state.load_factor,
+        other.load_factor
+    );
+    let error =
+        solver.control(&mut other, Control::Displacement { node: 0, component: 2, by: 1.0 }).unwrap_err();
+    assert!(matches!(error, SolveError::Impossible(_)), "{error}");
+}
+
+/// A load step that fails leaves the last equilibrium on the way, and tells its residuals.
+#[test]
+fn a_failed_load_step_keeps_what_was_found() {
+    let mut model = cantilever();
+    let kind = LoadKind::Force { nodes: vec![26], force: Vector3::new(-3e6, 0.0, 1e3) };
+    model.loads.push(Load { name: "crush".into(), kind, curve: ramp(), controlled: false });
+    let settings = StaticSettings { halvings: 3, iterations: 8, ..StaticSettings::default() };
+    let mut state = State::at_rest(&model);
+    let mut solver = Statics::new(&model, settings).unwrap();
+    let error = solver.solve(&mut state, 1.0).unwrap_err();
+    println!("{error}");
+    assert!(state.time < 1.0 && state.position.iter().all(|x| x.iter().all(|c| c.is_finite())));
+}
+
+/// Initial places other than rest are strained; a curved rest shape is not.
+#[test]
+fn only_the_difference_from_rest_costs_energy() {
+    let model = model(ball(2), 0.01);
+    let mut state = State::at_rest(&model);
+    assert!(state.shell_energy(&model).unwrap().bending < 1e-20);
+    state.position.iter_mut().for_each(|x| *x *= 1.1);
+    assert!(state.shell_energy(&model).unwrap().membrane > 1.0);
+}
+
+/// Points of edges agree from both sides, bit for bit within 1e-15, in a strongly deformed state; also at a crease.
+#[test]
+fn the_curved_surface_is_watertight() {
+    let cube: (Vec<Vector3<f64>>, Vec<[u32; 3]>) = (
+        (0..8).map(|i| Vector3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect(),
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+            .into_iter()
+            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
+    );
+    let mut random = Random::new(9);
+    for (shape, size) in [(ball(2), 0.1), (cube, 0.3)] {
+        let model = model(shape, 0.01);
+        for rule in [EdgeRule::Arc, EdgeRule::Third] {
+            let surface = CurvedSurface::new(&model, rule);
+            let mut state = State::at_rest(&model);
+            let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| size * random.number()).collect();
+            state.advance(&shake, 1.0);
+            let mut at_edge: Vec<([u32; 2], Vector3<f64>)> = Vec::new();
+            for (number, facet) in model.facets.iter().enumerate() {
+                let patch = surface.patch(&model, &state, number as u32);
+                for i in 0..3 {
+                    let (a, b) = (facet.nodes[i], facet.nodes[(i + 1) % 3]);
+                    let mut weights = [0.0; 3];
+                    weights[i] = if a < b { 0.3 } else { 0.7 };
+                    weights[(i + 1) % 3] = 1.0 - weights[i];
+                    at_edge.push(([a.min(b), a.max(b)], patch.point(weights)));
+                }
+            }
+            at_edge.sort_by_key(|(edge, _)| *edge);
+            for pair in at_edge.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+                assert!((pair[0].1 - pair[1].1).norm() < 1e-14, "{:?}", pair[0].0);
+            }
+        }
+    }
+}
+
+/// 128 patches lie twenty times closer to the sphere than their facets; the picture shares the points of edges.
+#[test]
+fn the_curved_surface_of_a_ball_is_round() {
+    let model = {
+        let mut model = model(ball(2), 0.01);
+        model.normals.iter_mut().for_each(|normal| normal.direction = model.rest[normal.node as usize]);
+        model
+    };
+    let surface = CurvedSurface::new(&model, EdgeRule::Arc);
+    let state = State::at_rest(&model);
+    let picture = surface.picture(&model, 4);
+    assert_eq!(picture.triangles.len(), 128 * 16);
+    // A closed surface: V − E + F = 2 with E = 3F/2.
+    assert_eq!(picture.places.len(), 2 + 128 * 8);
+    let off =
+        |place: &Place| (surface.patch(&model, &state, place.facet).point(place.weights).norm() - 1.0).abs();
+    let curved = picture.places.iter().map(off).fold(0.0, f64::max);
+    let flat = model.facets.iter().map(|facet| {
+        let [a, b, c] = facet.nodes.map(|node| model.rest[node as usize]);
+        1.0 - ((a + b + c) / 3.0).norm()
+    });
+    let flat = flat.fold(0.0, f64::max);
+    println!("off the sphere: facets {flat:.1e}, patches {curved:.1e}");
+    assert!(curved < 0.05 * flat, "{curved:e} {flat:e}");
+}
+
+/// Points of a finer sphere find their feet, stay where they are at rest, and turn with the body.
+#[test]
+fn a_visual_mesh_is_carried() {
+    let model = model(ball(2), 0.01);
+    let surface = CurvedSurface::new(&model, EdgeRule::Arc);
+    let mut state = State::at_rest(&model);
+    let points: Vec<Vector3<f64>> = ball(3).0.iter().map(|p| 1.02 * p).collect();
+    let near = |point: &Vector3<f64>| {
+        let distance = |facet: &u32| {
+            let nodes = model.facets[*facet as usize].nodes.map(|node| model.rest[node as usize]);
+            ((nodes[0] + nodes[1] + nodes[2]) / 3.0 - point).norm()
+        };
+        (0..128_u32).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+    };
+    // Also from a facet somewhat off.
+    let carried: Vec<Carried> = points.iter().map(|p| surface.carry(&model, &state, *p, near(p))).collect();
+    for (point, carried) in points.iter().zip(&carried) {
+        assert!((surface.carried(&model, &state, carried) - point).norm() < 1e-12);
+        assert!(
+            (carried.height - 0.02).abs() < 0.01 && carried.aside[0].hypot(carried.aside[1]) < 2e-3,
+            "{carried:?}"
+        );
+    }
+    let turn = exponential(&Vector3::new(1.0, -0.5, 2.0));
+    state.position.iter_mut().for_each(|x| *x = turn * *x);
+    state.rotation.iter_mut().for_each(|r| *r = turn * *r);
+    for (point, carried) in points.iter().zip(&carried) {
+        assert!((surface.carried(&model, &state, carried) - turn * point).norm() < 1e-12);
+    }
+}
+
+/// Six tets a cell of a grid of unit cells.
+fn bar(counts: [usize; 3], size: [f64; 3]) -> (Vec<Vector3<f64>>, Vec<[u32; 4]>) {
+    let [nx, ny, nz] = counts;
+    let number = |i: usize, j: usize, k: usize| (i + (nx + 1) * (j + (ny + 1) * k)) as u32;
+    let mut points = Vec::new();
+    for k in 0..=nz {
+        for j in 0..=ny {
+            for i in 0..=nx {
+                let part = |at: usize, of: usize, size: f64| size * at as f64 / of as f64;
+                points.push(Vector3::new(part(i, nx, size[0]), part(j, ny, size[1]), part(k, nz, size[2])));
+            }
+        }
+    }
+    let mut cells = Vec::new();
+    for cell in 0..nx * ny * nz {
+        let corner = [cell % nx, cell / nx % ny, cell / nx / ny];
+        for path in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
+            let mut at = corner;
+            let mut tet = [number(at[0], at[1], at[2]); 4];
+            for (axis, node) in path.into_iter().zip(&mut tet[1..]) {
+                at[axis] += 1;
+                *node = number(at[0], at[1], at[2]);
+            }
+            if matches!(path, [0, 2, 1] | [2, 1, 0] | [1, 0, 2]) {
+                tet.swap(1, 2);
+            }
+            cells.push(tet);
+        }
+    }
+    (points, cells)
+}
+
+/// A block pulled by a small stress lengthens by σ/E and thins by ν σ/E, exactly for linear tets; turned by a quarter with its supports it
+/// does the same.
+#[test]
+fn a_block_of_tets_is_stretched_as_by_hooke() {
+    let (points, cells) = bar([3, 2, 2], [3.0, 2.0, 2.0]);
+    let mut model = Model::new(points);
+    model.add_solid("block", &cells, MATERIAL).unwrap();
+    let on = |f: &dyn Fn(&Vector3<f64>) -> bool| {
+        (0..model.rest.len() as u32).filter(|&n| f(&model.rest[n as usize])).collect::<Vec<u32>>()
+    };
+    let (left, floor, back) = (on(&|x| x.x == 0.0), on(&|x| x.y == 0.0), on(&|x| x.z == 0.0));
+    for (axis, nodes) in [left, floor, back].into_iter().enumerate() {
+        let mut components = [false; 6];
+        components[axis] = true;
+        model.constraints.push(fix(nodes, components));
+    }
+    // Uniform traction on x = 3: a third of the area of each face triangle to its corners.
+    let stress = 10.0;
+    for tet in &cells {
+        let face: Vec<u32> = tet.iter().copied().filter(|&n| model.rest[n as usize].x == 3.0).collect();
+        if face.len() == 3 {
+            let kind = LoadKind::Force { nodes: face, force: Vector3::new(stress * 0.5 / 3.0, 0.0, 0.0) };
+            model.loads.push(Load { name: "traction".into(), kind, curve: hold(), controlled: false });
+        }
+    }
+    let mut state = State::at_rest(&model);
+    Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+    for (x, rest) in state.position.iter().zip(&model.rest) {
+        let strain = stress / 1e6;
+        let exact = Vector3::new(
+            rest.x * (1.0 + strain),
+            rest.y * (1.0 - 0.3 * strain),
+            rest.z * (1.0 - 0.3 * strain),
+        );
+        assert!((x - exact).norm() < 1e-8, "{x} {exact}");
+    }
+}
+
+/// Tets and shells share nodes: a shell on a block stiffens it; implicit motion of both comes to rest at the static equilibrium.
+#[test]
+fn shells_and_tets_move_together() {
+    let (points, cells) = bar([8, 1, 1], [8.0, 1.0, 1.0]);
+    let top: Vec<[u32; 3]> = (0..8)
+        .flat_map(|i| {
+            let node = |i: u32, j: u32| i + 9 * (j + 2);
+            [[node(i, 0), node(i + 1, 0), node(i + 1, 1)], [node(i, 0), node(i + 1, 1), node(i, 1)]]
+        })
+        .collect();
+    let build = |skin: bool| {
+        let mut model = Model::new(points.clone());
+        model.add_solid("bar", &cells, Material { density: 10.0, ..MATERIAL }).unwrap();
+        if skin {
+            model.add_shell(&Shell::new("skin", top.clone(), 0.2, MATERIAL)).unwrap();
+        }
+        let held = (0..points.len() as u32).filter(|&n| points[n as usize].x == 0.0).collect();
+        model.constraints.push(fix(held, [true; 6]));
+        let kind = LoadKind::Force { nodes: vec![8], force: Vector3::new(0.0, 0.0, -300.0) };
+        model.loads.push(Load { name: "pull".into(), kind, curve: hold(), controlled: false });
+        model
+    };
+    let sag = |model: &Model| {
+        let mut state = State::at_rest(model);
+        Statics::new(model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+        state.position[8].z
+    };
+    let mut both = build(true);
+    let (bare, skinned) = (sag(&build(false)), sag(&both));
+    println!("sag {bare:.3}, with skin {skinned:.3}");
+    assert!(skinned < 0.0 && bare < 1.05 * skinned, "{bare} {skinned}");
+    both.mass_damping = 2.0;
+    let mut state = State::at_rest(&both);
+    let mut solver = BackwardEuler::new(&both, DynamicSettings::new(0.5)).unwrap();
+    for _ in 0..100 {
+        solver.advance(&mut state).unwrap();
+    }
+    assert!((state.position[8].z - skinned).abs() < 1e-4, "{}", state.position[8].z);
+}
+
+/// Pressure on the curved surface of a ball: no resultant, and p times the area of a circle on each half; the flat facets have less.
+#[test]
+fn pressure_on_the_curved_surface_acts_on_its_area() {
+    let mut model = balloon(2, 1.0);
+    model.normals.iter_mut().for_each(|normal| normal.direction = model.rest[normal.node as usize]);
+    let half = |model: &Model, spread| {
+        let mut model = model.clone();
+        let upper = (0..128).filter(|&cell: &u32| {
+            model.facets[cell as usize].nodes.iter().map(|&n| model.rest[n as usize].z).sum::<f64>() > 0.0
+        });
+        let cells = upper.collect();
+        model.loads[0].kind = LoadKind::Pressure { cells, pressure: 1.0, spread };
+        let mut system = System::new(&model, LinearSolver::Direct).unwrap();
+        system.evaluate(&State::at_rest(&model), 0.0, None).unwrap();
+        (0..3).map(|c| system.controlled.iter().skip(c).step_by(6).sum()).collect::<Vec<f64>>()
+    };
+    let (flat, curved) = (half(&model, Spread::Lumped), half(&model, Spread::Curved));
+    assert!(curved[0].abs() < 1e-12 && curved[1].abs() < 1e-12, "{curved:?}");
+    let circle = std::f64::consts::PI;
+    println!("half a ball under pressure: flat {:.4}, curved {:.4}, circle {circle:.4}", flat[2], curved[2]);
+    assert!((curved[2] / circle - 1.0).abs() < 2e-3 && flat[2] < 0.99 * circle, "{flat:?} {curved:?}");
+}
+
+/// Conjugate gradients say why they stop: too few iterations, or a body that buckles.
+#[test]
+fn conjugate_gradients_tell_why_they_stop() {
+    let model = cantilever();
+    let solve = |iterations, squeeze: f64| {
+        let linear = LinearSolver::ConjugateGradients {
+            tolerance: 1e-10,
+            iterations,
+            preconditioner: Preconditioner::BlockJacobi,
+        };
+        let mut state = State::at_rest(&model);
+        state.position.iter_mut().for_each(|x| x.x *= squeeze);
+        let settings = StaticSettings { linear, ..StaticSettings::default() };
+        Statics::new(&model, settings).unwrap().linear(&state, 1.0).map(|_| ())
+    };
+    assert_eq!(solve(5000, 1.0), Ok(()));
+    assert!(matches!(solve(3, 1.0), Err(SolveError::Stalled { iterations: 3, .. })));
+    assert!(matches!(solve(5000, 0.9), Err(SolveError::Indefinite { .. })));
+}
+
+/// A balloon with a hole is refused with its border.
+#[test]
+fn a_balloon_must_be_closed() {
+    let mut model = balloon(2, 1.0);
+    let cells = (1..128).collect();
+    model.loads[0].kind = LoadKind::Pressure { cells, pressure: 1.0, spread: Spread::Lumped };
+    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut state = State::at_rest(&model);
+    let error = solver.control(&mut state, Control::Volume { volume: 5.0 }).unwrap_err();
+    assert!(error.to_string().contains("1 open borders: 3 nodes"), "{error}");
+}
