@@ -4,7 +4,7 @@
 
 use std::error::Error;
 
-use pliant_bench::{Clocked, Specimen, Spread, elastic, soft_tissue};
+use pliant_bench::{Clocked, Specimen, Spread, Timed, elastic, soft_tissue};
 use pliant_geometry::Mesh;
 use pliant_mechanics::State;
 use pliant_meshing::{Organ, Phantom, Stuffing, VolumeCell};
