@@ -49,19 +49,44 @@ pub struct DistanceField {
 impl DistanceField {
     /// Of a region in a box with the margin of the smoothing. `progress` hears fractions from 0 to 1.
     pub fn new(region: &Region, smoothing: &Smoothing, progress: &dyn Fn(f64)) -> Result<Self, LabelError> {
+        let outside: Vec<bool> = region.inside.iter().map(|inside| !inside).collect();
+        Self::between(region, &outside, smoothing, progress)
+    }
+
+    /// Of a part of a whole in the same box: positive where the part is nearer than the rest of the whole, also outside
+    /// of both. Its zero surface goes on where the part meets the surface of the whole.
+    pub fn within(
+        part: &Region,
+        whole: &Region,
+        smoothing: &Smoothing,
+        progress: &dyn Fn(f64),
+    ) -> Result<Self, LabelError> {
+        let rest: Vec<bool> =
+            part.inside.iter().zip(&whole.inside).map(|(&part, &whole)| whole && !part).collect();
+        Self::between(part, &rest, smoothing, progress)
+    }
+
+    fn between(
+        region: &Region,
+        other: &[bool],
+        smoothing: &Smoothing,
+        progress: &dyn Fn(f64),
+    ) -> Result<Self, LabelError> {
         for (what, value) in [("sigma", smoothing.sigma), ("clip", smoothing.clip)] {
             if !(0.0..=100.0).contains(&value) {
                 return Err(LabelError::BadLength { what, value });
             }
         }
         let grid = region.grid;
-        let mut values = signed_distances(region, smoothing.clip * largest(grid.spacing()), progress);
+        let mut values = signed_distances(region, other, smoothing.clip * largest(grid.spacing()), progress);
         progress(0.7);
         for axis in 0..3 {
             values = smoothed(&grid, values, axis, smoothing.sigma);
         }
         progress(0.9);
-        let shift = matching_shift(&values, region.volume(), &grid);
+        let counted =
+            values.iter().enumerate().filter(|&(at, _)| region.inside[at] || other[at]).map(|(_, f)| *f);
+        let shift = matching_shift(counted, region.volume(), &grid);
         values.par_iter_mut().for_each(|value| *value -= shift as f32);
         let bounds = positive_box(&grid, &values)
             .ok_or(LabelError::Emptied { label: region.label, operation: "smoothing" })?;
@@ -131,25 +156,34 @@ fn largest(spacing: [f64; 3]) -> f64 {
     spacing.into_iter().fold(0.0, f64::max)
 }
 
-/// The distance to the surface [m], positive inside, cut at ± `clip`.
-fn signed_distances(region: &Region, clip: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
+/// The distance to the surface between a region and another one [m], positive inside, cut at ± `clip`; in voxels of
+/// neither, half of how much nearer the region is.
+fn signed_distances(region: &Region, other: &[bool], clip: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
     let grid = region.grid;
     let spacing = Vector3::from(grid.spacing());
     let to_inside = nearest_sites(&grid, |at| region.inside[at]);
     progress(0.35);
-    let to_outside = nearest_sites(&grid, |at| !region.inside[at]);
-    let distance = |at: usize| {
-        let inside = region.inside[at];
-        let site = if inside { to_outside[at] } else { to_inside[at] };
-        let sign = if inside { 1.0 } else { -1.0 };
-        if site == NONE {
-            return (sign * clip) as f32;
-        }
+    let to_other = nearest_sites(&grid, |at| other[at]);
+    let way = |at: usize, site: u32| {
         let [here, there] = [at, site as usize].map(|at| Vector3::from(grid.triple(at).map(|i| i as f64)));
-        let way = (here - there).component_mul(&spacing);
+        (here - there).component_mul(&spacing)
+    };
+    let length = |at: usize, site: u32| if site == NONE { 2.0 * clip } else { way(at, site).norm() };
+    let to_face = |at: usize, site: u32| {
+        if site == NONE {
+            return clip;
+        }
         // Half a voxel along the way: h/2 in a cubic grid, h_a/2 along axis a.
-        let half = way.normalize().component_mul(&spacing).norm() / 2.0;
-        (sign * (way.norm() - half).min(clip)) as f32
+        let way = way(at, site);
+        way.norm() - way.normalize().component_mul(&spacing).norm() / 2.0
+    };
+    let distance = |at: usize| {
+        let distance = match (region.inside[at], other[at]) {
+            (true, _) => to_face(at, to_other[at]),
+            (false, true) => -to_face(at, to_inside[at]),
+            _ => 0.5 * (length(at, to_other[at]) - length(at, to_inside[at])),
+        };
+        distance.clamp(-clip, clip) as f32
     };
     (0..grid.len()).into_par_iter().map(distance).collect()
 }
@@ -274,10 +308,10 @@ fn smoothed(grid: &Grid, values: Vec<f32>, axis: usize, sigma: f64) -> Vec<f32> 
 
 /// The constant c for which f − c encloses `volume` [m³]. A voxel counts by the part of it, one mean step thick, on the
 /// inner side of a plane at the distance f − c.
-fn matching_shift(values: &[f32], volume: f64, grid: &Grid) -> f64 {
+fn matching_shift(values: impl Iterator<Item = f32> + Clone, volume: f64, grid: &Grid) -> f64 {
     let step = grid.voxel_volume().cbrt();
-    let near: Vec<f64> = values.iter().map(|&f| f64::from(f)).filter(|f| f.abs() < 2.0 * step).collect();
-    let deep = values.iter().filter(|&&f| f64::from(f) >= 2.0 * step).count() as f64;
+    let near: Vec<f64> = values.clone().map(f64::from).filter(|f| f.abs() < 2.0 * step).collect();
+    let deep = values.filter(|&f| f64::from(f) >= 2.0 * step).count() as f64;
     let enclosed = |shift: f64| {
         let parts = near.iter().map(|f| (0.5 + (f - shift) / step).clamp(0.0, 1.0));
         (deep + parts.sum::<f64>()) * grid.voxel_volume()

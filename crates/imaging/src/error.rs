@@ -225,6 +225,14 @@ pub enum LabelError {
         /// Its value [m].
         value: f64,
     },
+    /// More labels than a mesh can tell apart.
+    #[error("{labels} labels asked for in one mesh, more than {limit}; mesh them in parts")]
+    TooManyLabels {
+        /// Labels asked for.
+        labels: usize,
+        /// Labels allowed.
+        limit: usize,
+    },
     /// A region too large to work on.
     #[error("the region with its margin has {voxels} voxels, more than {limit}; crop or resample the image")]
     TooManyVoxels {

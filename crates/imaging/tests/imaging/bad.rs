@@ -7,7 +7,7 @@ use pliant_imaging::{ImageError, ImageFormat, ImageProblem, ReadOptions, read, r
 use crate::write::*;
 
 fn error(bytes: &[u8], format: ImageFormat) -> String {
-    read_bytes(bytes, format, &ReadOptions::default()).err().expect("the image is bad").to_string()
+    read_bytes(bytes, format, &ReadOptions::default()).expect_err("the image is bad").to_string()
 }
 
 /// What an error of a NIfTI file says after some bytes of a good one are replaced.

@@ -1,0 +1,151 @@
+//! Materials in a mesh of the whole body: each inner material is cut out along its surface. Points near the surface move
+//! onto it first, then every edge that it still crosses is halved there, the longest first; whatever the order, the mesh
+//! stays conforming, and no edge is crossed any more.
+
+use crate::anatomy::Anatomy;
+use crate::complex::{Complex, OUTSIDE};
+
+/// Halvings of an edge to find where a surface cuts it.
+const BISECTIONS: u32 = 24;
+
+/// A cut nearer to an end than this part of its edge moves that end, if it may move.
+const ALPHA: f64 = 0.35;
+
+/// A cut nearer to an end that may not move than this part of its edge counts as that end.
+const AT_END: f64 = 0.1;
+
+/// Moving a point onto the surface must leave its tets this part of the ideal acoustic length.
+const LEAST_AFTER_MOVE: f64 = 0.2;
+
+/// Where a surface crosses an edge.
+struct Crossing {
+    edge: [u32; 2],
+    /// Fraction of the way from the first end.
+    at: f64,
+    length: f64,
+}
+
+/// Cuts out all materials but the first. `ideal` is the acoustic length of an ideal tet [m].
+pub(crate) fn cut(complex: &mut Complex, anatomy: &Anatomy<'_>, ideal: f64) {
+    for material in 2..=anatomy.labels().len() {
+        Surface { anatomy, material, ideal }.cut(complex);
+        complex.find_sides();
+    }
+}
+
+/// The surface of a material.
+struct Surface<'a> {
+    anatomy: &'a Anatomy<'a>,
+    material: usize,
+    ideal: f64,
+}
+
+impl Surface<'_> {
+    fn cut(&self, complex: &mut Complex) {
+        let mut values: Vec<f64> =
+            complex.points.iter().map(|point| self.anatomy.inside(self.material, point)).collect();
+        self.move_points(complex, &mut values);
+        let mut crossings = self.crossings(complex, &values);
+        for crossing in &crossings {
+            // Ends that could not be moved.
+            if let Some(end) = crossing.near_end(AT_END) {
+                values[crossing.edge[end] as usize] = 0.0;
+            }
+        }
+        crossings.retain(|crossing| crossing.edge.iter().all(|&end| values[end as usize] != 0.0));
+        crossings.sort_by(|a, b| b.length.total_cmp(&a.length).then(a.edge.cmp(&b.edge)));
+        for Crossing { edge: [p, q], at, .. } in crossings {
+            let position = complex.points[p as usize].lerp(&complex.points[q as usize], at);
+            complex.bisect([p, q], position);
+            values.push(0.0);
+        }
+        for tet in complex.alive().collect::<Vec<_>>() {
+            let nodes = complex.tets[tet as usize].map(|node| values[node as usize]);
+            let side = match nodes.iter().sum::<f64>() {
+                0.0 => self.anatomy.inside(
+                    self.material,
+                    &(complex.corners(tet).iter().sum::<pliant_geometry::Vector3>() / 4.0),
+                ),
+                sum => sum,
+            };
+            if side > 0.0 {
+                complex.material[tet as usize] = self.material as u8;
+            }
+        }
+    }
+
+    /// Edges with ends on both sides, and where the surface crosses them.
+    fn crossings(&self, complex: &Complex, values: &[f64]) -> Vec<Crossing> {
+        let mut edges: Vec<[u32; 2]> = Vec::new();
+        for tet in complex.alive() {
+            let nodes = complex.tets[tet as usize];
+            for (i, &p) in nodes.iter().enumerate() {
+                for &q in &nodes[i + 1..] {
+                    if values[p as usize] * values[q as usize] < 0.0 {
+                        edges.push([p.min(q), p.max(q)]);
+                    }
+                }
+            }
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        edges.into_iter().map(|edge| self.crossing(complex, edge, values)).collect()
+    }
+
+    fn crossing(&self, complex: &Complex, edge: [u32; 2], values: &[f64]) -> Crossing {
+        let [start, end] = edge.map(|point| complex.points[point as usize]);
+        let begins_inside = values[edge[0] as usize] > 0.0;
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if (self.anatomy.inside(self.material, &start.lerp(&end, middle)) > 0.0) == begins_inside {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Crossing { edge, at: 0.5 * (low + high), length: (end - start).norm() }
+    }
+
+    /// Moves each free point that is near a crossing to its nearest one, where its tets bear it.
+    fn move_points(&self, complex: &mut Complex, values: &mut [f64]) {
+        let mut nearest: Vec<Option<(f64, pliant_geometry::Vector3)>> = vec![None; complex.points.len()];
+        for crossing in self.crossings(complex, values) {
+            if let Some(end) = crossing.near_end(ALPHA) {
+                let [p, q] = crossing.edge.map(|point| complex.points[point as usize]);
+                let to = p.lerp(&q, crossing.at);
+                let distance = (to - [p, q][end]).norm();
+                let best = &mut nearest[crossing.edge[end] as usize];
+                if best.is_none_or(|(least, _)| distance < least) {
+                    *best = Some((distance, to));
+                }
+            }
+        }
+        for (point, (_, to)) in
+            nearest.into_iter().enumerate().filter_map(|(point, best)| Some((point, best?)))
+        {
+            let free = complex.sides[point].count_ones() == 1 && complex.sides[point] & OUTSIDE == 0;
+            let before = std::mem::replace(&mut complex.points[point], to);
+            let bears =
+                || complex.star[point].iter().all(|&tet| complex.length(tet) > LEAST_AFTER_MOVE * self.ideal);
+            if free && bears() {
+                values[point] = 0.0;
+            } else {
+                complex.points[point] = before;
+            }
+        }
+    }
+}
+
+impl Crossing {
+    /// The end that the crossing is near to.
+    fn near_end(&self, part: f64) -> Option<usize> {
+        if self.at < part {
+            Some(0)
+        } else if 1.0 - self.at < part {
+            Some(1)
+        } else {
+            None
+        }
+    }
+}
