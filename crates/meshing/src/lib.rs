@@ -35,6 +35,7 @@ mod phantom;
 mod stencil;
 mod structured;
 mod stuffing;
+mod surfaces;
 mod tets;
 mod topology;
 mod voxels;

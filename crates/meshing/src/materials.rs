@@ -2,8 +2,10 @@
 //! onto it first, then every edge that it still crosses is halved there, the longest first; whatever the order, the mesh
 //! stays conforming, and no edge is crossed any more.
 
-use crate::anatomy::Anatomy;
+use pliant_geometry::Vector3;
+
 use crate::complex::{Complex, OUTSIDE};
+use crate::surfaces::Surfaces;
 
 /// Halvings of an edge to find where a surface cuts it.
 const BISECTIONS: u32 = 24;
@@ -26,16 +28,16 @@ struct Crossing {
 }
 
 /// Cuts out all materials but the first. `ideal` is the acoustic length of an ideal tet [m].
-pub(crate) fn cut(complex: &mut Complex, anatomy: &Anatomy<'_>, ideal: f64) {
-    for material in 2..=anatomy.labels().len() {
-        Surface { anatomy, material, ideal }.cut(complex);
+pub(crate) fn cut(complex: &mut Complex, surfaces: &Surfaces<'_>, ideal: f64) {
+    for material in 2..=surfaces.materials() {
+        Surface { surfaces, material, ideal }.cut(complex);
         complex.find_sides();
     }
 }
 
 /// The surface of a material.
 struct Surface<'a> {
-    anatomy: &'a Anatomy<'a>,
+    surfaces: &'a Surfaces<'a>,
     material: usize,
     ideal: f64,
 }
@@ -43,7 +45,7 @@ struct Surface<'a> {
 impl Surface<'_> {
     fn cut(&self, complex: &mut Complex) {
         let mut values: Vec<f64> =
-            complex.points.iter().map(|point| self.anatomy.inside(self.material, point)).collect();
+            complex.points.iter().map(|point| self.surfaces.inside(self.material, point)).collect();
         self.move_points(complex, &mut values);
         let mut crossings = self.crossings(complex, &values);
         for crossing in &crossings {
@@ -62,10 +64,9 @@ impl Surface<'_> {
         for tet in complex.alive().collect::<Vec<_>>() {
             let nodes = complex.tets[tet as usize].map(|node| values[node as usize]);
             let side = match nodes.iter().sum::<f64>() {
-                0.0 => self.anatomy.inside(
-                    self.material,
-                    &(complex.corners(tet).iter().sum::<pliant_geometry::Vector3>() / 4.0),
-                ),
+                0.0 => {
+                    self.surfaces.inside(self.material, &(complex.corners(tet).iter().sum::<Vector3>() / 4.0))
+                }
                 sum => sum,
             };
             if side > 0.0 {
@@ -98,7 +99,7 @@ impl Surface<'_> {
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
-            if (self.anatomy.inside(self.material, &start.lerp(&end, middle)) > 0.0) == begins_inside {
+            if (self.surfaces.inside(self.material, &start.lerp(&end, middle)) > 0.0) == begins_inside {
                 low = middle;
             } else {
                 high = middle;
@@ -109,7 +110,7 @@ impl Surface<'_> {
 
     /// Moves each free point that is near a crossing to its nearest one, where its tets bear it.
     fn move_points(&self, complex: &mut Complex, values: &mut [f64]) {
-        let mut nearest: Vec<Option<(f64, pliant_geometry::Vector3)>> = vec![None; complex.points.len()];
+        let mut nearest: Vec<Option<(f64, Vector3)>> = vec![None; complex.points.len()];
         for crossing in self.crossings(complex, values) {
             if let Some(end) = crossing.near_end(ALPHA) {
                 let [p, q] = crossing.edge.map(|point| complex.points[point as usize]);

@@ -3,10 +3,10 @@
 //! stay between them. Deterministic: everything goes in the order of numbers, and the directions of trial moves are
 //! turned by a fixed sequence.
 
-use pliant_geometry::Vector3;
+use pliant_geometry::{CellKind, Vector3};
 
-use crate::anatomy::Anatomy;
 use crate::complex::{Complex, OUTSIDE, acoustic_length};
+use crate::surfaces::Surfaces;
 
 /// Threshold of the first round, in ideal acoustic lengths.
 const FIRST_THRESHOLD: f64 = 0.3;
@@ -21,6 +21,13 @@ const SHRINK: f64 = 0.6;
 /// First trial moves, in lattice constants.
 const REACH: f64 = 0.15;
 
+/// Times that surfaces are shifted, and how far at most, in lattice constants.
+const SHIFTS: usize = 4;
+const LARGEST_SHIFT: f64 = 0.25;
+
+/// Volumes nearer than this part to what they must be are left alone.
+const VOLUME_TOLERANCE: f64 = 2e-3;
+
 /// What the optimiser did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Optimised {
@@ -33,7 +40,7 @@ pub(crate) struct Optimised {
 /// The optimiser of one mesh.
 pub(crate) struct Optimiser<'a> {
     pub(crate) complex: &'a mut Complex,
-    pub(crate) anatomy: &'a Anatomy<'a>,
+    pub(crate) surfaces: Surfaces<'a>,
     /// Lattice constant [m].
     pub(crate) edge: f64,
     /// Acoustic length of an ideal tet [m].
@@ -43,20 +50,67 @@ pub(crate) struct Optimiser<'a> {
 }
 
 impl<'a> Optimiser<'a> {
-    pub(crate) fn new(complex: &'a mut Complex, anatomy: &'a Anatomy<'a>, edge: f64, ideal: f64) -> Self {
-        Self { complex, anatomy, edge, ideal, noise: 1, done: Optimised::default() }
+    pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>, edge: f64, ideal: f64) -> Self {
+        Self { complex, surfaces, edge, ideal, noise: 1, done: Optimised::default() }
     }
 
-    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal.
-    pub(crate) fn run(&mut self, target: f64, rounds: usize, progress: &dyn Fn(f64)) -> Optimised {
+    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh
+    /// encloses `volumes` [m³], of the whole and of the inner materials, as far as these are known.
+    pub(crate) fn run(
+        &mut self,
+        target: f64,
+        rounds: usize,
+        volumes: &[Option<f64>],
+        progress: &dyn Fn(f64),
+    ) -> Optimised {
+        self.improve(target, rounds, RAMP, &|done| progress(0.7 * done));
+        for repeat in 0..SHIFTS {
+            if !self.shift_surfaces(volumes, target) {
+                break;
+            }
+            let rounds = rounds.div_ceil(2);
+            self.improve(target, rounds, 0.0, &|_| {});
+            progress(0.7 + 0.3 * (repeat + 1) as f64 / SHIFTS as f64);
+        }
+        self.done
+    }
+
+    /// Shifts the surfaces whose volume is off, and their points with them; whether any was.
+    fn shift_surfaces(&mut self, volumes: &[Option<f64>], target: f64) -> bool {
+        let measured = measure(self.complex, self.surfaces.materials());
+        let mut shifted = 0;
+        for (surface, (wanted, [volume, area])) in volumes.iter().zip(measured).enumerate() {
+            let Some(wanted) = wanted else { continue };
+            if (volume / wanted - 1.0).abs() > VOLUME_TOLERANCE && area > 0.0 {
+                self.surfaces.shift(surface, (wanted - volume) / area, LARGEST_SHIFT * self.edge);
+                // Bit 0 of the sides is the outside, bit m the material m.
+                shifted |= if surface == 0 { OUTSIDE } else { 1 << (surface + 1) };
+            }
+        }
+        for node in 0..self.complex.points.len() as u32 {
+            let sides = self.complex.sides[node as usize];
+            if sides.count_ones() > 1 && sides & shifted != 0 {
+                let here = self.complex.points[node as usize];
+                let least = self.star_min(node, &here, u32::MAX, 0.0).min(0.6 * target * self.ideal);
+                if let Some(there) = self.project(node, here)
+                    && self.star_min(node, &there, u32::MAX, 0.0) >= least
+                {
+                    self.complex.points[node as usize] = there;
+                }
+            }
+        }
+        shifted != 0
+    }
+
+    fn improve(&mut self, target: f64, rounds: usize, ramp: f64, progress: &dyn Fn(f64)) {
         let mut idle = 0;
         for round in 0..rounds {
-            let ramp = ((round + 1) as f64 / (RAMP * rounds as f64)).min(1.0);
+            let ramp = ((round + 1) as f64 / (ramp * rounds as f64)).min(1.0);
             let threshold = self.ideal * (FIRST_THRESHOLD + (target - FIRST_THRESHOLD) * ramp);
             let before = self.complex.worst();
             let changes = self.peel(threshold) + self.collapse(threshold);
             self.relocate(threshold);
-            self.done.rounds = round + 1;
+            self.done.rounds += 1;
             progress((round + 1) as f64 / rounds as f64);
             let worst = self.complex.worst();
             if worst >= target * self.ideal {
@@ -67,7 +121,6 @@ impl<'a> Optimiser<'a> {
                 break;
             }
         }
-        self.done
     }
 
     /// Tets below a length, the worst first.
@@ -219,7 +272,7 @@ impl<'a> Optimiser<'a> {
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
         match self.complex.sides[node as usize] {
             sides if sides.count_ones() < 2 => Some(place),
-            sides => self.anatomy.project(sides, &place, 0.15 * self.edge),
+            sides => self.surfaces.project(sides, &place, 0.15 * self.edge),
         }
     }
 
@@ -275,4 +328,39 @@ fn directions() -> impl Iterator<Item = Vector3> {
     let grid = (0..27)
         .map(|at| Vector3::new((at % 3) as f64 - 1.0, (at / 3 % 3) as f64 - 1.0, (at / 9) as f64 - 1.0));
     grid.filter(|direction| *direction != Vector3::zeros()).map(|direction| direction.normalize())
+}
+
+/// Volume [m³] and area [m²] of the whole and of each inner material; the area of a material without what lies on the
+/// boundary of the whole.
+fn measure(complex: &Complex, materials: usize) -> Vec<[f64; 2]> {
+    let mut measured = vec![[0.0; 2]; materials];
+    let mut faces: Vec<([u32; 3], u8)> = Vec::new();
+    for tet in complex.alive() {
+        let corners = complex.corners(tet);
+        let volume = pliant_geometry::volume(CellKind::Tet, &corners);
+        let material = complex.material[tet as usize];
+        measured[0][0] += volume;
+        if material > 1 {
+            measured[usize::from(material) - 1][0] += volume;
+        }
+        for mut face in complex.faces(tet) {
+            face.sort_unstable();
+            faces.push((face, material));
+        }
+    }
+    faces.sort_unstable();
+    for same in faces.chunk_by(|a, b| a.0 == b.0) {
+        let area =
+            pliant_geometry::volume(CellKind::Triangle, &same[0].0.map(|node| complex.points[node as usize]));
+        match same {
+            [_] => measured[0][1] += area,
+            [(_, a), (_, b)] if a != b => {
+                for m in [a, b].into_iter().filter(|m| **m > 1) {
+                    measured[usize::from(*m) - 1][1] += area;
+                }
+            }
+            _ => {}
+        }
+    }
+    measured
 }

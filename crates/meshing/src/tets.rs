@@ -13,6 +13,7 @@ use crate::error::{MeshingError, require_positive};
 use crate::manifold::{crowded_edges, mend};
 use crate::materials::cut;
 use crate::optimise::Optimiser;
+use crate::surfaces::Surfaces;
 use crate::{DEFAULT_CELL_LIMIT, Stuffing};
 
 /// A request for tetrahedra of an anatomy.
@@ -62,13 +63,20 @@ impl OrganTets {
         // The ideal tet of a body-centred lattice: a / (2 √2).
         let ideal = self.edge / 8_f64.sqrt();
         let raw = complex.worst();
-        cut(&mut complex, anatomy, ideal);
+        let surfaces = Surfaces::new(anatomy);
+        cut(&mut complex, &surfaces, ideal);
         let crowded = crowded_edges(&complex).len();
         let mended = mend(&mut complex);
         progress(0.2);
         let optimised = if self.target > 0.0 {
             let onward = |done: f64| progress(0.2 + 0.75 * done);
-            Optimiser::new(&mut complex, anatomy, self.edge, ideal).run(self.target, self.rounds, &onward)
+            let volumes = wanted_volumes(anatomy);
+            Optimiser::new(&mut complex, surfaces, self.edge, ideal).run(
+                self.target,
+                self.rounds,
+                &volumes,
+                &onward,
+            )
         } else {
             Default::default()
         };
@@ -92,6 +100,13 @@ impl OrganTets {
         progress(1.0);
         Ok(OrganMesh { mesh, report })
     }
+}
+
+/// Volume of the whole and of each inner material [m³], where known.
+fn wanted_volumes(anatomy: &Anatomy<'_>) -> Vec<Option<f64>> {
+    let mut volumes = anatomy.volumes().to_vec();
+    volumes[0] = volumes.iter().copied().sum();
+    volumes
 }
 
 fn labelled(points: Vec<Vector3>, nodes: Vec<u32>, material: &[u8], labels: &[i32]) -> Mesh {
