@@ -35,6 +35,25 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let made = request.mesh(&anatomy, &|_| {})?;
                 let seconds = start.elapsed().as_secs_f64();
                 let [forth, back, rms] = images::distances(&made.mesh, &truth);
+                if number > 0 {
+                    let r = &made.report;
+                    println!(
+                        "    lattice {number}: {seconds:.2} s, {} tets, least {:.3} (raw {:.3}), dihedral {:.1}, RMS {:.3} a, H {:.2} / {:.2} mm, {} left, {:?}",
+                        r.tets,
+                        r.acoustic_part,
+                        r.raw_acoustic_part,
+                        r.dihedral[0],
+                        rms / edge,
+                        forth * 1e3,
+                        back * 1e3,
+                        r.crowded_edges_left,
+                        r.materials
+                            .iter()
+                            .map(|m| m.volume / m.voxel_volume.unwrap_or(f64::NAN))
+                            .collect::<Vec<_>>()
+                    );
+                    continue;
+                }
                 println!(
                     "  {:.0} mm: {seconds:.2} s, H {:.2} / {:.2} mm, RMS {:.3} mm ({:.3} a)\n    {}",
                     edge * 1e3,

@@ -84,6 +84,16 @@ impl Complex {
         FACES.map(|face| face.map(|corner| self.tets[tet as usize][corner]))
     }
 
+    /// Edges, increasing, each once.
+    pub(crate) fn edges(&self) -> Vec<[u32; 2]> {
+        let mut edges = Vec::new();
+        for tet in self.alive() {
+            let [a, b, c, d] = self.tets[tet as usize];
+            edges.extend([[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]].map(|[p, q]| [p.min(q), p.max(q)]));
+        }
+        distinct(edges)
+    }
+
     /// Least acoustic length of all tets [m].
     pub(crate) fn worst(&self) -> f64 {
         self.alive().map(|tet| self.length(tet)).fold(f64::INFINITY, f64::min)

@@ -24,12 +24,12 @@
 
 mod anatomy;
 mod complex;
+mod cut;
 mod error;
 mod extent;
 mod field;
 mod lattice;
 mod manifold;
-mod materials;
 mod optimise;
 mod phantom;
 mod stencil;

@@ -25,6 +25,9 @@ const REACH: f64 = 0.15;
 const SHIFTS: usize = 4;
 const LARGEST_SHIFT: f64 = 0.25;
 
+/// Where the target is still not reached, points round bad tets may leave their surfaces by this, in lattice constants.
+const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
+
 /// Volumes nearer than this part to what they must be are left alone.
 const VOLUME_TOLERANCE: f64 = 2e-3;
 
@@ -45,13 +48,15 @@ pub(crate) struct Optimiser<'a> {
     pub(crate) edge: f64,
     /// Acoustic length of an ideal tet [m].
     pub(crate) ideal: f64,
+    /// How far a point may be from the sides that it lies between [m].
+    slack: f64,
     noise: u64,
     done: Optimised,
 }
 
 impl<'a> Optimiser<'a> {
     pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>, edge: f64, ideal: f64) -> Self {
-        Self { complex, surfaces, edge, ideal, noise: 1, done: Optimised::default() }
+        Self { complex, surfaces, edge, ideal, slack: 0.0, noise: 1, done: Optimised::default() }
     }
 
     /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh
@@ -70,7 +75,14 @@ impl<'a> Optimiser<'a> {
             }
             let rounds = rounds.div_ceil(2);
             self.improve(target, rounds, 0.0, &|_| {});
-            progress(0.7 + 0.3 * (repeat + 1) as f64 / SHIFTS as f64);
+            progress(0.7 + 0.2 * (repeat + 1) as f64 / SHIFTS as f64);
+        }
+        for slack in SLACKS {
+            if self.complex.worst() >= target * self.ideal {
+                break;
+            }
+            self.slack = slack * self.edge;
+            self.improve(target, rounds.div_ceil(2), 0.0, &|_| {});
         }
         self.done
     }
@@ -272,6 +284,7 @@ impl<'a> Optimiser<'a> {
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
         match self.complex.sides[node as usize] {
             sides if sides.count_ones() < 2 => Some(place),
+            sides if self.surfaces.off(sides, &place) < self.slack => Some(place),
             sides => self.surfaces.project(sides, &place, 0.15 * self.edge),
         }
     }

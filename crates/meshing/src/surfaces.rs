@@ -80,6 +80,11 @@ impl<'a> Surfaces<'a> {
         found
     }
 
+    /// How far off a point is from where its sides meet [m].
+    pub(crate) fn off(&self, sides: Sides, point: &Vector3) -> f64 {
+        self.constraints(sides, point).largest()
+    }
+
     /// The closest point between the same sides, by Newton's method with steps of at most `longest` [m] on the least
     /// move; `None` if it is not found.
     pub(crate) fn project(&self, sides: Sides, from: &Vector3, longest: f64) -> Option<Vector3> {

@@ -9,9 +9,10 @@ use serde::Serialize;
 
 use crate::anatomy::Anatomy;
 use crate::complex::Complex;
+use crate::cut::{cut_gaps, cut_materials};
 use crate::error::{MeshingError, require_positive};
 use crate::manifold::{crowded_edges, mend};
-use crate::materials::cut;
+
 use crate::optimise::Optimiser;
 use crate::surfaces::Surfaces;
 use crate::{DEFAULT_CELL_LIMIT, Stuffing};
@@ -64,7 +65,8 @@ impl OrganTets {
         let ideal = self.edge / 8_f64.sqrt();
         let raw = complex.worst();
         let surfaces = Surfaces::new(anatomy);
-        cut(&mut complex, &surfaces, ideal);
+        let bridges = cut_gaps(&mut complex, anatomy.field(), self.edge, ideal);
+        cut_materials(&mut complex, &surfaces, ideal);
         let crowded = crowded_edges(&complex).len();
         let mended = mend(&mut complex);
         progress(0.2);
@@ -83,6 +85,7 @@ impl OrganTets {
         let repairs = Repairs {
             dropped_pieces: stuffed.dropped_components,
             dropped_cells: stuffed.dropped_cells,
+            bridges,
             crowded_edges: crowded,
             doubled_points: mended.doubled,
             halved_edges: mended.halved,
@@ -135,6 +138,8 @@ pub struct Repairs {
     pub dropped_pieces: usize,
     /// Cells in them.
     pub dropped_cells: usize,
+    /// Edges that bridged a gap thinner than they are long.
+    pub bridges: usize,
     /// Edges where the body touched itself (more than two boundary faces).
     pub crowded_edges: usize,
     /// Points doubled so that banks of a thin gap can slide.
@@ -274,10 +279,13 @@ impl fmt::Display for TetReport {
             "acoustic length  {:.4e} m at least, {:.3} of the ideal ({:.3} before optimisation)",
             self.acoustic_length, self.acoustic_part, self.raw_acoustic_part
         )?;
-        let Repairs { dropped_pieces, dropped_cells, crowded_edges, doubled_points, halved_edges } =
+        let Repairs { dropped_pieces, dropped_cells, bridges, crowded_edges, doubled_points, halved_edges } =
             self.repairs;
         if dropped_pieces > 0 {
             writeln!(f, "left out         {dropped_cells} cells in {dropped_pieces} small pieces")?;
+        }
+        if bridges > 0 {
+            writeln!(f, "gaps cut out     {bridges} edges bridged gaps thinner than the lattice")?;
         }
         if crowded_edges > 0 {
             writeln!(

@@ -1,10 +1,12 @@
-//! Materials in a mesh of the whole body: each inner material is cut out along its surface. Points near the surface move
+//! Cuts a mesh along a surface: inner materials out of the whole body, and gaps that edges bridge unseen, both ends being
+//! inside. Points near the surface move
 //! onto it first, then every edge that it still crosses is halved there, the longest first; whatever the order, the mesh
 //! stays conforming, and no edge is crossed any more.
 
 use pliant_geometry::Vector3;
 
 use crate::complex::{Complex, OUTSIDE};
+use crate::field::ImplicitField;
 use crate::surfaces::Surfaces;
 
 /// Halvings of an edge to find where a surface cuts it.
@@ -19,6 +21,9 @@ const AT_END: f64 = 0.1;
 /// Moving a point onto the surface must leave its tets this part of the ideal acoustic length.
 const LEAST_AFTER_MOVE: f64 = 0.2;
 
+/// An edge bridges a gap where the field falls below minus this part of the lattice constant along it.
+const GAP: f64 = 0.1;
+
 /// Where a surface crosses an edge.
 struct Crossing {
     edge: [u32; 2],
@@ -28,24 +33,70 @@ struct Crossing {
 }
 
 /// Cuts out all materials but the first. `ideal` is the acoustic length of an ideal tet [m].
-pub(crate) fn cut(complex: &mut Complex, surfaces: &Surfaces<'_>, ideal: f64) {
+pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>, ideal: f64) {
     for material in 2..=surfaces.materials() {
-        Surface { surfaces, material, ideal }.cut(complex);
+        let inside = |point: &Vector3| surfaces.inside(material, point);
+        let values = complex.points.iter().map(inside).collect();
+        let sides = Surface { inside: &inside, ideal }.cut(complex, values);
+        for (tet, side) in sides {
+            if side > 0.0 {
+                complex.material[tet as usize] = material as u8;
+            }
+        }
         complex.find_sides();
     }
 }
 
-/// The surface of a material.
+/// Cuts out gaps between banks of the body that edges of the mesh bridge. How many edges did.
+pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField, edge: f64, ideal: f64) -> usize {
+    let inside = |point: &Vector3| field.value(point);
+    let mut values: Vec<f64> = complex.points.iter().map(inside).collect();
+    let deepest = |[p, q]: [u32; 2]| {
+        let [p, q] = [p, q].map(|point| complex.points[point as usize]);
+        let samples = [0.25, 0.5, 0.75].map(|at| p.lerp(&q, at));
+        let [a, b, c] = samples.map(|point| (inside(&point), point));
+        [b, a, c].into_iter().fold(b, |least, other| if other.0 < least.0 { other } else { least })
+    };
+    let mut bridges: Vec<([u32; 2], f64, Vector3)> = Vec::new();
+    for ends in complex.edges() {
+        let (value, point) = deepest(ends);
+        if value < -GAP * edge {
+            bridges.push((ends, value, point));
+        }
+    }
+    bridges.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    let count = bridges.len();
+    if count == 0 {
+        return 0;
+    }
+    for (ends, value, point) in bridges {
+        complex.bisect(ends, point);
+        values.push(value);
+    }
+    // Points of the boundary lie on the surface but for round-off.
+    for (value, sides) in values.iter_mut().zip(&complex.sides) {
+        if sides & OUTSIDE != 0 && value.abs() < 1e-6 * edge {
+            *value = 0.0;
+        }
+    }
+    for (tet, side) in (Surface { inside: &inside, ideal }).cut(complex, values) {
+        if side < 0.0 {
+            complex.remove(tet);
+        }
+    }
+    complex.find_sides();
+    count
+}
+
+/// The surface where a function is zero.
 struct Surface<'a> {
-    surfaces: &'a Surfaces<'a>,
-    material: usize,
+    inside: &'a dyn Fn(&Vector3) -> f64,
     ideal: f64,
 }
 
 impl Surface<'_> {
-    fn cut(&self, complex: &mut Complex) {
-        let mut values: Vec<f64> =
-            complex.points.iter().map(|point| self.surfaces.inside(self.material, point)).collect();
+    /// Cuts the mesh along the surface, given the function at its points; the side of each tet: positive inside.
+    fn cut(&self, complex: &mut Complex, mut values: Vec<f64>) -> Vec<(u32, f64)> {
         self.move_points(complex, &mut values);
         let mut crossings = self.crossings(complex, &values);
         for crossing in &crossings {
@@ -61,36 +112,22 @@ impl Surface<'_> {
             complex.bisect([p, q], position);
             values.push(0.0);
         }
-        for tet in complex.alive().collect::<Vec<_>>() {
-            let nodes = complex.tets[tet as usize].map(|node| values[node as usize]);
-            let side = match nodes.iter().sum::<f64>() {
-                0.0 => {
-                    self.surfaces.inside(self.material, &(complex.corners(tet).iter().sum::<Vector3>() / 4.0))
-                }
-                sum => sum,
-            };
-            if side > 0.0 {
-                complex.material[tet as usize] = self.material as u8;
-            }
-        }
+        let side = |tet: u32| match complex.tets[tet as usize]
+            .iter()
+            .map(|&node| values[node as usize])
+            .sum::<f64>()
+        {
+            0.0 => (self.inside)(&(complex.corners(tet).iter().sum::<Vector3>() / 4.0)),
+            sum => sum,
+        };
+        complex.alive().map(|tet| (tet, side(tet))).collect()
     }
 
     /// Edges with ends on both sides, and where the surface crosses them.
     fn crossings(&self, complex: &Complex, values: &[f64]) -> Vec<Crossing> {
-        let mut edges: Vec<[u32; 2]> = Vec::new();
-        for tet in complex.alive() {
-            let nodes = complex.tets[tet as usize];
-            for (i, &p) in nodes.iter().enumerate() {
-                for &q in &nodes[i + 1..] {
-                    if values[p as usize] * values[q as usize] < 0.0 {
-                        edges.push([p.min(q), p.max(q)]);
-                    }
-                }
-            }
-        }
-        edges.sort_unstable();
-        edges.dedup();
-        edges.into_iter().map(|edge| self.crossing(complex, edge, values)).collect()
+        let crossed = |[p, q]: &[u32; 2]| values[*p as usize] * values[*q as usize] < 0.0;
+        let edges = complex.edges().into_iter().filter(crossed);
+        edges.map(|edge| self.crossing(complex, edge, values)).collect()
     }
 
     fn crossing(&self, complex: &Complex, edge: [u32; 2], values: &[f64]) -> Crossing {
@@ -99,7 +136,7 @@ impl Surface<'_> {
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
-            if (self.surfaces.inside(self.material, &start.lerp(&end, middle)) > 0.0) == begins_inside {
+            if ((self.inside)(&start.lerp(&end, middle)) > 0.0) == begins_inside {
                 low = middle;
             } else {
                 high = middle;
