@@ -22,26 +22,35 @@
 
 // Units stand in brackets; rustdoc takes [m] for a link.
 
+mod anatomy;
+mod complex;
+mod cut;
 mod error;
 mod extent;
 mod field;
 mod lattice;
+mod manifold;
+mod optimise;
 mod phantom;
 mod sheets;
 mod stencil;
 mod structured;
 mod stuffing;
+mod surfaces;
+mod tets;
 mod topology;
 mod voxels;
 
 use pliant_geometry::Mesh;
 
+pub use anatomy::Anatomy;
 pub use error::MeshingError;
 pub use field::{Ellipsoid, ImplicitField};
 pub use phantom::{Organ, Phantom, brain_label};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
+pub use tets::{MaterialReport, OrganMesh, OrganTets, Repairs, Steps, TetReport};
 pub use voxels::Voxels;
 
 /// Cells allowed in a mesh unless the caller says otherwise. Limits above 2²⁵ (34 million) act as 2²⁵.
