@@ -2,6 +2,8 @@
 //! gaps. Closing is dilation and erosion by a ball in millimetres, through exact distances, so it is the same along
 //! every axis of an image with thick slices.
 
+use std::fmt;
+
 use pliant_geometry::Vector3;
 use serde::Serialize;
 
@@ -27,7 +29,6 @@ pub struct Cleaning {
 
 /// What a cleaning changed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
 pub struct Cleaned {
     /// Voxels added in gaps.
     pub gap_voxels: u64,
@@ -39,6 +40,20 @@ pub struct Cleaned {
     pub pieces_removed: u64,
     /// Voxels removed with them.
     pub voxels_removed: u64,
+}
+
+impl fmt::Display for Cleaned {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { gap_voxels, holes, hole_voxels, pieces_removed, voxels_removed } = self;
+        let done = [
+            (*gap_voxels, format!("{gap_voxels} voxels added in gaps")),
+            (*holes, format!("{hole_voxels} voxels added in {holes} holes")),
+            (*pieces_removed, format!("{voxels_removed} voxels removed in {pieces_removed} smaller pieces")),
+        ];
+        let done: Vec<String> =
+            done.into_iter().filter(|(count, _)| *count > 0).map(|(_, words)| words).collect();
+        if done.is_empty() { f.write_str("nothing to clean") } else { f.write_str(&done.join(", ")) }
+    }
 }
 
 /// A region of an image: a box of voxels, each inside or not. The box has a margin; it may reach beyond the image.

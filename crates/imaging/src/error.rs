@@ -209,6 +209,24 @@ pub enum LabelError {
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
+    /// The background is no region.
+    #[error("label 0 is the background; the image has {}", list(present))]
+    Background {
+        /// Labels of the image, without 0.
+        present: Vec<i32>,
+    },
+    /// No label asked for.
+    #[error("no label is chosen; the image has {}", list(present))]
+    NoneChosen {
+        /// Labels of the image, without 0.
+        present: Vec<i32>,
+    },
+    /// A label asked for twice.
+    #[error("label {label} is named twice; name each once")]
+    Repeated {
+        /// The label.
+        label: i32,
+    },
     /// The cleaning left nothing.
     #[error("nothing is left of label {label} after {operation}; use a milder setting")]
     Emptied {

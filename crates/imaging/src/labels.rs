@@ -11,7 +11,6 @@ use crate::image::LabelImage;
 
 /// The voxels of one label.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
 pub struct RegionReport {
     /// The label.
     pub label: i32,

@@ -1,7 +1,7 @@
 //! What a mesher of organs is given: the field of the whole body, and of each of its materials where there are several.
 //! A point is of the material whose field is largest. Fields come from the regions of an image, or from functions.
 
-use pliant_geometry::Vector3;
+use pliant_geometry::{DataArray, Mesh, Vector3};
 use pliant_imaging::{Cleaned, Cleaning, DistanceField, LabelError, LabelImage, Smoothing};
 
 use crate::complex::MOST_MATERIALS;
@@ -54,9 +54,7 @@ impl<'a> Anatomy<'a> {
         smoothing: &Smoothing,
         progress: &dyn Fn(f64),
     ) -> Result<(Anatomy<'static>, Cleaned), LabelError> {
-        if labels.len() > MOST_MATERIALS {
-            return Err(LabelError::TooManyLabels { labels: labels.len(), limit: MOST_MATERIALS });
-        }
+        require_choice(image, labels)?;
         let share = 1.0 / (labels.len() + 1) as f64;
         let part = |number: usize| move |done: f64| progress(share * (number as f64 + done));
         let (whole, done) = image.region(labels, smoothing.margin())?.clean(cleaning)?;
@@ -86,14 +84,50 @@ impl<'a> Anatomy<'a> {
         &*self.whole
     }
 
+    /// Gives each cell the label of the material that its centre lies in, as cell data `label`.
+    pub fn label(&self, mesh: &mut Mesh) {
+        let Mesh { points, blocks, .. } = mesh;
+        for block in blocks {
+            let label = |cell: &[u32]| {
+                let sum: Vector3 = cell.iter().map(|&node| points[node as usize]).sum();
+                f64::from(self.label_at(&(sum / cell.len() as f64)))
+            };
+            let labels = block.cells().map(label).collect();
+            block.data.insert("label".to_owned(), DataArray::scalar(labels));
+        }
+    }
+
+    /// The label of a point of the body.
+    fn label_at(&self, point: &Vector3) -> i32 {
+        let depth = |(label, field): &(i32, Option<Box<dyn ImplicitField + 'a>>)| {
+            Some((*label, field.as_ref()?.value(point))).filter(|(_, depth)| *depth > 0.0)
+        };
+        let deepest = self.materials.iter().filter_map(depth).max_by(|a, b| a.1.total_cmp(&b.1));
+        deepest.map_or(self.materials[0].0, |(label, _)| label)
+    }
+
     /// Labels of the materials.
     pub fn labels(&self) -> Vec<i32> {
         self.materials.iter().map(|(label, _)| *label).collect()
     }
 
     /// Volumes of the materials in the image [m³], where known.
-    pub(crate) fn volumes(&self) -> &[Option<f64>] {
+    pub fn volumes(&self) -> &[Option<f64>] {
         &self.volumes
+    }
+}
+
+/// Whether labels can be meshed together: at least one, each once, none the background, not too many.
+fn require_choice(image: &LabelImage, labels: &[i32]) -> Result<(), LabelError> {
+    let repeated = (1..labels.len()).find(|&at| labels[..at].contains(&labels[at]));
+    match repeated {
+        _ if labels.is_empty() => Err(LabelError::NoneChosen { present: image.present() }),
+        _ if labels.contains(&0) => Err(LabelError::Background { present: image.present() }),
+        Some(at) => Err(LabelError::Repeated { label: labels[at] }),
+        None if labels.len() > MOST_MATERIALS => {
+            Err(LabelError::TooManyLabels { labels: labels.len(), limit: MOST_MATERIALS })
+        }
+        None => Ok(()),
     }
 }
 

@@ -1,7 +1,7 @@
-//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields filled with tetrahedra
+//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields or image regions filled with tetrahedra
 //! (isosurface stuffing) or cubes. Lengths are in metres. The same request gives the same mesh, bit for bit,
 //! on any number of threads.
-//! Leaves out: images and surfaces as input, optimisation of the cells.
+//! Leaves out: surfaces as input, cubes weighted by how full they are.
 //!
 //! ```
 //! use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Organ, Phantom, Resolution, Stuffing, VolumeCell};
@@ -25,6 +25,7 @@
 mod anatomy;
 mod complex;
 mod cut;
+mod deviation;
 mod error;
 mod extent;
 mod field;
@@ -44,6 +45,7 @@ mod voxels;
 use pliant_geometry::Mesh;
 
 pub use anatomy::Anatomy;
+pub use deviation::Deviation;
 pub use error::MeshingError;
 pub use field::{Ellipsoid, ImplicitField};
 pub use phantom::{Organ, Phantom, brain_label};

@@ -132,7 +132,6 @@ pub struct OrganMesh {
 
 /// What was repaired.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
 pub struct Repairs {
     /// Small pieces left out.
     pub dropped_pieces: usize,
@@ -150,7 +149,6 @@ pub struct Repairs {
 
 /// What the optimiser did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
 pub struct Steps {
     /// Rounds run.
     pub rounds: usize,
@@ -164,7 +162,6 @@ pub struct Steps {
 
 /// One material of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
 pub struct MaterialReport {
     /// Its label.
     pub label: i32,
@@ -178,7 +175,6 @@ pub struct MaterialReport {
 
 /// Size and quality of a mesh of an anatomy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
 pub struct TetReport {
     /// Points.
     pub nodes: usize,

@@ -39,7 +39,7 @@ fn regions_have_volume_box_and_pieces() {
             && text.ends_with("in 2 pieces, the largest of 27 voxels")
     );
     let json = serde_json::to_value(seven).unwrap();
-    assert_eq!(json["largest-component"], 27);
+    assert_eq!(json["largest_component"], 27);
 }
 
 #[test]
