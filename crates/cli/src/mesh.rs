@@ -143,7 +143,9 @@ fn make(arguments: &MeshImage, labels: &LabelImage, chosen: &[i32], bar: &Bar) -
     };
     bar.update_mesh(PARTS[0] + PARTS[1], "measuring distances");
     let deviation = Deviation::new(&mesh, anatomy.field(), edge).map_err(refused)?;
-    let warnings = deviation.doubt(edge).map(|doubt| format!("{doubt}; use a shorter edge"));
+    // Steps of cubes stay behind the body by up to half of their diagonal.
+    let allowed = if matches!(arguments.cells, MeshCells::Tets) { edge / 2.0 } else { edge };
+    let warnings = deviation.doubt(allowed).map(|doubt| format!("{doubt}; use a shorter edge"));
     Ok(Made {
         materials: materials(&mesh, &anatomy),
         quality: QualityReport::new(&mesh),

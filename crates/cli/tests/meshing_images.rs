@@ -97,7 +97,7 @@ density = 1000
 [constraint.base]
 type = "fix"
 body = "organ"
-nodes = { box = { min = [-1, -1, -1], max = [1, 1, -0.01] } }
+nodes = { box = [[-1, -1, -1], [1, 1, -0.008]] }
 "#;
 
 fn workshop(mesh: &str, law: &str) -> Workshop {
@@ -126,7 +126,7 @@ fn labels_are_listed_with_volume_place_and_pieces() {
     assert_eq!(told.code, 0, "{}", told.err);
     for piece in [
         "NIfTI-1",
-        "40 × 40 × 40 voxels of 1 × 1 × 1 mm",
+        "40 × 40 × 40 voxels of 1.000 × 1.000 × 1.000 mm",
         "label 5:",
         "in 2 pieces",
         "label 8:",
@@ -223,6 +223,8 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
     workshop.write("cut.nii.gz", &packed[..packed.len() / 2]);
     workshop.write("text.txt", "no image\n");
     let mut negative = Picture::organ().nifti();
+    // Without the matrix, whose code is at 254, the spacings count.
+    negative[254] = 0;
     negative[84..88].copy_from_slice(&(-1_f32).to_le_bytes());
     workshop.write("negative.nii", &negative);
     workshop.write("empty.nii", Picture::new(|_| 0).nifti());
@@ -242,7 +244,11 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
         (seg, &["--label", "5", "--edge", "-1"], &["edge is -1", "positive"]),
         (seg, &["--label", "5", "--edge", "nan"], &["edge is NaN", "positive"]),
         (seg, &["--label", "5", "--edge", "5e-5"], &["limit", "--force"]),
-        (seg, &["--label", "9", "--edge", "0.01"], &["no cell of edge 0.01 m fits", "shorter edge"]),
+        (
+            seg,
+            &["--label", "9", "--edge", "0.01"],
+            &["nothing is left of label 9 after smoothing", "finer voxels"],
+        ),
         (seg, &["--label", "5", "--edge", "0.006", "--close-gaps", "-1"], &["gaps to close is -1", "metres"]),
         (seg, &["--label", "5", "--edge", "0.006", "--close-gaps", "30"], &["voxels", "3 mm"]),
     ];
@@ -270,12 +276,12 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
 #[test]
 fn a_part_thinner_than_the_cells_is_told_with_its_place() {
     let workshop = with_image();
-    // A ball with a rod of 2 mm that sticks out by 8 mm.
-    let rod = |[x, y, z]: [f64; 3]| x > 0.0 && x < 18.0 && y.abs() < 1.0 && z.abs() < 1.0;
-    let picture = Picture::new(|p| i16::from(p.iter().map(|x| x * x).sum::<f64>() < 100.0 || rod(p)));
-    workshop.write("rod.nii", picture.nifti());
+    // A ball on the left with a rod of 4 mm that sticks out to x = 18 mm.
+    let ball = |[x, y, z]: [f64; 3]| (x + 8.0).powi(2) + y * y + z * z < 100.0;
+    let rod = |[x, y, z]: [f64; 3]| (-8.0..18.0).contains(&x) && y.abs() < 2.0 && z.abs() < 2.0;
+    workshop.write("rod.nii", Picture::new(|point| i16::from(ball(point) || rod(point))).nifti());
     let told =
-        workshop.pliant(&["mesh", "rod.nii", "--label", "1", "--edge", "0.005", "-o", "rod.vtu", "--json"]);
+        workshop.pliant(&["mesh", "rod.nii", "--label", "1", "--edge", "0.008", "-o", "rod.vtu", "--json"]);
     assert_eq!(told.code, 0, "{}", told.err);
     let json = told.json();
     assert!(

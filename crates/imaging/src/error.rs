@@ -228,7 +228,9 @@ pub enum LabelError {
         label: i32,
     },
     /// The cleaning left nothing.
-    #[error("nothing is left of label {label} after {operation}; use a milder setting")]
+    #[error(
+        "nothing is left of label {label} after {operation}; use a milder setting, or an image of finer voxels"
+    )]
     Emptied {
         /// The label.
         label: i32,

@@ -1,5 +1,7 @@
 //! How far the boundary of a mesh and the surface of the body it was made of are apart, both ways.
 
+use std::collections::HashMap;
+
 use pliant_geometry::{Mesh, SurfaceLocator, Vector3, boundary};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -17,7 +19,7 @@ const STEPS: usize = 8;
 /// Distances between the boundary of a mesh and the surface where a field is zero [m].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Deviation {
-    /// Largest distance from the nodes and face centres of the mesh's boundary to the surface, at least.
+    /// Largest distance from the nodes and face centres of the mesh's boundary to the surface.
     pub largest_from_mesh: f64,
     /// Root mean square of the same, weighted by area.
     pub rms_from_mesh: f64,
@@ -39,12 +41,13 @@ impl Deviation {
         let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
         let locator = SurfaceLocator::new(&surface, &faces, &mesh.points);
         let mut found = Self::default();
+        let samples = Samples::new(crossings(field, &low, &high, step), edge);
         let (mut squares, mut weight) = (0.0, 0.0);
         let from_mesh = surface.faces.par_iter().map(|face| {
             let corners = face.nodes().iter().map(|&node| mesh.points[node as usize]);
             let far = corners
                 .chain([face.centre(&mesh.points)])
-                .map(|point| way_to_surface(field, &point, edge))
+                .map(|point| way_to_surface(field, &point, edge).min(samples.distance(&point)))
                 .collect::<Vec<_>>();
             (face.area(&mesh.points), far)
         });
@@ -54,10 +57,9 @@ impl Deviation {
             weight += area;
         }
         found.rms_from_mesh = root_mean(squares, weight);
-        let samples = crossings(field, &low, &high, step);
         let to_mesh = |point: &Vector3| locator.closest(point).map_or(0.0, |at| (at.position - point).norm());
-        let distances: Vec<f64> = samples.par_iter().map(to_mesh).collect();
-        for (&distance, point) in distances.iter().zip(&samples) {
+        let distances: Vec<f64> = samples.points.par_iter().map(to_mesh).collect();
+        for (&distance, point) in distances.iter().zip(&samples.points) {
             if distance > found.largest_from_body {
                 (found.largest_from_body, found.farthest) = (distance, (*point).into());
             }
@@ -68,10 +70,10 @@ impl Deviation {
 }
 
 impl Deviation {
-    /// Where the mesh stays more than a cell of `edge` [m] behind the body, in words.
-    pub fn doubt(&self, edge: f64) -> Option<String> {
+    /// Where the mesh stays farther behind the body than `allowed` [m], in words.
+    pub fn doubt(&self, allowed: f64) -> Option<String> {
         let [x, y, z] = self.farthest.map(|x| x * 1e3);
-        (self.largest_from_body > edge).then(|| {
+        (self.largest_from_body > allowed).then(|| {
             format!(
                 "the mesh stays {:.1} mm behind the body at ({x:.1}, {y:.1}, {z:.1}) mm: a part there is thinner than \
                  the cells, or a small piece that was left out",
@@ -85,11 +87,45 @@ fn root_mean(squares: f64, weight: f64) -> f64 {
     if weight > 0.0 { (squares / weight).sqrt() } else { 0.0 }
 }
 
-/// Distance to the zero surface along the gradient [m]; where the field is flat, what it says itself.
+/// Points of the surface, in cubes by their place.
+struct Samples {
+    points: Vec<Vector3>,
+    cubes: HashMap<[i64; 3], Vec<u32>>,
+    /// Edge of the cubes [m].
+    edge: f64,
+}
+
+impl Samples {
+    fn new(points: Vec<Vector3>, edge: f64) -> Self {
+        let mut cubes: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+        for (index, point) in (0..).zip(&points) {
+            cubes.entry(cube(point, edge)).or_default().push(index);
+        }
+        Self { points, cubes, edge }
+    }
+
+    /// Distance to the nearest of them [m]; infinite without any.
+    fn distance(&self, from: &Vector3) -> f64 {
+        let own = cube(from, self.edge);
+        let near = (0..27).map(|at| [own[0] + at % 3 - 1, own[1] + at / 3 % 3 - 1, own[2] + at / 9 - 1]);
+        let near = near.filter_map(|cube| self.cubes.get(&cube)).flatten();
+        let nearest = near.map(|&at| (self.points[at as usize] - from).norm()).fold(f64::INFINITY, f64::min);
+        // What is farther than an edge may be nearer in other cubes.
+        if nearest <= self.edge {
+            return nearest;
+        }
+        self.points.iter().map(|point| (point - from).norm()).fold(f64::INFINITY, f64::min)
+    }
+}
+
+fn cube(point: &Vector3, edge: f64) -> [i64; 3] {
+    [0, 1, 2].map(|axis| (point[axis] / edge).floor() as i64)
+}
+
+/// Distance to the zero surface along the gradient [m], which is exact nearby; infinite where the way is lost.
 fn way_to_surface(field: &(impl ImplicitField + ?Sized), from: &Vector3, longest: f64) -> f64 {
     let mut point = *from;
     let mut value = field.value(&point);
-    let own = value.abs();
     for _ in 0..STEPS {
         if value.abs() < 1e-3 * longest {
             break;
@@ -97,12 +133,12 @@ fn way_to_surface(field: &(impl ImplicitField + ?Sized), from: &Vector3, longest
         let gradient = field.gradient(&point);
         let step = gradient * (value / gradient.norm_squared());
         if !step.iter().all(|x| x.is_finite()) {
-            return own;
+            return f64::INFINITY;
         }
         point -= if step.norm() > longest { step.normalize() * longest } else { step };
         value = field.value(&point);
     }
-    if value.abs() < 1e-2 * longest { (point - from).norm() + value.abs() } else { own }
+    if value.abs() < 1e-2 * longest { (point - from).norm() + value.abs() } else { f64::INFINITY }
 }
 
 /// Where the zero surface crosses the edges of a grid over a box.
