@@ -79,7 +79,7 @@ impl DeviceBlocks {
     /// Blocks of the cells of a solid.
     ///
     /// # Errors
-    /// If an array is too large.
+    /// If an array is too large, or groups share too little memory.
     pub(crate) fn of_cells(
         memory: &Memory<'_>,
         device: &Device,
@@ -88,6 +88,8 @@ impl DeviceBlocks {
     ) -> Result<Self, GpuError> {
         let cells = &solid.cells;
         let per_cell = cells.nodes_per_cell();
+        // Displacements and places at rest of all nodes, forces and energies of all cells.
+        device.shares(4 * (2 * 3 * MOST_NODES + (3 * per_cell + 1) * GROUP as usize))?;
         let centre = |cell: usize| {
             let sum =
                 cells.nodes(cell).iter().fold([0.0; 3], |sum, &node| add(sum, model.rest[node as usize]));

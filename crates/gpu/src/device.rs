@@ -249,14 +249,28 @@ impl Device {
     /// If a kernel can't work on so many arrays, or in groups of so many invocations.
     pub(crate) fn allows(&self, arrays: u32, group: u32) -> Result<(), GpuError> {
         let most = self.device.limits().max_storage_buffers_per_shader_stage;
-        let lacks = |what| Err(GpuError::Lacks { adapter: self.adapter.name.clone(), what });
         if most < arrays {
-            return lacks(format!("{arrays} arrays a kernel (it has {most})"));
+            return Err(self.lacks(format!("{arrays} arrays a kernel (it has {most})")));
         }
-        if self.adapter.group_size < group {
-            return lacks(format!("groups of {group} invocations (its are of {})", self.adapter.group_size));
+        let largest = self.adapter.group_size;
+        if largest < group {
+            return Err(self.lacks(format!("groups of {group} invocations (its are of {largest})")));
         }
         Ok(())
+    }
+
+    /// # Errors
+    /// If groups of invocations share less memory [B].
+    pub(crate) fn shares(&self, bytes: usize) -> Result<(), GpuError> {
+        let most = self.adapter.shared_memory;
+        if (most as usize) < bytes {
+            return Err(self.lacks(format!("{bytes} bytes of shared memory (it has {most})")));
+        }
+        Ok(())
+    }
+
+    pub(crate) fn lacks(&self, what: String) -> GpuError {
+        GpuError::Lacks { adapter: self.adapter.name.clone(), what }
     }
 
     /// Waits until everything submitted is done.

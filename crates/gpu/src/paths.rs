@@ -62,9 +62,7 @@ impl Paths {
             Design::Fast => Self::fast(memory, device, model, nodes),
             Design::FloatAtomics => {
                 if !device.adapter().float_atomics {
-                    let (adapter, what) =
-                        (device.adapter().name.clone(), "floating-point atomics".to_owned());
-                    return Err(GpuError::Lacks { adapter, what });
+                    return Err(device.lacks("floating-point atomics".to_owned()));
                 }
                 let cells = include_str!("shaders/float_cells.wgsl").to_owned();
                 let gather = include_str!("shaders/float_nodes.wgsl").to_owned();
