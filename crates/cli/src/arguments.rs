@@ -64,6 +64,12 @@ pub enum Command {
     /// Say what a mesh file holds, how good it is, and what is wrong with it.
     #[command(after_help = "Examples:\n  pliant info liver.msh\n  pliant info liver.msh --convert liver.vtu")]
     Info(Info),
+    /// List the labels of a segmented image: volume, place and pieces of each.
+    #[command(after_help = "Examples:\n  pliant labels seg.nii.gz\n  pliant labels seg.nii.gz --json")]
+    Labels(Labels),
+    /// Make a mesh of volume cells from labels of a segmented image.
+    #[command(after_help = MESH_HELP)]
+    Mesh(MeshImage),
     /// Compute the solid results of the thesis and write them beside the printed ones.
     #[command(
         after_help = "Examples:\n  pliant reproduce\n  pliant reproduce --list\n  pliant reproduce --only fig-6.3 --out shear\n\n\
@@ -284,11 +290,86 @@ pub struct Info {
     pub json: bool,
 }
 
+const MESH_HELP: &str = "\
+Images: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, or the folder of a DICOM series. The mesh is in metres, in
+the coordinates of the patient: x to the right, y to the front, z to the head.
+
+Examples:
+  pliant labels seg.nii.gz
+  pliant mesh seg.nii.gz --label 5 --edge 0.008 -o liver.vtu
+  pliant mesh brain.nii.gz --label 1 --label 2 --edge 0.006 --keep-largest -o brain.vtu   # two materials
+  pliant mesh seg.nii.gz --label 5 --edge 0.01 --as hexes --close-gaps 0.003 --fill-holes -o liver.msh
+  pliant mesh grey.nii --threshold 0.5 --edge 0.008 -o grey.vtu
+
+The label of each cell is its cell data `label`. A scene can name the image itself:
+  mesh = { image = \"seg.nii.gz\", label = 5, edge = 0.008 }
+
+Exit codes: 0 done, 1 the mesh could not be written, 2 the input is wrong.";
+
+#[derive(Debug, clap::Args)]
+pub struct Labels {
+    /// An image file, or the folder of a DICOM series.
+    pub image: PathBuf,
+    /// UID of the DICOM series, where the folder holds several.
+    #[arg(long, value_name = "UID")]
+    pub series: Option<String>,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub struct MeshImage {
+    /// An image file, or the folder of a DICOM series.
+    pub image: PathBuf,
+    /// Label to mesh; several make one mesh of several materials. The first one takes what cleaning adds.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub label: Vec<i32>,
+    /// Instead of labels: all voxels of at least this value, as of a map of probabilities.
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true, conflicts_with = "label")]
+    pub threshold: Option<f64>,
+    /// Edge of the cells [m].
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub edge: f64,
+    /// The cells: tetrahedra shaped for large stable steps, or cubes with a stepped surface.
+    #[arg(long = "as", value_name = "CELLS", default_value = "tets")]
+    pub cells: MeshCells,
+    /// Name of the mesh; .vtu or .msh.
+    #[arg(short, long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Close gaps and channels of up to this width [m].
+    #[arg(long, value_name = "M", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub close_gaps: f64,
+    /// Fill cavities without a way out.
+    #[arg(long)]
+    pub fill_holes: bool,
+    /// Keep only the largest piece.
+    #[arg(long)]
+    pub keep_largest: bool,
+    /// Make more than five million cells, if it comes to that.
+    #[arg(long)]
+    pub force: bool,
+    /// UID of the DICOM series, where the folder holds several.
+    #[arg(long, value_name = "UID")]
+    pub series: Option<String>,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum MeshCells {
+    Tets,
+    Hexes,
+}
+
 impl Command {
     pub fn wants_json(&self) -> bool {
         match self {
             Self::Run(run) => run.json,
             Self::Info(info) => info.json,
+            Self::Labels(labels) => labels.json,
+            Self::Mesh(mesh) => mesh.json,
             Self::Bench(bench) => bench.json,
             Self::Devices { json } => *json,
             Self::Sweep(_)

@@ -19,6 +19,7 @@ use tempfile::TempDir;
 
 use crate::arguments::{self, Check, Command, DeviceName, Info, Overrides, Precision, Run};
 use crate::bench::bench;
+use crate::mesh;
 use crate::report::{self, Bar, Failure, say};
 use crate::reproduce::reproduce;
 
@@ -37,6 +38,8 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Info(arguments) => info(&arguments),
+        Command::Labels(arguments) => mesh::labels(&arguments),
+        Command::Mesh(arguments) => mesh::mesh(&arguments),
         Command::Import { model, out } => import(&model, &out),
         Command::Reproduce(arguments) => reproduce(&arguments),
         Command::Bench(arguments) => bench(&arguments),

@@ -7,11 +7,13 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
+use pliant_geometry::io::MeshFileError;
 use pliant_gpu::Adapter;
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::{
     LoadStepProgress, Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, number,
 };
+use serde_json::json;
 
 /// The input is wrong (exit code 2).
 #[derive(Debug)]
@@ -79,6 +81,15 @@ pub fn refused(message: &str) {
     let _ = say(failed_input(message));
 }
 
+/// Prints that a mesh could not be written, which is no mistake of the input; exit code 1.
+pub fn failed_output(error: &MeshFileError, json: bool) -> Result<ExitCode, Failure> {
+    eprintln!("error: {error}");
+    if json {
+        say(json!({ "status": "failed", "error": { "kind": "output", "message": error.to_string() } }))?;
+    }
+    Ok(ExitCode::from(1))
+}
+
 /// Prints mistakes or doubts with the user's own lines underlined.
 pub fn show(errors: &SceneErrors) {
     let handler = miette::GraphicalReportHandler::new_themed(theme());
@@ -130,6 +141,12 @@ impl Bar {
     pub fn update_bench(&self, progress: &pliant_bench::Progress) {
         self.0.set_position((1000.0 * progress.part) as u64);
         self.0.set_message(progress.now.clone());
+    }
+
+    /// A part of the work from 0 to 1, and what is being done.
+    pub fn update_mesh(&self, part: f64, now: &'static str) {
+        self.0.set_position((1000.0 * part) as u64);
+        self.0.set_message(now);
     }
 
     pub fn finish(&self) {

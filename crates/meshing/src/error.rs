@@ -13,6 +13,14 @@ pub enum MeshingError {
         /// Its value.
         value: f64,
     },
+    /// No mesh of a curved body is made of ideal tets.
+    #[error(
+        "target is {target}; the least acoustic length can't be that of ideal tets: 0.75 is reached as a rule, 0.9 at best"
+    )]
+    TargetTooHigh {
+        /// Part of the ideal asked for.
+        target: f64,
+    },
     /// A position has an infinite or NaN coordinate.
     #[error("{what} is ({}, {}, {}) m; it must be finite", value.x, value.y, value.z)]
     NotFinite {

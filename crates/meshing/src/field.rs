@@ -1,5 +1,5 @@
 //! Bodies described by a function that is positive inside: what the meshers of fields ask of a shape.
-//! Leaves out fields sampled on images.
+//! Fields of images are in `pliant-imaging`.
 
 use pliant_geometry::Vector3;
 
@@ -10,6 +10,32 @@ pub trait ImplicitField: Sync {
 
     /// Smallest and largest corner of a box that encloses the body [m].
     fn bounds(&self) -> (Vector3, Vector3);
+
+    /// Gradient of the value, without unit: by central differences over a ten-thousandth of the box unless the field
+    /// knows better.
+    fn gradient(&self, point: &Vector3) -> Vector3 {
+        let (low, high) = self.bounds();
+        let step = 1e-4 * (high - low).amax();
+        Vector3::from_fn(|axis, _| {
+            let mut shift = Vector3::zeros();
+            shift[axis] = step;
+            (self.value(&(point + shift)) - self.value(&(point - shift))) / (2.0 * step)
+        })
+    }
+}
+
+impl<F: ImplicitField + ?Sized> ImplicitField for &F {
+    fn value(&self, point: &Vector3) -> f64 {
+        (**self).value(point)
+    }
+
+    fn bounds(&self) -> (Vector3, Vector3) {
+        (**self).bounds()
+    }
+
+    fn gradient(&self, point: &Vector3) -> Vector3 {
+        (**self).gradient(point)
+    }
 }
 
 /// An ellipsoid with its axes along x, y and z.

@@ -1,7 +1,7 @@
-//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields filled with tetrahedra
+//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields or image regions filled with tetrahedra
 //! (isosurface stuffing) or cubes. Lengths are in metres. The same request gives the same mesh, bit for bit,
 //! on any number of threads.
-//! Leaves out: images and surfaces as input, optimisation of the cells.
+//! Leaves out: surfaces as input, cubes weighted by how full they are.
 //!
 //! ```
 //! use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Organ, Phantom, Resolution, Stuffing, VolumeCell};
@@ -22,26 +22,37 @@
 
 // Units stand in brackets; rustdoc takes [m] for a link.
 
+mod anatomy;
+mod complex;
+mod cut;
+mod deviation;
 mod error;
 mod extent;
 mod field;
 mod lattice;
+mod manifold;
+mod optimise;
 mod phantom;
 mod sheets;
 mod stencil;
 mod structured;
 mod stuffing;
+mod surfaces;
+mod tets;
 mod topology;
 mod voxels;
 
 use pliant_geometry::Mesh;
 
+pub use anatomy::Anatomy;
+pub use deviation::Deviation;
 pub use error::MeshingError;
 pub use field::{Ellipsoid, ImplicitField};
 pub use phantom::{Organ, Phantom, brain_label};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
+pub use tets::{MaterialReport, OrganMesh, OrganTets, Repairs, Steps, TetReport};
 pub use voxels::Voxels;
 
 /// Cells allowed in a mesh unless the caller says otherwise. Limits above 2²⁵ (34 million) act as 2²⁵.

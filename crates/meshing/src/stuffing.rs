@@ -5,7 +5,7 @@
 //! Two things differ from the paper: all points are warped at once, so that their order does not matter, and
 //! the diagonals of `stencil.rs` favour the time step. The paper's bound of 10.8° on dihedral angles does not
 //! hold then: down to 8.2° was seen (brain at 5 mm; example `measure`).
-//! Leaves out: grading, optimisation, interfaces inside the body, mending of non-manifold edges.
+//! Leaves out: grading; what `tets.rs` does afterwards (optimisation, materials, mending of non-manifold edges).
 
 use pliant_geometry::{CellKind, Vector3};
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ use crate::extent::{allowed, checked_box, require_room};
 use crate::field::ImplicitField;
 use crate::lattice::{DIRECTIONS, Lattice, Triple, is_long, tets_from};
 use crate::stencil::{Corner, stencil};
-use crate::topology::largest_component;
+use crate::topology::{large_components, largest_component};
 use crate::{DEFAULT_CELL_LIMIT, FieldMesh};
 
 /// A cut nearer to the end of a long edge than this fraction of the edge warps that end onto the surface.
@@ -52,6 +52,23 @@ impl Stuffing {
 
     /// Fills the body of the field with tetrahedra. The result does not depend on the number of threads.
     pub fn mesh(&self, field: &(impl ImplicitField + ?Sized)) -> Result<FieldMesh, MeshingError> {
+        let (warped, tets) = self.fill(field)?;
+        Ok(largest_component(CellKind::Tet, &tets, |node| warped.position(node)))
+    }
+
+    /// The same with all components of at least this part of the largest one's cells, and how many cells and components
+    /// less that leaves out.
+    pub(crate) fn parts(
+        &self,
+        field: &(impl ImplicitField + ?Sized),
+        smallest: f64,
+    ) -> Result<FieldMesh, MeshingError> {
+        let (warped, tets) = self.fill(field)?;
+        Ok(large_components(CellKind::Tet, &tets, smallest, |node| warped.position(node)))
+    }
+
+    /// The tetrahedra, before any is left out.
+    fn fill(&self, field: &(impl ImplicitField + ?Sized)) -> Result<(Warped, Vec<u32>), MeshingError> {
         let lattice = self.lattice(field)?;
         let sign = signs(&lattice, field)?;
         let warped = Warped::new(lattice, sign, field);
@@ -61,7 +78,7 @@ impl Stuffing {
             return Err(MeshingError::NoCells { edge: self.edge, size: high - low });
         }
         require_at_most((tets.len() / 4) as f64, allowed(self.cell_limit))?;
-        Ok(largest_component(CellKind::Tet, &tets, |node| warped.position(node)))
+        Ok((warped, tets))
     }
 
     fn lattice(&self, field: &(impl ImplicitField + ?Sized)) -> Result<Lattice, MeshingError> {

@@ -20,20 +20,33 @@ pub(crate) fn largest_component(
     cells: &[u32],
     position: impl Fn(u32) -> Vector3 + Sync + Send,
 ) -> FieldMesh {
+    // Of equal components only the first is kept.
+    large_components(kind, cells, f64::INFINITY, position)
+}
+
+/// Keeps the largest face-connected component of `cells` and all that have at least the part `smallest` of its cells.
+pub(crate) fn large_components(
+    kind: CellKind,
+    cells: &[u32],
+    smallest: f64,
+    position: impl Fn(u32) -> Vector3 + Sync + Send,
+) -> FieldMesh {
     let faces = sorted_faces(kind, cells);
     let components = Components::new(kind, cells, &faces);
-    let kept = components.largest();
+    let kept = components.large(smallest);
     let n = kind.node_count();
     let nodes: Vec<u32> = cells
         .chunks_exact(n)
         .zip(&components.root)
-        .filter(|(_, root)| **root == kept)
+        .filter(|(_, root)| kept[**root as usize])
         .flat_map(|(cell, _)| cell)
         .copied()
         .collect();
     FieldMesh {
-        non_manifold_edges: non_manifold_edges(kind, cells, &faces, |cell| components.root[cell] == kept),
-        dropped_components: components.count - 1,
+        non_manifold_edges: non_manifold_edges(kind, cells, &faces, |cell| {
+            kept[components.root[cell] as usize]
+        }),
+        dropped_components: components.count - kept.iter().filter(|&&kept| kept).count(),
         dropped_cells: (cells.len() - nodes.len()) / n,
         mesh: compact(kind, nodes, position),
     }
@@ -116,13 +129,18 @@ impl Components {
         Self { root, count }
     }
 
-    /// Root of the component with the most cells, the lowest of equals.
-    fn largest(&self) -> u32 {
+    /// Whether each root is that of the component with the most cells (the lowest of equals), or of one with at least
+    /// the part `smallest` of them.
+    fn large(&self, smallest: f64) -> Vec<bool> {
         let mut size = vec![0_u32; self.root.len()];
         for &root in &self.root {
             size[root as usize] += 1;
         }
-        (0..size.len()).rev().max_by_key(|&root| size[root]).unwrap_or(0) as u32
+        let largest = (0..size.len()).rev().max_by_key(|&root| size[root]).unwrap_or(0);
+        let least = smallest * f64::from(size.get(largest).copied().unwrap_or(0));
+        (0..size.len())
+            .map(|root| root == largest || size[root] > 0 && f64::from(size[root]) >= least)
+            .collect()
     }
 }
 

@@ -31,6 +31,7 @@
 //! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
 //! ```
 
+mod bound;
 mod build;
 pub mod checker;
 mod checkpoint;
@@ -52,6 +53,7 @@ mod target;
 #[cfg(test)]
 mod testing;
 
+pub use bound::element_bound;
 pub use build::{Built, BuiltBody, PLAUSIBLE_SIZE, build};
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use output::{

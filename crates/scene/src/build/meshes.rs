@@ -1,17 +1,18 @@
 //! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and repaired.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{self, MeshFileError};
 use pliant_geometry::{CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose, reorder};
+use pliant_imaging::{Cleaning, ImageError, LabelError, ReadOptions, Smoothing};
 use pliant_meshing::{
-    Block, DEFAULT_CELL_LIMIT, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Phantom, Resolution,
-    Stuffing, Tube, VolumeCell, Voxels, brain_label,
+    Anatomy, Block, DEFAULT_CELL_LIMIT, Deviation, Ellipsoid, FieldMesh, ImplicitField, MeshingError,
+    OrganTets, Phantom, Resolution, Stuffing, Tube, VolumeCell, Voxels, brain_label,
 };
 
 use super::Builder;
 use crate::diagnostic::{Diagnostic, counted};
-use crate::format::{Cells, Fix, MeshTable, Organ};
+use crate::format::{Cells, CleanTable, Fix, MeshTable, Organ};
 use crate::output::number;
 
 /// A mesh and where it comes from.
@@ -31,6 +32,7 @@ impl Builder<'_> {
     pub(super) fn mesh(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let given = [
             ("file", table.file.is_some()),
+            ("image", table.image.is_some()),
             ("block", table.block.is_some()),
             ("ellipsoid", table.ellipsoid.is_some()),
             ("tube", table.tube.is_some()),
@@ -39,13 +41,25 @@ impl Builder<'_> {
         let sources: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
         let [source] = sources[..] else {
             let message = format!("a mesh comes from exactly one source, found {}", sources.len());
-            let help = "give one of `file`, `block`, `ellipsoid`, `tube`, `organ`";
+            let help = "give one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`";
             self.error(path, message, "this mesh", help);
             return None;
         };
-        let mut made = match &table.file {
-            Some(file) => self.file(file.clone(), table, path)?,
-            None => self.shape(source, table, path)?,
+        let of_images = [
+            ("label", table.label.is_some()),
+            ("labels", table.labels.is_some()),
+            ("threshold", table.threshold.is_some()),
+            ("clean", table.clean.is_some()),
+        ];
+        if let Some((key, _)) = of_images.into_iter().find(|(_, given)| *given && source != "image") {
+            let message = format!("`{key}` is for images, and this mesh comes from `{source}`");
+            self.error(&[path, &[key]].concat(), message, "here", "leave it out");
+            return None;
+        }
+        let mut made = match (&table.file, &table.image) {
+            (Some(file), _) => self.file(file.clone(), table, path)?,
+            (_, Some(image)) => self.image(image, table, path)?,
+            _ => self.shape(source, table, path)?,
         };
         let shift = Vector3::from(table.at);
         for point in &mut made.mesh.points {
@@ -78,6 +92,103 @@ impl Builder<'_> {
                 None
             }
         }
+    }
+
+    /// The cells of labels of an image.
+    fn image(&mut self, image: &Path, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+        let at = |key| [path, &[key]].concat();
+        let refused = [
+            ("fix", table.fix.is_some(), "`fix` repairs mesh files", "`clean` cleans the labels of an image"),
+            ("scale", table.scale != 1.0, "`scale` does not go with `image`", "an image tells its own unit"),
+        ];
+        for (key, given, message, help) in refused {
+            if given {
+                self.error(&at(key), message, "here", help);
+                return None;
+            }
+        }
+        let Some(edge) = table.edge else {
+            let help = "add `edge`, the size of a cell in metres, for example `edge = 0.008`";
+            self.error(&at("image"), "`image` needs `edge`", "this image", help);
+            return None;
+        };
+        let (key, chosen, threshold) = match (table.label, &table.labels, table.threshold) {
+            (Some(label), None, None) => ("label", vec![label], None),
+            (None, Some(labels), None) => ("labels", labels.clone(), None),
+            (None, None, Some(threshold)) => ("threshold", vec![1], Some(threshold)),
+            (None, None, None) => ("image", Vec::new(), None),
+            _ => {
+                let message = "an image is cut out by exactly one of `label`, `labels`, `threshold`";
+                self.error(path, message, "this mesh", "leave the others out");
+                return None;
+            }
+        };
+        let read = match pliant_imaging::read(&self.scene.folder.join(image), &ReadOptions::default()) {
+            Ok(read) => read,
+            Err(error) => {
+                let help = match error {
+                    ImageError::Open { .. } => "file names are relative to the scene file",
+                    _ => "`pliant labels` reads an image on its own",
+                };
+                self.error(&at("image"), error.to_string(), "this image", help);
+                return None;
+            }
+        };
+        let name = image.display().to_string();
+        self.notes.extend(read.notes.iter().map(|note| format!("{name}: {note}")));
+        let labels = match threshold {
+            Some(least) => Ok(read.threshold(least..=f64::INFINITY)),
+            None => read.labels(),
+        };
+        let made = labels.map_err(|error| ("image", error)).and_then(|labels| {
+            let CleanTable { close_gaps, fill_holes, keep_largest } = table.clean.unwrap_or_default();
+            let cleaning = Cleaning { close_gaps, fill_holes, keep_largest };
+            Anatomy::from_image(&labels, &chosen, &cleaning, &Smoothing::default(), &|_| {}).map_err(
+                |error| (if matches!(error, LabelError::BadLength { .. }) { "clean" } else { key }, error),
+            )
+        });
+        let (anatomy, cleaned) = match made {
+            Ok(made) => made,
+            Err((key, error)) => {
+                let help = match error {
+                    LabelError::NoneChosen { .. } => {
+                        "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`"
+                    }
+                    LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
+                    LabelError::Absent { .. } if threshold.is_some() => {
+                        "no voxel is as large as that; use a lower threshold"
+                    }
+                    _ => "`pliant labels` lists the labels of an image",
+                };
+                self.error(&at(key), error.to_string(), "here", help);
+                return None;
+            }
+        };
+        if table.clean.is_some() {
+            self.notes.push(format!("{name}: {cleaned}"));
+        }
+        let (mesh, dropped, count) = match fill_anatomy(&anatomy, table.cells, edge) {
+            Ok(filled) => filled,
+            Err(error) => {
+                self.error(&at("edge"), error.to_string(), "this size", "");
+                return None;
+            }
+        };
+        if count > 0 {
+            self.notes.push(format!("{name}: {dropped} cells in {count} loose parts were dropped"));
+        }
+        let doubt = Deviation::new(&mesh, anatomy.field(), edge).ok().and_then(|found| found.doubt(edge));
+        if let Some(doubt) = doubt {
+            let place = self.source().span(&at("edge"));
+            let help = "use a shorter edge, or `clean = { keep-largest = true }` for small pieces";
+            self.out.push(Diagnostic::warning(doubt).at(place, "this size").help(help));
+        }
+        let cells = describe_cells(table.cells);
+        let words = match threshold {
+            Some(least) => format!("from {least} on"),
+            None => format!("label {}", chosen.iter().map(i32::to_string).collect::<Vec<_>>().join(", ")),
+        };
+        Some(MeshOrigin { mesh, origin: format!("{name} ({}), {words}, {cells} of {edge} m", read.format) })
     }
 
     fn shape(&mut self, source: &str, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
@@ -285,11 +396,34 @@ fn label_brain(mesh: &mut Mesh, scale: f64) {
     }
 }
 
-fn describe_shape(source: &str, table: &MeshTable) -> String {
-    let cells = match table.cells {
+/// The mesh of an anatomy with its labels, and the cells in small pieces that were dropped with the number of these.
+fn fill_anatomy(
+    anatomy: &Anatomy<'_>,
+    cells: Cells,
+    edge: f64,
+) -> Result<(Mesh, usize, usize), MeshingError> {
+    match cells {
+        Cells::Tets => {
+            let made = OrganTets::new(edge).mesh(anatomy, &|_| {})?;
+            Ok((made.mesh, made.report.repairs.dropped_cells, made.report.repairs.dropped_pieces))
+        }
+        Cells::Hexes => {
+            let mut made = Voxels::new(edge).mesh(anatomy.field())?;
+            anatomy.label(&mut made.mesh);
+            Ok((made.mesh, made.dropped_cells, made.dropped_components))
+        }
+    }
+}
+
+fn describe_cells(cells: Cells) -> &'static str {
+    match cells {
         Cells::Tets => "tets",
         Cells::Hexes => "hexes",
-    };
+    }
+}
+
+fn describe_shape(source: &str, table: &MeshTable) -> String {
+    let cells = describe_cells(table.cells);
     let name = match table.organ {
         Some(Organ::Liver) => "built-in liver",
         Some(Organ::Brain) => "built-in brain",
@@ -393,6 +527,13 @@ mod tests {
             ("{ block = { size = [1, 1, 1] }, edge = 1, scale = 2 }", "`scale` does not go with `block`"),
             ("{ file = 'a.msh', edge = 1 }", "`edge` is for built-in shapes"),
             ("{ edge = 1 }", "exactly one source, found 0"),
+            ("{ organ = 'liver', edge = 1, label = 1 }", "`label` is for images"),
+            ("{ file = 'a.msh', clean = { fill-holes = true } }", "`clean` is for images"),
+            ("{ image = 'a.nii', label = 1 }", "`image` needs `edge`"),
+            ("{ image = 'a.nii', edge = 1, label = 1, fix = 'merge' }", "`fix` repairs mesh files"),
+            ("{ image = 'a.nii', edge = 1, label = 1, scale = 2 }", "`scale` does not go with `image`"),
+            ("{ image = 'a.nii', edge = 1, label = 1, labels = [2] }", "exactly one of `label`"),
+            ("{ image = 'a.nii', edge = 1, label = 1 }", "cannot open"),
         ] {
             let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
             let scene = read(&CUBE.replace(own, &format!("mesh = {mesh}")));

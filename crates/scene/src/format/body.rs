@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyTable {
-    /// Its mesh, from a file or a built-in shape.
+    /// Its mesh, from a file, a built-in shape, or a segmented image.
     pub mesh: MeshTable,
     /// The element; if not given, `tet4` for tets and `hex8` for hexes. For soft tissue prefer `tet4-anp` to `tet4`.
     #[serde(default)]
@@ -169,13 +169,30 @@ impl Element {
     }
 }
 
-/// A mesh: exactly one of `file`, `block`, `ellipsoid`, `tube`, `organ`.
+/// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
     /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY.
     #[serde(default)]
     pub file: Option<PathBuf>,
+    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, or the folder of a
+    /// DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
+    #[serde(default)]
+    pub image: Option<PathBuf>,
+    /// Label of the image to mesh.
+    #[serde(default)]
+    pub label: Option<i32>,
+    /// Several labels of the image as one body; each cell has its own as cell data `label`, for `law`, `density` and
+    /// `hourglass` by label. The first label takes what cleaning adds.
+    #[serde(default)]
+    pub labels: Option<Vec<i32>>,
+    /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
+    #[serde(default)]
+    pub threshold: Option<f64>,
+    /// Cleaning of the labels of an image before they are meshed.
+    #[serde(default)]
+    pub clean: Option<CleanTable>,
     /// A box from the origin.
     #[serde(default)]
     pub block: Option<BlockShape>,
@@ -188,11 +205,11 @@ pub struct MeshTable {
     /// A built-in organ, centred on the origin.
     #[serde(default)]
     pub organ: Option<Organ>,
-    /// Target edge length of the cells of a built-in shape [m].
+    /// Target edge length of the cells of a built-in shape or an image [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
-    /// Cells of a built-in shape.
+    /// Cells of a built-in shape or an image.
     #[serde(default, rename = "as")]
     pub cells: Cells,
     /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).
@@ -209,6 +226,22 @@ pub struct MeshTable {
 
 fn one() -> f64 {
     1.0
+}
+
+/// Cleaning of the labels of an image, taken together, in this order.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CleanTable {
+    /// Width of gaps and channels to close [m].
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub close_gaps: f64,
+    /// Whether to fill cavities without a way out.
+    #[serde(default)]
+    pub fill_holes: bool,
+    /// Whether to keep only the largest piece.
+    #[serde(default)]
+    pub keep_largest: bool,
 }
 
 /// One repair or several.
@@ -243,14 +276,14 @@ pub enum Fix {
     Merge,
 }
 
-/// Cells of a built-in shape.
+/// Cells of a built-in shape or an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cells {
     /// Tetrahedra.
     #[default]
     Tets,
-    /// Hexahedra: structured for blocks and tubes, voxels for ellipsoids and organs.
+    /// Hexahedra: structured for blocks and tubes, cubes with a stepped surface for ellipsoids, organs and images.
     Hexes,
 }
 
@@ -304,6 +337,6 @@ pub enum Organ {
 pub struct SurfaceTable {
     /// The body that carries it.
     pub on: String,
-    /// The surface: triangles or quads of a file, or the boundary of a built-in shape.
+    /// The surface: triangles or quads of a file, or the boundary of a built-in shape or an image.
     pub mesh: MeshTable,
 }

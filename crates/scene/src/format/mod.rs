@@ -6,8 +6,8 @@ mod load;
 mod output;
 
 pub use body::{
-    BlockShape, BodyTable, ByLabel, Cells, Density, Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes,
-    Hourglass, MeshTable, Organ,
+    BlockShape, BodyTable, ByLabel, Cells, CleanTable, Density, Element, EllipsoidShape, Fibre, FibreRule,
+    Fix, Fixes, Hourglass, MeshTable, Organ,
 };
 pub use body::{SurfaceTable, TubeShape};
 pub use load::{

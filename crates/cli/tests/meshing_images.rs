@@ -1,0 +1,383 @@
+//! Labels and meshes of segmented images, from the command line and from scenes, through the real binary. The images are
+//! small and written here; one of a patient is used where `PLIANT_DATA` names a folder that has it.
+
+mod support;
+
+use std::io::Write;
+use std::path::Path;
+
+use pliant_geometry::io;
+use serde_json::Value;
+use support::{Told, Workshop};
+
+/// Voxels along each side, of 1 mm.
+const SIDE: usize = 40;
+
+/// An image of 1 mm voxels whose centre is the origin of the world.
+struct Picture {
+    voxels: Vec<i16>,
+}
+
+impl Picture {
+    fn new(label: impl Fn([f64; 3]) -> i16) -> Self {
+        let at = |i: usize| i as f64 - (SIDE as f64 - 1.0) / 2.0;
+        let place = |n: usize| [at(n % SIDE), at(n / SIDE % SIDE), at(n / SIDE / SIDE)];
+        Self { voxels: (0..SIDE.pow(3)).map(|n| label(place(n))).collect() }
+    }
+
+    /// A ball of label 5 and radius 15 mm around one of label 8 and 7 mm, with a loose voxel of label 5, a hole, and a
+    /// single voxel of label 9.
+    fn organ() -> Self {
+        Self::new(|[x, y, z]| {
+            let r = (x * x + y * y + z * z).sqrt();
+            match [x, y, z] {
+                [-18.5, -18.5, -18.5] => 5,
+                [18.5, 18.5, 18.5] => 9,
+                [0.5, 0.5, 11.5] => 0,
+                _ if r < 7.0 => 8,
+                _ if r < 15.0 => 5,
+                _ => 0,
+            }
+        })
+    }
+
+    /// As NIfTI-1 (the published layout), packed.
+    fn packed(&self) -> Vec<u8> {
+        let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        packer.write_all(&self.nifti()).expect("memory takes it");
+        packer.finish().expect("memory takes it")
+    }
+
+    fn nifti(&self) -> Vec<u8> {
+        let mut bytes = vec![0; 352];
+        let mut put = |at: usize, number: &[u8]| bytes[at..at + number.len()].copy_from_slice(number);
+        put(0, &348_i32.to_le_bytes());
+        for (at, n) in [3, SIDE, SIDE, SIDE, 1, 1, 1, 1].into_iter().enumerate() {
+            put(40 + 2 * at, &(n as i16).to_le_bytes());
+        }
+        put(70, &4_i16.to_le_bytes());
+        put(72, &16_i16.to_le_bytes());
+        for at in 0..4 {
+            put(76 + 4 * at, &1_f32.to_le_bytes());
+        }
+        put(108, &352_f32.to_le_bytes());
+        put(123, &[2]);
+        put(254, &2_i16.to_le_bytes());
+        let corner = -(SIDE as f32 - 1.0) / 2.0;
+        for row in 0..3 {
+            put(280 + 20 * row, &1_f32.to_le_bytes());
+            put(292 + 16 * row, &corner.to_le_bytes());
+        }
+        put(344, b"n+1\0");
+        bytes.extend(self.voxels.iter().flat_map(|voxel| voxel.to_le_bytes()));
+        bytes
+    }
+}
+
+/// A scene that names the image itself; `MESH` stands for what its mesh is.
+const SCENE: &str = r#"[scene]
+until = 0.01
+gravity = [0, 0, -9.81]
+
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 3e3
+poisson-ratio = 0.45
+
+[law.core]
+type = "neo-hookean"
+young-modulus = 9e3
+poisson-ratio = 0.45
+
+[body.organ]
+mesh = MESH
+law = LAW
+density = 1000
+
+[constraint.base]
+type = "fix"
+body = "organ"
+nodes = { box = { min = [-1, -1, -1], max = [1, 1, -0.01] } }
+"#;
+
+fn workshop(mesh: &str, law: &str) -> Workshop {
+    let workshop = Workshop::new(&SCENE.replace("MESH", mesh).replace("LAW", law));
+    workshop.write("case/seg.nii.gz", Picture::organ().packed());
+    workshop
+}
+
+fn with_image() -> Workshop {
+    workshop("{ image = \"seg.nii.gz\", label = 5, edge = 0.006 }", "\"tissue\"")
+}
+
+/// Runs `pliant mesh case/seg.nii.gz …`.
+fn mesh(workshop: &Workshop, more: &[&str]) -> Told {
+    workshop.pliant(&[&["mesh", "case/seg.nii.gz"], more].concat())
+}
+
+fn close(value: &Value, expected: f64, within: f64) -> bool {
+    value.as_f64().is_some_and(|value| (value - expected).abs() <= within * expected.abs())
+}
+
+#[test]
+fn labels_are_listed_with_volume_place_and_pieces() {
+    let workshop = with_image();
+    let told = workshop.pliant(&["labels", "case/seg.nii.gz"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    for piece in [
+        "NIfTI-1",
+        "40 × 40 × 40 voxels of 1 × 1 × 1 mm",
+        "label 5:",
+        "in 2 pieces",
+        "label 8:",
+        "label 9: 1 voxels",
+    ] {
+        assert!(told.out.contains(piece), "no `{piece}` in:\n{}", told.out);
+    }
+    let json = workshop.pliant(&["labels", "case/seg.nii.gz", "--json"]).json();
+    assert_eq!(json["size"], serde_json::json!([40, 40, 40]));
+    assert_eq!(json["labels"].as_array().map(Vec::len), Some(3));
+    let core = &json["labels"][1];
+    assert_eq!((&core["label"], &core["components"]), (&8.into(), &1.into()));
+    assert!(close(&core["volume"], 1.4368e-6, 0.03), "{core}");
+    assert!(close(&core["low"][0], -7e-3, 0.01) && close(&core["high"][2], 7e-3, 0.01), "{core}");
+}
+
+#[test]
+fn two_labels_become_one_mesh_of_two_materials() {
+    let workshop = with_image();
+    let arguments = [
+        "--label",
+        "5",
+        "--label",
+        "8",
+        "--edge",
+        "0.005",
+        "--keep-largest",
+        "--fill-holes",
+        "-o",
+        "two.vtu",
+    ];
+    let told = mesh(&workshop, &[&arguments[..], &["--json"]].concat());
+    assert_eq!(told.code, 0, "{}", told.err);
+    let json = told.json();
+    assert_eq!(json["cleaned"]["holes"], 1);
+    assert_eq!(json["cleaned"]["pieces_removed"], 1);
+    assert_eq!(json["components"], 1);
+    assert_eq!(json["files"][0], "two.vtu");
+    assert!(json["acoustic_part"].as_f64().unwrap() > 0.6, "{json}");
+    assert!(json["distances"]["largest_from_body"].as_f64().unwrap() < 2.5e-3, "{json}");
+    for material in json["materials"].as_array().unwrap() {
+        assert!(material["volume_error"].as_f64().unwrap().abs() < 0.05, "{material}");
+    }
+    // c = √((λ + 2μ)/ρ) = 3.37 m/s for E = 3 kPa, ν = 0.45.
+    let expected = json["acoustic_length"].as_f64().unwrap() / (11379.3_f64 / 1000.0).sqrt();
+    assert!(close(&json["element_bound"]["brain-like"], expected, 0.3), "{json}");
+
+    let read = io::read(&workshop.path("two.vtu")).expect("a mesh");
+    assert_eq!(read.mesh.points.len(), json["nodes"].as_u64().unwrap() as usize);
+    let block = read.mesh.volume_blocks().next().expect("cells");
+    let core: Vec<_> =
+        block.cells().zip(&block.data["label"].values).filter(|(_, label)| **label == 8.0).collect();
+    assert_eq!(core.len() as u64, json["materials"][1]["cells"].as_u64().unwrap());
+    for node in core.iter().flat_map(|(cell, _)| cell.iter()) {
+        assert!(read.mesh.points[*node as usize].norm() < 9e-3);
+    }
+
+    let page = mesh(&workshop, &arguments);
+    assert_eq!(page.code, 0, "{}", page.err);
+    for piece in [
+        "cleaned",
+        "label 8",
+        "dihedral angle",
+        "acoustic length",
+        "body to mesh",
+        "stable step",
+        "brain-like",
+    ] {
+        assert!(page.out.contains(piece), "no `{piece}` in:\n{}", page.out);
+    }
+    assert!(page.err.contains("wrote two.vtu"), "{}", page.err);
+}
+
+#[test]
+fn hexes_and_thresholds_work_and_go_to_gmsh() {
+    let workshop = with_image();
+    let told =
+        mesh(&workshop, &["--threshold", "5", "--edge", "0.004", "--as", "hexes", "-o", "all.msh", "--json"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let json = told.json();
+    assert!(close(&json["materials"][0]["volume"], 1.4137e-5, 0.06), "{json}");
+    assert_eq!((&json["as"], &json["materials"][0]["label"]), (&"hexes".into(), &1.into()));
+    let read = io::read(&workshop.path("all.msh")).expect("a mesh");
+    assert_eq!(
+        read.mesh.volume_blocks().map(|block| block.len()).sum::<usize>() as u64,
+        json["cells"].as_u64().unwrap()
+    );
+}
+
+#[test]
+fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
+    let workshop = with_image();
+    let packed = Picture::organ().packed();
+    workshop.write("cut.nii.gz", &packed[..packed.len() / 2]);
+    workshop.write("text.txt", "no image\n");
+    let mut negative = Picture::organ().nifti();
+    negative[84..88].copy_from_slice(&(-1_f32).to_le_bytes());
+    workshop.write("negative.nii", &negative);
+    workshop.write("empty.nii", Picture::new(|_| 0).nifti());
+    let seg = "case/seg.nii.gz";
+    let chosen = ["--label", "5", "--edge", "0.006"];
+    let cases: [(&str, &[&str], &[&str]); 16] = [
+        ("missing.nii", &chosen, &["cannot open `missing.nii`", "check the path"]),
+        ("text.txt", &chosen, &["not an image", "NIfTI"]),
+        ("cut.nii.gz", &chosen, &["cut.nii.gz", "copy it again"]),
+        ("negative.nii", &chosen, &["pixdim"]),
+        ("empty.nii", &chosen, &["no voxel has label 5", "only background (0)"]),
+        (seg, &["--label", "6", "--edge", "0.006"], &["no voxel has label 6; the image has 5, 8, 9"]),
+        (seg, &["--label", "0", "--edge", "0.006"], &["label 0 is the background; the image has 5, 8, 9"]),
+        (seg, &["--label", "5", "--label", "5", "--edge", "0.006"], &["label 5 is named twice"]),
+        (seg, &["--edge", "0.006"], &["no label is chosen; the image has 5, 8, 9", "--label"]),
+        (seg, &["--threshold", "50", "--edge", "0.006"], &["no voxel is 50 or more", "lower"]),
+        (seg, &["--label", "5", "--edge", "-1"], &["edge is -1", "positive"]),
+        (seg, &["--label", "5", "--edge", "nan"], &["edge is NaN", "positive"]),
+        (seg, &["--label", "5", "--edge", "5e-5"], &["limit", "--force"]),
+        (seg, &["--label", "9", "--edge", "0.01"], &["no cell of edge 0.01 m fits", "shorter edge"]),
+        (seg, &["--label", "5", "--edge", "0.006", "--close-gaps", "-1"], &["gaps to close is -1", "metres"]),
+        (seg, &["--label", "5", "--edge", "0.006", "--close-gaps", "30"], &["voxels", "3 mm"]),
+    ];
+    for (image, more, says) in cases {
+        let told = workshop.pliant(&[&["mesh", image], more, &["-o", "out.vtu", "--json"]].concat());
+        assert_eq!(told.code, 2, "{image} {more:?}: {}{}", told.err, told.out);
+        assert_eq!(told.json()["error"]["kind"], "input");
+        for piece in says {
+            assert!(told.words().contains(piece), "{image} {more:?}: no `{piece}` in: {}", told.err);
+        }
+        assert_eq!(told.err.matches("error:").count(), 1, "{}", told.err);
+        assert!(!workshop.path("out.vtu").exists());
+    }
+    for name in ["out.stl", "out.vtk", "out"] {
+        let told = mesh(&workshop, &[&chosen[..], &["-o", name]].concat());
+        assert_eq!(told.code, 2, "{}", told.err);
+        assert!(told.err.contains("ends in .vtu or .msh"), "{}", told.err);
+        assert!(!workshop.path(name).exists());
+    }
+    let told = workshop.pliant(&["labels", "text.txt", "--json"]);
+    assert_eq!(told.code, 2);
+    assert!(told.words().contains("not an image"), "{}", told.err);
+}
+
+#[test]
+fn a_part_thinner_than_the_cells_is_told_with_its_place() {
+    let workshop = with_image();
+    // A ball with a rod of 2 mm that sticks out by 8 mm.
+    let rod = |[x, y, z]: [f64; 3]| x > 0.0 && x < 18.0 && y.abs() < 1.0 && z.abs() < 1.0;
+    let picture = Picture::new(|p| i16::from(p.iter().map(|x| x * x).sum::<f64>() < 100.0 || rod(p)));
+    workshop.write("rod.nii", picture.nifti());
+    let told =
+        workshop.pliant(&["mesh", "rod.nii", "--label", "1", "--edge", "0.005", "-o", "rod.vtu", "--json"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let json = told.json();
+    assert!(
+        told.words().contains("warning: the mesh stays") && told.err.contains("shorter edge"),
+        "{}",
+        told.err
+    );
+    assert!(close(&json["distances"]["farthest"][0], 0.0175, 0.06), "{json}");
+    assert_eq!(json["warnings"].as_array().map(Vec::len), Some(1));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_a_failure_of_the_output() {
+    let workshop = with_image();
+    // A file may have 8 blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
+    let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" mesh case/seg.nii.gz --label 5 --edge 0.006 -o out.vtu --json";
+    let told: Told = std::process::Command::new("sh")
+        .args(["-c", limited, env!("CARGO_BIN_EXE_pliant")])
+        .current_dir(workshop.path(""))
+        .output()
+        .expect("a shell")
+        .into();
+    assert_eq!(told.code, 1, "{}", told.err);
+    assert!(told.words().contains("free space"), "{}", told.err);
+    assert_eq!(told.json()["error"]["kind"], "output");
+    assert!(!workshop.path("out.vtu").exists());
+    let left: Vec<_> = std::fs::read_dir(workshop.path("")).expect("a folder").collect();
+    assert_eq!(left.len(), 1, "{left:?}");
+}
+
+#[test]
+fn a_scene_names_an_image_and_laws_by_label() {
+    let mesh = "{ image = \"seg.nii.gz\", labels = [5, 8], edge = 0.006, as = \"tets\", clean = { keep-largest = true } }";
+    let workshop = workshop(mesh, "{ 5 = \"tissue\", 8 = \"core\" }");
+    let told = workshop.pliant(&["check", "case"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.contains("seg.nii.gz (NIfTI-1), label 5, 8, tets of 0.006 m"), "{}", told.out);
+    let ran = workshop.run(&[]);
+    let json = ran.done();
+    assert!(ran.words().contains("1 voxels removed in 1 smaller pieces"), "{}", ran.err);
+    // 14.137 ml of water's density, with facets.
+    assert!(close(&json["mass"], 14.1e-3, 0.05), "{json}");
+}
+
+#[test]
+fn a_scene_with_hexes_of_an_image_runs() {
+    let workshop = workshop(
+        "{ image = \"seg.nii.gz\", threshold = 5, edge = 0.006, as = \"hexes\", clean = { keep-largest = true } }",
+        "\"tissue\"",
+    );
+    workshop.run(&[]).done();
+}
+
+#[test]
+fn mistakes_about_images_are_underlined_in_the_scene() {
+    for (mesh, says) in [
+        ("{ image = \"seg.nii.gz\", label = 6, edge = 0.006 }", "the image has 5, 8, 9"),
+        ("{ image = \"seg.nii.gz\", labels = [5, 0], edge = 0.006 }", "label 0 is the background"),
+        ("{ image = \"seg.nii.gz\", labels = [], edge = 0.006 }", "no label is chosen"),
+        ("{ image = \"seg.nii.gz\", edge = 0.006 }", "add `label = 1`"),
+        ("{ image = \"other.nii.gz\", label = 5, edge = 0.006 }", "relative to the scene file"),
+        ("{ image = \"scene.toml\", label = 5, edge = 0.006 }", "not an image"),
+        ("{ image = \"seg.nii.gz\", label = 5, edge = 5e-5 }", "exceed"),
+        ("{ image = \"seg.nii.gz\", threshold = 50, edge = 0.006 }", "lower threshold"),
+        ("{ image = \"seg.nii.gz\", label = 5, edge = 0.006, clean = { close-gaps = -1 } }", "close-gaps"),
+        ("{ image = \"seg.nii.gz\", label = 5, edge = 0.006, fix = \"merge\" }", "`clean` cleans"),
+    ] {
+        let told = workshop(mesh, "\"tissue\"").pliant(&["check", "case"]);
+        assert_eq!(told.code, 2, "{mesh}: {}", told.err);
+        assert!(told.underlines(&format!("mesh = {mesh}")), "{mesh}: {}", told.err);
+        assert!(told.words().contains(says), "{mesh}: no `{says}` in {}", told.err);
+    }
+}
+
+/// The liver of a patient, where `PLIANT_DATA` has it: meshed by one command.
+#[test]
+fn a_liver_of_a_patient_is_meshed() {
+    const NAME: &str = "abdomen-totalseg/example_seg.nii.gz";
+    let Some(image) = std::env::var_os("PLIANT_DATA")
+        .map(|folder| Path::new(&folder).join(NAME))
+        .filter(|path| path.exists())
+    else {
+        println!("skipped: set PLIANT_DATA to the folder that holds {NAME}");
+        return;
+    };
+    let image = image.to_str().expect("a path of text");
+    let workshop = with_image();
+    let told = workshop.pliant(&[
+        "mesh",
+        image,
+        "--label",
+        "5",
+        "--edge",
+        "0.012",
+        "--keep-largest",
+        "-o",
+        "liver.vtu",
+        "--json",
+    ]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let json = told.json();
+    assert!(json["acoustic_part"].as_f64().unwrap() > 0.5, "{json}");
+    assert!(json["materials"][0]["volume_error"].as_f64().unwrap().abs() < 0.03, "{json}");
+}

@@ -1,0 +1,306 @@
+//! What can be wrong with an image, where, and what to try.
+
+use std::path::PathBuf;
+
+use pliant_geometry::Vector3;
+use pliant_geometry::io::Place;
+
+/// An image that could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file or folder could not be opened or read from disk.
+    #[error("cannot open `{}`: {source}; check the path and the permissions", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// Neither the first bytes nor the ending tell a format that can be read.
+    #[error(
+        "`{}` is not an image known here; formats read: NIfTI (.nii, .nii.gz, .hdr + .img), NRRD (.nrrd, .nhdr), MetaImage \
+         (.mha, .mhd), GIPL (.gipl, .gipl.gz), DICOM (a folder of slices); convert it, e.g. with ITK-SNAP or 3D Slicer",
+        path.display()
+    )]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file was opened, but what it holds is no usable image.
+    #[error("cannot read `{}`{place}: {problem}", path.display())]
+    Content {
+        /// The file, or the folder of a series.
+        path: PathBuf,
+        /// Where in the file.
+        place: Place,
+        /// What is wrong there.
+        problem: Box<ImageProblem>,
+    },
+}
+
+/// What is wrong inside an image file, and what to try.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ImageProblem {
+    /// The file ends too early, or announces more than it holds.
+    #[error(
+        "the file ends while reading {reading}: {expected} bytes are needed and {found} are there; copy or export it again"
+    )]
+    Truncated {
+        /// What was being read.
+        reading: &'static str,
+        /// Bytes needed.
+        expected: u64,
+        /// Bytes found.
+        found: u64,
+    },
+    /// Compressed data that cannot be unpacked.
+    #[error(
+        "{reading} cannot be unpacked after {found} bytes ({message}): the file is cut off or damaged; copy it again"
+    )]
+    Packed {
+        /// What was being read.
+        reading: &'static str,
+        /// Bytes unpacked before.
+        found: u64,
+        /// What the decoder says.
+        message: String,
+    },
+    /// The first bytes are not those of the format.
+    #[error("the file is not {format}: {found}; check the ending, or that the file arrived whole")]
+    NotThisFormat {
+        /// The format expected.
+        format: &'static str,
+        /// What was found instead.
+        found: String,
+    },
+    /// A field of the header is missing.
+    #[error("the header has no `{field}`; export the image again")]
+    MissingField {
+        /// The field.
+        field: &'static str,
+    },
+    /// A field of the header has a value that cannot be.
+    #[error("`{field}` is {value}; {expected}")]
+    BadField {
+        /// The field.
+        field: &'static str,
+        /// What it holds.
+        value: String,
+        /// What it must be, and how to get there.
+        expected: &'static str,
+    },
+    /// A variant of the format that is not read.
+    #[error("{what} cannot be read here; {remedy}")]
+    Unsupported {
+        /// What was found.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// More voxels than allowed. Found before they are allocated.
+    #[error(
+        "the image has {voxels} voxels, more than the {limit} allowed; crop or resample it, or raise the limit"
+    )]
+    TooManyVoxels {
+        /// Voxels announced; the largest number there is if they cannot be counted.
+        voxels: u64,
+        /// Voxels allowed.
+        limit: u64,
+    },
+    /// The steps from voxel to voxel span no volume, or are no numbers.
+    #[error(
+        "the steps from voxel to voxel ({}, {} and {} m) span no volume; correct the orientation in the header",
+        shown(&steps[0]), shown(&steps[1]), shown(&steps[2])
+    )]
+    Singular {
+        /// Steps along i, j and k [m].
+        steps: [Vector3; 3],
+    },
+    /// A folder without any DICOM slice.
+    #[error("no DICOM slice among {files} files; give the folder that holds the slices themselves")]
+    NoSlices {
+        /// Files looked at.
+        files: usize,
+    },
+    /// A folder with slices of several series.
+    #[error("the folder holds {} series: {}; choose one by its UID", series.len(), series.join("; "))]
+    MixedSeries {
+        /// Each series: UID, description and number of slices.
+        series: Vec<String>,
+    },
+    /// The series asked for is not in the folder.
+    #[error("no slice belongs to series {asked}; the folder holds {}", series.join("; "))]
+    NoSuchSeries {
+        /// The UID asked for.
+        asked: String,
+        /// Each series: UID, description and number of slices.
+        series: Vec<String>,
+    },
+    /// A slice differs from the first one where all must agree.
+    #[error(
+        "`{file}` has {what} {found}, the first slice {expected}; remove what does not belong to the series"
+    )]
+    SliceDiffers {
+        /// File name of the slice.
+        file: String,
+        /// What differs.
+        what: &'static str,
+        /// What this slice has.
+        found: String,
+        /// What the first slice has.
+        expected: String,
+    },
+    /// Slices are not evenly spaced.
+    #[error(
+        "between `{before}` and `{after}` the slices are {gap:.3} mm apart, elsewhere {expected:.3} mm: slices are missing; \
+         copy the whole series"
+    )]
+    MissingSlices {
+        /// File name before the gap.
+        before: String,
+        /// File name after the gap.
+        after: String,
+        /// Distance there [mm].
+        gap: f64,
+        /// Median distance [mm].
+        expected: f64,
+    },
+    /// Two slices at the same place.
+    #[error("`{first}` and `{second}` lie at the same place; keep one phase or echo in the folder")]
+    SamePlace {
+        /// File name of one.
+        first: String,
+        /// File name of the other.
+        second: String,
+    },
+}
+
+/// Three lengths for a message.
+fn shown(step: &Vector3) -> String {
+    format!("({:.3e}, {:.3e}, {:.3e})", step.x, step.y, step.z)
+}
+
+/// Why there is no region to work on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LabelError {
+    /// A value that is not a whole number.
+    #[error(
+        "voxel {voxel:?} is {value}, which is no label; give a label image, or choose the region by a threshold"
+    )]
+    NotWhole {
+        /// The value.
+        value: f64,
+        /// The voxel (i, j, k).
+        voxel: [usize; 3],
+    },
+    /// A label beyond 32 bits.
+    #[error("voxel {voxel:?} has the label {label}, beyond ±2147483647; renumber the labels")]
+    TooLarge {
+        /// The label.
+        label: i128,
+        /// The voxel (i, j, k).
+        voxel: [usize; 3],
+    },
+    /// No voxel has the label.
+    #[error("no voxel has label {label}; the image has {}", list(present))]
+    Absent {
+        /// Label asked for.
+        label: i32,
+        /// Labels of the image, without 0.
+        present: Vec<i32>,
+    },
+    /// The background is no region.
+    #[error("label 0 is the background; the image has {}", list(present))]
+    Background {
+        /// Labels of the image, without 0.
+        present: Vec<i32>,
+    },
+    /// No label asked for.
+    #[error("no label is chosen; the image has {}", list(present))]
+    NoneChosen {
+        /// Labels of the image, without 0.
+        present: Vec<i32>,
+    },
+    /// A label asked for twice.
+    #[error("label {label} is named twice; name each once")]
+    Repeated {
+        /// The label.
+        label: i32,
+    },
+    /// The cleaning left nothing.
+    #[error("nothing is left of label {label} after {operation}; use a milder setting")]
+    Emptied {
+        /// The label.
+        label: i32,
+        /// What removed the last voxel.
+        operation: &'static str,
+    },
+    /// A length that must be positive and finite.
+    #[error("{what} is {value}; it must be finite and not negative")]
+    BadLength {
+        /// Which length.
+        what: &'static str,
+        /// Its value [m].
+        value: f64,
+    },
+    /// More labels than a mesh can tell apart.
+    #[error("{labels} labels asked for in one mesh, more than {limit}; mesh them in parts")]
+    TooManyLabels {
+        /// Labels asked for.
+        labels: usize,
+        /// Labels allowed.
+        limit: usize,
+    },
+    /// A region too large to work on.
+    #[error("the region with its margin has {voxels} voxels, more than {limit}; crop or resample the image")]
+    TooManyVoxels {
+        /// Voxels needed.
+        voxels: u64,
+        /// Voxels allowed.
+        limit: u64,
+    },
+}
+
+fn list(labels: &[i32]) -> String {
+    match labels {
+        [] => "only background (0)".to_owned(),
+        labels => {
+            let words: Vec<String> = labels.iter().take(60).map(i32::to_string).collect();
+            let rest = labels.len().saturating_sub(60);
+            words.join(", ") + &if rest > 0 { format!(" and {rest} more") } else { String::new() }
+        }
+    }
+}
+
+/// A problem and its place: what the readers of bytes return, before the path is known.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    pub(crate) place: Place,
+    pub(crate) problem: ImageProblem,
+}
+
+impl From<ImageProblem> for Fault {
+    fn from(problem: ImageProblem) -> Self {
+        Self { place: Place::File, problem }
+    }
+}
+
+impl ImageProblem {
+    pub(crate) fn at_byte(self, byte: usize) -> Fault {
+        Fault { place: Place::Byte(byte), problem: self }
+    }
+
+    pub(crate) fn at_line(self, line: usize) -> Fault {
+        Fault { place: Place::Line(line), problem: self }
+    }
+
+    /// A field with a value that cannot be; long values are cut.
+    pub(crate) fn bad(field: &'static str, value: impl ToString, expected: &'static str) -> Self {
+        let value = value.to_string();
+        let mut short: String = value.chars().take(60).filter(|c| !c.is_control()).collect();
+        if short.len() < value.len() {
+            short.push('…');
+        }
+        Self::BadField { field, value: format!("`{short}`"), expected }
+    }
+}

@@ -1,0 +1,180 @@
+//! Bytes of a file, unpacked on the way. Memory grows with the bytes that arrive, never with what a header announces.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+
+use crate::error::{Fault, ImageProblem};
+use crate::image::{Numbers, Order, Scalar};
+
+/// Longest header of a text format; NRRD's of 3D Slicer list every segment.
+const HEADER_LIMIT: u64 = 1 << 22;
+
+/// A place that moves through the bytes of a file.
+pub(super) struct Input<'a> {
+    bytes: Box<dyn BufRead + 'a>,
+    /// The file, where its neighbours may be read.
+    path: Option<PathBuf>,
+    /// Bytes read (after unpacking).
+    at: usize,
+    packed: bool,
+    /// Bytes that header lines may still take.
+    header_left: u64,
+}
+
+impl<'a> Input<'a> {
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let mut file = BufReader::with_capacity(1 << 16, File::open(path)?);
+        let packed = file.fill_buf()?.starts_with(&[0x1f, 0x8b]);
+        Ok(Self::new(file, packed, Some(path.to_owned())))
+    }
+
+    pub fn of_bytes(bytes: &'a [u8]) -> Self {
+        Self::new(bytes, bytes.starts_with(&[0x1f, 0x8b]), None)
+    }
+
+    fn new(bytes: impl BufRead + 'a, packed: bool, path: Option<PathBuf>) -> Self {
+        let bytes: Box<dyn BufRead + 'a> = if packed {
+            Box::new(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(bytes)))
+        } else {
+            Box::new(bytes)
+        };
+        Self { bytes, path, at: 0, packed, header_left: HEADER_LIMIT }
+    }
+
+    /// What follows, as an input of its own.
+    pub fn rest(&mut self) -> Input<'_> {
+        let Self { path, at, packed, header_left, .. } = self;
+        let (path, at, packed, header_left) = (path.clone(), *at, *packed, *header_left);
+        Input { bytes: Box::new(&mut self.bytes), path, at, packed, header_left }
+    }
+
+    /// What follows, packed with gzip.
+    pub fn unpack_gzip(self) -> Self {
+        Self { bytes: Box::new(BufReader::new(MultiGzDecoder::new(self.bytes))), packed: true, ..self }
+    }
+
+    /// What follows, packed with zlib.
+    pub fn unpack_zlib(self) -> Self {
+        Self { bytes: Box::new(BufReader::new(ZlibDecoder::new(self.bytes))), packed: true, ..self }
+    }
+
+    /// The file of this name beside this one, from its beginning, packed or not: it begins with voxels, which may look like
+    /// anything.
+    pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'static>, Fault> {
+        let Some(path) = &self.path else {
+            return Err(ImageProblem::Unsupported {
+                what: format!("data in another file (`{name}`)"),
+                remedy: "read the header from its own file",
+            }
+            .into());
+        };
+        let path = path.with_file_name("").join(name);
+        match File::open(&path) {
+            Ok(file) => Ok(Input::new(BufReader::with_capacity(1 << 16, file), false, Some(path))),
+            Err(error) => {
+                let expected = "that file must lie beside the header and be readable";
+                Err(ImageProblem::bad(field, name, expected).with_cause(&error).into())
+            }
+        }
+    }
+
+    /// The name of this file with another ending, as far as it goes: `scan.hdr.gz` and `img` give `scan.img` and
+    /// `scan.img.gz`.
+    pub fn sibling_names(&self, ending: &str) -> Vec<String> {
+        let name = self.path.as_deref().and_then(|path| path.file_name()?.to_str());
+        let stem =
+            name.map(|name| name.strip_suffix(".gz").unwrap_or(name)).and_then(|name| name.rsplit_once('.'));
+        stem.map_or(Vec::new(), |(stem, _)| vec![format!("{stem}.{ending}"), format!("{stem}.{ending}.gz")])
+    }
+
+    /// Up to `count` of the coming bytes, without moving.
+    pub fn peek(&mut self, count: usize) -> Result<Vec<u8>, Fault> {
+        let before = self.at;
+        let head = self.up_to(count as u64, "the first bytes")?;
+        self.at = before;
+        let rest = std::mem::replace(&mut self.bytes, Box::new(io::empty()));
+        self.bytes = Box::new(Cursor::new(head.clone()).chain(rest));
+        Ok(head)
+    }
+
+    /// Up to `count` bytes.
+    pub fn up_to(&mut self, count: u64, reading: &'static str) -> Result<Vec<u8>, Fault> {
+        let mut bytes = Vec::new();
+        let result = (&mut self.bytes).take(count).read_to_end(&mut bytes);
+        self.at += bytes.len();
+        match result {
+            Ok(_) => Ok(bytes),
+            Err(error) => Err(self.broken(reading, &error)),
+        }
+    }
+
+    /// Exactly `count` bytes.
+    pub fn exact(&mut self, count: u64, reading: &'static str) -> Result<Vec<u8>, Fault> {
+        let start = self.at;
+        let bytes = self.up_to(count, reading)?;
+        let found = bytes.len() as u64;
+        if found < count {
+            return Err(ImageProblem::Truncated { reading, expected: count, found }.at_byte(start));
+        }
+        Ok(bytes)
+    }
+
+    /// Passes over `count` bytes.
+    pub fn skip(&mut self, count: u64, reading: &'static str) -> Result<(), Fault> {
+        match io::copy(&mut (&mut self.bytes).take(count), &mut io::sink()) {
+            Ok(found) => {
+                self.at += found as usize;
+                let problem = ImageProblem::Truncated { reading, expected: count, found };
+                if found < count { Err(problem.at_byte(self.at)) } else { Ok(()) }
+            }
+            Err(error) => Err(self.broken(reading, &error)),
+        }
+    }
+
+    /// The next line without its end; `None` at the end of the file.
+    pub fn line(&mut self) -> Result<Option<String>, Fault> {
+        let mut line = Vec::new();
+        let result = (&mut self.bytes).take(self.header_left).read_until(b'\n', &mut line);
+        self.at += line.len();
+        self.header_left -= (line.len() as u64).min(self.header_left);
+        if let Err(error) = result {
+            return Err(self.broken("the header", &error));
+        }
+        if self.header_left == 0 {
+            return Err(ImageProblem::Unsupported {
+                what: "a header of more than 4 MiB".to_owned(),
+                remedy: "check that this is an image at all",
+            }
+            .into());
+        }
+        if line.is_empty() {
+            return Ok(None);
+        }
+        let text = String::from_utf8_lossy(&line);
+        Ok(Some(text.trim_end_matches(['\n', '\r']).to_owned()))
+    }
+
+    /// The numbers of `count` voxels.
+    pub fn numbers(&mut self, count: usize, scalar: Scalar, order: Order) -> Result<Numbers, Fault> {
+        let bytes = self.exact(count as u64 * scalar.size() as u64, "the voxels")?;
+        Ok(Numbers { scalar, order, bytes })
+    }
+
+    fn broken(&self, reading: &'static str, error: &io::Error) -> Fault {
+        let message = if self.packed { error.to_string() } else { format!("reading failed: {error}") };
+        ImageProblem::Packed { reading, found: self.at as u64, message }.at_byte(self.at)
+    }
+}
+
+impl ImageProblem {
+    /// Adds what the operating system says to the value of a bad field.
+    fn with_cause(mut self, cause: &io::Error) -> Self {
+        if let Self::BadField { value, .. } = &mut self {
+            *value += &format!(" ({cause})");
+        }
+        self
+    }
+}

@@ -1,0 +1,9 @@
+//! Images in: every format, orientations, bad files, regions and their cleaning, fields.
+
+mod bad;
+mod cleaning;
+mod fields;
+mod formats;
+mod mutation;
+mod real;
+mod write;

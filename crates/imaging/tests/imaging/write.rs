@@ -1,0 +1,339 @@
+//! Writers of every format, for tests: a header by the published layout, then the voxels.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::{DeflateEncoder, GzEncoder, ZlibEncoder};
+use nalgebra::{Matrix3, Vector3};
+
+/// A volume of 16-bit numbers in RAS [mm].
+#[derive(Clone)]
+pub struct Volume {
+    pub dims: [usize; 3],
+    pub origin: Vector3<f64>,
+    pub axes: Matrix3<f64>,
+    pub values: Vec<i16>,
+}
+
+impl Volume {
+    /// Small, oblique and left-handed, each voxel a number of its own.
+    pub fn oblique() -> Self {
+        let rotation = nalgebra::Rotation3::from_euler_angles(0.3, -0.4, 1.1);
+        let mirrored = Matrix3::from_diagonal(&Vector3::new(0.9, 1.25, -2.5));
+        let dims = [5, 4, 3];
+        Self {
+            dims,
+            origin: Vector3::new(-31.5, 12.25, 101.0),
+            axes: rotation.matrix() * mirrored,
+            values: (0..60).map(|i| i * 37 - 900).collect(),
+        }
+    }
+
+    fn bytes(&self, big: bool) -> Vec<u8> {
+        self.values.iter().flat_map(|x| if big { x.to_be_bytes() } else { x.to_le_bytes() }).collect()
+    }
+
+    fn spacing(&self) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.axes.column(axis).norm())
+    }
+
+    /// Unit vectors of the axes in LPS.
+    fn directions_lps(&self) -> [[f64; 3]; 3] {
+        [0, 1, 2].map(|axis| {
+            let unit = self.axes.column(axis).normalize();
+            [-unit.x, -unit.y, unit.z]
+        })
+    }
+
+    fn origin_lps(&self) -> [f64; 3] {
+        [-self.origin.x, -self.origin.y, self.origin.z]
+    }
+}
+
+/// Numbers put into a header.
+struct Bytes {
+    bytes: Vec<u8>,
+    big: bool,
+}
+
+impl Bytes {
+    fn put<const N: usize>(&mut self, at: usize, mut little: [u8; N]) {
+        if self.big {
+            little.reverse();
+        }
+        self.bytes[at..at + N].copy_from_slice(&little);
+    }
+}
+
+/// Which of the orientations a NIfTI header gets.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Form {
+    Sform,
+    Qform,
+    Neither,
+}
+
+pub fn nifti1(volume: &Volume, form: Form, big: bool) -> Vec<u8> {
+    let mut header = Bytes { bytes: vec![0; 352], big };
+    header.put(0, 348_i32.to_le_bytes());
+    for (at, n) in [3, volume.dims[0], volume.dims[1], volume.dims[2], 1, 1, 1, 1].into_iter().enumerate() {
+        header.put(40 + 2 * at, (n as i16).to_le_bytes());
+    }
+    header.put(70, 4_i16.to_le_bytes());
+    header.put(72, 16_i16.to_le_bytes());
+    let (rotation, qfac) = quaternion(volume);
+    let spacing = volume.spacing();
+    for (at, h) in [qfac, spacing[0], spacing[1], spacing[2]].into_iter().enumerate() {
+        header.put(76 + 4 * at, (h as f32).to_le_bytes());
+    }
+    header.put(108, 352_f32.to_le_bytes());
+    header.bytes[123] = 2;
+    if form != Form::Neither {
+        header.put(252, 1_i16.to_le_bytes());
+        for (at, x) in rotation.into_iter().chain(volume.origin.iter().copied()).enumerate() {
+            header.put(256 + 4 * at, (x as f32).to_le_bytes());
+        }
+    }
+    if form == Form::Sform {
+        header.put(254, 2_i16.to_le_bytes());
+        for row in 0..3 {
+            let numbers =
+                [volume.axes[(row, 0)], volume.axes[(row, 1)], volume.axes[(row, 2)], volume.origin[row]];
+            for (at, x) in numbers.into_iter().enumerate() {
+                header.put(280 + 16 * row + 4 * at, (x as f32).to_le_bytes());
+            }
+        }
+    }
+    header.bytes[344..348].copy_from_slice(b"n+1\0");
+    header.bytes.extend(volume.bytes(big));
+    header.bytes
+}
+
+pub fn nifti2(volume: &Volume, big: bool) -> Vec<u8> {
+    let mut header = Bytes { bytes: vec![0; 544], big };
+    header.put(0, 540_i32.to_le_bytes());
+    header.bytes[4..12].copy_from_slice(b"n+2\0\r\n\x1a\n");
+    header.put(12, 4_i16.to_le_bytes());
+    header.put(14, 16_i16.to_le_bytes());
+    for (at, n) in [3, volume.dims[0], volume.dims[1], volume.dims[2], 1, 1, 1, 1].into_iter().enumerate() {
+        header.put(16 + 8 * at, (n as i64).to_le_bytes());
+    }
+    header.put(168, 544_i64.to_le_bytes());
+    header.put(348, 1_i32.to_le_bytes());
+    header.put(500, 2_i32.to_le_bytes());
+    for row in 0..3 {
+        let numbers =
+            [volume.axes[(row, 0)], volume.axes[(row, 1)], volume.axes[(row, 2)], volume.origin[row]];
+        for (at, x) in numbers.into_iter().enumerate() {
+            header.put(400 + 32 * row + 8 * at, x.to_le_bytes());
+        }
+    }
+    header.bytes.extend(volume.bytes(big));
+    header.bytes
+}
+
+/// (b, c, d) of the rotation, and qfac: −1 for left-handed axes, whose third column is mirrored.
+fn quaternion(volume: &Volume) -> ([f64; 3], f64) {
+    let mut axes = volume.axes;
+    let qfac = volume.axes.determinant().signum();
+    for axis in 0..3 {
+        let unit = axes.column(axis).normalize() * if axis == 2 { qfac } else { 1.0 };
+        axes.set_column(axis, &unit);
+    }
+    let q = nalgebra::UnitQuaternion::from_matrix(&axes);
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    ([sign * q.i, sign * q.j, sign * q.k], qfac)
+}
+
+pub fn nrrd(volume: &Volume, encoding: &str, big: bool) -> Vec<u8> {
+    let mut file = nrrd_header(volume, encoding, big).into_bytes();
+    file.push(b'\n');
+    file.extend(match encoding {
+        "gzip" => gzip(&volume.bytes(big)),
+        "ascii" => volume.values.iter().map(|x| format!("{x} ")).collect::<String>().into_bytes(),
+        _ => volume.bytes(big),
+    });
+    file
+}
+
+pub fn nrrd_header(volume: &Volume, encoding: &str, big: bool) -> String {
+    let [nx, ny, nz] = volume.dims;
+    let vector = |[x, y, z]: [f64; 3]| format!("({x:.17},{y:.17},{z:.17})");
+    let steps = [0, 1, 2].map(|axis| {
+        let step = volume.axes.column(axis);
+        vector([-step.x, -step.y, step.z])
+    });
+    format!(
+        "NRRD0004\n# a comment\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: {nx} {ny} {nz}\n\
+         space directions: {}\nkinds: domain domain domain\nendian: {}\nencoding: {encoding}\nkey:=value\n\
+         space origin: {}\n",
+        steps.join(" "),
+        if big { "big" } else { "little" },
+        vector(volume.origin_lps())
+    )
+}
+
+pub fn metaimage(volume: &Volume, compressed: bool, big: bool, data_file: &str) -> Vec<u8> {
+    let [nx, ny, nz] = volume.dims;
+    let numbers = |values: &[f64]| values.iter().map(|x| format!("{x:.17}")).collect::<Vec<_>>().join(" ");
+    let header = format!(
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = {}\nCompressedData = {}\n\
+         TransformMatrix = {}\nOffset = {}\nCenterOfRotation = 0 0 0\nElementSpacing = {}\nDimSize = {nx} {ny} {nz}\n\
+         ElementType = MET_SHORT\nElementDataFile = {data_file}\n",
+        if big { "True" } else { "False" },
+        if compressed { "True" } else { "False" },
+        numbers(&volume.directions_lps().concat()),
+        numbers(&volume.origin_lps()),
+        numbers(&volume.spacing())
+    );
+    let mut file = header.into_bytes();
+    if data_file == "LOCAL" {
+        file.extend(metaimage_data(volume, compressed, big));
+    }
+    file
+}
+
+pub fn metaimage_data(volume: &Volume, compressed: bool, big: bool) -> Vec<u8> {
+    let bytes = volume.bytes(big);
+    if compressed {
+        let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
+        packed.write_all(&bytes).unwrap();
+        packed.finish().unwrap()
+    } else {
+        bytes
+    }
+}
+
+/// GIPL has no orientation: only spacing and origin are written.
+pub fn gipl(volume: &Volume) -> Vec<u8> {
+    let mut header = Bytes { bytes: vec![0; 256], big: true };
+    for (at, n) in [volume.dims[0], volume.dims[1], volume.dims[2], 1].into_iter().enumerate() {
+        header.put(2 * at, (n as u16).to_le_bytes());
+    }
+    header.put(8, 15_u16.to_le_bytes());
+    for (axis, h) in volume.spacing().into_iter().enumerate() {
+        header.put(10 + 4 * axis, (h as f32).to_le_bytes());
+        header.put(204 + 8 * axis, volume.origin_lps()[axis].to_le_bytes());
+    }
+    header.put(252, 0xEFFF_E9B0_u32.to_le_bytes());
+    header.bytes.extend(volume.bytes(true));
+    header.bytes
+}
+
+/// Encodings of DICOM.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Syntax {
+    Implicit,
+    Explicit,
+    Deflated,
+    BigEndian,
+}
+
+/// The slice `k` of a volume.
+pub fn dicom(volume: &Volume, k: usize, syntax: Syntax, series: &str) -> Vec<u8> {
+    let uid = match syntax {
+        Syntax::Implicit => "1.2.840.10008.1.2",
+        Syntax::Explicit => "1.2.840.10008.1.2.1",
+        Syntax::Deflated => "1.2.840.10008.1.2.1.99",
+        Syntax::BigEndian => "1.2.840.10008.1.2.2",
+    };
+    let mut file = vec![0; 128];
+    file.extend(b"DICM");
+    element(&mut file, 0x0002_0010, b"UI", uid.as_bytes(), Syntax::Explicit);
+    let position = volume.origin + volume.axes.column(2) * k as f64;
+    let text = |values: &[f64]| {
+        values.iter().map(|x| format!("{x:.14}")).collect::<Vec<_>>().join("\\").into_bytes()
+    };
+    let [row, column, _] = volume.directions_lps();
+    let [along, down, _] = volume.spacing();
+    let number = |x: usize| {
+        if syntax == Syntax::BigEndian { (x as u16).to_be_bytes() } else { (x as u16).to_le_bytes() }
+    };
+    let mut set = Vec::new();
+    let mut put = |tag, vr: &[u8; 2], value: &[u8]| element(&mut set, tag, vr, value, syntax);
+    put(0x0008_103E, b"LO", b"a test ");
+    // A sequence with a place of its own, which is not that of the slice.
+    put(0x0008_1140, b"SQ", &nested(syntax));
+    put(0x0020_000E, b"UI", series.as_bytes());
+    put(0x0020_0032, b"DS", &text(&[-position.x, -position.y, position.z]));
+    put(0x0020_0037, b"DS", &text(&[row, column].concat()));
+    put(0x0028_0002, b"US", &number(1));
+    put(0x0028_0004, b"CS", b"MONOCHROME2");
+    put(0x0028_0010, b"US", &number(volume.dims[1]));
+    put(0x0028_0011, b"US", &number(volume.dims[0]));
+    put(0x0028_0030, b"DS", &text(&[down, along]));
+    put(0x0028_0100, b"US", &number(16));
+    put(0x0028_0101, b"US", &number(16));
+    put(0x0028_0102, b"US", &number(15));
+    put(0x0028_0103, b"US", &number(1));
+    let plane = volume.dims[0] * volume.dims[1];
+    let slice = Volume { values: volume.values[k * plane..(k + 1) * plane].to_vec(), ..volume.clone() };
+    put(0x7FE0_0010, b"OW", &slice.bytes(syntax == Syntax::BigEndian));
+    if syntax == Syntax::Deflated {
+        let mut packed = DeflateEncoder::new(Vec::new(), Compression::fast());
+        packed.write_all(&set).unwrap();
+        set = packed.finish().unwrap();
+    }
+    file.extend(set);
+    file
+}
+
+/// An item of undefined length with ImagePositionPatient in it, ended by its delimiters.
+fn nested(syntax: Syntax) -> Vec<u8> {
+    let mut item = Vec::new();
+    tag(&mut item, 0xFFFE_E000, syntax);
+    item.extend([0xFF; 4]);
+    element(&mut item, 0x0020_0032, b"DS", b"1\\2\\3 ", syntax);
+    for delimiter in [0xFFFE_E00D, 0xFFFE_E0DD_u32] {
+        tag(&mut item, delimiter, syntax);
+        item.extend([0; 4]);
+    }
+    item
+}
+
+fn tag(out: &mut Vec<u8>, tag: u32, syntax: Syntax) {
+    for half in [(tag >> 16) as u16, tag as u16] {
+        out.extend(if syntax == Syntax::BigEndian { half.to_be_bytes() } else { half.to_le_bytes() });
+    }
+}
+
+fn element(out: &mut Vec<u8>, number: u32, vr: &[u8; 2], value: &[u8], syntax: Syntax) {
+    tag(out, number, syntax);
+    let big = syntax == Syntax::BigEndian;
+    let mut value = value.to_vec();
+    if value.len() % 2 == 1 {
+        value.push(if vr == b"UI" { 0 } else { b' ' });
+    }
+    // Sequences are written with undefined length; their delimiters are in the value.
+    let length = if vr == b"SQ" { u32::MAX } else { value.len() as u32 };
+    let long = if big { length.to_be_bytes() } else { length.to_le_bytes() };
+    if syntax == Syntax::Implicit {
+        out.extend(long);
+    } else {
+        out.extend(vr);
+        if matches!(vr, b"OW" | b"SQ") {
+            out.extend([0, 0]);
+            out.extend(long);
+        } else {
+            let short = length as u16;
+            out.extend(if big { short.to_be_bytes() } else { short.to_le_bytes() });
+        }
+    }
+    out.extend(value);
+}
+
+pub fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+    packed.write_all(bytes).unwrap();
+    packed.finish().unwrap()
+}
+
+/// The slices of a volume as files of a folder, in an order that has nothing to do with their places.
+pub fn dicom_folder(folder: &Path, volume: &Volume, syntax: Syntax) {
+    for k in 0..volume.dims[2] {
+        let name = format!("{:02}.dcm", (k * 7 + 3) % 23);
+        fs::write(folder.join(name), dicom(volume, k, syntax, "1.2.3.4")).unwrap();
+    }
+}

@@ -1,0 +1,333 @@
+//! A tetrahedral mesh that changes: points move, edges collapse or are halved, tets go. Each point knows its tets and
+//! the *sides* that meet there: the materials of its tets, and the outside if it lies on the boundary. A point with two
+//! sides lies on a surface, with three on a line, with four it is a corner.
+
+use pliant_geometry::Vector3;
+
+/// A tet that is no more.
+const GONE: [u32; 4] = [u32::MAX; 4];
+
+/// Stands for the outside in links: every boundary face is joined with it to a tet.
+const GHOST: u32 = u32::MAX;
+
+/// Faces of a tet, outward, each opposite to the corner of its number.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// The sides at a point: bit 0 the outside, bit m the material m.
+pub(crate) type Sides = u64;
+
+/// The outside as a side.
+pub(crate) const OUTSIDE: Sides = 1;
+
+/// Most materials in a mesh.
+pub(crate) const MOST_MATERIALS: usize = 63;
+
+/// Tets, points and how they hang together.
+pub(crate) struct Complex {
+    pub(crate) points: Vec<Vector3>,
+    pub(crate) tets: Vec<[u32; 4]>,
+    /// Material of each tet, from 1.
+    pub(crate) material: Vec<u8>,
+    /// The tets round each point.
+    pub(crate) star: Vec<Vec<u32>>,
+    pub(crate) sides: Vec<Sides>,
+}
+
+/// Acoustic length of a tet [m]: 6 V / (Σ (2 A_a)²)^(1/2), negative if inverted (see `pliant_geometry::acoustic_length`).
+#[inline]
+pub(crate) fn acoustic_length(x: [Vector3; 4]) -> f64 {
+    let [u, v, w] = [x[1] - x[0], x[2] - x[0], x[3] - x[0]];
+    let [a, b, c] = [v.cross(&w), w.cross(&u), u.cross(&v)];
+    let squares = a.norm_squared() + b.norm_squared() + c.norm_squared() + (a + b + c).norm_squared();
+    if squares > 0.0 { u.dot(&a) / squares.sqrt() } else { 0.0 }
+}
+
+impl Complex {
+    /// All tets of material 1.
+    pub(crate) fn new(points: Vec<Vector3>, tets: Vec<[u32; 4]>) -> Self {
+        let mut star = vec![Vec::new(); points.len()];
+        for (tet, nodes) in (0..).zip(&tets) {
+            nodes.iter().for_each(|&node| star[node as usize].push(tet));
+        }
+        let mut complex =
+            Self { material: vec![1; tets.len()], sides: vec![0; points.len()], points, tets, star };
+        complex.find_sides();
+        complex
+    }
+
+    /// Finds the sides of all points anew.
+    pub(crate) fn find_sides(&mut self) {
+        self.sides = (0..self.points.len() as u32).map(|point| self.sides_of(point)).collect();
+    }
+
+    fn sides_of(&self, point: u32) -> Sides {
+        let materials =
+            self.star[point as usize].iter().fold(0, |sides, &tet| sides | 1 << self.material[tet as usize]);
+        materials | if self.rim_of(point, |_| true).is_empty() { 0 } else { OUTSIDE }
+    }
+
+    /// Tets that there are, in order.
+    pub(crate) fn alive(&self) -> impl Iterator<Item = u32> {
+        (0_u32..).zip(&self.tets).filter(|(_, nodes)| **nodes != GONE).map(|(tet, _)| tet)
+    }
+
+    pub(crate) fn corners(&self, tet: u32) -> [Vector3; 4] {
+        self.tets[tet as usize].map(|node| self.points[node as usize])
+    }
+
+    pub(crate) fn length(&self, tet: u32) -> f64 {
+        acoustic_length(self.corners(tet))
+    }
+
+    /// Faces of a tet, outward, in the order of the opposite corners.
+    pub(crate) fn faces(&self, tet: u32) -> [[u32; 3]; 4] {
+        FACES.map(|face| face.map(|corner| self.tets[tet as usize][corner]))
+    }
+
+    /// Edges, increasing, each once.
+    pub(crate) fn edges(&self) -> Vec<[u32; 2]> {
+        let mut edges = Vec::new();
+        for tet in self.alive() {
+            let [a, b, c, d] = self.tets[tet as usize];
+            edges.extend([[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]].map(|[p, q]| [p.min(q), p.max(q)]));
+        }
+        distinct(edges)
+    }
+
+    /// Least acoustic length of all tets [m].
+    pub(crate) fn worst(&self) -> f64 {
+        self.alive().map(|tet| self.length(tet)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Faces round a point that only one of the chosen tets has, outward from it.
+    pub(crate) fn rim_of(&self, point: u32, chosen: impl Fn(u32) -> bool) -> Vec<[u32; 3]> {
+        let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::with_capacity(72);
+        for &tet in self.star[point as usize].iter().filter(|&&tet| chosen(tet)) {
+            for face in self.faces(tet).into_iter().filter(|face| face.contains(&point)) {
+                let mut key = face;
+                key.sort_unstable();
+                faces.push((key, face));
+            }
+        }
+        faces.sort_unstable();
+        faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1).collect()
+    }
+
+    /// Points joined to a point by an edge, increasing.
+    pub(crate) fn neighbours(&self, point: u32) -> Vec<u32> {
+        let tets = self.star[point as usize].iter();
+        let mut all: Vec<u32> =
+            tets.flat_map(|&tet| self.tets[tet as usize]).filter(|&other| other != point).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Removes a tet.
+    pub(crate) fn remove(&mut self, tet: u32) {
+        for node in self.tets[tet as usize] {
+            self.star[node as usize].retain(|&other| other != tet);
+        }
+        self.tets[tet as usize] = GONE;
+    }
+
+    /// Halves an edge at `position`: every tet round it becomes two. The new point.
+    pub(crate) fn bisect(&mut self, [p, q]: [u32; 2], position: Vector3) -> u32 {
+        let new = self.points.len() as u32;
+        self.points.push(position);
+        self.star.push(Vec::new());
+        self.sides.push(0);
+        let around: Vec<u32> = self.star[p as usize]
+            .iter()
+            .copied()
+            .filter(|&tet| self.tets[tet as usize].contains(&q))
+            .collect();
+        for tet in around {
+            let nodes = self.tets[tet as usize];
+            let with = |from: u32| nodes.map(|node| if node == from { new } else { node });
+            let second = self.tets.len() as u32;
+            self.tets[tet as usize] = with(q);
+            self.tets.push(with(p));
+            self.material.push(self.material[tet as usize]);
+            self.star[q as usize].retain(|&other| other != tet);
+            for node in with(p) {
+                self.star[node as usize].push(second);
+            }
+            self.star[new as usize].push(tet);
+        }
+        self.sides[new as usize] = self.sides_of(new);
+        new
+    }
+
+    /// Joins `gone` into `kept`, which moves to `position`. The caller has asked [`Self::may_collapse`].
+    pub(crate) fn collapse(&mut self, gone: u32, kept: u32, position: Vector3) {
+        for tet in std::mem::take(&mut self.star[gone as usize]) {
+            if self.tets[tet as usize].contains(&kept) {
+                for node in self.tets[tet as usize] {
+                    self.star[node as usize].retain(|&other| other != tet);
+                }
+                self.tets[tet as usize] = GONE;
+            } else {
+                for node in &mut self.tets[tet as usize] {
+                    if *node == gone {
+                        *node = kept;
+                    }
+                }
+                self.star[kept as usize].push(tet);
+            }
+        }
+        self.points[kept as usize] = position;
+    }
+
+    /// Whether joining the ends of an edge leaves the body and each of its materials as they hang together: the link
+    /// condition (Dey, Edelsbrunner, Guha, Nekhayev 1999) in the body and in every material, each closed by a ghost
+    /// point on its boundary.
+    pub(crate) fn may_collapse(&self, u: u32, v: u32) -> bool {
+        let stars = [u, v].map(|point| self.star[point as usize].as_slice());
+        let materials = stars.concat().iter().fold(0_u64, |all, &tet| all | 1 << self.material[tet as usize]);
+        if !self.link_condition(u, v, |_| true) {
+            return false;
+        }
+        let mut each = (1..64_u8).filter(|m| materials >> m & 1 == 1);
+        materials.count_ones() == 1
+            || each.all(|m| self.link_condition(u, v, |tet| self.material[tet as usize] == m))
+    }
+
+    fn link_condition(&self, u: u32, v: u32, chosen: impl Fn(u32) -> bool + Copy) -> bool {
+        let has = |point: u32| self.star[point as usize].iter().any(|&tet| chosen(tet));
+        if !(has(u) && has(v)) {
+            return true;
+        }
+        let (of_u, of_v) = (self.link(u, chosen), self.link(v, chosen));
+        let of_edge = self.link_of_edge(u, v, chosen);
+        !of_edge.points.is_empty()
+            && common(&of_u.points, &of_v.points) == of_edge.points
+            && common(&of_u.edges, &of_v.edges) == of_edge.edges
+            && common(&of_u.faces, &of_v.faces).is_empty()
+    }
+
+    fn link(&self, point: u32, chosen: impl Fn(u32) -> bool) -> Link {
+        let mut faces: Vec<[u32; 3]> = Vec::with_capacity(64);
+        for &tet in self.star[point as usize].iter().filter(|&&tet| chosen(tet)) {
+            faces.extend(self.faces(tet).iter().filter(|face| !face.contains(&point)));
+        }
+        for face in self.rim_of(point, chosen) {
+            faces.push(face.map(|node| if node == point { GHOST } else { node }));
+        }
+        faces.iter_mut().for_each(|face| face.sort_unstable());
+        let edges = faces.iter().flat_map(|&[a, b, c]| [[a, b], [a, c], [b, c]]).collect();
+        Link { points: distinct(faces.concat()), edges: distinct(edges), faces: distinct(faces) }
+    }
+
+    fn link_of_edge(&self, u: u32, v: u32, chosen: impl Fn(u32) -> bool) -> Link {
+        let mut edges: Vec<[u32; 2]> = Vec::with_capacity(16);
+        for &tet in self.star[u as usize].iter().filter(|&&tet| chosen(tet)) {
+            let nodes = self.tets[tet as usize];
+            if nodes.contains(&v) {
+                let mut rest = nodes.into_iter().filter(|&node| node != u && node != v);
+                let [a, b] = [rest.next().unwrap_or(GHOST), rest.next().unwrap_or(GHOST)];
+                edges.push([a.min(b), a.max(b)]);
+            }
+        }
+        for face in self.rim_of(u, chosen).into_iter().filter(|face| face.contains(&v)) {
+            edges.extend(face.into_iter().filter(|&node| node != u && node != v).map(|node| [node, GHOST]));
+        }
+        Link { points: distinct(edges.concat()), edges: distinct(edges), faces: Vec::new() }
+    }
+
+    /// Points without gaps in their numbers, tets, and their materials.
+    pub(crate) fn compacted(&self) -> (Vec<Vector3>, Vec<u32>, Vec<u8>) {
+        let mut number = vec![u32::MAX; self.points.len()];
+        let mut points = Vec::new();
+        for (at, _) in self.star.iter().enumerate().filter(|(_, star)| !star.is_empty()) {
+            number[at] = points.len() as u32;
+            points.push(self.points[at]);
+        }
+        let nodes =
+            self.alive().flat_map(|tet| self.tets[tet as usize]).map(|node| number[node as usize]).collect();
+        (points, nodes, self.alive().map(|tet| self.material[tet as usize]).collect())
+    }
+}
+
+/// The link of a point or an edge, sorted.
+struct Link {
+    points: Vec<u32>,
+    edges: Vec<[u32; 2]>,
+    faces: Vec<[u32; 3]>,
+}
+
+fn distinct<T: Ord>(mut all: Vec<T>) -> Vec<T> {
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// What is in both of two sorted lists.
+fn common<T: Ord + Copy>(a: &[T], b: &[T]) -> Vec<T> {
+    a.iter().copied().filter(|item| b.binary_search(item).is_ok()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Six tets round the edge from 0 to 7 of a cube (Kuhn), points by bits.
+    fn cube() -> Complex {
+        let points = (0..8).map(|at| Vector3::from([at & 1, at >> 1 & 1, at >> 2].map(f64::from))).collect();
+        let ring = [1, 3, 2, 6, 4, 5];
+        let tets = (0..6).map(|at| [0, ring[at], ring[(at + 1) % 6], 7]).collect();
+        Complex::new(points, tets)
+    }
+
+    #[test]
+    fn acoustic_length_is_that_of_geometry() {
+        let cube = cube();
+        for tet in cube.alive() {
+            let corners = cube.corners(tet);
+            let reference = pliant_geometry::acoustic_length(pliant_geometry::CellKind::Tet, &corners);
+            assert!((cube.length(tet) - reference).abs() < 1e-15 && reference > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_halved_edge_is_on_the_boundary_if_the_edge_was() {
+        let mut cube = cube();
+        let inner = cube.bisect([0, 7], Vector3::repeat(0.5));
+        let outer = cube.bisect([0, 1], Vector3::new(0.5, 0.0, 0.0));
+        assert_eq!((cube.sides[inner as usize], cube.sides[outer as usize]), (2, 3));
+        assert_eq!(cube.alive().count(), 6 + 6 + 4);
+        let volume: f64 = cube
+            .alive()
+            .map(|tet| pliant_geometry::volume(pliant_geometry::CellKind::Tet, &cube.corners(tet)))
+            .sum();
+        assert!((volume - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn an_edge_through_the_body_between_boundary_points_may_not_collapse() {
+        let mut cube = cube();
+        assert!(!cube.may_collapse(0, 7), "the diagonal of the cube");
+        let middle = cube.bisect([0, 7], Vector3::repeat(0.5));
+        assert!(cube.may_collapse(middle, 0));
+        cube.collapse(middle, 0, Vector3::zeros());
+        assert_eq!(cube.alive().count(), 6);
+        assert!(cube.may_collapse(1, 0), "an edge of the cube");
+    }
+
+    #[test]
+    fn a_material_may_not_be_pinched() {
+        let mut cube = cube();
+        let middle = cube.bisect([0, 7], Vector3::repeat(0.5));
+        // Three tets round the lower half of the diagonal are another material.
+        let lower: Vec<u32> =
+            cube.alive().filter(|&tet| cube.tets[tet as usize].contains(&0)).take(3).collect();
+        lower.iter().for_each(|&tet| cube.material[tet as usize] = 2);
+        cube.find_sides();
+        assert_eq!(cube.sides[middle as usize], 0b110);
+        assert!(
+            !cube.may_collapse(middle, 0),
+            "its edge from point 0 to the middle is all that holds it there"
+        );
+        assert!(!cube.may_collapse(middle, 7), "the middle is inside, 7 is not on material 2");
+    }
+}

@@ -1,0 +1,189 @@
+//! Cuts a mesh along a surface: inner materials out of the whole body, and gaps that edges bridge unseen, both ends being
+//! inside. Points near the surface move
+//! onto it first, then every edge that it still crosses is halved there, the longest first; whatever the order, the mesh
+//! stays conforming, and no edge is crossed any more.
+
+use pliant_geometry::Vector3;
+
+use crate::complex::{Complex, OUTSIDE};
+use crate::field::ImplicitField;
+use crate::surfaces::Surfaces;
+
+/// Halvings of an edge to find where a surface cuts it.
+const BISECTIONS: u32 = 24;
+
+/// A cut nearer to an end than this part of its edge moves that end, if it may move.
+const ALPHA: f64 = 0.35;
+
+/// A cut nearer to an end that may not move than this part of its edge counts as that end.
+const AT_END: f64 = 0.1;
+
+/// Moving a point onto the surface must leave its tets this part of the ideal acoustic length.
+const LEAST_AFTER_MOVE: f64 = 0.2;
+
+/// An edge bridges a gap where the field falls below minus this part of the lattice constant along it.
+const GAP: f64 = 0.1;
+
+/// Where a surface crosses an edge.
+struct Crossing {
+    edge: [u32; 2],
+    /// Fraction of the way from the first end.
+    at: f64,
+    length: f64,
+}
+
+/// Cuts out all materials but the first. `ideal` is the acoustic length of an ideal tet [m].
+pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>, ideal: f64) {
+    for material in 2..=surfaces.materials() {
+        let inside = |point: &Vector3| surfaces.inside(material, point);
+        let values = complex.points.iter().map(inside).collect();
+        let sides = Surface { inside: &inside, ideal }.cut(complex, values);
+        for (tet, side) in sides {
+            if side > 0.0 {
+                complex.material[tet as usize] = material as u8;
+            }
+        }
+        complex.find_sides();
+    }
+}
+
+/// Cuts out gaps between banks of the body that edges of the mesh bridge. How many edges did.
+pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField, edge: f64, ideal: f64) -> usize {
+    let inside = |point: &Vector3| field.value(point);
+    let mut values: Vec<f64> = complex.points.iter().map(inside).collect();
+    let deepest = |[p, q]: [u32; 2]| {
+        let [p, q] = [p, q].map(|point| complex.points[point as usize]);
+        let samples = [0.25, 0.5, 0.75].map(|at| p.lerp(&q, at));
+        let [a, b, c] = samples.map(|point| (inside(&point), point));
+        [b, a, c].into_iter().fold(b, |least, other| if other.0 < least.0 { other } else { least })
+    };
+    let mut bridges: Vec<([u32; 2], f64, Vector3)> = Vec::new();
+    for ends in complex.edges() {
+        let (value, point) = deepest(ends);
+        if value < -GAP * edge {
+            bridges.push((ends, value, point));
+        }
+    }
+    bridges.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    let count = bridges.len();
+    if count == 0 {
+        return 0;
+    }
+    for (ends, value, point) in bridges {
+        complex.bisect(ends, point);
+        values.push(value);
+    }
+    // Points of the boundary lie on the surface but for round-off.
+    for (value, sides) in values.iter_mut().zip(&complex.sides) {
+        if sides & OUTSIDE != 0 && value.abs() < 1e-6 * edge {
+            *value = 0.0;
+        }
+    }
+    for (tet, side) in (Surface { inside: &inside, ideal }).cut(complex, values) {
+        if side < 0.0 {
+            complex.remove(tet);
+        }
+    }
+    complex.find_sides();
+    count
+}
+
+/// The surface where a function is zero.
+struct Surface<'a> {
+    inside: &'a dyn Fn(&Vector3) -> f64,
+    ideal: f64,
+}
+
+impl Surface<'_> {
+    /// Cuts the mesh along the surface, given the function at its points; the side of each tet: positive inside.
+    fn cut(&self, complex: &mut Complex, mut values: Vec<f64>) -> Vec<(u32, f64)> {
+        self.move_points(complex, &mut values);
+        let mut crossings = self.crossings(complex, &values);
+        for crossing in &crossings {
+            // Ends that could not be moved.
+            if let Some(end) = crossing.near_end(AT_END) {
+                values[crossing.edge[end] as usize] = 0.0;
+            }
+        }
+        crossings.retain(|crossing| crossing.edge.iter().all(|&end| values[end as usize] != 0.0));
+        crossings.sort_by(|a, b| b.length.total_cmp(&a.length).then(a.edge.cmp(&b.edge)));
+        for Crossing { edge: [p, q], at, .. } in crossings {
+            let position = complex.points[p as usize].lerp(&complex.points[q as usize], at);
+            complex.bisect([p, q], position);
+            values.push(0.0);
+        }
+        let side = |tet: u32| match complex.tets[tet as usize]
+            .iter()
+            .map(|&node| values[node as usize])
+            .sum::<f64>()
+        {
+            0.0 => (self.inside)(&(complex.corners(tet).iter().sum::<Vector3>() / 4.0)),
+            sum => sum,
+        };
+        complex.alive().map(|tet| (tet, side(tet))).collect()
+    }
+
+    /// Edges with ends on both sides, and where the surface crosses them.
+    fn crossings(&self, complex: &Complex, values: &[f64]) -> Vec<Crossing> {
+        let crossed = |[p, q]: &[u32; 2]| values[*p as usize] * values[*q as usize] < 0.0;
+        let edges = complex.edges().into_iter().filter(crossed);
+        edges.map(|edge| self.crossing(complex, edge, values)).collect()
+    }
+
+    fn crossing(&self, complex: &Complex, edge: [u32; 2], values: &[f64]) -> Crossing {
+        let [start, end] = edge.map(|point| complex.points[point as usize]);
+        let begins_inside = values[edge[0] as usize] > 0.0;
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if ((self.inside)(&start.lerp(&end, middle)) > 0.0) == begins_inside {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Crossing { edge, at: 0.5 * (low + high), length: (end - start).norm() }
+    }
+
+    /// Moves each free point that is near a crossing to its nearest one, where its tets bear it.
+    fn move_points(&self, complex: &mut Complex, values: &mut [f64]) {
+        let mut nearest: Vec<Option<(f64, Vector3)>> = vec![None; complex.points.len()];
+        for crossing in self.crossings(complex, values) {
+            if let Some(end) = crossing.near_end(ALPHA) {
+                let [p, q] = crossing.edge.map(|point| complex.points[point as usize]);
+                let to = p.lerp(&q, crossing.at);
+                let distance = (to - [p, q][end]).norm();
+                let best = &mut nearest[crossing.edge[end] as usize];
+                if best.is_none_or(|(least, _)| distance < least) {
+                    *best = Some((distance, to));
+                }
+            }
+        }
+        for (point, (_, to)) in
+            nearest.into_iter().enumerate().filter_map(|(point, best)| Some((point, best?)))
+        {
+            let free = complex.sides[point].count_ones() == 1 && complex.sides[point] & OUTSIDE == 0;
+            let before = std::mem::replace(&mut complex.points[point], to);
+            let bears =
+                || complex.star[point].iter().all(|&tet| complex.length(tet) > LEAST_AFTER_MOVE * self.ideal);
+            if free && bears() {
+                values[point] = 0.0;
+            } else {
+                complex.points[point] = before;
+            }
+        }
+    }
+}
+
+impl Crossing {
+    /// The end that the crossing is near to.
+    fn near_end(&self, part: f64) -> Option<usize> {
+        if self.at < part {
+            Some(0)
+        } else if 1.0 - self.at < part {
+            Some(1)
+        } else {
+            None
+        }
+    }
+}

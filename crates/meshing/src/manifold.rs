@@ -1,0 +1,152 @@
+//! Mends a body that touches itself: where a gap is thinner than the cells, its two banks share points or edges. A point
+//! is doubled for every group of its tets that hang together through faces; an edge with more than two boundary faces is
+//! halved first, which gives its banks a point of their own each. Faces are kept, so no volume changes.
+
+use std::collections::BTreeMap;
+
+use crate::complex::Complex;
+
+/// What was mended.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Mended {
+    /// Points added by doubling.
+    pub(crate) doubled: usize,
+    /// Edges halved.
+    pub(crate) halved: usize,
+}
+
+/// Mends all points and edges.
+pub(crate) fn mend(complex: &mut Complex) -> Mended {
+    let mut mended = Mended { doubled: double_points(complex, 0..complex.points.len() as u32), halved: 0 };
+    // Halving leaves two edges that are fine, so once is enough but for edges made by doubling.
+    for _ in 0..4 {
+        let edges = crowded_edges(complex);
+        if edges.is_empty() {
+            break;
+        }
+        for [p, q] in edges {
+            let middle = (complex.points[p as usize] + complex.points[q as usize]) / 2.0;
+            let new = complex.bisect([p, q], middle);
+            mended.halved += 1;
+            mended.doubled += double_points(complex, new..new + 1);
+        }
+    }
+    mended
+}
+
+/// Edges with more than two boundary faces, increasing.
+pub(crate) fn crowded_edges(complex: &Complex) -> Vec<[u32; 2]> {
+    let mut faces: BTreeMap<[u32; 3], u32> = BTreeMap::new();
+    for face in complex.alive().flat_map(|tet| complex.faces(tet)) {
+        let mut key = face;
+        key.sort_unstable();
+        *faces.entry(key).or_default() += 1;
+    }
+    let mut edges: BTreeMap<[u32; 2], u32> = BTreeMap::new();
+    for ([a, b, c], _) in faces.into_iter().filter(|(_, count)| *count == 1) {
+        for edge in [[a, b], [a, c], [b, c]] {
+            *edges.entry(edge).or_default() += 1;
+        }
+    }
+    edges.into_iter().filter(|(_, count)| *count > 2).map(|(edge, _)| edge).collect()
+}
+
+/// Doubles the points whose tets fall into groups; how many points that adds.
+fn double_points(complex: &mut Complex, points: std::ops::Range<u32>) -> usize {
+    let mut added = 0;
+    for point in points {
+        let groups = groups(complex, point);
+        for group in groups.iter().skip(1) {
+            let twin = complex.points.len() as u32;
+            complex.points.push(complex.points[point as usize]);
+            complex.sides.push(complex.sides[point as usize]);
+            complex.star.push(group.clone());
+            complex.star[point as usize].retain(|tet| !group.contains(tet));
+            for &tet in group {
+                for node in &mut complex.tets[tet as usize] {
+                    if *node == point {
+                        *node = twin;
+                    }
+                }
+            }
+            added += 1;
+        }
+    }
+    added
+}
+
+/// Tets round a point in groups that hang together through faces with the point; the group of the first tet first.
+fn groups(complex: &Complex, point: u32) -> Vec<Vec<u32>> {
+    let star = &complex.star[point as usize];
+    let mut rest: Vec<u32> = star.clone();
+    rest.sort_unstable();
+    let shares_face = |a: u32, b: u32| {
+        let [a, b] = [a, b].map(|tet| complex.tets[tet as usize]);
+        a.iter().filter(|node| b.contains(node)).count() == 3
+    };
+    let mut groups = Vec::new();
+    while !rest.is_empty() {
+        let mut group = vec![rest.remove(0)];
+        let mut at = 0;
+        while at < group.len() {
+            let tet = group[at];
+            let (joined, left): (Vec<u32>, Vec<u32>) =
+                rest.iter().partition(|&&other| shares_face(tet, other));
+            group.extend(joined);
+            rest = left;
+            at += 1;
+        }
+        groups.push(group);
+    }
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_geometry::Vector3;
+
+    use super::*;
+
+    /// Two cubes of six tets that share an edge, joined by nothing else or round it.
+    #[test]
+    fn two_bodies_that_share_an_edge_come_apart() {
+        let corner = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+        let points = vec![
+            corner(0., 0., 0.),
+            corner(0., 0., 1.),
+            corner(1., 0., 0.),
+            corner(1., 0.5, 0.5),
+            corner(-1., 0., 0.),
+            corner(-1., -0.5, 0.5),
+        ];
+        let mut complex = Complex::new(points, vec![[0, 2, 3, 1], [0, 4, 5, 1]]);
+        assert_eq!(crowded_edges(&complex), [[0, 1]]);
+        assert_eq!(mend(&mut complex), Mended { doubled: 2, halved: 0 });
+        assert!(crowded_edges(&complex).is_empty());
+        assert_eq!(complex.points.len(), 8);
+    }
+
+    /// A ring of tets round an edge with two of them taken out opposite each other: its ends hold the halves together.
+    #[test]
+    fn an_edge_between_halves_that_hang_together_elsewhere_is_halved() {
+        let around = |at: usize| {
+            let (sine, cosine) = (at as f64 * std::f64::consts::FRAC_PI_3).sin_cos();
+            Vector3::new(cosine, sine, 0.5)
+        };
+        let mut points = vec![Vector3::zeros(), Vector3::z()];
+        points.extend((0..6).map(around));
+        // Above and below, full rings.
+        points.extend([Vector3::new(0.0, 0.0, 2.0), Vector3::new(0.0, 0.0, -1.0)]);
+        let ring = |at: u32| 2 + at % 6;
+        let mut tets: Vec<[u32; 4]> =
+            (0..6).filter(|at| at % 3 != 0).map(|at| [0, ring(at), ring(at + 1), 1]).collect();
+        tets.extend((0..6).map(|at| [1, ring(at), ring(at + 1), 8]));
+        tets.extend((0..6).map(|at| [9, ring(at), ring(at + 1), 0]));
+        let mut complex = Complex::new(points, tets);
+        assert_eq!(crowded_edges(&complex), [[0, 1]]);
+        let mended = mend(&mut complex);
+        assert_eq!(mended.halved, 1);
+        assert!(crowded_edges(&complex).is_empty());
+        assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
+    }
+}

@@ -1,0 +1,379 @@
+//! Improves a tetrahedral mesh for explicit dynamics, where the least acoustic length sets the time step: tets below a
+//! rising threshold lose an edge or their place, then points move to where their worst tet is best. Points between sides
+//! stay between them. Deterministic: everything goes in the order of numbers, and the directions of trial moves are
+//! turned by a fixed sequence.
+
+use pliant_geometry::{CellKind, Vector3};
+
+use crate::complex::{Complex, OUTSIDE, acoustic_length};
+use crate::surfaces::Surfaces;
+
+/// Threshold of the first round, in ideal acoustic lengths.
+const FIRST_THRESHOLD: f64 = 0.3;
+
+/// The threshold reaches its goal in this part of the rounds.
+const RAMP: f64 = 0.6;
+
+/// Sweeps over the points in a round, and by how much trial moves shrink from one to the next.
+const SWEEPS: usize = 3;
+const SHRINK: f64 = 0.6;
+
+/// First trial moves, in lattice constants.
+const REACH: f64 = 0.15;
+
+/// Times that surfaces are shifted, and how far at most, in lattice constants.
+const SHIFTS: usize = 4;
+const LARGEST_SHIFT: f64 = 0.25;
+
+/// Where the target is still not reached, points round bad tets may leave their surfaces by this, in lattice constants.
+const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
+
+/// Volumes nearer than this part to what they must be are left alone.
+const VOLUME_TOLERANCE: f64 = 2e-3;
+
+/// What the optimiser did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Optimised {
+    pub(crate) rounds: usize,
+    pub(crate) peeled: usize,
+    pub(crate) collapsed: usize,
+    pub(crate) moved: usize,
+}
+
+/// The optimiser of one mesh.
+pub(crate) struct Optimiser<'a> {
+    pub(crate) complex: &'a mut Complex,
+    pub(crate) surfaces: Surfaces<'a>,
+    /// Lattice constant [m].
+    pub(crate) edge: f64,
+    /// Acoustic length of an ideal tet [m].
+    pub(crate) ideal: f64,
+    /// How far a point may be from the sides that it lies between [m].
+    slack: f64,
+    noise: u64,
+    done: Optimised,
+}
+
+impl<'a> Optimiser<'a> {
+    pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>, edge: f64, ideal: f64) -> Self {
+        Self { complex, surfaces, edge, ideal, slack: 0.0, noise: 1, done: Optimised::default() }
+    }
+
+    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh
+    /// encloses `volumes` [m³], of the whole and of the inner materials, as far as these are known.
+    pub(crate) fn run(
+        &mut self,
+        target: f64,
+        rounds: usize,
+        volumes: &[Option<f64>],
+        progress: &dyn Fn(f64),
+    ) -> Optimised {
+        self.improve(target, rounds, RAMP, &|done| progress(0.7 * done));
+        for repeat in 0..SHIFTS {
+            if !self.shift_surfaces(volumes, target) {
+                break;
+            }
+            let rounds = rounds.div_ceil(2);
+            self.improve(target, rounds, 0.0, &|_| {});
+            progress(0.7 + 0.2 * (repeat + 1) as f64 / SHIFTS as f64);
+        }
+        for slack in SLACKS {
+            if self.complex.worst() >= target * self.ideal {
+                break;
+            }
+            self.slack = slack * self.edge;
+            self.improve(target, rounds.div_ceil(2), 0.0, &|_| {});
+        }
+        self.done
+    }
+
+    /// Shifts the surfaces whose volume is off, and their points with them; whether any was.
+    fn shift_surfaces(&mut self, volumes: &[Option<f64>], target: f64) -> bool {
+        let measured = measure(self.complex, self.surfaces.materials());
+        let mut shifted = 0;
+        for (surface, (wanted, [volume, area])) in volumes.iter().zip(measured).enumerate() {
+            let Some(wanted) = wanted else { continue };
+            if (volume / wanted - 1.0).abs() > VOLUME_TOLERANCE && area > 0.0 {
+                self.surfaces.shift(surface, (wanted - volume) / area, LARGEST_SHIFT * self.edge);
+                // Bit 0 of the sides is the outside, bit m the material m.
+                shifted |= if surface == 0 { OUTSIDE } else { 1 << (surface + 1) };
+            }
+        }
+        for node in 0..self.complex.points.len() as u32 {
+            let sides = self.complex.sides[node as usize];
+            if sides.count_ones() > 1 && sides & shifted != 0 {
+                let here = self.complex.points[node as usize];
+                let least = self.star_min(node, &here, u32::MAX, 0.0).min(0.6 * target * self.ideal);
+                if let Some(there) = self.project(node, here)
+                    && self.star_min(node, &there, u32::MAX, 0.0) >= least
+                {
+                    self.complex.points[node as usize] = there;
+                }
+            }
+        }
+        shifted != 0
+    }
+
+    fn improve(&mut self, target: f64, rounds: usize, ramp: f64, progress: &dyn Fn(f64)) {
+        let mut idle = 0;
+        for round in 0..rounds {
+            let ramp = ((round + 1) as f64 / (ramp * rounds as f64)).min(1.0);
+            let threshold = self.ideal * (FIRST_THRESHOLD + (target - FIRST_THRESHOLD) * ramp);
+            let before = self.complex.worst();
+            let changes = self.peel(threshold) + self.collapse(threshold);
+            self.relocate(threshold);
+            self.done.rounds += 1;
+            progress((round + 1) as f64 / rounds as f64);
+            let worst = self.complex.worst();
+            if worst >= target * self.ideal {
+                break;
+            }
+            idle = if ramp == 1.0 && changes == 0 && worst <= before * (1.0 + 1e-6) { idle + 1 } else { 0 };
+            if idle == 2 {
+                break;
+            }
+        }
+    }
+
+    /// Tets below a length, the worst first.
+    fn below(&self, threshold: f64) -> Vec<u32> {
+        let lengths = self.complex.alive().map(|tet| (self.complex.length(tet), tet));
+        let mut bad: Vec<(f64, u32)> = lengths.filter(|(length, _)| *length < threshold).collect();
+        bad.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        bad.into_iter().map(|(_, tet)| tet).collect()
+    }
+
+    /// Removes tets of the boundary below half the threshold that the body does not need to hang together.
+    fn peel(&mut self, threshold: f64) -> usize {
+        let mut peeled = 0;
+        for tet in self.below(threshold / 2.0) {
+            if self.may_peel(tet) {
+                let nodes = self.complex.tets[tet as usize];
+                self.complex.remove(tet);
+                for node in nodes {
+                    self.refresh(node);
+                }
+                peeled += 1;
+            }
+        }
+        self.done.peeled += peeled;
+        peeled
+    }
+
+    /// Three boundary faces: a tip. Two: a wedge, if the edge that its removal lays open is not on the boundary yet.
+    fn may_peel(&self, tet: u32) -> bool {
+        let nodes = self.complex.tets[tet as usize];
+        let is_open = |corner: usize| {
+            let face: Vec<u32> =
+                nodes.iter().enumerate().filter(|&(at, _)| at != corner).map(|(_, &n)| n).collect();
+            let mut both = self.complex.star[face[0] as usize]
+                .iter()
+                .filter(|&&other| face.iter().all(|node| self.complex.tets[other as usize].contains(node)));
+            both.next().is_some() && both.next().is_none()
+        };
+        let open: Vec<usize> = (0..4).filter(|&corner| is_open(corner)).collect();
+        // The material of the boundary must not change where it is peeled off.
+        let one_material =
+            nodes.iter().all(|&node| (self.complex.sides[node as usize] & !OUTSIDE).count_ones() == 1);
+        match open.as_slice() {
+            [_, _, _] => one_material,
+            &[a, b] => {
+                // Faces opposite a and b are open: the edge from a to b is inside.
+                let edge = [nodes[a], nodes[b]];
+                let rim = self.complex.rim_of(edge[0], |_| true);
+                one_material && !rim.iter().any(|face| face.contains(&edge[1]))
+            }
+            _ => false,
+        }
+    }
+
+    fn refresh(&mut self, node: u32) {
+        let star = &self.complex.star[node as usize];
+        let materials = star.iter().fold(0, |sides, &tet| sides | 1 << self.complex.material[tet as usize]);
+        let open = !self.complex.rim_of(node, |_| true).is_empty();
+        self.complex.sides[node as usize] = materials | if open { OUTSIDE } else { 0 };
+    }
+
+    fn collapse(&mut self, threshold: f64) -> usize {
+        let mut collapsed = 0;
+        for tet in self.below(threshold) {
+            let nodes = self.complex.tets[tet as usize];
+            // A collapse before may have taken it away or improved it.
+            if nodes[0] != u32::MAX
+                && self.complex.length(tet) < threshold
+                && self.collapse_one(nodes, threshold)
+            {
+                collapsed += 1;
+            }
+        }
+        self.done.collapsed += collapsed;
+        collapsed
+    }
+
+    /// Tries the edges of a tet, the shortest first, both ways.
+    fn collapse_one(&mut self, nodes: [u32; 4], threshold: f64) -> bool {
+        let point = |node: u32| self.complex.points[node as usize];
+        let mut edges: Vec<(f64, u32, u32)> = Vec::with_capacity(6);
+        for (i, &p) in nodes.iter().enumerate() {
+            edges.extend(nodes[i + 1..].iter().map(|&q| ((point(p) - point(q)).norm(), p, q)));
+        }
+        edges.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, p, q) in edges {
+            for (gone, kept) in [(p, q), (q, p)] {
+                if let Some(position) = self.best_collapse(gone, kept, threshold)
+                    && self.complex.may_collapse(gone, kept)
+                {
+                    self.complex.collapse(gone, kept, position);
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Where the joined point would be best, if that is better than before.
+    fn best_collapse(&self, gone: u32, kept: u32, threshold: f64) -> Option<Vector3> {
+        let [own, other] = [gone, kept].map(|node| self.complex.sides[node as usize]);
+        if own & !other != 0 {
+            return None;
+        }
+        let [from, to] = [gone, kept].map(|node| self.complex.points[node as usize]);
+        let middle = (from + to) / 2.0;
+        let places = match (own == other, own.count_ones()) {
+            (false, _) => vec![to],
+            (true, 1) => vec![middle, from, to],
+            (true, _) => self.project(kept, middle).into_iter().chain([from, to]).collect(),
+        };
+        let old = self.star_min(gone, &self.complex.points[gone as usize], u32::MAX, 0.0).min(self.star_min(
+            kept,
+            &self.complex.points[kept as usize],
+            u32::MAX,
+            0.0,
+        ));
+        let mut best: Option<(f64, Vector3)> = None;
+        for place in places {
+            let floor = best.map_or(old, |(length, _)| length);
+            let new = self.star_min(gone, &place, kept, floor);
+            let new = if new > floor { new.min(self.star_min(kept, &place, gone, floor)) } else { new };
+            if new > floor && (new >= threshold || new > 1.2 * old) {
+                best = Some((new, place));
+            }
+        }
+        best.map(|(_, place)| place)
+    }
+
+    /// Least acoustic length of the tets round a node if it were at `place`, leaving out those with another node; stops
+    /// once it is not above `floor`.
+    fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        for &tet in &self.complex.star[node as usize] {
+            let nodes = self.complex.tets[tet as usize];
+            if nodes.contains(&without) {
+                continue;
+            }
+            let corners = nodes.map(|n| if n == node { *place } else { self.complex.points[n as usize] });
+            least = least.min(acoustic_length(corners));
+            if least <= floor {
+                break;
+            }
+        }
+        least
+    }
+
+    /// The place nearest to `place` between the sides of a node.
+    fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
+        match self.complex.sides[node as usize] {
+            sides if sides.count_ones() < 2 => Some(place),
+            sides if self.surfaces.off(sides, &place) < self.slack => Some(place),
+            sides => self.surfaces.project(sides, &place, 0.15 * self.edge),
+        }
+    }
+
+    /// Moves the points whose worst tet is near the threshold or below to the best of some places round them.
+    fn relocate(&mut self, threshold: f64) {
+        for sweep in 0..SWEEPS {
+            let reach = REACH * self.edge * SHRINK.powi(sweep as i32);
+            for node in 0..self.complex.points.len() as u32 {
+                let here = self.complex.points[node as usize];
+                let now = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY);
+                if now < 1.05 * threshold {
+                    self.relocate_one(node, now, reach);
+                }
+            }
+        }
+    }
+
+    fn relocate_one(&mut self, node: u32, now: f64, reach: f64) {
+        let here = self.complex.points[node as usize];
+        let neighbours = self.complex.neighbours(node);
+        let sum: Vector3 = neighbours.iter().map(|&other| self.complex.points[other as usize]).sum();
+        let half_way = (here + sum / neighbours.len() as f64) / 2.0;
+        let reach = reach * (0.5 + self.random());
+        // Worst tets first: most trials end at the first tet.
+        let mut star = std::mem::take(&mut self.complex.star[node as usize]);
+        star.sort_by(|&a, &b| self.complex.length(a).total_cmp(&self.complex.length(b)).then(a.cmp(&b)));
+        self.complex.star[node as usize] = star;
+        let (mut best, mut place) = (now, here);
+        for trial in std::iter::once(half_way).chain(directions().map(|direction| here + direction * reach)) {
+            // Free trials that are no better are not worth projecting: their tets change little.
+            if let Some(trial) = self.project(node, trial) {
+                let length = self.star_min(node, &trial, u32::MAX, best);
+                if length > best {
+                    (best, place) = (length, trial);
+                }
+            }
+        }
+        if place != here {
+            self.complex.points[node as usize] = place;
+            self.done.moved += 1;
+        }
+    }
+
+    /// From 0 to 1, the same sequence every time (Knuth's multiplier).
+    fn random(&mut self) -> f64 {
+        self.noise = self.noise.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.noise >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// The 26 unit vectors to the neighbours in a cubic grid.
+fn directions() -> impl Iterator<Item = Vector3> {
+    let grid = (0..27)
+        .map(|at| Vector3::new((at % 3) as f64 - 1.0, (at / 3 % 3) as f64 - 1.0, (at / 9) as f64 - 1.0));
+    grid.filter(|direction| *direction != Vector3::zeros()).map(|direction| direction.normalize())
+}
+
+/// Volume [m³] and area [m²] of the whole and of each inner material; the area of a material without what lies on the
+/// boundary of the whole.
+fn measure(complex: &Complex, materials: usize) -> Vec<[f64; 2]> {
+    let mut measured = vec![[0.0; 2]; materials];
+    let mut faces: Vec<([u32; 3], u8)> = Vec::new();
+    for tet in complex.alive() {
+        let corners = complex.corners(tet);
+        let volume = pliant_geometry::volume(CellKind::Tet, &corners);
+        let material = complex.material[tet as usize];
+        measured[0][0] += volume;
+        if material > 1 {
+            measured[usize::from(material) - 1][0] += volume;
+        }
+        for mut face in complex.faces(tet) {
+            face.sort_unstable();
+            faces.push((face, material));
+        }
+    }
+    faces.sort_unstable();
+    for same in faces.chunk_by(|a, b| a.0 == b.0) {
+        let area =
+            pliant_geometry::volume(CellKind::Triangle, &same[0].0.map(|node| complex.points[node as usize]));
+        match same {
+            [_] => measured[0][1] += area,
+            [(_, a), (_, b)] if a != b => {
+                for m in [a, b].into_iter().filter(|m| **m > 1) {
+                    measured[usize::from(*m) - 1][1] += area;
+                }
+            }
+            _ => {}
+        }
+    }
+    measured
+}

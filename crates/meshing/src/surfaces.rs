@@ -1,0 +1,144 @@
+//! The surfaces of an anatomy: which points lie between which sides, and the way there. Each surface may be shifted a little
+//! outwards, so that facets between points of a curved surface enclose the right volume.
+
+use pliant_geometry::Vector3;
+
+use crate::anatomy::Anatomy;
+use crate::complex::{OUTSIDE, Sides};
+
+/// The surfaces of the whole body and of its inner materials.
+pub(crate) struct Surfaces<'a> {
+    anatomy: &'a Anatomy<'a>,
+    /// Where the surfaces of the whole (0) and of the inner materials lie: at these values of their fields [m].
+    levels: Vec<f64>,
+}
+
+impl<'a> Surfaces<'a> {
+    pub(crate) fn new(anatomy: &'a Anatomy<'a>) -> Self {
+        Self { anatomy, levels: vec![0.0; anatomy.labels().len()] }
+    }
+
+    /// Number of materials.
+    pub(crate) fn materials(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Moves the surface of the whole (0) or of an inner material (its number less one) outwards [m], by at most `most` in
+    /// all.
+    pub(crate) fn shift(&mut self, surface: usize, outwards: f64, most: f64) {
+        self.levels[surface] = (self.levels[surface] - outwards).clamp(-most, most);
+    }
+
+    /// How far a point is inside a material (numbered from 1) rather than in any other [m].
+    pub(crate) fn inside(&self, material: usize, point: &Vector3) -> f64 {
+        let own = self.depth(material, point);
+        let others = (1..=self.levels.len()).filter(|&other| other != material);
+        own - others.map(|other| self.depth(other, point)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Field of a material [m]. The first one has none of its own and is what the others leave: minus the deepest of
+    /// them.
+    fn depth(&self, material: usize, point: &Vector3) -> f64 {
+        match material {
+            1 => -self.inner().map(|m| self.depth(m, point)).fold(f64::NEG_INFINITY, f64::max),
+            m => self.anatomy.inner(m).value(point) - self.levels[m - 1],
+        }
+    }
+
+    /// The materials with a field of their own.
+    fn inner(&self) -> impl Iterator<Item = usize> {
+        2..=self.levels.len()
+    }
+
+    /// Gradient of the field of a material.
+    fn slope(&self, material: usize, point: &Vector3) -> Vector3 {
+        if material > 1 {
+            return self.anatomy.inner(material).gradient(point);
+        }
+        let deepest = self.inner().max_by(|&a, &b| self.depth(a, point).total_cmp(&self.depth(b, point)));
+        deepest.map_or(Vector3::zeros(), |m| -self.slope(m, point))
+    }
+
+    /// What must be zero at a point between sides, with its gradient: the field of the body on its boundary, the
+    /// difference of two materials between them. At most three.
+    pub(crate) fn constraints(&self, sides: Sides, point: &Vector3) -> Constraints {
+        let mut found = Constraints::default();
+        if sides & OUTSIDE != 0 {
+            found.push(
+                self.anatomy.field().value(point) - self.levels[0],
+                self.anatomy.field().gradient(point),
+            );
+        }
+        let mut materials = (1..=self.levels.len()).filter(|&m| sides >> m & 1 == 1);
+        if let Some(first) = materials.next() {
+            for other in materials {
+                // Half the difference has the slope of a distance.
+                let value = 0.5 * (self.depth(first, point) - self.depth(other, point));
+                found.push(value, 0.5 * (self.slope(first, point) - self.slope(other, point)));
+            }
+        }
+        found
+    }
+
+    /// How far off a point is from where its sides meet [m].
+    pub(crate) fn off(&self, sides: Sides, point: &Vector3) -> f64 {
+        self.constraints(sides, point).largest()
+    }
+
+    /// The closest point between the same sides, by Newton's method with steps of at most `longest` [m] on the least
+    /// move; `None` if it is not found.
+    pub(crate) fn project(&self, sides: Sides, from: &Vector3, longest: f64) -> Option<Vector3> {
+        let mut point = *from;
+        for _ in 0..12 {
+            let constraints = self.constraints(sides, &point);
+            if constraints.count == 0 || constraints.largest() < 1e-4 * longest {
+                return Some(point);
+            }
+            let step = constraints.newton_step()?;
+            let length = step.norm();
+            point -= if length > longest { step * (longest / length) } else { step };
+        }
+        None
+    }
+}
+
+/// Values that must be zero, and their gradients.
+#[derive(Default)]
+pub(crate) struct Constraints {
+    values: [f64; 3],
+    gradients: [Vector3; 3],
+    count: usize,
+}
+
+impl Constraints {
+    fn push(&mut self, value: f64, gradient: Vector3) {
+        if self.count < 3 {
+            (self.values[self.count], self.gradients[self.count]) = (value, gradient);
+            self.count += 1;
+        }
+    }
+
+    pub(crate) fn largest(&self) -> f64 {
+        self.values[..self.count].iter().fold(0.0, |largest, value| largest.max(value.abs()))
+    }
+
+    /// The shortest step that makes the linear parts zero: Jᵀ (J Jᵀ)⁻¹ c.
+    fn newton_step(&self) -> Option<Vector3> {
+        let [a, b, c] = &self.gradients;
+        let [p, q, r] = self.values;
+        match self.count {
+            1 => Some(a * (p / a.norm_squared())).filter(|step| step.iter().all(|x| x.is_finite())),
+            2 => {
+                let (aa, ab, bb) = (a.norm_squared(), a.dot(b), b.norm_squared());
+                let determinant = aa * bb - ab * ab;
+                // Surfaces that meet at less than 0.6° have no line to speak of.
+                (determinant > 1e-4 * aa * bb)
+                    .then(|| a * ((bb * p - ab * q) / determinant) + b * ((aa * q - ab * p) / determinant))
+            }
+            _ => {
+                let matrix = nalgebra::Matrix3::from_rows(&[a.transpose(), b.transpose(), c.transpose()]);
+                matrix.try_inverse().map(|inverse| inverse * Vector3::new(p, q, r))
+            }
+        }
+    }
+}

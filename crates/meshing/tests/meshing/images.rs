@@ -1,0 +1,77 @@
+//! Label images of the analytic organs as their definition gives them, and the truth to measure meshes against.
+
+use pliant_geometry::{Mesh, SurfaceLocator, Vector3, boundary};
+use pliant_imaging::{Grid, LabelImage};
+use pliant_meshing::{ImplicitField, Organ, Phantom, Stuffing, brain_label};
+
+/// 128³ voxels of 205/128 mm, centres at (i + ½) h − 102.5 mm.
+fn labelled(label: impl Fn(&Vector3) -> i32 + Sync) -> LabelImage {
+    use rayon::prelude::*;
+    let h = 0.205 / 128.0;
+    let grid = Grid::along_axes([128; 3], Vector3::repeat(0.5 * h - 0.1025), [h; 3]).expect("a cubic grid");
+    let at = |at: usize| label(&grid.position(&grid.triple(at).map(|i| i as f64).into()));
+    LabelImage { labels: (0..grid.len()).into_par_iter().map(at).collect(), grid }
+}
+
+pub fn liver() -> LabelImage {
+    let liver = Phantom::new(Organ::Liver, 1.0).expect("a positive scale");
+    labelled(|point| i32::from(liver.value(point) > 0.0))
+}
+
+pub fn brain() -> LabelImage {
+    labelled(|point| brain_label(point, 1.0) as i32)
+}
+
+pub fn whole_brain() -> LabelImage {
+    labelled(|point| i32::from(brain_label(point, 1.0) > 0))
+}
+
+pub fn ball(radius: f64) -> LabelImage {
+    labelled(|point| i32::from(point.norm() < radius))
+}
+
+/// The true surface of an organ: points on it about 1.5 mm apart, on a fine mesh of its field.
+pub struct Truth {
+    points: Vec<Vector3>,
+    locator: SurfaceLocator,
+}
+
+impl Truth {
+    pub fn new(field: &impl ImplicitField) -> Self {
+        let fine = Stuffing::new(0.002).mesh(field).expect("the organ is meshed").mesh;
+        let surface = boundary(&fine);
+        let points = surface.nodes().iter().map(|&node| fine.points[node as usize]).collect();
+        let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
+        Self { points, locator: SurfaceLocator::new(&surface, &faces, &fine.points) }
+    }
+}
+
+pub fn truth(organ: &str) -> Truth {
+    let organ = if organ.starts_with("liver") { Organ::Liver } else { Organ::Brain };
+    Truth::new(&Phantom::new(organ, 1.0).expect("a positive scale"))
+}
+
+/// Largest distance from the mesh's surface to the truth, from the truth to the mesh, and the root mean square of the
+/// first [m]; each face sampled at 15 places.
+pub fn distances(mesh: &Mesh, truth: &Truth) -> [f64; 3] {
+    let surface = boundary(mesh);
+    let (mut forth, mut squares, mut weight) = (0.0_f64, 0.0, 0.0);
+    for face in &surface.faces {
+        let corners: Vec<Vector3> = face.nodes().iter().map(|&node| mesh.points[node as usize]).collect();
+        for (i, j) in (0..5).flat_map(|i| (0..5 - i).map(move |j| (i, j))) {
+            let [a, b] = [i as f64 / 4.0, j as f64 / 4.0];
+            let point = corners[0] * (1.0 - a - b) + corners[1] * a + corners[2] * b;
+            let distance =
+                (truth.locator.closest(&point).expect("the truth has faces").position - point).norm();
+            forth = forth.max(distance);
+            squares += distance * distance * face.area(&mesh.points);
+            weight += face.area(&mesh.points);
+        }
+    }
+    let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
+    let locator = SurfaceLocator::new(&surface, &faces, &mesh.points);
+    let to_mesh =
+        |point: &Vector3| (locator.closest(point).expect("the mesh has faces").position - point).norm();
+    let back = truth.points.iter().map(to_mesh).fold(0.0, f64::max);
+    [forth, back, (squares / weight).sqrt()]
+}
