@@ -120,6 +120,9 @@ pub struct Bench {
     /// Repeats of each row; the median counts.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub repeats: u16,
+    /// Wall time of a repeat [s]. On a busy machine the least of many short repeats is what nothing disturbed.
+    #[arg(long, value_name = "S", default_value_t = 0.2, value_parser = seconds)]
+    pub seconds: f64,
     /// Instructions to run in, instead of the widest there are; `plain` is one number at a time.
     #[arg(long, value_name = "WORD", value_parser = instructions())]
     pub lanes: Option<Instructions>,
@@ -129,6 +132,13 @@ pub struct Bench {
     /// Also renew the tables in a Markdown file, between its two marks.
     #[arg(long, value_name = "FILE")]
     pub table: Option<PathBuf>,
+}
+
+fn seconds(typed: &str) -> Result<f64, String> {
+    match typed.parse() {
+        Ok(seconds) if (0.001..=60.0).contains(&seconds) => Ok(seconds),
+        _ => Err("a repeat takes between 0.001 and 60 seconds".into()),
+    }
 }
 
 fn instructions() -> impl TypedValueParser<Value = Instructions> {

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use pliant_bench::{BenchError, Case, Place, Settings, cases, find, measure};
+use pliant_bench::{BenchError, Case, Instructions, Place, Settings, cases, find, measure};
 use serde_json::json;
 
 use crate::arguments::Bench;
@@ -17,8 +17,9 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
     let cases = chosen(arguments)?;
     let page = arguments.table.as_deref().map(|path| Page::read(path, "bench")).transpose()?;
     let bar = Bar::new();
-    let mut settings = Settings { repeats: arguments.repeats.into(), ..Settings::default() };
-    settings.lanes = arguments.lanes.unwrap_or(settings.lanes);
+    let Bench { seconds, repeats, lanes, .. } = *arguments;
+    let settings =
+        Settings { repeats: repeats.into(), seconds, lanes: lanes.unwrap_or_else(Instructions::widest) };
     let result = measure(&cases, settings, &mut |progress| bar.update_bench(&progress));
     bar.finish();
     let report = match result {

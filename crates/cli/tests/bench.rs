@@ -95,7 +95,18 @@ fn designs_without_a_device_are_answered_with_the_packages() {
 fn lanes_are_chosen_by_word_and_missing_ones_are_refused() {
     let workshop = Workshop::new("");
     let run = |word: &str| {
-        let row = ["bench", "--only", "hex8-nh-1000", "--repeats", "1", "--json", "--lanes", word];
+        let row = [
+            "bench",
+            "--only",
+            "hex8-nh-1000",
+            "--repeats",
+            "1",
+            "--seconds",
+            "0.01",
+            "--json",
+            "--lanes",
+            word,
+        ];
         workshop.pliant(&row)
     };
     let told = run("plain");
@@ -164,6 +175,7 @@ fn an_unknown_row_is_answered_with_the_nearest() {
     assert!(told.err.contains("did you mean `tet4-nh-55566`?"), "{}", told.err);
     assert!(told.out.contains("tet4-nh-5556"), "{}", told.out);
     assert_eq!(workshop.pliant(&["bench", "--repeats", "0"]).code, 2);
+    assert_eq!(workshop.pliant(&["bench", "--seconds", "0"]).code, 2);
     workshop.write("page.md", "# Page\n");
     let told = workshop.pliant(&["bench", "--table", "page.md"]);
     assert_eq!(told.code, 2);

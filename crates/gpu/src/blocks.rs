@@ -1,15 +1,16 @@
-//! Blocks of neighbouring cells, small enough for the memory that a group of invocations shares.
+//! Blocks of neighbouring cells or nodes, small enough for the memory that a group of invocations shares.
 
 use pliant_mechanics::model::{Cells, Model, Solid};
 use pliant_mechanics::tensor::{Vector, add, scale, sub};
 
 use crate::kernel::{Binding, Bound, GROUP, Memory};
+use crate::loads::DeviceLoads;
 use crate::{Device, GpuError};
 
 /// Most nodes of a block: a corner takes one byte.
 const MOST_NODES: usize = 255;
 
-/// A block; twin of the one in block_cells.wgsl.
+/// A block; twin of those in block_cells.wgsl and node_blocks.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct Block {
@@ -24,51 +25,62 @@ pub(crate) struct DeviceBlocks {
     pub bound: Bound,
     /// How many there are.
     pub count: usize,
-    /// The cells, block by block.
+    /// The cells, block by block; some stand in several.
     pub order: Vec<u32>,
-    /// The nodes of all blocks: each has a slot.
+    /// The nodes of all blocks.
     pub nodes: Vec<u32>,
-}
-
-/// Sizes of arrays in shared memory.
-pub(crate) fn shared_sizes(cells: &Cells) -> [(&'static str, usize); 2] {
-    [("MOST_NODES", 3 * MOST_NODES), ("FORCES", 3 * cells.nodes_per_cell() * GROUP as usize)]
+    /// Constants of the kernel.
+    pub constants: Vec<(&'static str, usize)>,
 }
 
 /// The nodes of some cells, increasing.
 fn nodes_of(cells: &Cells, block: &[u32]) -> Vec<u32> {
-    let mut nodes: Vec<u32> = block.iter().flat_map(|&cell| cells.nodes(cell as usize)).copied().collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    nodes
+    sorted(block.iter().flat_map(|&cell| cells.nodes(cell as usize)).copied().collect())
 }
 
-/// Puts cells that lie together next to each other, by cutting in two along the longest side; ends of blocks in `ends`.
-fn bisect(cells: &Cells, centres: &[Vector<f64>], order: &mut [u32], first: usize, ends: &mut Vec<usize>) {
-    let group = GROUP as usize;
-    if order.len() <= group && nodes_of(cells, order).len() <= MOST_NODES {
-        ends.push(first + order.len());
-        return;
+fn sorted(mut numbers: Vec<u32>) -> Vec<u32> {
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers
+}
+
+/// Cuts things at some places into blocks by halving along the longest side.
+struct Bisection<'a> {
+    places: &'a [Vector<f64>],
+    /// Blocks have a whole multiple of so many where possible, so that all but the last are full.
+    whole: usize,
+    fits: &'a dyn Fn(&[u32]) -> bool,
+}
+
+impl Bisection<'_> {
+    /// Puts what lies together next to each other; ends of blocks in `ends`. One alone is a block whether it fits or not.
+    fn cut(&self, order: &mut [u32], first: usize, ends: &mut Vec<usize>) {
+        if order.len() <= 1 || order.len() <= self.whole && (self.fits)(order) {
+            if !order.is_empty() {
+                ends.push(first + order.len());
+            }
+            return;
+        }
+        let along = |c: usize| order.iter().map(move |&item| self.places[item as usize][c]);
+        let extent =
+            |c: usize| along(c).fold(f64::NEG_INFINITY, f64::max) - along(c).fold(f64::INFINITY, f64::min);
+        let axis = (0..3).max_by(|&a, &b| extent(a).total_cmp(&extent(b))).unwrap_or(0);
+        let wholes = order.len().div_ceil(self.whole);
+        let middle = if wholes > 1 { wholes / 2 * self.whole } else { order.len() / 2 };
+        let place = |item: u32| self.places[item as usize][axis];
+        order.select_nth_unstable_by(middle, |&a, &b| place(a).total_cmp(&place(b)).then(a.cmp(&b)));
+        let (left, right) = order.split_at_mut(middle);
+        self.cut(left, first, ends);
+        self.cut(right, first + middle, ends);
     }
-    let along = |c: usize| order.iter().map(move |&cell| centres[cell as usize][c]);
-    let extent =
-        |c: usize| along(c).fold(f64::NEG_INFINITY, f64::max) - along(c).fold(f64::INFINITY, f64::min);
-    let axis = (0..3).max_by(|&a, &b| extent(a).total_cmp(&extent(b))).unwrap_or(0);
-    // Whole groups to the left, so that all but the last are full.
-    let groups = order.len().div_ceil(group);
-    let middle = if groups > 1 { groups / 2 * group } else { order.len() / 2 };
-    let by_place =
-        |a: &u32, b: &u32| centres[*a as usize][axis].total_cmp(&centres[*b as usize][axis]).then(a.cmp(b));
-    order.select_nth_unstable_by(middle, by_place);
-    let (left, right) = order.split_at_mut(middle);
-    bisect(cells, centres, left, first, ends);
-    bisect(cells, centres, right, first + middle, ends);
 }
 
 impl DeviceBlocks {
+    /// Blocks of the cells of a solid.
+    ///
     /// # Errors
-    /// If an array is too large.
-    pub(crate) fn new(
+    /// If an array is too large, or groups share too little memory.
+    pub(crate) fn of_cells(
         memory: &Memory<'_>,
         device: &Device,
         model: &Model,
@@ -76,6 +88,8 @@ impl DeviceBlocks {
     ) -> Result<Self, GpuError> {
         let cells = &solid.cells;
         let per_cell = cells.nodes_per_cell();
+        // Displacements and places at rest of all nodes, forces and energies of all cells.
+        device.shares(4 * (2 * 3 * MOST_NODES + (3 * per_cell + 1) * GROUP as usize))?;
         let centre = |cell: usize| {
             let sum =
                 cells.nodes(cell).iter().fold([0.0; 3], |sum, &node| add(sum, model.rest[node as usize]));
@@ -84,9 +98,8 @@ impl DeviceBlocks {
         let centres: Vec<_> = (0..cells.len()).map(centre).collect();
         let mut order: Vec<u32> = (0..cells.len() as u32).collect();
         let mut ends = Vec::new();
-        if !order.is_empty() {
-            bisect(cells, &centres, &mut order, 0, &mut ends);
-        }
+        let fits = |block: &[u32]| nodes_of(cells, block).len() <= MOST_NODES;
+        Bisection { places: &centres, whole: GROUP as usize, fits: &fits }.cut(&mut order, 0, &mut ends);
         let mut blocks = Vec::new();
         let (mut nodes, mut rest, mut offsets, mut given) = (Vec::new(), Vec::new(), vec![0_u32], Vec::new());
         let mut corners = vec![[0_u8; 4]; cells.len() * per_cell / 4];
@@ -130,6 +143,179 @@ impl DeviceBlocks {
             memory.filled("the nodes of blocks", &rest)?,
         ];
         let bound = Bound::new(device, &arrays.each_ref().map(Binding::Read));
-        Ok(Self { bound, count: blocks.len(), order, nodes })
+        let constants = vec![("MOST_NODES", MOST_NODES), ("CORNERS", per_cell)];
+        Ok(Self { bound, count: blocks.len(), order, nodes, constants })
+    }
+
+    /// Blocks of nodes, the first of them number `first_block` of all; their kernel also reads the loads.
+    ///
+    /// # Errors
+    /// If an array is too large.
+    pub(crate) fn of_nodes(
+        memory: &Memory<'_>,
+        device: &Device,
+        cut: NodeBlocks,
+        first_block: usize,
+        loads: Option<&DeviceLoads>,
+    ) -> Result<Self, GpuError> {
+        let arrays = [
+            memory.filled("the blocks of nodes", &cut.blocks)?,
+            memory.filled("the nodes of blocks", &cut.nodes)?,
+            memory.filled("the cells of blocks", &cut.corners)?,
+        ];
+        let mut bindings = loads.map_or([Binding::Nothing; 4], DeviceLoads::bindings).to_vec();
+        bindings.extend(arrays.each_ref().map(Binding::Read));
+        let constants = vec![
+            ("MOST_NODES", cut.most_nodes),
+            ("MOST_OWN", MOST_OWN),
+            ("CORNER_BITS", cut.corner_bits),
+            ("BLOCKS", cut.blocks.len()),
+            ("FIRST_BLOCK", first_block),
+        ];
+        let bound = Bound::new(device, &bindings);
+        Ok(Self { bound, count: cut.blocks.len(), order: cut.cells, nodes: cut.nodes, constants })
+    }
+}
+
+/// Most nodes that a block of nodes moves: 4³, where hexahedra are evaluated 1.95 times each and tetrahedra 1.78 times.
+const MOST_OWN: usize = 64;
+
+/// A node of a block of which an earlier solid has left forces.
+const TAKES: u32 = 1 << 31;
+
+/// A node of a block that a later solid moves.
+const LEAVES: u32 = 1 << 30;
+
+/// Shared memory of a block of nodes [B]: what adds up work, a whole force of each node it moves, and displacements.
+fn shared_memory(nodes: usize) -> usize {
+    16 * GROUP as usize + 16 * MOST_OWN + 12 * nodes
+}
+
+/// The nodes of a solid, cut into blocks with all cells at them.
+pub(crate) struct NodeBlocks {
+    blocks: Vec<Block>,
+    /// The nodes of all blocks, with what they take and leave; in each block first those that it moves.
+    nodes: Vec<u32>,
+    /// The cells of all blocks; those at borders stand in several.
+    cells: Vec<u32>,
+    /// Their corners among the nodes of their block, in rows of all cells.
+    corners: Vec<u32>,
+    /// Bits of a corner.
+    corner_bits: usize,
+    /// Most nodes of a block.
+    most_nodes: usize,
+}
+
+impl NodeBlocks {
+    /// Cuts each solid. A node of several solids is moved by the last of them, one of none by the last of all.
+    ///
+    /// # Errors
+    /// If what belongs to one node alone does not fit into the memory that a group shares.
+    pub(crate) fn of_solids(device: &Device, model: &Model) -> Result<Vec<Self>, GpuError> {
+        let all = |solid: &Solid| (0..solid.cells.len() as u32).collect::<Vec<_>>();
+        let mut nodes: Vec<_> =
+            model.solids.iter().map(|solid| nodes_of(&solid.cells, &all(solid))).collect();
+        let last = model.solids.len().saturating_sub(1);
+        let mut of_node = vec![(u32::MAX, last as u32); model.node_count()];
+        for (solid, nodes) in (0..).zip(&nodes) {
+            for &node in nodes {
+                let (first, last) = &mut of_node[node as usize];
+                (*first, *last) = (solid.min(*first), solid);
+            }
+        }
+        let strays = (0..).zip(&of_node).filter(|(_, (first, _))| *first == u32::MAX).map(|(node, _)| node);
+        if let Some(nodes) = nodes.last_mut() {
+            nodes.extend(strays);
+        }
+        let cut = |(index, solid, nodes): (u32, &Solid, Vec<u32>)| {
+            let marked = |node: u32| {
+                let (first, last) = of_node[node as usize];
+                let takes = if first < index { TAKES } else { 0 };
+                node | takes | if last > index { LEAVES } else { 0 }
+            };
+            Self::cut(device, model, solid, nodes, &marked)
+        };
+        let solids = (0..).zip(&model.solids).zip(nodes);
+        solids.map(|((index, solid), nodes)| cut((index, solid, nodes))).collect()
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.blocks.len()
+    }
+
+    fn cut(
+        device: &Device,
+        model: &Model,
+        solid: &Solid,
+        mut order: Vec<u32>,
+        marked: &dyn Fn(u32) -> u32,
+    ) -> Result<Self, GpuError> {
+        let cells = &solid.cells;
+        let mut at_node = vec![Vec::new(); model.node_count()];
+        for cell in 0..cells.len() {
+            cells.nodes(cell).iter().for_each(|&node| at_node[node as usize].push(cell as u32));
+        }
+        let cells_at =
+            |own: &[u32]| sorted(own.iter().flat_map(|&n| &at_node[n as usize]).copied().collect());
+        let limit = device.adapter().shared_memory as usize;
+        let most = (limit.saturating_sub(shared_memory(0)) / 12).min(MOST_NODES);
+        let fits = |own: &[u32]| nodes_of(cells, &cells_at(own)).len() <= most;
+        let mut ends = Vec::new();
+        Bisection { places: &model.rest, whole: MOST_OWN, fits: &fits }.cut(&mut order, 0, &mut ends);
+
+        let mut cut = Self {
+            blocks: vec![],
+            nodes: vec![],
+            cells: vec![],
+            corners: vec![],
+            corner_bits: 8,
+            most_nodes: 1,
+        };
+        let mut locals = Vec::new();
+        let mut first = 0;
+        for end in ends {
+            order[first..end].sort_unstable();
+            let own = &order[first..end];
+            let block_cells = cells_at(own);
+            let mut around = nodes_of(cells, &block_cells);
+            let (neighbours, needed) = (around.len(), shared_memory(around.len()));
+            if needed > limit {
+                let (adapter, node) = (device.adapter().name.clone(), own[0]);
+                let (needed, limit) = (needed as u64, limit as u64);
+                return Err(GpuError::Crowded { adapter, node, neighbours, needed, limit });
+            }
+            around.retain(|node| own.binary_search(node).is_err());
+            let local = |node: &u32| match own.binary_search(node) {
+                Ok(place) => place,
+                Err(_) => own.len() + around.partition_point(|known| known < node),
+            };
+            locals.extend(block_cells.iter().flat_map(|&cell| cells.nodes(cell as usize)).map(local));
+            let count = own.len() + around.len();
+            cut.blocks.push(Block {
+                first_cell: cut.cells.len() as u32,
+                cells: block_cells.len() as u32,
+                first_node: cut.nodes.len() as u32,
+                nodes: (own.len() << 16 | count) as u32,
+            });
+            cut.nodes.extend(own.iter().chain(&around).map(|&node| marked(node)));
+            cut.cells.extend(block_cells);
+            cut.most_nodes = cut.most_nodes.max(count);
+            first = end;
+        }
+        cut.pack(&locals, cells.nodes_per_cell());
+        Ok(cut)
+    }
+
+    /// Packs the corners, cell by cell, into rows.
+    fn pack(&mut self, locals: &[usize], per_cell: usize) {
+        self.corner_bits = if self.most_nodes <= 256 { 8 } else { 16 };
+        let (count, per_word) = (self.cells.len(), 32 / self.corner_bits);
+        self.corners = vec![0; count * per_cell / per_word];
+        for (index, &local) in locals.iter().enumerate() {
+            let (cell, a) = (index / per_cell, index % per_cell);
+            self.corners[a / per_word * count + cell] |=
+                (local as u32) << (self.corner_bits * (a % per_word));
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Adapters and the one that is opened.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::GpuError;
@@ -55,8 +57,7 @@ pub struct Adapter {
 }
 
 impl Adapter {
-    fn new(adapter: &wgpu::Adapter) -> Self {
-        let (info, limits, features) = (adapter.get_info(), adapter.limits(), adapter.features());
+    fn new(info: wgpu::AdapterInfo, limits: &wgpu::Limits, features: wgpu::Features) -> Self {
         Self {
             name: info.name,
             kind: match info.device_type {
@@ -85,7 +86,7 @@ fn found() -> Vec<(Adapter, wgpu::Adapter)> {
     let instance = wgpu::Instance::new(descriptor);
     let mut found: Vec<(Adapter, wgpu::Adapter)> = pollster::block_on(instance.enumerate_adapters(backends))
         .into_iter()
-        .map(|adapter| (Adapter::new(&adapter), adapter))
+        .map(|adapter| (Adapter::new(adapter.get_info(), &adapter.limits(), adapter.features()), adapter))
         .collect();
     found.sort_by_key(|(adapter, _)| adapter.kind);
     found
@@ -102,8 +103,38 @@ pub struct Device {
     adapter: Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    /// The first thing that went wrong since it was opened.
-    fault: Arc<Mutex<Option<GpuError>>>,
+    faults: Faults,
+}
+
+/// What went wrong with a device since it was opened.
+#[derive(Clone, Debug)]
+struct Faults {
+    adapter: String,
+    /// The first thing: what follows are its consequences. Only that the device is lost explains all.
+    first: Arc<Mutex<Option<GpuError>>>,
+    /// What the arrays of the last model take [B].
+    needed: Arc<AtomicU64>,
+}
+
+impl Faults {
+    fn note(&self, error: GpuError) {
+        let mut first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
+        if first.is_none() || matches!(error, GpuError::Lost { .. }) {
+            *first = Some(error);
+        }
+    }
+
+    fn out_of_memory(&self) -> GpuError {
+        let needed = self.needed.load(Ordering::Relaxed).div_ceil(1 << 20);
+        GpuError::OutOfMemory { adapter: self.adapter.clone(), needed }
+    }
+
+    fn report(&self, error: &wgpu::Error) {
+        self.note(match error {
+            wgpu::Error::OutOfMemory { .. } => self.out_of_memory(),
+            other => GpuError::Internal { adapter: self.adapter.clone(), reason: other.to_string() },
+        });
+    }
 }
 
 impl Device {
@@ -112,13 +143,25 @@ impl Device {
     /// # Errors
     /// If there is none, or it can't be opened.
     pub fn open(name: Option<&str>) -> Result<Self, GpuError> {
+        Self::open_within(name, |_, _| {})
+    }
+
+    /// Opens an adapter as if it had less than it has, to see what becomes of a model there.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    #[doc(hidden)]
+    pub fn open_within(
+        name: Option<&str>,
+        lessen: impl FnOnce(&mut wgpu::Limits, &mut wgpu::Features),
+    ) -> Result<Self, GpuError> {
         let mut found = found();
         let names: Vec<String> = found.iter().map(|(adapter, _)| adapter.name.clone()).collect();
         if let Some(name) = name {
             let name = name.to_lowercase();
             found.retain(|(adapter, _)| adapter.name.to_lowercase().contains(&name));
         }
-        let Some((adapter, handle)) = found.into_iter().next() else {
+        let Some((_, handle)) = found.into_iter().next() else {
             return Err(match name {
                 Some(name) if !names.is_empty() => {
                     GpuError::UnknownAdapter { asked: name.to_owned(), found: names }
@@ -126,20 +169,27 @@ impl Device {
                 _ => GpuError::NoAdapter,
             });
         };
+        let (mut limits, mut features) = (handle.limits(), handle.features());
+        lessen(&mut limits, &mut features);
+        let adapter = Adapter::new(handle.get_info(), &limits, features);
         let wanted = wgpu::Features::SHADER_FLOAT32_ATOMIC | wgpu::Features::TIMESTAMP_QUERY;
         let request = wgpu::DeviceDescriptor {
             label: Some("pliant"),
-            required_features: handle.features() & wanted,
-            required_limits: handle.limits(),
+            required_features: features & wanted,
+            required_limits: limits,
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(handle.request_device(&request)).map_err(|error| {
             GpuError::Refused { adapter: adapter.name.clone(), reason: error.to_string() }
         })?;
-        let fault = Arc::new(Mutex::new(None));
-        let opened = Self { adapter, device, queue, fault };
-        opened.listen();
-        Ok(opened)
+        let faults = Faults { adapter: adapter.name.clone(), first: Arc::default(), needed: Arc::default() };
+        let on_error = faults.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| on_error.report(&error)));
+        let on_loss = faults.clone();
+        device.set_device_lost_callback(move |_, reason| {
+            on_loss.note(GpuError::Lost { adapter: on_loss.adapter.clone(), reason });
+        });
+        Ok(Self { adapter, device, queue, faults })
     }
 
     /// What it is.
@@ -152,47 +202,75 @@ impl Device {
         (&self.device, &self.queue)
     }
 
-    /// Notes what the driver reports, the first thing only: what follows are its consequences.
-    fn listen(&self) {
-        let note = {
-            let (fault, adapter) = (self.fault.clone(), self.adapter.name.clone());
-            move |error: &dyn Fn(String) -> GpuError| {
-                let mut fault = fault.lock().unwrap_or_else(PoisonError::into_inner);
-                fault.get_or_insert_with(|| error(adapter.clone()));
-            }
-        };
-        let on_error = note.clone();
-        self.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            on_error(&|adapter| match &error {
-                wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory { adapter, needed: 0 },
-                other => GpuError::Internal { adapter, reason: other.to_string() },
-            });
-        }));
-        self.device.set_device_lost_callback(move |reason, message| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                note(&|adapter| GpuError::Lost { adapter, reason: message.clone() });
-            }
-        });
+    /// Takes an error for one that the driver reports.
+    #[doc(hidden)]
+    pub fn report(&self, error: &wgpu::Error) {
+        self.faults.report(error);
     }
 
     /// # Errors
     /// What the driver has reported first, if anything.
     pub fn check(&self) -> Result<(), GpuError> {
-        match &*self.fault.lock().unwrap_or_else(PoisonError::into_inner) {
+        match &*self.faults.first.lock().unwrap_or_else(PoisonError::into_inner) {
             None => Ok(()),
             Some(fault) => Err(fault.clone()),
         }
     }
 
+    /// What the driver has reported first, or else `reason`.
+    pub(crate) fn fault(&self, reason: &dyn std::fmt::Display) -> GpuError {
+        self.check().err().unwrap_or_else(|| GpuError::Internal {
+            adapter: self.adapter.name.clone(),
+            reason: reason.to_string(),
+        })
+    }
+
+    /// Runs what makes the arrays of a model, whose bytes `needed` tells.
+    ///
     /// # Errors
-    /// If a kernel can't work on so many arrays.
-    pub(crate) fn needs(&self, arrays: u32) -> Result<(), GpuError> {
+    /// If the memory is full or the device fails, which goes before what was made of it.
+    pub(crate) fn fill<T>(
+        &self,
+        needed: impl Fn() -> u64,
+        make: impl FnOnce() -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let made = make();
+        let full = pollster::block_on(scope.pop());
+        self.faults.needed.store(needed(), Ordering::Relaxed);
+        if full.is_some() {
+            return Err(self.faults.out_of_memory());
+        }
+        self.check()?;
+        made
+    }
+
+    /// # Errors
+    /// If a kernel can't work on so many arrays, or in groups of so many invocations.
+    pub(crate) fn allows(&self, arrays: u32, group: u32) -> Result<(), GpuError> {
         let most = self.device.limits().max_storage_buffers_per_shader_stage;
         if most < arrays {
-            let what = format!("{arrays} arrays a kernel (it has {most})");
-            return Err(GpuError::Lacks { adapter: self.adapter.name.clone(), what });
+            return Err(self.lacks(format!("{arrays} arrays a kernel (it has {most})")));
+        }
+        let largest = self.adapter.group_size;
+        if largest < group {
+            return Err(self.lacks(format!("groups of {group} invocations (its are of {largest})")));
         }
         Ok(())
+    }
+
+    /// # Errors
+    /// If groups of invocations share less memory [B].
+    pub(crate) fn shares(&self, bytes: usize) -> Result<(), GpuError> {
+        let most = self.adapter.shared_memory;
+        if (most as usize) < bytes {
+            return Err(self.lacks(format!("{bytes} bytes of shared memory (it has {most})")));
+        }
+        Ok(())
+    }
+
+    pub(crate) fn lacks(&self, what: String) -> GpuError {
+        GpuError::Lacks { adapter: self.adapter.name.clone(), what }
     }
 
     /// Waits until everything submitted is done.
@@ -209,10 +287,14 @@ impl Device {
     }
 
     fn poll(&self, how: wgpu::PollType) -> Result<(), GpuError> {
-        let waited = self.device.poll(how);
+        // wgpu 30 panics where the driver says while waiting that the device is lost, once it has told so.
+        let waited = catch_unwind(AssertUnwindSafe(|| self.device.poll(how)));
         self.check()?;
-        waited
-            .map(|_| ())
-            .map_err(|error| GpuError::Lost { adapter: self.adapter.name.clone(), reason: error.to_string() })
+        let reason = match waited {
+            Ok(Ok(_)) => return Ok(()),
+            Ok(Err(error)) => error.to_string(),
+            Err(_) => "waiting for it failed".to_owned(),
+        };
+        Err(GpuError::Lost { adapter: self.adapter.name.clone(), reason })
     }
 }

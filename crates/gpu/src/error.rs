@@ -33,11 +33,11 @@ pub enum GpuError {
         reason: String,
     },
     /// The device's memory is full.
-    #[error("`{adapter}` is out of memory; the model takes {needed} MiB there")]
+    #[error("`{adapter}` is out of memory; the model takes at least {needed} MiB there")]
     OutOfMemory {
         /// The adapter.
         adapter: String,
-        /// What the model takes [MiB].
+        /// What the arrays of the model take, as far as they were made [MiB].
         needed: u64,
     },
     /// An array is larger than the adapter allows.
@@ -61,6 +61,22 @@ pub enum GpuError {
         adapter: String,
         /// What it lacks.
         what: String,
+    },
+    /// The nodes around one node do not fit into the memory that a group of invocations shares.
+    #[error(
+        "the {neighbours} nodes of the elements at node {node} take {needed} bytes of shared memory, more than the {limit} bytes of `{adapter}`"
+    )]
+    Crowded {
+        /// The adapter.
+        adapter: String,
+        /// The node.
+        node: u32,
+        /// Nodes of the elements there.
+        neighbours: usize,
+        /// What they take [B].
+        needed: u64,
+        /// The most that is allowed [B].
+        limit: u64,
     },
     /// Something that runs on the processor only.
     #[error("{what} can't run on a graphics processor")]
@@ -92,7 +108,13 @@ pub enum GpuError {
 impl GpuError {
     /// Whether another model could run on the device.
     pub fn is_about_the_model(&self) -> bool {
-        matches!(self, Self::TooLarge { .. } | Self::OutOfMemory { .. } | Self::Unsupported { .. })
+        matches!(
+            self,
+            Self::TooLarge { .. }
+                | Self::OutOfMemory { .. }
+                | Self::Crowded { .. }
+                | Self::Unsupported { .. }
+        )
     }
 
     /// What to try.
@@ -114,8 +136,9 @@ impl GpuError {
                 "take a coarser mesh, an adapter with more memory (`pliant devices`) or `device = \"cpu\"`"
             }
             Self::Lacks { .. } => {
-                "update the driver, or take another adapter of `pliant devices` or `device = \"cpu\"`"
+                "update the driver, or take another design, another adapter of `pliant devices` or `device = \"cpu\"`"
             }
+            Self::Crowded { .. } => "take the design `gather`, which shares no memory",
             Self::Unsupported { .. } => "take `device = \"cpu\"`",
             Self::Overflow { .. } => "take the design `gather`, whose forces are floating-point numbers",
             Self::Contradiction(_) => "leave the node out of one of the two, or give both the same motion",

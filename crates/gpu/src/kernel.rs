@@ -3,7 +3,6 @@
 use std::cell::Cell;
 
 use bytemuck::NoUninit;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BufferUsages, ShaderStages};
 
 use crate::{Device, GpuError};
@@ -25,30 +24,30 @@ impl<'d> Memory<'d> {
         Self { device, bytes: Cell::new(0) }
     }
 
-    /// All arrays so far [MiB], rounded up.
-    pub(crate) fn mebibytes(&self) -> u64 {
-        self.bytes.get().div_ceil(1 << 20)
+    /// All arrays so far [B].
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes.get()
     }
 
     /// An array with contents; at least as large as the largest element of any kernel.
     ///
     /// # Errors
-    /// If it is larger than the adapter allows.
+    /// If it is larger than the adapter allows, or the device fails.
     pub(crate) fn filled<T: NoUninit>(
         &self,
         what: &'static str,
         contents: &[T],
     ) -> Result<wgpu::Buffer, GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(contents);
-        self.count(what, bytes.len() as u64)?;
-        let least = [0; 16];
-        let contents = if bytes.len() < least.len() { &least } else { bytes };
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        Ok(self.device.device.create_buffer_init(&BufferInitDescriptor {
-            label: Some(what),
-            contents,
-            usage,
-        }))
+        let size = array_size(bytes.len());
+        self.count(what, size)?;
+        let buffer = self.buffer(what, size, ARRAY, true);
+        // Fails where the device is lost or its memory full, which whoever makes the arrays finds out.
+        let mut view = buffer.get_mapped_range_mut(..).map_err(|error| self.device.fault(&error))?;
+        view.slice(..bytes.len()).copy_from_slice(bytes);
+        drop(view);
+        buffer.unmap();
+        Ok(buffer)
     }
 
     /// An array of zeros.
@@ -56,19 +55,34 @@ impl<'d> Memory<'d> {
     /// # Errors
     /// As [`Self::filled`].
     pub(crate) fn zeros(&self, what: &'static str, bytes: usize) -> Result<wgpu::Buffer, GpuError> {
-        let size = (bytes as u64).max(16).next_multiple_of(16);
+        let size = array_size(bytes);
         self.count(what, size)?;
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        Ok(self.buffer(what, size, usage))
+        Ok(self.buffer(what, size, ARRAY, false))
+    }
+
+    /// Arrays of zeros for the two sides of an instant: two that alternate, or one and the same.
+    ///
+    /// # Errors
+    /// As [`Self::filled`].
+    pub(crate) fn sides(&self, what: &'static str, bytes: usize, alternate: bool) -> Result<Sides, GpuError> {
+        let one = self.zeros(what, bytes)?;
+        let other = if alternate { self.zeros(what, bytes)? } else { one.clone() };
+        Ok([one, other])
     }
 
     /// A small array for reading the same place at once.
     pub(crate) fn uniform(&self, what: &'static str, bytes: usize) -> wgpu::Buffer {
-        self.buffer(what, bytes as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST)
+        self.buffer(what, bytes as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST, false)
     }
 
-    fn buffer(&self, what: &'static str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
-        let descriptor = wgpu::BufferDescriptor { label: Some(what), size, usage, mapped_at_creation: false };
+    fn buffer(
+        &self,
+        what: &'static str,
+        size: u64,
+        usage: BufferUsages,
+        mapped_at_creation: bool,
+    ) -> wgpu::Buffer {
+        let descriptor = wgpu::BufferDescriptor { label: Some(what), size, usage, mapped_at_creation };
         self.device.device.create_buffer(&descriptor)
     }
 
@@ -83,9 +97,29 @@ impl<'d> Memory<'d> {
     }
 }
 
+/// What arrays are for.
+const ARRAY: BufferUsages = BufferUsages::STORAGE.union(BufferUsages::COPY_DST).union(BufferUsages::COPY_SRC);
+
+/// Bytes of an array, at least those of the largest element of any kernel.
+fn array_size(bytes: usize) -> u64 {
+    (bytes as u64).max(16).next_multiple_of(16)
+}
+
+/// An array that has two sides: at an instant one of them is now, the other one is next. Where a kernel changes it in place both
+/// are the same.
+pub(crate) type Sides = [wgpu::Buffer; 2];
+
 /// An array as a kernel sees it.
 #[derive(Clone, Copy)]
 pub(crate) enum Binding<'a> {
+    /// No kernel that is bound here uses this number.
+    Nothing,
+    /// To read the side that is now.
+    ReadNow(&'a Sides),
+    /// To read and write the side that is now.
+    WriteNow(&'a Sides),
+    /// To write the other side.
+    WriteNext(&'a Sides),
     /// To read.
     Read(&'a wgpu::Buffer),
     /// To read and write.
@@ -96,60 +130,89 @@ pub(crate) enum Binding<'a> {
     Moving(&'a wgpu::Buffer, u64),
 }
 
+impl<'a> Binding<'a> {
+    fn ty(self) -> Option<wgpu::BindingType> {
+        let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
+        let (ty, has_dynamic_offset) = match self {
+            Self::Nothing => return None,
+            Self::Read(_) | Self::ReadNow(_) => (storage(true), false),
+            Self::Write(_) | Self::WriteNow(_) | Self::WriteNext(_) => (storage(false), false),
+            Self::Uniform(_) => (wgpu::BufferBindingType::Uniform, false),
+            Self::Moving(..) => (wgpu::BufferBindingType::Uniform, true),
+        };
+        Some(wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None })
+    }
+
+    /// What is bound where `side` is now.
+    fn resource(self, side: usize) -> Option<wgpu::BindingResource<'a>> {
+        let buffer = match self {
+            Self::Nothing => return None,
+            Self::Read(buffer) | Self::Write(buffer) | Self::Uniform(buffer) => buffer,
+            Self::ReadNow(sides) | Self::WriteNow(sides) => &sides[side],
+            Self::WriteNext(sides) => &sides[1 - side],
+            Self::Moving(buffer, size) => {
+                let size = wgpu::BufferSize::new(size);
+                return Some(wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }));
+            }
+        };
+        Some(buffer.as_entire_binding())
+    }
+
+    fn is_array(self) -> bool {
+        !matches!(self, Self::Nothing | Self::Uniform(_) | Self::Moving(..))
+    }
+
+    fn has_sides(self) -> bool {
+        matches!(self, Self::ReadNow(_) | Self::WriteNow(_) | Self::WriteNext(_))
+    }
+}
+
 /// A group of bindings with its layout, in the order of their numbers.
 pub(crate) struct Bound {
     layout: wgpu::BindGroupLayout,
-    group: wgpu::BindGroup,
+    /// For each side that may be now.
+    groups: [wgpu::BindGroup; 2],
+    /// How many arrays there are.
+    arrays: u32,
 }
 
 impl Bound {
     pub(crate) fn new(device: &Device, bindings: &[Binding<'_>]) -> Self {
-        let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
-        let layout: Vec<wgpu::BindGroupLayoutEntry> = (0..)
+        let gpu = &device.device;
+        let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
             .zip(bindings)
-            .map(|(binding, what)| {
-                let (ty, has_dynamic_offset) = match what {
-                    Binding::Read(_) => (storage(true), false),
-                    Binding::Write(_) => (storage(false), false),
-                    Binding::Uniform(_) => (wgpu::BufferBindingType::Uniform, false),
-                    Binding::Moving(..) => (wgpu::BufferBindingType::Uniform, true),
-                };
-                let ty = wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None };
-                wgpu::BindGroupLayoutEntry { binding, visibility: ShaderStages::COMPUTE, ty, count: None }
+            .filter_map(|(binding, what)| {
+                let (visibility, ty) = (ShaderStages::COMPUTE, what.ty()?);
+                Some(wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None })
             })
             .collect();
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
-            .zip(bindings)
-            .map(|(binding, what)| {
-                let resource = match what {
-                    Binding::Read(buffer) | Binding::Write(buffer) | Binding::Uniform(buffer) => {
-                        buffer.as_entire_binding()
-                    }
-                    Binding::Moving(buffer, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                        buffer,
-                        offset: 0,
-                        size: wgpu::BufferSize::new(*size),
-                    }),
-                };
-                wgpu::BindGroupEntry { binding, resource }
+        let layout =
+            gpu.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
+        let group = |side: usize| {
+            let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
+                .zip(bindings)
+                .filter_map(|(binding, what)| {
+                    Some(wgpu::BindGroupEntry { binding, resource: what.resource(side)? })
+                })
+                .collect();
+            gpu.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &layout,
+                entries: &entries,
             })
-            .collect();
-        let device = &device.device;
-        let layout = device
-            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &layout });
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &layout,
-            entries: &entries,
-        });
-        Self { layout, group }
+        };
+        let one = group(0);
+        let other = if bindings.iter().any(|what| what.has_sides()) { group(1) } else { one.clone() };
+        let arrays = bindings.iter().filter(|what| what.is_array()).count() as u32;
+        Self { layout, groups: [one, other], arrays }
     }
 }
 
 /// A kernel with the arrays it works on; group 0 is the instant's.
 pub(crate) struct Kernel {
     pipeline: wgpu::ComputePipeline,
-    groups: Vec<wgpu::BindGroup>,
+    /// For each side that may be now.
+    bound: [Vec<wgpu::BindGroup>; 2],
     /// Groups of invocations along two dimensions.
     dispatch: [u32; 2],
 }
@@ -163,6 +226,9 @@ pub(crate) fn groups(invocations: usize) -> [u32; 2] {
 
 impl Kernel {
     /// From snippets of WGSL whose entry is `main`, with constants before them.
+    ///
+    /// # Errors
+    /// If it works on more arrays, or in larger groups, than the adapter allows.
     pub(crate) fn new(
         device: &Device,
         name: &str,
@@ -170,7 +236,8 @@ impl Kernel {
         snippets: &[&str],
         bound: &[&Bound],
         invocations: usize,
-    ) -> Self {
+    ) -> Result<Self, GpuError> {
+        device.allows(bound.iter().map(|bound| bound.arrays).sum(), GROUP)?;
         let mut source = format!("const GROUP = {GROUP}u;\n");
         for (name, value) in constants {
             source += &format!("const {name} = {value}u;\n");
@@ -196,15 +263,15 @@ impl Kernel {
             compilation_options: Default::default(),
             cache: None,
         });
-        let groups_bound = bound.iter().skip(1).map(|bound| bound.group.clone()).collect();
-        Self { pipeline, groups: groups_bound, dispatch: groups(invocations) }
+        let bound = [0, 1].map(|side| bound.iter().skip(1).map(|bound| bound.groups[side].clone()).collect());
+        Ok(Self { pipeline, bound, dispatch: groups(invocations) })
     }
 
-    /// Runs for the instant at an offset.
-    pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>, instant: &Bound, offset: u32) {
+    /// Runs for the instant at an offset, with `side` of arrays that have two.
+    pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>, instant: &Bound, offset: u32, side: usize) {
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &instant.group, &[offset]);
-        for (index, group) in (1..).zip(&self.groups) {
+        pass.set_bind_group(0, &instant.groups[0], &[offset]);
+        for (index, group) in (1..).zip(&self.bound[side]) {
             pass.set_bind_group(index, group, &[]);
         }
         pass.dispatch_workgroups(self.dispatch[0], self.dispatch[1], 1);

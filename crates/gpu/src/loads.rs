@@ -4,7 +4,7 @@ use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::{Vector, scale, sub};
 
-use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::kernel::{Binding, Bound, Kernel, Memory, Sides};
 use crate::solids::Four;
 use crate::{Device, GpuError};
 
@@ -15,8 +15,8 @@ const CORNER: u32 = u32::MAX;
 pub(crate) struct DeviceLoads {
     /// Finds the forces of pressed faces.
     pub pressure: Option<Kernel>,
-    /// What the pass over the nodes reads.
-    pub bound: Bound,
+    /// What kernels that move nodes read.
+    arrays: [wgpu::Buffer; 4],
 }
 
 /// Where a load acts: nodes of the model with weights.
@@ -76,7 +76,7 @@ impl DeviceLoads {
         device: &Device,
         instant: &Bound,
         model: &Model,
-        displacement: &wgpu::Buffer,
+        displacement: &Sides,
         constants: &[(&str, usize)],
     ) -> Result<Self, GpuError> {
         let mut entries: Vec<Vec<Four>> = vec![Vec::new(); model.node_count()];
@@ -121,7 +121,7 @@ impl DeviceLoads {
             let bound = Bound::new(
                 device,
                 &[
-                    Binding::Read(displacement),
+                    Binding::ReadNow(displacement),
                     Binding::Read(&places),
                     Binding::Read(&nodes),
                     Binding::Read(&rest),
@@ -130,11 +130,15 @@ impl DeviceLoads {
             );
             let snippets = [include_str!("shaders/instant.wgsl"), include_str!("shaders/pressure.wgsl")];
             let constants = [constants, &[("FACES", faces)]].concat();
-            Some(Kernel::new(device, "pressure", &constants, &snippets, &[instant, &bound], faces))
+            Some(Kernel::new(device, "pressure", &constants, &snippets, &[instant, &bound], faces)?)
         } else {
             None
         };
-        let read = [&offsets, &entries, &forces, &bodies].map(Binding::Read);
-        Ok(Self { pressure, bound: Bound::new(device, &read) })
+        Ok(Self { pressure, arrays: [offsets, entries, forces, bodies] })
+    }
+
+    /// What loads.wgsl reads, in group 3.
+    pub(crate) fn bindings(&self) -> [Binding<'_>; 4] {
+        self.arrays.each_ref().map(Binding::Read)
     }
 }

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use pliant_mechanics::model::{FREE, Model};
 use pliant_mechanics::tensor::Vector;
 
-use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory, groups};
+use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory, Sides, groups};
 use crate::loads::DeviceLoads;
 use crate::solids::Four;
 use crate::{Device, GpuError};
@@ -22,9 +22,10 @@ pub(crate) const SUMS: usize = 12;
 
 /// The arrays of nodes.
 pub(crate) struct DeviceNodes {
-    pub displacement: wgpu::Buffer,
-    pub increment: wgpu::Buffer,
-    pub next: wgpu::Buffer,
+    pub displacement: Sides,
+    pub increment: Sides,
+    /// The coming increments; where sides alternate they lie where the increments will be.
+    pub next: Sides,
     pub reactions: wgpu::Buffer,
     pub sums: wgpu::Buffer,
     constants: wgpu::Buffer,
@@ -33,11 +34,11 @@ pub(crate) struct DeviceNodes {
     pub held: Vec<u32>,
     /// How many nodes there are.
     pub count: usize,
-    /// Groups of the pass over them.
+    /// Groups that leave sums: of the pass over them, or of blocks.
     pub groups: usize,
 }
 
-/// The passes over the nodes.
+/// The passes over the nodes; they change the side that is now.
 pub(crate) struct NodeKernels {
     /// Finds the coming increments.
     pub pass: Kernel,
@@ -46,9 +47,16 @@ pub(crate) struct NodeKernels {
 }
 
 impl DeviceNodes {
+    /// With `blocks` that move nodes from one side to the other, if there are some.
+    ///
     /// # Errors
     /// If an array is too large.
-    pub(crate) fn new(memory: &Memory<'_>, model: &Model, owners: &[[u32; 3]]) -> Result<Self, GpuError> {
+    pub(crate) fn new(
+        memory: &Memory<'_>,
+        model: &Model,
+        owners: &[[u32; 3]],
+        blocks: Option<usize>,
+    ) -> Result<Self, GpuError> {
         let count = model.node_count();
         let amplitudes = model.amplitudes(owners);
         let mut held = Vec::new();
@@ -71,13 +79,18 @@ impl DeviceNodes {
                 constants.push([inertia as f32, body.damping as f32, mass as f32, f32::from_bits(hold)]);
             }
         }
-        let vectors = || memory.zeros("the nodes", count * size_of::<Four>());
+        let vectors = |alternate| memory.sides("the nodes", count * size_of::<Four>(), alternate);
         let [columns, rows] = groups(count);
-        let groups = (columns * rows) as usize;
+        let groups = ((columns * rows) as usize).max(blocks.unwrap_or(0));
+        let increment = vectors(blocks.is_some())?;
+        let next = match blocks {
+            Some(_) => [increment[1].clone(), increment[0].clone()],
+            None => vectors(false)?,
+        };
         Ok(Self {
-            displacement: vectors()?,
-            increment: vectors()?,
-            next: vectors()?,
+            displacement: vectors(blocks.is_some())?,
+            increment,
+            next,
             reactions: memory.zeros("the reactions", held.len() * size_of::<Four>())?,
             sums: memory.zeros("the energies", groups * SUMS * size_of::<f32>())?,
             constants: memory.filled("the nodes", &constants)?,
@@ -89,6 +102,9 @@ impl DeviceNodes {
     }
 
     /// The passes, with `gather` and `gathered` how forces come from the cells.
+    ///
+    /// # Errors
+    /// If the adapter allows fewer arrays.
     pub(crate) fn kernels(
         &self,
         device: &Device,
@@ -96,34 +112,62 @@ impl DeviceNodes {
         (gather, gathered): (&str, &Bound),
         loads: Option<&DeviceLoads>,
         constants: &[(&str, usize)],
-    ) -> NodeKernels {
+    ) -> Result<NodeKernels, GpuError> {
         let count = self.count;
         let bound = Bound::new(
             device,
             &[
-                Binding::Write(&self.displacement),
-                Binding::Write(&self.increment),
-                Binding::Write(&self.next),
+                Binding::WriteNow(&self.displacement),
+                Binding::WriteNow(&self.increment),
+                Binding::WriteNow(&self.next),
                 Binding::Read(&self.constants),
                 Binding::Read(&self.holds),
                 Binding::Write(&self.reactions),
                 Binding::Write(&self.sums),
             ],
         );
-        let common = [include_str!("shaders/instant.wgsl"), gather, include_str!("shaders/move.wgsl")];
-        let (external, mut bounds) = match loads {
-            Some(loads) => (include_str!("shaders/loads.wgsl"), vec![&loads.bound]),
-            None => (include_str!("shaders/unloaded.wgsl"), vec![]),
-        };
-        let pass = [&common[..], &[external, include_str!("shaders/node.wgsl")]].concat();
+        let loaded = loads.map(|loads| Bound::new(device, &loads.bindings()));
+        let common = [INSTANT, gather, MOVE, include_str!("shaders/in_place.wgsl")];
+        let pass =
+            [&common[..], &[external_forces(loads), MOTION, include_str!("shaders/node.wgsl")]].concat();
         let advance = [&common[..], &[include_str!("shaders/advance.wgsl")]].concat();
         let numbers = [constants, &[("NODES", count)]].concat();
-        let groups = [instant, &bound, gathered];
-        bounds.splice(0..0, groups);
-        NodeKernels {
-            pass: Kernel::new(device, "nodes", &numbers, &pass, &bounds, count),
-            advance: Kernel::new(device, "advance", &numbers, &advance, &groups, count),
-        }
+        let groups = [instant, gathered, &bound];
+        let with_loads: Vec<&Bound> = groups.into_iter().chain(&loaded).collect();
+        Ok(NodeKernels {
+            pass: Kernel::new(device, "nodes", &numbers, &pass, &with_loads, count)?,
+            advance: Kernel::new(device, "advance", &numbers, &advance, &groups, count)?,
+        })
+    }
+
+    /// What blocks of nodes work on, with `left` the forces that they leave.
+    pub(crate) fn of_blocks(&self, device: &Device, left: &wgpu::Buffer) -> Bound {
+        let bindings = [
+            Binding::ReadNow(&self.displacement),
+            Binding::ReadNow(&self.increment),
+            Binding::WriteNext(&self.displacement),
+            Binding::Read(&self.constants),
+            Binding::Read(&self.holds),
+            Binding::WriteNext(&self.increment),
+            Binding::Write(&self.sums),
+            Binding::Write(left),
+        ];
+        Bound::new(device, &bindings)
+    }
+}
+
+const INSTANT: &str = include_str!("shaders/instant.wgsl");
+
+/// What resists and holds nodes.
+pub(crate) const MOVE: &str = include_str!("shaders/move.wgsl");
+/// The coming increment of a node.
+pub(crate) const MOTION: &str = include_str!("shaders/central_difference.wgsl");
+
+/// What acts on nodes from outside.
+pub(crate) fn external_forces(loads: Option<&DeviceLoads>) -> &'static str {
+    match loads {
+        Some(_) => include_str!("shaders/loads.wgsl"),
+        None => include_str!("shaders/unloaded.wgsl"),
     }
 }
 

@@ -3,8 +3,11 @@
 use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
 use pliant_mechanics::tensor::dot;
 
-use crate::blocks::DeviceBlocks;
+use crate::blocks::{DeviceBlocks, NodeBlocks};
 use crate::kernel::{Binding, Bound, Memory};
+use crate::loads::DeviceLoads;
+use crate::nodes::{DeviceNodes, MOTION, MOVE, external_forces};
+use crate::run::table_constants;
 use crate::solids::Four;
 use crate::{Design, Device, GpuError};
 
@@ -12,6 +15,8 @@ use crate::{Design, Device, GpuError};
 pub(crate) const CORNERS: &str = include_str!("shaders/cell_corners.wgsl");
 /// The entry of a kernel of which each invocation takes a cell.
 pub(crate) const EACH_CELL: &str = include_str!("shaders/each_cell.wgsl");
+/// Forces as whole numbers.
+const FIXED: &str = include_str!("shaders/fixed.wgsl");
 
 /// Where cells give forces and nodes take them.
 pub(crate) struct Paths {
@@ -25,13 +30,21 @@ pub(crate) struct Paths {
     pub node_snippet: String,
     /// First slot of each solid.
     pub first_slot: Vec<usize>,
-    /// Blocks of the cells of each solid, if the design has some.
+    /// Blocks of each solid, if the design has some.
     pub blocks: Vec<DeviceBlocks>,
+    /// Whether blocks have the shapes of plain tetrahedra at rest found again from the places of their nodes.
+    pub finds_shapes: bool,
+    /// Whether kernels of cells move the nodes, too.
+    pub moves: bool,
+    /// Constants of kernels of cells.
+    pub constants: Vec<(&'static str, usize)>,
     /// Forces that have to be zero before an instant.
     sums: Option<wgpu::Buffer>,
 }
 
 impl Paths {
+    /// With what the nodes are cut into, where the design does so.
+    ///
     /// # Errors
     /// If an array is too large, or the device lacks what the design needs.
     pub(crate) fn new(
@@ -39,34 +52,73 @@ impl Paths {
         memory: &Memory<'_>,
         device: &Device,
         model: &Model,
-        displacement: &wgpu::Buffer,
+        nodes: &DeviceNodes,
+        loads: Option<&DeviceLoads>,
+        cut: Vec<NodeBlocks>,
     ) -> Result<Self, GpuError> {
         match design {
-            Design::Gather => Self::gather(memory, device, model, displacement),
-            Design::Fast => Self::fast(memory, device, model, displacement),
+            Design::Gather => Self::gather(memory, device, model, nodes),
+            Design::Blocks => Self::blocks(memory, device, model, nodes, loads, cut),
+            Design::Fast => Self::fast(memory, device, model, nodes),
             Design::FloatAtomics => {
                 if !device.adapter().float_atomics {
-                    let (adapter, what) =
-                        (device.adapter().name.clone(), "floating-point atomics".to_owned());
-                    return Err(GpuError::Lacks { adapter, what });
+                    return Err(device.lacks("floating-point atomics".to_owned()));
                 }
-                let snippets =
-                    [include_str!("shaders/float_cells.wgsl"), include_str!("shaders/float_nodes.wgsl")];
-                Self::atomics(memory, device, model, displacement, snippets, "")
+                let cells = include_str!("shaders/float_cells.wgsl").to_owned();
+                let gather = include_str!("shaders/float_nodes.wgsl").to_owned();
+                Self::atomics(memory, device, model, nodes, [cells, gather])
             }
             Design::FixedAtomics => {
+                let scale = Scale::new(model).constants();
                 let snippets =
                     [include_str!("shaders/fixed_cells.wgsl"), include_str!("shaders/fixed_nodes.wgsl")];
-                Self::atomics(memory, device, model, displacement, snippets, &Scale::new(model).constants())
+                let snippets = snippets.map(|snippet| [&scale, FIXED, snippet].join("\n"));
+                Self::atomics(memory, device, model, nodes, snippets)
             }
         }
+    }
+
+    /// One kernel a step. Of the forces of a block only whole numbers are kept, 16 bytes a node: in shared memory every graphics
+    /// processor adds them natively, in any order to the same sum. Slots to gather them from would take 48 bytes or more a cell
+    /// there, which makes blocks smaller and cells at borders more.
+    fn blocks(
+        memory: &Memory<'_>,
+        device: &Device,
+        model: &Model,
+        nodes: &DeviceNodes,
+        loads: Option<&DeviceLoads>,
+        cut: Vec<NodeBlocks>,
+    ) -> Result<Self, GpuError> {
+        let left = memory.zeros("the forces on nodes", model.node_count() * size_of::<Four>())?;
+        let scale = Scale::new(model).constants();
+        let snippets =
+            [&scale, FIXED, MOVE, external_forces(loads), MOTION, include_str!("shaders/node_blocks.wgsl")];
+        let mut first = 0;
+        let mut blocks = Vec::new();
+        for cut in cut {
+            let count = cut.len();
+            blocks.push(DeviceBlocks::of_nodes(memory, device, cut, first, loads)?);
+            first += count;
+        }
+        Ok(Self {
+            cells: nodes.of_blocks(device, &left),
+            cell_snippet: snippets.join("\n"),
+            nodes: Bound::new(device, &[Binding::Read(&left)]),
+            node_snippet: [&scale, FIXED, include_str!("shaders/left_nodes.wgsl")].join("\n"),
+            first_slot: vec![0; model.solids.len()],
+            blocks,
+            finds_shapes: false,
+            moves: true,
+            constants: table_constants(model).to_vec(),
+            sums: None,
+        })
     }
 
     fn gather(
         memory: &Memory<'_>,
         device: &Device,
         model: &Model,
-        displacement: &wgpu::Buffer,
+        nodes: &DeviceNodes,
     ) -> Result<Self, GpuError> {
         // A slot for each corner of each cell, corner by corner.
         let mut first_slot = vec![0];
@@ -86,12 +138,15 @@ impl Paths {
         let offsets = memory.filled("the cells at nodes", &offsets)?;
         let of_node = memory.filled("the cells at nodes", &of_node)?;
         Ok(Self {
-            cells: Bound::new(device, &[Binding::Read(displacement), Binding::Write(&forces)]),
+            cells: Bound::new(device, &[Binding::ReadNow(&nodes.displacement), Binding::Write(&forces)]),
             cell_snippet: [CORNERS, include_str!("shaders/gather_cells.wgsl"), EACH_CELL].join("\n"),
             nodes: Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read)),
             node_snippet: include_str!("shaders/gather_nodes.wgsl").to_owned(),
             first_slot,
             blocks: vec![],
+            finds_shapes: false,
+            moves: false,
+            constants: vec![],
             sums: None,
         })
     }
@@ -100,10 +155,10 @@ impl Paths {
         memory: &Memory<'_>,
         device: &Device,
         model: &Model,
-        displacement: &wgpu::Buffer,
+        nodes: &DeviceNodes,
     ) -> Result<Self, GpuError> {
         let blocks = (model.solids.iter())
-            .map(|solid| DeviceBlocks::new(memory, device, model, solid))
+            .map(|solid| DeviceBlocks::of_cells(memory, device, model, solid))
             .collect::<Result<Vec<_>, _>>()?;
         let mut first_slot = vec![0];
         for blocks in &blocks {
@@ -115,12 +170,15 @@ impl Paths {
         let offsets = memory.filled("the blocks at nodes", &offsets)?;
         let of_node = memory.filled("the blocks at nodes", &of_node)?;
         Ok(Self {
-            cells: Bound::new(device, &[Binding::Read(displacement), Binding::Write(&forces)]),
+            cells: Bound::new(device, &[Binding::ReadNow(&nodes.displacement), Binding::Write(&forces)]),
             cell_snippet: include_str!("shaders/block_cells.wgsl").to_owned(),
             nodes: Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read)),
             node_snippet: include_str!("shaders/gather_nodes.wgsl").to_owned(),
             first_slot,
             blocks,
+            finds_shapes: true,
+            moves: false,
+            constants: vec![],
             sums: None,
         })
     }
@@ -129,18 +187,20 @@ impl Paths {
         memory: &Memory<'_>,
         device: &Device,
         model: &Model,
-        displacement: &wgpu::Buffer,
-        [cells, nodes]: [&str; 2],
-        constants: &str,
+        nodes: &DeviceNodes,
+        [cells, gather]: [String; 2],
     ) -> Result<Self, GpuError> {
         let forces = memory.zeros("the forces on nodes", model.node_count() * size_of::<Four>())?;
         Ok(Self {
-            cells: Bound::new(device, &[Binding::Read(displacement), Binding::Write(&forces)]),
-            cell_snippet: [constants, CORNERS, cells, EACH_CELL].join("\n"),
+            cells: Bound::new(device, &[Binding::ReadNow(&nodes.displacement), Binding::Write(&forces)]),
+            cell_snippet: [CORNERS, &cells, EACH_CELL].join("\n"),
             nodes: Bound::new(device, &[Binding::Write(&forces)]),
-            node_snippet: [constants, nodes].join("\n"),
+            node_snippet: gather,
             first_slot: vec![0; model.solids.len()],
             blocks: vec![],
+            finds_shapes: false,
+            moves: false,
+            constants: vec![],
             sums: Some(forces),
         })
     }

@@ -47,10 +47,10 @@ impl DeviceRates {
         let kernel = |name, snippet, invocations| {
             Kernel::new(device, name, &[("ROUNDS", ROUNDS)], &[snippet], &[&instant, &arrays], invocations)
         };
-        let best = |kernel: &Kernel| -> Result<f64, GpuError> {
-            let mut best = f64::INFINITY;
+        let best = |kernel: Result<Kernel, GpuError>| -> Result<f64, GpuError> {
+            let (kernel, mut best) = (kernel?, f64::INFINITY);
             for _ in 0..repeats.max(1) {
-                best = best.min(seconds(device, kernel, &instant)?);
+                best = best.min(seconds(device, &kernel, &instant)?);
             }
             Ok(best)
         };
@@ -63,9 +63,9 @@ impl DeviceRates {
         let empty = kernel("empty", include_str!("shaders/empty.wgsl"), 1);
         let operations = 2 * 4 * 8 * ROUNDS * INVOCATIONS.min(bytes / 16);
         Ok(Self {
-            copy: 2.0 * bytes as f64 / best(&copy)?,
-            multiply_add: operations as f64 / best(&arithmetic)?,
-            launch: best(&empty)?,
+            copy: 2.0 * bytes as f64 / best(copy)?,
+            multiply_add: operations as f64 / best(arithmetic)?,
+            launch: best(empty)?,
         })
     }
 }
@@ -77,7 +77,7 @@ fn seconds(device: &Device, kernel: &Kernel, instant: &Bound) -> Result<f64, Gpu
         let started = Instant::now();
         let mut encoder = device.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
-        (0..length).for_each(|_| kernel.run(&mut pass, instant, 0));
+        (0..length).for_each(|_| kernel.run(&mut pass, instant, 0, 0));
         drop(pass);
         device.queue.submit([encoder.finish()]);
         device.wait()?;

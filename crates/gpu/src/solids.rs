@@ -5,7 +5,6 @@ use pliant_mechanics::prony::Relaxation;
 use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{History, PACK};
 
-use crate::blocks::shared_sizes;
 use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory};
 use crate::paths::{CORNERS, EACH_CELL, Paths};
 use crate::transfer::Transfer;
@@ -32,8 +31,10 @@ pub(crate) struct DeviceSolid {
     kernels: Vec<Kernel>,
     /// What relaxing laws remember of cells and of averaged pressures.
     histories: [wgpu::Buffer; 2],
-    /// The order of cells and of averaged pressures on the device, by their numbers in the solid.
+    /// The order of cells and of averaged pressures on the device, by their numbers in the solid; some lie there several times.
     orders: [Vec<u32>; 2],
+    /// Packs of history for each pack of cells and of averaged pressures.
+    packs: [usize; 2],
     /// Parameters of the law, then coefficients of relaxation.
     constants: wgpu::Buffer,
     /// Where the coefficients begin [B].
@@ -72,48 +73,55 @@ impl DeviceSolid {
             memory.uniform("constants of a solid", (parameters.len() + series) * size_of::<Four>());
         device.queue.write_buffer(&constants, 0, bytemuck::cast_slice(&parameters));
 
-        let slots = History::<f32>::slots(solid);
-        let packs = |count: usize, slots: usize| count.div_ceil(PACK) * slots * PACK * size_of::<f32>();
-        let averaged = match cells {
-            Cells::AveragedTet4(block, Averaging::Nodal) => LocalNodes::new(block).len(),
-            _ if cells.averages_pressure() => cells.len(),
-            _ => 0,
-        };
-        let histories = [
-            memory.zeros("the histories", packs(cells.len(), 6 * slots))?,
-            memory.zeros("the histories", packs(averaged, prony.volumetric_slots()))?,
-        ];
         let blocks = paths.blocks.get(index);
         let order = match blocks {
             Some(blocks) => blocks.order.clone(),
             None => (0..cells.len() as u32).collect(),
         };
-        // Plain tetrahedra in blocks find theirs from their nodes.
-        let found_again = blocks.is_some() && matches!(cells, Cells::Tet4(_));
+        let slots = History::<f32>::slots(solid);
+        let packs = [6 * slots, prony.volumetric_slots()];
+        let pressure_order: Vec<u32> = match cells {
+            Cells::AveragedTet4(block, Averaging::Nodal) => {
+                (0..LocalNodes::new(block).len() as u32).collect()
+            }
+            _ if cells.averages_pressure() => order.clone(),
+            _ => vec![],
+        };
+        let history = |order: &[u32], packs: usize| {
+            memory.zeros("the histories", order.len().div_ceil(PACK) * packs * PACK * size_of::<f32>())
+        };
+        let histories = [history(&order, packs[0])?, history(&pressure_order, packs[1])?];
+        let found_again = paths.finds_shapes && matches!(cells, Cells::Tet4(_));
         let shapes = if found_again { vec![] } else { rows_at_rest(cells, &order) };
-        let fibre_row = shapes.len() / cells.len().max(1);
-        let nodes = memory.filled("the cells", &rows_of_nodes(cells, &order))?;
-        let rest = memory
-            .filled("the shapes of cells at rest", &[shapes, rows_of_fibres(solid, &order)].concat())?;
-        let mut bindings = vec![
-            Binding::Read(&nodes),
-            Binding::Read(&rest),
-            Binding::Write(&histories[0]),
-            Binding::Uniform(&constants),
-        ];
+        let fibre_row = shapes.len() / order.len().max(1);
         let averages = match cells {
             Cells::AveragedTet4(block, _) => Some(Averages::new(memory, block, &order)?),
             _ => None,
         };
+        // Forces that are found in blocks name nodes by their places there.
+        let names_nodes = blocks.is_none() || averages.is_some();
+        let nodes = if names_nodes { rows_of_nodes(cells, &order) } else { vec![] };
+        let nodes = memory.filled("the cells", &nodes)?;
+        let rest = memory
+            .filled("the shapes of cells at rest", &[shapes, rows_of_fibres(solid, &order)].concat())?;
+        let of_cells = |nodes| {
+            [nodes, Binding::Read(&rest), Binding::Write(&histories[0]), Binding::Uniform(&constants)]
+        };
+        let mut bindings =
+            of_cells(if blocks.is_none() { Binding::Read(&nodes) } else { Binding::Nothing }).to_vec();
         match &averages {
-            Some(averages) => bindings.extend(averages.bindings(&histories[1])),
+            Some(averages) => bindings.extend(averages.means()),
             None if cells.averages_pressure() => bindings.push(Binding::Write(&histories[1])),
             None => {}
         }
         let bound = Bound::new(device, &bindings);
+        let averaging = averages.as_ref().map(|averages| {
+            let bindings = averages.bindings(&histories[1]);
+            Bound::new(device, &[&of_cells(Binding::Read(&nodes))[..], &bindings].concat())
+        });
 
         let mut numbers = vec![
-            ("CELLS", cells.len()),
+            ("CELLS", order.len()),
             ("FAMILIES", law.families()),
             ("PARAMETERS", parameters.len()),
             ("SERIES", series),
@@ -124,21 +132,26 @@ impl DeviceSolid {
         ];
         numbers.push(("FIBRES", fibre_row));
         numbers.push(("FIRST_SLOT", paths.first_slot[index]));
-        numbers.extend(shared_sizes(cells));
+        numbers.extend(&paths.constants);
+        numbers.extend(blocks.iter().flat_map(|blocks| &blocks.constants));
         let kernel = |name: &str, snippets: &[&str], bound: &[&Bound], count: usize| {
             let snippets = [&[INSTANT, &shader.source, CELLS, PRONY], snippets].concat();
             Kernel::new(device, name, &numbers, &snippets, bound, count)
         };
         let groups = [instant, &bound, &paths.cells];
+        let averaging_groups = [instant, averaging.as_ref().unwrap_or(&bound), &paths.cells];
         let forces = |name: &str, snippets: &[&str]| {
             let own = paths.cell_snippet.as_str();
             match blocks {
                 None => kernel(name, &[snippets, &[own]].concat(), &groups, cells.len()),
                 Some(blocks) => {
                     let groups = [&groups[..], &[&blocks.bound]].concat();
-                    let rest = include_str!("shaders/block_stored.wgsl");
-                    let more: &[&str] = if found_again { &[own] } else { &[own, rest] };
-                    kernel(name, &[snippets, more].concat(), &groups, blocks.count * GROUP as usize)
+                    let stored = if paths.finds_shapes && !found_again {
+                        include_str!("shaders/block_stored.wgsl")
+                    } else {
+                        ""
+                    };
+                    kernel(name, &[snippets, &[own, stored]].concat(), &groups, blocks.count * GROUP as usize)
                 }
             }
         };
@@ -157,14 +170,14 @@ impl DeviceSolid {
                     kernel(
                         name,
                         &[&[CORNERS, SHAPE, TET, AVERAGES], snippets, &[EACH_CELL]].concat(),
-                        &groups,
-                        cells.len(),
+                        &averaging_groups,
+                        order.len(),
                     )
                 };
                 let local = averages.as_ref().map_or(0, |averages| averages.count);
                 let of_nodes = |name: &str, snippets: &[&str]| {
                     let own = include_str!("shaders/node_averages.wgsl");
-                    kernel(name, &[&[AVERAGES], snippets, &[own]].concat(), &groups, local)
+                    kernel(name, &[&[AVERAGES], snippets, &[own]].concat(), &averaging_groups, local)
                 };
                 let changes = of_cells("volume changes", &[include_str!("shaders/volume_changes.wgsl")]);
                 let means = || of_nodes("means at nodes", &[include_str!("shaders/node_means.wgsl")]);
@@ -193,13 +206,9 @@ impl DeviceSolid {
                 }
             }
         };
+        let kernels = kernels.into_iter().collect::<Result<_, _>>()?;
         let series = (parameters.len() * size_of::<Four>()) as u64;
-        let pressure_order = match cells {
-            Cells::AveragedTet4(_, Averaging::Nodal) => (0..averaged as u32).collect(),
-            _ if averaged > 0 => order.clone(),
-            _ => vec![],
-        };
-        Ok(Self { kernels, histories, orders: [order, pressure_order], constants, series })
+        Ok(Self { kernels, histories, orders: [order, pressure_order], packs, constants, series })
     }
 
     /// Relaxes from now on over steps of `step` seconds.
@@ -219,15 +228,14 @@ impl DeviceSolid {
 
     /// Takes up the history of a state.
     pub(crate) fn upload(&self, device: &Device, history: &History<f32>) {
-        let packs = [&history.cells, &history.pressures];
-        for ((buffer, order), packs) in self.histories.iter().zip(&self.orders).zip(packs) {
-            let mut numbers = vec![0.0_f32; packs.len() * PACK];
-            for_each_number(order, packs.len(), |pack, lane, place| numbers[place] = packs[pack].0[lane]);
-            device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&numbers));
+        for (index, packs) in [&history.cells, &history.pressures].into_iter().enumerate() {
+            let mut numbers = vec![0.0_f32; self.numbers(index)];
+            self.for_each_number(index, |pack, lane, place| numbers[place] = packs[pack].0[lane]);
+            device.queue.write_buffer(&self.histories[index], 0, bytemuck::cast_slice(&numbers));
         }
     }
 
-    /// Brings the history back.
+    /// Brings the history back; that of all copies of a cell is the same.
     ///
     /// # Errors
     /// If the device fails.
@@ -237,26 +245,29 @@ impl DeviceSolid {
         device: &Device,
         history: &mut History<f32>,
     ) -> Result<(), GpuError> {
-        let packs = [&mut history.cells, &mut history.pressures];
-        for ((buffer, order), packs) in self.histories.iter().zip(&self.orders).zip(packs) {
-            if packs.is_empty() {
-                continue;
+        for (index, packs) in [&mut history.cells, &mut history.pressures].into_iter().enumerate() {
+            if self.numbers(index) > 0 {
+                transfer.read::<f32>(device, &self.histories[index], self.numbers(index), |numbers| {
+                    self.for_each_number(index, |pack, lane, place| packs[pack].0[lane] = numbers[place]);
+                })?;
             }
-            transfer.read::<f32>(device, buffer, packs.len() * PACK, |numbers| {
-                for_each_number(order, packs.len(), |pack, lane, place| packs[pack].0[lane] = numbers[place]);
-            })?;
         }
         Ok(())
     }
-}
 
-/// Visits the numbers in some packs of history: pack and lane in the order of the solid, and the place on the device.
-fn for_each_number(order: &[u32], packs: usize, mut visit: impl FnMut(usize, usize, usize)) {
-    let each = packs / order.len().div_ceil(PACK).max(1);
-    for (to, &from) in order.iter().enumerate() {
-        let from = from as usize;
-        for k in 0..each {
-            visit(from / PACK * each + k, from % PACK, (to / PACK * each + k) * PACK + to % PACK);
+    /// Numbers of one of the histories.
+    fn numbers(&self, index: usize) -> usize {
+        self.orders[index].len().div_ceil(PACK) * self.packs[index] * PACK
+    }
+
+    /// Visits the numbers of one of the histories: pack and lane in the order of the solid, and the place on the device.
+    fn for_each_number(&self, index: usize, mut visit: impl FnMut(usize, usize, usize)) {
+        let each = self.packs[index];
+        for (to, &from) in self.orders[index].iter().enumerate() {
+            let from = from as usize;
+            for k in 0..each {
+                visit(from / PACK * each + k, from % PACK, (to / PACK * each + k) * PACK + to % PACK);
+            }
         }
     }
 }
@@ -319,7 +330,7 @@ struct Averages {
 impl Averages {
     fn new(memory: &Memory<'_>, block: &CellBlock<4>, order: &[u32]) -> Result<Self, GpuError> {
         let local = LocalNodes::new(block);
-        let mut place = vec![0; order.len()];
+        let mut place = vec![0; block.nodes.len()];
         (0..).zip(order).for_each(|(to, &cell)| place[cell as usize] = to);
         let mut offsets = vec![0];
         let (mut cells, mut inverse_volume) = (Vec::new(), Vec::new());
@@ -331,7 +342,7 @@ impl Averages {
         }
         Ok(Self {
             count: local.len(),
-            cell_values: memory.zeros("the averages", block.nodes.len() * size_of::<f32>())?,
+            cell_values: memory.zeros("the averages", order.len() * size_of::<f32>())?,
             node_values: memory.zeros("the averages", local.len() * size_of::<f32>())?,
             nodes: memory.filled(
                 "the cells",
@@ -343,6 +354,12 @@ impl Averages {
         })
     }
 
+    /// What elements read that take the means of their nodes.
+    fn means(&self) -> [Binding<'_>; 3] {
+        [Binding::Nothing, Binding::Write(&self.node_values), Binding::Read(&self.nodes)]
+    }
+
+    /// What finds these means.
     fn bindings<'a>(&'a self, pressures: &'a wgpu::Buffer) -> [Binding<'a>; 7] {
         [
             Binding::Write(&self.cell_values),

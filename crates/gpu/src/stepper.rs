@@ -10,6 +10,7 @@ use pliant_mechanics::{
     model_balance_floor,
 };
 
+use crate::blocks::NodeBlocks;
 use crate::kernel::{Kernel, Memory};
 use crate::loads::DeviceLoads;
 use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
@@ -32,9 +33,6 @@ const LIMIT_EVERY: u64 = 1000;
 /// A submission takes no longer than this [s]: systems take a device away from a program that keeps it for seconds.
 const LONGEST_SUBMISSION: f64 = 0.2;
 
-/// The most arrays that a kernel reads and writes.
-const MOST_ARRAYS: u32 = 16;
-
 /// What comes back of an evaluated instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
@@ -47,6 +45,7 @@ pub enum Wanted {
 /// Where a state stood when it was looked at.
 #[derive(Clone, Copy)]
 struct Origin {
+    side: usize,
     steps: u64,
     time: f64,
     stability: Stability,
@@ -87,6 +86,8 @@ pub struct GpuStepper<'m> {
     transfer: Transfer,
     /// Length of a step [s] that relaxing laws are set to.
     relaxing: Option<f64>,
+    /// Which side of arrays with two is now.
+    side: usize,
     /// Whether a state was taken up.
     loaded: bool,
     /// Whether its instant is evaluated.
@@ -127,7 +128,7 @@ impl Observable<f32> for GpuStepper<'_> {
 }
 
 impl<'m> GpuStepper<'m> {
-    /// A stepper for steps of `step` seconds. Without a design it takes the one that is fastest as a rule.
+    /// A stepper for steps of `step` seconds, of a design or [`Design::usual`].
     ///
     /// # Errors
     /// If constraints contradict each other, or the device can't take the model.
@@ -138,17 +139,9 @@ impl<'m> GpuStepper<'m> {
         design: Option<Design>,
     ) -> Result<Self, GpuError> {
         let owners = model.constrained_components()?;
-        device.needs(MOST_ARRAYS)?;
         let memory = Memory::new(device);
-        let full = device.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let stepper = Self::on_device(device, &memory, model, step, design.unwrap_or(Design::Gather), owners);
-        let full = pollster::block_on(full.pop());
-        if full.is_some() {
-            let (adapter, needed) = (device.adapter().name.clone(), memory.mebibytes());
-            return Err(GpuError::OutOfMemory { adapter, needed });
-        }
-        device.check()?;
-        stepper
+        let design = design.unwrap_or(Design::usual(device.adapter().kind));
+        device.fill(|| memory.bytes(), || Self::on_device(device, &memory, model, step, design, owners))
     }
 
     fn on_device(
@@ -159,7 +152,12 @@ impl<'m> GpuStepper<'m> {
         design: Design,
         owners: Vec<[u32; 3]>,
     ) -> Result<Self, GpuError> {
-        let nodes = DeviceNodes::new(memory, model, &owners)?;
+        let cut = match design {
+            Design::Blocks => NodeBlocks::of_solids(device, model)?,
+            _ => vec![],
+        };
+        let blocks = (design == Design::Blocks).then(|| cut.iter().map(NodeBlocks::len).sum());
+        let nodes = DeviceNodes::new(memory, model, &owners, blocks)?;
         let instants = Instants::new(memory, device, model)?;
         let constants = table_constants(model);
         let loads = if model.loads.is_empty() {
@@ -167,12 +165,12 @@ impl<'m> GpuStepper<'m> {
         } else {
             Some(DeviceLoads::new(memory, device, &instants.bound, model, &nodes.displacement, &constants)?)
         };
-        let paths = Paths::new(design, memory, device, model, &nodes.displacement)?;
+        let paths = Paths::new(design, memory, device, model, &nodes, loads.as_ref(), cut)?;
         let solids = (model.solids.iter().enumerate())
             .map(|solid| DeviceSolid::new(memory, device, &instants.bound, solid, &paths))
             .collect::<Result<Vec<_>, _>>()?;
         let gather = (paths.node_snippet.as_str(), &paths.nodes);
-        let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), &constants);
+        let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), &constants)?;
         let control = StepControl::new(step);
         Ok(Self {
             device: device.clone(),
@@ -188,6 +186,7 @@ impl<'m> GpuStepper<'m> {
             instants,
             transfer: Transfer::default(),
             relaxing: None,
+            side: 0,
             loaded: false,
             evaluated: false,
             origin: None,
@@ -240,8 +239,8 @@ impl<'m> GpuStepper<'m> {
             false => fours(state.increment.iter().copied()),
         };
         let displacement = fours(state.displacement.iter().copied());
-        queue.write_buffer(&self.nodes.displacement, 0, bytemuck::cast_slice(&displacement));
-        queue.write_buffer(&self.nodes.increment, 0, bytemuck::cast_slice(&increment));
+        queue.write_buffer(&self.nodes.displacement[self.side], 0, bytemuck::cast_slice(&displacement));
+        queue.write_buffer(&self.nodes.increment[self.side], 0, bytemuck::cast_slice(&increment));
         for (solid, history) in self.solids.iter().zip(&state.history) {
             solid.upload(&self.device, history);
         }
@@ -299,7 +298,12 @@ impl<'m> GpuStepper<'m> {
         self.energies = state.work.settle(&results.sums, results.hourglass, before, self.balance_floor);
         self.enter_reactions(&results.reactions);
         (self.evaluated, self.since) = (true, 0);
-        self.origin = Some(Origin { steps: state.steps, time: state.time, stability: state.stability });
+        self.origin = Some(Origin {
+            side: self.side,
+            steps: state.steps,
+            time: state.time,
+            stability: state.stability,
+        });
         if state.work.has_lost_balance() {
             self.bring_back(state)?;
             let square = |u: &Vector<f32>| u.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>();
@@ -349,9 +353,9 @@ impl<'m> GpuStepper<'m> {
                 to.iter_mut().zip(fours).for_each(|(to, &[x, y, z, _])| *to = [x, y, z]);
             })
         };
-        vectors(&self.nodes.displacement, &mut state.displacement)?;
-        vectors(&self.nodes.increment, &mut state.increment)?;
-        vectors(&self.nodes.next, &mut self.next)?;
+        vectors(&self.nodes.displacement[self.side], &mut state.displacement)?;
+        vectors(&self.nodes.increment[self.side], &mut state.increment)?;
+        vectors(&self.nodes.next[self.side], &mut self.next)?;
         for (solid, history) in self.solids.iter().zip(&mut state.history) {
             solid.bring_back(&mut self.transfer, &self.device, history)?;
         }
@@ -364,6 +368,7 @@ impl<'m> GpuStepper<'m> {
         state.work.advance();
         (self.evaluated, self.entered) = (false, false);
         let mut from_look = true;
+        let mut side = self.side;
         let mut running: Option<(wgpu::SubmissionIndex, usize)> = None;
         let mut begun = Clock::now();
         while state.steps < end {
@@ -382,7 +387,8 @@ impl<'m> GpuStepper<'m> {
             if !from_look || count > 1 {
                 self.relax(self.lengths.next);
             }
-            let submitted = self.submit_steps(from_look);
+            let submitted = self.submit_steps(from_look, side);
+            side = self.side;
             from_look = false;
             // One submission waits while another runs.
             if let Some((earlier, count)) = running.replace((submitted.clone(), count)) {
@@ -409,8 +415,12 @@ impl<'m> GpuStepper<'m> {
 
     /// Moves the clock on by an instant. Whole steps that begin without a look are noted here.
     fn count(&mut self, state: &mut State<f32>) {
-        if self.since > 0 && state.is_between_steps() {
-            self.control.note(state);
+        if self.since > 0 {
+            // The step after a look moves nodes in place.
+            self.side = 1 - self.side;
+            if state.is_between_steps() {
+                self.control.note(state);
+            }
         }
         self.control.count(state);
         self.since += 1;
@@ -426,7 +436,7 @@ impl<'m> GpuStepper<'m> {
             let displacement = &mut state.displacement;
             self.transfer.read::<Four>(
                 &self.device,
-                &self.nodes.displacement,
+                &self.nodes.displacement[self.side],
                 self.nodes.count,
                 |fours| {
                     displacement.iter_mut().zip(fours).for_each(|(to, &[x, y, z, _])| *to = [x, y, z]);
@@ -453,26 +463,30 @@ impl<'m> GpuStepper<'m> {
     fn submit_evaluation(&mut self, time: f64, flags: u32, anew: bool) -> Result<Results, GpuError> {
         let instant = Instant::new(self.since, flags, self.lengths);
         self.instants.push(self.model, time, self.lengths.next, instant);
-        let (loads, solids, nodes) = (&self.loads, &self.solids, &self.kernels);
+        let (loads, solids, nodes, side) = (&self.loads, &self.solids, &self.kernels, self.side);
         self.instants.submit(&self.device, |pass, bound, _, offset| {
             if anew {
-                force_kernels(loads, solids).for_each(|kernel| kernel.run(pass, bound, offset));
+                force_kernels(loads, solids).for_each(|kernel| kernel.run(pass, bound, offset, side));
             }
-            nodes.pass.run(pass, bound, offset);
+            nodes.pass.run(pass, bound, offset, side);
         });
         self.results()
     }
 
-    /// Goes on from the instants that are pushed; the first of them may be one that was looked at.
-    fn submit_steps(&mut self, from_look: bool) -> wgpu::SubmissionIndex {
+    /// Goes on from the instants that are pushed, at first with a side; the first of them may be one that was looked at.
+    fn submit_steps(&mut self, from_look: bool, mut side: usize) -> wgpu::SubmissionIndex {
         let (loads, solids, nodes) = (&self.loads, &self.solids, &self.kernels);
+        let moves = self.paths.moves;
         self.instants.submit(&self.device, |pass, bound, place, offset| {
             if from_look && place == 0 {
-                nodes.advance.run(pass, bound, offset);
-            } else {
-                force_kernels(loads, solids).for_each(|kernel| kernel.run(pass, bound, offset));
-                nodes.pass.run(pass, bound, offset);
+                nodes.advance.run(pass, bound, offset, side);
+                return;
             }
+            force_kernels(loads, solids).for_each(|kernel| kernel.run(pass, bound, offset, side));
+            if !moves {
+                nodes.pass.run(pass, bound, offset, side);
+            }
+            side = 1 - side;
         })
     }
 
@@ -570,8 +584,9 @@ impl<'m> GpuStepper<'m> {
 
     /// Sets the clock to one of the instants since the last look.
     fn go_back(&mut self, state: &mut State<f32>, to: u32) {
-        if let Some(Origin { steps, time, stability }) = self.origin {
+        if let Some(Origin { side, steps, time, stability }) = self.origin {
             (state.steps, state.time, state.stability) = (steps, time, stability);
+            self.side = side;
             self.since = 0;
             while self.since < to {
                 self.count(state);

@@ -57,10 +57,7 @@ impl Transfer {
         device.queue.submit([encoder.finish()]);
         staging.map_async(wgpu::MapMode::Read, ..size, |_| {});
         device.wait()?;
-        let view = staging.get_mapped_range(..size).map_err(|error| GpuError::Internal {
-            adapter: device.adapter().name.clone(),
-            reason: error.to_string(),
-        })?;
+        let view = staging.get_mapped_range(..size).map_err(|error| device.fault(&error))?;
         let parts: Vec<&[u8]> =
             ends.windows(2).map(|ends| &view[ends[0] as usize..ends[1] as usize]).collect();
         take(&parts);

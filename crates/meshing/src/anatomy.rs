@@ -59,18 +59,15 @@ impl<'a> Anatomy<'a> {
         let part = |number: usize| move |done: f64| progress(share * (number as f64 + done));
         let (whole, done) = image.region(labels, smoothing.margin())?.clean(cleaning)?;
         let field = DistanceField::new(&whole, smoothing, &part(0))?;
-        let (mut materials, mut volumes): (Vec<(i32, Option<Box<dyn ImplicitField>>)>, Vec<_>) =
-            Default::default();
-        let mut others = 0.0;
+        let (mut materials, mut volumes, mut others) = (vec![(labels[0], None)], vec![None], 0.0);
         for (number, &label) in labels.iter().enumerate().skip(1) {
             let region = whole.part(image, label)?;
             others += region.volume();
             volumes.push(Some(region.volume()));
             let inner = DistanceField::within(&region, &whole, smoothing, &part(number))?;
-            materials.push((label, Some(Box::new(inner))));
+            materials.push((label, Some(Box::new(inner) as Box<dyn ImplicitField>)));
         }
-        materials.insert(0, (labels[0], None));
-        volumes.insert(0, Some(whole.volume() - others));
+        volumes[0] = Some(whole.volume() - others);
         Ok((Anatomy { whole: Box::new(field), materials, volumes }, done))
     }
 

@@ -20,8 +20,8 @@ struct Block {
 // … in the corners there: corner × GROUP + cell, two to a number.
 @group(3) @binding(4) var<storage, read> given: array<u32>;
 
-var<workgroup> moved: array<f32, MOST_NODES>;
-var<workgroup> forces: array<f32, FORCES>;
+var<workgroup> moved: array<f32, 3u * MOST_NODES>;
+var<workgroup> forces: array<f32, 3u * CORNERS * GROUP>;
 var<workgroup> energies: array<f32, GROUP>;
 var<private> place: u32;
 

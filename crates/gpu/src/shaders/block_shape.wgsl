@@ -3,7 +3,7 @@
 // Of the nodes of all blocks, from the first of each [m].
 @group(3) @binding(5) var<storage, read> block_rest: array<f32>;
 
-var<workgroup> resting: array<f32, MOST_NODES>;
+var<workgroup> resting: array<f32, 3u * MOST_NODES>;
 
 struct Shape {
     b1: vec3f,

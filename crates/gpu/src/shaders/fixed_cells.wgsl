@@ -2,14 +2,6 @@
 
 @group(2) @binding(1) var<storage, read_write> forces: array<atomic<i32>>;
 
-// A whole number of at most LIMIT, so that all cells at a node together stay in range; what is cut off is noted.
-fn whole(number: f32) -> i32 {
-    if !(abs(number) <= LIMIT) {
-        atomicMin(&findings[OVERFLOWN], instant.index);
-    }
-    return i32(round(clamp(number, -LIMIT, LIMIT)));
-}
-
 // The force of a cell on one of its nodes [N], and the energy its hourglass control holds [J].
 fn give(cell: u32, corner: u32, force: vec4f) {
     let place = 4u * node_of(cell, corner);

@@ -1,13 +1,13 @@
 // The forces of cells are added up already, as whole numbers; the next instant begins at zero.
 
-@group(2) @binding(0) var<storage, read_write> forces: array<atomic<i32>>;
+@group(1) @binding(0) var<storage, read_write> forces: array<atomic<i32>>;
 
 fn internal_force(node: u32) -> vec4f {
     let place = 4u * node;
-    let force = vec3i(
+    return force_of(vec4i(
         atomicLoad(&forces[place]), atomicLoad(&forces[place + 1u]), atomicLoad(&forces[place + 2u]),
-    );
-    return vec4f(vec3f(force) / PER_FORCE, f32(atomicLoad(&forces[place + 3u])) / PER_ENERGY);
+        atomicLoad(&forces[place + 3u]),
+    ));
 }
 
 fn clear(node: u32) {

@@ -1,6 +1,6 @@
 // The forces of cells are added up already; the next instant begins at zero.
 
-@group(2) @binding(0) var<storage, read_write> forces: array<atomic<f32>>;
+@group(1) @binding(0) var<storage, read_write> forces: array<atomic<f32>>;
 
 fn internal_force(node: u32) -> vec4f {
     let place = 4u * node;

@@ -20,7 +20,11 @@ fn external_force(node: u32, mass: f32) -> vec3f {
         if load == CORNER {
             force += entry.y * corner_forces[bitcast<u32>(entry.x)].xyz;
         } else {
-            force += table[instant.row + LOADS + load] * entry.xyz;
+            // A load of any size, even without limit, does nothing while its factor is zero.
+            let factor = table[instant.row + LOADS + load];
+            if factor != 0.0 {
+                force += factor * entry.xyz;
+            }
         }
     }
     return force;

@@ -1,4 +1,4 @@
-// The motion of nodes.
+// The motion of nodes: what resists it, and what holds them.
 
 struct Hold {
     // The constraint on each component, FREE without.
@@ -9,18 +9,13 @@ struct Hold {
 
 const FREE = 0xffffffffu;
 
-@group(1) @binding(0) var<storage, read_write> displacement: array<vec4f>;
-// Those before the instant …
-@group(1) @binding(1) var<storage, read_write> increment: array<vec4f>;
-// … and those after it.
-@group(1) @binding(2) var<storage, read_write> next_increment: array<vec4f>;
 // Inertia [kg], α [1/s], mass [kg], and which of `holds`.
-@group(1) @binding(3) var<storage, read> nodes: array<vec4f>;
-@group(1) @binding(4) var<storage, read> holds: array<Hold>;
+@group(2) @binding(3) var<storage, read> nodes: array<vec4f>;
+@group(2) @binding(4) var<storage, read> holds: array<Hold>;
 
-// Moves a node on by an increment, and where it is held to its place.
-fn go(node: u32, by: vec3f, held: u32) {
-    var u = displacement[node].xyz + by;
+// Where a node is to go, and where it is held its place.
+fn placed(place: vec3f, held: u32) -> vec3f {
+    var u = place;
     if held != FREE {
         let hold = holds[held];
         for (var c = 0u; c < 3u; c++) {
@@ -29,7 +24,5 @@ fn go(node: u32, by: vec3f, held: u32) {
             }
         }
     }
-    displacement[node] = vec4f(u, 0.0);
-    increment[node] = vec4f(by, 0.0);
-    clear(node);
+    return u;
 }

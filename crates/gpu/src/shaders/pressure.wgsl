@@ -31,7 +31,12 @@ fn main(
     }
     let first = 4u * face;
     let load = bitcast<u32>(corner_rest[first + 1u].w);
-    let pull = -corner_rest[first].w * table[instant.row + LOADS + load];
+    let factor = table[instant.row + LOADS + load];
+    // Of any size, even without limit.
+    var pull = 0.0;
+    if factor != 0.0 {
+        pull = -corner_rest[first].w * factor;
+    }
     let origin = carried(first);
     var x = array<vec3f, 4>();
     let corners = bitcast<u32>(corner_rest[first + 2u].w);

@@ -77,7 +77,7 @@ fn measure(cells: usize, device: Option<&Device>) -> Result<Vec<[f64; 4]>, CaseE
         Some(device) => {
             let mut running = Vec::new();
             for Specimen { model, .. } in &cubes {
-                let (design, state) = (Design::default(), State::at_rest(model));
+                let (design, state) = (Design::usual(device.adapter().kind), State::at_rest(model));
                 running.push(ClockedOnDevice::new(device, model, step, design, state)?);
             }
             interleaved(&mut running, REPEATS_ON_DEVICE, steps)

@@ -1,0 +1,95 @@
+// Central differences: the coming increment of a node from the one before; twin of stepper.rs, which has the formulas.
+
+// Of each group: kinetic energy, damping power, internal work before and after; external work before and after, energy of
+// hourglass control, shock; then internal and external work and damping power of all instants that were passed over.
+@group(2) @binding(6) var<storage, read_write> sums: array<vec4f>;
+
+var<workgroup> terms: array<vec4f, GROUP>;
+
+// The sum over a group.
+fn total(local: u32, value: vec4f) -> vec4f {
+    workgroupBarrier();
+    terms[local] = value;
+    for (var half = GROUP / 2u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if local < half {
+            terms[local] += terms[local + half];
+        }
+    }
+    workgroupBarrier();
+    return terms[0];
+}
+
+// Enters the work of a group at an instant that is passed over.
+fn pass_over(group: u32, work: vec4f) {
+    let at = 3u * group + 2u;
+    sums[at] = select(sums[at], vec4f(0.0), instant.index == 1u) + work;
+}
+
+// A node at an instant.
+struct Motion {
+    inertia: f32,
+    held: u32,
+    // Increments before and after [m].
+    before: vec3f,
+    next: vec3f,
+    // What the one before would be in a step as long as the one to come [m].
+    same_speed: vec3f,
+    internal: vec3f,
+    // With the reaction of what holds it [N].
+    applied: vec3f,
+    reaction: vec3f,
+    // What the start adds to the velocity [m/s].
+    shock: vec3f,
+}
+
+fn motion(node: u32, internal: vec3f) -> Motion {
+    let of_node = nodes[node];
+    let inertia = of_node.x;
+    let damping = of_node.y;
+    let held = bitcast<u32>(of_node.w);
+    var applied = external_force(node, of_node.z);
+    var before = increment[node].xyz;
+    var shock = vec3f(0.0);
+    if does(STARTS) {
+        let half = 0.5 * instant.before * instant.before;
+        let acceleration = (applied - internal) / inertia - damping * before;
+        before = instant.before * before - half * acceleration;
+        shock = half / instant.before * acceleration;
+    }
+    var same_speed = before * instant.ratio;
+    let a = damping * instant.half_mean;
+    var next = ((1.0 - a) * same_speed + instant.push / inertia * (applied - internal)) / (1.0 + a);
+    var reaction = vec3f(0.0);
+    if held != FREE {
+        let hold = holds[held];
+        for (var c = 0u; c < 3u; c++) {
+            if hold.owner[c] == FREE {
+                continue;
+            }
+            if does(STARTS) {
+                before[c] = 0.0;
+                same_speed[c] = 0.0;
+                shock[c] = 0.0;
+            }
+            next[c] = hold.amplitude[c] * table[instant.row + 2u * hold.owner[c]];
+            let velocity = (same_speed[c] + next[c]) * instant.per_two_steps;
+            let acceleration = (next[c] - same_speed[c]) * instant.per_push + damping * velocity;
+            reaction[c] = inertia * acceleration + internal[c] - applied[c];
+            applied[c] += reaction[c];
+        }
+    }
+    return Motion(inertia, held, before, next, same_speed, internal, applied, reaction, shock);
+}
+
+// Twice the kinetic energy [J].
+fn twice_kinetic(m: Motion) -> f32 {
+    let velocity = (m.same_speed + m.next) * instant.per_two_steps;
+    return m.inertia * dot(velocity, velocity);
+}
+
+// Internal and external work and damping power of an instant that is passed over.
+fn work(m: Motion, damping: f32) -> vec4f {
+    let both = 0.5 * (m.before + m.next);
+    return vec4f(dot(m.internal, both), dot(m.applied, both), damping * twice_kinetic(m), 0.0);
+}

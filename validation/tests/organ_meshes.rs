@@ -1,0 +1,92 @@
+//! Meshes of the label images of the analytic organs, made for the time step: the meshing specification's T2, T3 and T5.
+//! τ = Δt c / h with h = (V / nodes)^(1/3) compares meshes of different density; Δt is the true limit. Of the same organs,
+//! TetGen gives τ = 0.02 to 0.29, fTetWild 0.19, Gmsh 0.29 to 0.52, and the ideal lattice 0.73.
+
+use pliant_geometry::{Mesh, Vector3};
+use pliant_imaging::{Cleaning, LabelImage, Smoothing};
+use pliant_meshing::{Anatomy, OrganMesh, OrganTets};
+use pliant_validation::{Specimen, elastic, law, run};
+use serde_json::json;
+
+#[allow(dead_code)]
+#[path = "../../crates/meshing/tests/meshing/images.rs"]
+mod images;
+
+const YOUNG: f64 = 3000.0;
+const POISSON: f64 = 0.45;
+const DENSITY: f64 = 1000.0;
+
+fn specimen(mesh: Mesh) -> Specimen {
+    let tissue = law("neo-hookean", json!({ "young-modulus": YOUNG, "poisson-ratio": POISSON }));
+    Specimen::new(mesh, &elastic(tissue), [0.0; 3])
+}
+
+fn organ(image: &LabelImage, labels: &[i32], edge: f64, origin: Vector3) -> OrganMesh {
+    let cleaning = Cleaning { keep_largest: true, ..Cleaning::default() };
+    let (anatomy, _) = Anatomy::from_image(image, labels, &cleaning, &Smoothing::default(), &|_| {}).unwrap();
+    let request = OrganTets { origin: Some(origin), ..OrganTets::new(edge) };
+    request.mesh(&anatomy, &|_| {}).unwrap()
+}
+
+/// The true limit [s] and τ.
+fn limit(made: &OrganMesh) -> [f64; 2] {
+    let limit = specimen(made.mesh.clone()).true_limit();
+    let modulus = YOUNG * (1.0 - POISSON) / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON));
+    let volume: f64 = made.report.materials.iter().map(|material| material.volume).sum();
+    let h = (volume / made.report.nodes as f64).cbrt();
+    [limit, limit * (modulus / DENSITY).sqrt() / h]
+}
+
+fn check(name: &str, image: &LabelImage, labels: &[i32], edge: f64, least: f64) {
+    let made = organ(image, labels, edge, Vector3::zeros());
+    let [step, tau] = limit(&made);
+    println!(
+        "{name} at {:.0} mm: {} nodes, {} tets, least acoustic length {:.3} of ideal, true limit {:.3} ms, τ {tau:.3}",
+        edge * 1e3,
+        made.report.nodes,
+        made.report.tets,
+        made.report.acoustic_part,
+        step * 1e3
+    );
+    assert!(made.report.acoustic_part >= 0.75);
+    assert!(tau >= least, "τ = {tau}");
+}
+
+#[test]
+fn the_liver_at_10_mm_has_the_step_of_the_specification() {
+    check("liver", &images::liver(), &[1], 0.010, 0.58);
+}
+
+#[test]
+fn the_brain_at_10_mm_has_the_step_of_the_specification() {
+    check("brain", &images::whole_brain(), &[1], 0.010, 0.58);
+}
+
+#[test]
+fn inner_materials_do_not_cost_the_step() {
+    check("brain with ventricles and tumour", &images::brain(), &[1, 2, 3], 0.010, 0.58);
+}
+
+#[test]
+#[ignore = "slow: 10 s in release"]
+fn organs_at_5_mm_have_the_step_of_the_specification() {
+    check("liver", &images::liver(), &[1], 0.005, 0.56);
+    check("brain with ventricles and tumour", &images::brain(), &[1, 2, 3], 0.005, 0.56);
+}
+
+/// T5: 0.95 of the true limit runs 10⁴ steps, 1.1 of it diverges.
+#[test]
+#[ignore = "slow: 10⁴ steps"]
+fn the_true_limit_of_an_organ_is_sharp() {
+    let mesh = organ(&images::liver(), &[1], 0.010, Vector3::zeros()).mesh;
+    let held = specimen(mesh).fix("z-min", [true; 3]).falling([1e-3, 2e-3, -3e-3]);
+    let limit = held.true_limit();
+    let mut steps = 0;
+    run::<f64>(&held.model, 0.95 * limit, 1e4 * 0.95 * limit, |_, state| steps = state.steps)
+        .unwrap_or_else(|error| panic!("0.95 of the true limit: {error}"));
+    println!("0.95 of the true limit {:.4} ms: {steps} steps", limit * 1e3);
+    assert!(steps >= 10_000);
+    let failure = run::<f64>(&held.model, 1.1 * limit, 1e4 * limit, |_, state| steps = state.steps);
+    let failure = failure.err().expect("1.1 of the true limit diverges");
+    println!("1.1 of the true limit fails after {steps} steps: {failure}");
+}
