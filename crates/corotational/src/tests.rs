@@ -138,11 +138,11 @@ fn bad_shells_are_told_with_their_element() {
     thin.thickness = vec![0.1; 5];
     assert!(refuse(&thin).contains("32 elements and 5"));
     let mut soft = good.clone();
-    soft.material.elastic.young = 0.0;
+    soft.material[0].elastic.young = 0.0;
     assert!(refuse(&soft).contains("Young's modulus"));
-    soft.material.elastic = Elasticity { young: 1.0, poisson: 1.0 };
+    soft.material[0].elastic = Elasticity { young: 1.0, poisson: 1.0 };
     assert!(refuse(&soft).contains("Poisson's ratio"));
-    soft.material = Material { density: f64::NAN, ..MATERIAL };
+    soft.material[0] = Material { density: f64::NAN, ..MATERIAL };
     assert!(refuse(&soft).contains("density"));
     let with = |cell: [u32; 3]| Shell { cells: [cells.clone(), vec![cell]].concat(), ..good.clone() };
     assert!(

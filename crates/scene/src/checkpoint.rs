@@ -232,13 +232,6 @@ fn differing(parts: &[String]) -> String {
     }
 }
 
-fn word(solver: SolverName) -> &'static str {
-    match solver {
-        SolverName::Explicit => "explicit",
-        SolverName::QuasiStatic => "quasi-static",
-    }
-}
-
 impl Origin {
     fn of(scene: &Scene, built: &Built, plan: &Plan) -> Self {
         let mut parts = built.model.fingerprints();
@@ -264,7 +257,7 @@ impl Origin {
             return Err(ResumeError::OtherPrecision { checkpoint, scene });
         }
         if own.solver != self.solver {
-            let [checkpoint, scene] = [self.solver, own.solver].map(word);
+            let [checkpoint, scene] = [self.solver, own.solver].map(SolverName::word);
             return Err(ResumeError::OtherSolver { checkpoint, scene });
         }
         if own.parts != self.parts {
@@ -278,7 +271,7 @@ impl Origin {
             let until = (own.until != self.until).then_some(self.until);
             return Err(ResumeError::OtherScene { parts, until });
         }
-        let step = plan.steps_of(scene, self.until).1;
+        let step = plan.steps_of(scene, built, self.until).1;
         if step != self.step {
             return Err(ResumeError::OtherStep { checkpoint: self.step, scene: step });
         }

@@ -7,6 +7,8 @@ use pliant_mechanics::{
     CentralDifference, DynamicRelaxation, Equilibrium, Iteration, Observable, Real, RelaxationSettings, State,
 };
 
+use serde::Serialize;
+
 use crate::build::Built;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
@@ -23,6 +25,31 @@ pub struct LoadStepProgress {
     pub iteration: Iteration,
     /// The relative residual at which it is found.
     pub tolerance: f64,
+}
+
+/// What the equations of an implicit or a static run took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Effort {
+    /// Iterations of Newton's method in all.
+    pub newton_iterations: u64,
+    /// Linear equations solved.
+    pub solutions: u64,
+    /// Iterations of conjugate gradients in all; 0 with factors.
+    pub linear_iterations: u64,
+    /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
+    pub linear_residual: f64,
+    /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.
+    pub residual: Option<f64>,
+    /// Steps that were halved.
+    pub halved: u64,
+    /// Wall time of forces and stiffness of the cells [s].
+    pub seconds_cells: f64,
+    /// Wall time of factorising, or of making the preconditioner [s].
+    pub seconds_factors: f64,
+    /// Wall time of solving with them [s].
+    pub seconds_solution: f64,
+    /// Beginning of the first unstable equilibrium [s], seen from a negative pivot.
+    pub unstable_from: Option<f64>,
 }
 
 /// Brings a state from instant to instant.
@@ -63,12 +90,23 @@ pub(crate) trait Solver<R> {
 
     /// Takes that up again.
     fn resume(&mut self, _equilibrium: Equilibrium<R>) {}
+
+    /// Of shells and co-rotational solids: their state, with rotations.
+    fn corotational(&self) -> Option<&pliant_corotational::State> {
+        None
+    }
+
+    /// What its equations took; `None` of one that solves none.
+    fn effort(&self) -> Option<Effort> {
+        None
+    }
 }
 
 /// Watches the largest stable step of an explicit run; where every node is held there is no limit to watch.
 fn monitor(run: &RunTable, built: &Built, plan: &Plan) -> Option<Monitor> {
     let on_unstable = run.on_unstable.unwrap_or_default();
-    (plan.limit.step.is_finite()).then(|| Monitor::new(&built.model, plan.limit.step, on_unstable))
+    let limit = plan.limits.as_ref()?.limit.step;
+    limit.is_finite().then(|| Monitor::new(&built.model, limit, on_unstable))
 }
 
 /// The solver that a scene asks for, on the processor.
@@ -86,6 +124,10 @@ pub(crate) fn on_processor<'m, R: Real>(
                 Some(monitor) => Box::new(stepper.watched(monitor)),
                 None => Box::new(stepper),
             }
+        }
+        // Refused when the model was built.
+        SolverName::Implicit | SolverName::Static => {
+            return Err(FailureSummary::input(&"this solver is for shells and co-rotational solids"));
         }
         SolverName::QuasiStatic => {
             let precise = RelaxationSettings::default().tolerance;
