@@ -1,6 +1,6 @@
 //! Runs of shells and co-rotational solids behind the face of all solvers.
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 use pliant_corotational as corotational;
 use pliant_corotational::{
     BackwardEuler, DynamicSettings, Explicit, Forces, LinearSolver, Phases, Preconditioner, SolveError,
@@ -8,12 +8,13 @@ use pliant_corotational::{
 };
 use pliant_gpu::Wanted;
 use pliant_mechanics::{Energies, Observable, State};
+use serde::{Deserialize, Serialize};
 
 use crate::build::{Built, Control, Corotational};
 use crate::format::{LinearName, LinearWay, PreconditionerName, RunTable, SolverName};
 use crate::output::{FailureSummary, number};
 use crate::plan::Plan;
-use crate::solver::{Effort, LoadStepProgress, Solver};
+use crate::solver::{Effort, LoadStepProgress, Memory, Solver};
 
 /// Iterations from which on a lagged factorisation is made anew.
 const RENEW_AFTER: usize = 10;
@@ -37,6 +38,68 @@ pub(crate) struct Corotated<'m> {
     reactions: Vec<[f64; 3]>,
     evaluated: bool,
     effort: Effort,
+    /// What was taken before the run was resumed.
+    effort_before: Effort,
+}
+
+/// What a resumed run needs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Remembered {
+    state: Snapshot,
+    before: Option<(Vec<f64>, Snapshot)>,
+    energies: Energies,
+    effort: Effort,
+}
+
+impl Remembered {
+    /// Whether it is of a model with so many nodes.
+    pub(crate) fn fits(&self, nodes: usize) -> bool {
+        let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
+        before && self.state.fits(nodes)
+    }
+}
+
+/// A state in plain numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Snapshot {
+    time: f64,
+    load_factor: f64,
+    position: Vec<[f64; 3]>,
+    /// Quaternions (i, j, k, w).
+    rotation: Vec<[f64; 4]>,
+    velocity: Vec<[f64; 3]>,
+    spin: Vec<[f64; 3]>,
+}
+
+impl Snapshot {
+    fn of(state: &corotational::State) -> Self {
+        let plain = |vectors: &[Vector3<f64>]| vectors.iter().map(|&v| v.into()).collect();
+        Self {
+            time: state.time,
+            load_factor: state.load_factor,
+            position: plain(&state.position),
+            rotation: state.rotation.iter().map(|q| q.coords.into()).collect(),
+            velocity: plain(&state.velocity),
+            spin: plain(&state.spin),
+        }
+    }
+
+    fn fits(&self, nodes: usize) -> bool {
+        [self.position.len(), self.rotation.len(), self.velocity.len(), self.spin.len()] == [nodes; 4]
+    }
+
+    fn state(&self) -> corotational::State {
+        let vectors = |plain: &[[f64; 3]]| plain.iter().map(|&v| v.into()).collect();
+        let rotation = |&q: &[f64; 4]| UnitQuaternion::new_unchecked(Quaternion::from(Vector4::from(q)));
+        corotational::State {
+            time: self.time,
+            load_factor: self.load_factor,
+            position: vectors(&self.position),
+            rotation: self.rotation.iter().map(rotation).collect(),
+            velocity: vectors(&self.velocity),
+            spin: vectors(&self.spin),
+        }
+    }
 }
 
 enum Method<'m> {
@@ -93,6 +156,7 @@ impl<'m> Corotated<'m> {
             reactions: vec![[0.0; 3]; built.model.constraints.len()],
             evaluated: false,
             effort: Effort::default(),
+            effort_before: Effort::default(),
             built,
             part,
         })
@@ -168,7 +232,7 @@ impl<'m> Corotated<'m> {
                 self.effort.halved += u64::from(step.parts > 1);
                 self.effort.linear_residual = step.linear.residual;
                 self.effort.residual = if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
-                self.effort.take(solver.phases());
+                self.effort.take(solver.phases(), &self.effort_before);
             }
             Method::Static(solver) => {
                 let step = match self.part.control.map(|control| part_of(control, number, self.steps)) {
@@ -181,7 +245,7 @@ impl<'m> Corotated<'m> {
                 };
                 self.effort.newton_iterations += step.residuals.len().saturating_sub(1) as u64;
                 self.effort.halved += u64::from(step.parts > 1);
-                self.effort.take(solver.phases());
+                self.effort.take(solver.phases(), &self.effort_before);
                 if step.negative_pivots > 0 {
                     self.effort.unstable_from.get_or_insert(until);
                 }
@@ -192,12 +256,13 @@ impl<'m> Corotated<'m> {
 }
 
 impl Effort {
-    fn take(&mut self, phases: Phases) {
-        self.solutions = phases.solutions as u64;
-        self.linear_iterations = phases.iterations as u64;
-        self.seconds_cells = phases.cells.as_secs_f64();
-        self.seconds_factors = phases.preparation.as_secs_f64();
-        self.seconds_solution = phases.solution.as_secs_f64();
+    /// Takes what a solver has spent since it was made, in addition to what was spent before.
+    fn take(&mut self, phases: Phases, before: &Self) {
+        self.solutions = before.solutions + phases.solutions as u64;
+        self.linear_iterations = before.linear_iterations + phases.iterations as u64;
+        self.seconds_cells = before.seconds_cells + phases.cells.as_secs_f64();
+        self.seconds_factors = before.seconds_factors + phases.preparation.as_secs_f64();
+        self.seconds_solution = before.seconds_solution + phases.solution.as_secs_f64();
     }
 }
 
@@ -274,6 +339,22 @@ impl Solver<f64> for Corotated<'_> {
 
     fn observable(&self) -> &dyn Observable<f64> {
         self
+    }
+
+    fn memory(&self) -> Memory<f64> {
+        let before = self.before.as_ref().map(|(forces, state)| (forces.clone(), Snapshot::of(state)));
+        let (energies, effort) = (self.energies, self.effort.clone());
+        Memory::Corotated(Box::new(Remembered { state: Snapshot::of(&self.state), before, energies, effort }))
+    }
+
+    fn resume(&mut self, memory: Memory<f64>) {
+        let Memory::Corotated(remembered) = memory else { return };
+        let Remembered { state, before, energies, effort } = *remembered;
+        self.state = state.state();
+        self.before = before.map(|(forces, state)| (forces, state.state()));
+        self.energies = energies;
+        (self.effort, self.effort_before) = (effort.clone(), effort);
+        self.evaluated = false;
     }
 
     fn corotational(&self) -> Option<&corotational::State> {

@@ -19,7 +19,7 @@ use crate::output::{
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::corotational::Corotated;
-use crate::solver::{Effort, LoadStepProgress, Solver, on_device, on_processor};
+use crate::solver::{Effort, LoadStepProgress, Memory, Solver, on_device, on_processor};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -266,7 +266,7 @@ fn beginning<R: Real>(
         Some(checkpoint) => checkpoint
             .moment(built)
             .ok_or_else(|| OutputError::new(folder.path(), "the checkpoint is of another model")),
-        None => Ok(Moment { state: State::at_rest(&built.model), equilibrium: None }),
+        None => Ok(Moment { state: State::at_rest(&built.model), memory: Memory::Nothing }),
     }
 }
 
@@ -309,7 +309,7 @@ impl<'a, R: Real> Course<'a, R> {
         plan: &'a Plan,
         folder: &'a OutputFolder,
         options: Options<'_>,
-        Moment { state, equilibrium }: Moment<R>,
+        Moment { state, memory }: Moment<R>,
         mut solver: Box<dyn Solver<R> + 'a>,
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
@@ -317,7 +317,7 @@ impl<'a, R: Real> Course<'a, R> {
         let samples = if plan.target.device.is_some() { SAMPLES_ON_DEVICE } else { SAMPLES };
         let written = before.map(|before| before.outputs.as_slice());
         let watching = observers::<R>(scene, built, folder.path(), &mut files, written)?;
-        equilibrium.into_iter().for_each(|equilibrium| solver.resume(equilibrium));
+        solver.resume(memory);
         Ok(Self {
             scene,
             built,
@@ -402,7 +402,7 @@ impl<'a, R: Real> Course<'a, R> {
                 sampling: self.sampling,
                 outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
             };
-            let written = checkpoints.write(&progressed, &self.state, self.solver.equilibrium());
+            let written = checkpoints.write(&progressed, &self.state, &self.solver.memory());
             self.kept = Some(written.map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?);
         }
         // What is left of the last instant is quickly done.

@@ -7,9 +7,10 @@ use pliant_mechanics::{
     CentralDifference, DynamicRelaxation, Equilibrium, Iteration, Observable, Real, RelaxationSettings, State,
 };
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::build::Built;
+use crate::corotational::Remembered;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
@@ -27,8 +28,31 @@ pub struct LoadStepProgress {
     pub tolerance: f64,
 }
 
+/// What a solver needs beside the state to go on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Memory<R> {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The equilibrium last found.
+    Equilibrium(Equilibrium<R>),
+    /// Of shells and co-rotational solids.
+    Corotated(Box<Remembered>),
+}
+
+impl<R> Memory<R> {
+    /// Whether it is one of a model with so many nodes.
+    pub(crate) fn fits(&self, nodes: usize) -> bool {
+        match self {
+            Self::Nothing => true,
+            Self::Equilibrium(equilibrium) => equilibrium.residual.len() == nodes,
+            Self::Corotated(remembered) => remembered.fits(nodes),
+        }
+    }
+}
+
 /// What the equations of an implicit or a static run took.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
     /// Iterations of Newton's method in all.
     pub newton_iterations: u64,
@@ -84,12 +108,12 @@ pub(crate) trait Solver<R> {
 
     /// What a restart needs beside the state, after [`advance`](Self::advance): nothing where
     /// [`evaluate`](Self::evaluate) finds everything anew.
-    fn equilibrium(&self) -> Option<Equilibrium<R>> {
-        None
+    fn memory(&self) -> Memory<R> {
+        Memory::Nothing
     }
 
     /// Takes that up again.
-    fn resume(&mut self, _equilibrium: Equilibrium<R>) {}
+    fn resume(&mut self, _memory: Memory<R>) {}
 
     /// Of shells and co-rotational solids: their state, with rotations.
     fn corotational(&self) -> Option<&pliant_corotational::State> {
@@ -264,12 +288,14 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
         &self.relaxation
     }
 
-    fn equilibrium(&self) -> Option<Equilibrium<R>> {
-        Some(self.relaxation.equilibrium())
+    fn memory(&self) -> Memory<R> {
+        Memory::Equilibrium(self.relaxation.equilibrium())
     }
 
-    fn resume(&mut self, equilibrium: Equilibrium<R>) {
-        self.relaxation.resume(equilibrium);
+    fn resume(&mut self, memory: Memory<R>) {
+        if let Memory::Equilibrium(equilibrium) = memory {
+            self.relaxation.resume(equilibrium);
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use pliant_corotational::element::{Bending, Elasticity, Formulation, Membrane};
 use pliant_corotational::{Material, ModelError, Motion, Shell, Spread, Spring, State};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::fingerprint;
 
 use super::bodies::{Draft, nodes};
 use super::meshes::surface_of;
@@ -99,9 +100,10 @@ impl Builder<'_> {
             let message = format!("bodies of model `{}` are computed in double precision only", table.model.word());
             self.error(&["run", "precision"], message, "not for these bodies", "leave `precision` out");
         }
-        if scene.run.checkpoint.is_some() {
-            let message = format!("there are no checkpoints for bodies of model `{}`", table.model.word());
-            self.error(&["run", "checkpoint"], message, "not for these bodies", "leave it out");
+        if scene.run.checkpoint.is_some() && scene.run.control.as_ref().is_some_and(|c| c.arc_length.is_some()) {
+            let message = "there are no checkpoints of a run by arc length, which goes on in the direction of its last step";
+            let help = "leave it out, or control a displacement";
+            self.error(&["run", "checkpoint"], message, "not with `arc-length`", help);
         }
         if scene.run.mass_scaling.is_some() {
             let message = format!("mass is not scaled for bodies of model `{}`", table.model.word());
@@ -886,6 +888,19 @@ impl Corotational {
         };
         let (BodyCells::Facets(range) | BodyCells::Tets(range)) = self.cells.get(body)?;
         Some((range.len(), volume))
+    }
+
+    /// Each part of the model in words with a number that tells it from others; see [`fingerprint`].
+    pub(crate) fn fingerprints(&self) -> Vec<(String, u64)> {
+        let model = &self.model;
+        vec![
+            ("the mesh, thickness or material of shells".into(), fingerprint(&model.facets)),
+            ("the mesh or material of co-rotational solids".into(), fingerprint(&model.tets)),
+            ("constraints".into(), fingerprint(&(&model.constraints, &model.springs))),
+            ("loads or their control".into(), fingerprint(&(&model.loads, &self.control))),
+            ("creases".into(), fingerprint(&(&model.normals, &model.corner_normals))),
+            ("damping".into(), fingerprint(&[model.mass_damping, model.stiffness_damping])),
+        ]
     }
 
     /// The facet or the tetrahedron of a model that an error names: its body and its number in the body's mesh.
