@@ -8,6 +8,7 @@ use pliant_mechanics::curve::Curve;
 use crate::element::{Elasticity, Formulation};
 use crate::error::ModelError;
 use crate::facet::Facet;
+use crate::surface::Carried;
 use crate::tet::Tet;
 
 /// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
@@ -171,6 +172,14 @@ pub enum LoadKind {
         /// How it comes to the nodes.
         spread: Spread,
     },
+    /// Forces with fixed directions on points that the curved surface carries, by Jᵀ of the current state to forces and moments. How
+    /// these change with the state is left out of the stiffness.
+    Carried {
+        /// The points.
+        points: Vec<Carried>,
+        /// Force on each [N]; points beyond the last have none.
+        forces: Vec<Vector3<f64>>,
+    },
 }
 
 /// How a pressure on a shell comes to its nodes.
@@ -203,7 +212,9 @@ pub enum Motion {
     Fixed,
     /// They move.
     Moved {
-        /// Displacements [m] and rotations [rad] at a factor of 1; rotations about one axis only.
+        /// Displacement [m] and rotation vector [rad] at a factor of 1. With all three spins constrained a node turns by
+        /// exp(factor · vector) exactly, about any axis by any angle; with fewer, those components of its spin are prescribed. Constraints
+        /// with courses of their own on the same node about different axes do not commute.
         by: [f64; 6],
         /// Factor over time.
         curve: Curve,

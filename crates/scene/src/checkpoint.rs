@@ -520,7 +520,7 @@ mod tests {
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
         };
-        encode(&Origin::of(&scene, &built, &plan), &progressed, &state, &None).unwrap()
+        encode(&Origin::of(&scene, &built, &plan), &progressed, &state, &Memory::Nothing).unwrap()
     }
 
     #[test]

@@ -174,6 +174,10 @@ fn describe_corotational_load(kind: &pliant_corotational::LoadKind) -> String {
         LoadKind::Pressure { cells, pressure, .. } => {
             format!("{} Pa on {}", number(*pressure), counted(cells.len(), "triangle"))
         }
+        LoadKind::Carried { forces, .. } => {
+            let sum = forces.iter().sum::<nalgebra::Vector3<f64>>();
+            format!("{} N in all on {}", vector(&sum), counted(forces.len(), "carried point"))
+        }
     }
 }
 

@@ -5,7 +5,9 @@ use std::ops::Range;
 
 use pliant_corotational as corotational;
 use pliant_corotational::element::{Bending, Elasticity, Formulation, Membrane};
-use pliant_corotational::{Material, ModelError, Motion, Shell, Spread, Spring, State};
+use pliant_corotational::{
+    Carried, CurvedSurface, Material, ModelError, Motion, Shell, Spread, Spring, State,
+};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::fingerprint;
@@ -31,6 +33,10 @@ pub struct Corotational {
     pub control: Option<Control>,
     /// The state that a run starts from.
     pub start: State,
+    /// The curved surface of the shells, if something is carried by it.
+    pub surface: Option<CurvedSurface>,
+    /// The points of each of the scene's surfaces that a shell carries.
+    pub carried: BTreeMap<usize, Vec<Carried>>,
 }
 
 /// The cells of a body, in the order of its mesh.
@@ -468,7 +474,14 @@ impl Builder<'_> {
 impl Corotational {
     fn new() -> Self {
         let model = corotational::Model::default();
-        Self { start: State::at_rest(&model), model, cells: Vec::new(), control: None }
+        Self {
+            start: State::at_rest(&model),
+            model,
+            cells: Vec::new(),
+            control: None,
+            surface: None,
+            carried: BTreeMap::new(),
+        }
     }
 }
 
@@ -476,7 +489,7 @@ impl Corotational {
 impl Builder<'_> {
     /// Whether the nodes of a body turn.
     fn has_rotations(&self, body: usize) -> bool {
-        self.corotational.as_ref().is_some_and(|part| matches!(part.cells.get(body), Some(BodyCells::Facets(_))))
+        self.shell_cells(body).is_some()
     }
 
     /// The components of a constraint: translations and rotations. By default all translations, and rotations if the body has
@@ -620,11 +633,9 @@ impl Builder<'_> {
         if let LoadTable::Gravity(gravity) = table {
             return self.corotational_gravity(gravity, path);
         }
-        let on = table.on()?;
-        let Target::Body(body) = self.find_target(on, &at("on"))? else {
-            let message = "loads on surfaces that shells and co-rotational solids carry are not there yet";
-            self.error(&at("on"), message, "a carried surface", "load the body itself");
-            return None;
+        let body = match self.find_target(table.on()?, &at("on"))? {
+            Target::Body(body) => body,
+            Target::Surface(surface) => return self.load_on_surface(table, surface, path),
         };
         let shell = self.has_rotations(body);
         Some(match table {
@@ -664,6 +675,43 @@ impl Builder<'_> {
             }
             LoadTable::Gravity(_) => return None,
         })
+    }
+
+    /// A load on a surface that a shell or a co-rotational solid carries.
+    fn load_on_surface(
+        &mut self,
+        table: &LoadTable,
+        surface: usize,
+        path: &[&str],
+    ) -> Option<Vec<corotational::LoadKind>> {
+        let at = |key| [path, &[key]].concat();
+        let target = Target::Surface(surface);
+        let forces = match table {
+            LoadTable::Force(force) => match self.nodal_forces(force, target, path)? {
+                pliant_mechanics::load::LoadKind::Forces(forces) => forces,
+                _ => return None,
+            },
+            LoadTable::Traction(traction) => {
+                let faces = self.faces(target, &traction.faces, &at("faces"))?;
+                self.traction_forces(target, &faces, traction.traction)
+            }
+            _ => {
+                let message = "a carried surface takes forces and tractions";
+                self.error(&at("on"), message, "a carried surface", "load the body itself");
+                return None;
+            }
+        };
+        let part = self.corotational.as_ref()?;
+        if let Some(points) = part.carried.get(&surface) {
+            let (points, forces) =
+                forces.iter().map(|&(node, force)| (points[node as usize], Vector3::from(force))).unzip();
+            return Some(vec![corotational::LoadKind::Carried { points, forces }]);
+        }
+        let mapping = &self.model.surfaces[surface].mapping;
+        let nodal = forces.iter().flat_map(|&(point, force)| {
+            mapping.row(point as usize).map(move |(node, weight)| (node as u32, force.map(|f| f * weight)))
+        });
+        Some(single_forces(&nodal.collect::<Vec<_>>()))
     }
 
     fn corotational_gravity(
@@ -732,17 +780,21 @@ impl Builder<'_> {
         Some(corotational::LoadKind::Pressure { cells, pressure: table.pressure, spread })
     }
 
+    /// The facets of a shell, numbered in the model; `None` for another body.
+    pub(super) fn shell_cells(&self, body: usize) -> Option<Vec<u32>> {
+        match self.corotational.as_ref()?.cells.get(body)? {
+            BodyCells::Facets(range) => Some(range.clone().collect()),
+            BodyCells::Tets(_) => None,
+        }
+    }
+
     /// The selected facets of a shell, numbered in the model.
     fn facets(&mut self, body: usize, selection: &pliant_geometry::Selection, path: &[&str]) -> Option<Vec<u32>> {
-        let Some(BodyCells::Facets(range)) =
-            self.corotational.as_ref().and_then(|part| part.cells.get(body)).cloned()
-        else {
-            return None;
-        };
+        let cells = self.shell_cells(body)?;
         let built = &self.bodies[body];
         match selection.faces(&built.mesh, &built.boundary) {
             Ok(faces) => {
-                let cell = |face: u32| range.start + built.boundary.faces[face as usize].parent.index;
+                let cell = |face: u32| cells[built.boundary.faces[face as usize].parent.index as usize];
                 Some(faces.into_iter().map(cell).collect())
             }
             Err(error) => {
@@ -754,13 +806,9 @@ impl Builder<'_> {
 
     /// The edges of one triangle only both of whose ends are among some nodes of the model (increasing).
     fn border_edges(&self, body: usize, nodes: &[u32]) -> Vec<[u32; 2]> {
-        let (Some(part), Some(BodyCells::Facets(range))) =
-            (&self.corotational, self.corotational.as_ref().and_then(|part| part.cells.get(body)))
-        else {
-            return Vec::new();
-        };
+        let (Some(part), Some(cells)) = (&self.corotational, self.shell_cells(body)) else { return Vec::new() };
         let mut count: BTreeMap<[u32; 2], u32> = BTreeMap::new();
-        for facet in &part.model.facets[range.start as usize..range.end as usize] {
+        for facet in cells.iter().map(|&cell| &part.model.facets[cell as usize]) {
             for corner in 0..3 {
                 let [a, b] = [facet.nodes[corner], facet.nodes[(corner + 1) % 3]];
                 *count.entry([a.min(b), a.max(b)]).or_default() += 1;

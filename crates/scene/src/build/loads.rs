@@ -163,9 +163,9 @@ impl Builder<'_> {
     fn check_vtu(&mut self, table: &VtuTable, path: &[&str]) {
         let at = |key| [path, &[key]].concat();
         let target = table.on.as_ref().map(|on| self.find_target(on, &at("on")));
-        if let Some(Some(Target::Surface(_))) = target {
+        if let Some(Some(Target::Surface(surface))) = target {
             let help = "write displacement and velocity on surfaces, stresses on the body";
-            self.refuse_cell_fields(&table.data, &at("data"), help);
+            self.refuse_cell_fields(&table.data, surface, &at("data"), help);
         }
         let body = match target {
             None => None,
@@ -231,8 +231,8 @@ impl Builder<'_> {
     fn check_probe(&mut self, name: &str, probe: &ProbeTable, path: &[&str]) {
         let at = |key| [path, &[key]].concat();
         match self.find_target(&probe.on, &at("on")) {
-            Some(Target::Surface(_)) => {
-                self.refuse_cell_fields(&probe.data, &at("data"), "probe the body for stresses");
+            Some(Target::Surface(surface)) => {
+                self.refuse_cell_fields(&probe.data, surface, &at("data"), "probe the body for stresses");
             }
             Some(Target::Body(body)) => {
                 self.refuse_other_fields(&probe.data, Some(body), &at("data"));
@@ -252,7 +252,17 @@ impl Builder<'_> {
     }
 
     /// A carried surface has no cells whose stress could be told.
-    fn refuse_cell_fields(&mut self, fields: &[FieldName], path: &[&str], help: &str) {
+    fn refuse_cell_fields(&mut self, fields: &[FieldName], surface: usize, path: &[&str], help: &str) {
+        let on_shell = self.corotational.as_ref().is_some_and(|part| part.carried.contains_key(&surface));
+        if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {
+            let message = format!("surfaces on shells have a displacement and no `{}`", field.name());
+            self.error(path, message, "not on a surface", "write it on the body");
+            return;
+        }
+        if let Some(FieldName::Rotation) = fields.iter().find(|field| **field == FieldName::Rotation) {
+            self.error(path, "surfaces have no `rotation`", "not on a surface", "write it on the body");
+            return;
+        }
         if let Some(field) = fields.iter().find(|field| !field.is_nodal()) {
             let message =
                 format!("`{}` belongs to cells; a carried surface has none of its body's", field.name());

@@ -525,14 +525,14 @@ mod tests {
             duplicate_cells: vec![[triangle, triangle]],
             ..Diagnosis::default()
         };
-        assert!(problems(&found, &[]).is_empty());
+        assert!(problems(&found, &[], 3).is_empty());
     }
 
     #[test]
     fn reordering_is_offered_once() {
         let found = Diagnosis { inverted_cells: vec![tet(1)], ..Diagnosis::default() };
-        assert!(problems(&found, &[])[0].1.contains("fix = \"reorder\""));
-        assert!(problems(&found, &[Fix::Reorder])[0].1.contains("remesh"));
+        assert!(problems(&found, &[], 3)[0].1.contains("fix = \"reorder\""));
+        assert!(problems(&found, &[Fix::Reorder], 3)[0].1.contains("remesh"));
     }
 
     #[test]

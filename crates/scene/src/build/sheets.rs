@@ -117,7 +117,6 @@ fn described(source: &str, mesh: &Mesh) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::testing::{built_alone, mistakes_alone};
 
     fn shell(mesh: &str) -> String {

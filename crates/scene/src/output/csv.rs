@@ -4,6 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use pliant_corotational::Carried;
 use pliant_geometry::{Locator, Vector3};
 use pliant_mechanics::Real;
 use pliant_mechanics::recover::Recovery;
@@ -43,6 +44,8 @@ enum Place {
     Solid(usize, usize),
     /// A cell of a shell or a co-rotational solid.
     Corotated(fields::Cell),
+    /// A point of a surface that a shell carries.
+    Carried(Carried, Vector3),
 }
 
 pub(crate) const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "external", "hourglass", "balance"];
@@ -160,6 +163,13 @@ impl Rows {
     }
 }
 
+/// Where a point of a surface on a shell is [m].
+fn carried<R>(frame: &Frame<'_, R>, point: &Carried) -> Vector3 {
+    let part = frame.built.corotational.as_ref();
+    let found = part.and_then(|part| Some(part.surface.as_ref()?.carried(&part.model, frame.corotational?, point)));
+    found.unwrap_or_else(|| Vector3::repeat(f64::NAN))
+}
+
 /// Whether a table begins with these bytes; the reason if not.
 pub(super) fn verify(path: &Path, bytes: u64, crc: u32) -> Result<(), String> {
     let content = fs::read(path).map_err(|error| error.to_string())?;
@@ -223,6 +233,11 @@ impl Probe {
             let nearest = (0..mesh.points.len())
                 .min_by(|&a, &b| distance(&mesh.points[a]).total_cmp(&distance(&mesh.points[b])))
                 .unwrap_or(0);
+            let carried = built.corotational.as_ref().and_then(|part| part.carried.get(&surface));
+            if let Some(points) = carried {
+                let cell = Some(Place::Carried(points[nearest], mesh.points[nearest]));
+                return Self { weights: Vec::new(), cell, fields };
+            }
             let row = built.model.surfaces[surface].mapping.row(nearest);
             return Self {
                 weights: row.map(|(node, weight)| (node as u32, weight)).collect(),
@@ -271,11 +286,13 @@ impl Probe {
     ) {
         let recovered = recovery.zip(self.cell.as_ref()).and_then(|(recovery, place)| match *place {
             Place::Solid(solid, cell) => Some(recovery.cell(solid, cell)),
-            Place::Corotated(_) => None,
+            Place::Corotated(_) | Place::Carried(..) => None,
         });
         for &field in &self.fields {
             let mut value = [0.0; 9];
-            if field.is_nodal() {
+            if let Some(Place::Carried(point, rest)) = &self.cell {
+                value[..3].copy_from_slice((carried(frame, point) - rest).as_slice());
+            } else if field.is_nodal() {
                 for &(node, weight) in &self.weights {
                     let nodal = fields::nodal(frame, field, node as usize);
                     for (v, n) in value.iter_mut().zip(nodal) {

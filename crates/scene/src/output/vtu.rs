@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{MeshFileError, VtuOptions, write_pvd, write_vtu};
-use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::Real;
 use pliant_mechanics::recover::Recovery;
 use rayon::prelude::*;
@@ -103,6 +103,12 @@ impl<R: Real> Series<R> {
     fn fill(&mut self, frame: &Frame<'_, R>) {
         match &mut self.content {
             Content::Surface(index) => {
+                if let Some(displacement) = carried_on_shell(frame, *index) {
+                    let values = displacement.iter().flat_map(|d| [d.x, d.y, d.z]).collect();
+                    let name = FieldName::Displacement.name();
+                    self.mesh.point_data.insert(name.into(), DataArray { components: 3, values });
+                    return;
+                }
                 let mapping = &frame.built.model.surfaces[*index].mapping;
                 for &field in &self.fields {
                     let parent: Vec<[f64; 3]> = (0..frame.built.model.node_count())
@@ -269,6 +275,18 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
         cells.push(places);
     }
     (mesh, Content::Bodies { nodes, cells })
+}
+
+/// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
+pub(super) fn carried_on_shell<R>(frame: &Frame<'_, R>, surface: usize) -> Option<Vec<Vector3>> {
+    let part = frame.built.corotational.as_ref()?;
+    let (points, curved) = (part.carried.get(&surface)?, part.surface.as_ref()?);
+    let mut positions = vec![Vector3::zeros(); points.len()];
+    curved.carried_all(&part.model, frame.corotational?, points, &mut positions);
+    for (position, rest) in positions.iter_mut().zip(&frame.built.surfaces[surface].points) {
+        *position -= rest;
+    }
+    Some(positions)
 }
 
 /// The cells of one shell or co-rotational solid or of all, with the number of the `body` for several.
