@@ -231,7 +231,8 @@ impl<'m> Corotated<'m> {
                 self.effort.newton_iterations += iterations as u64;
                 self.effort.halved += u64::from(step.parts > 1);
                 self.effort.linear_residual = step.linear.residual;
-                self.effort.residual = if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
+                self.effort.residual =
+                    if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
                 self.effort.take(solver.phases(), &self.effort_before);
             }
             Method::Static(solver) => {
@@ -293,7 +294,9 @@ fn linear_solver(way: &LinearWay) -> LinearSolver {
             iterations: table.iterations as usize,
             preconditioner: match table.preconditioner {
                 PreconditionerName::BlockJacobi => Preconditioner::BlockJacobi,
-                PreconditionerName::LaggedFactors => Preconditioner::LaggedFactors { renew_after: RENEW_AFTER },
+                PreconditionerName::LaggedFactors => {
+                    Preconditioner::LaggedFactors { renew_after: RENEW_AFTER }
+                }
             },
         },
     }
@@ -386,7 +389,9 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
         SolveError::Stalled { .. } => ("not-converged", None, None),
-        SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => ("singular", Some(*node), None),
+        SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
+            ("singular", Some(*node), None)
+        }
         SolveError::Indefinite { .. } => ("unstable", None, None),
         SolveError::Broken { cell, .. } => ("inverted", None, part.cell(*cell)),
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
@@ -412,7 +417,10 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     };
     FailureSummary::of_solver(
         kind,
-        format!("after t = {} s{place}: {error}{history}; what was written before stays readable", number(time)),
+        format!(
+            "after t = {} s{place}: {error}{history}; what was written before stays readable",
+            number(time)
+        ),
         body,
         cell.map(|(_, cell)| cell),
         own_node,
