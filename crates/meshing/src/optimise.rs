@@ -35,7 +35,8 @@ const FIT_REACH: f64 = 0.25;
 /// Faces that follow their surface this well (root mean square, in lattice constants) stay.
 const FIT_ENOUGH: f64 = 0.01;
 
-/// Where the aim is still not reached, points round bad tets may leave their surfaces by this, in lattice constants.
+/// Where the aim is still not reached, points round bad tets may leave their surfaces by this, in lattice constants; by the
+/// last only where the target itself is not reached.
 const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
 
 /// Volumes nearer than this part to what they must be are left alone.
@@ -87,8 +88,8 @@ impl<'a> Optimiser<'a> {
             }
             progress(0.6 + 0.3 * (sweep + 1) as f64 / FIT_SWEEPS as f64);
         }
-        for slack in SLACKS {
-            if self.complex.worst() >= aim * self.ideal {
+        for (slack, goal) in [(SLACKS[0], aim), (SLACKS[1], aim), (SLACKS[2], target)] {
+            if self.complex.worst() >= goal * self.ideal {
                 break;
             }
             self.slack = slack * self.edge;

@@ -2,6 +2,8 @@
 
 mod checks;
 mod errors;
+mod images;
+mod organs;
 mod phantoms;
 mod structured;
 mod stuffing;
