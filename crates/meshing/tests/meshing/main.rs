@@ -2,6 +2,8 @@
 
 mod checks;
 mod errors;
+// Validation and an example share these; each uses its part.
+#[allow(dead_code)]
 mod images;
 mod organs;
 mod phantoms;
