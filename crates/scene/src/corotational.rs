@@ -220,6 +220,14 @@ impl<'m> Corotated<'m> {
         }
     }
 
+    /// Puts the displacements where all observers look for them.
+    fn show(&self, state: &mut State<f64>) {
+        let places = self.state.position.iter().zip(&self.part.model.rest);
+        for (own, (position, rest)) in state.displacement.iter_mut().zip(places) {
+            *own = (position - rest).into();
+        }
+    }
+
     /// One step of the method, to the time of its number.
     fn go(&mut self, number: u64) -> Result<(), SolveError> {
         let until = number as f64 * self.step;
@@ -303,10 +311,11 @@ fn linear_solver(way: &LinearWay) -> LinearSolver {
 }
 
 impl Solver<f64> for Corotated<'_> {
-    fn evaluate(&mut self, _state: &mut State<f64>, _wanted: Wanted) -> Result<(), FailureSummary> {
+    fn evaluate(&mut self, state: &mut State<f64>, _wanted: Wanted) -> Result<(), FailureSummary> {
         if self.evaluated {
             return Ok(());
         }
+        self.show(state);
         let found = self.forces.evaluate(&self.state);
         found.map_err(|error| failure(&error, self.built, self.part, self.state.time))?;
         self.find_energies();
@@ -324,11 +333,6 @@ impl Solver<f64> for Corotated<'_> {
         let number = state.steps + 1;
         let time = self.state.time;
         self.go(number).map_err(|error| failure(&error, self.built, self.part, time))?;
-        for (own, (position, rest)) in
-            state.displacement.iter_mut().zip(self.state.position.iter().zip(&self.part.model.rest))
-        {
-            *own = (position - rest).into();
-        }
         state.steps = number;
         state.time = self.state.time;
         self.evaluated = false;

@@ -158,6 +158,7 @@ impl Builder<'_> {
                 ("crease", shell, "a shell"),
                 ("branches", shell, "a shell"),
                 ("stiffness-damping", body.model != BodyModel::Solid, "shells and co-rotational solids"),
+                ("initial-displacement", body.model != BodyModel::Solid, "shells and co-rotational solids"),
                 ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
                 ("fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
                 ("second-fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
@@ -971,14 +972,37 @@ impl Builder<'_> {
         }
     }
 
+    /// Displacements [m] of all nodes at the start, if some body has some.
+    fn initial_displacement(&mut self) -> Option<Vec<Vector3>> {
+        let scene = self.scene;
+        let mut all = None;
+        for (body, (name, table)) in scene.bodies.iter().enumerate() {
+            let Some(wanted) = &table.initial_displacement else { continue };
+            let nodes: Vec<u32> = self.model.bodies[body].nodes.clone().collect();
+            let path = ["body", name.as_str(), "initial-displacement"];
+            let given = self.node_vectors(wanted, body, &nodes, &path)?;
+            let all = all.get_or_insert_with(|| vec![Vector3::zeros(); self.model.rest.len()]);
+            for (&node, vector) in nodes.iter().zip(given) {
+                all[node as usize] = Vector3::from(vector);
+            }
+        }
+        all
+    }
+
     /// Sets the state that a run starts from.
     pub(super) fn start_corotational(&mut self) {
+        let displacement = self.initial_displacement();
         let velocity = std::mem::take(&mut self.model.initial_velocity);
         let Some(part) = &mut self.corotational else {
             self.model.initial_velocity = velocity;
             return;
         };
         part.start = State::at_rest(&part.model);
+        if let Some(displacement) = displacement {
+            let all = part.model.rest.iter().zip(displacement);
+            let positions: Vec<Vector3> = all.map(|(rest, u)| rest + u).collect();
+            part.start.set_positions(&part.model, &positions);
+        }
         for (own, given) in part.start.velocity.iter_mut().zip(velocity) {
             *own = Vector3::from(given);
         }
