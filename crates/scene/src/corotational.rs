@@ -220,6 +220,14 @@ impl<'m> Corotated<'m> {
         }
     }
 
+    /// Puts the displacements where all observers look for them.
+    fn show(&self, state: &mut State<f64>) {
+        let places = self.state.position.iter().zip(&self.part.model.rest);
+        for (own, (position, rest)) in state.displacement.iter_mut().zip(places) {
+            *own = (position - rest).into();
+        }
+    }
+
     /// One step of the method, to the time of its number.
     fn go(&mut self, number: u64) -> Result<(), SolveError> {
         let until = number as f64 * self.step;
@@ -231,7 +239,8 @@ impl<'m> Corotated<'m> {
                 self.effort.newton_iterations += iterations as u64;
                 self.effort.halved += u64::from(step.parts > 1);
                 self.effort.linear_residual = step.linear.residual;
-                self.effort.residual = if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
+                self.effort.residual =
+                    if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
                 self.effort.take(solver.phases(), &self.effort_before);
             }
             Method::Static(solver) => {
@@ -293,17 +302,20 @@ fn linear_solver(way: &LinearWay) -> LinearSolver {
             iterations: table.iterations as usize,
             preconditioner: match table.preconditioner {
                 PreconditionerName::BlockJacobi => Preconditioner::BlockJacobi,
-                PreconditionerName::LaggedFactors => Preconditioner::LaggedFactors { renew_after: RENEW_AFTER },
+                PreconditionerName::LaggedFactors => {
+                    Preconditioner::LaggedFactors { renew_after: RENEW_AFTER }
+                }
             },
         },
     }
 }
 
 impl Solver<f64> for Corotated<'_> {
-    fn evaluate(&mut self, _state: &mut State<f64>, _wanted: Wanted) -> Result<(), FailureSummary> {
+    fn evaluate(&mut self, state: &mut State<f64>, _wanted: Wanted) -> Result<(), FailureSummary> {
         if self.evaluated {
             return Ok(());
         }
+        self.show(state);
         let found = self.forces.evaluate(&self.state);
         found.map_err(|error| failure(&error, self.built, self.part, self.state.time))?;
         self.find_energies();
@@ -321,11 +333,6 @@ impl Solver<f64> for Corotated<'_> {
         let number = state.steps + 1;
         let time = self.state.time;
         self.go(number).map_err(|error| failure(&error, self.built, self.part, time))?;
-        for (own, (position, rest)) in
-            state.displacement.iter_mut().zip(self.state.position.iter().zip(&self.part.model.rest))
-        {
-            *own = (position - rest).into();
-        }
         state.steps = number;
         state.time = self.state.time;
         self.evaluated = false;
@@ -386,7 +393,9 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
         SolveError::Stalled { .. } => ("not-converged", None, None),
-        SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => ("singular", Some(*node), None),
+        SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
+            ("singular", Some(*node), None)
+        }
         SolveError::Indefinite { .. } => ("unstable", None, None),
         SolveError::Broken { cell, .. } => ("inverted", None, part.cell(*cell)),
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
@@ -412,7 +421,10 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     };
     FailureSummary::of_solver(
         kind,
-        format!("after t = {} s{place}: {error}{history}; what was written before stays readable", number(time)),
+        format!(
+            "after t = {} s{place}: {error}{history}; what was written before stays readable",
+            number(time)
+        ),
         body,
         cell.map(|(_, cell)| cell),
         own_node,

@@ -88,6 +88,11 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
             Motion::Fixed => "fixes",
             Motion::Displacement(..) | Motion::Displacements(..) | Motion::Velocity(..) => "moves",
         };
+        let own = built.corotational.iter().flat_map(|part| &part.model.constraints);
+        let turns = own.filter(|own| own.name == constraint.name).flat_map(|own| &own.components[3..]);
+        let rotations: Vec<&str> =
+            ["rx", "ry", "rz"].into_iter().zip(turns).filter(|(_, on)| **on).map(|(axis, _)| axis).collect();
+        let axes = [axes, rotations.join(" ")].join(" ").trim().to_owned();
         let nodes = counted(constraint.nodes.len(), "node");
         writeln!(page, "constraint `{}`: {what} {axes} of {nodes}", constraint.name)?;
     }
@@ -97,7 +102,8 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
     for load in built.corotational.iter().flat_map(|part| &part.model.loads) {
         writeln!(page, "load `{}`: {}", load.name, describe_corotational_load(&load.kind))?;
     }
-    if let Some(springs) = built.corotational.as_ref().map(|part| part.model.springs.len()).filter(|&n| n > 0) {
+    if let Some(springs) = built.corotational.as_ref().map(|part| part.model.springs.len()).filter(|&n| n > 0)
+    {
         writeln!(page, "{} to points", counted(springs, "spring"))?;
     }
     for (name, table) in &scene.outputs {
@@ -148,7 +154,12 @@ fn write_corotational(page: &mut String, part: &Corotational, name: &str, built:
             let area: f64 = facets.iter().map(|facet| facet.area).sum();
             let [thin, thick] = [least(|f| f.thickness), most(|f| f.thickness)].map(number);
             let thickness = if thin == thick { thin } else { format!("{thin} to {thick}") };
-            writeln!(page, "  {} of a shell, {thickness} m thick, {} m²", counted(facets.len(), "triangle"), number(area))?;
+            writeln!(
+                page,
+                "  {} of a shell, {thickness} m thick, {} m²",
+                counted(facets.len(), "triangle"),
+                number(area)
+            )?;
             writeln!(page, "  smallest altitude {} m", number(least(Facet::altitude)))
         }
         BodyCells::Tets(range) => writeln!(page, "  {} co-rotational tets", range.len()),
@@ -160,7 +171,9 @@ fn describe_corotational_load(kind: &pliant_corotational::LoadKind) -> String {
     use pliant_corotational::LoadKind;
     let vector = |v: &nalgebra::Vector3<f64>| format!("({})", [v.x, v.y, v.z].map(number).join(", "));
     match kind {
-        LoadKind::Force { nodes, force } => format!("{} N on each of {}", vector(force), counted(nodes.len(), "node")),
+        LoadKind::Force { nodes, force } => {
+            format!("{} N on each of {}", vector(force), counted(nodes.len(), "node"))
+        }
         LoadKind::Moment { nodes, moment } => {
             format!("{} N m on each of {}", vector(moment), counted(nodes.len(), "node"))
         }
@@ -184,17 +197,14 @@ fn describe_corotational_load(kind: &pliant_corotational::LoadKind) -> String {
 fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> fmt::Result {
     let Some(Limits { bound, limit, limiting }) = &plan.limits else {
         let (step, until, solver) = (number(plan.step), number(scene.scene.until), scene.run.solver.word());
-        return writeln!(page, "\nsolver `{solver}`: {} steps of {step} s for {until} s", plan.steps);
+        let steps = counted(plan.steps as usize, "step");
+        return writeln!(page, "\nsolver `{solver}`: {steps} of {step} s for {until} s");
     };
     let seconds = plan.steps as f64 * limit.seconds_per_call;
     writeln!(page, "\ncritical step:")?;
     writeln!(page, "  element bound {} s, set by {limiting}", number(bound.step))?;
     let calls = limit.force_calls;
-    writeln!(
-        page,
-        "  true limit    {} s (assembled operator, {calls} force calls)",
-        number(limit.step)
-    )?;
+    writeln!(page, "  true limit    {} s (assembled operator, {calls} force calls)", number(limit.step))?;
     writeln!(
         page,
         "  step          {} s, {} steps for {} s",

@@ -99,8 +99,11 @@ fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<Stri
     if scene.run.solver != SolverName::Explicit || step <= stable {
         return Ok(None);
     }
-    let message =
-        format!("the step {} s is above the stable step {} s: it would be unstable", number(step), number(stable));
+    let message = format!(
+        "the step {} s is above the stable step {} s: it would be unstable",
+        number(step),
+        number(stable)
+    );
     let help = "take `step = \"auto\"`, or `solver = \"implicit\"` for long steps";
     let place = scene.source.span(&["run", "step"]);
     Err(Box::new(Diagnostic::error(message).at(place, "too large").help(help)))

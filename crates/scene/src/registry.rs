@@ -11,8 +11,8 @@ use serde_json::{Map, Value as Json, json};
 use crate::checker::{check_skipping, nearest, read_table};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
-    BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MomentTable, MoveTable,
-    PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable, TractionTable, VtuTable,
+    BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MomentTable,
+    MoveTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable, TractionTable, VtuTable,
 };
 use crate::source::{Source, Value};
 

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::build::Built;
 use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
+use crate::corotational::Corotated;
 use crate::format::{Precision, SolverName};
 use crate::output::{
     FailureSummary, Frame, OutputError, OutputFolder, PLOT, SUMMARY, Schedule, Scheduled, Summary, markdown,
@@ -18,7 +19,6 @@ use crate::output::{
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::corotational::Corotated;
 use crate::solver::{Effort, LoadStepProgress, Memory, Solver, on_device, on_processor};
 
 /// How far a run is.
@@ -246,7 +246,11 @@ fn go<'a, R: Real>(
         worst_balance: course.worst_balance,
         balance_floor: course.solver.balance_floor(),
         worst_hourglass: course.worst_hourglass,
-        stability: plan.limits.as_ref().filter(|_| scene.run.solver == SolverName::Explicit).map(|_| course.state.stability),
+        stability: plan
+            .limits
+            .as_ref()
+            .filter(|_| scene.run.solver == SolverName::Explicit)
+            .map(|_| course.state.stability),
         effort: course.solver.effort(),
         reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
         history: course.history,

@@ -27,11 +27,14 @@ impl Builder<'_> {
             let components = self.components(axes.as_deref(), body, turns, &path);
             let nodes = body.and_then(|body| self.body_nodes(body, selection, &[path[0], path[1], "nodes"]));
             let motion = match table {
+                ConstraintTable::Move(moved) if self.corotational.is_some() => {
+                    self.corotational_motion(name, moved, body.zip(nodes.as_deref()))
+                }
                 ConstraintTable::Move(moved) => self.motion(moved, body.zip(nodes.as_deref()), &path),
                 _ => Some(Motion::Fixed),
             };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
-                self.constrain_corotational(name, table, &nodes, components);
+                self.constrain_corotational(name, table, &motion, &nodes, components);
                 let [x, y, z, ..] = components;
                 let components = [x, y, z];
                 self.model.constraints.push(Constraint { name: name.clone(), nodes, components, motion });
@@ -60,7 +63,16 @@ impl Builder<'_> {
                 Some(Motion::Displacements(by?, curve?))
             }
             (None, Some(velocity)) => Some(Motion::Velocity(velocity, curve?)),
-            (None, None) if table.turn.is_some() => Some(Motion::Displacement([0.0; 3], curve?)),
+            (None, None) if table.turn.is_some() => {
+                let message = "the nodes of a solid do not turn by themselves";
+                self.error(
+                    &[path, &["turn"]].concat(),
+                    message,
+                    "not for a `solid`",
+                    "give displacements in `by`",
+                );
+                None
+            }
             (by, _) => {
                 let found = if by.is_some() { "both" } else { "neither" };
                 let message = format!("a motion has exactly one of `by` and `velocity`, found {found}");

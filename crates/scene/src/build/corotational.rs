@@ -10,7 +10,7 @@ use pliant_corotational::{
 };
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::curve::{Curve, Shape};
-use pliant_mechanics::fingerprint;
+use pliant_mechanics::{fingerprint, model};
 
 use super::bodies::{Draft, nodes};
 use super::meshes::surface_of;
@@ -98,15 +98,19 @@ impl Builder<'_> {
             self.error(&["body", first, "model"], message, "not beside a `solid`", help);
         }
         if scene.run.solver == SolverName::QuasiStatic {
-            let message = format!("the solver `quasi-static` is not for bodies of model `{}`", table.model.word());
+            let message =
+                format!("the solver `quasi-static` is not for bodies of model `{}`", table.model.word());
             let help = "take `solver = \"static\"`";
             self.error(&["run", "solver"], message, "not for these bodies", help);
         }
         if scene.run.precision == Some(crate::format::Precision::Single) {
-            let message = format!("bodies of model `{}` are computed in double precision only", table.model.word());
+            let message =
+                format!("bodies of model `{}` are computed in double precision only", table.model.word());
             self.error(&["run", "precision"], message, "not for these bodies", "leave `precision` out");
         }
-        if scene.run.checkpoint.is_some() && scene.run.control.as_ref().is_some_and(|c| c.arc_length.is_some()) {
+        if scene.run.checkpoint.is_some()
+            && scene.run.control.as_ref().is_some_and(|c| c.arc_length.is_some())
+        {
             let message = "there are no checkpoints of a run by arc length, which goes on in the direction of its last step";
             let help = "leave it out, or control a displacement";
             self.error(&["run", "checkpoint"], message, "not with `arc-length`", help);
@@ -154,13 +158,15 @@ impl Builder<'_> {
                 ("crease", shell, "a shell"),
                 ("branches", shell, "a shell"),
                 ("stiffness-damping", body.model != BodyModel::Solid, "shells and co-rotational solids"),
+                ("initial-displacement", body.model != BodyModel::Solid, "shells and co-rotational solids"),
                 ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
                 ("fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
                 ("second-fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
             ];
             for (key, wanted, of) in others {
                 if !wanted && self.source().node(&["body", name, key]).is_some() {
-                    let message = format!("`{key}` is for {of}, and `{name}` is of model `{}`", body.model.word());
+                    let message =
+                        format!("`{key}` is for {of}, and `{name}` is of model `{}`", body.model.word());
                     let help = "remove it, or change `model`";
                     self.error(&["body", name, key], message, "means nothing here", help);
                 }
@@ -199,7 +205,8 @@ impl Builder<'_> {
             if arrays.iter().any(|array| array.components != components) {
                 continue;
             }
-            let values = parents.iter().flat_map(|&(block, cell)| arrays[block].item(cell)).copied().collect();
+            let values =
+                parents.iter().flat_map(|&(block, cell)| arrays[block].item(cell)).copied().collect();
             whole.data.insert(name, DataArray { components, values });
         }
         if cut > 0 {
@@ -385,7 +392,9 @@ impl Builder<'_> {
                     Ok(values) => Some(values),
                     Err(label) => {
                         let message = match label {
-                            Some(label) => format!("triangles of `{name}` with label {label} have no thickness"),
+                            Some(label) => {
+                                format!("triangles of `{name}` with label {label} have no thickness")
+                            }
                             None => format!("the triangles of `{name}` have no labels"),
                         };
                         self.error(&path, message, "by label", "give one thickness, or one for every label");
@@ -444,11 +453,17 @@ impl Builder<'_> {
         if let Some(other) = table.element.filter(|&element| element != Element::Tet4) {
             let what = if other.is_shell() { "a shell" } else { "`model = \"solid\"`" };
             let message = format!("`{name}` is a co-rotational solid, and this element is of {what}");
-            self.error(&["body", name, "element"], message, "not for this model", "take `tet4`, or leave it out");
+            self.error(
+                &["body", name, "element"],
+                message,
+                "not for this model",
+                "take `tet4`, or leave it out",
+            );
             return None;
         }
         if mesh.volume_blocks().any(|block| block.kind != CellKind::Tet && !block.is_empty()) {
-            let message = format!("`{name}` is a co-rotational solid, which is made of tets, and its mesh has hexes");
+            let message =
+                format!("`{name}` is a co-rotational solid, which is made of tets, and its mesh has hexes");
             self.error(&["body", name, "mesh"], message, "this mesh", "use a mesh of tets: `as = \"tets\"`");
             return None;
         }
@@ -522,23 +537,41 @@ impl Builder<'_> {
         Some(chosen)
     }
 
-    /// Adds a constraint of the nodes of a shell or a co-rotational solid.
+    /// Adds a constraint of the nodes of a shell or a co-rotational solid, as the scene's own model has it in displacements.
     pub(super) fn constrain_corotational(
         &mut self,
         name: &str,
         table: &ConstraintTable,
+        motion: &model::Motion,
         nodes: &[u32],
         components: [bool; 6],
     ) {
-        let motion = match table {
-            ConstraintTable::Move(moved) => self.corotational_motion(name, moved),
-            _ => Some(Motion::Fixed),
+        let Some(part) = &mut self.corotational else { return };
+        let turn = match table {
+            ConstraintTable::Move(moved) => moved.turn.unwrap_or_default(),
+            _ => [0.0; 3],
         };
-        let (Some(motion), Some(part)) = (motion, &mut self.corotational) else { return };
+        let moved = |[x, y, z]: [f64; 3], curve: &Curve| Motion::Moved {
+            by: [x, y, z, turn[0], turn[1], turn[2]],
+            curve: curve.clone(),
+        };
+        let all: Vec<(Vec<u32>, Motion)> = match motion {
+            model::Motion::Displacement(by, curve) => vec![(nodes.to_vec(), moved(*by, curve))],
+            model::Motion::Displacements(by, curve) => {
+                nodes.iter().zip(by).map(|(&node, &by)| (vec![node], moved(by, curve))).collect()
+            }
+            _ => vec![(nodes.to_vec(), Motion::Fixed)],
+        };
         let constraint =
-            corotational::Constraint { name: name.to_owned(), nodes: nodes.to_vec(), components, motion };
-        let clash = part.model.constraints.iter().find(|known| clash(known, &constraint)).map(|c| c.name.clone());
-        part.model.constraints.push(constraint);
+            |(nodes, motion)| corotational::Constraint { name: name.to_owned(), nodes, components, motion };
+        let all: Vec<_> = all.into_iter().map(constraint).collect();
+        let clash = part
+            .model
+            .constraints
+            .iter()
+            .find(|known| all.iter().any(|own| clash(known, own)))
+            .map(|known| known.name.clone());
+        part.model.constraints.extend(all);
         if let Some(other) = clash {
             let first = self.source().key_span(&["constraint", &other]);
             let second = self.source().key_span(&["constraint", name]);
@@ -549,26 +582,37 @@ impl Builder<'_> {
         }
     }
 
-    fn corotational_motion(&mut self, name: &str, table: &MoveTable) -> Option<Motion> {
+    /// How nodes of shells and co-rotational solids are moved, without their rotation.
+    pub(super) fn corotational_motion(
+        &mut self,
+        name: &str,
+        table: &MoveTable,
+        nodes: Option<(usize, &[u32])>,
+    ) -> Option<model::Motion> {
         let path = ["constraint", name];
         let shift = match (&table.by, table.velocity) {
-            (None, Some(_)) => {
+            (_, Some(_)) => {
                 let message = "nodes of shells and co-rotational solids move by a way, not with a velocity";
                 let help = "give the whole way in `by`, with a `curve`";
                 self.error(&[path[0], path[1], "velocity"], message, "not for this model", help);
                 return None;
             }
-            (Some(Vectors::PerNode(_)), _) => {
-                let message = "nodes of shells and co-rotational solids move by one `by` together";
-                self.error(&[path[0], path[1], "by"], message, "not for this model", "give one vector for all nodes");
+            (Some(Vectors::PerNode(by)), _) => {
+                let (body, nodes) = nodes?;
+                let by = self.node_vectors(by, body, nodes, &[path[0], path[1], "by"])?;
+                return Some(model::Motion::Displacements(by, self.curve(&table.timing, &path)?));
+            }
+            (None, None) if table.turn.is_none() => {
+                let message = "a motion has `by`, `turn` or both, found neither";
+                self.error(&path, message, "this motion", "`by` in metres, `turn` in radians");
                 return None;
             }
-            (Some(Vectors::Uniform(by)), _) => *by,
-            (None, None) => [0.0; 3],
+            (by, None) => match by {
+                Some(Vectors::Uniform(by)) => *by,
+                _ => [0.0; 3],
+            },
         };
-        let turn = table.turn.unwrap_or_default();
-        let by = [shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]];
-        Some(Motion::Moved { by, curve: self.curve(&table.timing, &path)? })
+        Some(model::Motion::Displacement(shift, self.curve(&table.timing, &path)?))
     }
 
     /// Adds springs.
@@ -661,14 +705,24 @@ impl Builder<'_> {
             }
             LoadTable::Edge(edge) => {
                 if !shell {
-                    self.error(&at("on"), "a load on edges is for shells", "not a shell", "take a `traction`");
+                    self.error(
+                        &at("on"),
+                        "a load on edges is for shells",
+                        "not a shell",
+                        "take a `traction`",
+                    );
                     return None;
                 }
                 let nodes = self.body_nodes(body, &edge.nodes, &at("nodes"))?;
                 let edges = self.border_edges(body, &nodes);
                 if edges.is_empty() {
                     let message = "no edge of the border has both its ends selected";
-                    self.error(&at("nodes"), message, "this selection", "select all nodes along a border of the shell");
+                    self.error(
+                        &at("nodes"),
+                        message,
+                        "this selection",
+                        "select all nodes along a border of the shell",
+                    );
                     return None;
                 }
                 vec![corotational::LoadKind::Edge { edges, traction: Vector3::from(edge.traction) }]
@@ -789,7 +843,12 @@ impl Builder<'_> {
     }
 
     /// The selected facets of a shell, numbered in the model.
-    fn facets(&mut self, body: usize, selection: &pliant_geometry::Selection, path: &[&str]) -> Option<Vec<u32>> {
+    fn facets(
+        &mut self,
+        body: usize,
+        selection: &pliant_geometry::Selection,
+        path: &[&str],
+    ) -> Option<Vec<u32>> {
         let cells = self.shell_cells(body)?;
         let built = &self.bodies[body];
         match selection.faces(&built.mesh, &built.boundary) {
@@ -806,7 +865,9 @@ impl Builder<'_> {
 
     /// The edges of one triangle only both of whose ends are among some nodes of the model (increasing).
     fn border_edges(&self, body: usize, nodes: &[u32]) -> Vec<[u32; 2]> {
-        let (Some(part), Some(cells)) = (&self.corotational, self.shell_cells(body)) else { return Vec::new() };
+        let (Some(part), Some(cells)) = (&self.corotational, self.shell_cells(body)) else {
+            return Vec::new();
+        };
         let mut count: BTreeMap<[u32; 2], u32> = BTreeMap::new();
         for facet in cells.iter().map(|&cell| &part.model.facets[cell as usize]) {
             for corner in 0..3 {
@@ -867,10 +928,11 @@ impl Builder<'_> {
 
     fn controlled_volume(&mut self, load: &str, to: f64) -> Option<Control> {
         let part = self.corotational.as_ref()?;
-        let pressed = part.model.loads.iter().filter(|known| known.name == load).find_map(|load| match &load.kind {
-            corotational::LoadKind::Pressure { cells, .. } => Some(cells),
-            _ => None,
-        });
+        let pressed =
+            part.model.loads.iter().filter(|known| known.name == load).find_map(|load| match &load.kind {
+                corotational::LoadKind::Pressure { cells, .. } => Some(cells),
+                _ => None,
+            });
         let path = ["run", "control", "volume"];
         let Some(cells) = pressed else {
             let message = format!("`{load}` is no pressure on a shell, which a volume is controlled by");
@@ -896,7 +958,9 @@ impl Builder<'_> {
             return;
         }
         let Some(part) = &self.corotational else { return };
-        if let Err(corotational::SolveError::FreeBody { node, free_modes }) = corotational::check_held(&part.model) {
+        if let Err(corotational::SolveError::FreeBody { node, free_modes }) =
+            corotational::check_held(&part.model)
+        {
             let owner = self.model.bodies.iter().find(|body| body.nodes.contains(&node));
             let Some(name) = owner.map(|body| body.name.clone()) else { return };
             let message = format!(
@@ -908,14 +972,37 @@ impl Builder<'_> {
         }
     }
 
+    /// Displacements [m] of all nodes at the start, if some body has some.
+    fn initial_displacement(&mut self) -> Option<Vec<Vector3>> {
+        let scene = self.scene;
+        let mut all = None;
+        for (body, (name, table)) in scene.bodies.iter().enumerate() {
+            let Some(wanted) = &table.initial_displacement else { continue };
+            let nodes: Vec<u32> = self.model.bodies[body].nodes.clone().collect();
+            let path = ["body", name.as_str(), "initial-displacement"];
+            let given = self.node_vectors(wanted, body, &nodes, &path)?;
+            let all = all.get_or_insert_with(|| vec![Vector3::zeros(); self.model.rest.len()]);
+            for (&node, vector) in nodes.iter().zip(given) {
+                all[node as usize] = Vector3::from(vector);
+            }
+        }
+        all
+    }
+
     /// Sets the state that a run starts from.
     pub(super) fn start_corotational(&mut self) {
+        let displacement = self.initial_displacement();
         let velocity = std::mem::take(&mut self.model.initial_velocity);
         let Some(part) = &mut self.corotational else {
             self.model.initial_velocity = velocity;
             return;
         };
         part.start = State::at_rest(&part.model);
+        if let Some(displacement) = displacement {
+            let all = part.model.rest.iter().zip(displacement);
+            let positions: Vec<Vector3> = all.map(|(rest, u)| rest + u).collect();
+            part.start.set_positions(&part.model, &positions);
+        }
         for (own, given) in part.start.velocity.iter_mut().zip(velocity) {
             *own = Vector3::from(given);
         }

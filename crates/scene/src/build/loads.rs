@@ -35,7 +35,12 @@ impl Builder<'_> {
         let at = |key| [path, &[key]].concat();
         if let LoadTable::Moment(_) | LoadTable::Edge(_) = table {
             let message = "moments and loads on edges are for shells";
-            self.error(path, message, "not for a `solid`", "take forces or tractions, or set `model = \"shell\"`");
+            self.error(
+                path,
+                message,
+                "not for a `solid`",
+                "take forces or tractions, or set `model = \"shell\"`",
+            );
             return None;
         }
         let curve = self.curve(table.timing(), path);
@@ -77,7 +82,12 @@ impl Builder<'_> {
         Some(vec![(kind?, curve?, surface)])
     }
 
-    pub(super) fn nodal_forces(&mut self, table: &ForceTable, target: Target, path: &[&str]) -> Option<LoadKind> {
+    pub(super) fn nodal_forces(
+        &mut self,
+        table: &ForceTable,
+        target: Target,
+        path: &[&str],
+    ) -> Option<LoadKind> {
         let at = [path, &["nodes"]].concat();
         let nodes = match target {
             Target::Body(body) => self.body_nodes(body, &table.nodes, &at)?,
@@ -117,7 +127,12 @@ impl Builder<'_> {
     }
 
     /// The selected faces of a body (numbered in the model) or of a carried surface (numbered in it).
-    pub(super) fn faces(&mut self, target: Target, selection: &Selection, path: &[&str]) -> Option<Vec<Face>> {
+    pub(super) fn faces(
+        &mut self,
+        target: Target,
+        selection: &Selection,
+        path: &[&str],
+    ) -> Option<Vec<Face>> {
         let result = match target {
             Target::Body(body) => {
                 let (built, first) = (&self.bodies[body], self.model.bodies[body].nodes.start);
@@ -137,7 +152,12 @@ impl Builder<'_> {
         (mesh, boundary)
     }
 
-    pub(super) fn traction_forces(&self, target: Target, faces: &[Face], traction: [f64; 3]) -> Vec<(u32, [f64; 3])> {
+    pub(super) fn traction_forces(
+        &self,
+        target: Target,
+        faces: &[Face],
+        traction: [f64; 3],
+    ) -> Vec<(u32, [f64; 3])> {
         let rest = match target {
             Target::Body(_) => &self.model.rest,
             Target::Surface(index) => &self.model.surfaces[index].rest,
@@ -189,7 +209,8 @@ impl Builder<'_> {
     /// Refuses fields that no chosen body has.
     fn refuse_other_fields(&mut self, fields: &[FieldName], body: Option<usize>, path: &[&str]) {
         let scene = self.scene;
-        let models = scene.bodies.iter().enumerate().filter(|(index, _)| body.is_none_or(|body| body == *index));
+        let models =
+            scene.bodies.iter().enumerate().filter(|(index, _)| body.is_none_or(|body| body == *index));
         let models: Vec<BodyModel> = models.map(|(_, (_, table))| table.model).collect();
         let strange = fields.iter().position(|field| !models.iter().any(|&model| field.is_of(model)));
         if let (Some(index), Some(model)) = (strange, models.first()) {
@@ -241,7 +262,9 @@ impl Builder<'_> {
                     BodyModel::Shell => {
                         self.bodies[body].closest(&place).map(|found| (found.position - place).norm())
                     }
-                    _ => Locator::new(&self.bodies[body].mesh).locate(place).map(|location| location.distance),
+                    _ => {
+                        Locator::new(&self.bodies[body].mesh).locate(place).map(|location| location.distance)
+                    }
                 };
                 let distance = distance.unwrap_or(0.0);
                 let help = "give its place at rest in metres; the nearest cell carries it";

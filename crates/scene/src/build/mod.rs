@@ -100,7 +100,9 @@ pub fn build(scene: &Scene) -> Result<Built, SceneErrors> {
     builder.check_outputs();
     builder.check_free_bodies();
     builder.check_held();
-    builder.start_corotational();
+    if !builder.failed() {
+        builder.start_corotational();
+    }
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }

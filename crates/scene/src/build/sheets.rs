@@ -75,7 +75,9 @@ impl Builder<'_> {
             None => table.sheet().and_then(|shape| {
                 let counts = match (shape.grid.cells, table.edge) {
                     (Some(cells), None) => cells.map(|n| n as usize),
-                    (None, Some(edge)) => shape.lengths.map(|length| (length / edge).round().max(1.0) as usize),
+                    (None, Some(edge)) => {
+                        shape.lengths.map(|length| (length / edge).round().max(1.0) as usize)
+                    }
                     _ => return None,
                 };
                 let distortion = (shape.grid.distortion > 0.0)
@@ -157,7 +159,7 @@ mod tests {
             ("{ plate = { size = [1, 1], cells = [0, 2] } }", "0 cells asked for along x"),
             ("{ plate = { size = [1, 1], cells = [2, 2] }, as = 'hexes' }", "made of triangles"),
             ("{ plate = { size = [1, -1], cells = [2, 2] } }", "size along y is -1"),
-            ("{ sphere = { radius = 1, levels = 40 } }", "too many"),
+            ("{ sphere = { radius = 1, levels = 40 } }", "exceed the limit"),
             ("{ cylinder = { radius = 1, length = 1, span = 400 }, edge = 1 }", "span"),
         ] {
             let told = mistakes_alone(&shell(mesh)).plain().to_string();

@@ -52,8 +52,7 @@ impl Builder<'_> {
     fn carry_on_shell(&mut self, body: usize, cells: &[u32], name: &str, surface: &Mesh) -> Mapping {
         let mut farthest = 0.0_f64;
         if let Some(part) = &mut self.corotational {
-            let curved =
-                part.surface.get_or_insert_with(|| CurvedSurface::new(&part.model, EdgeRule::Arc));
+            let curved = part.surface.get_or_insert_with(|| CurvedSurface::new(&part.model, EdgeRule::Arc));
             let rest = State::at_rest(&part.model);
             let points = curved.carry_all(&part.model, &rest, cells, &surface.points).unwrap_or_default();
             let away = |point: &Carried| point.height.hypot(point.aside[0]).hypot(point.aside[1]);

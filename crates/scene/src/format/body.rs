@@ -7,6 +7,8 @@ use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::NodeVectors;
+
 /// A body.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -53,6 +55,10 @@ pub struct BodyTable {
     /// Velocity [m/s] at the start, of all nodes that no constraint holds or moves; not for quasi-static runs.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
+    /// Displacement [m] of each node from rest at the start, of shells and co-rotational solids; the nodes of shells turn with the
+    /// triangles round them. The mesh is the shape at rest.
+    #[serde(default)]
+    pub initial_displacement: Option<NodeVectors>,
     /// Fibre direction at rest; overrides that of the law.
     #[serde(default)]
     pub fibre: Option<Fibre>,

@@ -7,15 +7,16 @@ mod load;
 mod output;
 
 pub use body::{
-    AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density, Element,
-    EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Organ, PatternName,
-    PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule, TubeShape, TwistedStripShape,
+    AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
+    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Organ,
+    PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule, TubeShape,
+    TwistedStripShape,
 };
+pub use linear::{ControlTable, ControlledNode, LinearName, LinearTable, LinearWay, PreconditionerName};
 pub use load::{
     Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MomentTable, MoveTable,
     NodeVectorSource, NodeVectors, PressureTable, SpreadName, SpringTable, Timing, TractionTable, Vectors,
 };
-pub use linear::{ControlTable, ControlledNode, LinearName, LinearTable, LinearWay, PreconditionerName};
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 
 use pliant_gpu::Design;

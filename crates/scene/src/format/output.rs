@@ -121,7 +121,9 @@ impl FieldName {
             Self::CauchyStress | Self::Pressure | Self::VolumeRatio | Self::EnergyDensity => {
                 model != BodyModel::Shell
             }
-            Self::Pk2Stress | Self::GreenStrain | Self::Fibre | Self::FibreStretch => model == BodyModel::Solid,
+            Self::Pk2Stress | Self::GreenStrain | Self::Fibre | Self::FibreStretch => {
+                model == BodyModel::Solid
+            }
             _ => model == BodyModel::Shell,
         }
     }

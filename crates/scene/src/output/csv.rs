@@ -166,7 +166,8 @@ impl Rows {
 /// Where a point of a surface on a shell is [m].
 fn carried<R>(frame: &Frame<'_, R>, point: &Carried) -> Vector3 {
     let part = frame.built.corotational.as_ref();
-    let found = part.and_then(|part| Some(part.surface.as_ref()?.carried(&part.model, frame.corotational?, point)));
+    let found =
+        part.and_then(|part| Some(part.surface.as_ref()?.carried(&part.model, frame.corotational?, point)));
     found.unwrap_or_else(|| Vector3::repeat(f64::NAN))
 }
 
@@ -204,7 +205,8 @@ impl<R: Real> Observer<R> for Rows {
         }
         let cells_wanted = self.probes.iter().any(|probe| probe.fields.iter().any(|field| !field.is_nodal()));
         let recovery = cells_wanted.then(|| Recovery::new(&frame.built.model, frame.state));
-        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.corotational) {
+        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.corotational)
+        {
             self.corotated.fill(&part.model, state);
         }
         for probe in &self.probes {
@@ -253,8 +255,11 @@ impl Probe {
             let Some(found) = built.bodies[body].closest(&point) else {
                 return Self { weights: Vec::new(), cell: None, fields };
             };
-            let weights = found.nodes.iter().zip(found.weights).map(|(&node, weight)| (first + node, weight)).collect();
-            let cell = fields::Cell::Facet(range.start + built.bodies[body].boundary.faces[found.face as usize].parent.index);
+            let weights =
+                found.nodes.iter().zip(found.weights).map(|(&node, weight)| (first + node, weight)).collect();
+            let cell = fields::Cell::Facet(
+                range.start + built.bodies[body].boundary.faces[found.face as usize].parent.index,
+            );
             return Self { weights, cell: Some(Place::Corotated(cell)), fields };
         }
         let Some(location) = Locator::new(mesh).locate(point) else {

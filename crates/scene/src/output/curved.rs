@@ -26,7 +26,10 @@ impl Curved {
         let surface = CurvedSurface::new(&part.model, EdgeRule::Arc);
         let picture = surface.picture(&part.model, parts);
         let shown = |facet: u32| {
-            let owner = part.cells.iter().position(|cells| matches!(cells, BodyCells::Facets(r) if r.contains(&facet)));
+            let owner = part
+                .cells
+                .iter()
+                .position(|cells| matches!(cells, BodyCells::Facets(r) if r.contains(&facet)));
             on.is_none_or(|on| owner.is_some_and(|owner| built.bodies[owner].name == on))
         };
         let mut own = vec![u32::MAX; picture.places.len()];
@@ -82,7 +85,10 @@ impl Curved {
                     let place = &self.picture.places[point];
                     let nodes = model.facets[place.facet as usize].nodes;
                     let parts = nodes.iter().zip(place.weights);
-                    parts.map(|(&node, weight)| state.velocity[node as usize] * weight).sum::<nalgebra::Vector3<f64>>().into()
+                    parts
+                        .map(|(&node, weight)| state.velocity[node as usize] * weight)
+                        .sum::<nalgebra::Vector3<f64>>()
+                        .into()
                 }),
                 _ => {
                     let components = field.components();

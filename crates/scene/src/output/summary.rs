@@ -58,8 +58,8 @@ pub struct Summary {
     pub stability: Option<StabilitySummary>,
     /// What mass scaling adds; `null` without it.
     pub added_mass: Option<AddedMass>,
-    /// Imbalance of the energies at the end, as a fraction of the largest.
-    pub energy_balance: f64,
+    /// Imbalance of the energies at the end, as a fraction of the largest; `null` of shells and co-rotational solids.
+    pub energy_balance: Option<f64>,
     /// Force [N] of each constraint at the end, by name.
     #[serde(serialize_with = "as_map")]
     pub reactions: Vec<(String, [f64; 3])>,
@@ -295,7 +295,7 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
         warnings: doubts(built, outcome, stability.as_ref()),
         stability,
         added_mass: AddedMass::new(built),
-        energy_balance: outcome.energies.balance,
+        energy_balance: outcome.balance_floor.is_finite().then_some(outcome.energies.balance),
         reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
         time: outcome.time,
@@ -407,7 +407,11 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
     writeln!(page, "| iterations of Newton's method | {iterations}, {} a step |", per_step(iterations))?;
     if effort.linear_iterations > 0 {
         let iterations = effort.linear_iterations;
-        writeln!(page, "| iterations of conjugate gradients | {iterations}, {} a step |", per_step(iterations))?;
+        writeln!(
+            page,
+            "| iterations of conjugate gradients | {iterations}, {} a step |",
+            per_step(iterations)
+        )?;
         writeln!(page, "| their last residual, relative | {} |", number(effort.linear_residual))?;
     }
     if let Some(residual) = effort.residual {

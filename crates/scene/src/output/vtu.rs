@@ -295,7 +295,9 @@ fn merged_corotational(built: &Built, part: &Corotational, on: Option<&str>) -> 
     let (mut nodes, mut cells) = (Vec::new(), Vec::new());
     let kinds = [CellKind::Triangle, CellKind::Tet];
     let mut blocks = kinds.map(|kind| (CellBlock::new(kind, Vec::new()), Vec::new(), Vec::new()));
-    for (number, body) in built.bodies.iter().enumerate().filter(|(_, body)| on.is_none_or(|on| body.name == on)) {
+    for (number, body) in
+        built.bodies.iter().enumerate().filter(|(_, body)| on.is_none_or(|on| body.name == on))
+    {
         let offset = mesh.points.len() as u32;
         mesh.points.extend_from_slice(&body.mesh.points);
         nodes.extend(built.model.bodies[number].nodes.clone());
