@@ -121,7 +121,8 @@ impl Builder<'_> {
             self.error(&["run", "mass-scaling"], message, "not for these bodies", help);
         }
         if scene.run.on_unstable.is_some() {
-            let message = format!("the stable step of bodies of model `{}` is not watched", table.model.word());
+            let message =
+                format!("the stable step of bodies of model `{}` is not watched", table.model.word());
             let help = "leave it out; their step is held against the stable one at rest before the run";
             self.error(&["run", "on-unstable"], message, "not for these bodies", help);
         }
@@ -136,9 +137,17 @@ impl Builder<'_> {
             }
         }
         if table.stiffness_damping > 0.0 && scene.run.solver != SolverName::Implicit {
-            let message = format!("damping by stiffness needs the solver `implicit`, not `{}`", scene.run.solver.word());
+            let message = format!(
+                "damping by stiffness needs the solver `implicit`, not `{}`",
+                scene.run.solver.word()
+            );
             let path = ["body", first.as_str(), "stiffness-damping"];
-            self.error(&path, message, "not with this solver", "leave it out, or take `solver = \"implicit\"`");
+            self.error(
+                &path,
+                message,
+                "not with this solver",
+                "leave it out, or take `solver = \"implicit\"`",
+            );
         }
     }
 
