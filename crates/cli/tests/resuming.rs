@@ -210,7 +210,7 @@ checkpoint = {{ every = 0.02 }}
 {run}
 [law.tissue]
 type = "st-venant-kirchhoff"
-young-modulus = 1e6
+young-modulus = 1e8
 poisson-ratio = 0.3
 [body.wall]
 model = "shell"

@@ -186,6 +186,10 @@ fn doubtful_shells_are_warned_about() {
             "model the wall with tets",
         ],
     );
+    let distorted = PLATE.replace("[4, 2]", "[32, 32], distortion = 0.3, seed = 3");
+    let told = wall(&[(PLATE, &distorted)]).pliant(&["check", "case"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    says(&told, &["of `wall` folded back onto all neighbours, as inverted ones are", "smooth or remesh"]);
     let told = wall(&[(THICK, "thickness = 0.002\nelement = \"comas-2010\"")]).pliant(&["check", "case"]);
     assert_eq!(told.code, 0, "{}", told.err);
     says(&told, &["`wall` has the element of Comas (2010)", "6 to 26 % too soft", "take `dkt-opt`"]);

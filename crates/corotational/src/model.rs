@@ -99,6 +99,8 @@ pub struct Notes {
     pub turned: usize,
     /// Elements thicker than their smallest altitude: they answer as plates, but are none.
     pub thick: usize,
+    /// Triangles folded back onto all their neighbours, as inverted ones are: how many, and the number of the first.
+    pub inverted: Option<(usize, usize)>,
     /// Elements of Comas (2010), which depend on the numbering and converge to a wrong plate.
     pub comas: usize,
 }
@@ -254,6 +256,7 @@ impl Model {
             notes.comas += usize::from(shell.formulation.bending == crate::element::Bending::Comas2010);
             facets.push(facet);
         }
+        notes.inverted = self.inverted(&cells);
         for facet in &facets {
             for node in facet.nodes {
                 self.mass[node as usize] += facet.mass;
@@ -263,6 +266,26 @@ impl Model {
         self.add_normals(&facets, shell.crease);
         self.facets.extend(facets);
         Ok(notes)
+    }
+
+    /// The triangles with two neighbours or more whose normals are all turned by more than 150°: how many, and the first.
+    fn inverted(&self, cells: &[[u32; 3]]) -> Option<(usize, usize)> {
+        const TURNED: f64 = -0.866;
+        let normal = |cell: usize| {
+            let [a, b, c] = cells[cell].map(|node| self.rest[node as usize]);
+            (b - a).cross(&(c - a)).normalize()
+        };
+        let mut neighbours = vec![(0_usize, true); cells.len()];
+        for sides in edges(cells).into_values() {
+            let [(one, _), (other, _)] = sides[..] else { continue };
+            let back = normal(one).dot(&normal(other)) < TURNED;
+            for cell in [one, other] {
+                neighbours[cell] = (neighbours[cell].0 + 1, neighbours[cell].1 && back);
+            }
+        }
+        let mut all = (0..cells.len()).filter(|&cell| neighbours[cell].0 > 1 && neighbours[cell].1);
+        let first = all.next()?;
+        Some((1 + all.count(), first))
     }
 
     /// Adds co-rotational tetrahedra, which give mass to their nodes. They may share nodes with shells.

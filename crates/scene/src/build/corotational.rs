@@ -435,6 +435,16 @@ impl Builder<'_> {
             let help = "take larger triangles, a smaller thickness, or model the wall with tets";
             self.out.push(Diagnostic::warning(message).at(place, "thick").help(help));
         }
+        if let Some((inverted, first)) = notes.inverted {
+            let message = format!(
+                "{} of `{name}` folded back onto all neighbours, as inverted ones are: the first is triangle {first} (counted \
+                 from 0)",
+                counted(inverted, "triangle")
+            );
+            let place = self.source().span(&["body", name, "mesh"]);
+            let help = "equilibria may not be found there: smooth or remesh, or distort a built-in shape by less than 0.25";
+            self.out.push(Diagnostic::warning(message).at(place, "folded").help(help));
+        }
         if notes.comas > 0 {
             let message = format!(
                 "`{name}` has the element of Comas (2010), which depends on the numbering of its corners and converges to \
