@@ -108,7 +108,7 @@ fn triangles_are_turned_to_one_side_and_counted() {
     }
     let mut model = Model::new(points);
     let notes = model.add_shell(&Shell::new("ball", cells, 0.01, MATERIAL)).unwrap();
-    assert_eq!(notes, Notes { turned: 3, thick: 0, comas: 0 });
+    assert_eq!(notes, Notes { turned: 3, ..Notes::default() });
     let all: Vec<u32> = (0..128).collect();
     // Of an inscribed polyhedron of 128 faces.
     let volume = model.enclosed_volume(&all, &model.rest);
