@@ -28,6 +28,9 @@ pub struct DynamicSettings {
     pub tangent: Tangent,
     /// Solver of the linear equations.
     pub linear: LinearSolver,
+    /// Whether what conjugate gradients have reached when their iterations run out is taken as it is: bounded time, accuracy unchecked
+    /// (`DynamicStep::linear` tells the residual).
+    pub accept_stalled: bool,
 }
 
 impl DynamicSettings {
@@ -40,6 +43,7 @@ impl DynamicSettings {
             halvings: 6,
             tangent: Tangent::Full,
             linear: LinearSolver::Direct,
+            accept_stalled: false,
         }
     }
 
@@ -168,7 +172,17 @@ impl<'m> BackwardEuler<'m> {
             }
             self.add_inertia(h);
             self.system.prepare()?;
-            self.system.solve(&self.residual, &mut self.solution)?;
+            // The motion goes on, to begin with.
+            let going_on = if iteration == 0 { h } else { 0.0 };
+            for (guess, &component) in self.solution.iter_mut().zip(&self.system.equations.component) {
+                let (node, c) = (component as usize / 6, component as usize % 6);
+                let rate = if c < 3 { self.start.velocity[node][c] } else { self.start.spin[node][c - 3] };
+                *guess = going_on * rate;
+            }
+            match self.system.solve_from(&self.residual, &mut self.solution) {
+                Err(SolveError::Stalled { .. }) if self.settings.accept_stalled => {}
+                result => result?,
+            }
             self.increment.copy_from_slice(&self.pending);
             self.system.spread(&self.solution, &mut self.increment);
             self.pending.fill(0.0);

@@ -37,6 +37,7 @@ mod dynamics;
 pub mod element;
 mod error;
 mod facet;
+mod gradients;
 mod linear;
 mod model;
 mod rotation;

@@ -76,6 +76,11 @@ impl LowerMatrix {
         self.column_start.len() - 1
     }
 
+    /// The rows of a column.
+    pub(crate) fn rows(&self, column: u32) -> &[u32] {
+        &self.row[self.column_start[column as usize] as usize..self.column_start[column as usize + 1] as usize]
+    }
+
     /// Keeps both halves from now on.
     pub(crate) fn keep_mirror(&mut self) {
         self.mirror = vec![0.0; self.value.len()];

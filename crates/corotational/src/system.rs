@@ -156,6 +156,9 @@ impl<'m> System<'m> {
         if tangent.is_some() {
             self.matrix.clear();
             self.coupling.fill(0.0);
+            if let Some(workspace) = &mut self.workspace {
+                workspace.place(&state.position);
+            }
         }
         let kind = tangent.map(|(kind, _)| kind);
         let model = self.model;
@@ -370,13 +373,23 @@ impl<'m> System<'m> {
 
     /// Solves with the matrix prepared.
     pub(crate) fn solve(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
+        solution.fill(0.0);
+        self.solve_from(right, solution)
+    }
+
+    /// Solves with the matrix prepared; conjugate gradients start from the solution given, and leave what they reached there if
+    /// iterations run out.
+    pub(crate) fn solve_from(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         let start = Instant::now();
         let Some(workspace) = &mut self.workspace else { return Ok(()) };
-        self.last_solution = workspace.solve(&self.matrix, right, solution).map_err(linear_error)?;
+        let result = workspace.solve(&self.matrix, right, solution);
+        if let Ok(report) | Err(LinearError::Stalled(report)) = result {
+            self.last_solution = report;
+        }
         self.phases.solution += start.elapsed();
         self.phases.solutions += 1;
         self.phases.iterations += self.last_solution.iterations;
-        Ok(())
+        result.map(|_| ()).map_err(linear_error)
     }
 
     /// Increments of constrained components between two times, six a node.
