@@ -73,6 +73,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for shells in sizes {
         let model = tube(shells);
         for (name, linear) in solvers {
+            if std::env::var("ONLY").is_ok_and(|only| !name.contains(&only)) {
+                continue;
+            }
             let settings = DynamicSettings::new(0.04).real_time(linear);
             let mut solver = BackwardEuler::new(&model, settings)?;
             let mut state = State::at_rest(&model);

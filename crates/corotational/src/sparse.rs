@@ -186,12 +186,7 @@ impl LowerMatrix {
         self.value[self.column_start[equation] as usize]
     }
 
-    /// y = A x.
-    pub(crate) fn multiply(&self, x: &[f64], y: &mut [f64]) {
-        self.multiply_values(&self.value, x, y);
-    }
-
-    /// y = A x for another symmetric matrix of the same pattern.
+    /// y = A x for symmetric values in this pattern.
     pub(crate) fn multiply_values(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
         y.fill(0.0);
         for (column, bounds) in self.column_start.windows(2).enumerate() {

@@ -178,7 +178,7 @@ fn arrow(mesh: &mut Mesh, from: Vector3, to: Vector3, width: f64) {
 }
 
 /// A body that is shown where its points are.
-fn still(label: &str, mesh: &Mesh, value: Option<Vec<f64>>) -> Body<'_> {
+fn still<'a>(label: &str, mesh: &'a Mesh, value: Option<Vec<f64>>) -> Body<'a> {
     Body { label: label.into(), mesh, displacement: vec![[0.0; 3]; mesh.points.len()], value }
 }
 
@@ -388,12 +388,16 @@ impl Ellipsoid {
 fn rendering() -> Result<Findings, CaseError> {
     let mut findings = Findings::default();
     let source = "prototype of the formulas; tolerance 10 %";
-    for (levels, count, ours, theirs) in [(0, 20, [0.558, 0.264], 3.06), (1, 80, [0.0499, 0.0187], 0.441)] {
+    for (levels, count, ours, theirs) in [(0, 20_u32, [0.558, 0.264], 3.06), (1, 80, [0.0499, 0.0187], 0.441)] {
         let ball = Ellipsoid::new(levels, [1.0; 3])?;
         let surface = CurvedSurface::new(&ball.model, EdgeRule::Arc);
-        let places = surface.picture(&ball.model, 12).places;
-        let points = places.iter().map(|p| surface.patch(&ball.model, &ball.state, p.facet).point(p.weights));
-        let off: Vec<f64> = points.map(|p| 100.0 * (p.norm() - 1.0).abs() / ball.diagonal()).collect();
+        let mut off = Vec::new();
+        for facet in 0..count {
+            let patch = surface.patch(&ball.model, &ball.state, facet);
+            let lattice = (0..=12_u32).flat_map(|i| (0..=12 - i).map(move |j| [i, j, 12 - i - j]));
+            let points = lattice.map(|w| patch.point(w.map(|w| f64::from(w) / 12.0)));
+            off.extend(points.map(|p| 100.0 * (p.norm() - 1.0).abs() / ball.diagonal()));
+        }
         let rms = (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt();
         for (what, expected, found) in [("largest", ours[0], largest(off)), ("rms", ours[1], rms)] {
             let quantity = format!("sphere of {count} shells: {what} distance of the surface, part of the diagonal");

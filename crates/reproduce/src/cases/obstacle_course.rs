@@ -162,12 +162,17 @@ pub fn twisted_beam(thin: bool, across: usize, formulation: Formulation) -> Resu
 }
 
 fn forward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
-    sheet(shape, counts, Pattern::Diagonal)
+    let mut mesh = sheet(shape, counts, Pattern::Diagonal)?;
+    let turn = std::env::var("TURN").ok().and_then(|t| t.parse().ok()).unwrap_or(0);
+    mesh.blocks[0].nodes.chunks_exact_mut(3).for_each(|corners| corners.rotate_left(turn));
+    Ok(mesh)
 }
 
-/// Diagonals as in the prototype, which sets what a coarse mesh answers.
+/// Diagonals and first corners as in the prototype: they set what a coarse mesh answers, the corners with the thesis's element only.
 fn backward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
-    sheet(shape, counts, Pattern::Antidiagonal)
+    let mut mesh = sheet(shape, counts, Pattern::Antidiagonal)?;
+    mesh.blocks[0].nodes.chunks_exact_mut(3).for_each(|corners| corners.rotate_left(1));
+    Ok(mesh)
 }
 
 /// A problem on finer and finer meshes.
