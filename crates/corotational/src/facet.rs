@@ -254,11 +254,7 @@ impl Facet {
     /// the rest vanishes at equilibrium without moments.
     pub(crate) fn hessian(&self, placed: &Placed, kind: Tangent, k: &mut Matrix18) {
         self.local_tangent(placed, kind, k);
-        for j in 0..18 {
-            for i in 0..j {
-                k[(j, i)] = 0.5 * (k[(i, j)] + k[(j, i)]);
-            }
-        }
+        symmetrise(k);
         for b in 0..6 {
             for a in b..6 {
                 placed.turn_block(k, a, b);
@@ -421,6 +417,16 @@ impl Facet {
         let longest =
             (0..3).map(|i| (self.corners[i] - self.corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
         2.0 * self.area / longest
+    }
+}
+
+/// Keeps the symmetric part.
+pub(crate) fn symmetrise(k: &mut Matrix18) {
+    for j in 0..18 {
+        for i in 0..j {
+            let mean = 0.5 * (k[(i, j)] + k[(j, i)]);
+            (k[(i, j)], k[(j, i)]) = (mean, mean);
+        }
     }
 }
 

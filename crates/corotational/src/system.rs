@@ -7,7 +7,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use crate::error::SolveError;
-use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18};
+use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18, symmetrise};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::model::{LoadKind, Model, Motion, Spread};
 use crate::rotation::skew;
@@ -491,15 +491,6 @@ impl FacetResult {
             }
         }
         Ok(())
-    }
-}
-
-fn symmetrise(k: &mut Matrix18) {
-    for j in 0..18 {
-        for i in 0..j {
-            let mean = 0.5 * (k[(i, j)] + k[(j, i)]);
-            (k[(i, j)], k[(j, i)]) = (mean, mean);
-        }
     }
 }
 

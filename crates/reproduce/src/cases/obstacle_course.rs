@@ -162,10 +162,7 @@ pub fn twisted_beam(thin: bool, across: usize, formulation: Formulation) -> Resu
 }
 
 fn forward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
-    let mut mesh = sheet(shape, counts, Pattern::Diagonal)?;
-    let turn = std::env::var("TURN").ok().and_then(|t| t.parse().ok()).unwrap_or(0);
-    mesh.blocks[0].nodes.chunks_exact_mut(3).for_each(|corners| corners.rotate_left(turn));
-    Ok(mesh)
+    sheet(shape, counts, Pattern::Diagonal)
 }
 
 /// Diagonals and first corners as in the prototype: they set what a coarse mesh answers, the corners with the thesis's element only.
