@@ -289,15 +289,21 @@ pub struct Explicit<'m> {
 }
 
 impl<'m> Explicit<'m> {
-    /// The longest stable step [s] about rest, 2/ω of the stiffest element: a lower bound of the model's.
+    /// The longest stable step [s] about rest: 2/√(ω² + max k/m) of the stiffest element and the stiffest springs on a node, a lower bound
+    /// of the model's.
     pub fn stable_step(model: &Model) -> f64 {
         let shells = model.facets.iter().map(|facet| facet.highest_frequency_squared());
         let solids = model.tets.iter().map(|tet| tet.highest_frequency_squared());
         let highest = shells.chain(solids).fold(0.0, f64::max);
-        2.0 / highest.sqrt()
+        let mut springs = vec![0.0; model.rest.len()];
+        for spring in &model.springs {
+            springs[spring.node as usize] += spring.stiffness;
+        }
+        let held = springs.iter().zip(&model.mass).filter(|(_, mass)| **mass > 0.0);
+        2.0 / (highest + held.map(|(stiffness, mass)| stiffness / mass).fold(0.0, f64::max)).sqrt()
     }
 
-    /// A solver with steps of a length [s]. Springs and pressures shorten the stable step, and are not looked at.
+    /// A solver with steps of a length [s]. Pressures change the stable step, and are not looked at.
     ///
     /// # Errors
     /// If the step is longer than is stable, or damping is proportional to stiffness.

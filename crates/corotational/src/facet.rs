@@ -610,6 +610,9 @@ mod tests {
                 let off = (slope - k).amax() / k.amax();
                 println!("{kind:?} tangent against differences: {off:.1e}");
                 assert!(off < limit, "{kind:?}: {off:e}");
+                let mut hessian = Matrix18::zeros();
+                facet.hessian(&placed, kind, &mut hessian);
+                assert!((hessian - 0.5 * (k + k.transpose())).amax() < 1e-14 * k.amax());
             }
             let k = facet.tangent(&placed, Tangent::Symmetric);
             assert!((k - k.transpose()).amax() < 1e-12 * k.amax());
