@@ -17,8 +17,10 @@ const POISSON: f64 = 0.3;
 
 /// An octahedron whose faces are cut in four, drawn onto the sphere of radius 1: facets that differ by a factor of two in area.
 fn ball(cuts: usize) -> Mesh {
-    let mut points: Vec<Vector3> =
-        [1.0, -1.0].into_iter().flat_map(|s| [Vector3::x() * s, Vector3::y() * s, Vector3::z() * s]).collect();
+    let mut points: Vec<Vector3> = [1.0, -1.0]
+        .into_iter()
+        .flat_map(|s| [Vector3::x() * s, Vector3::y() * s, Vector3::z() * s])
+        .collect();
     let mut cells: Vec<[u32; 3]> =
         vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
     for _ in 0..cuts {
@@ -48,7 +50,8 @@ fn blown_up(cuts: usize, membrane: Membrane) -> [f64; 4] {
         .hold(vec![0], [true, true, true, false, false, false])
         .hold(vec![1], [false, true, true, false, false, false])
         .hold(vec![2], [false, false, true, false, false, false]);
-    balloon = balloon.load(LoadKind::Pressure { cells: cells.clone(), pressure: 1.0, spread: Spread::Lumped });
+    balloon =
+        balloon.load(LoadKind::Pressure { cells: cells.clone(), pressure: 1.0, spread: Spread::Lumped });
     balloon.model.loads[0].controlled = true;
     let model = &balloon.model;
     let mut solver = Statics::new(model, StaticSettings::default()).unwrap();
@@ -67,7 +70,8 @@ fn blown_up(cuts: usize, membrane: Membrane) -> [f64; 4] {
     let radius = (rest / (4.0 / 3.0 * PI)).cbrt();
     let exact = 2.0 * YOUNG * THICKNESS * (stretch - 1.0) / ((1.0 - POISSON) * radius * stretch * stretch);
     let centre = state.position.iter().sum::<Vector3>() / state.position.len() as f64;
-    let tilt = |n: usize| state.normal(model, n).angle(&(state.position[model.normals[n].node as usize] - centre));
+    let tilt =
+        |n: usize| state.normal(model, n).angle(&(state.position[model.normals[n].node as usize] - centre));
     let radii = state.position.iter().map(|x| (x - centre).norm() / stretch);
     let result = [
         state.load_factor / exact,

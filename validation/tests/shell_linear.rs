@@ -116,14 +116,24 @@ fn the_element_of_comas_converges_to_a_wrong_plate() {
 #[test]
 fn scordelis_lo_roof() {
     for (cells, expected) in [(4, 1.117), (8, 1.021), (16, 0.999), (32, 0.995)] {
-        expect(&format!("Scordelis-Lo, N = {cells}"), course::scordelis_lo(cells, Formulation::default()).unwrap(), expected, 0.005);
+        expect(
+            &format!("Scordelis-Lo, N = {cells}"),
+            course::scordelis_lo(cells, Formulation::default()).unwrap(),
+            expected,
+            0.005,
+        );
     }
 }
 
 #[test]
 fn pinched_cylinder_with_diaphragms() {
     for (cells, expected) in [(4, 0.724), (8, 0.973), (16, 1.023), (32, 1.012)] {
-        expect(&format!("pinched cylinder, N = {cells}"), course::pinched_cylinder(cells, Formulation::default()).unwrap(), expected, 0.01);
+        expect(
+            &format!("pinched cylinder, N = {cells}"),
+            course::pinched_cylinder(cells, Formulation::default()).unwrap(),
+            expected,
+            0.01,
+        );
     }
 }
 
@@ -174,7 +184,12 @@ fn twisted_beam() {
         for (across, expected) in [2, 4, 8].into_iter().zip(expected) {
             let ratios = course::twisted_beam(thin, across, Formulation::default()).unwrap();
             for (ratio, expected) in ratios.into_iter().zip(expected) {
-                expect(&format!("twisted beam, thin: {thin}, N = {across}"), ratio, expected, 0.01 * expected);
+                expect(
+                    &format!("twisted beam, thin: {thin}, N = {across}"),
+                    ratio,
+                    expected,
+                    0.01 * expected,
+                );
             }
         }
     }

@@ -105,7 +105,10 @@ impl Organ {
                     parts += step.parts;
                     iterations += step.residuals.len() - 1;
                     let [first, last] = [step.residuals[0], step.residuals[step.residuals.len() - 1]];
-                    println!("  load {part}/{steps}: residual {first:.1e} to {last:.1e} N, {} negative pivots", step.negative_pivots);
+                    println!(
+                        "  load {part}/{steps}: residual {first:.1e} to {last:.1e} N, {} negative pivots",
+                        step.negative_pivots
+                    );
                 }
                 Err(error) => {
                     println!("  fails at load {:.3}: {error}", state.time);
@@ -160,8 +163,8 @@ fn largest(model: &Model, state: &State) -> f64 {
 
 /// The largest difference of displacements over the largest displacement; `map` leads from a node of the first to that of the second.
 fn apart(one: &(Model, State), other: &(Model, State), map: impl Fn(usize) -> usize) -> f64 {
-    let differences =
-        (0..one.0.rest.len()).map(|n| (one.1.displacement(&one.0, n) - other.1.displacement(&other.0, map(n))).norm());
+    let differences = (0..one.0.rest.len())
+        .map(|n| (one.1.displacement(&one.0, n) - other.1.displacement(&other.0, map(n))).norm());
     differences.fold(0.0, f64::max) / largest(&one.0, &one.1)
 }
 
@@ -173,7 +176,9 @@ fn study(organ: &Organ, mesh: &Mesh) {
     let moved = organ.motion(mesh);
     println!("  motion after 1 s off equilibrium: {:.2e}", apart(&still, &moved, |n| n));
     match organ.equilibrium(&refined(mesh)) {
-        Ok(fine) => println!("  each shell cut in four: displacements move by {:.2e}", apart(&still, &fine, |n| n)),
+        Ok(fine) => {
+            println!("  each shell cut in four: displacements move by {:.2e}", apart(&still, &fine, |n| n))
+        }
         Err(error) => println!("  each shell cut in four: {error}"),
     }
 }
@@ -298,12 +303,19 @@ fn valve_leaflets_close() {
         }
         println!(
             "valve: {} shells, {count} nodes held, {notes:?}; leaflets {:.2} mm apart at {:.4} s, {parts} steps, {:.1} s, residual {residual:.1e}, largest displacement {:.2} mm",
-            model.facets.len(), 1e3 * now, state.time, start.elapsed().as_secs_f64(), 1e3 * largest(&model, &state)
+            model.facets.len(),
+            1e3 * now,
+            state.time,
+            start.elapsed().as_secs_f64(),
+            1e3 * largest(&model, &state)
         );
         (now, state.time, largest(&model, &state))
     };
     let coarse = run(false, 2e-3);
     let halved = run(false, 1e-3);
     let fine = run(true, 2e-3);
-    println!("first touch at {:.4} s; {:.4} s with half the step, {:.4} s with each shell cut in four", coarse.1, halved.1, fine.1);
+    println!(
+        "first touch at {:.4} s; {:.4} s with half the step, {:.4} s with each shell cut in four",
+        coarse.1, halved.1, fine.1
+    );
 }

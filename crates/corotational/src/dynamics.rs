@@ -464,6 +464,27 @@ mod tests {
         assert!(matches!(Explicit::new(&model, 1.01 * stable), Err(SolveError::Impossible(_))));
     }
 
+    /// A spring a hundred times as stiff as the strip sets the step, and 2000 steps of it stay bounded.
+    #[test]
+    fn springs_shorten_the_stable_step() {
+        let mut model = clamped(THIN);
+        let free = Explicit::stable_step(&model);
+        let node = 16;
+        let stiffness = 100.0 * 4.0 / (free * free) * model.mass[node];
+        model.springs.push(crate::Spring { node: node as u32, anchor: model.rest[node], stiffness });
+        let step = Explicit::stable_step(&model);
+        assert!(step < 0.1 * free && step > 0.09 * free, "{step:e} {free:e}");
+        let mut state = State::at_rest(&model);
+        state.velocity[node].z = 1e-3;
+        let mut solver = Explicit::new(&model, step).unwrap();
+        for _ in 0..2000 {
+            solver.advance(&mut state).unwrap();
+        }
+        // What it starts with, kept within the strip and the spring: 1e-3 m/s over the frequency of the spring, and some.
+        let off = (state.position[node] - model.rest[node]).norm();
+        assert!(off < 1e-3 * free, "{off:e}");
+    }
+
     /// Energy of explicit steps oscillates within 1 % in free vibration at large rotation.
     #[test]
     fn explicit_motion_keeps_its_energy() {

@@ -231,7 +231,10 @@ impl Facet {
     pub(crate) fn force(&self, placed: &Placed) -> (f64, Vector18) {
         let raw = self.linear_force(&placed.deformation);
         let spun = placed.to_spins(&raw);
-        (0.5 * placed.deformation.dot(&raw), placed.to_space(&project(placed, &self.frame_spins(placed), &spun)))
+        (
+            0.5 * placed.deformation.dot(&raw),
+            placed.to_space(&project(placed, &self.frame_spins(placed), &spun)),
+        )
     }
 
     /// The change of the force with positions and spins.
@@ -455,7 +458,8 @@ impl Sparse {
     /// M times this.
     #[inline(always)]
     fn after(&self, m: &Matrix3<f64>) -> Matrix3<f64> {
-        let row = |i: usize| [m[(i, 2)] * self.zx, m[(i, 2)] * self.zy, m[(i, 0)] * self.xz + m[(i, 1)] * self.yz];
+        let row =
+            |i: usize| [m[(i, 2)] * self.zx, m[(i, 2)] * self.zy, m[(i, 0)] * self.xz + m[(i, 1)] * self.yz];
         let [a, b, c] = [row(0), row(1), row(2)];
         Matrix3::new(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
     }
@@ -463,7 +467,8 @@ impl Sparse {
     /// The transpose of this times M.
     #[inline(always)]
     fn transposed_before(&self, m: &Matrix3<f64>) -> Matrix3<f64> {
-        let column = |j: usize| [self.zx * m[(2, j)], self.zy * m[(2, j)], self.xz * m[(0, j)] + self.yz * m[(1, j)]];
+        let column =
+            |j: usize| [self.zx * m[(2, j)], self.zy * m[(2, j)], self.xz * m[(0, j)] + self.yz * m[(1, j)]];
         let [a, b, c] = [column(0), column(1), column(2)];
         Matrix3::new(a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2])
     }

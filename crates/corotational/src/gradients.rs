@@ -205,7 +205,8 @@ fn aggregates(around: &[Vec<u32>]) -> (Vec<u32>, Vec<u32>) {
             }
             next += 1;
         }
-        let beside = members.iter().flat_map(|&node| &around[node as usize]).map(|&node| group[node as usize]);
+        let beside =
+            members.iter().flat_map(|&node| &around[node as usize]).map(|&node| group[node as usize]);
         match beside.filter(|&other| other != number && other != NONE).min() {
             Some(other) if members.len() < AGGREGATE / 4 => {
                 members.iter().for_each(|&node| group[node as usize] = other);
@@ -244,7 +245,8 @@ impl Coarse {
         for (number, ends) in fine.aggregate_start.windows(2).enumerate() {
             aggregate[ends[0] as usize..ends[1] as usize].fill(number as u32);
         }
-        let mut touching: std::collections::BTreeMap<(u32, u32), Vec<u32>> = std::collections::BTreeMap::new();
+        let mut touching: std::collections::BTreeMap<(u32, u32), Vec<u32>> =
+            std::collections::BTreeMap::new();
         for node in 0..fine.nodes() {
             for at in fine.row(node) {
                 let (row, column) = (aggregate[node], aggregate[fine.column[at] as usize]);
@@ -293,7 +295,8 @@ impl Coarse {
         });
         for ((row, column, _), value) in self.pairs.iter().zip(&self.value) {
             for j in 0..6 {
-                let (start, rows) = (self.matrix.column_start[6 * *column as usize + j], 6 * column + j as u32);
+                let (start, rows) =
+                    (self.matrix.column_start[6 * *column as usize + j], 6 * column + j as u32);
                 let below = self.matrix.rows(rows).partition_point(|&r| r < 6 * row);
                 let first = if row == column { j } else { 0 };
                 for i in first..6 {
@@ -307,8 +310,11 @@ impl Coarse {
     /// Solves for the rigid motions under the forces on the nodes; the power of these.
     fn solve(&mut self, fine: &BlockMatrix, r: &[Node]) -> f64 {
         let arm = &self.arm;
-        self.force.par_chunks_exact_mut(6).zip(fine.aggregate_start.par_windows(2)).with_min_len(16).for_each(
-            |(force, ends)| {
+        self.force
+            .par_chunks_exact_mut(6)
+            .zip(fine.aggregate_start.par_windows(2))
+            .with_min_len(16)
+            .for_each(|(force, ends)| {
                 force.fill(0.0);
                 for node in ends[0] as usize..ends[1] as usize {
                     let [f, m] = halves(&r[node]);
@@ -318,8 +324,7 @@ impl Coarse {
                         force[3 + c] += moment[c];
                     }
                 }
-            },
-        );
+            });
         self.motion.copy_from_slice(&self.force);
         self.factors.solve(&mut self.motion);
         self.force.iter().zip(&self.motion).map(|(f, m)| f * m).sum()
@@ -328,7 +333,8 @@ impl Coarse {
     /// What the rigid motion does to a node.
     fn motion(&self, node: usize) -> Node {
         let own = 6 * self.aggregate[node] as usize;
-        let [t, w] = [0, 3].map(|c| Vector3::new(self.motion[own + c], self.motion[own + c + 1], self.motion[own + c + 2]));
+        let [t, w] = [0, 3]
+            .map(|c| Vector3::new(self.motion[own + c], self.motion[own + c + 1], self.motion[own + c + 2]));
         let moved = t + w.cross(&self.arm[node]);
         [moved.x, moved.y, moved.z, w.x, w.y, w.z]
     }
@@ -491,9 +497,12 @@ impl Vectors {
         self.ap.fill([0.0; 6]);
         if self.x.iter().any(|x| *x != [0.0; 6]) {
             self.multiply(matrix, true);
-            let near: f64 = self.r.iter().zip(&self.ap).map(|(r, ax)| {
-                (0..6).map(|c| (r[c] - ax[c]) * (r[c] - ax[c])).sum::<f64>()
-            }).sum();
+            let near: f64 = self
+                .r
+                .iter()
+                .zip(&self.ap)
+                .map(|(r, ax)| (0..6).map(|c| (r[c] - ax[c]) * (r[c] - ax[c])).sum::<f64>())
+                .sum();
             if near < size {
                 for (r, ax) in self.r.iter_mut().zip(&self.ap) {
                     (0..6).for_each(|c| r[c] -= ax[c]);

@@ -78,7 +78,8 @@ impl LowerMatrix {
 
     /// The rows of a column.
     pub(crate) fn rows(&self, column: u32) -> &[u32] {
-        &self.row[self.column_start[column as usize] as usize..self.column_start[column as usize + 1] as usize]
+        &self.row
+            [self.column_start[column as usize] as usize..self.column_start[column as usize + 1] as usize]
     }
 
     /// Keeps both halves from now on.

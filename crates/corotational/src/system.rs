@@ -249,7 +249,11 @@ impl<'m> System<'m> {
         }
     }
 
-    fn evaluate_facets(&mut self, state: &State, tangent: Option<(Tangent, &[f64])>) -> Result<(), SolveError> {
+    fn evaluate_facets(
+        &mut self,
+        state: &State,
+        tangent: Option<(Tangent, &[f64])>,
+    ) -> Result<(), SolveError> {
         let kind = tangent.map(|(kind, _)| kind);
         let model = self.model;
         let mut results = std::mem::take(&mut self.results);

@@ -142,7 +142,11 @@ pub(crate) fn figure(
     }
     let scale = scale.map(|value| value * view.factor);
     if coloured {
-        let corner = if free { [width - WIDTH, height - 0.5 * (cell + BAR), WIDTH] } else { [0.0, height - BAR, width] };
+        let corner = if free {
+            [width - WIDTH, height - 0.5 * (cell + BAR), WIDTH]
+        } else {
+            [0.0, height - BAR, width]
+        };
         svg.push_str(&bar(view, scale, corner));
     }
     svg.push_str("</svg>\n");

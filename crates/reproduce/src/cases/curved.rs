@@ -112,7 +112,8 @@ impl Deflected {
         let matrix = SMatrix::<f64, 9, 9>::from_row_iterator(rows);
         let inverse = matrix.try_inverse().unwrap_or_else(|| SMatrix::repeat(f64::NAN));
         let turned = normals.into_iter().flat_map(|n| {
-            let turn = UnitQuaternion::rotation_between(&normal, &n).map_or(Vector3::zeros(), |q| q.scaled_axis());
+            let turn =
+                UnitQuaternion::rotation_between(&normal, &n).map_or(Vector3::zeros(), |q| q.scaled_axis());
             [0.0, axes[0].dot(&turn), axes[1].dot(&turn)]
         });
         let coefficients = inverse * SVector::<f64, 9>::from_iterator(turned);
@@ -141,7 +142,12 @@ impl Deflected {
 }
 
 /// How far force and moment of what comes to the nodes are off those of a force at a place, over the force and over force × mean edge.
-fn resultants_off(corners: [Vector3; 3], nodal: [[Vector3; 2]; 3], place: Vector3, force: Vector3) -> [f64; 2] {
+fn resultants_off(
+    corners: [Vector3; 3],
+    nodal: [[Vector3; 2]; 3],
+    place: Vector3,
+    force: Vector3,
+) -> [f64; 2] {
     let edge = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).sum::<f64>() / 3.0;
     let sum: Vector3 = nodal.iter().map(|[f, _]| f).sum();
     let moment: Vector3 = nodal.iter().zip(corners).map(|([f, m], x)| x.cross(f) + m).sum();
@@ -233,7 +239,12 @@ fn patch() -> Result<Findings, CaseError> {
     let [off, twisted] = resultants_off(corners, nodal, place, force);
     findings.rows.push(Row::deviation("resultant of the nodal forces", 1e-12, off, "statics"));
     findings.rows.push(Row::deviation("their moment, over force × edge", 1e-12, twisted, "statics"));
-    findings.rows.push(Row::deviation("⟨Jv, f⟩ = ⟨v, Jᵀf⟩", 1e-12, power_off(&patch, at, &force), "virtual work"));
+    findings.rows.push(Row::deviation(
+        "⟨Jv, f⟩ = ⟨v, Jᵀf⟩",
+        1e-12,
+        power_off(&patch, at, &force),
+        "virtual work",
+    ));
     let normals = [0, 1, 2].map(|i| state.normal(model, model.corner_normals[0][i] as usize));
     let theirs = Deflected::new(corners, normals);
     let [_, twisted] = resultants_off(corners, theirs.nodal_forces(at, &force), theirs.point(at), force);
@@ -251,7 +262,11 @@ fn power_off(patch: &Patch, weights: [f64; 3], force: &Vector3) -> f64 {
 }
 
 fn layers() -> Result<Findings, CaseError> {
-    let bowl = sheet(Sheet::Hemisphere { radius: 1.0, hole: 0.35, span: std::f64::consts::PI }, [6, 4], Pattern::Crossed)?;
+    let bowl = sheet(
+        Sheet::Hemisphere { radius: 1.0, hole: 0.35, span: std::f64::consts::PI },
+        [6, 4],
+        Pattern::Crossed,
+    )?;
     let specimen = Specimen::new(bowl, [1e6, 0.3], 0.01, Formulation::default())?;
     let model = &specimen.model;
     let state = State::at_rest(model);
@@ -272,7 +287,8 @@ fn layers() -> Result<Findings, CaseError> {
             model.facets[facet].nodes.iter().map(|&n| model.rest[n as usize]).sum::<Vector3>() / 3.0
         };
         let facets = 0..model.facets.len();
-        let closest = facets.min_by(|&a, &b| (centre(a) - point).norm().total_cmp(&(centre(b) - point).norm()));
+        let closest =
+            facets.min_by(|&a, &b| (centre(a) - point).norm().total_cmp(&(centre(b) - point).norm()));
         closest.unwrap_or(0) as u32
     };
     let carried: Vec<_> = fine.points.iter().map(|p| surface.carry(model, &state, *p, nearest(p))).collect();
@@ -310,9 +326,8 @@ fn layers() -> Result<Findings, CaseError> {
     let mut findings = Findings::default();
     let caption = "Half a bowl of 96 shells. Positions go from left to right, the force of the contact from right to left.";
     findings.figures.push(figure(&bodies, &view, caption)?);
-    let powers = (0..model.facets.len() as u32).map(|facet| {
-        power_off(&surface.patch(model, &state, facet), contact.weights, &force)
-    });
+    let powers = (0..model.facets.len() as u32)
+        .map(|facet| power_off(&surface.patch(model, &state, facet), contact.weights, &force));
     let quantity = "⟨Jv, f⟩ = ⟨v, Jᵀf⟩ on every shell, largest";
     findings.rows.push(Row::deviation(quantity, 1e-12, largest(powers), "virtual work"));
     let [off, twisted] = resultants_off(corners, nodal, touched, force);
@@ -361,7 +376,10 @@ impl Ellipsoid {
 
     fn deflected(&self, facet: usize) -> Deflected {
         let corners = self.model.facets[facet].nodes.map(|node| self.state.position[node as usize]);
-        Deflected::new(corners, self.model.corner_normals[facet].map(|n| self.state.normal(&self.model, n as usize)))
+        Deflected::new(
+            corners,
+            self.model.corner_normals[facet].map(|n| self.state.normal(&self.model, n as usize)),
+        )
     }
 
     /// The largest gap at an edge between the thesis's surfaces of its two facets, over the diagonal.
@@ -374,7 +392,15 @@ impl Ellipsoid {
                 for part in 1..20 {
                     let part = f64::from(part) / 20.0;
                     let at = |nodes: [u32; 3], facet: usize| {
-                        let weight = |n: u32| if n == p { part } else if n == q { 1.0 - part } else { 0.0 };
+                        let weight = |n: u32| {
+                            if n == p {
+                                part
+                            } else if n == q {
+                                1.0 - part
+                            } else {
+                                0.0
+                            }
+                        };
                         self.deflected(facet).point(nodes.map(weight))
                     };
                     largest = largest.max((at(one.nodes, a) - at(other.nodes, b)).norm());
@@ -388,7 +414,8 @@ impl Ellipsoid {
 fn rendering() -> Result<Findings, CaseError> {
     let mut findings = Findings::default();
     let source = "prototype of the formulas; tolerance 10 %";
-    for (levels, count, ours, theirs) in [(0, 20_u32, [0.558, 0.264], 3.06), (1, 80, [0.0499, 0.0187], 0.441)] {
+    for (levels, count, ours, theirs) in [(0, 20_u32, [0.558, 0.264], 3.06), (1, 80, [0.0499, 0.0187], 0.441)]
+    {
         let ball = Ellipsoid::new(levels, [1.0; 3])?;
         let surface = CurvedSurface::new(&ball.model, EdgeRule::Arc);
         let mut off = Vec::new();
@@ -400,10 +427,12 @@ fn rendering() -> Result<Findings, CaseError> {
         }
         let rms = (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt();
         for (what, expected, found) in [("largest", ours[0], largest(off)), ("rms", ours[1], rms)] {
-            let quantity = format!("sphere of {count} shells: {what} distance of the surface, part of the diagonal");
+            let quantity =
+                format!("sphere of {count} shells: {what} distance of the surface, part of the diagonal");
             findings.rows.push(Row::judged(quantity, "%", [expected, 0.1 * expected], found, source));
         }
-        let quantity = format!("sphere of {count} shells: gap at edges of the thesis's surface, part of the diagonal");
+        let quantity =
+            format!("sphere of {count} shells: gap at edges of the thesis's surface, part of the diagonal");
         let gap = 100.0 * ball.gap();
         let row = Row::shown(quantity, "%", gap, "prototype of the formulas");
         findings.rows.push(Row { reference: Some(theirs), ..row });
@@ -413,7 +442,8 @@ fn rendering() -> Result<Findings, CaseError> {
     let ball = Ellipsoid::new(0, [1.3, 1.0, 0.7])?;
     let surface = CurvedSurface::new(&ball.model, EdgeRule::Arc);
     let Picture { places, triangles } = surface.picture(&ball.model, 12);
-    let made = |of: &dyn Fn(&Place) -> Vector3| triangle_mesh(places.iter().map(of).collect(), triangles.clone());
+    let made =
+        |of: &dyn Fn(&Place) -> Vector3| triangle_mesh(places.iter().map(of).collect(), triangles.clone());
     let flat_mesh = made(&|p| flat(&ball.model, &ball.state, p));
     let curved = made(&|p| surface.patch(&ball.model, &ball.state, p.facet).point(p.weights));
     // Each facet by itself, as gaps part them.
@@ -448,7 +478,8 @@ fn rendering() -> Result<Findings, CaseError> {
     }
     let off = |mesh: &Mesh| 100.0 * largest(mesh.points.iter().map(|p| ball.distance(p))) / ball.diagonal();
     for (name, mesh) in [("flat", &flat_mesh), ("curved", &curved), ("carried, bound at rest", &irregular)] {
-        let quantity = format!("sphere of 20 shells made an ellipsoid: {name}, largest distance, part of the diagonal");
+        let quantity =
+            format!("sphere of 20 shells made an ellipsoid: {name}, largest distance, part of the diagonal");
         findings.rows.push(Row::shown(quantity, "%", off(mesh), ""));
     }
     let bodies = [
@@ -457,7 +488,14 @@ fn rendering() -> Result<Findings, CaseError> {
         still("the surface here, subdivided", &curved, None),
         still("an irregular mesh, carried", &irregular, None),
     ];
-    let view = View { from: [0.4, -1.0, 0.5], up: [0.0, 0.0, 1.0], edges: false, quantity: "", factor: 1.0, columns: 2 };
+    let view = View {
+        from: [0.4, -1.0, 0.5],
+        up: [0.0, 0.0, 1.0],
+        edges: false,
+        quantity: "",
+        factor: 1.0,
+        columns: 2,
+    };
     let caption = "A sphere of 20 shells moved to an ellipsoid with axes 1.3, 1 and 0.7.";
     findings.figures.push(figure(&bodies, &view, caption)?);
     Ok(findings)

@@ -10,8 +10,8 @@ pub mod liver;
 pub mod obstacle_course;
 pub mod plate;
 pub mod relaxation;
-pub mod shell_times;
 pub mod shear;
+pub mod shell_times;
 
 use crate::case::{Case, Correction};
 

@@ -69,8 +69,7 @@ pub fn pinched_cylinder(cells: usize, formulation: Formulation) -> Result<f64, C
 /// # Errors
 /// If the stiffness is singular.
 pub fn hemisphere(cells: usize, formulation: Formulation) -> Result<f64, CaseError> {
-    let mesh =
-        forward(Sheet::Hemisphere { radius: 10.0, hole: PI / 10.0, span: FRAC_PI_2 }, [cells; 2])?;
+    let mesh = forward(Sheet::Hemisphere { radius: 10.0, hole: PI / 10.0, span: FRAC_PI_2 }, [cells; 2])?;
     let shell = Specimen::new(mesh, [6.825e7, 0.3], 0.04, formulation)?
         .hold_edge("start", symmetry(1))
         .hold_edge("end", symmetry(0));
@@ -283,8 +282,9 @@ fn add_beams(findings: &mut Findings) -> Result<(), CaseError> {
         ("parallelograms", CantileverCells::Parallelograms, [0.5331, 0.9725]),
     ] {
         let found = cantilever(cells, Formulation::default())?;
-        for (way, (expected, found)) in
-            ["in plane, over 0.1081", "out of plane, over 0.4321"].into_iter().zip(expected.into_iter().zip(found))
+        for (way, (expected, found)) in ["in plane, over 0.1081", "out of plane, over 0.4321"]
+            .into_iter()
+            .zip(expected.into_iter().zip(found))
         {
             let quantity = format!("cantilever, 6 × 1 {name}, {way}");
             findings.rows.push(Row::judged(quantity, "", [expected, 0.01 * expected], found, source));
@@ -292,8 +292,9 @@ fn add_beams(findings: &mut Findings) -> Result<(), CaseError> {
     }
     for (cells, expected) in [(2, [0.9937, 1.0003]), (4, [0.9953, 0.9980]), (8, [0.9954, 0.9977])] {
         let found = twisted_beam(false, cells, Formulation::default())?;
-        for (way, (expected, found)) in
-            ["in plane, over 5.424e-3", "out of plane, over 1.754e-3"].into_iter().zip(expected.into_iter().zip(found))
+        for (way, (expected, found)) in ["in plane, over 5.424e-3", "out of plane, over 1.754e-3"]
+            .into_iter()
+            .zip(expected.into_iter().zip(found))
         {
             let quantity = format!("twisted beam, t = 0.32, N = {cells}, {way}");
             findings.rows.push(Row::judged(quantity, "", [expected, 0.01 * expected], found, source));

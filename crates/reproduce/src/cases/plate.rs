@@ -71,7 +71,9 @@ pub fn mesh(cells: usize, pattern: Pattern) -> Result<Mesh, CaseError> {
 /// If the mesh is no sound shell.
 pub fn held(mesh: Mesh, formulation: Formulation, components: [bool; 6]) -> Result<Specimen, CaseError> {
     let plate = Specimen::new(mesh, ELASTIC, THICKNESS, formulation)?;
-    Ok(["x-min", "x-max", "y-min", "y-max"].into_iter().fold(plate, |plate, edge| plate.hold_edge(edge, components)))
+    Ok(["x-min", "x-max", "y-min", "y-max"]
+        .into_iter()
+        .fold(plate, |plate, edge| plate.hold_edge(edge, components)))
 }
 
 /// Centre deflection of the clamped plate under uniform load by linear theory, over Timoshenko's 0.00126532 q L⁴/D.
@@ -126,15 +128,25 @@ fn compute() -> Result<Findings, CaseError> {
     let mut findings = Findings::default();
     let small = deflections(&[0.01])?[0];
     let quantity = "q = 0.01 Pa: deflection over 0.126532 q";
-    findings.rows.push(Row::judged(quantity, "", [1.0, 0.01], small / (0.01 * LINEAR), "linear theory (Timoshenko)"));
+    findings.rows.push(Row::judged(
+        quantity,
+        "",
+        [1.0, 0.01],
+        small / (0.01 * LINEAR),
+        "linear theory (Timoshenko)",
+    ));
     let thesis = as_in_the_thesis()?;
     let large = deflections(&[1.0, 2.0, 3.0, 4.0, 5.0])?;
     let loads = [1.0, 2.0, 3.0, 4.0, 5.0];
-    for ((load, found), (expected, printed)) in loads.into_iter().zip(&large).zip(LARGE.into_iter().zip(PRINTED)) {
+    for ((load, found), (expected, printed)) in
+        loads.into_iter().zip(&large).zip(LARGE.into_iter().zip(PRINTED))
+    {
         let source = "prototype of the formulas, large rotations; tolerance 1 %";
         let quantity = format!("q = {load} Pa: deflection");
         findings.rows.push(Row::judged(quantity, "m", [expected, 0.01 * expected], *found, source));
-        let quantity = format!("q = {load} Pa: the thesis's element in bending only, 9 × 9 nodes, equal shares of the load");
+        let quantity = format!(
+            "q = {load} Pa: the thesis's element in bending only, 9 × 9 nodes, equal shares of the load"
+        );
         let row = Row::shown(quantity, "m", thesis * load, "Table 8.1, as printed");
         findings.rows.push(Row { reference: Some(printed), ..row });
     }

@@ -24,7 +24,8 @@ const TOLERANCE: f64 = 1e-3;
 /// Elements of figure 9.4.
 const PRINTED: [usize; 5] = [200, 400, 600, 800, 1000];
 /// Elements of the plot of costs, and steps measured of each.
-const SIZES: [(usize, usize); 6] = [(200, 50), (800, 50), (4000, 50), (10_000, 25), (20_000, 15), (50_000, 8)];
+const SIZES: [(usize, usize); 6] =
+    [(200, 50), (800, 50), (4000, 50), (10_000, 25), (20_000, 15), (50_000, 8)];
 
 /// Figure 9.4.
 pub const CASE: Case = Case {
@@ -130,8 +131,11 @@ fn real_time(linear: LinearSolver) -> DynamicSettings {
 
 /// The thesis's two settings: residual 5 %, and 100 iterations.
 fn printed() -> [DynamicSettings; 2] {
-    let hundred =
-        LinearSolver::ConjugateGradients { tolerance: 0.0, iterations: 100, preconditioner: Preconditioner::BlockJacobi };
+    let hundred = LinearSolver::ConjugateGradients {
+        tolerance: 0.0,
+        iterations: 100,
+        preconditioner: Preconditioner::BlockJacobi,
+    };
     [
         real_time(gradients(0.05, Preconditioner::BlockJacobi)),
         DynamicSettings { accept_stalled: true, ..real_time(hundred) },
@@ -228,7 +232,8 @@ fn compute() -> Result<Findings, CaseError> {
         curves.push(Curve::new(name, colour, Pen::Line, points.clone()));
         curves.push(Curve::new("", colour, Pen::Markers, points));
     }
-    let caption = "One linear solution a step, residual 0.1 % with conjugate gradients; median of 8 to 50 steps.";
+    let caption =
+        "One linear solution a step, residual 0.1 % with conjugate gradients; median of 8 to 50 steps.";
     findings.figures.push(plot("Solvers", &curves, true).figure(caption)?);
 
     let quantity = "469 nodes: factors anew and a solution";
@@ -237,7 +242,8 @@ fn compute() -> Result<Findings, CaseError> {
     let [loose, exact] = [loose, real_time(LinearSolver::Direct)].map(|settings| measure(800, settings, 25));
     let (loose, exact) = (loose?.last, exact?.last);
     let rest = tube(800)?.rest;
-    let norm = |of: &dyn Fn(usize) -> Vector3| (0..rest.len()).map(|n| of(n).norm_squared()).sum::<f64>().sqrt();
+    let norm =
+        |of: &dyn Fn(usize) -> Vector3| (0..rest.len()).map(|n| of(n).norm_squared()).sum::<f64>().sqrt();
     let off = norm(&|n| loose.position[n] - exact.position[n]) / norm(&|n| exact.position[n] - rest[n]);
     let quantity = "800 shells after 1 s: displacements at a residual of 5 %, off those with factors";
     findings.rows.push(Row::shown(quantity, "", off, ""));
@@ -252,7 +258,13 @@ fn add_rows(findings: &mut Findings, shells: usize, name: &str, found: &Measured
         _ => (None, ""),
     };
     let mut add = |what: &str, unit, reference, value, source| {
-        findings.rows.push(Row::timed(format!("{shells} shells, {name}: {what}"), unit, reference, value, source));
+        findings.rows.push(Row::timed(
+            format!("{shells} shells, {name}: {what}"),
+            unit,
+            reference,
+            value,
+            source,
+        ));
     };
     add("a step, median", "ms", asked.0, median, asked.1);
     add("least", "ms", None, least, "");
