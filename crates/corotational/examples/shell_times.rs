@@ -63,6 +63,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("factors", LinearSolver::Direct),
         ("CG, older factors, 1e-3", gradients(1e-3, 500, Preconditioner::LaggedFactors { renew_after: 12 })),
         ("CG, blocks, 1e-3", gradients(1e-3, 5000, Preconditioner::BlockJacobi)),
+        ("CG, aggregates, 1e-3", gradients(1e-3, 5000, Preconditioner::Aggregates)),
         ("CG, blocks, 5e-2", gradients(5e-2, 5000, Preconditioner::BlockJacobi)),
     ];
     println!(
@@ -72,6 +73,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for shells in sizes {
         let model = tube(shells);
         for (name, linear) in solvers {
+            if std::env::var("ONLY").is_ok_and(|only| !name.contains(&only)) {
+                continue;
+            }
             let settings = DynamicSettings::new(0.04).real_time(linear);
             let mut solver = BackwardEuler::new(&model, settings)?;
             let mut state = State::at_rest(&model);
