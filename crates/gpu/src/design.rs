@@ -32,10 +32,11 @@ impl Design {
     pub const ALL: &[Self] =
         &[Self::Gather, Self::Blocks, Self::FloatAtomics, Self::FixedAtomics, Self::Fast];
 
-    /// The one that is taken where nobody asks for another. On software adapters `gather` measured best (Mesa's llvmpipe, 55,566
-    /// tetrahedra: 78 ns of processor time per cell and step, against 113 to 161 of the others). On graphics processors `fast` moves the fewest bytes per cell
-    /// and needs neither atomics nor a limited range; that it is the fastest there is reckoned from bytes and operations, not
-    /// measured yet.
+    /// The one that is taken where nobody asks for another.
+    ///
+    /// On software adapters `gather` measured best (Mesa's llvmpipe, 55,566 tetrahedra: 78 ns of processor time per cell and
+    /// step, 113 to 161 for the others). On graphics processors `fast` moves the fewest bytes, needs no atomics and has forces of any size;
+    /// that it is the fastest there is reckoned from bytes and operations and not measured yet.
     pub fn usual(kind: Kind) -> Self {
         match kind {
             Kind::Software => Self::Gather,

@@ -1,4 +1,15 @@
 //! The way forces take from cells to nodes, for each design.
+//!
+//! What an elastic `tet4` moves and computes in a step, counted from the arrays below for six cells a node, each number read once
+//! from memory; operations are those of a prototype's PTX (sm_90, neo-Hookean). The node itself (u, Δu read and written, its
+//! constants) is 80 B, 13 a cell. Of none a time on a graphics processor is measured.
+//!
+//! | design | bytes | operations | where they go |
+//! |---|---|---|---|
+//! | `gather` | 230 | 260 | cell: nodes 16, shape 48, u 3, forces written 64; node: forces 64, their places 17 |
+//! | `blocks` | 120 | 475 | 1.78 × (shape 48, corners 4), 3.4 × nodes around 11; no second kernel |
+//! | `float-atomics`, `fixed-atomics` | 90 | 260 | nodes 16, shape 48, u 3, sums 8; twelve atomic additions |
+//! | `fast` | 50 | 325 | corners 4, places of corners 8, 2.2 × nodes of blocks 20; shapes found again |
 
 use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
 use pliant_mechanics::tensor::dot;

@@ -71,6 +71,10 @@ impl Complex {
         (0_u32..).zip(&self.tets).filter(|(_, nodes)| **nodes != GONE).map(|(tet, _)| tet)
     }
 
+    pub(crate) fn is_alive(&self, tet: u32) -> bool {
+        self.tets[tet as usize] != GONE
+    }
+
     pub(crate) fn corners(&self, tet: u32) -> [Vector3; 4] {
         self.tets[tet as usize].map(|node| self.points[node as usize])
     }

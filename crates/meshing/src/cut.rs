@@ -53,9 +53,10 @@ pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField, edge: f
     let mut values: Vec<f64> = complex.points.iter().map(inside).collect();
     let deepest = |[p, q]: [u32; 2]| {
         let [p, q] = [p, q].map(|point| complex.points[point as usize]);
-        let samples = [0.25, 0.5, 0.75].map(|at| p.lerp(&q, at));
-        let [a, b, c] = samples.map(|point| (inside(&point), point));
-        [b, a, c].into_iter().fold(b, |least, other| if other.0 < least.0 { other } else { least })
+        // From the middle outwards, so that of equal depths the one nearest to it counts.
+        let samples = [4, 3, 5, 2, 6, 1, 7].map(|eighths| p.lerp(&q, f64::from(eighths) / 8.0));
+        let depths = samples.map(|point| (inside(&point), point));
+        depths.into_iter().fold(depths[0], |least, other| if other.0 < least.0 { other } else { least })
     };
     let mut bridges: Vec<([u32; 2], f64, Vector3)> = Vec::new();
     for ends in complex.edges() {

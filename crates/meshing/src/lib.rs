@@ -29,6 +29,7 @@ mod deviation;
 mod error;
 mod extent;
 mod field;
+mod flip;
 mod lattice;
 mod manifold;
 mod optimise;

@@ -1,7 +1,7 @@
 //! Improves a tetrahedral mesh for explicit dynamics, where the least acoustic length sets the time step: tets below a
-//! rising threshold lose an edge or their place, then points move to where their worst tet is best. Points between sides
-//! stay between them. Deterministic: everything goes in the order of numbers, and the directions of trial moves are
-//! turned by a fixed sequence.
+//! rising threshold lose an edge or are flipped, then points move to where their worst tet is best. Points between
+//! sides stay between them. Deterministic: everything goes in the order of numbers, and the directions of trial moves
+//! are turned by a fixed sequence.
 
 use pliant_geometry::{CellKind, Vector3};
 
@@ -35,8 +35,12 @@ const FIT_REACH: f64 = 0.25;
 /// Faces that follow their surface this well (root mean square, in lattice constants) stay.
 const FIT_ENOUGH: f64 = 0.01;
 
-/// Where the aim is still not reached, points round bad tets may leave their surfaces by this, in lattice constants.
+/// Where the aim is still not reached, points round bad tets may leave their surfaces by this, in lattice constants; by the
+/// last only where the target itself is not reached.
 const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
+
+/// Edges of the boundary may turn where the new one is no farther from the surface than this, in lattice constants.
+const FLIP_OFF: f64 = 0.03;
 
 /// Volumes nearer than this part to what they must be are left alone.
 const VOLUME_TOLERANCE: f64 = 2e-3;
@@ -47,6 +51,7 @@ pub(crate) struct Optimised {
     pub(crate) rounds: usize,
     pub(crate) peeled: usize,
     pub(crate) collapsed: usize,
+    pub(crate) flipped: usize,
     pub(crate) moved: usize,
 }
 
@@ -87,8 +92,8 @@ impl<'a> Optimiser<'a> {
             }
             progress(0.6 + 0.3 * (sweep + 1) as f64 / FIT_SWEEPS as f64);
         }
-        for slack in SLACKS {
-            if self.complex.worst() >= aim * self.ideal {
+        for (slack, goal) in [(SLACKS[0], aim), (SLACKS[1], aim), (SLACKS[2], target)] {
+            if self.complex.worst() >= goal * self.ideal {
                 break;
             }
             self.slack = slack * self.edge;
@@ -131,7 +136,7 @@ impl<'a> Optimiser<'a> {
             let ramp = ((round + 1) as f64 / (ramp * rounds as f64)).min(1.0);
             let threshold = self.ideal * (FIRST_THRESHOLD + (target - FIRST_THRESHOLD) * ramp);
             let before = self.complex.worst();
-            let changes = self.peel(threshold) + self.collapse(threshold);
+            let changes = self.peel(threshold) + self.collapse(threshold) + self.flip(threshold);
             // While the threshold rises, points just above it move too.
             self.relocate(if ramp_over { threshold } else { 1.05 * threshold });
             self.done.rounds += 1;
@@ -211,7 +216,7 @@ impl<'a> Optimiser<'a> {
         for tet in self.below(threshold) {
             let nodes = self.complex.tets[tet as usize];
             // A collapse before may have taken it away or improved it.
-            if nodes[0] != u32::MAX
+            if self.complex.is_alive(tet)
                 && self.complex.length(tet) < threshold
                 && self.collapse_one(nodes, threshold)
             {
@@ -220,6 +225,20 @@ impl<'a> Optimiser<'a> {
         }
         self.done.collapsed += collapsed;
         collapsed
+    }
+
+    /// Flips edges and faces of tets below a length.
+    fn flip(&mut self, threshold: f64) -> usize {
+        let surfaces = &self.surfaces;
+        let follows = |middle: &Vector3| surfaces.off(OUTSIDE, middle) <= FLIP_OFF * self.edge;
+        let mut flipped = 0;
+        for tet in self.below(threshold) {
+            if self.complex.is_alive(tet) && self.complex.flip(tet, &follows) {
+                flipped += 1;
+            }
+        }
+        self.done.flipped += flipped;
+        flipped
     }
 
     /// Tries the edges of a tet, the shortest first, both ways.
@@ -292,13 +311,21 @@ impl<'a> Optimiser<'a> {
         least
     }
 
-    /// The place nearest to `place` between the sides of a node.
+    /// The place nearest to `place` between the sides of a node, if it is on the same bank of the body: where its surface
+    /// looks the same way, within 90°. The other bank of a gap or of a thin lobe may be nearer.
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
-        match self.complex.sides[node as usize] {
-            sides if sides.count_ones() < 2 => Some(place),
-            sides if self.surfaces.off(sides, &place) < self.slack => Some(place),
-            sides => self.surfaces.project(sides, &place, 0.15 * self.edge),
+        let sides = self.complex.sides[node as usize];
+        if sides.count_ones() < 2 {
+            return Some(place);
         }
+        let near = self.surfaces.off(sides, &place) < self.slack;
+        let there = match near && (sides & OUTSIDE == 0 || self.surfaces.has_room(&place, self.slack)) {
+            true => place,
+            false => self.surfaces.project(sides, &place, 0.15 * self.edge)?,
+        };
+        let looks = |point: &Vector3| self.surfaces.constraints(sides, point).first_gradient();
+        let here = self.complex.points[node as usize];
+        (looks(&here).dot(&looks(&there)) > 0.0).then_some(there)
     }
 
     /// Slides points along their surface to where its facets follow the field best, as long as no tet falls below the
@@ -326,10 +353,7 @@ impl<'a> Optimiser<'a> {
         let floor = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY).min(least);
         let (mut best, mut place) = (0.99 * misfit, here);
         for direction in directions() {
-            let Some(trial) = self.surfaces.project(sides, &(here + direction * reach), 0.15 * self.edge)
-            else {
-                continue;
-            };
+            let Some(trial) = self.project(node, here + direction * reach) else { continue };
             let [misfit, _] = self.misfit(node, &trial, &faces);
             if misfit < best && self.star_min(node, &trial, u32::MAX, 0.0) >= floor {
                 (best, place) = (misfit, trial);

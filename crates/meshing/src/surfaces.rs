@@ -85,6 +85,15 @@ impl<'a> Surfaces<'a> {
         self.constraints(sides, point).largest()
     }
 
+    /// Whether a point is inside the body, or outside with more than `room` [m] to another bank of it.
+    pub(crate) fn has_room(&self, point: &Vector3, room: f64) -> bool {
+        let field = self.anatomy.field();
+        let depth = |point: &Vector3| field.value(point) - self.levels[0];
+        let here = depth(point);
+        let onward = point - room * field.gradient(point).try_normalize(0.0).unwrap_or_default();
+        here >= 0.0 || depth(&onward) < here - room / 2.0
+    }
+
     /// The closest point between the same sides, by Newton's method with steps of at most `longest` [m] on the least
     /// move; `None` if it is not found.
     pub(crate) fn project(&self, sides: Sides, from: &Vector3, longest: f64) -> Option<Vector3> {
@@ -120,6 +129,11 @@ impl Constraints {
 
     pub(crate) fn largest(&self) -> f64 {
         self.values[..self.count].iter().fold(0.0, |largest, value| largest.max(value.abs()))
+    }
+
+    /// The gradient of the first of them: of the body on its boundary.
+    pub(crate) fn first_gradient(&self) -> Vector3 {
+        self.gradients[0]
     }
 
     /// The shortest step that makes the linear parts zero: Jᵀ (J Jᵀ)⁻¹ c.

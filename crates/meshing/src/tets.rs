@@ -94,6 +94,7 @@ impl OrganTets {
             rounds: optimised.rounds,
             peeled: optimised.peeled,
             collapsed: optimised.collapsed,
+            flipped: optimised.flipped,
             moved: optimised.moved,
         };
         let left = crowded_edges(&complex).len();
@@ -156,6 +157,8 @@ pub struct Steps {
     pub peeled: usize,
     /// Edges collapsed.
     pub collapsed: usize,
+    /// Edges and faces flipped.
+    pub flipped: usize,
     /// Moves of points.
     pub moved: usize,
 }
@@ -293,10 +296,10 @@ impl fmt::Display for TetReport {
         if self.crowded_edges_left > 0 {
             writeln!(f, "still touching   {} edges", self.crowded_edges_left)?;
         }
-        let Steps { rounds, peeled, collapsed, moved } = self.steps;
+        let Steps { rounds, peeled, collapsed, flipped, moved } = self.steps;
         write!(
             f,
-            "optimiser        {rounds} rounds: {peeled} tets peeled, {collapsed} edges collapsed, {moved} moves"
+            "optimiser        {rounds} rounds: {peeled} tets peeled, {collapsed} edges collapsed, {flipped} flips, {moved} moves"
         )
     }
 }

@@ -7,7 +7,7 @@ use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::model::Surface;
 
-use crate::against::{compare_from, designs, load, step_of};
+use crate::against::{PLAIN, compare_from, designs, load, step_of};
 use crate::cube::{CELLS, Jumble, elastic, every_law, jumbled_cube, layer, neo_hookean, top_quads};
 use crate::support;
 
@@ -31,7 +31,9 @@ fn every_law_on_every_kind_of_element() {
         for element in ["tet4", "tet4-anp", "hex8"] {
             if element != "tet4-anp" || law.has_volumetric_energy() {
                 let what = format!("{} on {element}", law.name());
-                compare(&device, &what, &jumbled_cube(element, elastic(law)), EACH);
+                // A law meets an element in the same lines whatever the design, so that one element will do for the others.
+                let designs = if element == "tet4" { EACH } else { PLAIN };
+                compare(&device, &what, &jumbled_cube(element, elastic(law)), designs);
             }
         }
     }

@@ -2,6 +2,10 @@
 
 mod checks;
 mod errors;
+// Validation and an example share these; each uses its part.
+#[allow(dead_code)]
+mod images;
+mod organs;
 mod phantoms;
 mod structured;
 mod stuffing;
