@@ -201,7 +201,7 @@ fn patch() -> Result<Findings, CaseError> {
     }
     let surface = CurvedSurface::new(model, EdgeRule::Arc);
     let patch = surface.patch(model, &state, 0);
-    let Picture { places, triangles } = surface.picture(model, 8);
+    let Picture { places, triangles, .. } = surface.picture(model, 8);
     let flat_mesh = triangle_mesh(places.iter().map(|p| flat(model, &state, p)).collect(), triangles.clone());
     let curved_mesh = triangle_mesh(places.iter().map(|p| patch.point(p.weights)).collect(), triangles);
     let (at, force) = ([0.3, 0.4, 0.3], Vector3::new(0.1, -0.2, -1.0));
@@ -271,7 +271,7 @@ fn layers() -> Result<Findings, CaseError> {
     let model = &specimen.model;
     let state = State::at_rest(model);
     let surface = CurvedSurface::new(model, EdgeRule::Arc);
-    let Picture { places, triangles } = surface.picture(model, 6);
+    let Picture { places, triangles, .. } = surface.picture(model, 6);
     let point = |place: &Place| surface.patch(model, &state, place.facet).point(place.weights);
     let curved = triangle_mesh(places.iter().map(point).collect(), triangles);
     // A surface with a relief, which the shells carry.
@@ -444,7 +444,7 @@ fn rendering() -> Result<Findings, CaseError> {
     let rest = Ellipsoid::new(0, [1.0; 3])?;
     let ball = Ellipsoid::new(0, [1.3, 1.0, 0.7])?;
     let surface = CurvedSurface::new(&ball.model, EdgeRule::Arc);
-    let Picture { places, triangles } = surface.picture(&ball.model, 12);
+    let Picture { places, triangles, .. } = surface.picture(&ball.model, 12);
     let made =
         |of: &dyn Fn(&Place) -> Vector3| triangle_mesh(places.iter().map(of).collect(), triangles.clone());
     let flat_mesh = made(&|p| flat(&ball.model, &ball.state, p));
