@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use pliant_corotational::element::Elasticity;
+use pliant_corotational::element::{Elasticity, Formulation, Membrane};
 use pliant_corotational::{
     BackwardEuler, Constraint, DynamicSettings, LinearSolver, Load, LoadKind, Material, Model, Motion,
     Preconditioner, Shell, Spread, State, StaticSettings, Statics,
@@ -63,6 +63,7 @@ struct Organ {
     young: f64,
     thickness: f64,
     pressure: f64,
+    membrane: Membrane,
 }
 
 impl Organ {
@@ -70,7 +71,9 @@ impl Organ {
     fn model(&self, mesh: &Mesh) -> Model {
         let mut model = Model::new(mesh.points.clone());
         let material = Material { elastic: Elasticity { young: self.young, poisson: 0.45 }, density: 1000.0 };
-        let notes = model.add_shell(&Shell::new("organ", triangles(mesh), self.thickness, material)).unwrap();
+        let formulation = Formulation { membrane: self.membrane, ..Formulation::default() };
+        let shell = Shell::new("organ", triangles(mesh), self.thickness, material);
+        let notes = model.add_shell(&Shell { formulation, ..shell }).unwrap();
         println!("{} nodes, {} shells, {notes:?}", model.rest.len(), model.facets.len());
         let mut heights: Vec<f64> = mesh.points.iter().map(|p| p.z).collect();
         heights.sort_unstable_by(f64::total_cmp);
@@ -111,7 +114,23 @@ impl Organ {
                     );
                 }
                 Err(error) => {
-                    println!("  fails at load {:.3}: {error}", state.time);
+                    if let pliant_corotational::SolveError::Broken { cell, .. } = error {
+                        let f = &model.facets[cell];
+                        let around =
+                            model.facets.iter().filter(|o| f.nodes.iter().any(|n| o.nodes.contains(n)));
+                        println!(
+                            "  broken facet altitude {:.3} mm, area {:.3} mm2, around {:?} mm",
+                            1e3 * f.altitude(),
+                            1e6 * f.area,
+                            around.map(|o| (1e5 * o.altitude()).round() / 100.0).collect::<Vec<_>>()
+                        );
+                    }
+                    println!(
+                        "  fails at load {:.3}: {error}; volume × {:.4}, largest displacement {:.2} mm",
+                        state.time,
+                        model.enclosed_volume(&cells, &state.position) / rest,
+                        1e3 * largest(&model, &state)
+                    );
                     return Err(error.to_string());
                 }
             }
@@ -189,7 +208,7 @@ fn study(organ: &Organ, mesh: &Mesh) {
 fn aneurysm_under_pressure() {
     let Some(data) = data() else { return };
     let mesh = surface(data.join("aneurysm-sofa/aneurysm3D_1.off"), 1e-3);
-    study(&Organ { young: 1e6, thickness: 0.3e-3, pressure: 10e3 }, &mesh);
+    study(&Organ { young: 1e6, thickness: 0.3e-3, pressure: 10e3, membrane: Membrane::default() }, &mesh);
 }
 
 /// 13,770 triangles in mm; 3 kPa, E = 0.5 MPa, t = 3 mm.
@@ -198,7 +217,12 @@ fn aneurysm_under_pressure() {
 fn rectum_under_pressure() {
     let Some(data) = data() else { return };
     let mesh = surface(data.join("organs-openhelp/Rectum_Lumen.stl"), 1e-3);
-    study(&Organ { young: 0.5e6, thickness: 3e-3, pressure: 3e3 }, &mesh);
+    let organ = Organ { young: 0.5e6, thickness: 3e-3, pressure: 3e3, membrane: Membrane::default() };
+    drop(organ.equilibrium(&mesh));
+    let cst = Organ { membrane: Membrane::Cst { drilling: 1e-2 }, ..organ };
+    drop(cst.equilibrium(&mesh));
+    let half = Organ { pressure: 1.5e3, ..organ };
+    study(&half, &mesh);
 }
 
 /// Numbers of a table of two columns after its first line.

@@ -323,11 +323,11 @@ impl Facet {
             }
             let moved = g[j].after(&both) - rigid[2 * j].transpose() + force[j];
             let turned = rigid[2 * j + 1].transpose() + corrections[j];
-            for i in 0..3 {
+            for (i, g) in g.iter().enumerate() {
                 let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * j);
-                block += g[i].transposed_before(&moved);
+                block += g.transposed_before(&moved);
                 let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * j + 3);
-                block -= g[i].transposed_before(&turned);
+                block -= g.transposed_before(&turned);
             }
             let mut own = k.fixed_view_mut::<3, 3>(6 * j + 3, 6 * j + 3);
             own += corrections[j];

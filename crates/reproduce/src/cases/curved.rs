@@ -295,7 +295,11 @@ fn layers() -> Result<Findings, CaseError> {
     let bound = carried.iter().zip(&fine.points).map(|(c, p)| (surface.carried(model, &state, c) - p).norm());
     let bound = largest(bound);
 
-    let contact = carried[carried.len() / 2].place;
+    let seen = Vector3::new(-0.6, 0.5, 0.6);
+    let nodes = 0..fine.points.len();
+    let top =
+        nodes.max_by(|&a, &b| fine.points[a].dot(&seen).total_cmp(&fine.points[b].dot(&seen))).unwrap_or(0);
+    let contact = carried[top].place;
     let patch = surface.patch(model, &state, contact.facet);
     let touched = patch.point(contact.weights);
     let force = -0.5 * patch.normal(contact.weights);
@@ -307,8 +311,7 @@ fn layers() -> Result<Findings, CaseError> {
         arrow(&mut shells, corner - 1.6 * f, corner, 0.016);
     }
     let mut touching = fine.clone();
-    let top = carried[carried.len() / 2];
-    let skin = surface.carried(model, &state, &top);
+    let skin = surface.carried(model, &state, &carried[top]);
     arrow(&mut touching, skin - force, skin, 0.022);
     let bodies = [
         still("shells, with what comes to them", &shells, None),
