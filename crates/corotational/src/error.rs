@@ -80,7 +80,8 @@ pub enum ModelError {
         edge: [u32; 2],
     },
     /// A surface that encloses nothing.
-    #[error("a balloon must be closed, but its surface has {} open borders: {}", loops.len(), borders(loops))]
+    #[error("a balloon must be closed, but its surface has {} open border{}: {}", loops.len(),
+        if loops.len() == 1 { "" } else { "s" }, borders(loops))]
     Open {
         /// Nodes along each border.
         loops: Vec<Vec<u32>>,
@@ -103,7 +104,7 @@ fn borders(loops: &[Vec<u32>]) -> String {
 pub enum SolveError {
     /// Nothing holds a part.
     #[error(
-        "the part with node {node} is free in {free_modes} rigid motions; fix more of its nodes, or tie it to points \
+        "the part with node {node} is free in {free_modes} of 6 rigid motions; fix more of its nodes, or tie it to points \
          with springs"
     )]
     FreeBody {

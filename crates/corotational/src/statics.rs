@@ -7,7 +7,7 @@ use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::linear::{LinearSolver, dot};
-use crate::model::{LoadKind, Model};
+use crate::model::{Load, LoadKind, Model};
 use crate::state::State;
 use crate::system::{Phases, System};
 
@@ -200,7 +200,8 @@ impl<'m> Statics<'m> {
         }
     }
 
-    /// The next equilibrium under a control, which finds the factor of the controlled loads, at the state's time.
+    /// The next equilibrium under a control, which finds the factor of the controlled loads, at the state's time. A step that fails
+    /// is halved.
     ///
     /// # Errors
     /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is found (the state then is as it was).
@@ -216,17 +217,47 @@ impl<'m> Statics<'m> {
             }
         }
         let before = state.clone();
-        let result = self.newton(state, before.time, Some(control));
-        let step = result.map_err(|attempt| {
-            *state = before.clone();
+        self.halved(state, control, self.settings.halvings).map_err(|attempt| {
+            *state = before;
             attempt.error
-        })?;
-        for (direction, (now, then)) in
-            self.direction.chunks_exact_mut(6).zip(state.position.iter().zip(&before.position))
-        {
-            direction[..3].copy_from_slice((now - then).as_slice());
+        })
+    }
+
+    /// A step under a control, in two halves if it fails as a whole and may be halved so many times.
+    fn halved(&mut self, state: &mut State, control: Control, halvings: usize) -> Result<Step, Attempt> {
+        let before = state.clone();
+        match self.newton(state, before.time, Some(control)) {
+            Ok(step) => {
+                for (direction, (now, then)) in
+                    self.direction.chunks_exact_mut(6).zip(state.position.iter().zip(&before.position))
+                {
+                    direction[..3].copy_from_slice((now - then).as_slice());
+                }
+                Ok(Step { parts: 1, ..step })
+            }
+            Err(Attempt { retry: true, .. }) if halvings > 0 => {
+                *state = before;
+                let [first, second] = self.halves(control, state);
+                let parts = self.halved(state, first, halvings - 1)?.parts;
+                let step = self.halved(state, second, halvings - 1)?;
+                Ok(Step { parts: parts + step.parts, ..step })
+            }
+            Err(attempt) => Err(attempt),
         }
-        Ok(Step { parts: 1, ..step })
+    }
+
+    /// Two halves of what a control prescribes from a state on.
+    fn halves(&self, control: Control, state: &State) -> [Control; 2] {
+        match control {
+            Control::Displacement { node, component, by } => {
+                [Control::Displacement { node, component, by: 0.5 * by }; 2]
+            }
+            Control::ArcLength { length } => [Control::ArcLength { length: 0.5 * length }; 2],
+            Control::Volume { volume } => {
+                let now = controlled_volume(self.system.model, state);
+                [Control::Volume { volume: 0.5 * (now + volume) }, control]
+            }
+        }
     }
 
     fn newton(&mut self, state: &mut State, time: f64, control: Option<Control>) -> Result<Step, Attempt> {
@@ -356,10 +387,8 @@ impl<'m> Statics<'m> {
             }
             Control::Volume { volume } => {
                 let model = self.system.model;
-                let mut now = 0.0;
                 for load in model.loads.iter().filter(|load| load.controlled) {
                     let LoadKind::Pressure { cells, .. } = &load.kind else { continue };
-                    now += model.enclosed_volume(cells, &state.position);
                     for &cell in cells {
                         let nodes = model.facets[cell as usize].nodes;
                         let x = nodes.map(|node| state.position[node as usize]);
@@ -371,7 +400,7 @@ impl<'m> Statics<'m> {
                         }
                     }
                 }
-                now - volume
+                controlled_volume(model, state) - volume
             }
         }
     }
@@ -418,6 +447,15 @@ impl<'m> Statics<'m> {
         }
         Ok(factor)
     }
+}
+
+/// The volume [m³] that the facets of controlled pressures enclose.
+fn controlled_volume(model: &Model, state: &State) -> f64 {
+    let volume = |load: &Load| match &load.kind {
+        LoadKind::Pressure { cells, .. } => model.enclosed_volume(cells, &state.position),
+        _ => 0.0,
+    };
+    model.loads.iter().filter(|load| load.controlled).map(volume).sum()
 }
 
 /// Whether every part of a model is held: of its six rigid motions none may leave constraints and springs unmoved.

@@ -402,17 +402,10 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
     };
     let owner = node.and_then(body_of);
-    let body = owner.map(|body| body.name.clone()).or_else(|| {
-        let (body, _) = cell?;
-        Some(built.bodies[body].name.clone())
-    });
-    let of_body = body.as_ref().map(|name| format!(" of `{name}`")).unwrap_or_default();
     let own_node = node.zip(owner).map(|(node, body)| node - body.nodes.start);
-    let place = match (own_node, cell) {
-        (Some(node), _) => format!(" (node {node}{of_body})"),
-        (_, Some((_, cell))) => format!(" (element {cell}{of_body})"),
-        _ => String::new(),
-    };
+    let body = owner.map(|body| body.name.clone()).or_else(|| Some(built.bodies[cell?.0].name.clone()));
+    let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();
+    let told = numbered(error, own_node, cell.map(|(_, cell)| cell));
     let history = match error {
         SolveError::NotConverged { residuals, .. } => {
             let told: Vec<String> = residuals.iter().map(|&residual| number(residual)).collect();
@@ -423,7 +416,7 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     FailureSummary::of_solver(
         kind,
         format!(
-            "after t = {} s{place}: {error}{history}; what was written before stays readable",
+            "after t = {} s{place}: {told}{history}; what was written before stays readable",
             number(time)
         ),
         body,
@@ -431,4 +424,17 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
         own_node,
         time,
     )
+}
+
+/// An error with the numbers that a node and a cell have in their body.
+fn numbered(error: &SolveError, own_node: Option<u32>, own_cell: Option<u32>) -> SolveError {
+    let mut own = error.clone();
+    match &mut own {
+        SolveError::NotConverged { node, .. }
+        | SolveError::Singular { node, .. }
+        | SolveError::FreeBody { node, .. } => *node = own_node.unwrap_or(*node),
+        SolveError::Broken { cell, .. } => *cell = own_cell.map_or(*cell, |cell| cell as usize),
+        _ => {}
+    }
+    own
 }

@@ -120,6 +120,12 @@ impl Builder<'_> {
             let help = "leave it out, or take `solver = \"implicit\"`, which has no stable step";
             self.error(&["run", "mass-scaling"], message, "not for these bodies", help);
         }
+        if scene.run.on_unstable.is_some() {
+            let message =
+                format!("the stable step of bodies of model `{}` is not watched", table.model.word());
+            let help = "leave it out; their step is held against the stable one at rest before the run";
+            self.error(&["run", "on-unstable"], message, "not for these bodies", help);
+        }
         self.check_keys_of_shells(true);
         for key in ["damping", "stiffness-damping"] {
             let value =
@@ -130,10 +136,18 @@ impl Builder<'_> {
                 self.error(&["body", name, key], message, "another", help);
             }
         }
-        if table.stiffness_damping > 0.0 && scene.run.solver == SolverName::Explicit {
-            let message = "damping by stiffness needs the solver `implicit`";
+        if table.stiffness_damping > 0.0 && scene.run.solver != SolverName::Implicit {
+            let message = format!(
+                "damping by stiffness needs the solver `implicit`, not `{}`",
+                scene.run.solver.word()
+            );
             let path = ["body", first.as_str(), "stiffness-damping"];
-            self.error(&path, message, "not explicit", "take `damping`, or `solver = \"implicit\"`");
+            self.error(
+                &path,
+                message,
+                "not with this solver",
+                "leave it out, or take `solver = \"implicit\"`",
+            );
         }
     }
 
@@ -962,10 +976,11 @@ impl Builder<'_> {
             corotational::check_held(&part.model)
         {
             let owner = self.model.bodies.iter().find(|body| body.nodes.contains(&node));
-            let Some(name) = owner.map(|body| body.name.clone()) else { return };
+            let Some((name, first)) = owner.map(|body| (body.name.clone(), body.nodes.start)) else { return };
             let message = format!(
-                "`{name}` is free in {}, and a static run needs all of it held (the part with node {node})",
-                counted(free_modes, "rigid motion")
+                "`{name}` is free in {} of 6, and a static run needs all of it held (the part with node {})",
+                counted(free_modes, "rigid motion"),
+                node - first
             );
             let help = "fix more of its nodes, tie it to points with `type = \"spring\"`, or take `solver = \"implicit\"`";
             self.error(&["body", &name], message, "not held", help);

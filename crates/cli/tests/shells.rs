@@ -1,0 +1,512 @@
+//! Shells and co-rotational solids through the real binary: what is refused and in which words, what a failed run keeps, and what
+//! a run that went well leaves.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use pliant_geometry::Mesh;
+use support::{Told, Workshop, changed};
+
+/// A cantilever of 16 triangles.
+const WALL: &str = r#"[scene]
+until = 1.0
+
+[run]
+solver = "static"
+load-steps = 2
+threads = 1
+
+[law.wall]
+type = "st-venant-kirchhoff"
+young-modulus = 1e6
+poisson-ratio = 0.3
+
+[body.wall]
+model = "shell"
+mesh = { plate = { size = [0.2, 0.1], cells = [4, 2] } }
+law = "wall"
+density = 1000
+thickness = 0.002
+
+[constraint.base]
+type = "fix"
+body = "wall"
+nodes = { set = "x-min" }
+
+[load.push]
+type = "pressure"
+on = "wall"
+faces = "all"
+pressure = 1
+
+[output.fields]
+type = "vtu"
+every = 0.5
+
+[output.history]
+type = "csv"
+every = 0.5
+probes.end = { on = "wall", at = [0.2, 0.05, 0] }
+"#;
+
+const PLATE: &str = "mesh = { plate = { size = [0.2, 0.1], cells = [4, 2] } }";
+const THICK: &str = "thickness = 0.002";
+const STEPS: &str = "load-steps = 2";
+
+fn wall(changes: &[(&str, &str)]) -> Workshop {
+    Workshop::new(&changes.iter().fold(WALL.to_owned(), |scene, (good, other)| changed(&scene, good, other)))
+}
+
+#[track_caller]
+fn says(told: &Told, pieces: &[&str]) {
+    for piece in pieces {
+        assert!(told.words().contains(piece), "no `{piece}` in:\n{}", told.err);
+    }
+}
+
+/// The scene with changes is refused in these words, and nothing is written.
+#[track_caller]
+fn refused(changes: &[(&str, &str)], pieces: &[&str]) {
+    let workshop = wall(changes);
+    let told = workshop.run(&[]);
+    assert_eq!(told.code, 2, "{}\n{}", told.err, told.out);
+    says(&told, pieces);
+    assert_eq!(told.json()["error"]["kind"], "input");
+    assert!(!workshop.path("out").exists(), "something was written");
+}
+
+#[test]
+fn values_out_of_their_range_are_refused() {
+    for value in ["0", "-0.002"] {
+        let line = format!("thickness = {value}");
+        refused(
+            &[(THICK, &line)],
+            &["`body.wall.thickness` must be greater than 0", &format!("found {value}")],
+        );
+    }
+    refused(&[("thickness = 0.002\n", "")], &["`wall` is a shell and needs a `thickness`", "in metres"]);
+    for value in ["0", "-1"] {
+        let line = format!("young-modulus = {value}");
+        refused(&[("young-modulus = 1e6", &line)], &["`law.wall.young-modulus` must be greater than 0"]);
+        let line = format!("density = {value}");
+        refused(&[("density = 1000", &line)], &["`body.wall.density` must be greater than 0"]);
+    }
+    refused(
+        &[(THICK, "thickness = 0.002\ncrease = 200")],
+        &["`body.wall.crease` must be at least 0 and at most 180"],
+    );
+}
+
+/// A legacy OFF file.
+fn off(points: &[[f64; 3]], cells: &[&[u32]]) -> String {
+    let joined = |numbers: Vec<String>| numbers.join(" ") + "\n";
+    let points_text = points.iter().map(|p| joined(p.iter().map(f64::to_string).collect()));
+    let cells_text = cells
+        .iter()
+        .map(|cell| format!("{} ", cell.len()) + &joined(cell.iter().map(u32::to_string).collect()));
+    format!("OFF\n{} {} 0\n", points.len(), cells.len()) + &points_text.chain(cells_text).collect::<String>()
+}
+
+/// What the binary tells of a scene with a shell from a file.
+fn from_file(points: &[[f64; 3]], cells: &[&[u32]], changes: &[(&str, &str)]) -> Told {
+    let own = [
+        (PLATE, "mesh = { file = \"wall.off\" }"),
+        ("{ set = \"x-min\" }", "{ nearest = { point = [0, 0, 0], count = 3 } }"),
+        ("at = [0.2, 0.05, 0]", "at = [0.1, 0.1, 0]"),
+    ];
+    let workshop = wall(&[&own, changes].concat());
+    workshop.write("case/wall.off", off(points, cells));
+    workshop.run(&[])
+}
+
+#[test]
+fn meshes_that_are_no_shells_are_refused_or_repaired() {
+    const SQUARE: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.0, 0.1, 0.0]];
+    let with = |more: [f64; 3]| [&SQUARE[..], &[more]].concat();
+    from_file(&SQUARE, &[&[0, 1, 2], &[0, 2, 3]], &[]).done();
+    let told = from_file(&SQUARE, &[&[0, 1, 2, 3]], &[]);
+    told.done();
+    says(&told, &["`wall`: 1 quad cut into triangles"]);
+    let told = from_file(&SQUARE, &[&[0, 1, 2], &[0, 3, 2]], &[]);
+    told.done();
+    says(&told, &["`wall`: 1 triangle turned over, so that all face one side"]);
+
+    let told = from_file(&with([0.05, 0.05, 0.0]), &[&[0, 1, 2], &[0, 2, 3], &[0, 4, 2]], &[]);
+    assert_eq!(told.code, 2);
+    says(&told, &["`wall` has triangles without area at rest: triangle 2", "remesh there"]);
+
+    let fin: [&[u32]; 3] = [&[0, 1, 2], &[0, 2, 3], &[0, 2, 4]];
+    let told = from_file(&with([0.05, 0.05, 0.1]), &fin, &[]);
+    assert_eq!(told.code, 2);
+    says(&told, &["3 triangles of `wall` meet in the edge of nodes 0 and 2", "set `branches = true`"]);
+    from_file(&with([0.05, 0.05, 0.1]), &fin, &[(THICK, "thickness = 0.002\nbranches = true")]).done();
+
+    let strip = [[0.1, 0.0], [-0.05, 0.087], [-0.05, -0.087]];
+    let points: Vec<[f64; 3]> = strip.iter().flat_map(|&[x, y]| [[x, y, -0.02], [x, y, 0.02]]).collect();
+    let moebius: [&[u32]; 6] = [&[0, 2, 1], &[1, 2, 3], &[2, 4, 3], &[3, 4, 5], &[4, 1, 5], &[5, 1, 0]];
+    let told = from_file(&points, &moebius, &[]);
+    assert_eq!(told.code, 2);
+    says(&told, &["shell `wall` has no two sides", "nodes 3 and 4; cut it there"]);
+}
+
+#[test]
+fn what_a_static_run_cannot_hold_is_named_with_its_free_motions() {
+    let constraint = &WALL[WALL.find("[constraint").unwrap()..WALL.find("[load").unwrap()];
+    refused(
+        &[(constraint, "")],
+        &["`wall` is free in 6 rigid motions of 6", "type = \"spring\"", "`solver = \"implicit\"`"],
+    );
+    let pinned = "{ nearest = { point = [0, 0, 0] } }\ncomponents = [\"x\", \"y\", \"z\"]";
+    refused(&[("{ set = \"x-min\" }", pinned)], &["`wall` is free in 3 rigid motions of 6"]);
+    // The same scene has inertia with another solver.
+    wall(&[(constraint, ""), ("\"static\"", "\"implicit\""), (STEPS, "step = 0.1")]).run(&[]).done();
+}
+
+#[test]
+fn an_open_balloon_is_refused_with_its_borders() {
+    let control = "load-steps = 2\ncontrol = { load = \"push\", volume = 0.001 }";
+    refused(&[(STEPS, control)], &["a balloon must be closed", "1 open border: 12 nodes (0, 1, 2, 3, 4, …)"]);
+    let tube = "mesh = { cylinder = { radius = 0.05, length = 0.2, cells = [8, 4] } }";
+    refused(
+        &[(STEPS, control), (PLATE, tube), ("x-min", "z-min")],
+        &["2 open borders: 8 nodes (0,", "close the surface, or press on all of it"],
+    );
+}
+
+#[test]
+fn doubtful_shells_are_warned_about() {
+    let told = wall(&[(THICK, "thickness = 0.06")]).run(&[]);
+    told.done();
+    says(
+        &told,
+        &[
+            "16 triangles of 16 of `wall` are thicker than their smallest altitude",
+            "model the wall with tets",
+        ],
+    );
+    let told = wall(&[(THICK, "thickness = 0.002\nelement = \"comas-2010\"")]).pliant(&["check", "case"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    says(&told, &["`wall` has the element of Comas (2010)", "6 to 26 % too soft", "take `dkt-opt`"]);
+}
+
+#[test]
+fn singular_stiffness_names_the_node_and_what_to_try() {
+    for (element, component) in [("membrane", "z"), ("plate", "x")] {
+        let line = format!("thickness = 0.002\nelement = \"{element}\"");
+        let workshop = wall(&[(THICK, &line)]);
+        let told = workshop.run(&[]);
+        assert_eq!(told.code, 1, "{}", told.err);
+        let json = told.json();
+        assert_eq!((&json["error"]["kind"], &json["error"]["body"]), (&"singular".into(), &"wall".into()));
+        let node = json["error"]["node"].as_u64().expect("a node");
+        says(
+            &told,
+            &[
+                &format!(
+                    "in `wall`: the stiffness is singular: node {node} can move in {component} without resistance"
+                ),
+                "hold it, or give its elements stiffness in that direction",
+            ],
+        );
+    }
+}
+
+/// A load that is small until the middle of the run, and crushing at its end.
+const CRUSHING: &str = "pressure = 1e6\ncurve = { table = [[0, 0], [0.5, 1e-6], [1, 1]] }";
+
+#[test]
+fn a_run_without_equilibrium_keeps_what_it_found() {
+    let workshop = wall(&[("pressure = 1", CRUSHING)]);
+    let told = workshop.run(&[]);
+    assert_eq!(told.code, 1, "{}", told.err);
+    says(&told, &["after t = 0.5000 s", "in `wall`", "what was written before stays readable"]);
+    let kept = |workshop: &Workshop| {
+        let (_, rows) = workshop.table("out/case/history.csv");
+        assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), [0.0, 0.5]);
+        let times: Vec<f64> = workshop.series("out/case/fields.pvd").iter().map(|frame| frame.0).collect();
+        assert_eq!(times, [0.0, 0.5]);
+        assert!(workshop.read("out/case/summary.md").contains("after t = 0.5000 s"));
+    };
+    kept(&workshop);
+
+    // Halving as often as allowed does not help if there is no time to iterate.
+    let strong = CRUSHING.replace("1e6", "1e3").replace("1e-6", "1e-9");
+    let workshop = wall(&[("pressure = 1", &strong), (STEPS, "load-steps = 2\niterations = 2")]);
+    let told = workshop.run(&[]);
+    assert_eq!(told.code, 1, "{}", told.err);
+    let json = told.json();
+    assert_eq!(
+        (&json["error"]["kind"], &json["error"]["time"]),
+        (&"not-converged".into(), &0.5.into()),
+        "{json}"
+    );
+    says(&told, &["no equilibrium at t =", "residuals [N] of the last attempt:", "try smaller load steps"]);
+    kept(&workshop);
+
+    let stalled = "load-steps = 2\nlinear = { by = \"conjugate-gradients\", iterations = 2, preconditioner = \"block-jacobi\" }";
+    let told = wall(&[(STEPS, stalled)]).run(&[]);
+    assert_eq!(told.code, 1);
+    says(
+        &told,
+        &["conjugate gradients stand at a residual of", "after 2 iterations", "use the direct solver"],
+    );
+}
+
+#[test]
+fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
+    let explicit = ("\"static\"", "\"explicit\"");
+    let run = |line: &str| format!("load-steps = 2\n{line}");
+    let body = |line: &str| format!("thickness = 0.002\n{line}");
+    refused(
+        &[("\"static\"", "\"quasi-static\"")],
+        &["`quasi-static` is not for bodies of model `shell`", "\"static\""],
+    );
+    refused(
+        &[("model = \"shell\"\n", ""), (PLATE, "mesh = { block = { size = [0.1, 0.1, 0.1] }, edge = 0.05 }")],
+        &[
+            "the solver `static` is not for bodies of model `solid`",
+            "`thickness` is for a shell, and `wall` is of model `solid`",
+        ],
+    );
+    refused(
+        &[explicit, (STEPS, "step = 1e-2")],
+        &["is above the stable step", "`solver = \"implicit\"` for long steps"],
+    );
+    for (changes, pieces) in [
+        (
+            run("device = \"gpu\""),
+            ["shells and co-rotational solids runs on the processor only", "`device = \"cpu\"`"],
+        ),
+        (
+            run("precision = \"single\""),
+            ["model `shell` are computed in double precision only", "leave `precision` out"],
+        ),
+        (
+            run("mass-scaling = { target-step = 1e-3 }"),
+            ["mass is not scaled for bodies of model `shell`", "leave it out"],
+        ),
+        (
+            run("on-unstable = \"stop\""),
+            ["the stable step of bodies of model `shell` is not watched", "leave it out"],
+        ),
+        (run("control = { load = \"pull\", arc-length = 0.1 }"), ["there is no load `pull`", "`push`"]),
+        (
+            run("control = { load = \"push\", arc-length = 0.1, volume = 1.0 }"),
+            ["exactly one of `displacement`, `arc-length` and `volume`", "leave the others out"],
+        ),
+    ] {
+        refused(&[(STEPS, &changes)], &pieces);
+    }
+    for (line, pieces) in [
+        ("element = \"tet4\"", ["`wall` is a shell, and this element is of a solid", "`dkt-opt`"]),
+        ("hourglass = 0.1", ["`hourglass` is for `model = \"solid\"`", "means nothing here"]),
+        ("fibre = [1, 0, 0]", ["`fibre` is for `model = \"solid\"`", "means nothing here"]),
+        ("velocity = [1, 0, 0]", ["a static run has no inertia", "plays no part"]),
+        (
+            "stiffness-damping = 1e-3",
+            ["damping by stiffness needs the solver `implicit`, not `static`", "leave it out"],
+        ),
+    ] {
+        refused(&[(THICK, &body(line))], &pieces);
+    }
+    for key in ["iterations = 3", "linear = \"direct\"", "control = { load = \"push\", arc-length = 0.1 }"] {
+        let name = key.split(' ').next().unwrap();
+        refused(&[explicit, (STEPS, key)], &[&format!("`{name}` is for `solver ="), "means nothing here"]);
+    }
+    let relaxing = "poisson-ratio = 0.3\nprony = [{ part = \"isochoric\", weight = 0.3, time = 0.5 }]";
+    refused(&[("poisson-ratio = 0.3", relaxing)], &["law `wall` relaxes, and `wall` is of model `shell`"]);
+    refused(
+        &[("every = 0.5", "every = 0.5\ndata = [\"cauchy-stress\"]")],
+        &["bodies of model `shell` have no `cauchy-stress`"],
+    );
+    let tets = [
+        ("\"shell\"", "\"corotational\""),
+        (PLATE, "mesh = { block = { size = [0.2, 0.1, 0.1], cells = [2, 1, 1] } }"),
+        ("thickness = 0.002\n", ""),
+    ];
+    refused(&tets, &["a pressure on a co-rotational solid does not follow its faces", "take a `traction`"]);
+    let told = wall(&[(STEPS, &run("device = \"auto\""))]).run(&[]);
+    assert_eq!(told.done()["device"], "cpu");
+    says(&told, &["runs on the processor only"]);
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let block_jacobi = "step = 0.05\nlinear = { by = \"conjugate-gradients\", tolerance = 1e-6, preconditioner = \"block-jacobi\" }";
+    for (solver, line) in [
+        ("static", STEPS),
+        ("implicit", "step = 0.05"),
+        ("implicit", block_jacobi),
+        ("implicit", "step = 0.05\nlinear = \"conjugate-gradients\""),
+        ("explicit", "step = \"auto\""),
+    ] {
+        let workshop = wall(&[
+            ("\"static\"", &format!("\"{solver}\"")),
+            (STEPS, line),
+            ("cells = [4, 2]", "cells = [16, 8]"),
+        ]);
+        for threads in ["1", "2"] {
+            workshop.run(&["--threads", threads, "--out", &format!("out/{threads}")]).done();
+        }
+        for file in ["history.csv", "fields/000000.vtu", "fields/000002.vtu"] {
+            let [one, two] =
+                ["1", "2"].map(|threads| fs::read(workshop.path(&format!("out/{threads}/{file}"))).unwrap());
+            assert!(one == two, "{solver}, {line}: {file} differs");
+        }
+    }
+}
+
+#[test]
+fn json_tells_a_run_of_shells() {
+    let done = wall(&[("pressure = 1", "pressure = 1e-3")]).run(&[]).done();
+    assert_eq!((done["nodes"].as_u64(), done["elements"].as_u64()), (Some(15), Some(16)));
+    assert!((done["mass"].as_f64().unwrap() - 0.04).abs() < 1e-15, "{done}");
+    assert_eq!((&done["device"], &done["precision"]), (&"cpu".into(), &"double".into()));
+    assert_eq!(done["steps"], 2);
+    assert!(done["solver"]["newton_iterations"].as_u64().unwrap() >= 2, "{done}");
+    assert_eq!(done["solver"]["linear_iterations"], 0, "{done}");
+    for key in ["element_bound", "true_limit", "limiting_element", "stability"] {
+        assert!(done[key].is_null(), "{key}: {done}");
+    }
+    // A pressure of 1 mPa on 0.02 m², which hardly turns.
+    assert!((done["reactions"]["base"][2].as_f64().unwrap() + 2e-5).abs() < 1e-9, "{done}");
+}
+
+/// Twice the thickness, an eighth of the deflection.
+#[test]
+fn a_sweep_over_the_thickness_finds_the_cubes() {
+    let workshop = wall(&[("pressure = 1", "pressure = 1e-3")]);
+    let told = workshop.pliant(&["sweep", "case", "--set", "body.wall.thickness=0.001,0.002,0.004"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let text = workshop.read("out/case-sweep/sweep.csv");
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let column = rows[0].iter().position(|name| name.ends_with("probe.end.displacement.z")).unwrap();
+    let deflection = |row: usize| rows[row][column].parse::<f64>().unwrap();
+    for row in [2, 3] {
+        assert!((deflection(row - 1) / deflection(row) - 8.0).abs() < 0.01, "{text}");
+    }
+}
+
+/// Each of the 15 nodes has a spring of 10 N/m and a fifteenth of the force.
+#[test]
+fn a_plate_on_springs_yields_by_their_stiffness() {
+    let workshop = wall(&[
+        ("type = \"fix\"", "type = \"spring\"\nstiffness = 10"),
+        ("nodes = { set = \"x-min\" }", "nodes = \"all\""),
+        ("type = \"pressure\"", "type = \"force\""),
+        ("faces = \"all\"\npressure = 1", "nodes = \"all\"\ntotal = [0.01, 0, 0.02]"),
+    ]);
+    workshop.run(&[]).done();
+    let (_, rows) = workshop.table("out/case/history.csv");
+    let last = rows.last().unwrap();
+    for (found, force) in last[last.len() - 3..].iter().zip([0.01, 0.0, 0.02]) {
+        assert!((found - force / 150.0).abs() < 1e-9, "{last:?}");
+    }
+}
+
+/// A load set upon a plate at once makes it swing to twice the deflection that it has at rest.
+#[test]
+fn an_explicit_plate_swings_about_its_equilibrium() {
+    let soft = ("pressure = 1", "pressure = 1e-3\ncurve = \"hold\"");
+    // A cantilever of this bending stiffness swings once in 3.7 s.
+    let long = ("until = 1.0", "until = 4.0");
+    let still = wall(&[soft, long]);
+    still.run(&[]).done();
+    let (_, rows) = still.table("out/case/history.csv");
+    let rest = *rows.last().unwrap().last().unwrap();
+    let swinging = wall(&[
+        soft,
+        long,
+        ("\"static\"", "\"explicit\""),
+        ("load-steps = 2\n", ""),
+        ("csv\"\nevery = 0.5", "csv\"\nevery = 0.01"),
+    ]);
+    let done = swinging.run(&[]).done();
+    assert!(done["steps"].as_u64().unwrap() > 1000, "{done}");
+    let (_, rows) = swinging.table("out/case/history.csv");
+    let all = rows.iter().map(|row| row.last().unwrap() / rest);
+    let (low, high) = all.fold((0.0_f64, 0.0_f64), |(low, high), z| (low.min(z), high.max(z)));
+    assert!(high > 1.9 && high < 2.2 && low > -0.2, "{low} to {high} of the deflection at rest");
+}
+
+/// A visual mesh on a plate that is turned by half a radian and shifted follows it exactly.
+#[test]
+fn a_carried_surface_follows_a_rigid_motion_exactly() {
+    let (angle, shift) = (0.5_f64, [0.01, 0.02, 0.03]);
+    let turned = |[x, y, z]: [f64; 3]| {
+        let (s, c) = angle.sin_cos();
+        [c * x - s * y - x + shift[0], s * x + c * y - y + shift[1], z - z + shift[2]]
+    };
+    let mut motion = String::new();
+    for node in 0..15 {
+        let [x, y, z] = turned([0.05 * f64::from(node % 5), 0.05 * f64::from(node / 5), 0.0]);
+        motion += &format!("{node},{x:e},{y:e},{z:e}\n");
+    }
+    let workshop = wall(&[
+        ("\"static\"", "\"implicit\""),
+        (STEPS, "step = 0.1"),
+        ("type = \"fix\"", "type = \"move\""),
+        ("nodes = { set = \"x-min\" }", "nodes = \"all\"\nby = { csv = \"turn.csv\" }\nturn = [0, 0, 0.5]"),
+        ("[load.push]", "[surface.skin]\non = \"wall\"\nmesh = { file = \"skin.off\" }\n\n[load.push]"),
+        ("probes.end = { on = \"wall\"", "probes.skin = { on = \"skin\""),
+        ("type = \"vtu\"", "type = \"vtu\"\non = \"skin\"\ndata = [\"displacement\"]"),
+    ]);
+    workshop.write("case/turn.csv", motion);
+    workshop.write(
+        "case/skin.off",
+        off(&[[0.03, 0.01, 0.004], [0.17, 0.02, 0.001], [0.11, 0.09, -0.003]], &[&[0, 1, 2]]),
+    );
+    workshop.run(&[]).done();
+    let (_, last) = workshop.series("out/case/fields.pvd").pop().unwrap();
+    let moved = &last.mesh.point_data["displacement"];
+    for (point, at) in last.mesh.points.iter().enumerate() {
+        let expected = turned([at.x, at.y, at.z]);
+        for c in 0..3 {
+            assert!(
+                (moved.item(point)[c] - expected[c]).abs() < 1e-9,
+                "{point}: {:?} {expected:?}",
+                moved.item(point)
+            );
+        }
+    }
+}
+
+/// How often each edge of a mesh of triangles is used; points at the same place (moved by `displacement`) are one.
+fn sides(mesh: &Mesh) -> BTreeMap<[[i64; 3]; 2], u32> {
+    let moved = &mesh.point_data["displacement"];
+    let place = |node: u32| {
+        let (at, by) = (mesh.points[node as usize], moved.item(node as usize));
+        [0, 1, 2].map(|c| ((at[c] + by[c]) * 1e9).round() as i64)
+    };
+    let mut count = BTreeMap::new();
+    for triangle in mesh.blocks.iter().flat_map(|block| block.cells()) {
+        for corner in 0..3 {
+            let mut ends = [place(triangle[corner]), place(triangle[(corner + 1) % 3])];
+            ends.sort();
+            *count.entry(ends).or_insert(0) += 1;
+        }
+    }
+    count
+}
+
+#[test]
+fn the_curved_surface_of_a_balloon_is_watertight_in_every_frame() {
+    let workshop = wall(&[
+        (PLATE, "mesh = { sphere = { radius = 0.1, levels = 1 } }"),
+        ("{ set = \"x-min\" }", "{ nearest = { point = [0, 0, -0.1], count = 3 } }"),
+        ("pressure = 1", "pressure = 1000\nspread = \"curved\""),
+        ("every = 0.5", "every = 0.5\ncurved = 3"),
+        ("at = [0.2, 0.05, 0]", "at = [0, 0, 0.1]"),
+    ]);
+    workshop.run(&[]).done();
+    let frames = workshop.series("out/case/fields.pvd");
+    assert_eq!(frames.len(), 3);
+    for (time, frame) in frames {
+        let sides = sides(&frame.mesh);
+        assert_eq!(sides.len(), 80 * 9 * 3 / 2, "t = {time}");
+        assert!(sides.values().all(|&count| count == 2), "t = {time}: the surface is open");
+        assert_eq!(frame.mesh.point_data["normal"].components, 3);
+    }
+}
