@@ -83,11 +83,11 @@ fn thousand() -> u32 {
 #[serde(rename_all = "kebab-case")]
 pub enum PreconditionerName {
     /// The factors of an older stiffness, made anew once they need more than ten iterations.
-    #[default]
     LaggedFactors,
     /// The inverse of each node's own block: the least memory.
     BlockJacobi,
     /// This, and a solution for the rigid motions of groups of neighbouring nodes: far fewer iterations on many elements.
+    #[default]
     Aggregates,
 }
 
