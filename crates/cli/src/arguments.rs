@@ -70,7 +70,7 @@ pub enum Command {
     /// Make a mesh of volume cells from labels of a segmented image.
     #[command(after_help = MESH_HELP)]
     Mesh(MeshImage),
-    /// Compute the solid results of the thesis and write them beside the printed ones.
+    /// Compute the results of the thesis and write them beside the printed ones.
     #[command(
         after_help = "Examples:\n  pliant reproduce\n  pliant reproduce --list\n  pliant reproduce --only fig-6.3 --out shear\n\n\
                       Exit codes: 0 all numbers within their tolerance, 1 one is not, 2 the input is wrong."

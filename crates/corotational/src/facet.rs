@@ -214,114 +214,137 @@ impl Facet {
     }
 
     /// K in the facet's axes.
-    fn linear_stiffness(&self) -> Matrix18 {
-        let mut all = Matrix18::zeros();
+    fn linear_stiffness(&self, k: &mut Matrix18) {
+        k.fill(0.0);
         for (places, stiffness) in [(MEMBRANE, &self.membrane), (BENDING, &self.bending)] {
             for j in 0..9 {
                 for i in 0..9 {
-                    all[(places[i], places[j])] = stiffness[(i, j)];
+                    k[(places[i], places[j])] = stiffness[(i, j)];
                 }
             }
         }
-        all
     }
 
     /// Energy [J] and internal nodal forces and moments, its gradient with respect to positions and spins.
     pub(crate) fn force(&self, placed: &Placed) -> (f64, Vector18) {
         let raw = self.linear_force(&placed.deformation);
         let spun = placed.to_spins(&raw);
-        (0.5 * placed.deformation.dot(&raw), placed.to_space(&self.project(placed, &spun)))
+        (
+            0.5 * placed.deformation.dot(&raw),
+            placed.to_space(&project(placed, &self.frame_spins(placed), &spun)),
+        )
     }
 
     /// The change of the force with positions and spins.
+    #[cfg(test)]
     pub(crate) fn tangent(&self, placed: &Placed, kind: Tangent) -> Matrix18 {
-        let raw = self.linear_force(&placed.deformation);
-        let mut k = self.linear_stiffness();
-        let spun = match kind {
-            Tangent::Full => {
-                placed.spin_stiffness(&mut k);
-                placed.to_spins(&raw)
-            }
-            Tangent::Symmetric => raw,
-        };
-        let projected = self.project(placed, &spun);
-        let g = [0, 1, 2].map(|i| self.frame_spin(placed, i));
-        let arm = placed.local.map(|x| skew(&Vector3::new(x.x, x.y, 0.0)));
-        let translation = |v: &Vector18, i: usize| v.fixed_rows::<3>(6 * i).into_owned();
-        let rotation = |v: &Vector18, i: usize| v.fixed_rows::<3>(6 * i + 3).into_owned();
-
-        // Pᵀ K P; K does not resist translations, so of P only Ψ G counts.
-        let turn = |rows: &SMatrix<f64, 3, 18>| -> Matrix3<f64> {
-            (0..3).fold(Matrix3::zeros(), |sum, i| {
-                sum - rows.fixed_columns::<3>(6 * i) * arm[i] + rows.fixed_columns::<3>(6 * i + 3)
-            })
-        };
-        let rigid: [Matrix3<f64>; 6] =
-            [0, 1, 2, 3, 4, 5].map(|a| turn(&k.fixed_rows::<3>(3 * a).into_owned()));
-        let mut twice =
-            (0..3).fold(Matrix3::zeros(), |sum, i| sum + arm[i] * rigid[2 * i] + rigid[2 * i + 1]);
-        let mut corrections = [Matrix3::zeros(); 3];
-        if kind == Tangent::Full {
-            for (i, correction) in corrections.iter_mut().enumerate() {
-                *correction = moment_correction(&placed.theta[i], &rotation(&raw, i));
-                twice += *correction;
-            }
-        }
-        let force = [0, 1, 2].map(|i| skew(&translation(&spun, i)));
-        // Fnᵀ Ψ.
-        let leverage = (0..3).fold(Matrix3::zeros(), |sum, i| sum + force[i] * arm[i]);
-        for j in 0..3 {
-            for a in 0..6 {
-                let stress = if a % 2 == 0 {
-                    skew(&translation(&projected, a / 2))
-                } else {
-                    skew(&rotation(&projected, a / 2)) + corrections[a / 2]
-                };
-                let change = (rigid[a] + stress) * g[j];
-                let mut block = k.fixed_view_mut::<3, 3>(3 * a, 6 * j);
-                block -= change;
-            }
-            for i in 0..3 {
-                let mut both = k.fixed_view_mut::<3, 3>(6 * i, 6 * j);
-                both +=
-                    g[i].transpose() * (twice * g[j] - rigid[2 * j].transpose() + force[j] + leverage * g[j]);
-                let mut turned = k.fixed_view_mut::<3, 3>(6 * i, 6 * j + 3);
-                turned -= g[i].transpose() * (rigid[2 * j + 1].transpose() + corrections[j]);
-            }
-            let mut own = k.fixed_view_mut::<3, 3>(6 * j + 3, 6 * j + 3);
-            own += corrections[j];
-        }
-        match kind {
-            Tangent::Full => self.frame_change(placed, &spun, &g, &arm, &mut k),
-            Tangent::Symmetric => k = 0.5 * (k + k.transpose()),
+        let mut k = Matrix18::zeros();
+        self.local_tangent(placed, kind, &mut k);
+        if kind == Tangent::Symmetric {
+            k = 0.5 * (k + k.transpose());
         }
         for a in 0..6 {
             for b in 0..6 {
-                let mut block = k.fixed_view_mut::<3, 3>(3 * a, 3 * b);
-                let turned = placed.axes * block.clone_owned() * placed.axes.transpose();
-                block.copy_from(&turned);
+                placed.turn_block(&mut k, a, b);
             }
         }
         k
     }
 
-    /// G of a node: the spin of the frame over its translation, in the frame.
-    fn frame_spin(&self, placed: &Placed, node: usize) -> Matrix3<f64> {
-        let now = gradients(&placed.local)[node];
-        let rest = self.gradient[node] / placed.trace;
-        Matrix3::new(0.0, 0.0, now.y, 0.0, 0.0, -now.x, -rest.y, rest.x, 0.0)
+    /// The symmetric part of the change of the force: the Hessian of the energy on the group of rotations (Simo 1992, CMAME 96:189);
+    /// the rest vanishes at equilibrium without moments.
+    pub(crate) fn hessian(&self, placed: &Placed, kind: Tangent, k: &mut Matrix18) {
+        self.local_tangent(placed, kind, k);
+        symmetrise(k);
+        for b in 0..6 {
+            for a in b..6 {
+                placed.turn_block(k, a, b);
+            }
+        }
+        for j in 0..18 {
+            for i in 0..j {
+                k[(i, j)] = k[(j, i)];
+            }
+        }
     }
 
-    /// Pᵀ f: nodal forces whose resultants vanish.
-    fn project(&self, placed: &Placed, force: &Vector18) -> Vector18 {
-        let mean = (0..3).fold(Vector3::zeros(), |sum, i| sum + force.fixed_rows::<3>(6 * i) / 3.0);
-        let moment = placed.moment(force);
-        let mut projected = *force;
-        for i in 0..3 {
-            let mut own = projected.fixed_rows_mut::<3>(6 * i);
-            own -= mean + self.frame_spin(placed, i).tr_mul(&moment);
+    /// The change of the force in the facet's axes.
+    fn local_tangent(&self, placed: &Placed, kind: Tangent, k: &mut Matrix18) {
+        let raw = self.linear_force(&placed.deformation);
+        self.linear_stiffness(k);
+        let spun = match kind {
+            Tangent::Full => {
+                placed.spin_stiffness(k);
+                placed.to_spins(&raw)
+            }
+            Tangent::Symmetric => raw,
+        };
+        let g = self.frame_spins(placed);
+        let projected = project(placed, &g, &spun);
+        let arm = placed.local.map(|x| Sparse { xz: x.y, yz: -x.x, zx: -x.y, zy: x.x });
+        let part = |v: &Vector18, a: usize| Vector3::new(v[3 * a], v[3 * a + 1], v[3 * a + 2]);
+
+        // Pᵀ K P; K does not resist translations, so of P only Ψ G counts.
+        let mut rigid = [Matrix3::zeros(); 6];
+        for (a, rigid) in rigid.iter_mut().enumerate() {
+            for (i, arm) in arm.iter().enumerate() {
+                let block: Matrix3<f64> = k.fixed_view::<3, 3>(3 * a, 6 * i).into();
+                *rigid += k.fixed_view::<3, 3>(3 * a, 6 * i + 3) - arm.after(&block);
+            }
         }
-        projected
+        let mut twice = Matrix3::zeros();
+        for i in 0..3 {
+            // Sᵀ = −S.
+            twice += rigid[2 * i + 1] - arm[i].transposed_before(&rigid[2 * i]);
+        }
+        let mut corrections = [Matrix3::zeros(); 3];
+        if kind == Tangent::Full {
+            for (i, correction) in corrections.iter_mut().enumerate() {
+                *correction = moment_correction(&placed.theta[i], &part(&raw, 2 * i + 1));
+                twice += *correction;
+            }
+        }
+        let force = [0, 1, 2].map(|i| skew(&part(&spun, 2 * i)));
+        // Fnᵀ Ψ.
+        let mut leverage = Matrix3::zeros();
+        for i in 0..3 {
+            leverage += arm[i].after(&force[i]);
+        }
+        let both = twice + leverage;
+        let mut change = [Matrix3::zeros(); 6];
+        for (a, change) in change.iter_mut().enumerate() {
+            let correction = if a % 2 == 0 { Matrix3::zeros() } else { corrections[a / 2] };
+            *change = rigid[a] + skew(&part(&projected, a)) + correction;
+        }
+        for j in 0..3 {
+            for (a, change) in change.iter().enumerate() {
+                let mut block = k.fixed_view_mut::<3, 3>(3 * a, 6 * j);
+                block -= g[j].after(change);
+            }
+            let moved = g[j].after(&both) - rigid[2 * j].transpose() + force[j];
+            let turned = rigid[2 * j + 1].transpose() + corrections[j];
+            for (i, g) in g.iter().enumerate() {
+                let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * j);
+                block += g.transposed_before(&moved);
+                let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * j + 3);
+                block -= g.transposed_before(&turned);
+            }
+            let mut own = k.fixed_view_mut::<3, 3>(6 * j + 3, 6 * j + 3);
+            own += corrections[j];
+        }
+        if kind == Tangent::Full {
+            self.frame_change(placed, &spun, &g, &arm, k);
+        }
+    }
+
+    /// G of each node: the spin of the frame over its translation, in the frame.
+    fn frame_spins(&self, placed: &Placed) -> [Sparse; 3] {
+        let now = gradients(&placed.local);
+        let spin = |i: usize| {
+            let rest = self.gradient[i] / placed.trace;
+            Sparse { xz: now[i].y, yz: -now[i].x, zx: -rest.y, zy: rest.x }
+        };
+        [spin(0), spin(1), spin(2)]
     }
 
     /// Adds what comes from the change of G; matters at finite strain only.
@@ -329,8 +352,8 @@ impl Facet {
         &self,
         placed: &Placed,
         spun: &Vector18,
-        g: &[Matrix3<f64>; 3],
-        arm: &[Matrix3<f64>; 3],
+        g: &[Sparse; 3],
+        arm: &[Sparse; 3],
         k: &mut Matrix18,
     ) {
         let moment = placed.moment(spun);
@@ -340,12 +363,12 @@ impl Facet {
                 let tilt = moment.x * now[q].y - moment.y * now[q].x;
                 let out_of_plane = Vector3::z() * Vector3::new(now[i].x, now[i].y, 0.0).transpose() * tilt;
                 let stretch = Vector3::new(self.gradient[q].x, self.gradient[q].y, 0.0) / placed.trace;
-                out_of_plane + g[i].row(2).transpose() * stretch.transpose() * moment.z
+                out_of_plane + Vector3::new(g[i].zx, g[i].zy, 0.0) * stretch.transpose() * moment.z
             });
-            let turned = (0..3).fold(Matrix3::zeros(), |sum, q| sum - blocks[q] * arm[q]);
+            let turned = (0..3).fold(Matrix3::zeros(), |sum, q| sum - arm[q].after(&blocks[q]));
             for q in 0..3 {
                 let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * q);
-                block += blocks[q] - turned * g[q];
+                block += blocks[q] - g[q].after(&turned);
             }
         }
     }
@@ -382,7 +405,8 @@ impl Facet {
     /// The largest ω² [1/s²] of the element by itself about its rest shape, with its lumped masses: none of the model's is higher.
     pub(crate) fn highest_frequency_squared(&self) -> f64 {
         let scale = |i: usize| if i % 6 < 3 { self.mass } else { self.inertia }.sqrt();
-        let k = self.linear_stiffness();
+        let mut k = Matrix18::zeros();
+        self.linear_stiffness(&mut k);
         let scaled = Matrix18::from_fn(|i, j| k[(i, j)] / (scale(i) * scale(j)));
         SymmetricEigen::new(scaled).eigenvalues.max()
     }
@@ -400,7 +424,66 @@ impl Facet {
     }
 }
 
+/// Keeps the symmetric part.
+pub(crate) fn symmetrise(k: &mut Matrix18) {
+    for j in 0..18 {
+        for i in 0..j {
+            let mean = 0.5 * (k[(i, j)] + k[(j, i)]);
+            (k[(i, j)], k[(j, i)]) = (mean, mean);
+        }
+    }
+}
+
+/// Pᵀ f: nodal forces whose resultants vanish.
+fn project(placed: &Placed, g: &[Sparse; 3], force: &Vector18) -> Vector18 {
+    let mean = (0..3).fold(Vector3::zeros(), |sum, i| sum + force.fixed_rows::<3>(6 * i) / 3.0);
+    let moment = placed.moment(force);
+    let mut projected = *force;
+    for (i, g) in g.iter().enumerate() {
+        let mut own = projected.fixed_rows_mut::<3>(6 * i);
+        own -= mean + Vector3::new(g.zx * moment.z, g.zy * moment.z, g.xz * moment.x + g.yz * moment.y);
+    }
+    projected
+}
+
+/// A 3 × 3 matrix with nothing else than these entries, as G and S(x) in the plane are.
+#[derive(Clone, Copy)]
+struct Sparse {
+    xz: f64,
+    yz: f64,
+    zx: f64,
+    zy: f64,
+}
+
+impl Sparse {
+    /// M times this.
+    #[inline(always)]
+    fn after(&self, m: &Matrix3<f64>) -> Matrix3<f64> {
+        let row =
+            |i: usize| [m[(i, 2)] * self.zx, m[(i, 2)] * self.zy, m[(i, 0)] * self.xz + m[(i, 1)] * self.yz];
+        let [a, b, c] = [row(0), row(1), row(2)];
+        Matrix3::new(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
+    }
+
+    /// The transpose of this times M.
+    #[inline(always)]
+    fn transposed_before(&self, m: &Matrix3<f64>) -> Matrix3<f64> {
+        let column =
+            |j: usize| [self.zx * m[(2, j)], self.zy * m[(2, j)], self.xz * m[(0, j)] + self.yz * m[(1, j)]];
+        let [a, b, c] = [column(0), column(1), column(2)];
+        Matrix3::new(a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2])
+    }
+}
+
 impl Placed {
+    /// Brings a 3 × 3 block of a stiffness from the facet's axes to space.
+    #[inline(always)]
+    fn turn_block(&self, k: &mut Matrix18, a: usize, b: usize) {
+        let mut block = k.fixed_view_mut::<3, 3>(3 * a, 3 * b);
+        let turned = self.axes * block.clone_owned() * self.axes.transpose();
+        block.copy_from(&turned);
+    }
+
     /// Moments conjugate to rotation vectors made conjugate to spins: Hᵀ f.
     fn to_spins(&self, raw: &Vector18) -> Vector18 {
         let mut spun = *raw;
@@ -533,6 +616,9 @@ mod tests {
                 let off = (slope - k).amax() / k.amax();
                 println!("{kind:?} tangent against differences: {off:.1e}");
                 assert!(off < limit, "{kind:?}: {off:e}");
+                let mut hessian = Matrix18::zeros();
+                facet.hessian(&placed, kind, &mut hessian);
+                assert!((hessian - 0.5 * (k + k.transpose())).amax() < 1e-14 * k.amax());
             }
             let k = facet.tangent(&placed, Tangent::Symmetric);
             assert!((k - k.transpose()).amax() < 1e-12 * k.amax());

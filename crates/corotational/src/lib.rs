@@ -39,6 +39,7 @@ pub mod element;
 mod error;
 mod facet;
 mod forces;
+mod gradients;
 mod initial;
 mod linear;
 mod model;

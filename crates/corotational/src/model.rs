@@ -158,7 +158,8 @@ pub enum LoadKind {
         /// Force per area [Pa].
         traction: Vector3<f64>,
     },
-    /// A force per rest length along edges that keeps its direction, half to each end.
+    /// A force per rest length along edges that keeps its direction, half to each end. Left out are the drilling moments in the plane that
+    /// the ANDES membrane would take of it at the ends of an edge; they cancel between edges but at the ends of the loaded line.
     Edge {
         /// Ends of the edges.
         edges: Vec<[u32; 2]>,

@@ -76,6 +76,12 @@ impl LowerMatrix {
         self.column_start.len() - 1
     }
 
+    /// The rows of a column.
+    pub(crate) fn rows(&self, column: u32) -> &[u32] {
+        &self.row
+            [self.column_start[column as usize] as usize..self.column_start[column as usize + 1] as usize]
+    }
+
     /// Keeps both halves from now on.
     pub(crate) fn keep_mirror(&mut self) {
         self.mirror = vec![0.0; self.value.len()];
@@ -181,12 +187,7 @@ impl LowerMatrix {
         self.value[self.column_start[equation] as usize]
     }
 
-    /// y = A x.
-    pub(crate) fn multiply(&self, x: &[f64], y: &mut [f64]) {
-        self.multiply_values(&self.value, x, y);
-    }
-
-    /// y = A x for another symmetric matrix of the same pattern.
+    /// y = A x for symmetric values in this pattern.
     pub(crate) fn multiply_values(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
         y.fill(0.0);
         for (column, bounds) in self.column_start.windows(2).enumerate() {

@@ -7,7 +7,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use crate::error::SolveError;
-use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18};
+use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18, symmetrise};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::model::{LoadKind, Model, Motion, Spread};
 use crate::rotation::skew;
@@ -159,32 +159,14 @@ impl<'m> System<'m> {
         if tangent.is_some() {
             self.matrix.clear();
             self.coupling.fill(0.0);
-        }
-        let kind = tangent.map(|(kind, _)| kind);
-        let model = self.model;
-        let mut results = std::mem::take(&mut self.results);
-        for first in (0..model.facets.len()).step_by(CHUNK) {
-            let last = (first + CHUNK).min(model.facets.len());
-            let factor = state.load_factor;
-            let pressure = &self.pressure;
-            let symmetric = self.matrix.mirror.is_empty();
-            results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
-                let number = first + at;
-                let [fixed, controlled] = pressure[number];
-                let pressure = fixed + factor * controlled;
-                result.broken = result.fill(&model.facets[number], state, kind, pressure, symmetric).err();
-            });
-            for (number, result) in (first..last).zip(&results) {
-                if let Some(why) = result.broken {
-                    self.results = results;
-                    return Err(SolveError::Broken { cell: number, why });
-                }
-                self.add_facet(state, number, result, tangent.map(|(_, moved)| moved));
+            if let Some(workspace) = &mut self.workspace {
+                workspace.place(&state.position);
             }
         }
-        self.results = results;
+        // Within the threads' pool, so that no part waits for another thread to take it up.
+        rayon::scope(|_| self.evaluate_facets(state, tangent))?;
         self.evaluate_tets(state, tangent.map(|(_, moved)| moved))?;
-        for spring in &model.springs {
+        for spring in &self.model.springs {
             let at = 6 * spring.node as usize;
             let stretch = state.position[spring.node as usize] - spring.anchor;
             self.energy += 0.5 * spring.stiffness * stretch.norm_squared();
@@ -279,6 +261,38 @@ impl<'m> System<'m> {
                 }
             }
         }
+    }
+
+    fn evaluate_facets(
+        &mut self,
+        state: &State,
+        tangent: Option<(Tangent, &[f64])>,
+    ) -> Result<(), SolveError> {
+        let kind = tangent.map(|(kind, _)| kind);
+        let model = self.model;
+        let mut results = std::mem::take(&mut self.results);
+        let mut broken = None;
+        for first in (0..model.facets.len()).step_by(CHUNK) {
+            let last = (first + CHUNK).min(model.facets.len());
+            let factor = state.load_factor;
+            let pressure = &self.pressure;
+            let symmetric = self.matrix.mirror.is_empty();
+            results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
+                let number = first + at;
+                let [fixed, controlled] = pressure[number];
+                let pressure = fixed + factor * controlled;
+                result.broken = result.fill(&model.facets[number], state, kind, pressure, symmetric).err();
+            });
+            broken = (first..last).zip(&results).find_map(|(cell, result)| Some((cell, result.broken?)));
+            if broken.is_some() {
+                break;
+            }
+            for (number, result) in (first..last).zip(&results) {
+                self.add_facet(state, number, result, tangent.map(|(_, moved)| moved));
+            }
+        }
+        self.results = results;
+        broken.map_or(Ok(()), |(cell, why)| Err(SolveError::Broken { cell, why }))
     }
 
     fn add_facet(&mut self, state: &State, number: usize, result: &FacetResult, moved: Option<&[f64]>) {
@@ -384,13 +398,23 @@ impl<'m> System<'m> {
 
     /// Solves with the matrix prepared.
     pub(crate) fn solve(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
+        solution.fill(0.0);
+        self.solve_from(right, solution)
+    }
+
+    /// Solves with the matrix prepared; conjugate gradients start from the solution given, and leave what they reached there if
+    /// iterations run out.
+    pub(crate) fn solve_from(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         let start = Instant::now();
         let Some(workspace) = &mut self.workspace else { return Ok(()) };
-        self.last_solution = workspace.solve(&self.matrix, right, solution).map_err(linear_error)?;
+        let result = workspace.solve(&self.matrix, right, solution);
+        if let Ok(report) | Err(LinearError::Stalled(report)) = result {
+            self.last_solution = report;
+        }
         self.phases.solution += start.elapsed();
         self.phases.solutions += 1;
         self.phases.iterations += self.last_solution.iterations;
-        Ok(())
+        result.map(|_| ()).map_err(linear_error)
     }
 
     /// Increments of constrained components between two times, six a node.
@@ -476,14 +500,11 @@ impl FacetResult {
         let placed = facet.place(&x, &rotation)?;
         (self.energy, self.force) = facet.force(&placed);
         if let Some(kind) = kind {
-            self.tangent = facet.tangent(&placed, kind);
-            // Only the symmetric part: it is the Hessian on the group of rotations (Simo 1992, CMAME 96:189), and the rest vanishes
-            // at equilibrium without moments.
-            self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
+            facet.hessian(&placed, kind, &mut self.tangent);
             if pressure != 0.0 {
                 follow(&mut self.tangent, &x, pressure);
                 if symmetric {
-                    self.tangent = 0.5 * (self.tangent + self.tangent.transpose());
+                    symmetrise(&mut self.tangent);
                 }
             }
         }

@@ -1,8 +1,10 @@
 //! One result of the literature: what it shows, what was corrected in it, and what comes out here.
 
+use pliant_corotational::{ModelError, SolveError};
 use pliant_gpu::{GpuError, StepFailure};
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::{RelaxationError, StepError};
+use pliant_meshing::MeshingError;
 use pliant_scene::diagnostic::SceneErrors;
 use serde::Serialize;
 
@@ -150,6 +152,15 @@ pub enum CaseError {
     /// Constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
+    /// A body could not be meshed.
+    #[error(transparent)]
+    Mesh(#[from] MeshingError),
+    /// A mesh is no sound shell.
+    #[error(transparent)]
+    Shell(#[from] ModelError),
+    /// No equilibrium of a shell, or a step of it failed.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
     /// A scene is wrong.
     #[error("{}", .0.plain())]
     Scene(#[from] SceneErrors),

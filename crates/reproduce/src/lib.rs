@@ -1,4 +1,4 @@
-//! The results of the thesis (Comas 2010, chapter 6), run again and shown beside the printed ones: each a [`Case`] that
+//! The results of the thesis (Comas 2010, chapters 6, 8 and 9.2), run again and shown beside the printed ones: each a [`Case`] that
 //! gives rows of numbers and figures, all of them one page.
 //!
 //! Where the printed source is wrong, the case says what was corrected and why. References are embedded, so that a
@@ -12,6 +12,7 @@ mod plot;
 mod reference;
 mod report;
 mod run;
+pub mod shells;
 
 pub use case::{Case, CaseError, Correction, Figure, Findings, Row, find};
 pub use cases::CASES;

@@ -20,9 +20,9 @@ pub(crate) fn page(report: &Report) -> String {
     let machine = &report.machine;
     let built = commit().map_or_else(String::new, |commit| format!(" ({commit})"));
     let mut body = format!(
-        "<header><h1>The solid results of the thesis, run again</h1>\n\
+        "<header><h1>The results of the thesis, run again</h1>\n\
          <p class=\"lead\">O. Comas, <cite>Real-time soft tissue modelling on GPU for medical simulation</cite> (2010), \
-         chapter 6, computed by Pliant.</p>\n{verdict}\n\
+         chapters 6, 8 and 9.2, computed by Pliant.</p>\n{verdict}\n\
          <p class=\"meta\">{passed} of {judged} pass; {shown_only} more are shown without a judgement. \
          Pliant {}{built}, {}, {}, {} cores, {}; {:.0} s in all.</p></header>\n",
         env!("CARGO_PKG_VERSION"),
@@ -49,7 +49,7 @@ pub(crate) fn page(report: &Report) -> String {
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>Pliant: the solid results of the thesis</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+         <title>Pliant: the results of the thesis</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
     )
 }
 

@@ -115,9 +115,10 @@ pub(crate) fn figure(
     let columns = view.columns.min(bodies.len());
     let cell = camera.height + LABEL;
     let rows = bodies.len().div_ceil(columns);
-    // A place that no body takes is that of the bar.
-    let free = rows * columns > bodies.len();
-    let (width, height) = (WIDTH * columns as f64, cell * rows as f64 + if free { 0.0 } else { BAR });
+    // A place that no body takes is that of the bar, which nobody needs where nothing has a value.
+    let (free, coloured) = (rows * columns > bodies.len(), scale[0] <= scale[1]);
+    let below = if coloured && !free { BAR } else { 0.0 };
+    let (width, height) = (WIDTH * columns as f64, cell * rows as f64 + below);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" \
          font-family=\"sans-serif\" font-size=\"16\" fill=\"#222\">\n"
@@ -140,16 +141,19 @@ pub(crate) fn figure(
         );
     }
     let scale = scale.map(|value| value * view.factor);
-    if free {
-        svg.push_str(&bar(view, scale, [width - WIDTH, height - 0.5 * (cell + BAR), WIDTH]));
-    } else {
-        svg.push_str(&bar(view, scale, [0.0, height - BAR, width]));
+    if coloured {
+        let corner = if free {
+            [width - WIDTH, height - 0.5 * (cell + BAR), WIDTH]
+        } else {
+            [0.0, height - BAR, width]
+        };
+        svg.push_str(&bar(view, scale, corner));
     }
     svg.push_str("</svg>\n");
     Ok(Figure { svg, caption: caption.into() })
 }
 
-/// The edges at which a surface turns away from the camera with nothing of it on one side, as an SVG path.
+/// The edges at which a surface turns away from the camera or ends, with nothing of it on one side, as an SVG path.
 fn outline(faces: &[Face], points: &[Vector3], camera: &Camera, cover: &Samples) -> String {
     let mut edges: Vec<([u32; 2], bool)> = Vec::new();
     for face in faces {
@@ -162,7 +166,10 @@ fn outline(faces: &[Face], points: &[Vector3], camera: &Camera, cover: &Samples)
     edges.sort_unstable();
     let mut path = String::new();
     for pair in edges.chunk_by(|a, b| a.0 == b.0) {
-        let [(edge, false), (_, true)] = pair else { continue };
+        let edge = match pair {
+            [(edge, false), (_, true)] | [(edge, _)] => edge,
+            _ => continue,
+        };
         let [a, b] = edge.map(|node| camera.place(&points[node as usize]));
         if cover.ends_near(0.5 * (a + b)) {
             let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y);
@@ -248,6 +255,7 @@ fn paint(
     let normals = corner_normals(faces, points);
     for (face, normals) in faces.iter().zip(&normals) {
         let nodes = face.nodes();
+        let seen = camera.turn(&face.vector_area(points)).z > 0.0;
         let at = |k: usize| {
             let place = camera.place(&points[nodes[k] as usize]);
             Vector3::new(place.x * FINE, place.y * FINE, place.z)
@@ -257,13 +265,17 @@ fn paint(
             None => [205.0, 208.0, 212.0],
         };
         let light = |k: usize| {
-            let normal = camera.turn(&normals[k]);
+            let normal = camera.turn(&normals[k]) * if seen { 1.0 } else { -1.0 };
             0.55 + 0.45 * normal.dot(&Vector3::from(LIGHT)).max(0.0)
         };
         for k in 1..nodes.len() - 1 {
-            // Which sides of the triangle, each opposite to a corner, are edges of the face.
-            let drawn = [true, k + 2 == nodes.len(), k == 1];
-            let corners = [0, k, k + 1];
+            // Which sides of the triangle, each opposite to a corner, are edges of the face. From behind, the other way round.
+            let mut drawn = [true, k + 2 == nodes.len(), k == 1];
+            let mut corners = [0, k, k + 1];
+            if !seen {
+                drawn.swap(1, 2);
+                corners.swap(1, 2);
+            }
             let triangle = Triangle {
                 corners: corners.map(at),
                 colour: corners.map(colour),

@@ -11,7 +11,7 @@ use pliant_mechanics::{Energies, Observable, State};
 use serde::{Deserialize, Serialize};
 
 use crate::build::{Built, Control, Corotational};
-use crate::format::{LinearName, LinearWay, PreconditionerName, RunTable, SolverName};
+use crate::format::{LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName};
 use crate::output::{FailureSummary, number};
 use crate::plan::Plan;
 use crate::solver::{Effort, LoadStepProgress, Memory, Solver};
@@ -116,7 +116,11 @@ impl<'m> Corotated<'m> {
         part: &'m Corotational,
         plan: &Plan,
     ) -> Result<Self, FailureSummary> {
-        let linear = linear_solver(&run.linear);
+        let table = match &run.linear {
+            LinearWay::Named(name) => LinearTable::usual(*name),
+            LinearWay::Set(table) => table.clone(),
+        };
+        let linear = linear_solver(&table);
         let model = &part.model;
         let method = match run.solver {
             SolverName::Static => {
@@ -129,6 +133,7 @@ impl<'m> Corotated<'m> {
                 let mut settings = DynamicSettings { linear, ..DynamicSettings::new(plan.step) };
                 settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
                 settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
+                settings.accept_stalled = table.accept_stalled;
                 if settings.iterations == 1 {
                     settings = settings.real_time(linear);
                 }
@@ -288,12 +293,7 @@ fn part_of(control: Control, number: u64, of: u64) -> corotational::Control {
     }
 }
 
-fn linear_solver(way: &LinearWay) -> LinearSolver {
-    let usual = crate::format::LinearTable::usual;
-    let table = match way {
-        LinearWay::Named(name) => usual(*name),
-        LinearWay::Set(table) => table.clone(),
-    };
+fn linear_solver(table: &LinearTable) -> LinearSolver {
     match table.by {
         LinearName::Direct => LinearSolver::Direct,
         LinearName::Unsymmetric => LinearSolver::Unsymmetric,
@@ -302,6 +302,7 @@ fn linear_solver(way: &LinearWay) -> LinearSolver {
             iterations: table.iterations as usize,
             preconditioner: match table.preconditioner {
                 PreconditionerName::BlockJacobi => Preconditioner::BlockJacobi,
+                PreconditionerName::Aggregates => Preconditioner::Aggregates,
                 PreconditionerName::LaggedFactors => {
                     Preconditioner::LaggedFactors { renew_after: RENEW_AFTER }
                 }

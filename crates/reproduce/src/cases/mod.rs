@@ -3,11 +3,15 @@
 pub mod brain_shift;
 pub mod cost;
 pub mod cube;
+pub mod curved;
 pub mod elements;
 pub mod framework;
 pub mod liver;
+pub mod obstacle_course;
+pub mod plate;
 pub mod relaxation;
 pub mod shear;
+pub mod shell_times;
 
 use crate::case::{Case, Correction};
 
@@ -22,6 +26,12 @@ pub const CASES: &[Case] = &[
     liver::CASE,
     elements::CASE,
     brain_shift::CASE,
+    plate::CASE,
+    curved::PATCH,
+    curved::LAYERS,
+    curved::RENDERING,
+    obstacle_course::CASE,
+    shell_times::CASE,
 ];
 
 /// The thesis's factor 2, which every case with fibres meets.

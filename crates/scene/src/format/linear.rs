@@ -51,6 +51,10 @@ pub struct LinearTable {
     /// What conjugate gradients multiply residuals by.
     #[serde(default)]
     pub preconditioner: PreconditionerName,
+    /// Whether an `implicit` step goes on with what conjugate gradients have reached when their iterations run out, instead of
+    /// ending the run: bounded time, for real time. The summary tells the residual.
+    #[serde(default)]
+    pub accept_stalled: bool,
 }
 
 impl LinearTable {
@@ -61,6 +65,7 @@ impl LinearTable {
             tolerance: thousandth(),
             iterations: thousand(),
             preconditioner: PreconditionerName::default(),
+            accept_stalled: false,
         }
     }
 }
@@ -78,10 +83,12 @@ fn thousand() -> u32 {
 #[serde(rename_all = "kebab-case")]
 pub enum PreconditionerName {
     /// The factors of an older stiffness, made anew once they need more than ten iterations.
-    #[default]
     LaggedFactors,
-    /// The inverse of each node's own block.
+    /// The inverse of each node's own block: the least memory.
     BlockJacobi,
+    /// This, and a solution for the rigid motions of groups of neighbouring nodes: far fewer iterations on many elements.
+    #[default]
+    Aggregates,
 }
 
 /// What a static run prescribes instead of the size of one load: exactly one of `displacement`, `arc-length`, `volume`. It finds the

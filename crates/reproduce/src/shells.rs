@@ -1,0 +1,148 @@
+//! Shells of the literature: a sheet becomes a model, its edges are held and loaded by name.
+
+use pliant_corotational::element::{Bending, Elasticity, Formulation, Membrane};
+use pliant_corotational::{
+    Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
+};
+use pliant_geometry::{Mesh, Vector3};
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
+
+use crate::CaseError;
+
+/// Components held where a shell is clamped.
+pub const CLAMPED: [bool; 6] = [true; 6];
+
+/// The thesis's element, its typing errors put right: constant strain in the plane with hardly any resistance to drilling, and its
+/// bending.
+pub const THESIS: Formulation =
+    Formulation { membrane: Membrane::Cst { drilling: 1e-3 }, bending: Bending::Comas2010 };
+
+/// A shell of one thickness with its mesh.
+#[derive(Clone, Debug)]
+pub struct Specimen {
+    /// Its mesh, for names and places of nodes.
+    pub mesh: Mesh,
+    /// Its model.
+    pub model: Model,
+}
+
+/// Held on a plane of symmetry with this normal (0, 1, 2): the displacement along it and the spins about the others.
+pub fn symmetry(axis: usize) -> [bool; 6] {
+    std::array::from_fn(|c| (c % 3 == axis) == (c < 3))
+}
+
+/// Time, and the factor, from 0 to 1.
+pub fn ramp() -> Curve {
+    Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 }
+}
+
+/// The triangles of a mesh.
+///
+/// # Panics
+/// If it has none.
+pub fn triangles(mesh: &Mesh) -> Vec<[u32; 3]> {
+    mesh.blocks[0].nodes.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+}
+
+/// A sheet with cells along its two axes.
+///
+/// # Errors
+/// If it cannot be meshed so.
+pub fn sheet(sheet: Sheet, counts: [usize; 2], pattern: Pattern) -> Result<Mesh, CaseError> {
+    Ok(sheet.mesh(counts, pattern, None, DEFAULT_CELL_LIMIT)?)
+}
+
+impl Specimen {
+    /// A shell of a mesh; density 1000 kg/m³.
+    ///
+    /// # Errors
+    /// If the mesh is no sound shell.
+    pub fn new(
+        mesh: Mesh,
+        [young, poisson]: [f64; 2],
+        thickness: f64,
+        formulation: Formulation,
+    ) -> Result<Self, CaseError> {
+        let material = Material { elastic: Elasticity { young, poisson }, density: 1000.0 };
+        let mut model = Model::new(mesh.points.clone());
+        model.add_shell(&Shell {
+            formulation,
+            ..Shell::new("shell", triangles(&mesh), thickness, material)
+        })?;
+        Ok(Self { mesh, model })
+    }
+
+    /// The nodes of an edge, in order.
+    ///
+    /// # Panics
+    /// If there is no such edge.
+    pub fn edge(&self, name: &str) -> Vec<u32> {
+        self.mesh.point_sets.get(name).unwrap_or_else(|| panic!("no edge {name}")).clone()
+    }
+
+    /// The node nearest to a place.
+    pub fn node(&self, x: f64, y: f64, z: f64) -> u32 {
+        let place = Vector3::new(x, y, z);
+        let nodes = 0..self.mesh.points.len() as u32;
+        let distance = |node: &u32| (self.mesh.points[*node as usize] - place).norm();
+        nodes.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    }
+
+    /// Holds components of nodes.
+    #[must_use]
+    pub fn hold(mut self, nodes: Vec<u32>, components: [bool; 6]) -> Self {
+        let name = format!("constraint {}", self.model.constraints.len());
+        self.model.constraints.push(Constraint { name, nodes, components, motion: Motion::Fixed });
+        self
+    }
+
+    /// Holds components of an edge.
+    #[must_use]
+    pub fn hold_edge(self, edge: &str, components: [bool; 6]) -> Self {
+        let nodes = self.edge(edge);
+        self.hold(nodes, components)
+    }
+
+    /// A load that grows with time from 0 to 1.
+    #[must_use]
+    pub fn load(mut self, kind: LoadKind) -> Self {
+        let name = format!("load {}", self.model.loads.len());
+        self.model.loads.push(Load { name, kind, curve: ramp(), controlled: false });
+        self
+    }
+
+    /// A force on one node.
+    #[must_use]
+    pub fn pull(self, node: u32, force: [f64; 3]) -> Self {
+        self.load(LoadKind::Force { nodes: vec![node], force: force.into() })
+    }
+
+    /// A force along an edge, evenly per length.
+    #[must_use]
+    pub fn pull_edge(self, edge: &str, total: [f64; 3]) -> Self {
+        let nodes = self.edge(edge);
+        let edges: Vec<[u32; 2]> = nodes.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+        let length: f64 = edges
+            .iter()
+            .map(|[a, b]| (self.mesh.points[*a as usize] - self.mesh.points[*b as usize]).norm())
+            .sum();
+        self.load(LoadKind::Edge { edges, traction: Vector3::from(total) / length })
+    }
+
+    /// A force per area everywhere.
+    #[must_use]
+    pub fn cover(self, traction: [f64; 3]) -> Self {
+        let cells = (0..self.model.facets.len() as u32).collect();
+        self.load(LoadKind::Area { cells, traction: traction.into() })
+    }
+
+    /// Displacement and rotation of a node by linear theory at full load.
+    ///
+    /// # Errors
+    /// If the stiffness is singular.
+    pub fn linear(&self, node: u32) -> Result<[f64; 6], CaseError> {
+        let mut solver = Statics::new(&self.model, StaticSettings::default())?;
+        Ok(solver.linear(&State::at_rest(&self.model), 1.0)?[node as usize])
+    }
+}

@@ -1,0 +1,114 @@
+//! A thin balloon, R/t = 50, blown up to twice its volume, against the sphere of linear elasticity in its stretch, which the co-rotational
+//! element is: W = 4π R² t E (λ − 1)²/(1 − ν), so p = 2 E t (λ − 1)/((1 − ν) R λ²). A sphere of St. Venant–Kirchhoff, linear in λ²:
+//! p = E t (λ² − 1)/((1 − ν) R λ).
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use pliant_corotational::element::{Formulation, Membrane};
+use pliant_corotational::{Control, LoadKind, Spread, State, StaticSettings, Statics};
+use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
+use pliant_validation::claim;
+use pliant_validation::shells::Specimen;
+
+const THICKNESS: f64 = 0.02;
+const YOUNG: f64 = 1e6;
+const POISSON: f64 = 0.3;
+
+/// An octahedron whose faces are cut in four, drawn onto the sphere of radius 1: facets that differ by a factor of two in area.
+fn ball(cuts: usize) -> Mesh {
+    let mut points: Vec<Vector3> = [1.0, -1.0]
+        .into_iter()
+        .flat_map(|s| [Vector3::x() * s, Vector3::y() * s, Vector3::z() * s])
+        .collect();
+    let mut cells: Vec<[u32; 3]> =
+        vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
+    for _ in 0..cuts {
+        let mut middle = BTreeMap::new();
+        let mut cut = Vec::new();
+        for [a, b, c] in cells {
+            let [d, e, f] = [(a, b), (b, c), (c, a)].map(|(i, j)| {
+                *middle.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                    points.push((points[i as usize] + points[j as usize]).normalize());
+                    points.len() as u32 - 1
+                })
+            });
+            cut.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
+        }
+        cells = cut;
+    }
+    let nodes = cells.into_iter().flatten().collect();
+    Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
+}
+
+/// Pressure over that of the sphere at twice the volume, largest tilt of a node [rad], least and largest radius.
+fn blown_up(cuts: usize, membrane: Membrane) -> [f64; 4] {
+    let formulation = Formulation { membrane, ..Formulation::default() };
+    let balloon = Specimen::new(ball(cuts), [YOUNG, POISSON], THICKNESS, formulation).unwrap();
+    let cells: Vec<u32> = (0..balloon.model.facets.len() as u32).collect();
+    let mut balloon = balloon
+        .hold(vec![0], [true, true, true, false, false, false])
+        .hold(vec![1], [false, true, true, false, false, false])
+        .hold(vec![2], [false, false, true, false, false, false]);
+    balloon =
+        balloon.load(LoadKind::Pressure { cells: cells.clone(), pressure: 1.0, spread: Spread::Lumped });
+    balloon.model.loads[0].controlled = true;
+    let model = &balloon.model;
+    let mut solver = Statics::new(model, StaticSettings::default()).unwrap();
+    let mut state = State::at_rest(model);
+    state.time = 1.0;
+    let rest = model.enclosed_volume(&cells, &model.rest);
+    for part in 1..=20 {
+        let volume = rest * (1.0 + f64::from(part) / 20.0);
+        if let Err(error) = solver.control(&mut state, Control::Volume { volume }) {
+            println!("{membrane:?}, {} facets: fails at volume × {:.2}: {error}", cells.len(), volume / rest);
+            break;
+        }
+    }
+    let stretch = (model.enclosed_volume(&cells, &state.position) / rest).cbrt();
+    // Of the polyhedron: its volume is that of a slightly smaller sphere.
+    let radius = (rest / (4.0 / 3.0 * PI)).cbrt();
+    let exact = 2.0 * YOUNG * THICKNESS * (stretch - 1.0) / ((1.0 - POISSON) * radius * stretch * stretch);
+    let centre = state.position.iter().sum::<Vector3>() / state.position.len() as f64;
+    let tilt =
+        |n: usize| state.normal(model, n).angle(&(state.position[model.normals[n].node as usize] - centre));
+    let radii = state.position.iter().map(|x| (x - centre).norm() / stretch);
+    let result = [
+        state.load_factor / exact,
+        (0..model.normals.len()).map(tilt).fold(0.0, f64::max),
+        radii.clone().fold(f64::INFINITY, f64::min),
+        radii.fold(0.0, f64::max),
+    ];
+    println!(
+        "{membrane:?}, {} facets: stretch {stretch:.4}, p/p_exact {:.4}, tilt {:.4} rad, radii {:.4} to {:.4}",
+        cells.len(),
+        result[0],
+        result[1],
+        result[2],
+        result[3]
+    );
+    result
+}
+
+/// With constant strain the pressure comes to that of the sphere with the square of the edges, and normals stay radial but for what
+/// the angles of the facets leave; drilling counts for nothing.
+#[test]
+fn a_balloon_of_constant_strain_has_the_pressure_of_the_sphere() {
+    for (cuts, off, tilted) in [(2, 0.012, 0.05), (3, 0.004, 0.03), (4, 0.001, 0.016)] {
+        for drilling in [1e-3, 0.1] {
+            let [pressure, tilt, ..] = blown_up(cuts, Membrane::Cst { drilling });
+            claim("pressure off the sphere's", (pressure - 1.0).abs(), off);
+            claim("tilt [rad]", tilt, tilted);
+        }
+    }
+}
+
+/// With ANDES the nodes of few facets tilt, five times less with every edge halved; the pressure comes near all the same.
+#[test]
+fn a_balloon_of_andes_facets_tilts_its_nodes_on_coarse_meshes() {
+    let [coarse_off, coarse_tilt, ..] = blown_up(3, Membrane::default());
+    let [fine_off, fine_tilt, ..] = blown_up(4, Membrane::default());
+    assert!(coarse_tilt > 1.0 && fine_tilt < 0.25 * coarse_tilt, "{coarse_tilt} {fine_tilt}");
+    claim("pressure off the sphere's, 512 facets", (coarse_off - 1.0).abs(), 0.02);
+    claim("pressure off the sphere's, 2048 facets", (fine_off - 1.0).abs(), 0.001);
+}

@@ -1,0 +1,345 @@
+//! Shells of real shapes, read through `PLIANT_DATA`: the leaflets of a patient's aortic valve closing under their pressure, an aneurysm and
+//! a rectum blown up. What is told: time, residual, and how far the answer moves with the mesh and with the numbering.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use pliant_corotational::element::{Elasticity, Formulation, Membrane};
+use pliant_corotational::{
+    BackwardEuler, Constraint, DynamicSettings, LinearSolver, Load, LoadKind, Material, Model, Motion,
+    Preconditioner, Shell, Spread, State, StaticSettings, Statics,
+};
+use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_validation::claim;
+use pliant_validation::shells::{ramp, renumbered, triangles};
+
+fn data() -> Option<PathBuf> {
+    let path = std::env::var_os("PLIANT_DATA").map(PathBuf::from);
+    if path.is_none() {
+        println!("skipped: PLIANT_DATA is not set");
+    }
+    path
+}
+
+/// The triangles of a file in metres, points that lie on each other joined.
+fn surface(path: PathBuf, scale: f64) -> Mesh {
+    let mesh = io::read(&path).unwrap_or_else(|error| panic!("{error}")).mesh;
+    let mut number: BTreeMap<[u64; 3], u32> = BTreeMap::new();
+    let mut points = Vec::new();
+    let joined: Vec<u32> = (mesh.points.iter())
+        .map(|p| {
+            *number.entry([p.x, p.y, p.z].map(f64::to_bits)).or_insert_with(|| {
+                points.push(p * scale);
+                points.len() as u32 - 1
+            })
+        })
+        .collect();
+    let cells = mesh.block(CellKind::Triangle).map(|block| block.nodes.clone()).unwrap_or_default();
+    let nodes = cells.into_iter().map(|node| joined[node as usize]).collect();
+    Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
+}
+
+/// Each triangle cut in four at the middles of its edges: the same surface.
+fn refined(mesh: &Mesh) -> Mesh {
+    let mut points = mesh.points.clone();
+    let mut middle = BTreeMap::new();
+    let mut nodes = Vec::new();
+    for [a, b, c] in triangles(mesh) {
+        let [d, e, f] = [(a, b), (b, c), (c, a)].map(|(i, j)| {
+            *middle.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                points.push(0.5 * (points[i as usize] + points[j as usize]));
+                points.len() as u32 - 1
+            })
+        });
+        nodes.extend([a, d, f, d, b, e, f, e, c, d, e, f]);
+    }
+    Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
+}
+
+/// An organ to blow up.
+struct Organ {
+    young: f64,
+    thickness: f64,
+    pressure: f64,
+    membrane: Membrane,
+}
+
+impl Organ {
+    /// The lowest 5 % of the nodes in z fixed; pressure from inside grows with time from 0 to 1.
+    fn model(&self, mesh: &Mesh) -> Model {
+        let mut model = Model::new(mesh.points.clone());
+        let material = Material { elastic: Elasticity { young: self.young, poisson: 0.45 }, density: 1000.0 };
+        let formulation = Formulation { membrane: self.membrane, ..Formulation::default() };
+        let shell = Shell::new("organ", triangles(mesh), self.thickness, material);
+        let notes = model.add_shell(&Shell { formulation, ..shell }).unwrap();
+        println!("{} nodes, {} shells, {notes:?}", model.rest.len(), model.facets.len());
+        let mut heights: Vec<f64> = mesh.points.iter().map(|p| p.z).collect();
+        heights.sort_unstable_by(f64::total_cmp);
+        let level = heights[heights.len() / 20];
+        let low = (0..mesh.points.len() as u32).filter(|&n| mesh.points[n as usize].z <= level);
+        model.constraints.push(Constraint {
+            name: "lowest".into(),
+            nodes: low.collect(),
+            components: [true; 6],
+            motion: Motion::Fixed,
+        });
+        let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
+        let outwards = model.enclosed_volume(&cells, &model.rest).signum();
+        let kind = LoadKind::Pressure { cells, pressure: outwards * self.pressure, spread: Spread::Lumped };
+        model.loads.push(Load { name: "pressure".into(), kind, curve: ramp(), controlled: false });
+        model
+    }
+
+    /// The equilibrium at full pressure.
+    fn equilibrium(&self, mesh: &Mesh) -> Result<(Model, State), String> {
+        let model = self.model(mesh);
+        let start = Instant::now();
+        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        let mut state = State::at_rest(&model);
+        let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
+        let rest = model.enclosed_volume(&cells, &model.rest);
+        let (mut parts, mut iterations) = (0, 0);
+        let steps = 5;
+        for part in 1..=steps {
+            match solver.solve(&mut state, f64::from(part) / f64::from(steps)) {
+                Ok(step) => {
+                    parts += step.parts;
+                    iterations += step.residuals.len() - 1;
+                    let [first, last] = [step.residuals[0], step.residuals[step.residuals.len() - 1]];
+                    println!(
+                        "  load {part}/{steps}: residual {first:.1e} to {last:.1e} N, {} negative pivots",
+                        step.negative_pivots
+                    );
+                }
+                Err(error) => {
+                    if let pliant_corotational::SolveError::Broken { cell, .. } = error {
+                        let f = &model.facets[cell];
+                        let around =
+                            model.facets.iter().filter(|o| f.nodes.iter().any(|n| o.nodes.contains(n)));
+                        println!(
+                            "  broken facet altitude {:.3} mm, area {:.3} mm2, around {:?} mm",
+                            1e3 * f.altitude(),
+                            1e6 * f.area,
+                            around.map(|o| (1e5 * o.altitude()).round() / 100.0).collect::<Vec<_>>()
+                        );
+                    }
+                    println!(
+                        "  fails at load {:.3}: {error}; volume × {:.4}, largest displacement {:.2} mm",
+                        state.time,
+                        model.enclosed_volume(&cells, &state.position) / rest,
+                        1e3 * largest(&model, &state)
+                    );
+                    return Err(error.to_string());
+                }
+            }
+        }
+        println!(
+            "  static: {:.1} s, {parts} load steps, {iterations} iterations at their ends; largest displacement {:.3} mm, volume × {:.4}",
+            start.elapsed().as_secs_f64(),
+            1e3 * largest(&model, &state),
+            model.enclosed_volume(&cells, &state.position) / rest
+        );
+        Ok((model, state))
+    }
+
+    /// One second of motion in steps of 10 ms, the pressure full after 0.5 s, mass-damped.
+    fn motion(&self, mesh: &Mesh) -> (Model, State) {
+        let mut model = self.model(mesh);
+        model.loads[0].curve = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.5 };
+        model.mass_damping = 20.0;
+        let linear = LinearSolver::ConjugateGradients {
+            tolerance: 1e-6,
+            iterations: 5000,
+            preconditioner: Preconditioner::LaggedFactors { renew_after: 12 },
+        };
+        let mut solver =
+            BackwardEuler::new(&model, DynamicSettings { linear, ..DynamicSettings::new(0.01) }).unwrap();
+        let mut state = State::at_rest(&model);
+        let start = Instant::now();
+        let (mut newton, mut parts, mut residual) = (0, 0, 0.0_f64);
+        for _ in 0..100 {
+            let step = solver.advance(&mut state).unwrap();
+            newton += step.residuals.len() - 1;
+            parts += step.parts;
+            residual = residual.max(*step.residuals.last().unwrap());
+        }
+        let phases = solver.phases();
+        println!(
+            "  dynamic: {:.0} ms a step, {parts} steps, {:.1} iterations of Newton's method and {:.1} of conjugate gradients each, residual {residual:.1e}",
+            10.0 * start.elapsed().as_secs_f64(),
+            newton as f64 / 100.0,
+            phases.iterations as f64 / newton as f64
+        );
+        (model, state)
+    }
+}
+
+fn largest(model: &Model, state: &State) -> f64 {
+    (0..model.rest.len()).map(|n| state.displacement(model, n).norm()).fold(0.0, f64::max)
+}
+
+/// The largest difference of displacements over the largest displacement; `map` leads from a node of the first to that of the second.
+fn apart(one: &(Model, State), other: &(Model, State), map: impl Fn(usize) -> usize) -> f64 {
+    let differences = (0..one.0.rest.len())
+        .map(|n| (one.1.displacement(&one.0, n) - other.1.displacement(&other.0, map(n))).norm());
+    differences.fold(0.0, f64::max) / largest(&one.0, &one.1)
+}
+
+fn study(organ: &Organ, mesh: &Mesh) {
+    let still = organ.equilibrium(mesh).unwrap();
+    let (other, order) = renumbered(mesh, 1);
+    let again = organ.equilibrium(&other).unwrap();
+    claim("renumbered", apart(&still, &again, |n| order[n] as usize), 1e-6);
+    let moved = organ.motion(mesh);
+    println!("  motion after 1 s off equilibrium: {:.2e}", apart(&still, &moved, |n| n));
+    match organ.equilibrium(&refined(mesh)) {
+        Ok(fine) => {
+            println!("  each shell cut in four: displacements move by {:.2e}", apart(&still, &fine, |n| n))
+        }
+        Err(error) => println!("  each shell cut in four: {error}"),
+    }
+}
+
+/// 14,186 triangles in mm; 10 kPa, E = 1 MPa, t = 0.3 mm.
+#[test]
+#[ignore = "minutes"]
+fn aneurysm_under_pressure() {
+    let Some(data) = data() else { return };
+    let mesh = surface(data.join("aneurysm-sofa/aneurysm3D_1.off"), 1e-3);
+    study(&Organ { young: 1e6, thickness: 0.3e-3, pressure: 10e3, membrane: Membrane::default() }, &mesh);
+}
+
+/// 13,770 triangles in mm; 3 kPa, E = 0.5 MPa, t = 3 mm.
+#[test]
+#[ignore = "minutes"]
+fn rectum_under_pressure() {
+    let Some(data) = data() else { return };
+    let mesh = surface(data.join("organs-openhelp/Rectum_Lumen.stl"), 1e-3);
+    let organ = Organ { young: 0.5e6, thickness: 3e-3, pressure: 3e3, membrane: Membrane::default() };
+    drop(organ.equilibrium(&mesh));
+    let cst = Organ { membrane: Membrane::Cst { drilling: 1e-2 }, ..organ };
+    drop(cst.equilibrium(&mesh));
+    let half = Organ { pressure: 1.5e3, ..organ };
+    study(&half, &mesh);
+}
+
+/// Numbers of a table of two columns after its first line.
+fn table(path: PathBuf) -> Vec<(f64, f64)> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let row = |line: &str| {
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        (numbers[0], numbers[1])
+    };
+    text.lines().skip(1).filter(|line| !line.trim().is_empty()).map(row).collect()
+}
+
+/// The distance [m] of a node from the nearest facet of another leaflet, if that is below a limit.
+fn gap(model: &Model, state: &State, leaflet: &[usize], node: usize, limit: f64) -> f64 {
+    let mut least = limit;
+    let q = state.position[node];
+    for facet in model.facets.iter().filter(|facet| leaflet[facet.nodes[0] as usize] != leaflet[node]) {
+        let [a, b, c] = facet.nodes.map(|n| state.position[n as usize]);
+        let (ab, ac, aq) = (b - a, c - a, q - a);
+        if aq.norm() > least + ab.norm() + ac.norm() {
+            continue;
+        }
+        let normal = ab.cross(&ac);
+        let [u, v] = [aq.cross(&ac), ab.cross(&aq)].map(|w| w.dot(&normal) / normal.norm_squared());
+        let distance = if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+            aq.dot(&normal).abs() / normal.norm()
+        } else {
+            let side = |p: Vector3, e: Vector3| {
+                let t = ((q - p).dot(&e) / e.norm_squared()).clamp(0.0, 1.0);
+                (q - p - t * e).norm()
+            };
+            side(a, ab).min(side(a, ac)).min(side(b, c - b))
+        };
+        least = least.min(distance);
+    }
+    least
+}
+
+/// Leaflets of a patient's valve (E = 1 MPa, ν = 0.45, t = 0.4 mm, 1000 kg/m³, as their deck says in mm, g and s: pressures in Pa, damping
+/// 2/s), each fixed along the wall; until two are a thickness apart.
+#[test]
+#[ignore = "minutes"]
+fn valve_leaflets_close() {
+    let Some(data) = data() else { return };
+    let folder = data.join("shells-svfsi/valve");
+    let curve = table(folder.join("pbc.dat"));
+    let run = |fine: bool, step: f64| -> (f64, f64, f64) {
+        let (mut points, mut cells, mut leaflet, mut held) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for (number, name) in ["LCC", "NCC", "RCC"].into_iter().enumerate() {
+            let coarse = surface(folder.join(format!("PAT003_07_{name}.vtu")), 10e-3);
+            let wall = surface(folder.join(format!("PAT003_07_{name}_edge1.vtp")), 10e-3).points;
+            let mesh = if fine { refined(&coarse) } else { coarse };
+            let first = points.len() as u32;
+            // Nodes of the fixed edge, and the middles between two of them.
+            let on_wall = |p: &Vector3| {
+                let near = |w: &Vector3| (w - p).norm() < 1e-6;
+                wall.iter().any(near)
+                    || fine && wall.windows(2).any(|pair| (0.5 * (pair[0] + pair[1]) - p).norm() < 1e-6)
+            };
+            held.extend((first..).zip(&mesh.points).filter(|(_, p)| on_wall(p)).map(|(n, _)| n));
+            cells.extend(triangles(&mesh).into_iter().map(|t| t.map(|n| n + first)));
+            leaflet.extend(mesh.points.iter().map(|_| number));
+            points.extend(mesh.points);
+        }
+        let mut model = Model::new(points);
+        let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.45 }, density: 1000.0 };
+        let notes = model.add_shell(&Shell::new("valve", cells, 0.4e-3, material)).unwrap();
+        let count = held.len();
+        model.constraints.push(Constraint {
+            name: "wall".into(),
+            nodes: held,
+            components: [true; 6],
+            motion: Motion::Fixed,
+        });
+        let kind = LoadKind::Pressure {
+            cells: (0..model.facets.len() as u32).collect(),
+            pressure: 1.0,
+            spread: Spread::Lumped,
+        };
+        let course = Curve { shape: Shape::Table(curve.clone()), from: 0.0, to: 1.0 };
+        model.loads.push(Load { name: "valve".into(), kind, curve: course, controlled: false });
+        model.mass_damping = 2.0;
+        let mut solver = BackwardEuler::new(&model, DynamicSettings::new(step)).unwrap();
+        let mut state = State::at_rest(&model);
+        let start = Instant::now();
+        // Where the leaflets hang side by side on the wall they are close from the start.
+        let apart = |n: &usize| gap(&model, &state, &leaflet, *n, 2e-3) >= 2e-3;
+        let free: Vec<usize> = (0..leaflet.len()).filter(apart).collect();
+        let (mut parts, mut residual) = (0, 0.0_f64);
+        let mut now = 2e-3;
+        while state.time < 0.755 && now > 0.4e-3 {
+            let made = match solver.advance(&mut state) {
+                Ok(made) => made,
+                Err(error) => {
+                    println!("  fails at {:.4} s: {error}", state.time);
+                    break;
+                }
+            };
+            parts += made.parts;
+            residual = residual.max(*made.residuals.last().unwrap());
+            now = free.iter().map(|&n| gap(&model, &state, &leaflet, n, 2e-3)).fold(2e-3, f64::min);
+        }
+        println!(
+            "valve: {} shells, {count} nodes held, {notes:?}; leaflets {:.2} mm apart at {:.4} s, {parts} steps, {:.1} s, residual {residual:.1e}, largest displacement {:.2} mm",
+            model.facets.len(),
+            1e3 * now,
+            state.time,
+            start.elapsed().as_secs_f64(),
+            1e3 * largest(&model, &state)
+        );
+        (now, state.time, largest(&model, &state))
+    };
+    let coarse = run(false, 2e-3);
+    let halved = run(false, 1e-3);
+    let fine = run(true, 2e-3);
+    println!(
+        "first touch at {:.4} s; {:.4} s with half the step, {:.4} s with each shell cut in four",
+        coarse.1, halved.1, fine.1
+    );
+}
