@@ -732,5 +732,5 @@ fn a_balloon_must_be_closed() {
     let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&model);
     let error = solver.control(&mut state, Control::Volume { volume: 5.0 }).unwrap_err();
-    assert!(error.to_string().contains("1 open borders: 3 nodes"), "{error}");
+    assert!(error.to_string().contains("1 open border: 3 nodes"), "{error}");
 }
