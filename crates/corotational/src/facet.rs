@@ -411,9 +411,11 @@ impl Facet {
         SymmetricEigen::new(scaled).eigenvalues.max()
     }
 
-    /// E t [N/m].
-    pub(crate) fn membrane_modulus(&self) -> f64 {
-        self.elastic.young * self.thickness
+    /// The largest force of a displacement of one node [N/m]: of slivers far above E t.
+    pub(crate) fn stiffest(&self) -> f64 {
+        let in_plane = [0, 1, 3, 4, 6, 7].map(|at| self.membrane[(at, at)]);
+        let across = [0, 3, 6].map(|at| self.bending[(at, at)]);
+        in_plane.into_iter().chain(across).fold(0.0, f64::max)
     }
 
     /// The smallest altitude at rest [m].

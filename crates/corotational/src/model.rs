@@ -411,13 +411,14 @@ impl Model {
         if loops.is_empty() { Ok(()) } else { Err(ModelError::Open { loops }) }
     }
 
-    /// What round-off leaves of the norm of a residual [N], 8 ε E t |x| √n: displacements are differences of positions, known to ε |x|.
+    /// What round-off leaves of the norm of a residual [N], 8 ε |x| √Σk²: displacements are differences of positions, known to ε |x|,
+    /// and a cell makes forces of them with its largest stiffness k.
     pub(crate) fn round_off(&self) -> f64 {
         let extent = self.rest.iter().map(|x| x.amax()).fold(0.0, f64::max);
-        let shells = self.facets.iter().map(|facet| facet.membrane_modulus());
+        let shells = self.facets.iter().map(|facet| facet.stiffest());
         let solids = self.tets.iter().map(|tet| tet.modulus() * tet.volume.cbrt());
-        let stiffness = shells.chain(solids).fold(0.0, f64::max);
-        8.0 * f64::EPSILON * stiffness * extent * (self.rest.len() as f64).sqrt()
+        let stiffness = shells.chain(solids).map(|k| k * k).sum::<f64>().sqrt();
+        8.0 * f64::EPSILON * stiffness * extent
     }
 
     /// The mean length of the facets' and other cells' edges at rest [m]; 1 without any.

@@ -1,0 +1,342 @@
+//! The cells of shells and co-rotational solids: triangles, elements, materials, thickness.
+
+use std::collections::BTreeMap;
+
+use pliant_corotational as corotational;
+use pliant_corotational::element::{Bending, Elasticity, Formulation, Membrane};
+use pliant_corotational::{Material, ModelError, Motion, Shell};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+
+use super::{BodyCells, Corotational};
+use crate::build::bodies::{Draft, nodes};
+use crate::build::meshes::surface_of;
+use crate::build::{Builder, SCENE, bodies, suggestion};
+use crate::diagnostic::{Diagnostic, counted};
+use crate::format::{BodyModel, BodyTable, Element, Thickness, ThicknessRule};
+
+/// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
+const DRILLING: f64 = 0.01;
+
+impl Builder<'_> {
+    /// The mesh of a shell as triangles only: quads cut in two, volume cells left for their boundary.
+    pub(in crate::build) fn triangles(&mut self, mesh: Mesh, path: &[&str]) -> Option<Mesh> {
+        let surface = surface_of(mesh);
+        if surface.blocks.is_empty() {
+            let help = "a shell needs triangles or quads";
+            self.error(path, format!("`{}` has no triangles", path[1]), "this mesh", help);
+            return None;
+        }
+        let mut whole = CellBlock::new(CellKind::Triangle, Vec::new());
+        let names: Vec<String> = surface.blocks.iter().flat_map(|block| block.data.keys().cloned()).collect();
+        let mut cut = 0;
+        let mut parents: Vec<(usize, usize)> = Vec::new();
+        for (at, block) in surface.blocks.iter().enumerate() {
+            for (cell, corners) in block.cells().enumerate() {
+                whole.nodes.extend_from_slice(&corners[..3]);
+                parents.push((at, cell));
+                if block.kind == CellKind::Quad {
+                    whole.nodes.extend([corners[0], corners[2], corners[3]]);
+                    parents.push((at, cell));
+                    cut += 1;
+                }
+            }
+        }
+        for name in names {
+            let arrays: Option<Vec<&DataArray>> =
+                surface.blocks.iter().map(|block| block.data.get(&name)).collect();
+            let Some(arrays) = arrays else { continue };
+            let components = arrays[0].components;
+            if arrays.iter().any(|array| array.components != components) {
+                continue;
+            }
+            let values =
+                parents.iter().flat_map(|&(block, cell)| arrays[block].item(cell)).copied().collect();
+            whole.data.insert(name, DataArray { components, values });
+        }
+        if cut > 0 {
+            self.notes.push(format!("`{}`: {} cut into triangles", path[1], counted(cut, "quad")));
+            whole.sets.clear();
+        } else if let [only] = &surface.blocks[..] {
+            whole.sets = only.sets.clone();
+        }
+        Some(Mesh { blocks: vec![whole], ..surface })
+    }
+
+    /// Adds the cells of a shell or a co-rotational solid whose nodes are the last of the model.
+    pub(in crate::build) fn add_corotational(&mut self, draft: &Draft<'_>, first: u32) {
+        let rest = &self.model.rest;
+        let model = &mut self.corotational.get_or_insert_with(Corotational::new).model;
+        model.rest.extend(rest[model.rest.len()..].iter().map(|&p| Vector3::from(p)));
+        model.mass.resize(rest.len(), 0.0);
+        model.inertia.resize(rest.len(), 0.0);
+        (model.mass_damping, model.stiffness_damping) = (draft.table.damping, draft.table.stiffness_damping);
+        let added = match draft.table.model {
+            BodyModel::Shell => self.add_shell(draft, first),
+            _ => self.add_corotational_solid(draft, first),
+        };
+        let (Some(cells), Some(part)) = (added, &mut self.corotational) else { return };
+        part.cells.push(cells);
+        // What the scene's own model says of masses.
+        self.model.mass.copy_from_slice(&part.model.mass);
+    }
+
+    fn add_shell(&mut self, draft: &Draft<'_>, first: u32) -> Option<BodyCells> {
+        let &Draft { name, table, mesh, .. } = draft;
+        let block = mesh.block(CellKind::Triangle)?;
+        let formulation = self.formulation(name, table)?;
+        let material = self.materials(draft, block)?;
+        let thickness = self.thickness(name, table, block)?;
+        let cells: Vec<[u32; 3]> = (0..block.len() as u32).map(|cell| nodes(block, cell, first)).collect();
+        let count = cells.len();
+        let shell = Shell {
+            name: name.into(),
+            cells,
+            thickness,
+            material,
+            formulation,
+            crease: table.crease.unwrap_or(45.0).to_radians(),
+            branches: table.branches,
+        };
+        let part = self.corotational.as_mut()?;
+        let start = part.model.facets.len() as u32;
+        match part.model.add_shell(&shell) {
+            Ok(notes) => {
+                self.tell_notes(name, notes, count);
+                if formulation.bending == Bending::None && formulation.membrane != Membrane::None {
+                    let held = corotational::Constraint {
+                        name: format!("membrane {name}"),
+                        nodes: (first..self.model.rest.len() as u32).collect(),
+                        components: [false, false, false, true, true, true],
+                        motion: Motion::Fixed,
+                    };
+                    self.corotational.as_mut()?.model.constraints.push(held);
+                }
+                Some(BodyCells::Facets(start..start + count as u32))
+            }
+            Err(error) => {
+                self.refuse_part(name, &error);
+                None
+            }
+        }
+    }
+
+    fn formulation(&mut self, name: &str, table: &BodyTable) -> Option<Formulation> {
+        let cst = Membrane::Cst { drilling: DRILLING };
+        let (membrane, bending) = match table.element {
+            None | Some(Element::DktOpt) => (Membrane::default(), Bending::Dkt),
+            Some(Element::DktCst) => (cst, Bending::Dkt),
+            Some(Element::Membrane) => (cst, Bending::None),
+            Some(Element::Plate) => (Membrane::None, Bending::Dkt),
+            Some(Element::Comas2010) => (cst, Bending::Comas2010),
+            Some(_) => {
+                let help = "elements of shells: `dkt-opt`, `dkt-cst`, `membrane`, `plate`, `comas-2010`";
+                let message = format!("`{name}` is a shell, and this element is of a solid");
+                self.error(&["body", name, "element"], message, "not of a shell", help);
+                return None;
+            }
+        };
+        Some(Formulation { membrane, bending })
+    }
+
+    /// The material of each cell of a block, or one for all.
+    fn materials(&mut self, draft: &Draft<'_>, block: &CellBlock) -> Option<Vec<Material>> {
+        let &Draft { name, table, .. } = draft;
+        let labels = block.data.get("label");
+        let mut known: BTreeMap<Option<String>, Material> = BTreeMap::new();
+        let mut all = Vec::with_capacity(block.len());
+        for cell in 0..block.len() {
+            let label = labels.map(|labels| labels.item(cell)[0].to_string());
+            let material = match known.get(&label) {
+                Some(&material) => material,
+                None => {
+                    // A label without a value has been told.
+                    let law = table.law.of(label.as_deref())?;
+                    let density = table.density.of(label.as_deref())?.0;
+                    let material = Material { elastic: self.elasticity(name, table, law)?, density };
+                    *known.entry(label).or_insert(material)
+                }
+            };
+            all.push(material);
+        }
+        if known.len() == 1 {
+            all.truncate(1);
+        }
+        Some(all)
+    }
+
+    /// Young's modulus and Poisson's ratio of a law at small strain.
+    fn elasticity(&mut self, name: &str, table: &BodyTable, law_name: &str) -> Option<Elasticity> {
+        let scene = self.scene;
+        let path = bodies::law_path(name, &table.law, law_name);
+        let Some((_, law)) = scene.laws.iter().find(|(known, _)| known == law_name) else {
+            let known: Vec<&str> = scene.laws.iter().map(|(name, _)| name.as_str()).collect();
+            let help = suggestion(law_name, &known, SCENE, "laws");
+            self.error(&path, format!("there is no law `{law_name}`"), "no such law", help);
+            return None;
+        };
+        let what = match (law.law.is_isotropic(), law.extras.prony.is_empty()) {
+            (false, _) => "is not the same in all directions",
+            (_, false) => "relaxes",
+            _ => {
+                let moduli = law.law.small_strain();
+                let (k, g) = (moduli.bulk, moduli.shear);
+                if law.law.name() != "st-venant-kirchhoff" {
+                    let note = format!(
+                        "`{name}` takes Young's modulus and Poisson's ratio of law `{law_name}` at small strain"
+                    );
+                    if !self.notes.contains(&note) {
+                        self.notes.push(note);
+                    }
+                }
+                let poisson = (3.0 * k - 2.0 * g) / (2.0 * (3.0 * k + g));
+                return Some(Elasticity { young: 9.0 * k * g / (3.0 * k + g), poisson });
+            }
+        };
+        let message = format!("law `{law_name}` {what}, and `{name}` is of model `{}`", table.model.word());
+        let help = "take an isotropic law without `prony`, such as `neo-hookean`, or `model = \"solid\"`";
+        self.error(&path, message, "not for this model", help);
+        None
+    }
+
+    fn thickness(&mut self, name: &str, table: &BodyTable, block: &CellBlock) -> Option<Vec<f64>> {
+        let path = ["body", name, "thickness"];
+        match &table.thickness {
+            None => {
+                let help = "add `thickness = 0.002` in metres";
+                let message = format!("`{name}` is a shell and needs a `thickness`");
+                self.error(&path[..2], message, "`thickness` is missing", help);
+                None
+            }
+            Some(Thickness::Uniform(value)) => Some(vec![*value]),
+            Some(Thickness::PerCell(ThicknessRule::CellData(array))) => match block.data.get(array) {
+                Some(data) if data.components == 1 => Some(data.values.clone()),
+                found => {
+                    let (message, help) = match found {
+                        Some(data) => (
+                            format!("cell data `{array}` has {}", counted(data.components, "component")),
+                            "a thickness is one number for each triangle [m]".to_owned(),
+                        ),
+                        None => {
+                            let known: Vec<&str> = block.data.keys().map(String::as_str).collect();
+                            let help = suggestion(array, &known, "the mesh", "cell data");
+                            (format!("the mesh of `{name}` has no cell data `{array}`"), help)
+                        }
+                    };
+                    self.error(&path, message, "this array", help);
+                    None
+                }
+            },
+            Some(Thickness::PerCell(ThicknessRule::ByLabel(map))) => {
+                let labels = block.data.get("label");
+                let value = |cell: usize| {
+                    let label = labels.map(|labels| labels.item(cell)[0].to_string());
+                    label.as_ref().and_then(|label| map.get(label)).copied().ok_or(label)
+                };
+                match (0..block.len()).map(value).collect::<Result<Vec<f64>, _>>() {
+                    Ok(values) => Some(values),
+                    Err(label) => {
+                        let message = match label {
+                            Some(label) => {
+                                format!("triangles of `{name}` with label {label} have no thickness")
+                            }
+                            None => format!("the triangles of `{name}` have no labels"),
+                        };
+                        self.error(&path, message, "by label", "give one thickness, or one for every label");
+                        None
+                    }
+                }
+            }
+        }
+    }
+
+    fn tell_notes(&mut self, name: &str, notes: corotational::Notes, count: usize) {
+        if notes.turned > 0 {
+            self.notes.push(format!(
+                "`{name}`: {} turned over, so that all face one side",
+                counted(notes.turned, "triangle")
+            ));
+        }
+        if notes.thick > 0 {
+            let message = format!(
+                "{} of {count} of `{name}` are thicker than their smallest altitude: no longer thin",
+                counted(notes.thick, "triangle")
+            );
+            let place = self.source().span(&["body", name, "thickness"]);
+            let help = "take larger triangles, a smaller thickness, or model the wall with tets";
+            self.out.push(Diagnostic::warning(message).at(place, "thick").help(help));
+        }
+        if let Some((inverted, first)) = notes.inverted {
+            let message = format!(
+                "{} of `{name}` folded back onto all neighbours, as inverted ones are: the first is triangle {first} (counted \
+                 from 0)",
+                counted(inverted, "triangle")
+            );
+            let place = self.source().span(&["body", name, "mesh"]);
+            let help =
+                "fields are wrong there: smooth or remesh, or distort a built-in shape by less than 0.25";
+            self.out.push(Diagnostic::warning(message).at(place, "folded").help(help));
+        }
+        if notes.comas > 0 {
+            let message = format!(
+                "`{name}` has the element of Comas (2010), which depends on the numbering of its corners and converges to \
+                 plates 6 to 26 % too soft"
+            );
+            let place = self.source().span(&["body", name, "element"]);
+            let help = "it is there for comparison; take `dkt-opt`";
+            self.out.push(Diagnostic::warning(message).at(place, "converges to a wrong plate").help(help));
+        }
+    }
+
+    /// Tells why a part was refused, at the key that is about it.
+    fn refuse_part(&mut self, name: &str, error: &ModelError) {
+        let (key, help) = match error {
+            ModelError::OutOfRange { what, .. } if what.starts_with("thickness") => {
+                ("thickness", "give every triangle a thickness above 0, in metres")
+            }
+            ModelError::OutOfRange { what, .. } if what.starts_with("density") => ("density", ""),
+            ModelError::OutOfRange { .. } => ("law", "give the law other constants"),
+            ModelError::Branch { .. } => {
+                ("mesh", "set `branches = true` if walls are meant to meet there, or repair the mesh")
+            }
+            _ => ("mesh", "`pliant info` reads a mesh file on its own; `fix = \"merge\"` joins nodes"),
+        };
+        self.error(&["body", name, key], error.to_string(), "here", help);
+    }
+
+    fn add_corotational_solid(&mut self, draft: &Draft<'_>, first: u32) -> Option<BodyCells> {
+        let &Draft { name, table, mesh, .. } = draft;
+        if let Some(other) = table.element.filter(|&element| element != Element::Tet4) {
+            let what = if other.is_shell() { "a shell" } else { "`model = \"solid\"`" };
+            let message = format!("`{name}` is a co-rotational solid, and this element is of {what}");
+            self.error(
+                &["body", name, "element"],
+                message,
+                "not for this model",
+                "take `tet4`, or leave it out",
+            );
+            return None;
+        }
+        if mesh.volume_blocks().any(|block| block.kind != CellKind::Tet && !block.is_empty()) {
+            let message =
+                format!("`{name}` is a co-rotational solid, which is made of tets, and its mesh has hexes");
+            self.error(&["body", name, "mesh"], message, "this mesh", "use a mesh of tets: `as = \"tets\"`");
+            return None;
+        }
+        let block = mesh.block(CellKind::Tet)?;
+        let material = self.materials(draft, block)?;
+        let start = self.corotational.as_ref()?.model.tets.len() as u32;
+        // Cells of one material after the other would change their order: so they go one by one where there are several.
+        let all: Vec<[u32; 4]> = (0..block.len() as u32).map(|cell| nodes(block, cell, first)).collect();
+        let part = self.corotational.as_mut()?;
+        let added = match material[..] {
+            [one] => part.model.add_solid(name, &all, one),
+            _ => (all.iter().zip(&material))
+                .try_for_each(|(cell, &material)| part.model.add_solid(name, &[*cell], material)),
+        };
+        if let Err(error) = added {
+            self.refuse_part(name, &error);
+            return None;
+        }
+        Some(BodyCells::Tets(start..start + block.len() as u32))
+    }
+}

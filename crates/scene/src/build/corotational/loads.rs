@@ -1,0 +1,357 @@
+//! Loads on shells and co-rotational solids, and the control of one of them.
+
+use std::collections::BTreeMap;
+
+use pliant_corotational as corotational;
+use pliant_corotational::Spread;
+use pliant_geometry::Vector3;
+use pliant_mechanics::curve::{Curve, Shape};
+
+use super::{BodyCells, Control};
+use crate::build::{Builder, SCENE, Target, suggestion};
+use crate::format::{
+    Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SpreadName,
+};
+use crate::registry::LoadTable;
+
+impl Builder<'_> {
+    pub(in crate::build) fn add_corotational_loads(&mut self) {
+        let scene = self.scene;
+        if let Some(acceleration) = scene.scene.gravity {
+            let kind = corotational::LoadKind::Gravity { acceleration: Vector3::from(acceleration) };
+            self.push_loads("gravity", vec![kind], constant(), false);
+        }
+        for (name, table) in &scene.loads {
+            let path = ["load", name.as_str()];
+            let controlled = scene.run.control.as_ref().is_some_and(|control| control.load == *name);
+            let curve = match controlled {
+                true => self.no_timing(table, &path),
+                false => self.curve(table.timing(), &path),
+            };
+            let kinds = self.corotational_load(table, &path);
+            if let (Some(curve), Some(kinds)) = (curve, kinds) {
+                self.push_loads(name, kinds, curve, controlled);
+            }
+        }
+        if let Some(table) = &scene.run.control {
+            self.add_control(table);
+        }
+    }
+
+    fn push_loads(&mut self, name: &str, kinds: Vec<corotational::LoadKind>, curve: Curve, controlled: bool) {
+        let Some(part) = &mut self.corotational else { return };
+        let load =
+            |kind| corotational::Load { name: name.to_owned(), kind, curve: curve.clone(), controlled };
+        part.model.loads.extend(kinds.into_iter().map(load));
+    }
+
+    /// A controlled load has no course of its own.
+    fn no_timing(&mut self, table: &LoadTable, path: &[&str]) -> Option<Curve> {
+        let timing = table.timing();
+        if timing.curve.is_some() || timing.from != 0.0 || timing.to.is_some() {
+            let message = "the factor of a controlled load is found: it has no course of its own";
+            self.error(path, message, "this load", "leave out `curve`, `from` and `to`");
+            return None;
+        }
+        Some(constant())
+    }
+
+    fn corotational_load(&mut self, table: &LoadTable, path: &[&str]) -> Option<Vec<corotational::LoadKind>> {
+        let at = |key| [path, &[key]].concat();
+        if let LoadTable::Gravity(gravity) = table {
+            return self.corotational_gravity(gravity, path);
+        }
+        let body = match self.find_target(table.on()?, &at("on"))? {
+            Target::Body(body) => body,
+            Target::Surface(surface) => return self.load_on_surface(table, surface, path),
+        };
+        let shell = self.has_rotations(body);
+        Some(match table {
+            LoadTable::Force(force) => match self.nodal_forces(force, Target::Body(body), path)? {
+                pliant_mechanics::load::LoadKind::Forces(forces) => single_forces(&forces),
+                _ => return None,
+            },
+            LoadTable::Moment(moment) => vec![self.moment(moment, body, shell, path)?],
+            LoadTable::Traction(traction) if shell => {
+                let cells = self.facets(body, &traction.faces, &at("faces"))?;
+                vec![corotational::LoadKind::Area { cells, traction: Vector3::from(traction.traction) }]
+            }
+            LoadTable::Traction(traction) => {
+                let faces = self.faces(Target::Body(body), &traction.faces, &at("faces"))?;
+                single_forces(&self.traction_forces(Target::Body(body), &faces, traction.traction))
+            }
+            LoadTable::Pressure(pressure) if shell => vec![self.shell_pressure(pressure, body, path)?],
+            LoadTable::Pressure(_) => {
+                let help = "take a `traction`, `model = \"solid\"`, or cover the solid with a shell";
+                let message = "a pressure on a co-rotational solid does not follow its faces";
+                self.error(path, message, "not for this model", help);
+                return None;
+            }
+            LoadTable::Edge(edge) => {
+                if !shell {
+                    self.error(
+                        &at("on"),
+                        "a load on edges is for shells",
+                        "not a shell",
+                        "take a `traction`",
+                    );
+                    return None;
+                }
+                let nodes = self.body_nodes(body, &edge.nodes, &at("nodes"))?;
+                let edges = self.border_edges(body, &nodes);
+                if edges.is_empty() {
+                    let message = "no edge of the border has both its ends selected";
+                    self.error(
+                        &at("nodes"),
+                        message,
+                        "this selection",
+                        "select all nodes along a border of the shell",
+                    );
+                    return None;
+                }
+                vec![corotational::LoadKind::Edge { edges, traction: Vector3::from(edge.traction) }]
+            }
+            LoadTable::Gravity(_) => return None,
+        })
+    }
+
+    /// A load on a surface that a shell or a co-rotational solid carries.
+    fn load_on_surface(
+        &mut self,
+        table: &LoadTable,
+        surface: usize,
+        path: &[&str],
+    ) -> Option<Vec<corotational::LoadKind>> {
+        let at = |key| [path, &[key]].concat();
+        let target = Target::Surface(surface);
+        let forces = match table {
+            LoadTable::Force(force) => match self.nodal_forces(force, target, path)? {
+                pliant_mechanics::load::LoadKind::Forces(forces) => forces,
+                _ => return None,
+            },
+            LoadTable::Traction(traction) => {
+                let faces = self.faces(target, &traction.faces, &at("faces"))?;
+                self.traction_forces(target, &faces, traction.traction)
+            }
+            _ => {
+                let message = "a carried surface takes forces and tractions";
+                self.error(&at("on"), message, "a carried surface", "load the body itself");
+                return None;
+            }
+        };
+        let part = self.corotational.as_ref()?;
+        if let Some(points) = part.carried.get(&surface) {
+            let (points, forces) =
+                forces.iter().map(|&(node, force)| (points[node as usize], Vector3::from(force))).unzip();
+            return Some(vec![corotational::LoadKind::Carried { points, forces }]);
+        }
+        let mapping = &self.model.surfaces[surface].mapping;
+        let nodal = forces.iter().flat_map(|&(point, force)| {
+            mapping.row(point as usize).map(move |(node, weight)| (node as u32, force.map(|f| f * weight)))
+        });
+        Some(single_forces(&nodal.collect::<Vec<_>>()))
+    }
+
+    fn corotational_gravity(
+        &mut self,
+        table: &GravityTable,
+        path: &[&str],
+    ) -> Option<Vec<corotational::LoadKind>> {
+        let at = |key| [path, &[key]].concat();
+        let acceleration = Vector3::from(table.acceleration);
+        let body = match (&table.on, &table.nodes) {
+            (Some(name), _) => self.find_body(name, &at("on"))?,
+            (None, None) => return Some(vec![corotational::LoadKind::Gravity { acceleration }]),
+            (None, Some(_)) => {
+                let message = "`nodes` are nodes of one body, which `on` must name";
+                self.error(&at("nodes"), message, "of which body?", "add `on = \"BODY\"`");
+                return None;
+            }
+        };
+        let nodes = match &table.nodes {
+            Some(selection) => self.body_nodes(body, selection, &at("nodes"))?,
+            None => self.model.bodies[body].nodes.clone().collect(),
+        };
+        let weight = |node: u32| (node, <[f64; 3]>::from(acceleration * self.model.mass[node as usize]));
+        Some(single_forces(&nodes.into_iter().map(weight).collect::<Vec<_>>()))
+    }
+
+    fn moment(
+        &mut self,
+        table: &MomentTable,
+        body: usize,
+        shell: bool,
+        path: &[&str],
+    ) -> Option<corotational::LoadKind> {
+        let at = |key| [path, &[key]].concat();
+        if !shell {
+            let message = "only the nodes of shells take moments";
+            self.error(&at("on"), message, "not a shell", "take forces");
+            return None;
+        }
+        let nodes = self.body_nodes(body, &table.nodes, &at("nodes"))?;
+        let moment = match (table.each, table.total) {
+            (Some(each), None) => Vector3::from(each),
+            (None, Some(total)) => Vector3::from(total) / nodes.len() as f64,
+            (each, _) => {
+                let found = if each.is_some() { "both" } else { "neither" };
+                let message = format!("a moment has exactly one of `each` and `total`, found {found}");
+                let help = "`each` acts on every node, `total` is shared among them";
+                self.error(path, message, "this moment", help);
+                return None;
+            }
+        };
+        Some(corotational::LoadKind::Moment { nodes, moment })
+    }
+
+    fn shell_pressure(
+        &mut self,
+        table: &PressureTable,
+        body: usize,
+        path: &[&str],
+    ) -> Option<corotational::LoadKind> {
+        let cells = self.facets(body, &table.faces, &[path, &["faces"]].concat())?;
+        let spread = match table.spread {
+            SpreadName::Lumped => Spread::Lumped,
+            SpreadName::Curved => Spread::Curved,
+        };
+        Some(corotational::LoadKind::Pressure { cells, pressure: table.pressure, spread })
+    }
+
+    /// The facets of a shell, numbered in the model; `None` for another body.
+    pub(in crate::build) fn shell_cells(&self, body: usize) -> Option<Vec<u32>> {
+        match self.corotational.as_ref()?.cells.get(body)? {
+            BodyCells::Facets(range) => Some(range.clone().collect()),
+            BodyCells::Tets(_) => None,
+        }
+    }
+
+    /// The selected facets of a shell, numbered in the model.
+    fn facets(
+        &mut self,
+        body: usize,
+        selection: &pliant_geometry::Selection,
+        path: &[&str],
+    ) -> Option<Vec<u32>> {
+        let cells = self.shell_cells(body)?;
+        let built = &self.bodies[body];
+        match selection.faces(&built.mesh, &built.boundary) {
+            Ok(faces) => {
+                let cell = |face: u32| cells[built.boundary.faces[face as usize].parent.index as usize];
+                Some(faces.into_iter().map(cell).collect())
+            }
+            Err(error) => {
+                self.error(path, error.to_string(), "this selection", "");
+                None
+            }
+        }
+    }
+
+    /// The edges of one triangle only both of whose ends are among some nodes of the model (increasing).
+    fn border_edges(&self, body: usize, nodes: &[u32]) -> Vec<[u32; 2]> {
+        let (Some(part), Some(cells)) = (&self.corotational, self.shell_cells(body)) else {
+            return Vec::new();
+        };
+        let mut count: BTreeMap<[u32; 2], u32> = BTreeMap::new();
+        for facet in cells.iter().map(|&cell| &part.model.facets[cell as usize]) {
+            for corner in 0..3 {
+                let [a, b] = [facet.nodes[corner], facet.nodes[(corner + 1) % 3]];
+                *count.entry([a.min(b), a.max(b)]).or_default() += 1;
+            }
+        }
+        let chosen = |edge: &[u32; 2]| edge.iter().all(|node| nodes.binary_search(node).is_ok());
+        count.into_iter().filter(|(edge, n)| *n == 1 && chosen(edge)).map(|(edge, _)| edge).collect()
+    }
+
+    fn add_control(&mut self, table: &ControlTable) {
+        let path = ["run", "control"];
+        let scene = self.scene;
+        if !scene.loads.iter().any(|(name, _)| *name == table.load) {
+            let known: Vec<&str> = scene.loads.iter().map(|(name, _)| name.as_str()).collect();
+            let help = suggestion(&table.load, &known, SCENE, "loads");
+            let message = format!("there is no load `{}`", table.load);
+            self.error(&["run", "control", "load"], message, "no such load", help);
+            return;
+        }
+        let given = [table.displacement.is_some(), table.arc_length.is_some(), table.volume.is_some()];
+        if given.iter().filter(|&&given| given).count() != 1 {
+            let message = "a control has exactly one of `displacement`, `arc-length` and `volume`";
+            self.error(&path, message, "this control", "leave the others out");
+            return;
+        }
+        let control = match (&table.displacement, table.arc_length, table.volume) {
+            (Some(wanted), _, _) => self.controlled_node(wanted),
+            (_, Some(length), _) => Some(Control::ArcLength(length)),
+            (_, _, Some(volume)) => self.controlled_volume(&table.load, volume),
+            _ => None,
+        };
+        if let Some(part) = &mut self.corotational {
+            part.control = control;
+        }
+    }
+
+    fn controlled_node(&mut self, wanted: &ControlledNode) -> Option<Control> {
+        let at = |key| ["run", "control", "displacement", key];
+        let body = self.find_body(&wanted.body, &at("body"))?;
+        let nodes = self.model.bodies[body].nodes.clone();
+        let place = Vector3::from(wanted.at);
+        let away = |node: &u32| (Vector3::from(self.model.rest[*node as usize]) - place).norm_squared();
+        let node = nodes.min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let component = match wanted.component {
+            Axis::X => 0,
+            Axis::Y => 1,
+            Axis::Z => 2,
+            _ => {
+                let message = "a control moves a node along x, y or z, and does not turn it";
+                self.error(&at("component"), message, "a rotation", "take `x`, `y` or `z`");
+                return None;
+            }
+        };
+        Some(Control::Displacement { node, component, by: wanted.by })
+    }
+
+    fn controlled_volume(&mut self, load: &str, to: f64) -> Option<Control> {
+        let part = self.corotational.as_ref()?;
+        let pressed =
+            part.model.loads.iter().filter(|known| known.name == load).find_map(|load| match &load.kind {
+                corotational::LoadKind::Pressure { cells, .. } => Some(cells),
+                _ => None,
+            });
+        let path = ["run", "control", "volume"];
+        let Some(cells) = pressed else {
+            let message = format!("`{load}` is no pressure on a shell, which a volume is controlled by");
+            self.error(&path, message, "of what?", "let `load` name a pressure on a closed shell");
+            return None;
+        };
+        match part.model.check_closed(cells) {
+            Ok(()) => {
+                let from = part.model.enclosed_volume(cells, &part.model.rest);
+                Some(Control::Volume { from, to })
+            }
+            Err(error) => {
+                let help = "close the surface, or press on all of it";
+                self.error(&path, error.to_string(), "of an open surface", help);
+                None
+            }
+        }
+    }
+}
+
+fn constant() -> Curve {
+    Curve { shape: Shape::Hold, from: 0.0, to: 0.0 }
+}
+
+/// Forces node by node; those of the same size together.
+fn single_forces(forces: &[(u32, [f64; 3])]) -> Vec<corotational::LoadKind> {
+    let mut all: Vec<(Vec<u32>, [f64; 3])> = Vec::new();
+    let mut known: BTreeMap<[u64; 3], usize> = BTreeMap::new();
+    for &(node, force) in forces {
+        let at = *known.entry(force.map(f64::to_bits)).or_insert_with(|| {
+            all.push((Vec::new(), force));
+            all.len() - 1
+        });
+        all[at].0.push(node);
+    }
+    let kind = |(nodes, force)| corotational::LoadKind::Force { nodes, force: Vector3::from(force) };
+    all.into_iter().map(kind).collect()
+}

@@ -1,0 +1,326 @@
+//! Shells and co-rotational solids: their cells, constraints and loads, in a model of their own that shares the nodes.
+
+mod cells;
+mod constraints;
+mod loads;
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use pliant_corotational as corotational;
+use pliant_corotational::{Carried, CurvedSurface, State};
+use pliant_geometry::Vector3;
+use pliant_mechanics::fingerprint;
+
+use crate::build::Builder;
+use crate::diagnostic::counted;
+use crate::format::{BodyModel, BodyTable, SolverName};
+/// Shells and co-rotational solids of a scene. Nodes are those of the scene's model.
+#[derive(Clone, Debug)]
+pub struct Corotational {
+    /// Their model.
+    pub model: corotational::Model,
+    /// The cells of each body, in the order of the scene's bodies.
+    pub cells: Vec<BodyCells>,
+    /// What a static run prescribes instead of the size of a load.
+    pub control: Option<Control>,
+    /// The state that a run starts from.
+    pub start: State,
+    /// The curved surface of the shells, if something is carried by it.
+    pub surface: Option<CurvedSurface>,
+    /// The points of each of the scene's surfaces that a shell carries.
+    pub carried: BTreeMap<usize, Vec<Carried>>,
+}
+
+/// The cells of a body, in the order of its mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BodyCells {
+    /// Facets of the model.
+    Facets(Range<u32>),
+    /// Tetrahedra of the model.
+    Tets(Range<u32>),
+}
+
+/// A control of a whole static run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// A component (0 to 2) of a node moves by a distance [m] in all.
+    Displacement {
+        /// The node.
+        node: u32,
+        /// x, y or z as 0, 1, 2.
+        component: usize,
+        /// The distance [m].
+        by: f64,
+    },
+    /// All translations together move by a length [m] in each load step.
+    ArcLength(f64),
+    /// The pressurised facets enclose a volume [m³] in the end, and another at the start.
+    Volume {
+        /// At the start [m³].
+        from: f64,
+        /// At the end [m³].
+        to: f64,
+    },
+}
+
+impl Builder<'_> {
+    /// Refuses scenes of both kinds of bodies, and solvers that are not for them.
+    pub(in crate::build) fn check_models(&mut self) {
+        let scene = self.scene;
+        let other = |body: &&(String, BodyTable)| body.1.model != BodyModel::Solid;
+        let Some((first, table)) = scene.bodies.iter().find(other) else {
+            if matches!(scene.run.solver, SolverName::Implicit | SolverName::Static) {
+                let message =
+                    format!("the solver `{}` is not for bodies of model `solid`", scene.run.solver.word());
+                let help = "take `solver = \"explicit\"` or `\"quasi-static\"`, or `model = \"corotational\"` for the bodies";
+                self.error(&["run", "solver"], message, "not for these bodies", help);
+            }
+            self.check_keys_of_shells(false);
+            return;
+        };
+        if let Some((solid, _)) = scene.bodies.iter().find(|(_, body)| body.model == BodyModel::Solid) {
+            let message = format!(
+                "`{solid}` is of model `solid` and `{first}` of model `{}`: they have no solver in common",
+                table.model.word()
+            );
+            let help = "give all bodies `model = \"shell\"` or `\"corotational\"`, or run them in scenes of their own";
+            self.error(&["body", first, "model"], message, "not beside a `solid`", help);
+        }
+        if scene.run.solver == SolverName::QuasiStatic {
+            let message =
+                format!("the solver `quasi-static` is not for bodies of model `{}`", table.model.word());
+            let help = "take `solver = \"static\"`";
+            self.error(&["run", "solver"], message, "not for these bodies", help);
+        }
+        if scene.run.precision == Some(crate::format::Precision::Single) {
+            let message =
+                format!("bodies of model `{}` are computed in double precision only", table.model.word());
+            self.error(&["run", "precision"], message, "not for these bodies", "leave `precision` out");
+        }
+        if scene.run.checkpoint.is_some()
+            && scene.run.control.as_ref().is_some_and(|c| c.arc_length.is_some())
+        {
+            let message = "there are no checkpoints of a run by arc length, which goes on in the direction of its last step";
+            let help = "leave it out, or control a displacement";
+            self.error(&["run", "checkpoint"], message, "not with `arc-length`", help);
+        }
+        if scene.run.mass_scaling.is_some() {
+            let message = format!("mass is not scaled for bodies of model `{}`", table.model.word());
+            let help = "leave it out, or take `solver = \"implicit\"`, which has no stable step";
+            self.error(&["run", "mass-scaling"], message, "not for these bodies", help);
+        }
+        if scene.run.on_unstable.is_some() {
+            let message =
+                format!("the stable step of bodies of model `{}` is not watched", table.model.word());
+            let help = "leave it out; their step is held against the stable one at rest before the run";
+            self.error(&["run", "on-unstable"], message, "not for these bodies", help);
+        }
+        self.check_keys_of_shells(true);
+        for key in ["damping", "stiffness-damping"] {
+            let value =
+                |body: &BodyTable| if key == "damping" { body.damping } else { body.stiffness_damping };
+            if let Some((name, _)) = scene.bodies.iter().find(|(_, body)| value(body) != value(table)) {
+                let message = format!("`{name}` and `{first}` have different `{key}`");
+                let help = "shells and co-rotational solids of a scene all have the same";
+                self.error(&["body", name, key], message, "another", help);
+            }
+        }
+        if table.stiffness_damping > 0.0 && scene.run.solver != SolverName::Implicit {
+            let message = format!(
+                "damping by stiffness needs the solver `implicit`, not `{}`",
+                scene.run.solver.word()
+            );
+            let path = ["body", first.as_str(), "stiffness-damping"];
+            self.error(
+                &path,
+                message,
+                "not with this solver",
+                "leave it out, or take `solver = \"implicit\"`",
+            );
+        }
+    }
+
+    /// Refuses keys that say nothing for the models and the solver there are.
+    fn check_keys_of_shells(&mut self, present: bool) {
+        let run = &self.scene.run;
+        let newton = present && matches!(run.solver, SolverName::Implicit | SolverName::Static);
+        for (key, wanted, of) in [
+            ("iterations", newton, "`solver = \"implicit\"` and `\"static\"`"),
+            ("linear", newton, "`solver = \"implicit\"` and `\"static\"`"),
+            ("control", newton && run.solver == SolverName::Static, "`solver = \"static\"`"),
+        ] {
+            if self.source().node(&["run", key]).is_some() && !wanted {
+                let message = format!("`{key}` is for {of} of shells and co-rotational solids");
+                self.error(&["run", key], message, "means nothing here", "remove it");
+            }
+        }
+        for (name, body) in &self.scene.bodies {
+            let shell = body.model == BodyModel::Shell;
+            let others = [
+                ("thickness", shell, "a shell"),
+                ("crease", shell, "a shell"),
+                ("branches", shell, "a shell"),
+                ("stiffness-damping", body.model != BodyModel::Solid, "shells and co-rotational solids"),
+                ("initial-displacement", body.model != BodyModel::Solid, "shells and co-rotational solids"),
+                ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
+                ("fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
+                ("second-fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
+            ];
+            for (key, wanted, of) in others {
+                if !wanted && self.source().node(&["body", name, key]).is_some() {
+                    let message =
+                        format!("`{key}` is for {of}, and `{name}` is of model `{}`", body.model.word());
+                    let help = "remove it, or change `model`";
+                    self.error(&["body", name, key], message, "means nothing here", help);
+                }
+            }
+        }
+    }
+
+    /// Refuses what a static solver cannot hold.
+    pub(in crate::build) fn check_held(&mut self) {
+        if self.scene.run.solver != SolverName::Static {
+            return;
+        }
+        let Some(part) = &self.corotational else { return };
+        if let Err(corotational::SolveError::FreeBody { node, free_modes }) =
+            corotational::check_held(&part.model)
+        {
+            let owner = self.model.bodies.iter().find(|body| body.nodes.contains(&node));
+            let Some((name, first)) = owner.map(|body| (body.name.clone(), body.nodes.start)) else { return };
+            let message = format!(
+                "`{name}` is free in {} of 6, and a static run needs all of it held (the part with node {})",
+                counted(free_modes, "rigid motion"),
+                node - first
+            );
+            let help = "fix more of its nodes, tie it to points with `type = \"spring\"`, or take `solver = \"implicit\"`";
+            self.error(&["body", &name], message, "not held", help);
+        }
+    }
+
+    /// Displacements [m] of all nodes at the start, if some body has some.
+    fn initial_displacement(&mut self) -> Option<Vec<Vector3>> {
+        let scene = self.scene;
+        let mut all = None;
+        for (body, (name, table)) in scene.bodies.iter().enumerate() {
+            let Some(wanted) = &table.initial_displacement else { continue };
+            let nodes: Vec<u32> = self.model.bodies[body].nodes.clone().collect();
+            let path = ["body", name.as_str(), "initial-displacement"];
+            let given = self.node_vectors(wanted, body, &nodes, &path)?;
+            let all = all.get_or_insert_with(|| vec![Vector3::zeros(); self.model.rest.len()]);
+            for (&node, vector) in nodes.iter().zip(given) {
+                all[node as usize] = Vector3::from(vector);
+            }
+        }
+        all
+    }
+
+    /// Sets the state that a run starts from.
+    pub(in crate::build) fn start_corotational(&mut self) {
+        let displacement = self.initial_displacement();
+        let velocity = std::mem::take(&mut self.model.initial_velocity);
+        let Some(part) = &mut self.corotational else {
+            self.model.initial_velocity = velocity;
+            return;
+        };
+        part.start = State::at_rest(&part.model);
+        if let Some(displacement) = displacement {
+            let all = part.model.rest.iter().zip(displacement);
+            let positions: Vec<Vector3> = all.map(|(rest, u)| rest + u).collect();
+            part.start.set_positions(&part.model, &positions);
+        }
+        for (own, given) in part.start.velocity.iter_mut().zip(velocity) {
+            *own = Vector3::from(given);
+        }
+    }
+}
+
+impl Corotational {
+    fn new() -> Self {
+        let model = corotational::Model::default();
+        Self {
+            start: State::at_rest(&model),
+            model,
+            cells: Vec::new(),
+            control: None,
+            surface: None,
+            carried: BTreeMap::new(),
+        }
+    }
+
+    /// How many cells a body has, and their volume at rest [m³].
+    pub(crate) fn size(&self, body: usize) -> Option<(usize, f64)> {
+        let volume = match self.cells.get(body)? {
+            BodyCells::Facets(range) => {
+                let facets = &self.model.facets[range.start as usize..range.end as usize];
+                facets.iter().map(|facet| facet.area * facet.thickness).sum()
+            }
+            BodyCells::Tets(range) => {
+                self.model.tets[range.start as usize..range.end as usize].iter().map(|tet| tet.volume).sum()
+            }
+        };
+        let (BodyCells::Facets(range) | BodyCells::Tets(range)) = self.cells.get(body)?;
+        Some((range.len(), volume))
+    }
+
+    /// Each part of the model in words with a number that tells it from others; see [`fingerprint`].
+    pub(crate) fn fingerprints(&self) -> Vec<(String, u64)> {
+        let model = &self.model;
+        vec![
+            ("the mesh, thickness or material of shells".into(), fingerprint(&model.facets)),
+            ("the mesh or material of co-rotational solids".into(), fingerprint(&model.tets)),
+            ("constraints".into(), fingerprint(&(&model.constraints, &model.springs))),
+            ("loads or their control".into(), fingerprint(&(&model.loads, &self.control))),
+            ("creases".into(), fingerprint(&(&model.normals, &model.corner_normals))),
+            ("damping".into(), fingerprint(&[model.mass_damping, model.stiffness_damping])),
+        ]
+    }
+
+    /// The facet or the tetrahedron of a model that an error names: its body and its number in the body's mesh.
+    pub(crate) fn cell(&self, number: usize) -> Option<(usize, u32)> {
+        let facets = self.model.facets.len();
+        let find = |(body, cells): (usize, &BodyCells)| {
+            let (range, number) = match cells {
+                BodyCells::Facets(range) if number < facets => (range, number as u32),
+                BodyCells::Tets(range) if number >= facets => (range, (number - facets) as u32),
+                _ => return None,
+            };
+            range.contains(&number).then(|| (body, number - range.start))
+        };
+        self.cells.iter().enumerate().find_map(find)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_corotational::Forces;
+
+    use crate::build::build;
+    use crate::scene::Scene;
+    use crate::source::Source;
+
+    /// A plate that starts turned by a right angle, as a table tells, is not strained: its nodes have turned with it.
+    #[test]
+    fn a_start_that_is_a_rotation_costs_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let node = |k: usize| [(k % 3) as f64 / 2.0, (k / 3) as f64 / 2.0];
+        let row = |k: usize| {
+            let [x, y] = node(k);
+            format!("{k},{},{},0\n", -y - x, x - y)
+        };
+        std::fs::write(folder.path().join("turn.csv"), (0..9).map(row).collect::<String>()).unwrap();
+        let text = "[scene]\nuntil = 1\n[run]\nsolver = 'implicit'\n[law.wall]\ntype = 'neo-hookean'\n\
+                    young-modulus = 1e6\npoisson-ratio = 0.3\n[body.wall]\nmodel = 'shell'\nlaw = 'wall'\n\
+                    mesh = { plate = { size = [1, 1], cells = [2, 2] } }\ndensity = 1000\nthickness = 0.01\n\
+                    initial-displacement = { csv = 'turn.csv' }\nvelocity = [1, 2, 3]\n";
+        let source = Source::parse("plate.toml", text).unwrap();
+        let scene = Scene::from_source(source, folder.path().into()).unwrap();
+        let part = build(&scene).unwrap().corotational.unwrap();
+        let mut forces = Forces::new(&part.model);
+        forces.evaluate(&part.start).unwrap();
+        let moved = (part.start.position[8] - part.model.rest[8]).norm();
+        assert!((moved - 2.0).abs() < 1e-12 && forces.strain_energy() < 1e-20, "{}", forces.strain_energy());
+        assert!(part.start.velocity.iter().all(|v| *v == [1.0, 2.0, 3.0].into()));
+    }
+}
