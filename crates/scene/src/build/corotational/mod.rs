@@ -321,6 +321,6 @@ mod tests {
         forces.evaluate(&part.start).unwrap();
         let moved = (part.start.position[8] - part.model.rest[8]).norm();
         assert!((moved - 2.0).abs() < 1e-12 && forces.strain_energy() < 1e-20, "{}", forces.strain_energy());
-        assert!(part.start.velocity.iter().all(|v| *v == [1.0, 2.0, 3.0].into()));
+        assert!(part.start.velocity.iter().all(|v| <[f64; 3]>::from(*v) == [1.0, 2.0, 3.0]));
     }
 }
