@@ -58,7 +58,42 @@ fn refined(mesh: &Mesh) -> Mesh {
     Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
 }
 
+/// The longest edges of slivers, altitude below a twentieth of that edge, turned to the other diagonal where that is better; how many.
+fn flip_slivers(mesh: &mut Mesh) -> usize {
+    let mut cells = triangles(mesh);
+    let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]];
+    let length = |[a, b]: [u32; 2]| (mesh.points[a as usize] - mesh.points[b as usize]).norm();
+    let longest = |cell: [u32; 3]| {
+        sides(cell).into_iter().fold([cell[0]; 2], |best, s| if length(s) > length(best) { s } else { best })
+    };
+    let quality = |cell: [u32; 3]| {
+        let [a, b, c] = cell.map(|n| mesh.points[n as usize]);
+        (b - a).cross(&(c - a)).norm() / length(longest(cell)).powi(2)
+    };
+    let mut count = 0;
+    for at in 0..cells.len() {
+        let [p, q] = longest(cells[at]);
+        let tip = |cell: [u32; 3]| cell.into_iter().find(|n| ![p, q].contains(n)).unwrap_or(p);
+        let holds = |cell: &[u32; 3], ends: [u32; 2]| ends.iter().all(|end| cell.contains(end));
+        if quality(cells[at]) > 0.05 {
+            continue;
+        }
+        let Some(other) = (0..cells.len()).find(|&o| o != at && holds(&cells[o], [p, q])) else { continue };
+        let (r, s) = (tip(cells[at]), tip(cells[other]));
+        let turned = [[p, s, r], [s, q, r]];
+        let worst = |pair: [[u32; 3]; 2]| quality(pair[0]).min(quality(pair[1]));
+        let free = !cells.iter().any(|cell| holds(cell, [r, s]));
+        if free && worst(turned) > worst([cells[at], cells[other]]) {
+            [cells[at], cells[other]] = turned;
+            count += 1;
+        }
+    }
+    mesh.blocks[0].nodes = cells.into_iter().flatten().collect();
+    count
+}
+
 /// An organ to blow up.
+#[derive(Clone, Copy)]
 struct Organ {
     young: f64,
     thickness: f64,
@@ -92,8 +127,8 @@ impl Organ {
         model
     }
 
-    /// The equilibrium at full pressure.
-    fn equilibrium(&self, mesh: &Mesh) -> Result<(Model, State), String> {
+    /// The equilibrium at full pressure, in load steps.
+    fn equilibrium(&self, mesh: &Mesh, steps: u32) -> Result<(Model, State), String> {
         let model = self.model(mesh);
         let start = Instant::now();
         let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
@@ -101,7 +136,6 @@ impl Organ {
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
         let rest = model.enclosed_volume(&cells, &model.rest);
         let (mut parts, mut iterations) = (0, 0);
-        let steps = 5;
         for part in 1..=steps {
             match solver.solve(&mut state, f64::from(part) / f64::from(steps)) {
                 Ok(step) => {
@@ -114,17 +148,6 @@ impl Organ {
                     );
                 }
                 Err(error) => {
-                    if let pliant_corotational::SolveError::Broken { cell, .. } = error {
-                        let f = &model.facets[cell];
-                        let around =
-                            model.facets.iter().filter(|o| f.nodes.iter().any(|n| o.nodes.contains(n)));
-                        println!(
-                            "  broken facet altitude {:.3} mm, area {:.3} mm2, around {:?} mm",
-                            1e3 * f.altitude(),
-                            1e6 * f.area,
-                            around.map(|o| (1e5 * o.altitude()).round() / 100.0).collect::<Vec<_>>()
-                        );
-                    }
                     println!(
                         "  fails at load {:.3}: {error}; volume × {:.4}, largest displacement {:.2} mm",
                         state.time,
@@ -188,13 +211,13 @@ fn apart(one: &(Model, State), other: &(Model, State), map: impl Fn(usize) -> us
 }
 
 fn study(organ: &Organ, mesh: &Mesh) {
-    let still = organ.equilibrium(mesh).unwrap();
+    let still = organ.equilibrium(mesh, 5).unwrap();
     let (other, order) = renumbered(mesh, 1);
-    let again = organ.equilibrium(&other).unwrap();
+    let again = organ.equilibrium(&other, 5).unwrap();
     claim("renumbered", apart(&still, &again, |n| order[n] as usize), 1e-6);
     let moved = organ.motion(mesh);
     println!("  motion after 1 s off equilibrium: {:.2e}", apart(&still, &moved, |n| n));
-    match organ.equilibrium(&refined(mesh)) {
+    match organ.equilibrium(&refined(mesh), 2) {
         Ok(fine) => {
             println!("  each shell cut in four: displacements move by {:.2e}", apart(&still, &fine, |n| n))
         }
@@ -218,11 +241,19 @@ fn rectum_under_pressure() {
     let Some(data) = data() else { return };
     let mesh = surface(data.join("organs-openhelp/Rectum_Lumen.stl"), 1e-3);
     let organ = Organ { young: 0.5e6, thickness: 3e-3, pressure: 3e3, membrane: Membrane::default() };
-    drop(organ.equilibrium(&mesh));
-    let cst = Organ { membrane: Membrane::Cst { drilling: 1e-2 }, ..organ };
-    drop(cst.equilibrium(&mesh));
-    let half = Organ { pressure: 1.5e3, ..organ };
-    study(&half, &mesh);
+    // As it is, a pair of slivers of 0.2 mm folds over at 0.8 of the load; half of it is borne.
+    let failure = organ.equilibrium(&mesh, 5).unwrap_err();
+    assert!(failure.contains("folded over"), "{failure}");
+    study(&Organ { pressure: 1.5e3, ..organ }, &mesh);
+    let mut better = mesh;
+    println!("{} edges of slivers flipped", flip_slivers(&mut better));
+    if let Ok(still) = organ.equilibrium(&better, 5) {
+        let (other, order) = renumbered(&better, 1);
+        let again = organ.equilibrium(&other, 5).unwrap();
+        claim("renumbered", apart(&still, &again, |n| order[n] as usize), 1e-6);
+        let moved = organ.motion(&better);
+        println!("  motion after 1 s off equilibrium: {:.2e}", apart(&still, &moved, |n| n));
+    }
 }
 
 /// Numbers of a table of two columns after its first line.
@@ -235,6 +266,9 @@ fn table(path: PathBuf) -> Vec<(f64, f64)> {
     text.lines().skip(1).filter(|line| !line.trim().is_empty()).map(row).collect()
 }
 
+/// Longer than any edge of the leaflets [m].
+const EDGE: f64 = 4e-3;
+
 /// The distance [m] of a node from the nearest facet of another leaflet, if that is below a limit.
 fn gap(model: &Model, state: &State, leaflet: &[usize], node: usize, limit: f64) -> f64 {
     let mut least = limit;
@@ -242,7 +276,7 @@ fn gap(model: &Model, state: &State, leaflet: &[usize], node: usize, limit: f64)
     for facet in model.facets.iter().filter(|facet| leaflet[facet.nodes[0] as usize] != leaflet[node]) {
         let [a, b, c] = facet.nodes.map(|n| state.position[n as usize]);
         let (ab, ac, aq) = (b - a, c - a, q - a);
-        if aq.norm() > least + ab.norm() + ac.norm() {
+        if aq.norm_squared() > (least + EDGE).powi(2) {
             continue;
         }
         let normal = ab.cross(&ac);
@@ -288,6 +322,11 @@ fn valve_leaflets_close() {
             points.extend(mesh.points);
         }
         let mut model = Model::new(points);
+        let longest =
+            cells.iter().flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).fold(0.0, |longest: f64, [a, b]| {
+                longest.max((model.rest[*a as usize] - model.rest[*b as usize]).norm())
+            });
+        assert!(1.5 * longest < EDGE, "{longest}");
         let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.45 }, density: 1000.0 };
         let notes = model.add_shell(&Shell::new("valve", cells, 0.4e-3, material)).unwrap();
         let count = held.len();
