@@ -162,8 +162,9 @@ pub fn result(summary: &Summary) -> String {
         vec![format!("{nodes} nodes, {elements} elements; step {} s, {steps} steps", number(*step))];
     if summary.error.is_none() {
         let [wall, factor] = [*wall_seconds, *real_time_factor].map(number);
-        let balance = energy_balance * 100.0;
-        lines.push(format!("wall time {wall} s, {factor} × real time; energies balance to {balance:.2} %"));
+        let balance = energy_balance
+            .map_or_else(String::new, |balance| format!("; energies balance to {:.2} %", balance * 100.0));
+        lines.push(format!("wall time {wall} s, {factor} × real time{balance}"));
         lines.extend(summary.stability.as_ref().map(ToString::to_string));
         lines.extend(summary.reactions.iter().map(|(name, force)| {
             let [x, y, z] = force.map(number);

@@ -28,7 +28,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 21] = [
+const KEYS: [&str; 22] = [
     "status",
     "error",
     "bodies",
@@ -39,6 +39,7 @@ const KEYS: [&str; 21] = [
     "element_bound",
     "true_limit",
     "limiting_element",
+    "solver",
     "device",
     "precision",
     "steps",

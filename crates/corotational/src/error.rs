@@ -17,14 +17,16 @@ pub enum ModelError {
         /// What it must be.
         range: &'static str,
     },
-    /// Not one thickness and not one a cell.
-    #[error("shell `{shell}` has {cells} elements and {given} thicknesses; give one, or one an element")]
-    Thicknesses {
+    /// Not one value and not one a cell.
+    #[error("shell `{shell}` has {cells} elements and {given} {what}; give one, or one an element")]
+    Count {
         /// Name of the part.
         shell: String,
+        /// `thicknesses` or `materials`.
+        what: &'static str,
         /// Elements.
         cells: usize,
-        /// Thicknesses given.
+        /// Values given.
         given: usize,
     },
     /// A node that does not exist.

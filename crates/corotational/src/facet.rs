@@ -8,9 +8,7 @@ use nalgebra::{
     Matrix3, Matrix3x2, Rotation3, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector2, Vector3,
 };
 
-use crate::element::{
-    Corners, Elasticity, Formulation, MIDSIDES, Matrix9, andes_basic, area, curvature, gradients, strain,
-};
+use crate::element::{Corners, Elasticity, Formulation, Matrix9, andes_basic, area, gradients};
 use crate::model::Material;
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
 
@@ -68,7 +66,7 @@ pub struct ShellEnergy {
     pub drilling: f64,
 }
 
-/// Forces and moments per length in the axes of a facet, at its centroid.
+/// Forces and moments per length in the axes of a facet, their means over it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resultants {
     /// (nxx, nyy, nxy) [N/m].
@@ -364,18 +362,21 @@ impl Facet {
         ShellEnergy { membrane, bending: of(BENDING, &self.bending), drilling: plane - membrane }
     }
 
-    /// Forces and moments per length: of the constant strain, and the mean of the curvatures in the middle of the edges.
+    /// Mean forces and moments per length: those whose work with a uniform strain or curvature is that of the element's nodal forces,
+    /// whatever its formulation. For ANDES that is D Lᵀ d/A (Felippa 2003), for the discrete Kirchhoff triangle D times the mean
+    /// curvature.
     pub(crate) fn resultants(&self, placed: &Placed) -> Resultants {
-        let of = |places: [usize; 9]| SVector::<f64, 9>::from_fn(|i, _| placed.deformation[places[i]]);
-        let elastic = self.elastic.matrix();
-        let mean = MIDSIDES
-            .iter()
-            .fold(Vector3::zeros(), |sum, &at| sum + curvature(&self.corners, at) * of(BENDING) / 3.0);
-        Resultants {
-            membrane: elastic * strain(&self.corners) * of(MEMBRANE) * self.thickness,
-            moment: elastic * mean * (self.thickness.powi(3) / 12.0),
-            axes: placed.axes,
+        let force = self.linear_force(&placed.deformation);
+        let (mut membrane, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        for (i, corner) in self.corners.iter().enumerate() {
+            let (x, y) = (corner.x, corner.y);
+            let [fx, fy, fz, mx, my] = [0, 1, 2, 3, 4].map(|c| force[6 * i + c]);
+            membrane += Vector3::new(x * fx, y * fy, 0.5 * (x * fy + y * fx));
+            // w of curvatures −w,xx = 1, −w,yy = 1 and −2 w,xy = 1, with θx = w,y and θy = −w,x.
+            let deflection = -0.5 * Vector3::new(x * x, y * y, x * y);
+            moment += deflection * fz + Vector3::new(x * my, -y * mx, 0.5 * (y * my - x * mx));
         }
+        Resultants { membrane: membrane / self.area, moment: moment / self.area, axes: placed.axes }
     }
 
     /// The largest ω² [1/s²] of the element by itself about its rest shape, with its lumped masses: none of the model's is higher.

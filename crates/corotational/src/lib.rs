@@ -33,12 +33,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod carry;
 mod dynamics;
 pub mod element;
 mod error;
 mod facet;
+mod forces;
+mod initial;
 mod linear;
 mod model;
+mod picture;
+mod recover;
 mod rotation;
 mod sparse;
 mod state;
@@ -54,10 +59,13 @@ mod tet;
 pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit};
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
+pub use forces::Forces;
 pub use linear::{LinearReport, LinearSolver, Preconditioner};
 pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spread, Spring};
+pub use picture::{Picture, PictureFields};
+pub use recover::{ShellFields, SolidFields, von_mises};
 pub use state::State;
-pub use statics::{Control, StaticSettings, Statics, Step};
-pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Picture, Place};
+pub use statics::{Control, StaticSettings, Statics, Step, check_held};
+pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Place};
 pub use system::Phases;
 pub use tet::Tet;

@@ -8,6 +8,7 @@ use pliant_mechanics::curve::Curve;
 use crate::element::{Elasticity, Formulation};
 use crate::error::ModelError;
 use crate::facet::Facet;
+use crate::surface::Carried;
 use crate::tet::Tet;
 
 /// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
@@ -66,8 +67,8 @@ pub struct Shell {
     pub cells: Vec<[u32; 3]>,
     /// Thickness [m]: one, or one a triangle.
     pub thickness: Vec<f64>,
-    /// What it is made of.
-    pub material: Material,
+    /// What it is made of: one, or one a triangle.
+    pub material: Vec<Material>,
     /// Its elements.
     pub formulation: Formulation,
     /// Triangles that meet at a larger angle [rad] have normals of their own: a crease.
@@ -83,7 +84,7 @@ impl Shell {
             name: name.into(),
             cells,
             thickness: vec![thickness],
-            material,
+            material: vec![material],
             formulation: Formulation::default(),
             crease: std::f64::consts::FRAC_PI_4,
             branches: false,
@@ -171,6 +172,14 @@ pub enum LoadKind {
         /// How it comes to the nodes.
         spread: Spread,
     },
+    /// Forces with fixed directions on points that the curved surface carries, by Jᵀ of the current state to forces and moments. How
+    /// these change with the state is left out of the stiffness.
+    Carried {
+        /// The points.
+        points: Vec<Carried>,
+        /// Force on each [N]; points beyond the last have none.
+        forces: Vec<Vector3<f64>>,
+    },
 }
 
 /// How a pressure on a shell comes to its nodes.
@@ -203,7 +212,9 @@ pub enum Motion {
     Fixed,
     /// They move.
     Moved {
-        /// Displacements [m] and rotations [rad] at a factor of 1; rotations about one axis only.
+        /// Displacement [m] and rotation vector [rad] at a factor of 1. With all three spins constrained a node turns by
+        /// exp(factor · vector) exactly, about any axis by any angle; with fewer, those components of its spin are prescribed. Constraints
+        /// with courses of their own on the same node about different axes do not commute.
         by: [f64; 6],
         /// Factor over time.
         curve: Curve,
@@ -230,8 +241,9 @@ impl Model {
         let mut facets = Vec::with_capacity(cells.len());
         for (number, &nodes) in cells.iter().enumerate() {
             let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
+            let material = shell.material[if shell.material.len() == 1 { 0 } else { number }];
             let corners = nodes.map(|node| self.rest[node as usize]);
-            let facet = Facet::new(nodes, corners, thickness, shell.material, shell.formulation);
+            let facet = Facet::new(nodes, corners, thickness, material, shell.formulation);
             let facet = facet.ok_or_else(|| ModelError::Degenerate {
                 shell: shell.name.clone(),
                 cell: number,
@@ -287,11 +299,16 @@ impl Model {
             Err(ModelError::OutOfRange { shell: shell.name.clone(), what, value, range })
         };
         let positive = |value: f64| value > 0.0 && value.is_finite();
-        check_material(&shell.name, shell.material, 1.0, "between -1 and 1")?;
-        let (cells, given) = (shell.cells.len(), shell.thickness.len());
-        if given != 1 && given != cells {
-            return Err(ModelError::Thicknesses { shell: shell.name.clone(), cells, given });
+        for &material in &shell.material {
+            check_material(&shell.name, material, 1.0, "between -1 and 1")?;
         }
+        let cells = shell.cells.len();
+        for (what, given) in [("thicknesses", shell.thickness.len()), ("materials", shell.material.len())] {
+            if given != 1 && given != cells {
+                return Err(ModelError::Count { shell: shell.name.clone(), what, cells, given });
+            }
+        }
+        let given = shell.thickness.len();
         if let Some((cell, &value)) = shell.thickness.iter().enumerate().find(|(_, t)| !positive(**t)) {
             let what = if given == 1 { "thickness".into() } else { format!("thickness of element {cell}") };
             return out_of_range(what, value, "positive and finite");

@@ -420,8 +420,11 @@ impl<'m> Statics<'m> {
     }
 }
 
-/// Every part of the model must be held: of its six rigid motions none may leave constraints and springs unmoved.
-fn check_held(model: &Model) -> Result<(), SolveError> {
+/// Whether every part of a model is held: of its six rigid motions none may leave constraints and springs unmoved.
+///
+/// # Errors
+/// If not: a node of a part, and how many motions it is free in.
+pub fn check_held(model: &Model) -> Result<(), SolveError> {
     let nodes = model.rest.len();
     let mut part: Vec<usize> = (0..nodes).collect();
     fn root(part: &mut [usize], mut node: usize) -> usize {

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::facet::Vector18;
 use crate::model::Model;
@@ -60,20 +60,11 @@ pub struct Carried {
     pub aside: [f64; 2],
 }
 
-/// Points and triangles that show the surface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
-    /// Where its points lie; points of edges are shared.
-    pub places: Vec<Place>,
-    /// Its triangles.
-    pub triangles: Vec<[u32; 3]>,
-}
-
 /// One Bézier triangle.
 #[derive(Clone, Debug)]
 pub struct Patch {
-    p: [Vector3<f64>; 3],
-    n: [Vector3<f64>; 3],
+    pub(crate) p: [Vector3<f64>; 3],
+    pub(crate) n: [Vector3<f64>; 3],
     edge: [Vector3<f64>; 6],
     straight: [bool; 6],
     rule: EdgeRule,
@@ -119,57 +110,41 @@ impl CurvedSurface {
         Patch::new(p, n, self.straight[facet], self.rule)
     }
 
-    /// The foot of a point on the surface at a state, found from the facet below it: Gauss–Newton on |x − q|², walking to the
-    /// neighbour where the foot leaves a facet.
+    /// The foot of a point on the surface at a state, found from a facet near it: the nearest place of its patch, then those of the
+    /// neighbours across edges on which it lies, as long as they are nearer.
     pub fn project(&self, model: &Model, state: &State, point: Vector3<f64>, facet: u32) -> Place {
-        let mut place = Place { facet, weights: [1.0 / 3.0; 3] };
-        let mut nearest = (f64::INFINITY, place);
-        for _ in 0..30 {
-            let patch = self.patch(model, state, place.facet);
-            let (x, [along, across]) = (patch.point(place.weights), patch.tangents(place.weights));
-            let gap = point - x;
-            if gap.norm() < nearest.0 {
-                nearest = (gap.norm(), place);
-            }
-            let metric = Matrix2::new(
-                along.norm_squared(),
-                along.dot(&across),
-                along.dot(&across),
-                across.norm_squared(),
-            );
-            let slope = Vector2::new(along.dot(&gap), across.dot(&gap));
-            let Some(step) = metric.try_inverse().map(|inverse| inverse * slope) else { break };
-            let [_, second, third] = place.weights;
-            let free = [1.0 - second - third - step.x - step.y, second + step.x, third + step.y];
-            let next = match free.iter().position(|&w| w < 0.0) {
+        let nearest = |facet: u32| {
+            let (weights, distance) = self.patch(model, state, facet).closest(&point, [1.0 / 3.0; 3]);
+            (Place { facet, weights }, distance)
+        };
+        let mut best = nearest(facet);
+        let mut seen = vec![facet];
+        let mut next = vec![best.0];
+        while let Some(place) = next.pop() {
+            for corner in (0..3).filter(|&corner| place.weights[corner] < 1e-12) {
                 // The edge opposite to a corner lies across from it.
-                Some(corner) => match self.neighbours[place.facet as usize][(corner + 1) % 3] {
-                    Some(neighbour) => self.step_over(model, place.facet, neighbour, clamped(free)),
-                    None => Place { weights: clamped(free), ..place },
-                },
-                None => Place { weights: free, ..place },
-            };
-            let still = next.facet == place.facet
-                && next.weights.iter().zip(place.weights).all(|(a, b)| (a - b).abs() < 1e-14);
-            place = next;
-            if still {
-                break;
+                let across = self.neighbours[place.facet as usize][(corner + 1) % 3];
+                let Some(across) = across.filter(|facet| !seen.contains(facet)) else { continue };
+                seen.push(across);
+                let found = nearest(across);
+                // Equally near, round a common corner, are ways on.
+                if found.1 <= best.1 * (1.0 + 1e-9) {
+                    next.push(found.0);
+                }
+                if found.1 < best.1 {
+                    best = found;
+                }
             }
         }
-        let last = (point - self.patch(model, state, place.facet).point(place.weights)).norm();
-        if last <= nearest.0 { place } else { nearest.1 }
-    }
-
-    /// A place on the common edge as one of the neighbour.
-    fn step_over(&self, model: &Model, from: u32, to: u32, weights: [f64; 3]) -> Place {
-        let (from, nodes) = (model.facets[from as usize].nodes, model.facets[to as usize].nodes);
-        let weight = |node: u32| from.iter().position(|&n| n == node).map_or(0.0, |corner| weights[corner]);
-        Place { facet: to, weights: clamped(nodes.map(weight)) }
+        best.0
     }
 
     /// A point of a visual mesh, bound to the surface where it now is; `facet` is one near it.
     pub fn carry(&self, model: &Model, state: &State, point: Vector3<f64>, facet: u32) -> Carried {
-        let place = self.project(model, state, point, facet);
+        self.bind(model, state, &point, self.project(model, state, point, facet))
+    }
+
+    pub(crate) fn bind(&self, model: &Model, state: &State, point: &Vector3<f64>, place: Place) -> Carried {
         let patch = self.patch(model, state, place.facet);
         let offset = point - patch.point(place.weights);
         let [first, second, normal] = patch.frame(place.weights);
@@ -178,54 +153,39 @@ impl CurvedSurface {
 
     /// Where a carried point is.
     pub fn carried(&self, model: &Model, state: &State, point: &Carried) -> Vector3<f64> {
-        let patch = self.patch(model, state, point.place.facet);
-        let [first, second, normal] = patch.frame(point.place.weights);
-        patch.point(point.place.weights)
-            + point.aside[0] * first
-            + point.aside[1] * second
-            + point.height * normal
-    }
-
-    /// Points and triangles with each edge cut into `parts`.
-    pub fn picture(&self, model: &Model, parts: u32) -> Picture {
-        let parts = parts.max(1);
-        let mut picture = Picture { places: Vec::new(), triangles: Vec::new() };
-        // A point by the nodes that weigh in it, with their parts.
-        let mut known: BTreeMap<Vec<(u32, u32)>, u32> = BTreeMap::new();
-        for (number, facet) in model.facets.iter().enumerate() {
-            let mut point = |second: u32, third: u32| {
-                let shares = [parts - second - third, second, third];
-                let mut key: Vec<(u32, u32)> =
-                    facet.nodes.into_iter().zip(shares).filter(|s| s.1 > 0).collect();
-                key.sort_unstable();
-                if key.len() == 3 {
-                    key.push((number as u32, u32::MAX));
-                }
-                *known.entry(key).or_insert_with(|| {
-                    let weights = shares.map(|share| f64::from(share) / f64::from(parts));
-                    picture.places.push(Place { facet: number as u32, weights });
-                    picture.places.len() as u32 - 1
-                })
-            };
-            for third in 0..parts {
-                for second in 0..parts - third {
-                    let [a, b, c] =
-                        [point(second, third), point(second + 1, third), point(second, third + 1)];
-                    picture.triangles.push([a, b, c]);
-                    if second + third + 1 < parts {
-                        picture.triangles.push([b, point(second + 1, third + 1), c]);
-                    }
-                }
-            }
-        }
-        picture
+        self.patch(model, state, point.place.facet).carried(point)
     }
 }
 
-fn clamped(weights: [f64; 3]) -> [f64; 3] {
-    let positive = weights.map(|w| w.max(0.0));
-    let sum: f64 = positive.iter().sum();
-    positive.map(|w| w / sum)
+/// Area coordinates of the point of a triangle that is closest to a point (Ericson 2005, Real-Time Collision Detection, 5.1.5).
+pub(crate) fn closest_on_triangle([a, b, c]: &[Vector3<f64>; 3], to: &Vector3<f64>) -> [f64; 3] {
+    let (ab, ac) = (b - a, c - a);
+    let products = |from: &Vector3<f64>| (ab.dot(&(to - from)), ac.dot(&(to - from)));
+    let ((d1, d2), (d3, d4), (d5, d6)) = (products(a), products(b), products(c));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let (over_a, over_b, over_c) = (d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2);
+    if over_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let part = d1 / (d1 - d3);
+        return [1.0 - part, part, 0.0];
+    }
+    if over_b <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let part = d2 / (d2 - d6);
+        return [1.0 - part, 0.0, part];
+    }
+    if over_a <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let part = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return [0.0, 1.0 - part, part];
+    }
+    let sum = over_a + over_b + over_c;
+    [over_a / sum, over_b / sum, over_c / sum]
 }
 
 /// g(c) and its derivative.
@@ -269,22 +229,17 @@ impl Patch {
 
     /// The point at area coordinates [m].
     pub fn point(&self, weights: [f64; 3]) -> Vector3<f64> {
-        let (corner, edge) = Self::weights(weights);
-        let corners = self.p.iter().zip(corner).map(|(p, w)| p * w);
-        corners.chain(self.edge.iter().zip(edge).map(|(b, w)| b * w)).sum()
+        self.sum(Self::weights(weights))
     }
 
-    /// Its derivatives with respect to the second and the third area coordinate.
-    pub fn tangents(&self, [a, b, c]: [f64; 3]) -> [Vector3<f64>; 2] {
+    /// Derivatives of the weights with respect to the second and the third area coordinate.
+    fn weight_slopes([a, b, c]: [f64; 3]) -> [([f64; 3], [f64; 6]); 2] {
         let w = [a, b, c];
         // ∂/∂w of each weight, the three taken as independent.
         let middle = [6.0 * b * c, 6.0 * a * c, 6.0 * a * b];
-        let slope = |k: usize| -> Vector3<f64> {
-            let corners = (0..3).map(|i| {
-                let own = if i == k { 3.0 * w[i] * w[i] } else { 0.0 };
-                self.p[i] * (own - middle[k] / 6.0)
-            });
-            let edges = EDGES.into_iter().zip(&self.edge).map(|([i, j], control)| {
+        let slope = |k: usize| {
+            let corner = [0, 1, 2].map(|i| if i == k { 3.0 * w[i] * w[i] } else { 0.0 } - middle[k] / 6.0);
+            let edge = EDGES.map(|[i, j]| {
                 let own = if k == i {
                     6.0 * w[i] * w[j]
                 } else if k == j {
@@ -292,12 +247,25 @@ impl Patch {
                 } else {
                     0.0
                 };
-                control * (own + 0.25 * middle[k])
+                own + 0.25 * middle[k]
             });
-            corners.chain(edges).sum()
+            (corner, edge)
         };
         let first = slope(0);
-        [slope(1) - first, slope(2) - first]
+        [slope(1), slope(2)].map(|(corner, edge)| {
+            (std::array::from_fn(|i| corner[i] - first.0[i]), std::array::from_fn(|k| edge[k] - first.1[k]))
+        })
+    }
+
+    /// The sum of the control points with weights.
+    fn sum(&self, (corner, edge): ([f64; 3], [f64; 6])) -> Vector3<f64> {
+        let corners = self.p.iter().zip(corner).map(|(p, w)| p * w);
+        corners.chain(self.edge.iter().zip(edge).map(|(b, w)| b * w)).sum()
+    }
+
+    /// Its derivatives with respect to the second and the third area coordinate.
+    pub fn tangents(&self, weights: [f64; 3]) -> [Vector3<f64>; 2] {
+        Self::weight_slopes(weights).map(|slopes| self.sum(slopes))
     }
 
     /// The unit normal.
@@ -315,7 +283,11 @@ impl Patch {
 
     /// J: the velocity of a point over velocities and spins of the three nodes.
     pub fn jacobian(&self, weights: [f64; 3]) -> SMatrix<f64, 3, 18> {
-        let (corner, edge) = Self::weights(weights);
+        self.velocity_map(Self::weights(weights))
+    }
+
+    /// The velocity of the sum of the control points with weights.
+    fn velocity_map(&self, (corner, edge): ([f64; 3], [f64; 6])) -> SMatrix<f64, 3, 18> {
         let mut j = SMatrix::<f64, 3, 18>::zeros();
         let mut add = |node: usize, spin: bool, part: Matrix3<f64>| {
             let mut block = j.fixed_columns_mut::<3>(6 * node + if spin { 3 } else { 0 });
@@ -331,6 +303,74 @@ impl Patch {
             add(start, true, -turning * skew(&self.n[start]) * edge[k]);
         }
         j
+    }
+
+    /// Where a carried point is, of which this is the patch [m].
+    pub fn carried(&self, point: &Carried) -> Vector3<f64> {
+        let [first, second, normal] = self.frame(point.place.weights);
+        let aside = point.aside[0] * first + point.aside[1] * second;
+        self.point(point.place.weights) + aside + point.height * normal
+    }
+
+    /// J of a carried point: that of its foot, and of its offset o = α t + β n × t + h n with t = a/|a| and n = a × b/|a × b| of the
+    /// tangents a and b.
+    pub fn carried_jacobian(&self, point: &Carried) -> SMatrix<f64, 3, 18> {
+        let weights = point.place.weights;
+        let [by_second, by_third] = Self::weight_slopes(weights);
+        let (a, b) = (self.sum(by_second), self.sum(by_third));
+        let cross = a.cross(&b);
+        let (t, n) = (a.normalize(), cross.normalize());
+        let across =
+            |unit: &Vector3<f64>, length: f64| (Matrix3::identity() - unit * unit.transpose()) / length;
+        let [alpha, beta] = point.aside;
+        // δo = (α I + β S(n)) δt + (h I − β S(t)) δn and δ(a × b) = S(a) δb − S(b) δa.
+        let by_t = Matrix3::from_diagonal_element(alpha) + beta * skew(&n);
+        let by_n =
+            (Matrix3::from_diagonal_element(point.height) - beta * skew(&t)) * across(&n, cross.norm());
+        let by_a = by_t * across(&t, a.norm()) - by_n * skew(&b);
+        let by_b = by_n * skew(&a);
+        self.jacobian(weights) + by_a * self.velocity_map(by_second) + by_b * self.velocity_map(by_third)
+    }
+
+    /// Nodal forces and moments of a force on a carried point: Jᵀ f.
+    pub fn carried_forces(&self, point: &Carried, force: &Vector3<f64>) -> Vector18 {
+        self.carried_jacobian(point).tr_mul(force)
+    }
+
+    /// The nearest place of the patch and its distance [m]: Gauss–Newton, in which each step goes to the nearest point of the tangent
+    /// triangle, and is halved until it comes closer.
+    pub(crate) fn closest(&self, point: &Vector3<f64>, start: [f64; 3]) -> ([f64; 3], f64) {
+        let mut at = start;
+        let mut distance = (self.point(at) - point).norm();
+        for _ in 0..40 {
+            let (x, [along, across]) = (self.point(at), self.tangents(at));
+            let corner = |second: f64, third: f64| x + along * (second - at[1]) + across * (third - at[2]);
+            let aim = closest_on_triangle(&[corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)], point);
+            let change = [0, 1, 2].map(|i| aim[i] - at[i]);
+            if change.iter().all(|c| c.abs() < 1e-13) {
+                break;
+            }
+            let closer = [1.0, 0.5, 0.25, 0.125, 1.0 / 64.0, 1.0 / 512.0].into_iter().find_map(|part| {
+                let next = if part == 1.0 { aim } else { [0, 1, 2].map(|i| at[i] + part * change[i]) };
+                let there = (self.point(next) - point).norm();
+                (there < distance).then_some((next, there))
+            });
+            let Some(next) = closer else { break };
+            (at, distance) = next;
+        }
+        (at, distance)
+    }
+
+    /// An upper bound for the distance of its points from the flat facet [m]: it lies in the convex hull of its control points.
+    pub(crate) fn bulge(&self) -> f64 {
+        let edges: Vector3<f64> = self.edge.iter().sum();
+        let corners: Vector3<f64> = self.p.iter().sum();
+        let middle = 0.25 * edges - corners / 6.0;
+        let off = |control: &Vector3<f64>| {
+            let foot = closest_on_triangle(&self.p, control);
+            (self.p.iter().zip(foot).map(|(p, w)| p * w).sum::<Vector3<f64>>() - control).norm()
+        };
+        self.edge.iter().chain([&middle]).map(off).fold(0.0, f64::max)
     }
 
     /// ∂b/∂e and ∂b/∂n of an edge's control point.
@@ -382,6 +422,12 @@ mod tests {
     use super::*;
     use crate::rotation::exponential;
     use crate::testing::Random;
+
+    fn clamped(weights: [f64; 3]) -> [f64; 3] {
+        let positive = weights.map(|w| w.max(0.0));
+        let sum: f64 = positive.iter().sum();
+        positive.map(|w| w / sum)
+    }
 
     fn vector(random: &mut Random) -> Vector3<f64> {
         Vector3::from_fn(|_, _| random.number())
@@ -462,6 +508,46 @@ mod tests {
         }
         let off = patch.jacobian(l) * all - v - w.cross(&patch.point(l));
         assert!(off.norm() < 1e-13, "{off}");
+    }
+
+    /// A point off the surface, with its foot on a border: J by central differences with 1e-6, 1e-8; its forces keep their resultants,
+    /// 1e-12, and ⟨J v, f⟩ = ⟨v, Jᵀ f⟩, 1e-13.
+    #[test]
+    fn forces_on_carried_points_go_back_by_the_transpose() {
+        let mut random = Random::new(5);
+        for rule in [EdgeRule::Arc, EdgeRule::Third] {
+            for straight in [[false; 6], [true, true, false, false, false, true]] {
+                let (p, n, rule) = patch(&mut random, rule);
+                let place = Place { facet: 0, weights: weights(&mut random) };
+                let point = Carried { place, height: 0.3, aside: [-0.1, 0.2] };
+                let patch = Patch::new(p, n, straight, rule);
+                let j = patch.carried_jacobian(&point);
+                let h = 1e-6;
+                for place in 0..18 {
+                    let at = |by: f64| {
+                        let (mut p, mut n) = (p, n);
+                        let mut change = Vector3::zeros();
+                        change[place % 3] = by;
+                        if place % 6 < 3 {
+                            p[place / 6] += change;
+                        } else {
+                            n[place / 6] = exponential(&change) * n[place / 6];
+                        }
+                        Patch::new(p, n, straight, rule).carried(&point)
+                    };
+                    let off = (at(h) - at(-h)) / (2.0 * h) - j.column(place);
+                    assert!(off.norm() < 1e-8, "{rule:?} {place}: {off}");
+                }
+                let (f, v) = (vector(&mut random), Vector18::from_fn(|_, _| random.number()));
+                let back = patch.carried_forces(&point, &f);
+                assert!(((j * v).dot(&f) - v.dot(&back)).abs() < 1e-13);
+                let part = |a: usize| back.fixed_rows::<3>(3 * a).into_owned();
+                assert!((part(0) + part(2) + part(4) - f).norm() < 1e-12);
+                let moment =
+                    (0..3).fold(Vector3::zeros(), |m, i| m + p[i].cross(&part(2 * i)) + part(2 * i + 1));
+                assert!((moment - patch.carried(&point).cross(&f)).norm() < 1e-12);
+            }
+        }
     }
 
     #[test]

@@ -53,7 +53,7 @@ pub(crate) struct System<'m> {
     pub(crate) coupling: Vec<f64>,
     /// Pressures on facets [Pa]: fixed, controlled.
     pressure: Vec<[f64; 2]>,
-    /// The curved surface, if a pressure acts on it.
+    /// The curved surface, if a load acts on it.
     surface: Option<CurvedSurface>,
     /// Strain energy [J].
     pub(crate) energy: f64,
@@ -131,7 +131,10 @@ impl<'m> System<'m> {
             surface: model
                 .loads
                 .iter()
-                .any(|load| matches!(load.kind, LoadKind::Pressure { spread: Spread::Curved, .. }))
+                .any(|load| {
+                    use LoadKind::{Carried, Pressure};
+                    matches!(load.kind, Carried { .. } | Pressure { spread: Spread::Curved, .. })
+                })
                 .then(|| CurvedSurface::new(model, EdgeRule::Arc)),
             energy: 0.0,
             largest: 0.0,
@@ -248,6 +251,17 @@ impl<'m> System<'m> {
                     for ends in edges {
                         let [a, b] = ends.map(|node| model.rest[node as usize]);
                         ends.iter().for_each(|&node| add(node, 0, traction * (0.5 * (b - a).norm())));
+                    }
+                }
+                LoadKind::Carried { points, forces } => {
+                    let Some(surface) = &self.surface else { continue };
+                    for (point, force) in points.iter().zip(forces) {
+                        let facet = point.place.facet;
+                        let back = surface.patch(model, state, facet).carried_forces(point, force);
+                        for (i, &node) in model.facets[facet as usize].nodes.iter().enumerate() {
+                            add(node, 0, back.fixed_rows::<3>(6 * i).into());
+                            add(node, 3, back.fixed_rows::<3>(6 * i + 3).into());
+                        }
                     }
                 }
                 LoadKind::Pressure { cells, pressure, spread } => {

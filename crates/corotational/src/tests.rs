@@ -11,10 +11,11 @@ use crate::system::System;
 use crate::testing::Random;
 use crate::*;
 
-const MATERIAL: Material = Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+pub(crate) const MATERIAL: Material =
+    Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
 
 /// Points and triangles of an octahedron of radius 1 facing outwards, each triangle cut in four some times.
-fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+pub(crate) fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
     let mut points: Vec<Vector3<f64>> = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
         .map(|p: [i32; 3]| Vector3::from(p.map(f64::from)))
         .to_vec();
@@ -40,7 +41,7 @@ fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
 }
 
 /// A strip of 8 × 2 cells of side 1.
-fn strip() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+pub(crate) fn strip() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
     let points = (0..27).map(|i| Vector3::new(f64::from(i % 9), f64::from(i / 9), 0.0)).collect();
     let cell = |i: u32| {
         let a = i % 8 + 9 * (i / 8);
@@ -49,11 +50,22 @@ fn strip() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
     (points, (0..16).flat_map(cell).collect())
 }
 
+/// A cube of side 1 facing outwards, two triangles a side.
+pub(crate) fn cube() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+    (
+        (0..8).map(|i| Vector3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect(),
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+            .into_iter()
+            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
+    )
+}
+
 fn hold() -> Curve {
     Curve { shape: Shape::Hold, from: 0.0, to: 1.0 }
 }
 
-fn ramp() -> Curve {
+pub(crate) fn ramp() -> Curve {
     Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 }
 }
 
@@ -61,14 +73,14 @@ fn fix(nodes: Vec<u32>, components: [bool; 6]) -> Constraint {
     Constraint { name: "fixed".into(), nodes, components, motion: Motion::Fixed }
 }
 
-fn model((points, cells): (Vec<Vector3<f64>>, Vec<[u32; 3]>), thickness: f64) -> Model {
+pub(crate) fn model((points, cells): (Vec<Vector3<f64>>, Vec<[u32; 3]>), thickness: f64) -> Model {
     let mut model = Model::new(points);
     model.add_shell(&Shell::new("shell", cells, thickness, MATERIAL)).unwrap();
     model
 }
 
 /// The strip clamped at one end with a force at the other.
-fn cantilever() -> Model {
+pub(crate) fn cantilever() -> Model {
     let mut model = model(strip(), 0.1);
     model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
     let kind = LoadKind::Force { nodes: vec![8, 17, 26], force: Vector3::new(0.0, 0.0, 0.5) };
@@ -77,7 +89,7 @@ fn cantilever() -> Model {
 }
 
 /// The ball with six components held, so that nothing resists its breathing.
-fn balloon(cuts: usize, pressure: f64) -> Model {
+pub(crate) fn balloon(cuts: usize, pressure: f64) -> Model {
     let mut model = model(ball(cuts), 0.02);
     model.constraints.push(fix(vec![0], [true, true, true, false, false, false]));
     model.constraints.push(fix(vec![1], [false, true, true, false, false, false]));
@@ -138,11 +150,11 @@ fn bad_shells_are_told_with_their_element() {
     thin.thickness = vec![0.1; 5];
     assert!(refuse(&thin).contains("32 elements and 5"));
     let mut soft = good.clone();
-    soft.material.elastic.young = 0.0;
+    soft.material[0].elastic.young = 0.0;
     assert!(refuse(&soft).contains("Young's modulus"));
-    soft.material.elastic = Elasticity { young: 1.0, poisson: 1.0 };
+    soft.material[0].elastic = Elasticity { young: 1.0, poisson: 1.0 };
     assert!(refuse(&soft).contains("Poisson's ratio"));
-    soft.material = Material { density: f64::NAN, ..MATERIAL };
+    soft.material[0] = Material { density: f64::NAN, ..MATERIAL };
     assert!(refuse(&soft).contains("density"));
     let with = |cell: [u32; 3]| Shell { cells: [cells.clone(), vec![cell]].concat(), ..good.clone() };
     assert!(
@@ -426,15 +438,8 @@ fn only_the_difference_from_rest_costs_energy() {
 /// Points of edges agree from both sides, bit for bit within 1e-15, in a strongly deformed state; also at a crease.
 #[test]
 fn the_curved_surface_is_watertight() {
-    let cube: (Vec<Vector3<f64>>, Vec<[u32; 3]>) = (
-        (0..8).map(|i| Vector3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect(),
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
-            .into_iter()
-            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect(),
-    );
     let mut random = Random::new(9);
-    for (shape, size) in [(ball(2), 0.1), (cube, 0.3)] {
+    for (shape, size) in [(ball(2), 0.1), (cube(), 0.3)] {
         let model = model(shape, 0.01);
         for rule in [EdgeRule::Arc, EdgeRule::Third] {
             let surface = CurvedSurface::new(&model, rule);
@@ -518,7 +523,7 @@ fn a_visual_mesh_is_carried() {
 }
 
 /// Six tets a cell of a grid of unit cells.
-fn bar(counts: [usize; 3], size: [f64; 3]) -> (Vec<Vector3<f64>>, Vec<[u32; 4]>) {
+pub(crate) fn bar(counts: [usize; 3], size: [f64; 3]) -> (Vec<Vector3<f64>>, Vec<[u32; 4]>) {
     let [nx, ny, nz] = counts;
     let number = |i: usize, j: usize, k: usize| (i + (nx + 1) * (j + (ny + 1) * k)) as u32;
     let mut points = Vec::new();

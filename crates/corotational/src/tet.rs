@@ -15,6 +15,16 @@ pub(crate) type Vector12 = SVector<f64, 12>;
 /// Stiffness over them.
 pub(crate) type Matrix12 = SMatrix<f64, 12, 12>;
 
+/// What a tetrahedron bears at a state.
+pub(crate) struct TetStress {
+    /// Cauchy stress [Pa].
+    pub(crate) cauchy: Matrix3<f64>,
+    /// Strain energy over the volume at rest [J/m³].
+    pub(crate) density: f64,
+    /// J.
+    pub(crate) volume_ratio: f64,
+}
+
 /// A tetrahedron: what its rest shape gives.
 #[derive(Clone, Debug)]
 pub struct Tet {
@@ -98,6 +108,24 @@ impl Tet {
             }
         }
         Ok((energy, force))
+    }
+
+    /// Cauchy stress P Fᵀ/J with P = R (2μ (S − I) + λ tr(S − I) I), and the energy density it is the derivative of.
+    pub(crate) fn stress(&self, state: &State) -> Result<TetStress, Broken> {
+        let f = self.gradient_at(&self.nodes.map(|node| state.position[node as usize]));
+        let volume_ratio = f.determinant();
+        if volume_ratio <= 0.0 || volume_ratio.is_nan() {
+            return Err(Broken::Inverted(volume_ratio));
+        }
+        let [lambda, mu] = self.lame;
+        let r = rotation(&f);
+        let trace = r.dot(&f) - 3.0;
+        let cauchy = (2.0 * mu * (f - r) + lambda * trace * r) * f.transpose() / volume_ratio;
+        Ok(TetStress {
+            cauchy: 0.5 * (cauchy + cauchy.transpose()),
+            density: mu * (f - r).norm_squared() + 0.5 * lambda * trace * trace,
+            volume_ratio,
+        })
     }
 
     /// The largest ω² [1/s²] by itself about rest, with its lumped mass.

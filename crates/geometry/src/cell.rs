@@ -69,7 +69,7 @@ pub(crate) fn nodes_differ(nodes: &[u32]) -> bool {
 
 /// The blocks that make up the body: the non-empty ones of the highest dimension in the mesh, in the
 /// order of `CellKind`. A tetrahedral mesh that also lists its boundary triangles is a body of tets.
-pub(crate) fn body_blocks(mesh: &Mesh) -> Vec<&CellBlock> {
+pub fn body_blocks(mesh: &Mesh) -> Vec<&CellBlock> {
     let dimension = mesh.blocks.iter().filter(|b| !b.is_empty()).map(|b| b.kind.dimension()).max();
     let mut blocks: Vec<&CellBlock> =
         mesh.blocks.iter().filter(|b| !b.is_empty() && Some(b.kind.dimension()) == dimension).collect();

@@ -20,19 +20,28 @@ pub struct SurfacePoint {
     pub position: Vector3,
     /// The outward unit normal there; zero where the surface folds onto itself.
     pub normal: Vector3,
+    /// The face it lies on, as an index into the surface's faces.
+    pub face: u32,
+    /// Three nodes of it between which it lies (of a quad those of one half).
+    pub nodes: [u32; 3],
+    /// Their weights, which add up to 1.
+    pub weights: [f64; 3],
 }
 
 #[derive(Clone, Debug)]
 struct Triangle {
     corners: [Vector3; 3],
     normals: [Vector3; 3],
+    face: u32,
+    nodes: [u32; 3],
 }
 
 impl Triangle {
     fn closest(&self, to: &Vector3) -> SurfacePoint {
         let weights = barycentric_of_closest(&self.corners, to);
         let normal = on_triangle(&self.normals, weights).try_normalize(1e-12).unwrap_or_default();
-        SurfacePoint { position: on_triangle(&self.corners, weights), normal }
+        let position = on_triangle(&self.corners, weights);
+        SurfacePoint { position, normal, face: self.face, nodes: self.nodes, weights }
     }
 }
 
@@ -56,16 +65,17 @@ impl SurfaceLocator {
     /// Sorts some faces of a surface (indices into its faces) into a tree; only they count for the normals. A quad is
     /// taken as two triangles.
     pub fn new(surface: &Surface, faces: &[u32], points: &[Vector3]) -> Self {
-        let faces = faces.iter().map(|&face| surface.faces[face as usize]).collect();
-        let part = Surface { faces };
+        let part = Surface { faces: faces.iter().map(|&face| surface.faces[face as usize]).collect() };
         let normals = part.node_normals(points);
-        let triangle = |nodes: [u32; 3]| Triangle {
+        let triangle = |(face, nodes): (u32, [u32; 3])| Triangle {
             corners: nodes.map(|node| points[node as usize]),
             normals: nodes.map(|node| normals[node as usize]),
+            face,
+            nodes,
         };
-        let halves = part.faces.iter().flat_map(|face| {
+        let halves = part.faces.iter().zip(faces).flat_map(|(face, &number)| {
             let nodes = face.nodes();
-            (2..nodes.len()).map(|k| [nodes[0], nodes[k - 1], nodes[k]])
+            (2..nodes.len()).map(move |k| (number, [nodes[0], nodes[k - 1], nodes[k]]))
         });
         Self { tree: RTree::bulk_load(halves.map(triangle).collect()) }
     }

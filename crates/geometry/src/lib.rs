@@ -45,7 +45,7 @@ mod surface;
 #[cfg(test)]
 mod testing;
 
-pub use cell::CellId;
+pub use cell::{CellId, body_blocks};
 pub use closest::{SurfaceLocator, SurfacePoint};
 pub use diagnosis::{CrowdedFace, Diagnosis, diagnose, reorder};
 pub use locate::{Location, Locator};

@@ -8,21 +8,22 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use pliant_mechanics::{Equilibrium, Real, State, fingerprint};
+use pliant_mechanics::{Real, State, fingerprint};
 use serde::{Deserialize, Serialize};
 
-use crate::build::Built;
+use crate::build::{Built, Corotational};
 use crate::diagnostic::counted;
 use crate::format::{Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, Written, number};
 use crate::plan::Plan;
 use crate::run::History;
 use crate::scene::Scene;
+use crate::solver::Memory;
 
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -64,7 +65,7 @@ pub(crate) struct Progressed {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Moment<R> {
     pub state: State<R>,
-    pub equilibrium: Option<Equilibrium<R>>,
+    pub memory: Memory<R>,
 }
 
 /// Why a run cannot be resumed.
@@ -232,21 +233,17 @@ fn differing(parts: &[String]) -> String {
     }
 }
 
-fn word(solver: SolverName) -> &'static str {
-    match solver {
-        SolverName::Explicit => "explicit",
-        SolverName::QuasiStatic => "quasi-static",
-    }
-}
-
 impl Origin {
     fn of(scene: &Scene, built: &Built, plan: &Plan) -> Self {
         let mut parts = built.model.fingerprints();
+        parts.extend(built.corotational.iter().flat_map(Corotational::fingerprints));
         let outputs = scene.outputs.iter();
         parts.extend(outputs.map(|(name, table)| (format!("output `{name}`"), fingerprint(table))));
         parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));
         parts.push(("`run.on-unstable`".into(), fingerprint(&scene.run.on_unstable.unwrap_or_default())));
         parts.push(("`run.mass-scaling`".into(), fingerprint(&scene.run.mass_scaling)));
+        parts.push(("`run.iterations`".into(), fingerprint(&scene.run.iterations)));
+        parts.push(("`run.linear`".into(), fingerprint(&scene.run.linear)));
         Self {
             precision: plan.target.precision,
             solver: scene.run.solver,
@@ -264,7 +261,7 @@ impl Origin {
             return Err(ResumeError::OtherPrecision { checkpoint, scene });
         }
         if own.solver != self.solver {
-            let [checkpoint, scene] = [self.solver, own.solver].map(word);
+            let [checkpoint, scene] = [self.solver, own.solver].map(SolverName::word);
             return Err(ResumeError::OtherSolver { checkpoint, scene });
         }
         if own.parts != self.parts {
@@ -278,7 +275,7 @@ impl Origin {
             let until = (own.until != self.until).then_some(self.until);
             return Err(ResumeError::OtherScene { parts, until });
         }
-        let step = plan.steps_of(scene, self.until).1;
+        let step = plan.steps_of(scene, built, self.until).1;
         if step != self.step {
             return Err(ResumeError::OtherStep { checkpoint: self.step, scene: step });
         }
@@ -388,11 +385,10 @@ impl Checkpoint {
             let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
             (nodes, history.collect::<Vec<_>>())
         };
-        let residual = moment.equilibrium.as_ref().map_or(rest.displacement.len(), |e| e.residual.len());
         let samples = self.progressed.history.reactions.iter();
         let fits = sizes(&moment.state) == sizes(&rest)
             && moment.state.stability.fits(&built.model)
-            && residual == rest.displacement.len()
+            && moment.memory.fits(rest.displacement.len())
             && samples.map(Vec::len).all(|len| len == built.model.constraints.len());
         fits.then_some(moment)
     }
@@ -434,11 +430,11 @@ impl<'a> Checkpoints<'a> {
         &self,
         progressed: &Progressed,
         state: &State<R>,
-        equilibrium: Option<Equilibrium<R>>,
+        memory: &Memory<R>,
     ) -> Result<PathBuf, OutputError> {
         let path = self.folder.path().join(name(progressed.steps));
         let failed = |reason: &dyn std::fmt::Display| OutputError::new(&path, reason);
-        let bytes = encode(&self.origin, progressed, state, &equilibrium).map_err(|e| failed(&e))?;
+        let bytes = encode(&self.origin, progressed, state, memory).map_err(|e| failed(&e))?;
         let temporary = path.with_extension("pliant.tmp");
         let written = File::create(&temporary).and_then(|mut file| {
             file.write_all(&bytes)?;
@@ -462,13 +458,13 @@ fn encode<R: Real>(
     origin: &Origin,
     progressed: &Progressed,
     state: &State<R>,
-    equilibrium: &Option<Equilibrium<R>>,
+    memory: &Memory<R>,
 ) -> postcard::Result<Vec<u8>> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend(FORMAT.to_le_bytes());
     bytes.extend([0; 8]);
     // As the fields of a [`Moment`], one after the other.
-    let mut bytes = postcard::to_extend(&(origin, progressed, state, equilibrium), bytes)?;
+    let mut bytes = postcard::to_extend(&(origin, progressed, state, memory), bytes)?;
     let length = (bytes.len() - HEAD) as u64;
     bytes[12..HEAD].copy_from_slice(&length.to_le_bytes());
     let crc = crc32fast::hash(&bytes);
@@ -524,7 +520,7 @@ mod tests {
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
         };
-        encode(&Origin::of(&scene, &built, &plan), &progressed, &state, &None).unwrap()
+        encode(&Origin::of(&scene, &built, &plan), &progressed, &state, &Memory::Nothing).unwrap()
     }
 
     #[test]
@@ -577,9 +573,9 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_3_is_as_it_was() {
+    fn the_layout_of_format_4_is_as_it_was() {
         let state = State::<f32>::at_rest(&built("").model);
         let bytes = postcard::to_stdvec(&state).unwrap();
-        assert_eq!((FORMAT, bytes.len()), (3, 1082));
+        assert_eq!((FORMAT, bytes.len()), (4, 1082));
     }
 }

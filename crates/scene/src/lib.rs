@@ -27,7 +27,8 @@
 //! let built = pliant_scene::build(&scene)?;
 //! let plan = pliant_scene::plan(&scene, &built)?;
 //! assert_eq!(built.model.node_count(), 27);
-//! assert!(plan.bound.step <= plan.limit.step);
+//! let limits = plan.limits.unwrap();
+//! assert!(limits.bound.step <= limits.limit.step);
 //! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
 //! ```
 
@@ -35,6 +36,7 @@ mod bound;
 mod build;
 pub mod checker;
 mod checkpoint;
+mod corotational;
 pub mod diagnostic;
 pub mod format;
 pub mod niftysim;
@@ -54,17 +56,17 @@ mod target;
 mod testing;
 
 pub use bound::element_bound;
-pub use build::{Built, BuiltBody, PLAUSIBLE_SIZE, build};
+pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, PLAUSIBLE_SIZE, build};
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use output::{
     AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,
     Summary, failed_input, failed_output, number,
 };
 pub use overview::overview;
-pub use plan::{LimitingElement, Plan, SAFETY, plan};
+pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};
 pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, scene_file};
-pub use solver::LoadStepProgress;
+pub use solver::{Effort, LoadStepProgress};
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;

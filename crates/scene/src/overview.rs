@@ -2,14 +2,15 @@
 
 use std::fmt::{self, Write};
 
+use pliant_corotational::Facet;
 use pliant_geometry::QualityReport;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
 
-use crate::build::Built;
+use crate::build::{BodyCells, Built, Corotational};
 use crate::diagnostic::counted;
 use crate::output::{AddedMass, bodies, number};
-use crate::plan::Plan;
+use crate::plan::{Limits, Plan};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
 
@@ -51,6 +52,9 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
                 ),
             )?;
         }
+        if let Some(part) = &built.corotational {
+            write_corotational(page, part, &body.name, built)?;
+        }
         if let Some([least, most]) = quality.dihedral {
             writeln!(page, "  dihedral angles {least:.1}° to {most:.1}°")?;
         }
@@ -61,8 +65,10 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
             let [min, median, max] = [edge.min, edge.median, edge.max].map(number);
             writeln!(page, "  edges {min} to {max} m, median {median} m")?;
         }
-        writeln!(page, "  quality (acoustic length relative to the ideal cell of the same volume):")?;
-        quality.histogram_lines().iter().try_for_each(|line| writeln!(page, "    {line}"))?;
+        if quality.acoustic_length.is_some() {
+            writeln!(page, "  quality (acoustic length relative to the ideal cell of the same volume):")?;
+            quality.histogram_lines().iter().try_for_each(|line| writeln!(page, "    {line}"))?;
+        }
         writeln!(page)?;
     }
     for (surface, mesh) in built.model.surfaces.iter().zip(&built.surfaces) {
@@ -82,11 +88,23 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
             Motion::Fixed => "fixes",
             Motion::Displacement(..) | Motion::Displacements(..) | Motion::Velocity(..) => "moves",
         };
+        let own = built.corotational.iter().flat_map(|part| &part.model.constraints);
+        let turns = own.filter(|own| own.name == constraint.name).flat_map(|own| &own.components[3..]);
+        let rotations: Vec<&str> =
+            ["rx", "ry", "rz"].into_iter().zip(turns).filter(|(_, on)| **on).map(|(axis, _)| axis).collect();
+        let axes = [axes, rotations.join(" ")].join(" ").trim().to_owned();
         let nodes = counted(constraint.nodes.len(), "node");
         writeln!(page, "constraint `{}`: {what} {axes} of {nodes}", constraint.name)?;
     }
     for load in &built.model.loads {
         writeln!(page, "load `{}`: {}", load.name, describe_load(built, load))?;
+    }
+    for load in built.corotational.iter().flat_map(|part| &part.model.loads) {
+        writeln!(page, "load `{}`: {}", load.name, describe_corotational_load(&load.kind))?;
+    }
+    if let Some(springs) = built.corotational.as_ref().map(|part| part.model.springs.len()).filter(|&n| n > 0)
+    {
+        writeln!(page, "{} to points", counted(springs, "spring"))?;
     }
     for (name, table) in &scene.outputs {
         match table {
@@ -125,16 +143,68 @@ fn describe_load(built: &Built, load: &Load) -> String {
     }
 }
 
+/// What the cells of a shell or a co-rotational solid are.
+fn write_corotational(page: &mut String, part: &Corotational, name: &str, built: &Built) -> fmt::Result {
+    let body = built.bodies.iter().position(|body| body.name == name).unwrap_or(0);
+    match &part.cells[body] {
+        BodyCells::Facets(range) => {
+            let facets = &part.model.facets[range.start as usize..range.end as usize];
+            let least = |of: fn(&Facet) -> f64| facets.iter().map(of).fold(f64::INFINITY, f64::min);
+            let most = |of: fn(&Facet) -> f64| facets.iter().map(of).fold(0.0, f64::max);
+            let area: f64 = facets.iter().map(|facet| facet.area).sum();
+            let [thin, thick] = [least(|f| f.thickness), most(|f| f.thickness)].map(number);
+            let thickness = if thin == thick { thin } else { format!("{thin} to {thick}") };
+            writeln!(
+                page,
+                "  {} of a shell, {thickness} m thick, {} m²",
+                counted(facets.len(), "triangle"),
+                number(area)
+            )?;
+            writeln!(page, "  smallest altitude {} m", number(least(Facet::altitude)))
+        }
+        BodyCells::Tets(range) => writeln!(page, "  {} co-rotational tets", range.len()),
+    }
+}
+
+/// What a load does at its full size.
+fn describe_corotational_load(kind: &pliant_corotational::LoadKind) -> String {
+    use pliant_corotational::LoadKind;
+    let vector = |v: &nalgebra::Vector3<f64>| format!("({})", [v.x, v.y, v.z].map(number).join(", "));
+    match kind {
+        LoadKind::Force { nodes, force } => {
+            format!("{} N on each of {}", vector(force), counted(nodes.len(), "node"))
+        }
+        LoadKind::Moment { nodes, moment } => {
+            format!("{} N m on each of {}", vector(moment), counted(nodes.len(), "node"))
+        }
+        LoadKind::Gravity { acceleration } => format!("{} m/s² on everything", vector(acceleration)),
+        LoadKind::Area { cells, traction } => {
+            format!("{} Pa on {}", vector(traction), counted(cells.len(), "triangle"))
+        }
+        LoadKind::Edge { edges, traction } => {
+            format!("{} N/m along {}", vector(traction), counted(edges.len(), "edge"))
+        }
+        LoadKind::Pressure { cells, pressure, .. } => {
+            format!("{} Pa on {}", number(*pressure), counted(cells.len(), "triangle"))
+        }
+        LoadKind::Carried { forces, .. } => {
+            let sum = forces.iter().sum::<nalgebra::Vector3<f64>>();
+            format!("{} N in all on {}", vector(&sum), counted(forces.len(), "carried point"))
+        }
+    }
+}
+
 fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> fmt::Result {
-    let seconds = plan.steps as f64 * plan.limit.seconds_per_call;
+    let Some(Limits { bound, limit, limiting }) = &plan.limits else {
+        let (step, until, solver) = (number(plan.step), number(scene.scene.until), scene.run.solver.word());
+        let steps = counted(plan.steps as usize, "step");
+        return writeln!(page, "\nsolver `{solver}`: {steps} of {step} s for {until} s");
+    };
+    let seconds = plan.steps as f64 * limit.seconds_per_call;
     writeln!(page, "\ncritical step:")?;
-    writeln!(page, "  element bound {} s, set by {}", number(plan.bound.step), plan.limiting)?;
-    let calls = plan.limit.force_calls;
-    writeln!(
-        page,
-        "  true limit    {} s (assembled operator, {calls} force calls)",
-        number(plan.limit.step)
-    )?;
+    writeln!(page, "  element bound {} s, set by {limiting}", number(bound.step))?;
+    let calls = limit.force_calls;
+    writeln!(page, "  true limit    {} s (assembled operator, {calls} force calls)", number(limit.step))?;
     writeln!(
         page,
         "  step          {} s, {} steps for {} s",

@@ -1,9 +1,10 @@
 //! Which time step a run takes: from the mesh and the laws, or as the user asks, held against the true limit.
 
+use pliant_corotational::Explicit;
 use pliant_mechanics::critical_step::{ElementBound, TrueLimit, element_bound, true_limit};
 use serde::Serialize;
 
-use crate::build::Built;
+use crate::build::{Built, Corotational};
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{SolverName, StepChoice};
 use crate::output::number;
@@ -12,6 +13,8 @@ use crate::target::Target;
 
 /// Part of the true limit that an automatic step takes.
 pub const SAFETY: f64 = 0.9;
+/// Automatic step [s] of implicit runs.
+pub const IMPLICIT_STEP: f64 = 0.01;
 
 /// The step of a run and what limits it.
 #[derive(Clone, Debug)]
@@ -20,16 +23,23 @@ pub struct Plan {
     pub step: f64,
     /// Steps to take.
     pub steps: u64,
+    /// What limits explicit steps of solids; `None` of shells and co-rotational solids.
+    pub limits: Option<Limits>,
+    /// What to tell the user about a step that was asked for.
+    pub note: Option<String>,
+    /// Where the run computes.
+    pub target: Target,
+}
+
+/// What limits explicit steps.
+#[derive(Clone, Debug)]
+pub struct Limits {
     /// The smallest element bound.
     pub bound: ElementBound,
     /// The limit of the assembled operator.
     pub limit: TrueLimit,
     /// The cell that sets the bound.
     pub limiting: LimitingElement,
-    /// What to tell the user about a step that was asked for.
-    pub note: Option<String>,
-    /// Where the run computes.
-    pub target: Target,
 }
 
 /// The cell that sets the element bound.
@@ -62,6 +72,46 @@ impl std::fmt::Display for LimitingElement {
 /// If the step asked for is above the true limit, or the scene can't run where it asks to.
 pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
     let fail = |diagnostic| Err(scene.source.errors(vec![diagnostic]));
+    let (limits, note) = match &built.corotational {
+        Some(part) => (None, check_explicit_step(scene, part)),
+        None => match limits(scene, built) {
+            Ok((limits, note)) => (Some(limits), Ok(note)),
+            Err(diagnostic) => return fail(*diagnostic),
+        },
+    };
+    let note = match note {
+        Ok(note) => note,
+        Err(diagnostic) => return fail(*diagnostic),
+    };
+    let target = match Target::choose(scene, built) {
+        Ok(target) => target,
+        Err(diagnostic) => return fail(*diagnostic),
+    };
+    let mut plan = Plan { step: 0.0, steps: 0, limits, note, target };
+    (plan.steps, plan.step) = plan.steps_of(scene, built, scene.scene.until);
+    Ok(plan)
+}
+
+/// Holds an explicit step of shells and co-rotational solids against what is stable.
+fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<String>, Box<Diagnostic>> {
+    let StepChoice::Seconds(step) = scene.run.step else { return Ok(None) };
+    let stable = Explicit::stable_step(&part.model);
+    if scene.run.solver != SolverName::Explicit || step <= stable {
+        return Ok(None);
+    }
+    let message = format!(
+        "the step {} s is above the stable step {} s: it would be unstable",
+        number(step),
+        number(stable)
+    );
+    let help = "take `step = \"auto\"`, or `solver = \"implicit\"` for long steps";
+    let place = scene.source.span(&["run", "step"]);
+    Err(Box::new(Diagnostic::error(message).at(place, "too large").help(help)))
+}
+
+/// What limits the steps of solids, and what to tell about the step asked for.
+fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<Diagnostic>> {
+    let fail = |diagnostic| Err(Box::new(diagnostic));
     let Some(bound) = element_bound(&built.model) else {
         return fail(Diagnostic::error("the scene has no elements"));
     };
@@ -92,23 +142,19 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         }
         _ => None,
     };
-    let target = match Target::choose(scene) {
-        Ok(target) => target,
-        Err(diagnostic) => return fail(*diagnostic),
-    };
-    let mut plan = Plan { step: 0.0, steps: 0, bound, limit, limiting, note, target };
-    (plan.steps, plan.step) = plan.steps_of(scene, scene.scene.until);
-    Ok(plan)
+    Ok((Limits { bound, limit, limiting }, note))
 }
 
 impl Plan {
     /// How many steps of which size [s] a scene of this duration [s] takes.
-    pub(crate) fn steps_of(&self, scene: &Scene, until: f64) -> (u64, f64) {
+    pub(crate) fn steps_of(&self, scene: &Scene, built: &Built, until: f64) -> (u64, f64) {
         let asked = match scene.run.step {
             StepChoice::Seconds(step) => step,
-            StepChoice::Auto(_) => match scene.run.solver {
-                SolverName::QuasiStatic => until / f64::from(scene.run.load_steps),
-                SolverName::Explicit => automatic(&self.bound, &self.limit),
+            StepChoice::Auto(_) => match (scene.run.solver, &self.limits, &built.corotational) {
+                (SolverName::QuasiStatic | SolverName::Static, ..) => until / f64::from(scene.run.load_steps),
+                (SolverName::Explicit, Some(limits), _) => automatic(&limits.bound, &limits.limit),
+                (SolverName::Explicit, None, Some(part)) => SAFETY * Explicit::stable_step(&part.model),
+                _ => IMPLICIT_STEP.min(until),
             },
         };
         let steps = (until / asked - 1e-9).ceil().max(1.0);
@@ -160,19 +206,20 @@ mod tests {
     #[test]
     fn an_automatic_step_is_a_whole_part_of_the_duration_below_the_true_limit() {
         let plan = planned("").unwrap();
-        assert!(plan.step <= SAFETY * plan.limit.step && plan.bound.step <= plan.limit.step);
+        let limits = plan.limits.as_ref().unwrap();
+        assert!(plan.step <= SAFETY * limits.limit.step && limits.bound.step <= limits.limit.step);
         assert!((plan.step * plan.steps as f64 - 0.1).abs() < 1e-15);
         assert!(
-            0.1 / (plan.steps - 1) as f64 > SAFETY * plan.limit.step,
+            0.1 / (plan.steps - 1) as f64 > SAFETY * limits.limit.step,
             "one step fewer would be too large"
         );
-        assert_eq!((plan.limiting.body.as_str(), plan.limiting.element.as_str()), ("cube", "hex8"));
+        assert_eq!((limits.limiting.body.as_str(), limits.limiting.element.as_str()), ("cube", "hex8"));
         assert!(plan.note.is_none());
     }
 
     #[test]
     fn a_step_is_held_against_bound_and_true_limit() {
-        let automatic = planned("").unwrap();
+        let automatic = planned("").unwrap().limits.unwrap();
         let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
         let close = asked(0.95 * automatic.limit.step).unwrap();
         assert!(close.note.is_some_and(|note| note.contains("close to the true limit")));

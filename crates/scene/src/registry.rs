@@ -11,8 +11,8 @@ use serde_json::{Map, Value as Json, json};
 use crate::checker::{check_skipping, nearest, read_table};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
-    BodyTable, CsvTable, FixTable, ForceTable, GravityTable, LawExtras, MoveTable, PressureTable, RunTable,
-    SceneTable, SurfaceTable, TractionTable, VtuTable,
+    BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MomentTable,
+    MoveTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable, TractionTable, VtuTable,
 };
 use crate::source::{Source, Value};
 
@@ -64,12 +64,15 @@ typed! {
     ConstraintTable, "constraint":
     "fix" => Fix(FixTable),
     "move" => Move(MoveTable),
+    "spring" => Spring(SpringTable),
 }
 
 typed! {
     /// A table `[load.NAME]`.
     LoadTable, "load":
     "force" => Force(ForceTable),
+    "moment" => Moment(MomentTable),
+    "edge" => Edge(EdgeLoadTable),
     "traction" => Traction(TractionTable),
     "pressure" => Pressure(PressureTable),
     "gravity" => Gravity(GravityTable),
@@ -263,7 +266,7 @@ mod tests {
     #[test]
     fn every_parameter_of_every_table_has_a_meaning() {
         let sections = sections();
-        assert_eq!(sections.len(), 4 + AnyLaw::NAMES.len() + 2 + 4 + 2);
+        assert_eq!(sections.len(), 4 + AnyLaw::NAMES.len() + 3 + 6 + 2);
         for Section { header, name, schema } in sections {
             for parameter in describe(&schema) {
                 assert!(!parameter.description.is_empty(), "{header} {name:?}: {}", parameter.key);

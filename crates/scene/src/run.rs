@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::build::Built;
 use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
+use crate::corotational::Corotated;
 use crate::format::{Precision, SolverName};
 use crate::output::{
     FailureSummary, Frame, OutputError, OutputFolder, PLOT, SUMMARY, Schedule, Scheduled, Summary, markdown,
@@ -18,7 +19,7 @@ use crate::output::{
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::{LoadStepProgress, Solver, on_device, on_processor};
+use crate::solver::{Effort, LoadStepProgress, Memory, Solver, on_device, on_processor};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -66,6 +67,8 @@ pub(crate) struct Outcome {
     pub worst_hourglass: (f64, f64),
     /// What was seen of the largest stable step; `None` of a run without inertia.
     pub stability: Option<Stability>,
+    /// What its equations took, if it solved some.
+    pub effort: Option<Effort>,
     pub reactions: Vec<[f64; 3]>,
     pub history: History,
     pub files: Vec<PathBuf>,
@@ -87,6 +90,7 @@ impl Outcome {
             balance_floor: 0.0,
             worst_hourglass: (0.0, 0.0),
             stability: None,
+            effort: None,
             reactions: vec![[0.0; 3]; built.model.constraints.len()],
             history: History::default(),
             files: Vec::new(),
@@ -144,7 +148,13 @@ pub fn run_with(
             go::<f32>(scene, built, plan, folder, options, |_| on_processor(&scene.run, built, plan), report)
         }
         (None, Precision::Double) => {
-            go::<f64>(scene, built, plan, folder, options, |_| on_processor(&scene.run, built, plan), report)
+            let solver = |_: &State<f64>| -> Result<Box<dyn Solver<f64> + '_>, FailureSummary> {
+                match &built.corotational {
+                    Some(part) => Ok(Box::new(Corotated::new(&scene.run, built, part, plan)?)),
+                    None => on_processor(&scene.run, built, plan),
+                }
+            };
+            go::<f64>(scene, built, plan, folder, options, solver, report)
         }
     })?;
     if let Err(error) = write_pages(scene, built, plan, folder, &mut outcome) {
@@ -236,7 +246,12 @@ fn go<'a, R: Real>(
         worst_balance: course.worst_balance,
         balance_floor: course.solver.balance_floor(),
         worst_hourglass: course.worst_hourglass,
-        stability: (scene.run.solver == SolverName::Explicit).then_some(course.state.stability),
+        stability: plan
+            .limits
+            .as_ref()
+            .filter(|_| scene.run.solver == SolverName::Explicit)
+            .map(|_| course.state.stability),
+        effort: course.solver.effort(),
         reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
         history: course.history,
         files: course.files.into_iter().chain(course.kept).collect(),
@@ -255,7 +270,7 @@ fn beginning<R: Real>(
         Some(checkpoint) => checkpoint
             .moment(built)
             .ok_or_else(|| OutputError::new(folder.path(), "the checkpoint is of another model")),
-        None => Ok(Moment { state: State::at_rest(&built.model), equilibrium: None }),
+        None => Ok(Moment { state: State::at_rest(&built.model), memory: Memory::Nothing }),
     }
 }
 
@@ -298,7 +313,7 @@ impl<'a, R: Real> Course<'a, R> {
         plan: &'a Plan,
         folder: &'a OutputFolder,
         options: Options<'_>,
-        Moment { state, equilibrium }: Moment<R>,
+        Moment { state, memory }: Moment<R>,
         mut solver: Box<dyn Solver<R> + 'a>,
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
@@ -306,7 +321,7 @@ impl<'a, R: Real> Course<'a, R> {
         let samples = if plan.target.device.is_some() { SAMPLES_ON_DEVICE } else { SAMPLES };
         let written = before.map(|before| before.outputs.as_slice());
         let watching = observers::<R>(scene, built, folder.path(), &mut files, written)?;
-        equilibrium.into_iter().for_each(|equilibrium| solver.resume(equilibrium));
+        solver.resume(memory);
         Ok(Self {
             scene,
             built,
@@ -341,7 +356,12 @@ impl<'a, R: Real> Course<'a, R> {
         if self.sampling.is_due(time, step, last) {
             self.history.sample(self.built, observable, &self.state);
         }
-        let frame = Frame { built: self.built, state: &self.state, stepper: observable };
+        let frame = Frame {
+            built: self.built,
+            state: &self.state,
+            stepper: observable,
+            corotational: self.solver.corotational(),
+        };
         look(&mut self.watching, &frame, step, last)
             .map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?;
         Ok(last)
@@ -386,7 +406,7 @@ impl<'a, R: Real> Course<'a, R> {
                 sampling: self.sampling,
                 outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
             };
-            let written = checkpoints.write(&progressed, &self.state, self.solver.equilibrium());
+            let written = checkpoints.write(&progressed, &self.state, &self.solver.memory());
             self.kept = Some(written.map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?);
         }
         // What is left of the last instant is quickly done.

@@ -7,7 +7,10 @@ use pliant_mechanics::{
     CentralDifference, DynamicRelaxation, Equilibrium, Iteration, Observable, Real, RelaxationSettings, State,
 };
 
+use serde::{Deserialize, Serialize};
+
 use crate::build::Built;
+use crate::corotational::Remembered;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
@@ -23,6 +26,54 @@ pub struct LoadStepProgress {
     pub iteration: Iteration,
     /// The relative residual at which it is found.
     pub tolerance: f64,
+}
+
+/// What a solver needs beside the state to go on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Memory<R> {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The equilibrium last found.
+    Equilibrium(Equilibrium<R>),
+    /// Of shells and co-rotational solids.
+    Corotated(Box<Remembered>),
+}
+
+impl<R> Memory<R> {
+    /// Whether it is one of a model with so many nodes.
+    pub(crate) fn fits(&self, nodes: usize) -> bool {
+        match self {
+            Self::Nothing => true,
+            Self::Equilibrium(equilibrium) => equilibrium.residual.len() == nodes,
+            Self::Corotated(remembered) => remembered.fits(nodes),
+        }
+    }
+}
+
+/// What the equations of an implicit or a static run took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Effort {
+    /// Iterations of Newton's method in all.
+    pub newton_iterations: u64,
+    /// Linear equations solved.
+    pub solutions: u64,
+    /// Iterations of conjugate gradients in all; 0 with factors.
+    pub linear_iterations: u64,
+    /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
+    pub linear_residual: f64,
+    /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.
+    pub residual: Option<f64>,
+    /// Steps that were halved.
+    pub halved: u64,
+    /// Wall time of forces and stiffness of the cells [s].
+    pub seconds_cells: f64,
+    /// Wall time of factorising, or of making the preconditioner [s].
+    pub seconds_factors: f64,
+    /// Wall time of solving with them [s].
+    pub seconds_solution: f64,
+    /// Beginning of the first unstable equilibrium [s], seen from a negative pivot.
+    pub unstable_from: Option<f64>,
 }
 
 /// Brings a state from instant to instant.
@@ -57,18 +108,29 @@ pub(crate) trait Solver<R> {
 
     /// What a restart needs beside the state, after [`advance`](Self::advance): nothing where
     /// [`evaluate`](Self::evaluate) finds everything anew.
-    fn equilibrium(&self) -> Option<Equilibrium<R>> {
-        None
+    fn memory(&self) -> Memory<R> {
+        Memory::Nothing
     }
 
     /// Takes that up again.
-    fn resume(&mut self, _equilibrium: Equilibrium<R>) {}
+    fn resume(&mut self, _memory: Memory<R>) {}
+
+    /// Of shells and co-rotational solids: their state, with rotations.
+    fn corotational(&self) -> Option<&pliant_corotational::State> {
+        None
+    }
+
+    /// What its equations took; `None` of one that solves none.
+    fn effort(&self) -> Option<Effort> {
+        None
+    }
 }
 
 /// Watches the largest stable step of an explicit run; where every node is held there is no limit to watch.
 fn monitor(run: &RunTable, built: &Built, plan: &Plan) -> Option<Monitor> {
     let on_unstable = run.on_unstable.unwrap_or_default();
-    (plan.limit.step.is_finite()).then(|| Monitor::new(&built.model, plan.limit.step, on_unstable))
+    let limit = plan.limits.as_ref()?.limit.step;
+    limit.is_finite().then(|| Monitor::new(&built.model, limit, on_unstable))
 }
 
 /// The solver that a scene asks for, on the processor.
@@ -86,6 +148,10 @@ pub(crate) fn on_processor<'m, R: Real>(
                 Some(monitor) => Box::new(stepper.watched(monitor)),
                 None => Box::new(stepper),
             }
+        }
+        // Refused when the model was built.
+        SolverName::Implicit | SolverName::Static => {
+            return Err(FailureSummary::input(&"this solver is for shells and co-rotational solids"));
         }
         SolverName::QuasiStatic => {
             let precise = RelaxationSettings::default().tolerance;
@@ -222,12 +288,14 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
         &self.relaxation
     }
 
-    fn equilibrium(&self) -> Option<Equilibrium<R>> {
-        Some(self.relaxation.equilibrium())
+    fn memory(&self) -> Memory<R> {
+        Memory::Equilibrium(self.relaxation.equilibrium())
     }
 
-    fn resume(&mut self, equilibrium: Equilibrium<R>) {
-        self.relaxation.resume(equilibrium);
+    fn resume(&mut self, memory: Memory<R>) {
+        if let Memory::Equilibrium(equilibrium) = memory {
+            self.relaxation.resume(equilibrium);
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use pliant_gpu::{Device, GpuError, Kind};
 
+use crate::build::Built;
 use crate::diagnostic::Diagnostic;
 use crate::format::{DeviceName, Precision, RunTable, SolverName};
 use crate::scene::Scene;
@@ -22,8 +23,9 @@ impl Target {
     ///
     /// # Errors
     /// If a graphics processor is asked for, and there is none or it can't run the scene.
-    pub(crate) fn choose(scene: &Scene) -> Result<Self, Box<Diagnostic>> {
+    pub(crate) fn choose(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
         let run = &scene.run;
+        let corotational = built.corotational.is_some();
         match run.device {
             DeviceName::Cpu => match &run.adapter {
                 None => Ok(Self::processor(run, None)),
@@ -35,7 +37,7 @@ impl Target {
                     Err(Box::new(error.help("set `device = \"gpu\"` or `\"auto\"`, or leave `adapter` out")))
                 }
             },
-            DeviceName::Gpu => match processor_only(run) {
+            DeviceName::Gpu => match processor_only(run, corotational) {
                 None => match open(run) {
                     Ok(device) => {
                         let software = device.adapter().kind == Kind::Software;
@@ -60,7 +62,7 @@ impl Target {
                     Err(Box::new(error.help(help)))
                 }
             },
-            DeviceName::Auto => Ok(match processor_only(run) {
+            DeviceName::Auto => Ok(match processor_only(run, corotational) {
                 Some((_, what, _)) => {
                     Self::processor(run, Some(format!("{what} runs on the processor only")))
                 }
@@ -95,7 +97,11 @@ impl Target {
 }
 
 /// The key that a graphics processor can't serve, in words, and what to do.
-fn processor_only(run: &RunTable) -> Option<(&'static str, &'static str, &'static str)> {
+fn processor_only(run: &RunTable, corotational: bool) -> Option<(&'static str, &'static str, &'static str)> {
+    if corotational {
+        let help = "set `device = \"cpu\"`, or leave it out";
+        return Some(("device", "the model of shells and co-rotational solids", help));
+    }
     if run.solver == SolverName::QuasiStatic {
         let help = "set `device = \"cpu\"`, or `solver = \"explicit\"`";
         return Some(("solver", "the solver `quasi-static`", help));

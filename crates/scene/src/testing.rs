@@ -43,3 +43,17 @@ pub(crate) fn built(more: &str) -> Built {
 pub(crate) fn mistakes(more: &str) -> SceneErrors {
     build(&scene(more)).expect_err("a mistake")
 }
+
+/// What is built from a text alone.
+pub(crate) fn built_alone(text: &str) -> Built {
+    build(&read(text)).unwrap_or_else(|error| panic!("{}", error.plain()))
+}
+
+/// What is wrong with a text alone, found when it is read or when it is built.
+pub(crate) fn mistakes_alone(text: &str) -> SceneErrors {
+    let source = Source::parse("alone.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
+    match Scene::from_source(source, ".".into()) {
+        Ok(scene) => build(&scene).expect_err("a mistake"),
+        Err(errors) => errors,
+    }
+}

@@ -16,9 +16,8 @@ pub type Matrix9 = SMatrix<f64, 9, 9>;
 pub type Corners = [Vector2<f64>; 3];
 
 pub use bending::discrete_kirchhoff;
-pub(crate) use bending::{MIDSIDES, curvature};
 pub use comas::comas_2010;
-pub(crate) use membrane::{andes_basic, strain};
+pub(crate) use membrane::andes_basic;
 pub use membrane::{andes_opt, constant_strain};
 
 /// How a shell resists in its plane.

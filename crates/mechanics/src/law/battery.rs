@@ -6,11 +6,6 @@ use super::samples::{every_law, merged, term};
 use super::*;
 use crate::tensor::{Tensor, dot, scale};
 
-/// True if the law is the same in all directions.
-fn is_isotropic(law: &AnyLaw) -> bool {
-    law.families() == 0 && law.name() != "fung-orthotropic"
-}
-
 const FIBRE: [f64; 3] = [0.6, 0.0, 0.8];
 /// As many as any law has families; the second at right angles.
 const FIBRES: [[f64; 3]; 2] = [FIBRE, [0.0, 1.0, 0.0]];
@@ -192,7 +187,7 @@ fn no_wave_at_rest_is_faster_than_the_longitudinal_modulus_says_and_none_stands_
         assert!(slowest > 0.0, "{law:?}: ρc² = {slowest}");
         assert!(fastest <= bound * (1.0 + 1e-6), "{law:?}: ρc² = {fastest}, bound {bound}");
         // Tight: exact without fibres and with one family, else as far as the sum of maxima is from the maximum of sums.
-        let exact = is_isotropic(&law) || law.name() == "transversely-isotropic";
+        let exact = law.is_isotropic() || law.name() == "transversely-isotropic";
         let least = if exact { 1.0 - 1e-6 } else { 0.8 };
         assert!(fastest >= bound * least, "{law:?}: ρc² = {fastest}, bound {bound}");
     }

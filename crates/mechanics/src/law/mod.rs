@@ -251,6 +251,11 @@ impl AnyLaw {
         with_law!(self, law => Law::families(law))
     }
 
+    /// True if the law is the same in all directions.
+    pub fn is_isotropic(&self) -> bool {
+        self.families() == 0 && self.name() != "fung-orthotropic"
+    }
+
     /// Moduli at rest; see [`Law::small_strain`].
     pub fn small_strain(&self) -> SmallStrainModuli {
         with_law!(self, law => law.small_strain())

@@ -55,7 +55,8 @@ impl Program {
         let short = scene(cells, 1e-3)?;
         let built = pliant_scene::build(&short)?;
         // The duration that takes as many steps as are to be timed.
-        let step = SAFETY * pliant_scene::plan(&short, &built)?.limit.step;
+        let limits = pliant_scene::plan(&short, &built)?.limits;
+        let step = SAFETY * limits.map_or(1e-3, |limits| limits.limit.step);
         let scene = scene(cells, step * (ELEMENT_STEPS / cells.pow(3)) as f64)?;
         let built = pliant_scene::build(&scene)?;
         let plan = pliant_scene::plan(&scene, &built)?;

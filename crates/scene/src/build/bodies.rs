@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use pliant_geometry::{CellBlock, CellKind, Mesh, Surface, boundary};
+use pliant_geometry::{CellBlock, CellKind, Mesh, Surface, body_blocks, boundary};
 use pliant_mechanics::model::{Averaging, Body, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
 
 use super::{Builder, BuiltBody, SCENE, suggestion};
 use crate::diagnostic::counted;
-use crate::format::{BodyTable, ByLabel, Density, Element, Hourglass, SolverName};
+use crate::format::{BodyModel, BodyTable, ByLabel, Density, Element, Hourglass};
 use crate::registry::LawTable;
 
 /// A body that is being built.
@@ -36,7 +36,11 @@ impl Builder<'_> {
             let Some(mut made) = self.mesh(&table.mesh, &mesh_path) else { continue };
             let file_nodes = made.mesh.points.len();
             let file_numbers = self.repair(&mut made.mesh, &table.mesh, &mesh_path);
-            if !self.check_mesh(&made.mesh, &table.mesh, &mesh_path) {
+            if table.model == BodyModel::Shell {
+                let Some(mesh) = self.triangles(made.mesh, &mesh_path) else { continue };
+                made.mesh = mesh;
+            }
+            if !self.check_mesh(&made.mesh, table, &mesh_path) {
                 continue;
             }
             let boundary = boundary(&made.mesh);
@@ -65,6 +69,10 @@ impl Builder<'_> {
         self.check_labels(name, ["law", "\"law\""], &table.law, mesh);
         self.check_labels(name, ["density", "1000"], &table.density, mesh);
         self.check_labels(name, ["hourglass", "0.2"], &table.hourglass, mesh);
+        if table.model != BodyModel::Solid {
+            self.add_corotational(draft, first);
+            return;
+        }
         for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
             if !self.check_element(name, table, block.kind) {
                 return;
@@ -78,8 +86,9 @@ impl Builder<'_> {
     /// The velocity at the start of the model's last nodes, from a first one on.
     fn set_velocity(&mut self, name: &str, table: &BodyTable, first: usize) {
         let Some(velocity) = table.velocity else { return };
-        if self.scene.run.solver == SolverName::QuasiStatic {
-            let message = format!("`{name}` has a velocity, but a quasi-static run has no inertia");
+        if self.scene.run.solver.finds_equilibria() {
+            let word = self.scene.run.solver.word();
+            let message = format!("`{name}` has a velocity, but a {word} run has no inertia");
             let help = "leave it out, or run the scene with `solver = \"explicit\"`";
             self.error(&["body", name, "velocity"], message, "plays no part", help);
         }
@@ -88,7 +97,9 @@ impl Builder<'_> {
     }
 
     fn check_element(&mut self, name: &str, table: &BodyTable, kind: CellKind) -> bool {
-        let fits = table.element.is_none_or(|element| element.is_tet() == (kind == CellKind::Tet));
+        let fits = table
+            .element
+            .is_none_or(|element| !element.is_shell() && element.is_tet() == (kind == CellKind::Tet));
         if !fits {
             let cells = if kind == CellKind::Tet { "tets" } else { "hexes" };
             let message = format!("the mesh of `{name}` has {cells}, which this element is not for");
@@ -104,7 +115,7 @@ impl Builder<'_> {
         let ByLabel::Each(map) = values else { return };
         let path = ["body", name, key];
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-        for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
+        for block in body_blocks(mesh) {
             let Some(labels) = block.data.get("label") else {
                 let message = format!("the {} cells of `{name}` have no labels", block.kind.name());
                 let help = format!(
@@ -236,7 +247,7 @@ fn parts(table: &BodyTable, block: &CellBlock) -> Vec<Part> {
 }
 
 /// Where a body names a law: its `law`, or the label in it.
-fn law_path<'a>(body: &'a str, choice: &'a ByLabel<String>, law: &str) -> Vec<&'a str> {
+pub(super) fn law_path<'a>(body: &'a str, choice: &'a ByLabel<String>, law: &str) -> Vec<&'a str> {
     let label = match choice {
         ByLabel::One(_) => None,
         ByLabel::Each(map) => map.iter().find(|(_, known)| *known == law).map(|(label, _)| label),

@@ -5,7 +5,7 @@ use pliant_mechanics::model::{Constraint, Motion};
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
-use crate::format::{Axis, MoveTable, Vectors};
+use crate::format::{MoveTable, SolverName, Vectors};
 use crate::registry::{ConstraintTable, LoadTable};
 
 impl Builder<'_> {
@@ -13,18 +13,30 @@ impl Builder<'_> {
         let scene = self.scene;
         for (name, table) in &scene.constraints {
             let path = ["constraint", name.as_str()];
-            let (body, selection, axes) = match table {
-                ConstraintTable::Fix(fix) => (&fix.body, &fix.nodes, &fix.components),
-                ConstraintTable::Move(moved) => (&moved.body, &moved.nodes, &moved.components),
+            let (body, selection, axes, turns) = match table {
+                ConstraintTable::Fix(fix) => (&fix.body, &fix.nodes, &fix.components, true),
+                ConstraintTable::Move(moved) => {
+                    (&moved.body, &moved.nodes, &moved.components, moved.turn.is_some())
+                }
+                ConstraintTable::Spring(spring) => {
+                    self.add_springs(name, spring);
+                    continue;
+                }
             };
-            let components = self.components(axes.as_deref(), &path);
             let body = self.find_body(body, &[path[0], path[1], "body"]);
+            let components = self.components(axes.as_deref(), body, turns, &path);
             let nodes = body.and_then(|body| self.body_nodes(body, selection, &[path[0], path[1], "nodes"]));
             let motion = match table {
-                ConstraintTable::Fix(_) => Some(Motion::Fixed),
+                ConstraintTable::Move(moved) if self.corotational.is_some() => {
+                    self.corotational_motion(name, moved, body.zip(nodes.as_deref()))
+                }
                 ConstraintTable::Move(moved) => self.motion(moved, body.zip(nodes.as_deref()), &path),
+                _ => Some(Motion::Fixed),
             };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
+                self.constrain_corotational(name, table, &motion, &nodes, components);
+                let [x, y, z, ..] = components;
+                let components = [x, y, z];
                 self.model.constraints.push(Constraint { name: name.clone(), nodes, components, motion });
             }
         }
@@ -51,29 +63,22 @@ impl Builder<'_> {
                 Some(Motion::Displacements(by?, curve?))
             }
             (None, Some(velocity)) => Some(Motion::Velocity(velocity, curve?)),
+            (None, None) if table.turn.is_some() => {
+                let message = "the nodes of a solid do not turn by themselves";
+                self.error(
+                    &[path, &["turn"]].concat(),
+                    message,
+                    "not for a `solid`",
+                    "give displacements in `by`",
+                );
+                None
+            }
             (by, _) => {
                 let found = if by.is_some() { "both" } else { "neither" };
                 let message = format!("a motion has exactly one of `by` and `velocity`, found {found}");
                 self.error(path, message, "this motion", "`by` in metres, `velocity` in metres per second");
                 None
             }
-        }
-    }
-
-    fn components(&mut self, axes: Option<&[Axis]>, path: &[&str]) -> Option<[bool; 3]> {
-        match axes {
-            None => Some([true; 3]),
-            Some([]) => {
-                let at = [path, &["components"]].concat();
-                self.error(
-                    &at,
-                    "`components` is empty",
-                    "here",
-                    "name x, y, z, or leave it out for all three",
-                );
-                None
-            }
-            Some(axes) => Some([Axis::X, Axis::Y, Axis::Z].map(|axis| axes.contains(&axis))),
         }
     }
 
@@ -101,19 +106,19 @@ impl Builder<'_> {
         let flies =
             |name: &str| scene.bodies.iter().any(|(own, body)| own == name && body.velocity.is_some());
         for (index, body) in self.model.bodies.iter().enumerate() {
+            let springs = self.corotational.as_ref().map_or(&[][..], |part| &part.model.springs);
             let held =
-                self.model.constraints.iter().any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)));
-            if held {
+                self.model.constraints.iter().any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)))
+                    || springs.iter().any(|spring| body.nodes.contains(&spring.node));
+            if held || scene.run.solver == SolverName::Static {
                 continue;
             }
             let name = &body.name;
             let surfaces = self.model.surfaces.iter().filter(|s| s.body == index).map(|s| s.name.as_str());
             let own: Vec<&str> = surfaces.chain([name.as_str()]).collect();
             let loaded = scene.loads.iter().any(|(_, load)| match load {
-                LoadTable::Force(l) => own.contains(&l.on.as_str()),
-                LoadTable::Traction(l) => own.contains(&l.on.as_str()),
-                LoadTable::Pressure(l) => own.contains(&l.on.as_str()),
                 LoadTable::Gravity(_) => false,
+                load => load.on().is_some_and(|on| own.contains(&on)),
             });
             let falls = scene.scene.gravity.is_some()
                 || scene.loads.iter().any(|(_, load)| matches!(load, LoadTable::Gravity(g) if g.on.as_ref().is_none_or(|on| on == name)));

@@ -5,12 +5,16 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
 use super::{Builder, SCENE, Target, suggestion};
-use crate::format::{CsvTable, FieldName, ForceTable, ProbeTable, Vectors, VtuTable};
+use crate::format::{At, BodyModel, CsvTable, FieldName, ForceTable, ProbeTable, Timing, Vectors, VtuTable};
 use crate::registry::{LoadTable, OutputTable};
 
 impl Builder<'_> {
     pub(super) fn add_loads(&mut self) {
         let scene = self.scene;
+        if self.corotational.is_some() {
+            self.add_corotational_loads();
+            return;
+        }
         if let Some(acceleration) = scene.scene.gravity {
             for body in 0..self.model.bodies.len() {
                 let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
@@ -29,13 +33,17 @@ impl Builder<'_> {
 
     fn loads(&mut self, table: &LoadTable, path: &[&str]) -> Option<Vec<(LoadKind, Curve, Option<usize>)>> {
         let at = |key| [path, &[key]].concat();
-        let timing = match table {
-            LoadTable::Force(l) => &l.timing,
-            LoadTable::Traction(l) => &l.timing,
-            LoadTable::Pressure(l) => &l.timing,
-            LoadTable::Gravity(l) => &l.timing,
-        };
-        let curve = self.curve(timing, path);
+        if let LoadTable::Moment(_) | LoadTable::Edge(_) = table {
+            let message = "moments and loads on edges are for shells";
+            self.error(
+                path,
+                message,
+                "not for a `solid`",
+                "take forces or tractions, or set `model = \"shell\"`",
+            );
+            return None;
+        }
+        let curve = self.curve(table.timing(), path);
         if let LoadTable::Gravity(gravity) = table {
             let bodies = match &gravity.on {
                 Some(name) => vec![self.find_body(name, &at("on"))?],
@@ -56,13 +64,7 @@ impl Builder<'_> {
             let load = |body| LoadKind::Gravity { body, acceleration };
             return Some(bodies.into_iter().map(|body| (load(body), curve.clone(), None)).collect());
         }
-        let on = match table {
-            LoadTable::Force(l) => &l.on,
-            LoadTable::Traction(l) => &l.on,
-            LoadTable::Pressure(l) => &l.on,
-            LoadTable::Gravity(_) => return None,
-        };
-        let target = self.find_target(on, &at("on"))?;
+        let target = self.find_target(table.on()?, &at("on"))?;
         let kind = match table {
             LoadTable::Force(l) => self.nodal_forces(l, target, path),
             LoadTable::Traction(l) => self
@@ -71,7 +73,7 @@ impl Builder<'_> {
             LoadTable::Pressure(l) => self
                 .faces(target, &l.faces, &at("faces"))
                 .map(|faces| LoadKind::Pressure { faces, pressure: l.pressure }),
-            LoadTable::Gravity(_) => None,
+            LoadTable::Gravity(_) | LoadTable::Moment(_) | LoadTable::Edge(_) => None,
         };
         let surface = match target {
             Target::Body(_) => None,
@@ -80,7 +82,12 @@ impl Builder<'_> {
         Some(vec![(kind?, curve?, surface)])
     }
 
-    fn nodal_forces(&mut self, table: &ForceTable, target: Target, path: &[&str]) -> Option<LoadKind> {
+    pub(super) fn nodal_forces(
+        &mut self,
+        table: &ForceTable,
+        target: Target,
+        path: &[&str],
+    ) -> Option<LoadKind> {
         let at = [path, &["nodes"]].concat();
         let nodes = match target {
             Target::Body(body) => self.body_nodes(body, &table.nodes, &at)?,
@@ -120,7 +127,12 @@ impl Builder<'_> {
     }
 
     /// The selected faces of a body (numbered in the model) or of a carried surface (numbered in it).
-    fn faces(&mut self, target: Target, selection: &Selection, path: &[&str]) -> Option<Vec<Face>> {
+    pub(super) fn faces(
+        &mut self,
+        target: Target,
+        selection: &Selection,
+        path: &[&str],
+    ) -> Option<Vec<Face>> {
         let result = match target {
             Target::Body(body) => {
                 let (built, first) = (&self.bodies[body], self.model.bodies[body].nodes.start);
@@ -140,7 +152,12 @@ impl Builder<'_> {
         (mesh, boundary)
     }
 
-    fn traction_forces(&self, target: Target, faces: &[Face], traction: [f64; 3]) -> Vec<(u32, [f64; 3])> {
+    pub(super) fn traction_forces(
+        &self,
+        target: Target,
+        faces: &[Face],
+        traction: [f64; 3],
+    ) -> Vec<(u32, [f64; 3])> {
         let rest = match target {
             Target::Body(_) => &self.model.rest,
             Target::Surface(index) => &self.model.surfaces[index].rest,
@@ -165,10 +182,55 @@ impl Builder<'_> {
 
     fn check_vtu(&mut self, table: &VtuTable, path: &[&str]) {
         let at = |key| [path, &[key]].concat();
-        let Some(on) = &table.on else { return };
-        if let Some(Target::Surface(_)) = self.find_target(on, &at("on")) {
+        let target = table.on.as_ref().map(|on| self.find_target(on, &at("on")));
+        if let Some(Some(Target::Surface(surface))) = target {
             let help = "write displacement and velocity on surfaces, stresses on the body";
-            self.refuse_cell_fields(&table.data, &at("data"), help);
+            self.refuse_cell_fields(&table.data, surface, &at("data"), help);
+        }
+        let body = match target {
+            None => None,
+            Some(Some(Target::Body(body))) => Some(body),
+            Some(_) => return,
+        };
+        self.refuse_other_fields(&table.data, body, &at("data"));
+        let shells = self.scene.bodies.iter().enumerate().any(|(index, (_, table))| {
+            body.is_none_or(|body| body == index) && table.model == BodyModel::Shell
+        });
+        if table.curved.is_some() && !shells {
+            let message = "only shells have a curved surface";
+            self.error(&at("curved"), message, "no shell", "leave `curved` out");
+        }
+        if table.curved.is_some() && table.at == At::Points {
+            let message = "on a curved surface fields of cells are written on the cells";
+            self.error(&at("at"), message, "not with `curved`", "leave `at` or `curved` out");
+        }
+    }
+
+    /// Refuses fields that no chosen body has.
+    fn refuse_other_fields(&mut self, fields: &[FieldName], body: Option<usize>, path: &[&str]) {
+        let scene = self.scene;
+        let models =
+            scene.bodies.iter().enumerate().filter(|(index, _)| body.is_none_or(|body| body == *index));
+        let models: Vec<BodyModel> = models.map(|(_, (_, table))| table.model).collect();
+        let strange = fields.iter().position(|field| !models.iter().any(|&model| field.is_of(model)));
+        if let (Some(index), Some(model)) = (strange, models.first()) {
+            let index_text = index.to_string();
+            let message = format!("bodies of model `{}` have no `{}`", model.word(), fields[index].name());
+            let help = match model {
+                BodyModel::Shell => {
+                    "fields of a shell: `displacement`, `velocity`, `rotation`, `von-mises`, `stress-top`, `stress-middle`, \
+                     `stress-bottom`, `membrane-force`, `bending-moment`, `membrane-energy`, `bending-energy`, \
+                     `drilling-energy`, `thickness`"
+                }
+                BodyModel::Corotational => {
+                    "fields of a co-rotational solid: `displacement`, `velocity`, `cauchy-stress`, `von-mises`, `pressure`, \
+                     `J`, `energy-density`"
+                }
+                BodyModel::Solid => "leave it out: it is a field of shells",
+            };
+            let given = self.source().node(&[path, &[index_text.as_str()]].concat()).is_some();
+            let at = if given { [path, &[index_text.as_str()]].concat() } else { path.to_vec() };
+            self.error(&at, message, "no such field", help);
         }
     }
 
@@ -190,12 +252,21 @@ impl Builder<'_> {
     fn check_probe(&mut self, name: &str, probe: &ProbeTable, path: &[&str]) {
         let at = |key| [path, &[key]].concat();
         match self.find_target(&probe.on, &at("on")) {
-            Some(Target::Surface(_)) => {
-                self.refuse_cell_fields(&probe.data, &at("data"), "probe the body for stresses");
+            Some(Target::Surface(surface)) => {
+                self.refuse_cell_fields(&probe.data, surface, &at("data"), "probe the body for stresses");
             }
             Some(Target::Body(body)) => {
-                let found = Locator::new(&self.bodies[body].mesh).locate(Vector3::from(probe.at));
-                let distance = found.map_or(0.0, |location| location.distance);
+                self.refuse_other_fields(&probe.data, Some(body), &at("data"));
+                let place = Vector3::from(probe.at);
+                let distance = match self.scene.bodies[body].1.model {
+                    BodyModel::Shell => {
+                        self.bodies[body].closest(&place).map(|found| (found.position - place).norm())
+                    }
+                    _ => {
+                        Locator::new(&self.bodies[body].mesh).locate(place).map(|location| location.distance)
+                    }
+                };
+                let distance = distance.unwrap_or(0.0);
                 let help = "give its place at rest in metres; the nearest cell carries it";
                 self.doubt_place(&format!("probe `{name}`"), distance, body, &at("at"), help);
             }
@@ -204,12 +275,48 @@ impl Builder<'_> {
     }
 
     /// A carried surface has no cells whose stress could be told.
-    fn refuse_cell_fields(&mut self, fields: &[FieldName], path: &[&str], help: &str) {
+    fn refuse_cell_fields(&mut self, fields: &[FieldName], surface: usize, path: &[&str], help: &str) {
+        let on_shell = self.corotational.as_ref().is_some_and(|part| part.carried.contains_key(&surface));
+        if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {
+            let message = format!("surfaces on shells have a displacement and no `{}`", field.name());
+            self.error(path, message, "not on a surface", "write it on the body");
+            return;
+        }
+        if let Some(FieldName::Rotation) = fields.iter().find(|field| **field == FieldName::Rotation) {
+            self.error(path, "surfaces have no `rotation`", "not on a surface", "write it on the body");
+            return;
+        }
         if let Some(field) = fields.iter().find(|field| !field.is_nodal()) {
             let message =
                 format!("`{}` belongs to cells; a carried surface has none of its body's", field.name());
             self.error(path, message, "not on a surface", help);
         }
+    }
+}
+
+impl LoadTable {
+    /// Its course over time.
+    pub(super) fn timing(&self) -> &Timing {
+        match self {
+            Self::Force(load) => &load.timing,
+            Self::Moment(load) => &load.timing,
+            Self::Edge(load) => &load.timing,
+            Self::Traction(load) => &load.timing,
+            Self::Pressure(load) => &load.timing,
+            Self::Gravity(load) => &load.timing,
+        }
+    }
+
+    /// What it acts on; `None`: everything.
+    pub(super) fn on(&self) -> Option<&str> {
+        Some(match self {
+            Self::Force(load) => &load.on,
+            Self::Moment(load) => &load.on,
+            Self::Edge(load) => &load.on,
+            Self::Traction(load) => &load.on,
+            Self::Pressure(load) => &load.on,
+            Self::Gravity(load) => return load.on.as_deref(),
+        })
     }
 }
 

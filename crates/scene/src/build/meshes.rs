@@ -12,7 +12,7 @@ use pliant_meshing::{
 
 use super::Builder;
 use crate::diagnostic::{Diagnostic, counted};
-use crate::format::{Cells, CleanTable, Fix, MeshTable, Organ};
+use crate::format::{BodyModel, BodyTable, Cells, CleanTable, Fix, MeshTable, Organ};
 use crate::output::number;
 
 /// A mesh and where it comes from.
@@ -23,6 +23,9 @@ pub(crate) struct MeshOrigin {
 
 /// An organ larger or smaller than this [m] is probably in other units.
 pub const PLAUSIBLE_SIZE: [f64; 2] = [1e-3, 10.0];
+
+/// Shapes of volume cells.
+const SOLID_SHAPES: [&str; 4] = ["block", "ellipsoid", "tube", "organ"];
 
 /// Carries the nodes' numbers in the file through the repairs.
 const FILE_NUMBER: &str = "number of the node in the mesh file";
@@ -37,11 +40,18 @@ impl Builder<'_> {
             ("ellipsoid", table.ellipsoid.is_some()),
             ("tube", table.tube.is_some()),
             ("organ", table.organ.is_some()),
+            ("plate", table.plate.is_some()),
+            ("cylinder", table.cylinder.is_some()),
+            ("sphere", table.sphere.is_some()),
+            ("hemisphere", table.hemisphere.is_some()),
+            ("annulus", table.annulus.is_some()),
+            ("twisted-strip", table.twisted_strip.is_some()),
         ];
         let sources: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
         let [source] = sources[..] else {
             let message = format!("a mesh comes from exactly one source, found {}", sources.len());
-            let help = "give one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`";
+            let help = "give one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, or for shells `plate`, `cylinder`, \
+                        `sphere`, `hemisphere`, `annulus`, `twisted-strip`";
             self.error(path, message, "this mesh", help);
             return None;
         };
@@ -59,7 +69,8 @@ impl Builder<'_> {
         let mut made = match (&table.file, &table.image) {
             (Some(file), _) => self.file(file.clone(), table, path)?,
             (_, Some(image)) => self.image(image, table, path)?,
-            _ => self.shape(source, table, path)?,
+            _ if SOLID_SHAPES.contains(&source) => self.shape(source, table, path)?,
+            _ => self.sheet(source, table, path)?,
         };
         let shift = Vector3::from(table.at);
         for point in &mut made.mesh.points {
@@ -70,7 +81,7 @@ impl Builder<'_> {
 
     fn file(&mut self, file: PathBuf, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let at = |key| [path, &[key]].concat();
-        for (key, given) in [("edge", table.edge.is_some()), ("as", table.cells != Cells::Tets)] {
+        for (key, given) in [("edge", table.edge.is_some()), ("as", table.cells.is_some())] {
             if given {
                 let message = format!("`{key}` is for built-in shapes; a mesh file has its own cells");
                 self.error(&at(key), message, "here", "leave it out");
@@ -167,7 +178,7 @@ impl Builder<'_> {
         if table.clean.is_some() {
             self.notes.push(format!("{name}: {cleaned}"));
         }
-        let (mesh, dropped, count) = match fill_anatomy(&anatomy, table.cells, edge) {
+        let (mesh, dropped, count) = match fill_anatomy(&anatomy, table.volume_cells(), edge) {
             Ok(filled) => filled,
             Err(error) => {
                 self.error(&at("edge"), error.to_string(), "this size", "");
@@ -178,14 +189,14 @@ impl Builder<'_> {
             self.notes.push(format!("{name}: {dropped} cells in {count} loose parts were dropped"));
         }
         // Steps of cubes stay behind the body by up to half of their diagonal.
-        let allowed = if table.cells == Cells::Tets { edge / 2.0 } else { edge };
+        let allowed = if table.volume_cells() == Cells::Tets { edge / 2.0 } else { edge };
         let doubt = Deviation::new(&mesh, anatomy.field(), edge).ok().and_then(|found| found.doubt(allowed));
         if let Some(doubt) = doubt {
             let place = self.source().span(&at("edge"));
             let help = "use a shorter edge, or `clean = { keep-largest = true }` for small pieces";
             self.out.push(Diagnostic::warning(doubt).at(place, "this size").help(help));
         }
-        let cells = describe_cells(table.cells);
+        let cells = describe_cells(table.volume_cells());
         let words = match threshold {
             Some(least) => format!("from {least} on"),
             None => format!("label {}", chosen.iter().map(i32::to_string).collect::<Vec<_>>().join(", ")),
@@ -266,16 +277,23 @@ impl Builder<'_> {
     }
 
     /// Refuses a body's mesh that cannot be simulated.
-    pub(super) fn check_mesh(&mut self, mesh: &Mesh, table: &MeshTable, path: &[&str]) -> bool {
+    pub(super) fn check_mesh(&mut self, mesh: &Mesh, body: &BodyTable, path: &[&str]) -> bool {
+        let table = &body.mesh;
         let fixes: &[Fix] = table.fix.as_ref().map_or(&[], |fixes| fixes.as_slice());
         let place = if table.file.is_some() { [path, &["file"]].concat() } else { path.to_vec() };
-        if mesh.volume_blocks().all(|block| block.is_empty()) {
-            let help = "a solid body needs tets or hexes; this mesh has only surface cells or none";
+        let dimension = if body.model == BodyModel::Shell { 2 } else { 3 };
+        if dimension == 3 && mesh.volume_blocks().all(|block| block.is_empty()) {
+            let help = "a solid body needs tets or hexes; this mesh has only surface cells or none. For a thin wall set \
+                        `model = \"shell\"`";
             self.error(&place, format!("`{}` has no volume elements", path[1]), "this mesh", help);
             return false;
         }
-        let found = diagnose(mesh);
-        let problems = problems(&found, fixes);
+        let mut found = diagnose(mesh);
+        if dimension == 2 && table.file.is_none() {
+            // The slit of an annulus.
+            found.duplicate_nodes.clear();
+        }
+        let problems = problems(&found, fixes, dimension);
         for (message, help) in &problems {
             self.error(&place, format!("`{}` has {message}", path[1]), "this mesh", *help);
         }
@@ -305,15 +323,15 @@ impl Builder<'_> {
     }
 }
 
-/// What keeps a mesh of volume cells from being simulated, with what to do about it. Surface cells may be as they are.
-fn problems(found: &Diagnosis, fixes: &[Fix]) -> Vec<(String, &'static str)> {
-    let solid = |cells: &[CellId]| -> Vec<CellId> {
-        cells.iter().filter(|cell| cell.kind.dimension() == 3).copied().collect()
+/// What keeps a mesh of cells of a dimension from being simulated, with what to do about it. Other cells may be as they are.
+fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, &'static str)> {
+    let own = |cells: &[CellId]| -> Vec<CellId> {
+        cells.iter().filter(|cell| cell.kind.dimension() == dimension).copied().collect()
     };
     let (lost, inverted, flat) =
-        (solid(&found.out_of_range_cells), solid(&found.inverted_cells), solid(&found.degenerate_cells));
+        (own(&found.out_of_range_cells), own(&found.inverted_cells), own(&found.degenerate_cells));
     let repeats: Vec<CellId> = found.duplicate_cells.iter().map(|&[_, repeat]| repeat).collect();
-    let repeats = solid(&repeats);
+    let repeats = own(&repeats);
     let reorder = match fixes.contains(&Fix::Reorder) {
         false => "add `fix = \"reorder\"` to the mesh to swap their nodes",
         true => "swapping their nodes does not help: remesh there",
@@ -324,9 +342,9 @@ fn problems(found: &Diagnosis, fixes: &[Fix]) -> Vec<(String, &'static str)> {
         ("elements that name nodes which do not exist", list_cells(&lost), "repair the mesh file"),
         ("inverted elements at rest", list_cells(&inverted), reorder),
         (
-            "elements without volume at rest",
+            if dimension == 3 { "elements without volume at rest" } else { "triangles without area at rest" },
             list_cells(&flat),
-            "remesh there, or take them out of the mesh: their stable time step is zero",
+            "remesh there, or take them out of the mesh",
         ),
         (
             "nodes that no element uses",
@@ -350,7 +368,7 @@ fn problems(found: &Diagnosis, fixes: &[Fix]) -> Vec<(String, &'static str)> {
 }
 
 fn make_shape(table: &MeshTable, edge: f64) -> Result<FieldMesh, MeshingError> {
-    let kind = match table.cells {
+    let kind = match table.volume_cells() {
         Cells::Tets => VolumeCell::Tet,
         Cells::Hexes => VolumeCell::Hex,
     };
@@ -367,7 +385,7 @@ fn make_shape(table: &MeshTable, edge: f64) -> Result<FieldMesh, MeshingError> {
             Tube { inner_radius: tube.inner_radius, outer_radius: tube.outer_radius, length: tube.length };
         return tube.mesh(edge, kind, DEFAULT_CELL_LIMIT).map(whole);
     }
-    let fill = |field: &dyn ImplicitField| match table.cells {
+    let fill = |field: &dyn ImplicitField| match table.volume_cells() {
         Cells::Tets => Stuffing::new(edge).mesh(field),
         Cells::Hexes => Voxels::new(edge).mesh(field),
     };
@@ -425,7 +443,7 @@ fn describe_cells(cells: Cells) -> &'static str {
 }
 
 fn describe_shape(source: &str, table: &MeshTable) -> String {
-    let cells = describe_cells(table.cells);
+    let cells = describe_cells(table.volume_cells());
     let name = match table.organ {
         Some(Organ::Liver) => "built-in liver",
         Some(Organ::Brain) => "built-in brain",
@@ -507,14 +525,14 @@ mod tests {
             duplicate_cells: vec![[triangle, triangle]],
             ..Diagnosis::default()
         };
-        assert!(problems(&found, &[]).is_empty());
+        assert!(problems(&found, &[], 3).is_empty());
     }
 
     #[test]
     fn reordering_is_offered_once() {
         let found = Diagnosis { inverted_cells: vec![tet(1)], ..Diagnosis::default() };
-        assert!(problems(&found, &[])[0].1.contains("fix = \"reorder\""));
-        assert!(problems(&found, &[Fix::Reorder])[0].1.contains("remesh"));
+        assert!(problems(&found, &[], 3)[0].1.contains("fix = \"reorder\""));
+        assert!(problems(&found, &[Fix::Reorder], 3)[0].1.contains("remesh"));
     }
 
     #[test]

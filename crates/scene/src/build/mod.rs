@@ -3,14 +3,16 @@
 
 mod bodies;
 mod constraints;
+mod corotational;
 mod fibres;
 mod loads;
 mod mass;
 mod meshes;
 mod node_vectors;
+mod sheets;
 mod surfaces;
 
-use pliant_geometry::{Mesh, Surface};
+use pliant_geometry::{Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 
@@ -20,6 +22,7 @@ use crate::format::{CurveShape, Timing};
 use crate::scene::Scene;
 use crate::source::Source;
 
+pub use corotational::{BodyCells, Control, Corotational};
 pub(crate) use meshes::MeshOrigin;
 pub use meshes::PLAUSIBLE_SIZE;
 
@@ -28,6 +31,8 @@ pub use meshes::PLAUSIBLE_SIZE;
 pub struct Built {
     /// The model.
     pub model: Model,
+    /// Shells and co-rotational solids; the model then holds their nodes, but no cells and no loads.
+    pub corotational: Option<Corotational>,
     /// The bodies' meshes, in the order of the model's bodies.
     pub bodies: Vec<BuiltBody>,
     /// The carried surfaces' meshes, in the order of the model's surfaces.
@@ -56,6 +61,12 @@ pub struct BuiltBody {
 }
 
 impl BuiltBody {
+    /// The point of its boundary that is closest to a point at rest [m].
+    pub(crate) fn closest(&self, point: &Vector3) -> Option<SurfacePoint> {
+        let all: Vec<u32> = (0..self.boundary.faces.len() as u32).collect();
+        SurfaceLocator::new(&self.boundary, &all, &self.mesh.points).closest(point)
+    }
+
     /// The number that a node has in the mesh file.
     fn number_in_file(&self, node: u32) -> u32 {
         self.file_numbers.get(node as usize).copied().unwrap_or(node)
@@ -70,11 +81,13 @@ pub fn build(scene: &Scene) -> Result<Built, SceneErrors> {
     let mut builder = Builder {
         scene,
         model: Model::default(),
+        corotational: None,
         bodies: Vec::new(),
         surfaces: Vec::new(),
         out: Vec::new(),
         notes: Vec::new(),
     };
+    builder.check_models();
     builder.add_bodies();
     builder.check_explicit_only();
     if builder.failed() {
@@ -86,16 +99,19 @@ pub fn build(scene: &Scene) -> Result<Built, SceneErrors> {
     builder.add_loads();
     builder.check_outputs();
     builder.check_free_bodies();
+    builder.check_held();
+    builder.start_corotational();
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }
-    let Builder { model, bodies, surfaces, out: warnings, notes, .. } = builder;
-    Ok(Built { model, bodies, surfaces, warnings, notes })
+    let Builder { model, corotational, bodies, surfaces, out: warnings, notes, .. } = builder;
+    Ok(Built { model, corotational, bodies, surfaces, warnings, notes })
 }
 
 struct Builder<'s> {
     scene: &'s Scene,
     model: Model,
+    corotational: Option<Corotational>,
     bodies: Vec<BuiltBody>,
     surfaces: Vec<Mesh>,
     out: Vec<Diagnostic>,

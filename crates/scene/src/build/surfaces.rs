@@ -1,5 +1,6 @@
 //! Surfaces carried by bodies: each point tied to the cell it lies in, or the nearest one.
 
+use pliant_corotational::{Carried, CurvedSurface, EdgeRule, State};
 use pliant_geometry::{Locator, Mesh};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::model::Surface;
@@ -37,11 +38,30 @@ impl Builder<'_> {
                 continue;
             }
             let Some(body) = body else { continue };
-            let mapping = self.carry(body, name, &surface);
+            let mapping = match self.shell_cells(body) {
+                Some(cells) => self.carry_on_shell(body, &cells, name, &surface),
+                None => self.carry(body, name, &surface),
+            };
             let rest = surface.points.iter().map(|&p| <[f64; 3]>::from(p)).collect();
             self.model.surfaces.push(Surface { name: name.clone(), body, rest, mapping });
             self.surfaces.push(surface);
         }
+    }
+
+    /// The points of a surface carried by the curved surface of a shell, kept there; no linear mapping.
+    fn carry_on_shell(&mut self, body: usize, cells: &[u32], name: &str, surface: &Mesh) -> Mapping {
+        let mut farthest = 0.0_f64;
+        if let Some(part) = &mut self.corotational {
+            let curved = part.surface.get_or_insert_with(|| CurvedSurface::new(&part.model, EdgeRule::Arc));
+            let rest = State::at_rest(&part.model);
+            let points = curved.carry_all(&part.model, &rest, cells, &surface.points).unwrap_or_default();
+            let away = |point: &Carried| point.height.hypot(point.aside[0]).hypot(point.aside[1]);
+            farthest = points.iter().map(away).fold(0.0, f64::max);
+            part.carried.insert(self.model.surfaces.len(), points);
+        }
+        let help = "is it in the same units and place as the body? `scale` and `at` move it";
+        self.doubt_place(&format!("surface `{name}`"), farthest, body, &["surface", name, "mesh"], help);
+        Mapping::from_rows(surface.points.iter().map(|_| &[][..]))
     }
 
     fn carry(&mut self, body: usize, name: &str, surface: &Mesh) -> Mapping {

@@ -7,24 +7,45 @@ use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A solid body.
+/// A body.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyTable {
-    /// Its mesh, from a file, a built-in shape, or a segmented image.
+    /// How it is modelled. All bodies of a scene are `solid`, or none is.
+    #[serde(default)]
+    pub model: BodyModel,
+    /// Its mesh, from a file, a built-in shape, or a segmented image. A shell's mesh is of triangles (quads are cut into
+    /// two); a volume mesh gives it its boundary.
     pub mesh: MeshTable,
-    /// The element; if not given, `tet4` for tets and `hex8` for hexes. For soft tissue prefer `tet4-anp` to `tet4`.
+    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-opt` for shells. For soft tissue prefer
+    /// `tet4-anp` to `tet4`.
     #[serde(default)]
     pub element: Option<Element>,
-    /// The name of its law, or a law for each cell label: `{ 1 = "parenchyma", 2 = "tumour" }`.
+    /// The name of its law, or a law for each cell label: `{ 1 = "parenchyma", 2 = "tumour" }`. Shells and co-rotational solids
+    /// take Young's modulus and Poisson's ratio of an isotropic law at small strain.
     pub law: ByLabel<String>,
     /// Mass per volume [kg/m³], or one for each cell label. Elements with averaged pressure average it apart on parts of
     /// different density.
     pub density: ByLabel<Density>,
-    /// Mass-proportional damping [1/s].
+    /// Thickness of a shell [m]: one, or one for each triangle.
+    #[serde(default)]
+    pub thickness: Option<Thickness>,
+    /// Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved surface has a kink; 45
+    /// if not given.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 180.0))]
+    pub crease: Option<f64>,
+    /// Whether more than two triangles of a shell may meet in an edge.
+    #[serde(default)]
+    pub branches: bool,
+    /// Mass-proportional damping [1/s]. All shells and co-rotational solids of a scene have the same.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub damping: f64,
+    /// Stiffness-proportional damping [s] of shells and co-rotational solids with the solver `implicit`; the same for all.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub stiffness_damping: f64,
     /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus; above about 0.5 it stiffens
     /// bending. One for the whole body or for each cell label.
     #[serde(default = "default_hourglass")]
@@ -42,6 +63,51 @@ pub struct BodyTable {
 
 fn default_hourglass() -> ByLabel<Hourglass> {
     ByLabel::One(Hourglass(0.2))
+}
+
+/// How a body is modelled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BodyModel {
+    /// A solid in large strain, by any law: total Lagrangian.
+    #[default]
+    Solid,
+    /// A solid of tets in large rotation and small strain, stiffly elastic or in long steps: with the solvers `implicit` and
+    /// `static`.
+    Corotational,
+    /// A thin wall of triangles with membrane, bending and twist in large rotation and small strain.
+    Shell,
+}
+
+impl BodyModel {
+    /// Its word in a scene file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Solid => "solid",
+            Self::Corotational => "corotational",
+            Self::Shell => "shell",
+        }
+    }
+}
+
+/// Thickness of a shell [m].
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Thickness {
+    /// The same everywhere [m].
+    Uniform(#[schemars(extend("exclusiveMinimum" = 0.0))] f64),
+    /// One for each triangle.
+    PerCell(ThicknessRule),
+}
+
+/// Where the thickness of each triangle comes from.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ThicknessRule {
+    /// The name of a cell-data array of the mesh [m]: `{ cell-data = "thickness" }`.
+    CellData(String),
+    /// One for each cell label [m]: `{ by-label = { 1 = 0.002, 2 = 0.001 } }`.
+    ByLabel(BTreeMap<String, f64>),
 }
 
 /// One value for a whole body, or one for each cell label.
@@ -155,9 +221,27 @@ pub enum Element {
     Hex8,
     /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell.
     Hex8Full,
+    /// Shell: discrete Kirchhoff triangle and optimal ANDES membrane, whose drilling adapts to the thickness: the recommended one.
+    DktOpt,
+    /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane, and calm under pressures
+    /// that stretch thin curved walls much.
+    DktCst,
+    /// Shell without bending: a constant-strain membrane whose nodes do not turn.
+    Membrane,
+    /// Shell without membrane: bending and twist of plates, for studies; something else must hold it in its plane.
+    Plate,
+    /// Shell: the element of Comas (2010), corrected for its typing errors. Only for comparison: it depends on the numbering of
+    /// the corners and converges to plates 6 to 26 % too soft.
+    #[serde(rename = "comas-2010")]
+    Comas2010,
 }
 
 impl Element {
+    /// True for elements of shells.
+    pub fn is_shell(self) -> bool {
+        matches!(self, Self::DktOpt | Self::DktCst | Self::Membrane | Self::Plate | Self::Comas2010)
+    }
+
     /// True for tetrahedra.
     pub fn is_tet(self) -> bool {
         matches!(self, Self::Tet4 | Self::Tet4Anp | Self::Tet4Ianp | Self::Tet4IanpNiftysim)
@@ -169,7 +253,8 @@ impl Element {
     }
 }
 
-/// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`.
+/// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, or for shells `plate`, `cylinder`, `sphere`,
+/// `hemisphere`, `annulus`, `twisted-strip`.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
@@ -205,13 +290,33 @@ pub struct MeshTable {
     /// A built-in organ, centred on the origin.
     #[serde(default)]
     pub organ: Option<Organ>,
+    /// A rectangle of triangles in the plane z = 0 from the origin, facing +z. Point sets: `x-min`, `x-max`, `y-min`, `y-max`.
+    #[serde(default)]
+    pub plate: Option<PlateShape>,
+    /// A cylinder of triangles about the z axis from z = 0, open at its ends, facing outwards. Point sets: `z-min`, `z-max`, and of
+    /// a part `start`, `end`.
+    #[serde(default)]
+    pub cylinder: Option<CylinderShape>,
+    /// A sphere of triangles about the origin, facing outwards.
+    #[serde(default)]
+    pub sphere: Option<SphereShape>,
+    /// A hemisphere of triangles z ≥ 0 about the z axis with a hole at the pole, facing outwards. Point sets: `equator`, `hole`,
+    /// and of a part `start`, `end`.
+    #[serde(default)]
+    pub hemisphere: Option<HemisphereShape>,
+    /// A ring of triangles in the plane z = 0 about the origin, facing +z, slit along +x. Point sets: `inner`, `outer`, `start`, `end`.
+    #[serde(default)]
+    pub annulus: Option<AnnulusShape>,
+    /// A strip of triangles along x that turns about the x axis. Point sets: `x-min`, `x-max`, `low`, `high`.
+    #[serde(default)]
+    pub twisted_strip: Option<TwistedStripShape>,
     /// Target edge length of the cells of a built-in shape or an image [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
-    /// Cells of a built-in shape or an image.
+    /// Cells of a built-in shape or an image; tets if not given.
     #[serde(default, rename = "as")]
-    pub cells: Cells,
+    pub cells: Option<Cells>,
     /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).
     #[serde(default = "one")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -226,6 +331,13 @@ pub struct MeshTable {
 
 fn one() -> f64 {
     1.0
+}
+
+impl MeshTable {
+    /// The volume cells of a built-in shape or an image.
+    pub fn volume_cells(&self) -> Cells {
+        self.cells.unwrap_or_default()
+    }
 }
 
 /// Cleaning of the labels of an image, taken together, in this order.
@@ -319,6 +431,144 @@ pub struct TubeShape {
     /// Length [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub length: f64,
+}
+
+/// Triangles on a grid.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct SheetGrid {
+    /// Cells of the grid along its two axes; if not given, from `edge`.
+    #[serde(default)]
+    pub cells: Option<[u32; 2]>,
+    /// How cells become triangles.
+    #[serde(default)]
+    pub pattern: PatternName,
+    /// Largest shift of inner points along each axis, at random, as a part of a cell, below 0.5.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 0.5))]
+    pub distortion: f64,
+    /// Another seed, other shifts.
+    #[serde(default)]
+    pub seed: u64,
+}
+
+/// How the cells of a grid become triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PatternName {
+    /// Two triangles, all diagonals from the start of both axes to their ends.
+    #[default]
+    Diagonal,
+    /// Two triangles, all diagonals the other way.
+    Antidiagonal,
+    /// Two triangles, diagonals mirrored from cell to cell.
+    UnionJack,
+    /// Four triangles round the middle.
+    Crossed,
+}
+
+/// A rectangle; grid axes are x and y.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct PlateShape {
+    /// Lengths along x and y [m].
+    pub size: [f64; 2],
+    /// Its triangles.
+    #[serde(flatten)]
+    pub grid: SheetGrid,
+}
+
+/// A cylinder or a part of one; grid axes are round and along.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct CylinderShape {
+    /// Radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// Length [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub length: f64,
+    /// Angle from the x axis [degrees] at which a part starts.
+    #[serde(default)]
+    pub from: f64,
+    /// Angle that it spans [degrees].
+    #[serde(default = "whole_turn")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 360.0))]
+    pub span: f64,
+    /// Its triangles.
+    #[serde(flatten)]
+    pub grid: SheetGrid,
+}
+
+/// A sphere: an icosahedron whose triangles are cut into four again and again.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SphereShape {
+    /// Radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// How often triangles are cut: 0 makes 20, 1 makes 80, 2 makes 320; if not given, from `edge`.
+    #[serde(default)]
+    pub levels: Option<u32>,
+}
+
+/// A hemisphere or a part of one; grid axes are round and towards the pole.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct HemisphereShape {
+    /// Radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// Angle between the axis and the edge of the hole [degrees].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 90.0))]
+    pub hole: f64,
+    /// Angle from the x axis that it spans [degrees].
+    #[serde(default = "whole_turn")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 360.0))]
+    pub span: f64,
+    /// Its triangles.
+    #[serde(flatten)]
+    pub grid: SheetGrid,
+}
+
+/// A ring; grid axes are outwards and round. A whole turn has a slit: its sides lie on each other, but are not joined.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct AnnulusShape {
+    /// Inner radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub inner: f64,
+    /// Outer radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub outer: f64,
+    /// Angle from the x axis that it spans [degrees].
+    #[serde(default = "whole_turn")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 360.0))]
+    pub span: f64,
+    /// Its triangles.
+    #[serde(flatten)]
+    pub grid: SheetGrid,
+}
+
+/// A strip that turns; grid axes are along and across.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct TwistedStripShape {
+    /// Length along x [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub length: f64,
+    /// Width [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub width: f64,
+    /// Angle between its ends [degrees].
+    pub twist: f64,
+    /// Its triangles.
+    #[serde(flatten)]
+    pub grid: SheetGrid,
+}
+
+fn whole_turn() -> f64 {
+    360.0
 }
 
 /// A built-in organ of analytic shape.

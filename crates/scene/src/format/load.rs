@@ -6,7 +6,7 @@ use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A component of space.
+/// A component of the motion of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Axis {
@@ -16,6 +16,12 @@ pub enum Axis {
     Y,
     /// Along z.
     Z,
+    /// Rotation about x, of the nodes of shells.
+    Rx,
+    /// Rotation about y, of the nodes of shells.
+    Ry,
+    /// Rotation about z, of the nodes of shells.
+    Rz,
 }
 
 /// How a motion or a load grows.
@@ -59,12 +65,28 @@ pub struct FixTable {
     pub body: String,
     /// Which nodes.
     pub nodes: Selection,
-    /// Components held; if not given, all three.
+    /// Components held; if not given, all: of shells also the rotations, which clamps them.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
 }
 
-/// Nodes moved as prescribed: exactly one of `by` and `velocity`. Curve: `smooth-step` if not given.
+/// Springs without rest length that pull nodes of shells and co-rotational solids to points.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SpringTable {
+    /// The body.
+    pub body: String,
+    /// Which nodes.
+    pub nodes: Selection,
+    /// Stiffness of the spring of each node [N/m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub stiffness: f64,
+    /// The point they are pulled to [m]; if not given, each node to its own place at rest.
+    #[serde(default)]
+    pub to: Option<[f64; 3]>,
+}
+
+/// Nodes moved as prescribed: exactly one of `by` and `velocity`, or `turn` alone or with `by`. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MoveTable {
@@ -78,7 +100,10 @@ pub struct MoveTable {
     /// Velocity [m/s], multiplied by the curve.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
-    /// Components prescribed; if not given, all three.
+    /// Rotation of nodes of shells about their own places [rad]: about the axis of this vector by its length, reached along the curve.
+    #[serde(default)]
+    pub turn: Option<[f64; 3]>,
+    /// Components prescribed; if not given, all three of the displacement, and with `turn` the rotations.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
     /// Its course.
@@ -142,6 +167,41 @@ pub struct ForceTable {
     pub timing: Timing,
 }
 
+/// Moments on nodes of shells, about axes that stay in space: exactly one of `each` and `total`. Curve: `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct MomentTable {
+    /// The body.
+    pub on: String,
+    /// Which nodes.
+    pub nodes: Selection,
+    /// Moment on each node [N m].
+    #[serde(default)]
+    pub each: Option<[f64; 3]>,
+    /// Moment [N m] shared equally among the nodes.
+    #[serde(default)]
+    pub total: Option<[f64; 3]>,
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
+/// A force per length on edges of shells, of triangles both of whose ends are selected and which only one triangle has. Curve:
+/// `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct EdgeLoadTable {
+    /// The body.
+    pub on: String,
+    /// Which nodes.
+    pub nodes: Selection,
+    /// Force per length at rest [N/m]; its direction stays.
+    pub traction: [f64; 3],
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
 /// A force per reference area on faces. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -165,8 +225,12 @@ pub struct PressureTable {
     pub on: String,
     /// Which faces: those with all nodes selected.
     pub faces: Selection,
-    /// Pressure [Pa]; positive pushes inwards.
+    /// Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face (a closed one that faces
+    /// outwards is blown up).
     pub pressure: f64,
+    /// How it comes to the nodes of a shell.
+    #[serde(default)]
+    pub spread: SpreadName,
     /// Its course.
     #[serde(flatten)]
     pub timing: Timing,
@@ -187,4 +251,15 @@ pub struct GravityTable {
     /// Its course.
     #[serde(flatten)]
     pub timing: Timing,
+}
+
+/// How a pressure on a shell comes to its nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpreadName {
+    /// A third of the force on each flat triangle to each of its corners.
+    #[default]
+    Lumped,
+    /// From the curved surface, as forces and moments.
+    Curved,
 }

@@ -2,17 +2,20 @@
 //! beside its formulas) with meaning, unit, range and default; schema, checks and reference page come from that.
 
 mod body;
+mod linear;
 mod load;
 mod output;
 
 pub use body::{
-    BlockShape, BodyTable, ByLabel, Cells, CleanTable, Density, Element, EllipsoidShape, Fibre, FibreRule,
-    Fix, Fixes, Hourglass, MeshTable, Organ,
+    AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
+    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Organ,
+    PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule, TubeShape,
+    TwistedStripShape,
 };
-pub use body::{SurfaceTable, TubeShape};
+pub use linear::{ControlTable, ControlledNode, LinearName, LinearTable, LinearWay, PreconditionerName};
 pub use load::{
-    Axis, CurveShape, FixTable, ForceTable, GravityTable, MoveTable, NodeVectorSource, NodeVectors,
-    PressureTable, Timing, TractionTable, Vectors,
+    Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MomentTable, MoveTable,
+    NodeVectorSource, NodeVectors, PressureTable, SpreadName, SpringTable, Timing, TractionTable, Vectors,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 
@@ -57,8 +60,8 @@ pub struct RunTable {
     /// How the state goes from instant to instant.
     #[serde(default)]
     pub solver: SolverName,
-    /// Time step [s]; `auto`: 0.9 × the true limit of the assembled model at rest, or one of `load-steps` equal ones where
-    /// the solver is `quasi-static`.
+    /// Time step [s]; `auto`: 0.9 × the true limit of the assembled model at rest, one of `load-steps` equal ones where
+    /// the solver is `quasi-static` or `static`, and 0.01 s where it is `implicit`.
     #[serde(default)]
     pub step: StepChoice,
     /// What an explicit run does when the largest stable step of the deformed model, watched during the run, falls below
@@ -68,15 +71,27 @@ pub struct RunTable {
     /// Makes the elements that limit an explicit step heavier.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
-    /// Load steps of a quasi-static run with `step = "auto"`.
+    /// Load steps of a quasi-static or static run with `step = "auto"`.
     #[serde(default = "ten")]
     #[schemars(range(min = 1, max = 1_000_000))]
     pub load_steps: u32,
-    /// Largest residual force of a quasi-static equilibrium over the largest internal force; if not given, 1e-6 in
-    /// double and 1e-4 in single precision.
+    /// Largest residual force over the largest internal force (or load, or inertial force) at which an equilibrium is found; if not
+    /// given, 1e-6 in double and 1e-4 in single precision with the solver `quasi-static`, 1e-8 with `static`, 1e-6 with
+    /// `implicit`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: Option<f64>,
+    /// Iterations of Newton's method at the most in a step of `implicit` (20 if not given) or `static` (40). With 1 a step of
+    /// `implicit` is one linear solution, and its residual is not checked: for real time.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 10_000))]
+    pub iterations: Option<u32>,
+    /// How `implicit` and `static` solve their linear equations.
+    #[serde(default)]
+    pub linear: LinearWay,
+    /// What a `static` run prescribes instead of the size of a load, so that it goes past limit points.
+    #[serde(default)]
+    pub control: Option<ControlTable>,
     /// Threads; 0: one per core. The number never changes a result.
     #[serde(default)]
     #[schemars(range(max = 1024))]
@@ -118,6 +133,27 @@ pub enum SolverName {
     Explicit,
     /// Equilibria without inertia, by dynamic relaxation.
     QuasiStatic,
+    /// Dynamics with inertia in long steps, by backward Euler: for shells and co-rotational solids.
+    Implicit,
+    /// Equilibria without inertia, by Newton's method: for shells and co-rotational solids.
+    Static,
+}
+
+impl SolverName {
+    /// Its word in a scene file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Explicit => "explicit",
+            Self::QuasiStatic => "quasi-static",
+            Self::Implicit => "implicit",
+            Self::Static => "static",
+        }
+    }
+
+    /// Whether it knows no inertia.
+    pub fn finds_equilibria(self) -> bool {
+        matches!(self, Self::QuasiStatic | Self::Static)
+    }
 }
 
 /// Where a solver runs.

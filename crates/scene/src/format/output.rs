@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::BodyModel;
+
 /// A field of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -13,11 +15,13 @@ pub enum FieldName {
     Displacement,
     /// Velocity [m/s].
     Velocity,
+    /// Rotation vector [rad] of the nodes of shells, of length at most π.
+    Rotation,
     /// Cauchy stress [Pa].
     CauchyStress,
     /// Second Piola–Kirchhoff stress [Pa].
     Pk2Stress,
-    /// Von Mises stress [Pa].
+    /// Von Mises stress [Pa]; of a shell the largest of top, middle and bottom.
     VonMises,
     /// Green–Lagrange strain.
     GreenStrain,
@@ -32,6 +36,25 @@ pub enum FieldName {
     VolumeRatio,
     /// Strain energy of the instantaneous elastic law per volume at rest [J/m³].
     EnergyDensity,
+    /// Force per length in the wall of a shell [N/m], as a tensor in space.
+    MembraneForce,
+    /// Moment per length in the wall of a shell [N], as a tensor in space; positive where the top is in tension.
+    BendingMoment,
+    /// Stress at the top of a shell [Pa], half the thickness along its normal.
+    StressTop,
+    /// Stress in the middle of a shell [Pa].
+    StressMiddle,
+    /// Stress at the bottom of a shell [Pa].
+    StressBottom,
+    /// Energy of stretching a shell, per area at rest [J/m²].
+    MembraneEnergy,
+    /// Energy of bending and twisting a shell, per area at rest [J/m²].
+    BendingEnergy,
+    /// Energy of nodes of a shell that turn about the normal otherwise than their triangle, per area at rest [J/m²]: not of the
+    /// wall; much of it means that the mesh is too coarse.
+    DrillingEnergy,
+    /// Thickness of a shell at rest [m].
+    Thickness,
 }
 
 impl FieldName {
@@ -49,25 +72,60 @@ impl FieldName {
             Self::Pressure => "pressure",
             Self::VolumeRatio => "J",
             Self::EnergyDensity => "energy-density",
+            Self::Rotation => "rotation",
+            Self::MembraneForce => "membrane-force",
+            Self::BendingMoment => "bending-moment",
+            Self::StressTop => "stress-top",
+            Self::StressMiddle => "stress-middle",
+            Self::StressBottom => "stress-bottom",
+            Self::MembraneEnergy => "membrane-energy",
+            Self::BendingEnergy => "bending-energy",
+            Self::DrillingEnergy => "drilling-energy",
+            Self::Thickness => "thickness",
         }
     }
 
     /// Numbers per point or cell.
     pub fn components(self) -> usize {
         match self {
-            Self::Displacement | Self::Velocity | Self::Fibre => 3,
-            Self::CauchyStress | Self::Pk2Stress | Self::GreenStrain => 9,
+            Self::Displacement | Self::Velocity | Self::Rotation | Self::Fibre => 3,
+            Self::CauchyStress
+            | Self::Pk2Stress
+            | Self::GreenStrain
+            | Self::MembraneForce
+            | Self::BendingMoment
+            | Self::StressTop
+            | Self::StressMiddle
+            | Self::StressBottom => 9,
             Self::VonMises
             | Self::FibreStretch
             | Self::Pressure
             | Self::VolumeRatio
-            | Self::EnergyDensity => 1,
+            | Self::EnergyDensity
+            | Self::MembraneEnergy
+            | Self::BendingEnergy
+            | Self::DrillingEnergy
+            | Self::Thickness => 1,
         }
     }
 
     /// True for fields that live on nodes.
     pub fn is_nodal(self) -> bool {
-        matches!(self, Self::Displacement | Self::Velocity)
+        matches!(self, Self::Displacement | Self::Velocity | Self::Rotation)
+    }
+
+    /// True for fields that bodies of a model have.
+    pub fn is_of(self, model: BodyModel) -> bool {
+        match self {
+            Self::Displacement | Self::Velocity | Self::VonMises => true,
+            Self::CauchyStress | Self::Pressure | Self::VolumeRatio | Self::EnergyDensity => {
+                model != BodyModel::Shell
+            }
+            Self::Pk2Stress | Self::GreenStrain | Self::Fibre | Self::FibreStretch => {
+                model == BodyModel::Solid
+            }
+            _ => model == BodyModel::Shell,
+        }
     }
 }
 
@@ -98,6 +156,10 @@ pub struct VtuTable {
     /// Where fields of cells are written.
     #[serde(default)]
     pub at: At,
+    /// Parts that each edge of a shell is cut into, to show its curved surface instead of flat triangles.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 100))]
+    pub curved: Option<u32>,
 }
 
 fn default_fields() -> Vec<FieldName> {

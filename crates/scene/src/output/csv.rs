@@ -4,6 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use pliant_corotational::Carried;
 use pliant_geometry::{Locator, Vector3};
 use pliant_mechanics::Real;
 use pliant_mechanics::recover::Recovery;
@@ -11,7 +12,7 @@ use pliant_mechanics::recover::Recovery;
 use crc32fast::Hasher;
 
 use super::{Frame, Observer, OutputError, Written, fields};
-use crate::build::Built;
+use crate::build::{BodyCells, Built};
 use crate::format::{CsvTable, FieldName, ProbeTable};
 
 pub(super) struct Rows {
@@ -26,16 +27,30 @@ pub(super) struct Rows {
     reactions: Vec<usize>,
     energy: bool,
     probes: Vec<Probe>,
+    /// Fields of the cells of shells and co-rotational solids, if a probe wants some.
+    corotated: fields::Corotated,
 }
 
 /// A point that is followed: the nodes that carry it, and the cell it lies in.
 struct Probe {
     weights: Vec<(u32, f64)>,
-    cell: Option<(usize, usize)>,
+    cell: Option<Place>,
     fields: Vec<FieldName>,
 }
 
+/// A cell of the model.
+enum Place {
+    /// A cell of a solid.
+    Solid(usize, usize),
+    /// A cell of a shell or a co-rotational solid.
+    Corotated(fields::Cell),
+    /// A point of a surface that a shell carries.
+    Carried(Carried, Vector3),
+}
+
 pub(crate) const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "external", "hourglass", "balance"];
+/// Parts of the internal energy of shells.
+const SHELL_ENERGIES: [&str; 3] = ["membrane", "bending", "drilling"];
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
@@ -53,6 +68,13 @@ impl Rows {
         }
         if table.energy {
             header.extend(ENERGIES.map(|energy| format!("energy.{energy}")));
+        }
+        let shells = built.corotational.as_ref().is_some_and(|part| !part.model.facets.is_empty());
+        if table.energy && shells {
+            header.extend(SHELL_ENERGIES.map(|energy| format!("energy.{energy}")));
+        }
+        if built.corotational.as_ref().is_some_and(|part| part.control.is_some()) {
+            header.push("load-factor".into());
         }
         let mut probes = Vec::new();
         for (name, probe) in &table.probes {
@@ -76,6 +98,7 @@ impl Rows {
             reactions,
             energy: table.energy,
             probes,
+            corotated: fields::Corotated::default(),
         }
     }
 
@@ -140,6 +163,14 @@ impl Rows {
     }
 }
 
+/// Where a point of a surface on a shell is [m].
+fn carried<R>(frame: &Frame<'_, R>, point: &Carried) -> Vector3 {
+    let part = frame.built.corotational.as_ref();
+    let found =
+        part.and_then(|part| Some(part.surface.as_ref()?.carried(&part.model, frame.corotational?, point)));
+    found.unwrap_or_else(|| Vector3::repeat(f64::NAN))
+}
+
 /// Whether a table begins with these bytes; the reason if not.
 pub(super) fn verify(path: &Path, bytes: u64, crc: u32) -> Result<(), String> {
     let content = fs::read(path).map_err(|error| error.to_string())?;
@@ -162,10 +193,24 @@ impl<R: Real> Observer<R> for Rows {
             let e = frame.stepper.energies();
             row.extend([e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]);
         }
+        if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
+            if self.energy && !part.model.facets.is_empty() {
+                // An element that has no energy ends the run with a reason.
+                let parts = state.shell_energy(&part.model).unwrap_or_default();
+                row.extend([parts.membrane, parts.bending, parts.drilling]);
+            }
+            if part.control.is_some() {
+                row.push(state.load_factor);
+            }
+        }
         let cells_wanted = self.probes.iter().any(|probe| probe.fields.iter().any(|field| !field.is_nodal()));
         let recovery = cells_wanted.then(|| Recovery::new(&frame.built.model, frame.state));
+        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.corotational)
+        {
+            self.corotated.fill(&part.model, state);
+        }
         for probe in &self.probes {
-            probe.read(frame, recovery.as_ref(), &mut row);
+            probe.read(frame, recovery.as_ref(), &self.corotated, &mut row);
         }
         let row: Vec<String> = row.iter().map(|value| format!("{value:e}")).collect();
         self.write(row.join(","))
@@ -190,6 +235,11 @@ impl Probe {
             let nearest = (0..mesh.points.len())
                 .min_by(|&a, &b| distance(&mesh.points[a]).total_cmp(&distance(&mesh.points[b])))
                 .unwrap_or(0);
+            let carried = built.corotational.as_ref().and_then(|part| part.carried.get(&surface));
+            if let Some(points) = carried {
+                let cell = Some(Place::Carried(points[nearest], mesh.points[nearest]));
+                return Self { weights: Vec::new(), cell, fields };
+            }
             let row = built.model.surfaces[surface].mapping.row(nearest);
             return Self {
                 weights: row.map(|(node, weight)| (node as u32, weight)).collect(),
@@ -200,6 +250,18 @@ impl Probe {
         let body = built.bodies.iter().position(|body| body.name == table.on).unwrap_or(0);
         let mesh = &built.bodies[body].mesh;
         let first = built.model.bodies[body].nodes.start;
+        let cells = built.corotational.as_ref().map(|part| &part.cells[body]);
+        if let Some(BodyCells::Facets(range)) = cells {
+            let Some(found) = built.bodies[body].closest(&point) else {
+                return Self { weights: Vec::new(), cell: None, fields };
+            };
+            let weights =
+                found.nodes.iter().zip(found.weights).map(|(&node, weight)| (first + node, weight)).collect();
+            let cell = fields::Cell::Facet(
+                range.start + built.bodies[body].boundary.faces[found.face as usize].parent.index,
+            );
+            return Self { weights, cell: Some(Place::Corotated(cell)), fields };
+        }
         let Some(location) = Locator::new(mesh).locate(point) else {
             return Self { weights: Vec::new(), cell: None, fields };
         };
@@ -209,16 +271,33 @@ impl Probe {
         let cell = built.model.solids.iter().enumerate().find_map(|(index, solid)| {
             let fits = solid.body == body && solid.cells.nodes_per_cell() == location.kind.node_count();
             let cell = solid.original.iter().position(|&original| fits && original == location.cell)?;
-            Some((index, cell))
+            Some(Place::Solid(index, cell))
         });
+        let cell = match cells {
+            Some(BodyCells::Tets(range)) => {
+                Some(Place::Corotated(fields::Cell::Tet(range.start + location.cell)))
+            }
+            _ => cell,
+        };
         Self { weights, cell, fields }
     }
 
-    fn read<R: Real>(&self, frame: &Frame<'_, R>, recovery: Option<&Recovery<'_, R>>, row: &mut Vec<f64>) {
-        let recovered = recovery.zip(self.cell).map(|(recovery, (solid, cell))| recovery.cell(solid, cell));
+    fn read<R: Real>(
+        &self,
+        frame: &Frame<'_, R>,
+        recovery: Option<&Recovery<'_, R>>,
+        corotated: &fields::Corotated,
+        row: &mut Vec<f64>,
+    ) {
+        let recovered = recovery.zip(self.cell.as_ref()).and_then(|(recovery, place)| match *place {
+            Place::Solid(solid, cell) => Some(recovery.cell(solid, cell)),
+            Place::Corotated(_) | Place::Carried(..) => None,
+        });
         for &field in &self.fields {
             let mut value = [0.0; 9];
-            if field.is_nodal() {
+            if let Some(Place::Carried(point, rest)) = &self.cell {
+                value[..3].copy_from_slice((carried(frame, point) - rest).as_slice());
+            } else if field.is_nodal() {
                 for &(node, weight) in &self.weights {
                     let nodal = fields::nodal(frame, field, node as usize);
                     for (v, n) in value.iter_mut().zip(nodal) {
@@ -226,7 +305,11 @@ impl Probe {
                     }
                 }
             } else {
-                value = recovered.as_ref().map_or([f64::NAN; 9], |cell| fields::of_cell(cell, field));
+                value = match (&recovered, &self.cell, &frame.built.corotational) {
+                    (Some(cell), ..) => fields::of_cell(cell, field),
+                    (_, Some(Place::Corotated(cell)), Some(part)) => corotated.of(&part.model, *cell, field),
+                    _ => [f64::NAN; 9],
+                };
             }
             row.extend_from_slice(&value[..field.components()]);
         }

@@ -1,5 +1,7 @@
 //! Values of the fields a user can ask for, at nodes and cells.
 
+use nalgebra::Matrix3;
+use pliant_corotational::{Model, ShellFields, SolidFields, State};
 use pliant_mechanics::Real;
 use pliant_mechanics::recover::CellFields;
 use pliant_mechanics::tensor::Symmetric;
@@ -14,6 +16,9 @@ pub(super) type Value = [f64; 9];
 pub(super) fn nodal<R: Real>(frame: &Frame<'_, R>, field: FieldName, node: usize) -> Value {
     let vector = match field {
         FieldName::Velocity => frame.stepper.velocity(frame.state, node),
+        FieldName::Rotation => {
+            frame.corotational.map_or([0.0; 3], |state| state.rotation[node].scaled_axis().into())
+        }
         _ => frame.state.displacement[node].map(R::to_f64),
     };
     padded(&vector)
@@ -31,7 +36,7 @@ pub(super) fn of_cell(fields: &CellFields, field: FieldName) -> Value {
         FieldName::Pressure => padded(&[fields.pressure()]),
         FieldName::VolumeRatio => padded(&[fields.volume_ratio]),
         FieldName::EnergyDensity => padded(&[fields.energy_density]),
-        FieldName::Displacement | FieldName::Velocity => [f64::NAN; 9],
+        _ => [f64::NAN; 9],
     }
 }
 
@@ -44,4 +49,65 @@ fn padded(values: &[f64]) -> Value {
 fn tensor(symmetric: &Symmetric<f64>) -> Value {
     let [xx, yy, zz, xy, yz, xz] = symmetric.0;
     [xx, xy, xz, xy, yy, yz, xz, yz, zz]
+}
+
+/// A cell of a shell or a co-rotational solid, by its number in the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cell {
+    Facet(u32),
+    Tet(u32),
+}
+
+/// Fields of the cells of shells and co-rotational solids at an instant.
+#[derive(Default)]
+pub(super) struct Corotated {
+    shells: ShellFields,
+    solids: SolidFields,
+}
+
+impl Corotated {
+    /// Finds them for the instant of a frame.
+    pub fn fill(&mut self, model: &Model, state: &State) {
+        // An element that is folded over or inverted has ended the run before anyone looks at it.
+        let _ = self.shells.fill(model, state);
+        let _ = self.solids.fill(model, state);
+    }
+
+    /// The value of a field in a cell; the first `components` numbers count.
+    pub fn of(&self, model: &Model, cell: Cell, field: FieldName) -> Value {
+        let matrix = |matrix: &Matrix3<f64>| {
+            let mut value = [0.0; 9];
+            value.copy_from_slice(matrix.as_slice());
+            value
+        };
+        match cell {
+            Cell::Facet(at) => {
+                let (at, fields) = (at as usize, &self.shells);
+                match field {
+                    FieldName::VonMises => padded(&[fields.largest[at]]),
+                    FieldName::MembraneForce => matrix(&fields.membrane[at]),
+                    FieldName::BendingMoment => matrix(&fields.moment[at]),
+                    FieldName::StressTop => matrix(&fields.stress[0][at]),
+                    FieldName::StressMiddle => matrix(&fields.stress[1][at]),
+                    FieldName::StressBottom => matrix(&fields.stress[2][at]),
+                    FieldName::MembraneEnergy => padded(&[fields.energy[at].membrane]),
+                    FieldName::BendingEnergy => padded(&[fields.energy[at].bending]),
+                    FieldName::DrillingEnergy => padded(&[fields.energy[at].drilling]),
+                    FieldName::Thickness => padded(&[model.facets[at].thickness]),
+                    _ => [f64::NAN; 9],
+                }
+            }
+            Cell::Tet(at) => {
+                let (at, fields) = (at as usize, &self.solids);
+                match field {
+                    FieldName::CauchyStress => matrix(&fields.stress[at]),
+                    FieldName::VonMises => padded(&[fields.von_mises[at]]),
+                    FieldName::Pressure => padded(&[fields.pressure[at]]),
+                    FieldName::EnergyDensity => padded(&[fields.energy[at]]),
+                    FieldName::VolumeRatio => padded(&[fields.volume_ratio[at]]),
+                    _ => [f64::NAN; 9],
+                }
+            }
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Observers: what looks at a run and writes it down. They never change the state.
 
 mod csv;
+mod curved;
 mod fields;
 mod folder;
 mod plot;
@@ -53,6 +54,8 @@ pub(crate) struct Frame<'a, R> {
     pub built: &'a Built,
     pub state: &'a State<R>,
     pub stepper: &'a dyn Observable<R>,
+    /// Of shells and co-rotational solids: their state, with rotations.
+    pub corotational: Option<&'a pliant_corotational::State>,
 }
 
 impl<R: Real> Frame<'_, R> {

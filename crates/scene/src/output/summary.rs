@@ -11,9 +11,10 @@ use serde_json::{Value as Json, json};
 use super::OutputError;
 use super::stability::{AddedMass, StabilitySummary, doubts};
 use crate::build::Built;
-use crate::plan::{LimitingElement, Plan};
+use crate::plan::{LimitingElement, Limits, Plan};
 use crate::run::{History, Outcome};
 use crate::scene::Scene;
+use crate::solver::Effort;
 
 /// The status of a run that was told to stop.
 const INTERRUPTED: &str = "interrupted";
@@ -35,12 +36,14 @@ pub struct Summary {
     pub mass: f64,
     /// Time step [s].
     pub step: f64,
-    /// Smallest element bound of the critical step [s].
-    pub element_bound: f64,
+    /// Smallest element bound of the critical step [s]; `null` of shells and co-rotational solids, as the two below.
+    pub element_bound: Option<f64>,
     /// Limit of the assembled operator [s].
-    pub true_limit: f64,
+    pub true_limit: Option<f64>,
     /// The element that sets the bound.
-    pub limiting_element: LimitingElement,
+    pub limiting_element: Option<LimitingElement>,
+    /// What its equations took; `null` where none were solved.
+    pub solver: Option<Effort>,
     /// Where it was computed: `cpu`, or the name of the graphics processor.
     pub device: String,
     /// `single` or `double`.
@@ -55,8 +58,8 @@ pub struct Summary {
     pub stability: Option<StabilitySummary>,
     /// What mass scaling adds; `null` without it.
     pub added_mass: Option<AddedMass>,
-    /// Imbalance of the energies at the end, as a fraction of the largest.
-    pub energy_balance: f64,
+    /// Imbalance of the energies at the end, as a fraction of the largest; `null` of shells and co-rotational solids.
+    pub energy_balance: Option<f64>,
     /// Force [N] of each constraint at the end, by name.
     #[serde(serialize_with = "as_map")]
     pub reactions: Vec<(String, [f64; 3])>,
@@ -103,7 +106,7 @@ pub struct LoadStepSummary {
 /// Why a run failed or an input was refused.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureSummary {
-    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `not-converged`, `device`, `output`, `input` or `interrupted`.
+    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `device`, `output`, `input` or `interrupted`.
     pub kind: &'static str,
     /// The body, where it is about one.
     pub body: Option<String>,
@@ -138,7 +141,7 @@ fn empty(status: &str, error: FailureSummary) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "true_limit": null, "limiting_element": null, "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "true_limit": null, "limiting_element": null, "solver": null, "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
@@ -178,6 +181,18 @@ impl FailureSummary {
     /// A scene that should have been refused before.
     pub(crate) fn input(error: &dyn std::fmt::Display) -> Self {
         Self::about("input", error.to_string(), None)
+    }
+
+    /// A step of shells or co-rotational solids that could not be taken.
+    pub(crate) fn of_solver(
+        kind: &'static str,
+        message: String,
+        body: Option<String>,
+        element: Option<u32>,
+        node: Option<u32>,
+        time: f64,
+    ) -> Self {
+        Self { body, element, node, ..Self::about(kind, message, Some(time)) }
     }
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
@@ -236,11 +251,15 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
             (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum()
         };
         let range = body.nodes.start as usize..body.nodes.end as usize;
+        let (elements, volume) = match built.corotational.as_ref().and_then(|part| part.size(index)) {
+            Some(size) => size,
+            None => (solids.clone().map(|solid| solid.cells.len()).sum(), solids.map(volume).sum()),
+        };
         BodySummary {
             name: body.name.clone(),
             nodes: range.len(),
-            elements: solids.clone().map(|solid| solid.cells.len()).sum(),
-            volume: solids.map(volume).sum(),
+            elements,
+            volume,
             mass: built.model.mass[range].iter().sum(),
         }
     };
@@ -251,6 +270,7 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
 pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Outcome) -> Summary {
     let stability = StabilitySummary::new(scene, plan, outcome);
     let reactions = built.model.constraints.iter().zip(&outcome.reactions);
+    let bodies = bodies(built);
     Summary {
         status: match &outcome.failure {
             None => "done",
@@ -258,14 +278,15 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
             Some(_) => "failed",
         },
         error: outcome.failure.clone(),
-        bodies: bodies(built),
         nodes: built.model.node_count(),
-        elements: built.model.cell_count(),
+        elements: bodies.iter().map(|body| body.elements).sum(),
+        bodies,
         mass: built.model.mass.iter().sum(),
         step: plan.step,
-        element_bound: plan.bound.step,
-        true_limit: plan.limit.step,
-        limiting_element: plan.limiting.clone(),
+        element_bound: plan.limits.as_ref().map(|limits| limits.bound.step),
+        true_limit: plan.limits.as_ref().map(|limits| limits.limit.step),
+        limiting_element: plan.limits.as_ref().map(|limits| limits.limiting.clone()),
+        solver: outcome.effort.clone(),
         device: plan.target.name().to_owned(),
         precision: plan.target.precision.word(),
         steps: outcome.steps,
@@ -274,7 +295,7 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
         warnings: doubts(built, outcome, stability.as_ref()),
         stability,
         added_mass: AddedMass::new(built),
-        energy_balance: outcome.energies.balance,
+        energy_balance: outcome.balance_floor.is_finite().then_some(outcome.energies.balance),
         reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
         time: outcome.time,
@@ -340,8 +361,10 @@ fn write_page(
     writeln!(page, "\n## Time step\n")?;
     writeln!(page, "| | |\n|---|---|")?;
     writeln!(page, "| step | {} s |", number(plan.step))?;
-    writeln!(page, "| element bound | {} s, set by {} |", number(plan.bound.step), plan.limiting)?;
-    writeln!(page, "| true limit (assembled operator) | {} s |", number(plan.limit.step))?;
+    if let Some(Limits { bound, limit, limiting }) = &plan.limits {
+        writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
+        writeln!(page, "| true limit (assembled operator) | {} s |", number(limit.step))?;
+    }
     if let Some(AddedMass { mass, percent, elements, .. }) = &summary.added_mass {
         let mass = number(*mass);
         writeln!(page, "| mass added by scaling | {mass} kg, {percent:.2} %, to {elements} elements |")?;
@@ -351,6 +374,9 @@ fn write_page(
     }
     if let Some(stability) = &summary.stability {
         writeln!(page, "\nDuring the run: {stability}.")?;
+    }
+    if let Some(effort) = &summary.solver {
+        write_effort(page, effort, outcome.steps)?;
     }
     write_energies(page, outcome)?;
     write_reactions(page, built, outcome)?;
@@ -374,6 +400,34 @@ fn write_page(
     outcome.files.iter().try_for_each(|file| writeln!(page, "* `{}`", short(file)))
 }
 
+fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Result {
+    writeln!(page, "\n## Equations\n\n| | |\n|---|---|")?;
+    let per_step = |count: u64| number(count as f64 / steps.max(1) as f64);
+    let iterations = effort.newton_iterations;
+    writeln!(page, "| iterations of Newton's method | {iterations}, {} a step |", per_step(iterations))?;
+    if effort.linear_iterations > 0 {
+        let iterations = effort.linear_iterations;
+        writeln!(
+            page,
+            "| iterations of conjugate gradients | {iterations}, {} a step |",
+            per_step(iterations)
+        )?;
+        writeln!(page, "| their last residual, relative | {} |", number(effort.linear_residual))?;
+    }
+    if let Some(residual) = effort.residual {
+        writeln!(page, "| last residual, relative | {} |", number(residual))?;
+    }
+    writeln!(page, "| steps that were halved | {} |", effort.halved)?;
+    let milliseconds = |seconds: f64| number(seconds * 1e3 / steps.max(1) as f64);
+    writeln!(page, "| forces and stiffness | {} ms a step |", milliseconds(effort.seconds_cells))?;
+    writeln!(page, "| factors or preconditioner | {} ms a step |", milliseconds(effort.seconds_factors))?;
+    writeln!(page, "| solution | {} ms a step |", milliseconds(effort.seconds_solution))?;
+    if let Some(time) = effort.unstable_from {
+        writeln!(page, "| unstable equilibria | from t = {} s on |", number(time))?;
+    }
+    Ok(())
+}
+
 fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
     let Energies { kinetic, internal, damping, hourglass, external, balance } = outcome.energies;
     writeln!(page, "\n## Energy at the end\n\n| | J |\n|---|---|")?;
@@ -385,6 +439,12 @@ fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
         ("hourglass control", hourglass),
     ] {
         writeln!(page, "| {name} | {} |", number(value))?;
+    }
+    if outcome.balance_floor.is_infinite() {
+        return writeln!(
+            page,
+            "\nThe balance is not judged: an implicit step takes energy like a damper, and external work is a sum of trapezia."
+        );
     }
     writeln!(
         page,

@@ -7,13 +7,14 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{MeshFileError, VtuOptions, write_pvd, write_vtu};
-use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::Real;
 use pliant_mechanics::recover::Recovery;
 use rayon::prelude::*;
 
+use super::fields::Cell;
 use super::{Frame, Observer, OutputError, Written, fields};
-use crate::build::Built;
+use crate::build::{BodyCells, Built, Corotational};
 use crate::format::{At, FieldName, VtuTable};
 
 pub(super) struct Series<R> {
@@ -36,6 +37,10 @@ enum Content {
     Surface(usize),
     /// Bodies: the model's node of each point, and (solid, cell) of each cell of each block.
     Bodies { nodes: Vec<u32>, cells: Vec<Vec<(u32, u32)>> },
+    /// Shells and co-rotational solids: the model's node of each point, and the cells of each block.
+    Corotational { nodes: Vec<u32>, cells: Vec<Vec<Cell>>, fields: Box<fields::Corotated> },
+    /// The curved surface of shells.
+    Curved(Box<super::curved::Curved>),
 }
 
 impl<R: Real> Series<R> {
@@ -49,7 +54,14 @@ impl<R: Real> Series<R> {
         let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
         let (mesh, content) = match surface {
             Some(index) => (bare(&built.surfaces[index]), Content::Surface(index)),
-            None => merged_bodies(built, on),
+            None => match (&built.corotational, table.curved) {
+                (None, _) => merged_bodies(built, on),
+                (Some(part), None) => merged_corotational(built, part, on),
+                (Some(part), Some(parts)) => {
+                    let (curved, mesh) = super::curved::Curved::new(built, part, on, parts);
+                    (mesh, Content::Curved(Box::new(curved)))
+                }
+            },
         };
         let own = folder.join(name);
         fs::create_dir_all(&own).map_err(|error| OutputError::new(&own, error))?;
@@ -89,8 +101,14 @@ impl<R: Real> Series<R> {
     }
 
     fn fill(&mut self, frame: &Frame<'_, R>) {
-        match &self.content {
+        match &mut self.content {
             Content::Surface(index) => {
+                if let Some(displacement) = carried_on_shell(frame, *index) {
+                    let values = displacement.iter().flat_map(|d| [d.x, d.y, d.z]).collect();
+                    let name = FieldName::Displacement.name();
+                    self.mesh.point_data.insert(name.into(), DataArray { components: 3, values });
+                    return;
+                }
                 let mapping = &frame.built.model.surfaces[*index].mapping;
                 for &field in &self.fields {
                     let parent: Vec<[f64; 3]> = (0..frame.built.model.node_count())
@@ -107,6 +125,14 @@ impl<R: Real> Series<R> {
                 fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
                 fill_cells(&mut self.mesh, frame, &self.fields, self.at, cells);
             }
+            Content::Corotational { nodes, cells, fields } => {
+                fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
+                if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
+                    fields.fill(&part.model, state);
+                    fill_corotational(&mut self.mesh, &part.model, fields, &self.fields, self.at, cells);
+                }
+            }
+            Content::Curved(curved) => curved.fill(&mut self.mesh, frame, &self.fields),
         }
     }
 }
@@ -249,6 +275,84 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
         cells.push(places);
     }
     (mesh, Content::Bodies { nodes, cells })
+}
+
+/// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
+pub(super) fn carried_on_shell<R>(frame: &Frame<'_, R>, surface: usize) -> Option<Vec<Vector3>> {
+    let part = frame.built.corotational.as_ref()?;
+    let (points, curved) = (part.carried.get(&surface)?, part.surface.as_ref()?);
+    let mut positions = vec![Vector3::zeros(); points.len()];
+    curved.carried_all(&part.model, frame.corotational?, points, &mut positions);
+    for (position, rest) in positions.iter_mut().zip(&frame.built.surfaces[surface].points) {
+        *position -= rest;
+    }
+    Some(positions)
+}
+
+/// The cells of one shell or co-rotational solid or of all, with the number of the `body` for several.
+fn merged_corotational(built: &Built, part: &Corotational, on: Option<&str>) -> (Mesh, Content) {
+    let mut mesh = Mesh::default();
+    let (mut nodes, mut cells) = (Vec::new(), Vec::new());
+    let kinds = [CellKind::Triangle, CellKind::Tet];
+    let mut blocks = kinds.map(|kind| (CellBlock::new(kind, Vec::new()), Vec::new(), Vec::new()));
+    for (number, body) in
+        built.bodies.iter().enumerate().filter(|(_, body)| on.is_none_or(|on| body.name == on))
+    {
+        let offset = mesh.points.len() as u32;
+        mesh.points.extend_from_slice(&body.mesh.points);
+        nodes.extend(built.model.bodies[number].nodes.clone());
+        let (at, range) = match &part.cells[number] {
+            BodyCells::Facets(range) => (0, range),
+            BodyCells::Tets(range) => (1, range),
+        };
+        let cell = [Cell::Facet, Cell::Tet][at];
+        let (block, places, owners) = &mut blocks[at];
+        let own = body.mesh.block(kinds[at]).map_or(&[][..], |own| &own.nodes[..]);
+        block.nodes.extend(own.iter().map(|node| node + offset));
+        places.extend(range.clone().map(cell));
+        owners.resize(places.len(), number as f64);
+    }
+    for (mut block, places, owners) in blocks.into_iter().filter(|(block, ..)| !block.is_empty()) {
+        if built.bodies.len() > 1 {
+            block.data.insert("body".into(), DataArray::scalar(owners));
+        }
+        mesh.blocks.push(block);
+        cells.push(places);
+    }
+    (mesh, Content::Corotational { nodes, cells, fields: Box::default() })
+}
+
+fn fill_corotational(
+    mesh: &mut Mesh,
+    model: &pliant_corotational::Model,
+    found: &fields::Corotated,
+    wanted: &[FieldName],
+    at: At,
+    cells: &[Vec<Cell>],
+) {
+    let wanted: Vec<FieldName> = wanted.iter().copied().filter(|field| !field.is_nodal()).collect();
+    let mut averages = Averages::new(mesh.points.len(), &wanted);
+    for (block, cells) in mesh.blocks.iter_mut().zip(cells) {
+        for (slot, &field) in wanted.iter().enumerate() {
+            let components = field.components();
+            if at == At::Cells {
+                let value = |&cell: &Cell| found.of(model, cell, field).into_iter().take(components);
+                let values = cells.iter().flat_map(value).collect();
+                block.data.insert(field.name().into(), DataArray { components, values });
+                continue;
+            }
+            for (index, &cell) in cells.iter().enumerate() {
+                let size = match cell {
+                    Cell::Facet(facet) => model.facets[facet as usize].area,
+                    Cell::Tet(tet) => model.tets[tet as usize].volume,
+                };
+                averages.add(slot, block.cell(index), &found.of(model, cell, field)[..components], size);
+            }
+        }
+    }
+    if at == At::Points {
+        averages.write(&mut mesh.point_data, &wanted);
+    }
 }
 
 fn fill_nodal<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], nodes: &[u32]) {

@@ -1,0 +1,46 @@
+//! What acts on the nodes of a model at a state, without a solver: for reactions, energies and whoever looks at a run.
+
+use crate::error::SolveError;
+use crate::model::Model;
+use crate::state::State;
+use crate::system::System;
+
+/// Forces and moments on the nodes of a model at the state last evaluated.
+pub struct Forces<'m> {
+    system: System<'m>,
+}
+
+impl<'m> Forces<'m> {
+    /// For a model; nothing is known before the first evaluation.
+    pub fn new(model: &'m Model) -> Self {
+        Self { system: System::forces_only(model) }
+    }
+
+    /// Finds the forces at a state and its time.
+    ///
+    /// # Errors
+    /// If an element collapses or folds over.
+    pub fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
+        self.system.evaluate(state, state.time, None)?;
+        let system = &mut self.system;
+        for (load, controlled) in system.external.iter_mut().zip(&system.controlled) {
+            *load += state.load_factor * controlled;
+        }
+        Ok(())
+    }
+
+    /// Force [N] and moment [N m] that elements and springs resist with, six numbers a node.
+    pub fn internal(&self) -> &[f64] {
+        &self.system.internal
+    }
+
+    /// Force [N] and moment [N m] of all loads, six numbers a node.
+    pub fn loads(&self) -> &[f64] {
+        &self.system.external
+    }
+
+    /// Energy stored in elements and springs [J].
+    pub fn strain_energy(&self) -> f64 {
+        self.system.energy
+    }
+}

@@ -1,0 +1,429 @@
+//! Runs of shells and co-rotational solids behind the face of all solvers.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+use pliant_corotational as corotational;
+use pliant_corotational::{
+    BackwardEuler, DynamicSettings, Explicit, Forces, LinearSolver, Phases, Preconditioner, SolveError,
+    StaticSettings, Statics,
+};
+use pliant_gpu::Wanted;
+use pliant_mechanics::{Energies, Observable, State};
+use serde::{Deserialize, Serialize};
+
+use crate::build::{Built, Control, Corotational};
+use crate::format::{LinearName, LinearWay, PreconditionerName, RunTable, SolverName};
+use crate::output::{FailureSummary, number};
+use crate::plan::Plan;
+use crate::solver::{Effort, LoadStepProgress, Memory, Solver};
+
+/// Iterations from which on a lagged factorisation is made anew.
+const RENEW_AFTER: usize = 10;
+
+/// A run of shells and co-rotational solids.
+pub(crate) struct Corotated<'m> {
+    built: &'m Built,
+    part: &'m Corotational,
+    method: Method<'m>,
+    /// Step [s].
+    step: f64,
+    /// Steps of the whole run.
+    steps: u64,
+    state: corotational::State,
+    forces: Forces<'m>,
+    /// Which components of each node are held or moved, six a node.
+    prescribed: Vec<bool>,
+    /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its positions and rotations.
+    before: Option<(Vec<f64>, corotational::State)>,
+    energies: Energies,
+    reactions: Vec<[f64; 3]>,
+    evaluated: bool,
+    effort: Effort,
+    /// What was taken before the run was resumed.
+    effort_before: Effort,
+}
+
+/// What a resumed run needs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Remembered {
+    state: Snapshot,
+    before: Option<(Vec<f64>, Snapshot)>,
+    energies: Energies,
+    effort: Effort,
+}
+
+impl Remembered {
+    /// Whether it is of a model with so many nodes.
+    pub(crate) fn fits(&self, nodes: usize) -> bool {
+        let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
+        before && self.state.fits(nodes)
+    }
+}
+
+/// A state in plain numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Snapshot {
+    time: f64,
+    load_factor: f64,
+    position: Vec<[f64; 3]>,
+    /// Quaternions (i, j, k, w).
+    rotation: Vec<[f64; 4]>,
+    velocity: Vec<[f64; 3]>,
+    spin: Vec<[f64; 3]>,
+}
+
+impl Snapshot {
+    fn of(state: &corotational::State) -> Self {
+        let plain = |vectors: &[Vector3<f64>]| vectors.iter().map(|&v| v.into()).collect();
+        Self {
+            time: state.time,
+            load_factor: state.load_factor,
+            position: plain(&state.position),
+            rotation: state.rotation.iter().map(|q| q.coords.into()).collect(),
+            velocity: plain(&state.velocity),
+            spin: plain(&state.spin),
+        }
+    }
+
+    fn fits(&self, nodes: usize) -> bool {
+        [self.position.len(), self.rotation.len(), self.velocity.len(), self.spin.len()] == [nodes; 4]
+    }
+
+    fn state(&self) -> corotational::State {
+        let vectors = |plain: &[[f64; 3]]| plain.iter().map(|&v| v.into()).collect();
+        let rotation = |&q: &[f64; 4]| UnitQuaternion::new_unchecked(Quaternion::from(Vector4::from(q)));
+        corotational::State {
+            time: self.time,
+            load_factor: self.load_factor,
+            position: vectors(&self.position),
+            rotation: self.rotation.iter().map(rotation).collect(),
+            velocity: vectors(&self.velocity),
+            spin: vectors(&self.spin),
+        }
+    }
+}
+
+enum Method<'m> {
+    Static(Box<Statics<'m>>),
+    Implicit(Box<BackwardEuler<'m>>),
+    Explicit(Box<Explicit<'m>>),
+}
+
+impl<'m> Corotated<'m> {
+    /// The run that a scene asks for, at its start.
+    pub(crate) fn new(
+        run: &RunTable,
+        built: &'m Built,
+        part: &'m Corotational,
+        plan: &Plan,
+    ) -> Result<Self, FailureSummary> {
+        let linear = linear_solver(&run.linear);
+        let model = &part.model;
+        let method = match run.solver {
+            SolverName::Static => {
+                let mut settings = StaticSettings { linear, ..StaticSettings::default() };
+                settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
+                settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
+                Statics::new(model, settings).map(|solver| Method::Static(Box::new(solver)))
+            }
+            SolverName::Implicit => {
+                let mut settings = DynamicSettings { linear, ..DynamicSettings::new(plan.step) };
+                settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
+                settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
+                if settings.iterations == 1 {
+                    settings = settings.real_time(linear);
+                }
+                BackwardEuler::new(model, settings).map(|solver| Method::Implicit(Box::new(solver)))
+            }
+            _ => Explicit::new(model, plan.step).map(|solver| Method::Explicit(Box::new(solver))),
+        };
+        let mut prescribed = vec![false; 6 * model.rest.len()];
+        for constraint in &model.constraints {
+            for &node in &constraint.nodes {
+                for (own, held) in prescribed[6 * node as usize..].iter_mut().zip(constraint.components) {
+                    *own |= held;
+                }
+            }
+        }
+        Ok(Self {
+            method: method.map_err(|error| failure(&error, built, part, 0.0))?,
+            step: plan.step,
+            steps: plan.steps,
+            state: part.start.clone(),
+            forces: Forces::new(model),
+            prescribed,
+            before: None,
+            energies: Energies::default(),
+            reactions: vec![[0.0; 3]; built.model.constraints.len()],
+            evaluated: false,
+            effort: Effort::default(),
+            effort_before: Effort::default(),
+            built,
+            part,
+        })
+    }
+
+    /// Forces from outside: loads on free components, what holds or moves the others.
+    fn outside(&self) -> Vec<f64> {
+        let all = self.forces.loads().iter().zip(self.forces.internal()).zip(&self.prescribed);
+        all.map(|((load, internal), held)| if *held { *internal } else { *load }).collect()
+    }
+
+    /// Work of the forces from outside since the instant before [J], by the trapezoidal rule.
+    fn work(&self, outside: &[f64]) -> f64 {
+        let Some((forces, state)) = &self.before else { return 0.0 };
+        let node = |(node, (now, then)): (usize, (&[f64], &[f64]))| {
+            let shift = self.state.position[node] - state.position[node];
+            let turn = (self.state.rotation[node] * state.rotation[node].inverse()).scaled_axis();
+            let mean = |first: usize| Vector3::from_fn(|c, _| 0.5 * (now[first + c] + then[first + c]));
+            shift.dot(&mean(0)) + turn.dot(&mean(3))
+        };
+        outside.chunks_exact(6).zip(forces.chunks_exact(6)).enumerate().map(node).sum()
+    }
+
+    fn kinetic(&self) -> f64 {
+        let model = &self.part.model;
+        let node = |node: usize| {
+            model.mass[node] * self.state.velocity[node].norm_squared()
+                + model.inertia[node] * self.state.spin[node].norm_squared()
+        };
+        0.5 * (0..model.rest.len()).map(node).sum::<f64>()
+    }
+
+    fn find_energies(&mut self) {
+        let outside = self.outside();
+        let kinetic = self.kinetic();
+        let internal = self.forces.strain_energy();
+        let external = match &self.before {
+            Some(_) => self.energies.external + self.work(&outside),
+            // What is given at the start.
+            None => kinetic + internal,
+        };
+        // Backward Euler takes energy like a damper; a static path has no inertia to compare with.
+        let damping = match self.method {
+            Method::Implicit(_) => external - kinetic - internal,
+            _ => 0.0,
+        };
+        self.energies = Energies { kinetic, internal, damping, external, ..Energies::default() };
+        self.before = Some((outside, self.state.clone()));
+    }
+
+    fn find_reactions(&mut self) {
+        let [internal, loads] = [self.forces.internal(), self.forces.loads()];
+        for (reaction, constraint) in self.reactions.iter_mut().zip(&self.built.model.constraints) {
+            *reaction = [0.0; 3];
+            for &node in &constraint.nodes {
+                for c in (0..3).filter(|&c| constraint.components[c]) {
+                    let at = 6 * node as usize + c;
+                    reaction[c] += internal[at] - loads[at];
+                }
+            }
+        }
+    }
+
+    /// One step of the method, to the time of its number.
+    fn go(&mut self, number: u64) -> Result<(), SolveError> {
+        let until = number as f64 * self.step;
+        match &mut self.method {
+            Method::Explicit(solver) => solver.advance(&mut self.state)?,
+            Method::Implicit(solver) => {
+                let step = solver.advance(&mut self.state)?;
+                let iterations = step.residuals.len().saturating_sub(1).max(1);
+                self.effort.newton_iterations += iterations as u64;
+                self.effort.halved += u64::from(step.parts > 1);
+                self.effort.linear_residual = step.linear.residual;
+                self.effort.residual =
+                    if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
+                self.effort.take(solver.phases(), &self.effort_before);
+            }
+            Method::Static(solver) => {
+                let step = match self.part.control.map(|control| part_of(control, number, self.steps)) {
+                    Some(control) => {
+                        let step = solver.control(&mut self.state, control)?;
+                        self.state.time = until;
+                        step
+                    }
+                    None => solver.solve(&mut self.state, until)?,
+                };
+                self.effort.newton_iterations += step.residuals.len().saturating_sub(1) as u64;
+                self.effort.halved += u64::from(step.parts > 1);
+                self.effort.take(solver.phases(), &self.effort_before);
+                if step.negative_pivots > 0 {
+                    self.effort.unstable_from.get_or_insert(until);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Effort {
+    /// Takes what a solver has spent since it was made, in addition to what was spent before.
+    fn take(&mut self, phases: Phases, before: &Self) {
+        self.solutions = before.solutions + phases.solutions as u64;
+        self.linear_iterations = before.linear_iterations + phases.iterations as u64;
+        self.seconds_cells = before.seconds_cells + phases.cells.as_secs_f64();
+        self.seconds_factors = before.seconds_factors + phases.preparation.as_secs_f64();
+        self.seconds_solution = before.seconds_solution + phases.solution.as_secs_f64();
+    }
+}
+
+/// What the load step of a number (counted from 1) prescribes.
+fn part_of(control: Control, number: u64, of: u64) -> corotational::Control {
+    match control {
+        Control::Displacement { node, component, by } => {
+            corotational::Control::Displacement { node, component, by: by / of as f64 }
+        }
+        Control::ArcLength(length) => corotational::Control::ArcLength { length },
+        Control::Volume { from, to } => {
+            corotational::Control::Volume { volume: from + (to - from) * number as f64 / of as f64 }
+        }
+    }
+}
+
+fn linear_solver(way: &LinearWay) -> LinearSolver {
+    let usual = crate::format::LinearTable::usual;
+    let table = match way {
+        LinearWay::Named(name) => usual(*name),
+        LinearWay::Set(table) => table.clone(),
+    };
+    match table.by {
+        LinearName::Direct => LinearSolver::Direct,
+        LinearName::Unsymmetric => LinearSolver::Unsymmetric,
+        LinearName::ConjugateGradients => LinearSolver::ConjugateGradients {
+            tolerance: table.tolerance,
+            iterations: table.iterations as usize,
+            preconditioner: match table.preconditioner {
+                PreconditionerName::BlockJacobi => Preconditioner::BlockJacobi,
+                PreconditionerName::LaggedFactors => {
+                    Preconditioner::LaggedFactors { renew_after: RENEW_AFTER }
+                }
+            },
+        },
+    }
+}
+
+impl Solver<f64> for Corotated<'_> {
+    fn evaluate(&mut self, _state: &mut State<f64>, _wanted: Wanted) -> Result<(), FailureSummary> {
+        if self.evaluated {
+            return Ok(());
+        }
+        let found = self.forces.evaluate(&self.state);
+        found.map_err(|error| failure(&error, self.built, self.part, self.state.time))?;
+        self.find_energies();
+        self.find_reactions();
+        self.evaluated = true;
+        Ok(())
+    }
+
+    fn advance(
+        &mut self,
+        state: &mut State<f64>,
+        _steps: u64,
+        _watch: &mut dyn FnMut(LoadStepProgress),
+    ) -> Result<(), FailureSummary> {
+        let number = state.steps + 1;
+        let time = self.state.time;
+        self.go(number).map_err(|error| failure(&error, self.built, self.part, time))?;
+        for (own, (position, rest)) in
+            state.displacement.iter_mut().zip(self.state.position.iter().zip(&self.part.model.rest))
+        {
+            *own = (position - rest).into();
+        }
+        state.steps = number;
+        state.time = self.state.time;
+        self.evaluated = false;
+        Ok(())
+    }
+
+    /// The balance is not judged.
+    fn balance_floor(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn observable(&self) -> &dyn Observable<f64> {
+        self
+    }
+
+    fn memory(&self) -> Memory<f64> {
+        let before = self.before.as_ref().map(|(forces, state)| (forces.clone(), Snapshot::of(state)));
+        let (energies, effort) = (self.energies, self.effort.clone());
+        Memory::Corotated(Box::new(Remembered { state: Snapshot::of(&self.state), before, energies, effort }))
+    }
+
+    fn resume(&mut self, memory: Memory<f64>) {
+        let Memory::Corotated(remembered) = memory else { return };
+        let Remembered { state, before, energies, effort } = *remembered;
+        self.state = state.state();
+        self.before = before.map(|(forces, state)| (forces, state.state()));
+        self.energies = energies;
+        (self.effort, self.effort_before) = (effort.clone(), effort);
+        self.evaluated = false;
+    }
+
+    fn corotational(&self) -> Option<&corotational::State> {
+        Some(&self.state)
+    }
+
+    fn effort(&self) -> Option<Effort> {
+        (!matches!(self.method, Method::Explicit(_))).then(|| self.effort.clone())
+    }
+}
+
+impl Observable<f64> for Corotated<'_> {
+    fn energies(&self) -> &Energies {
+        &self.energies
+    }
+
+    fn reaction(&self, constraint: usize) -> [f64; 3] {
+        self.reactions[constraint]
+    }
+
+    fn velocity(&self, _state: &State<f64>, node: usize) -> [f64; 3] {
+        self.state.velocity[node].into()
+    }
+}
+
+/// What a user is told of a step that failed, from a time on.
+fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) -> FailureSummary {
+    let body_of = |node: u32| built.model.bodies.iter().find(|body| body.nodes.contains(&node));
+    let (kind, node, cell) = match error {
+        SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
+        SolveError::Stalled { .. } => ("not-converged", None, None),
+        SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
+            ("singular", Some(*node), None)
+        }
+        SolveError::Indefinite { .. } => ("unstable", None, None),
+        SolveError::Broken { cell, .. } => ("inverted", None, part.cell(*cell)),
+        SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
+    };
+    let owner = node.and_then(body_of);
+    let body = owner.map(|body| body.name.clone()).or_else(|| {
+        let (body, _) = cell?;
+        Some(built.bodies[body].name.clone())
+    });
+    let of_body = body.as_ref().map(|name| format!(" of `{name}`")).unwrap_or_default();
+    let own_node = node.zip(owner).map(|(node, body)| node - body.nodes.start);
+    let place = match (own_node, cell) {
+        (Some(node), _) => format!(" (node {node}{of_body})"),
+        (_, Some((_, cell))) => format!(" (element {cell}{of_body})"),
+        _ => String::new(),
+    };
+    let history = match error {
+        SolveError::NotConverged { residuals, .. } => {
+            let told: Vec<String> = residuals.iter().map(|&residual| number(residual)).collect();
+            format!("; residuals [N] of the last attempt: {}", told.join(", "))
+        }
+        _ => String::new(),
+    };
+    FailureSummary::of_solver(
+        kind,
+        format!(
+            "after t = {} s{place}: {error}{history}; what was written before stays readable",
+            number(time)
+        ),
+        body,
+        cell.map(|(_, cell)| cell),
+        own_node,
+        time,
+    )
+}

@@ -1,0 +1,106 @@
+//! The curved surface of shells as a mesh of small triangles.
+
+use pliant_corotational::{CurvedSurface, EdgeRule, Picture, PictureFields};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
+use pliant_mechanics::Real;
+
+use super::{Frame, fields};
+use crate::build::{BodyCells, Built, Corotational};
+use crate::format::FieldName;
+
+/// The curved surface of one shell or of all.
+pub(super) struct Curved {
+    surface: CurvedSurface,
+    picture: Picture,
+    found: PictureFields,
+    cells: fields::Corotated,
+    /// Points of the picture that are shown.
+    points: Vec<u32>,
+    /// The facet of each triangle that is shown.
+    facets: Vec<u32>,
+}
+
+impl Curved {
+    /// With each edge cut into `parts`; and the mesh at rest.
+    pub(super) fn new(built: &Built, part: &Corotational, on: Option<&str>, parts: u32) -> (Self, Mesh) {
+        let surface = CurvedSurface::new(&part.model, EdgeRule::Arc);
+        let picture = surface.picture(&part.model, parts);
+        let shown = |facet: u32| {
+            let owner = part
+                .cells
+                .iter()
+                .position(|cells| matches!(cells, BodyCells::Facets(r) if r.contains(&facet)));
+            on.is_none_or(|on| owner.is_some_and(|owner| built.bodies[owner].name == on))
+        };
+        let mut own = vec![u32::MAX; picture.places.len()];
+        let (mut points, mut facets, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, triangle) in picture.triangles.iter().enumerate() {
+            let facet = picture.facet(number);
+            if !shown(facet) {
+                continue;
+            }
+            facets.push(facet);
+            for &point in triangle {
+                let at = &mut own[point as usize];
+                if *at == u32::MAX {
+                    *at = points.len() as u32;
+                    points.push(point);
+                }
+                nodes.push(*at);
+            }
+        }
+        let mesh = Mesh {
+            points: points.iter().map(|&point| picture.rest[point as usize]).collect(),
+            blocks: vec![CellBlock::new(CellKind::Triangle, nodes)],
+            ..Mesh::default()
+        };
+        let curved = Self {
+            surface,
+            picture,
+            found: PictureFields::default(),
+            cells: fields::Corotated::default(),
+            points,
+            facets,
+        };
+        (curved, mesh)
+    }
+
+    /// Puts the wanted fields and the normals of an instant into the mesh.
+    pub(super) fn fill<R: Real>(&mut self, mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName]) {
+        let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) else { return };
+        let model = &part.model;
+        self.found.fill(&self.picture, &self.surface, model, state);
+        self.cells.fill(model, state);
+        let points = &self.points;
+        let vectors = |values: &dyn Fn(usize) -> [f64; 3]| DataArray {
+            components: 3,
+            values: points.iter().flat_map(|&point| values(point as usize)).collect(),
+        };
+        mesh.point_data.insert("normal".into(), vectors(&|point| self.found.normal[point].into()));
+        for &field in wanted {
+            let array = match field {
+                FieldName::Displacement => vectors(&|point| self.found.displacement[point].into()),
+                FieldName::Rotation => vectors(&|point| self.found.rotation[point].into()),
+                FieldName::Velocity => vectors(&|point| {
+                    let place = &self.picture.places[point];
+                    let nodes = model.facets[place.facet as usize].nodes;
+                    let parts = nodes.iter().zip(place.weights);
+                    parts
+                        .map(|(&node, weight)| state.velocity[node as usize] * weight)
+                        .sum::<nalgebra::Vector3<f64>>()
+                        .into()
+                }),
+                _ => {
+                    let components = field.components();
+                    let value = |&facet: &u32| {
+                        self.cells.of(model, fields::Cell::Facet(facet), field).into_iter().take(components)
+                    };
+                    let values = self.facets.iter().flat_map(value).collect();
+                    mesh.blocks[0].data.insert(field.name().into(), DataArray { components, values });
+                    continue;
+                }
+            };
+            mesh.point_data.insert(field.name().into(), array);
+        }
+    }
+}
