@@ -29,7 +29,10 @@ const FACETS: usize = 8;
 const DENSE: usize = 16;
 
 /// Shells to start from where an error is asked for.
-const START: usize = 120;
+const START: usize = 250;
+
+/// Rounds aim at this part of the error asked for: what is measured between the places that they look at is a little more.
+const AIM: f64 = 0.97;
 
 /// Rounds of refinement at most.
 const MOST_ROUNDS: usize = 40;
@@ -116,6 +119,8 @@ struct Target {
 struct Shells {
     mesh: TriangleMesh,
     normals: Vec<Vector3>,
+    /// Points that may move along the target: those round shells that were too far off. The others keep what was fitted.
+    active: Vec<bool>,
 }
 
 impl FittedShells {
@@ -163,7 +168,7 @@ impl FittedShells {
             let count = shells.mesh.len();
             let worst = far.iter().copied().fold(0.0, f64::max);
             let ready = match goal {
-                ShellGoal::Error(error) => worst <= error * target.diagonal,
+                ShellGoal::Error(error) => worst <= AIM * error * target.diagonal,
                 ShellGoal::Shells(number) => count + 1 >= number,
             };
             // Among those that are ready the closest counts; until then the last.
@@ -173,7 +178,7 @@ impl FittedShells {
             reached = ready;
             let (bound, room) = match goal {
                 _ if ready => break,
-                ShellGoal::Error(error) => (error * target.diagonal, usize::MAX),
+                ShellGoal::Error(error) => (AIM * error * target.diagonal, usize::MAX),
                 ShellGoal::Shells(number) => (share(&far, count, worst), (number - count) / 2),
             };
             progress(match goal {
@@ -210,7 +215,7 @@ impl Shells {
     fn new(mesh: TriangleMesh, target: &Target) -> Self {
         let (points, triangles) = mesh.compact();
         let normals = points.iter().map(|x| target.reference.closest(x).1).collect();
-        Self { mesh: TriangleMesh::new(points, triangles), normals }
+        Self { active: vec![true; points.len()], mesh: TriangleMesh::new(points, triangles), normals }
     }
 
     /// Puts a point on the target, or on its border, with the normal there.
@@ -241,11 +246,15 @@ impl Shells {
             for [a, b] in self.mesh.edges() {
                 let Some(new) = self.mesh.flipped(a, b) else { continue };
                 let [Some(s), Some(t)] = self.mesh.sides(a, b) else { continue };
-                if self.mesh.flip_is_sound([s, t], new, 1.1) {
+                let active = new.as_flattened().iter().all(|&n| self.active[n as usize]);
+                if active && self.mesh.flip_is_sound([s, t], new, 1.1) {
                     self.mesh.flip(a, b, new);
                 }
             }
-            for point in 0..self.mesh.points.len() as u32 {
+            for point in (0..self.mesh.points.len() as u32)
+                .filter(|&point| self.active[point as usize])
+                .collect::<Vec<_>>()
+            {
                 self.move_along(point, target);
             }
         }
@@ -405,6 +414,7 @@ impl Shells {
         order.sort_by(|&a, &b| far[b as usize].total_cmp(&far[a as usize]));
         let mut touched = vec![false; far.len()];
         let mut halved = 0;
+        let mut changed: Vec<u32> = order.iter().flat_map(|&t| self.mesh.triangles[t as usize]).collect();
         for t in order {
             if halved == room {
                 break;
@@ -425,7 +435,13 @@ impl Shells {
             self.normals.push(patch.normal(place));
             touched.resize(self.mesh.triangles.len(), true);
             self.place(fresh, target);
+            changed.push(fresh);
             halved += 1;
+        }
+        self.active = vec![false; self.mesh.points.len()];
+        for point in changed {
+            self.active[point as usize] = true;
+            self.mesh.neighbours(point).iter().for_each(|&n| self.active[n as usize] = true);
         }
         halved
     }
