@@ -67,7 +67,7 @@ pub enum Command {
     /// List the labels of a segmented image: volume, place and pieces of each.
     #[command(after_help = "Examples:\n  pliant labels seg.nii.gz\n  pliant labels seg.nii.gz --json")]
     Labels(Labels),
-    /// Make a mesh of volume cells from labels of a segmented image.
+    /// Make a mesh from labels of a segmented image: tets, hexes, a surface, curved shells. Surfaces and shells also from mesh files.
     #[command(after_help = MESH_HELP)]
     Mesh(MeshImage),
     /// Compute the results of the thesis and write them beside the printed ones.
@@ -301,7 +301,14 @@ Examples:
   pliant mesh seg.nii.gz --label 5 --edge 0.01 --as hexes --close-gaps 0.003 --fill-holes -o liver.msh
   pliant mesh grey.nii --threshold 0.5 --edge 0.008 -o grey.vtu
 
-The label of each cell is its cell data `label`. A scene can name the image itself:
+  pliant mesh seg.nii.gz --label 5 --as surface --edge 0.005 -o liver.ply              # even triangles
+  pliant mesh liver.stl --as surface --cells 8000 -o coarse.stl                        # as few as asked for
+  pliant mesh liver.stl --as shells --error 0.5% -o liver.vtu --error-map off.vtu      # or --shells 800
+
+Surfaces and shells are also made from the triangles and quads of mesh files (OBJ, OFF, STL, PLY, VTP, VTK, VTU, Gmsh), or from the
+boundary of their cells. Shells are curved triangles: point data `normal` are the fitted normals of their nodes.
+
+The label of each volume cell is its cell data `label`. A scene can name the image itself:
   mesh = { image = \"seg.nii.gz\", label = 5, edge = 0.008 }
 
 Exit codes: 0 done, 1 the mesh could not be written, 2 the input is wrong.";
@@ -320,7 +327,7 @@ pub struct Labels {
 
 #[derive(Debug, clap::Args)]
 pub struct MeshImage {
-    /// An image file, or the folder of a DICOM series.
+    /// An image file, or the folder of a DICOM series; for surfaces and shells also a mesh file.
     pub image: PathBuf,
     /// Label to mesh; several make one mesh of several materials. The first one takes what cleaning adds.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
@@ -328,13 +335,28 @@ pub struct MeshImage {
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true, conflicts_with = "label")]
     pub threshold: Option<f64>,
-    /// Edge of the cells [m].
+    /// Edge of the cells [m]. Tets and hexes need it; a surface gets even triangles of this edge.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
-    pub edge: f64,
-    /// The cells: tetrahedra shaped for large stable steps, or cubes with a stepped surface.
+    pub edge: Option<f64>,
+    /// Triangles of a surface, instead of their edge: as few, placed where the shape needs them.
+    #[arg(long = "cells", value_name = "N", conflicts_with = "edge")]
+    pub triangles: Option<usize>,
+    /// Number of shells.
+    #[arg(long, value_name = "N", conflicts_with_all = ["edge", "triangles"])]
+    pub shells: Option<usize>,
+    /// Largest distance of shells from the surface, both ways, as a part of the diagonal of its box: 0.005 or 0.5%.
+    #[arg(long, value_name = "PART", value_parser = part, conflicts_with_all = ["edge", "triangles", "shells"])]
+    pub error: Option<f64>,
+    /// Factor that makes the lengths of a mesh file metres: 0.001 for millimetres. Images know theirs.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub scale: f64,
+    /// Also write the curved surface of the shells in small triangles, with its distance from the target as point data.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["edge", "triangles"])]
+    pub error_map: Option<PathBuf>,
+    /// What to make: tetrahedra shaped for large stable steps, cubes with a stepped surface, a surface, or curved shells.
     #[arg(long = "as", value_name = "CELLS", default_value = "tets")]
     pub cells: MeshCells,
-    /// Name of the mesh; .vtu or .msh.
+    /// Name of the mesh; .vtu or .msh, of a surface also .ply, .obj or .stl.
     #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
     /// Close gaps and channels of up to this width [m].
@@ -361,6 +383,20 @@ pub struct MeshImage {
 pub enum MeshCells {
     Tets,
     Hexes,
+    Surface,
+    Shells,
+}
+
+/// A part of one, or percent.
+fn part(typed: &str) -> Result<f64, String> {
+    let number = match typed.strip_suffix('%') {
+        Some(percent) => percent.trim().parse::<f64>().map(|percent| percent / 100.0),
+        None => typed.parse(),
+    };
+    match number {
+        Ok(part) if part > 0.0 && part < 1.0 => Ok(part),
+        _ => Err("a part of the diagonal is above 0 and below 1, as 0.005 or 0.5%".into()),
+    }
 }
 
 impl Command {

@@ -7,6 +7,7 @@ mod mesh;
 mod page;
 mod report;
 mod reproduce;
+mod skin;
 
 use std::process::ExitCode;
 

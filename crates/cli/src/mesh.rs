@@ -1,4 +1,4 @@
-//! `pliant labels` and `pliant mesh`: what a segmented image holds, and cells of it.
+//! `pliant labels` and `pliant mesh`: what a segmented image holds, and cells of it. Surfaces and shells are in `skin.rs`.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -15,6 +15,7 @@ use serde_json::{Value as Json, json};
 
 use crate::arguments::{Labels, MeshCells, MeshImage};
 use crate::report::{Bar, Failure, failed_output, say};
+use crate::skin;
 
 pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
     let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
@@ -38,13 +39,11 @@ pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
 }
 
 pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
+    if matches!(arguments.cells, MeshCells::Surface | MeshCells::Shells) {
+        return skin::mesh(arguments);
+    }
     require_volume_format(arguments)?;
-    let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
-    let image = read(&arguments.image, &options).map_err(|error| Failure::plain(error, ""))?;
-    let (labels, chosen) = match arguments.threshold {
-        Some(least) => (image.threshold(least..=f64::INFINITY), vec![1]),
-        None => (image.labels().map_err(|error| label_failure(&error))?, arguments.label.clone()),
-    };
+    let (image, labels, chosen) = regions(arguments)?;
     let bar = Bar::new();
     let made = make(arguments, &labels, &chosen, &bar);
     bar.finish();
@@ -67,6 +66,17 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
         say(object)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The image, what is segmented in it, and the labels chosen.
+pub fn regions(arguments: &MeshImage) -> Result<(Image, LabelImage, Vec<i32>), Failure> {
+    let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
+    let image = read(&arguments.image, &options).map_err(|error| Failure::plain(error, ""))?;
+    let (labels, chosen) = match arguments.threshold {
+        Some(least) => (image.threshold(least..=f64::INFINITY), vec![1]),
+        None => (image.labels().map_err(|error| label_failure(&error))?, arguments.label.clone()),
+    };
+    Ok((image, labels, chosen))
 }
 
 /// Refuses a name whose ending no volume mesh can be written to, before any work.
@@ -96,7 +106,7 @@ fn label_failure(error: &LabelError) -> Failure {
     Failure::plain(error, help)
 }
 
-fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
+pub fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
     let help = match error {
         MeshingError::TooManyCells { .. } | MeshingError::LatticeTooLarge { .. } if !force => {
             "lengths are in metres: `--edge 0.008` makes cells of 8 mm; `--force` makes so many all the same"
@@ -111,21 +121,11 @@ fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
 const PARTS: [f64; 3] = [0.3, 0.6, 0.1];
 
 fn make(arguments: &MeshImage, labels: &LabelImage, chosen: &[i32], bar: &Bar) -> Result<Made, Failure> {
-    let cleaning = Cleaning {
-        close_gaps: arguments.close_gaps,
-        fill_holes: arguments.fill_holes,
-        keep_largest: arguments.keep_largest,
+    let Some(edge) = arguments.edge else {
+        return Err(Failure::plain("no edge for the cells", "for example `--edge 0.008`, in metres"));
     };
-    let (edge, force) = (arguments.edge, arguments.force);
-    let field = |done: f64| bar.update_mesh(PARTS[0] * done, "smoothing the surface");
-    let (anatomy, cleaned) = Anatomy::from_image(labels, chosen, &cleaning, &Smoothing::default(), &field)
-        .map_err(|error| match (&error, arguments.threshold) {
-            (LabelError::Absent { .. }, Some(least)) => {
-                let message = format!("no voxel is {least} or more");
-                Failure::plain(message, "use a lower `--threshold`")
-            }
-            _ => label_failure(&error),
-        })?;
+    let force = arguments.force;
+    let (anatomy, cleaned) = anatomy(arguments, labels, chosen, bar)?;
     let filling = |done: f64| bar.update_mesh(PARTS[0] + PARTS[1] * done, "making cells");
     let cell_limit = if force { usize::MAX } else { DEFAULT_CELL_LIMIT };
     let refused = |error: MeshingError| meshing_failure(&error, force);
@@ -135,7 +135,7 @@ fn make(arguments: &MeshImage, labels: &LabelImage, chosen: &[i32], bar: &Bar) -
             let made = request.mesh(&anatomy, &filling).map_err(refused)?;
             (made.mesh, Cells::Tets(Box::new(made.report)))
         }
-        MeshCells::Hexes => {
+        _ => {
             let mut made = Voxels { edge, cell_limit }.mesh(anatomy.field()).map_err(refused)?;
             anatomy.label(&mut made.mesh);
             (made.mesh, Cells::Hexes { dropped: [made.dropped_components, made.dropped_cells] })
@@ -157,6 +157,30 @@ fn make(arguments: &MeshImage, labels: &LabelImage, chosen: &[i32], bar: &Bar) -
         cells,
         cleaned,
         deviation,
+    })
+}
+
+/// The chosen regions, cleaned and smoothed.
+pub fn anatomy(
+    arguments: &MeshImage,
+    labels: &LabelImage,
+    chosen: &[i32],
+    bar: &Bar,
+) -> Result<(Anatomy<'static>, Cleaned), Failure> {
+    let cleaning = Cleaning {
+        close_gaps: arguments.close_gaps,
+        fill_holes: arguments.fill_holes,
+        keep_largest: arguments.keep_largest,
+    };
+    let field = |done: f64| bar.update_mesh(PARTS[0] * done, "smoothing the surface");
+    Anatomy::from_image(labels, chosen, &cleaning, &Smoothing::default(), &field).map_err(|error| {
+        match (&error, arguments.threshold) {
+            (LabelError::Absent { .. }, Some(least)) => {
+                let message = format!("no voxel is {least} or more");
+                Failure::plain(message, "use a lower `--threshold`")
+            }
+            _ => label_failure(&error),
+        }
     })
 }
 
@@ -297,13 +321,13 @@ impl Material {
     }
 }
 
-fn image_line(image: &Image) -> String {
+pub fn image_line(image: &Image) -> String {
     let [nx, ny, nz] = image.grid.dims;
     let [hx, hy, hz] = image.grid.spacing().map(|h| number(h * 1e3));
     format!("{}, {nx} × {ny} × {nz} voxels of {hx} × {hy} × {hz} mm", image.format)
 }
 
-fn image_object(image: &Image) -> Json {
+pub fn image_object(image: &Image) -> Json {
     json!({
         "format": image.format, "size": image.grid.dims, "spacing": image.grid.spacing(), "notes": image.notes,
     })

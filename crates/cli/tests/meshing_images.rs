@@ -387,3 +387,56 @@ fn a_liver_of_a_patient_is_meshed() {
     assert!(json["acoustic_part"].as_f64().unwrap() > 0.5, "{json}");
     assert!(json["materials"][0]["volume_error"].as_f64().unwrap().abs() < 0.03, "{json}");
 }
+
+/// A ball of 15 mm: 14.1 ml, 28.3 cm², closed; then from that file fewer triangles, and shells.
+#[test]
+fn a_surface_of_an_image_becomes_fewer_triangles_and_shells() {
+    let workshop = with_image();
+    let labels = ["--label", "5", "--label", "8", "--keep-largest", "--fill-holes"];
+    let even = [&labels[..], &["--as", "surface", "--edge", "0.003", "-o", "even.ply", "--json"]].concat();
+    let json = mesh(&workshop, &even).json();
+    assert!(close(&json["volume"], 14.14e-6, 0.04) && close(&json["area"], 28.27e-4, 0.04), "{json}");
+    assert_eq!((&json["border_edges"], &json["components"]), (&0.into(), &1.into()));
+    assert!(json["least_angle"].as_f64().unwrap() > 20.0, "{json}");
+
+    let fewer = workshop
+        .pliant(&["mesh", "even.ply", "--as", "surface", "--cells", "200", "-o", "few.stl", "--json"]);
+    let json = fewer.json();
+    assert_eq!(json["cells"], 200);
+    // Edges of 5.7 mm on a radius of 15 mm: h²/6R = 0.36 mm at the centres of triangles.
+    assert!(json["distances"]["largest_forward"].as_f64().unwrap() < 0.8e-3, "{json}");
+
+    let shells = [
+        "mesh",
+        "even.ply",
+        "--as",
+        "shells",
+        "--shells",
+        "80",
+        "-o",
+        "shells.vtu",
+        "--error-map",
+        "off.vtu",
+        "--json",
+    ];
+    let json = workshop.pliant(&shells).json();
+    assert!(json["report"]["shells"].as_u64().unwrap() <= 80, "{json}");
+    let distances = &json["report"]["distances"];
+    // Shells follow the ball; the target's own facets are h²/6R = 0.1 mm off it.
+    assert!(distances["largest_forward"].as_f64().unwrap() < 0.3e-3, "{json}");
+    assert!(io::read(&workshop.path("shells.vtu")).unwrap().mesh.point_data.contains_key("normal"));
+    assert!(io::read(&workshop.path("off.vtu")).unwrap().mesh.point_data.contains_key("distance"));
+}
+
+#[test]
+fn what_a_surface_or_shells_need_is_told() {
+    let workshop = with_image();
+    let told = mesh(&workshop, &["--label", "5", "--as", "shells", "-o", "a.vtu"]);
+    assert!(told.code == 2 && told.err.contains("--error 0.5%"), "{}", told.err);
+    let told = mesh(&workshop, &["--label", "5", "--as", "surface", "-o", "a.vtu"]);
+    assert!(told.code == 2 && told.err.contains("--cells 8000"), "{}", told.err);
+    let told = mesh(&workshop, &["--label", "5", "-o", "a.vtu"]);
+    assert!(told.code == 2 && told.err.contains("--edge 0.008"), "{}", told.err);
+    let told = mesh(&workshop, &["--label", "5", "--as", "shells", "--error", "3", "-o", "a.vtu"]);
+    assert!(told.code == 2 && told.err.contains("0.5%"), "{}", told.err);
+}

@@ -4,13 +4,14 @@
 //! Leaves out: keeping neighbouring points of a mesh on the same side of a fold.
 
 use nalgebra::Vector3;
+use pliant_geometry::barycentric_of_closest;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
 use crate::facet::Vector18;
 use crate::model::Model;
 use crate::state::State;
-use crate::surface::{Carried, CurvedSurface, Place, closest_on_triangle};
+use crate::surface::{Carried, CurvedSurface, Place};
 
 /// A search tree over the curved surface where it was when the tree was made.
 struct Nearest<'s> {
@@ -39,7 +40,7 @@ impl RTreeObject for Flat {
 impl PointDistance for Flat {
     fn distance_2(&self, point: &[f64; 3]) -> f64 {
         let point = Vector3::from(*point);
-        let weights = closest_on_triangle(&self.corners, &point);
+        let weights = barycentric_of_closest(&self.corners, &point);
         (self.corners.iter().zip(weights).map(|(x, w)| x * w).sum::<Vector3<f64>>() - point).norm_squared()
     }
 }
@@ -67,7 +68,7 @@ impl<'s> Nearest<'s> {
                 break;
             }
             let patch = self.surface.patch(self.model, self.state, flat.facet);
-            let (weights, distance) = patch.closest(point, closest_on_triangle(&flat.corners, point));
+            let (weights, distance) = patch.closest(point, barycentric_of_closest(&flat.corners, point));
             if best.is_none_or(|(_, nearest)| distance < nearest) {
                 best = Some((Place { facet: flat.facet, weights }, distance));
             }

@@ -163,15 +163,16 @@ impl Patch {
     /// (Vlachos et al. 2001, in Bernstein's form). It differs from [`Patch::normal`] by a term that falls with the square of the edges, but
     /// is the same on both sides of an edge.
     pub fn shading_normal(&self, weights: [f64; 3]) -> Vector3<f64> {
+        let (p, n) = (self.corners(), self.normals());
         let sum = (0..3).fold(Vector3::zeros(), |sum, i| {
             let j = (i + 1) % 3;
-            let (e, ends) = (self.p[j] - self.p[i], self.n[i] + self.n[j]);
+            let (e, ends) = (p[j] - p[i], n[i] + n[j]);
             // The mean of the ends mirrored at the plane across the edge.
             let middle = ends - e * (2.0 * e.dot(&ends) / e.norm_squared());
-            let middle = middle.try_normalize(0.0).unwrap_or(self.n[i]);
-            sum + weights[i] * (weights[i] * self.n[i] + 2.0 * weights[j] * middle)
+            let middle = middle.try_normalize(0.0).unwrap_or(n[i]);
+            sum + weights[i] * (weights[i] * n[i] + 2.0 * weights[j] * middle)
         });
-        sum.try_normalize(0.0).unwrap_or(self.n[0])
+        sum.try_normalize(0.0).unwrap_or(n[0])
     }
 }
 

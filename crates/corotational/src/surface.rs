@@ -6,29 +6,16 @@
 //! Leaves out: continuous tangents across edges (their jump falls with h²).
 
 use std::collections::BTreeMap;
+use std::ops::Deref;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
+pub use pliant_geometry::EdgeRule;
+use pliant_geometry::{ControlWeights, CurvedTriangle, EDGES};
 
 use crate::facet::Vector18;
 use crate::model::Model;
 use crate::rotation::skew;
 use crate::state::State;
-
-/// Where control points lie along the tangent of an edge.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EdgeRule {
-    /// 2/(3 c (1 + c)) of the tangent, with c the cosine between edge and tangent: arcs, three to four times closer to spheres.
-    #[default]
-    Arc,
-    /// A third: plain PN triangles.
-    Third,
-}
-
-/// Cosines between edge and tangent below this do not shorten the tangent further.
-const STEEPEST: f64 = 0.1;
-
-/// Ends of the six control points along edges: 12, 21, 23, 32, 31, 13.
-const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2]];
 
 /// A place on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,14 +47,16 @@ pub struct Carried {
     pub aside: [f64; 2],
 }
 
-/// One Bézier triangle.
+/// The curved triangle over a facet, and its motion with the facet's nodes.
 #[derive(Clone, Debug)]
-pub struct Patch {
-    pub(crate) p: [Vector3<f64>; 3],
-    pub(crate) n: [Vector3<f64>; 3],
-    edge: [Vector3<f64>; 6],
-    straight: [bool; 6],
-    rule: EdgeRule,
+pub struct Patch(CurvedTriangle);
+
+impl Deref for Patch {
+    type Target = CurvedTriangle;
+
+    fn deref(&self) -> &CurvedTriangle {
+        &self.0
+    }
 }
 
 impl CurvedSurface {
@@ -157,121 +146,10 @@ impl CurvedSurface {
     }
 }
 
-/// Area coordinates of the point of a triangle that is closest to a point (Ericson 2005, Real-Time Collision Detection, 5.1.5).
-pub(crate) fn closest_on_triangle([a, b, c]: &[Vector3<f64>; 3], to: &Vector3<f64>) -> [f64; 3] {
-    let (ab, ac) = (b - a, c - a);
-    let products = |from: &Vector3<f64>| (ab.dot(&(to - from)), ac.dot(&(to - from)));
-    let ((d1, d2), (d3, d4), (d5, d6)) = (products(a), products(b), products(c));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return [1.0, 0.0, 0.0];
-    }
-    if d3 >= 0.0 && d4 <= d3 {
-        return [0.0, 1.0, 0.0];
-    }
-    if d6 >= 0.0 && d5 <= d6 {
-        return [0.0, 0.0, 1.0];
-    }
-    let (over_a, over_b, over_c) = (d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2);
-    if over_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        let part = d1 / (d1 - d3);
-        return [1.0 - part, part, 0.0];
-    }
-    if over_b <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        let part = d2 / (d2 - d6);
-        return [1.0 - part, 0.0, part];
-    }
-    if over_a <= 0.0 && d4 >= d3 && d5 >= d6 {
-        let part = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return [0.0, 1.0 - part, part];
-    }
-    let sum = over_a + over_b + over_c;
-    [over_a / sum, over_b / sum, over_c / sum]
-}
-
-/// g(c) and its derivative.
-fn reach(rule: EdgeRule, c: f64) -> (f64, f64) {
-    match rule {
-        EdgeRule::Third => (1.0 / 3.0, 0.0),
-        EdgeRule::Arc if c < STEEPEST => (2.0 / (3.0 * STEEPEST * (1.0 + STEEPEST)), 0.0),
-        EdgeRule::Arc => {
-            let below = c * (1.0 + c);
-            (2.0 / (3.0 * below), -2.0 * (1.0 + 2.0 * c) / (3.0 * below * below))
-        }
-    }
-}
-
 impl Patch {
     /// A patch of corners [m] and unit normals; control points on straight edges where told.
     pub fn new(p: [Vector3<f64>; 3], n: [Vector3<f64>; 3], straight: [bool; 6], rule: EdgeRule) -> Self {
-        let mut patch = Self { p, n, edge: [Vector3::zeros(); 6], straight, rule };
-        for (k, [i, j]) in EDGES.into_iter().enumerate() {
-            let e = p[j] - p[i];
-            patch.edge[k] = if straight[k] {
-                p[i] + e / 3.0
-            } else {
-                let t = e - e.dot(&n[i]) * n[i];
-                p[i] + reach(rule, t.norm() / e.norm()).0 * t
-            };
-        }
-        patch
-    }
-
-    /// Weights of the corners and of the edges' control points; the middle one is spread over them with quadratic precision.
-    fn weights([a, b, c]: [f64; 3]) -> ([f64; 3], [f64; 6]) {
-        let middle = 6.0 * a * b * c;
-        let corner = [a, b, c].map(|w| w * w * w - middle / 6.0);
-        let edge = EDGES.map(|[i, j]| {
-            let w = [a, b, c];
-            3.0 * w[i] * w[i] * w[j] + 0.25 * middle
-        });
-        (corner, edge)
-    }
-
-    /// The point at area coordinates [m].
-    pub fn point(&self, weights: [f64; 3]) -> Vector3<f64> {
-        self.sum(Self::weights(weights))
-    }
-
-    /// Derivatives of the weights with respect to the second and the third area coordinate.
-    fn weight_slopes([a, b, c]: [f64; 3]) -> [([f64; 3], [f64; 6]); 2] {
-        let w = [a, b, c];
-        // ∂/∂w of each weight, the three taken as independent.
-        let middle = [6.0 * b * c, 6.0 * a * c, 6.0 * a * b];
-        let slope = |k: usize| {
-            let corner = [0, 1, 2].map(|i| if i == k { 3.0 * w[i] * w[i] } else { 0.0 } - middle[k] / 6.0);
-            let edge = EDGES.map(|[i, j]| {
-                let own = if k == i {
-                    6.0 * w[i] * w[j]
-                } else if k == j {
-                    3.0 * w[i] * w[i]
-                } else {
-                    0.0
-                };
-                own + 0.25 * middle[k]
-            });
-            (corner, edge)
-        };
-        let first = slope(0);
-        [slope(1), slope(2)].map(|(corner, edge)| {
-            (std::array::from_fn(|i| corner[i] - first.0[i]), std::array::from_fn(|k| edge[k] - first.1[k]))
-        })
-    }
-
-    /// The sum of the control points with weights.
-    fn sum(&self, (corner, edge): ([f64; 3], [f64; 6])) -> Vector3<f64> {
-        let corners = self.p.iter().zip(corner).map(|(p, w)| p * w);
-        corners.chain(self.edge.iter().zip(edge).map(|(b, w)| b * w)).sum()
-    }
-
-    /// Its derivatives with respect to the second and the third area coordinate.
-    pub fn tangents(&self, weights: [f64; 3]) -> [Vector3<f64>; 2] {
-        Self::weight_slopes(weights).map(|slopes| self.sum(slopes))
-    }
-
-    /// The unit normal.
-    pub fn normal(&self, weights: [f64; 3]) -> Vector3<f64> {
-        let [along, across] = self.tangents(weights);
-        along.cross(&across).normalize()
+        Self(CurvedTriangle::new(p, n, straight, rule))
     }
 
     /// Two unit tangents and the normal.
@@ -283,24 +161,16 @@ impl Patch {
 
     /// J: the velocity of a point over velocities and spins of the three nodes.
     pub fn jacobian(&self, weights: [f64; 3]) -> SMatrix<f64, 3, 18> {
-        self.velocity_map(Self::weights(weights))
+        self.velocity_map(CurvedTriangle::weights(weights))
     }
 
     /// The velocity of the sum of the control points with weights.
-    fn velocity_map(&self, (corner, edge): ([f64; 3], [f64; 6])) -> SMatrix<f64, 3, 18> {
+    fn velocity_map(&self, weights: ControlWeights) -> SMatrix<f64, 3, 18> {
         let mut j = SMatrix::<f64, 3, 18>::zeros();
-        let mut add = |node: usize, spin: bool, part: Matrix3<f64>| {
-            let mut block = j.fixed_columns_mut::<3>(6 * node + if spin { 3 } else { 0 });
-            block += part;
-        };
-        for (node, w) in corner.into_iter().enumerate() {
-            add(node, false, Matrix3::from_diagonal_element(w));
-        }
-        for (k, [start, end]) in EDGES.into_iter().enumerate() {
-            let (along, turning) = self.edge_derivative(k);
-            add(start, false, (Matrix3::identity() - along) * edge[k]);
-            add(end, false, along * edge[k]);
-            add(start, true, -turning * skew(&self.n[start]) * edge[k]);
+        let by = self.derivatives(weights);
+        for (node, ([by_corner, by_normal], normal)) in by.into_iter().zip(self.normals()).enumerate() {
+            j.fixed_columns_mut::<3>(6 * node).copy_from(&by_corner);
+            j.fixed_columns_mut::<3>(6 * node + 3).copy_from(&(-by_normal * skew(normal)));
         }
         j
     }
@@ -316,7 +186,7 @@ impl Patch {
     /// tangents a and b.
     pub fn carried_jacobian(&self, point: &Carried) -> SMatrix<f64, 3, 18> {
         let weights = point.place.weights;
-        let [by_second, by_third] = Self::weight_slopes(weights);
+        let [by_second, by_third] = CurvedTriangle::weight_slopes(weights);
         let (a, b) = (self.sum(by_second), self.sum(by_third));
         let cross = a.cross(&b);
         let (t, n) = (a.normalize(), cross.normalize());
@@ -335,63 +205,6 @@ impl Patch {
     /// Nodal forces and moments of a force on a carried point: Jᵀ f.
     pub fn carried_forces(&self, point: &Carried, force: &Vector3<f64>) -> Vector18 {
         self.carried_jacobian(point).tr_mul(force)
-    }
-
-    /// The nearest place of the patch and its distance [m]: Gauss–Newton, in which each step goes to the nearest point of the tangent
-    /// triangle, and is halved until it comes closer.
-    pub(crate) fn closest(&self, point: &Vector3<f64>, start: [f64; 3]) -> ([f64; 3], f64) {
-        let mut at = start;
-        let mut distance = (self.point(at) - point).norm();
-        for _ in 0..40 {
-            let (x, [along, across]) = (self.point(at), self.tangents(at));
-            let corner = |second: f64, third: f64| x + along * (second - at[1]) + across * (third - at[2]);
-            let aim = closest_on_triangle(&[corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)], point);
-            let change = [0, 1, 2].map(|i| aim[i] - at[i]);
-            if change.iter().all(|c| c.abs() < 1e-13) {
-                break;
-            }
-            let closer = [1.0, 0.5, 0.25, 0.125, 1.0 / 64.0, 1.0 / 512.0].into_iter().find_map(|part| {
-                let next = if part == 1.0 { aim } else { [0, 1, 2].map(|i| at[i] + part * change[i]) };
-                let there = (self.point(next) - point).norm();
-                (there < distance).then_some((next, there))
-            });
-            let Some(next) = closer else { break };
-            (at, distance) = next;
-        }
-        (at, distance)
-    }
-
-    /// An upper bound for the distance of its points from the flat facet [m]: it lies in the convex hull of its control points.
-    pub(crate) fn bulge(&self) -> f64 {
-        let edges: Vector3<f64> = self.edge.iter().sum();
-        let corners: Vector3<f64> = self.p.iter().sum();
-        let middle = 0.25 * edges - corners / 6.0;
-        let off = |control: &Vector3<f64>| {
-            let foot = closest_on_triangle(&self.p, control);
-            (self.p.iter().zip(foot).map(|(p, w)| p * w).sum::<Vector3<f64>>() - control).norm()
-        };
-        self.edge.iter().chain([&middle]).map(off).fold(0.0, f64::max)
-    }
-
-    /// ∂b/∂e and ∂b/∂n of an edge's control point.
-    fn edge_derivative(&self, k: usize) -> (Matrix3<f64>, Matrix3<f64>) {
-        if self.straight[k] {
-            return (Matrix3::from_diagonal_element(1.0 / 3.0), Matrix3::zeros());
-        }
-        let [i, j] = EDGES[k];
-        let (e, n) = (self.p[j] - self.p[i], self.n[i]);
-        let t = e - e.dot(&n) * n;
-        let (length, size) = (e.norm(), t.norm());
-        let c = size / length;
-        let (g, slope) = reach(self.rule, c);
-        let by_e = Matrix3::identity() - n * n.transpose();
-        let by_n = -(n * e.transpose() + Matrix3::from_diagonal_element(e.dot(&n)));
-        if slope == 0.0 {
-            return (g * by_e, g * by_n);
-        }
-        let c_e = t.transpose() * by_e / (size * length) - e.transpose() * (c / (length * length));
-        let c_n = t.transpose() * by_n / (size * length);
-        (g * by_e + slope * t * c_e, g * by_n + slope * t * c_n)
     }
 
     /// Nodal forces [m²] and moments [m³] of a pressure of 1: ∫ Jᵀ n dA, with the rule of six points of Dunavant (1985), exact to the
@@ -561,17 +374,5 @@ mod tests {
         let third = (patch.point([a - h, b, c + h]) - patch.point([a + h, b, c - h])) / (2.0 * h);
         let [along, across] = patch.tangents([a, b, c]);
         assert!((along - second).norm() < 1e-8 && (across - third).norm() < 1e-8);
-    }
-
-    /// Arcs: an edge whose end normals are those of a circle lies on it to 1e-3 of its sagitta at 40°.
-    #[test]
-    fn an_edge_of_a_circle_is_an_arc() {
-        let at = |angle: f64| Vector3::new(angle.cos(), angle.sin(), 0.0);
-        let ends = [at(0.0), at(0.7), Vector3::new(0.9, 0.3, 0.5)];
-        let patch = Patch::new(ends, [ends[0], ends[1], Vector3::x()], [false; 6], EdgeRule::Arc);
-        for s in [0.2, 0.5, 0.8] {
-            let off = (patch.point([1.0 - s, s, 0.0]).norm() - 1.0).abs();
-            assert!(off < 1e-4, "{off:e}");
-        }
     }
 }

@@ -33,6 +33,7 @@
 //! # Ok::<(), pliant_geometry::SelectionError>(())
 //! ```
 
+mod bezier;
 mod cell;
 mod closest;
 mod diagnosis;
@@ -45,10 +46,11 @@ mod surface;
 #[cfg(test)]
 mod testing;
 
+pub use bezier::{ControlWeights, CurvedTriangle, EDGES, EdgeRule};
 pub use cell::{CellId, body_blocks};
 pub use closest::{SurfaceLocator, SurfacePoint};
 pub use diagnosis::{CrowdedFace, Diagnosis, diagnose, reorder};
-pub use locate::{Location, Locator};
+pub use locate::{Location, Locator, barycentric_of_closest};
 pub use mesh::{CellBlock, CellKind, DataArray, Mesh};
 pub use quality::{
     QualityReport, Spread, acoustic_length, dihedral_angles, gradient_integrals, relative_acoustic_length,

@@ -332,7 +332,7 @@ pub(crate) fn on_triangle(x: &[Vector3; 3], weights: [f64; 3]) -> Vector3 {
 
 /// Barycentric coordinates of the point of a triangle closest to `p`: the corner, edge or face in whose Voronoi
 /// region `p` lies (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
-pub(crate) fn barycentric_of_closest([a, b, c]: &[Vector3; 3], p: &Vector3) -> [f64; 3] {
+pub fn barycentric_of_closest([a, b, c]: &[Vector3; 3], p: &Vector3) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
     let from = |x: &Vector3| (ab.dot(&(p - x)), ac.dot(&(p - x)));
     let part = |x: f64, of: f64| if of > 0.0 { x / of } else { 0.0 };

@@ -95,6 +95,9 @@ pub enum MeshingError {
         /// Size of the box of the body [m].
         size: Vector3,
     },
+    /// A surface without triangles of any area.
+    #[error("there is no surface: no triangle or quad has an area")]
+    NoSurface,
     /// The field is NaN or infinite somewhere.
     #[error(
         "the field is {value} at ({}, {}, {}) m; it must be finite around the body",

@@ -1,7 +1,8 @@
 //! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields or image regions filled with tetrahedra
 //! (isosurface stuffing) or cubes. Lengths are in metres. The same request gives the same mesh, bit for bit,
 //! on any number of threads.
-//! Leaves out: surfaces as input, cubes weighted by how full they are.
+//! Surfaces of fields and files in even or few triangles, and curved shells fitted to them.
+//! Leaves out: bodies of surfaces, cubes weighted by how full they are.
 //!
 //! ```
 //! use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Organ, Phantom, Resolution, Stuffing, VolumeCell};
@@ -25,35 +26,45 @@
 mod anatomy;
 mod complex;
 mod cut;
+mod decimate;
 mod deviation;
 mod error;
 mod extent;
 mod field;
 mod flip;
+mod hausdorff;
+mod isosurface;
 mod lattice;
 mod manifold;
 mod optimise;
 mod phantom;
+mod remesh;
 mod sheets;
+mod shells;
 mod stencil;
 mod structured;
 mod stuffing;
 mod surfaces;
 mod tets;
 mod topology;
+mod triangles;
 mod voxels;
 
 use pliant_geometry::Mesh;
 
 pub use anatomy::Anatomy;
+pub use decimate::Fewer;
 pub use deviation::Deviation;
 pub use error::MeshingError;
 pub use field::{Ellipsoid, ImplicitField};
+pub use hausdorff::Hausdorff;
 pub use phantom::{Organ, Phantom, brain_label};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
+pub use shells::{FittedShells, ShellGoal, ShellReport};
 pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
 pub use tets::{MaterialReport, OrganMesh, OrganTets, Repairs, Steps, TetReport};
+pub use triangles::{SurfaceRepairs, TriangleMesh};
 pub use voxels::Voxels;
 
 /// Cells allowed in a mesh unless the caller says otherwise. Limits above 2²⁵ (34 million) act as 2²⁵.

@@ -1,0 +1,210 @@
+//! `pliant mesh --as surface` and `--as shells`: triangles and curved shells of an image or of a mesh file.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use pliant_geometry::io::{self, Format};
+use pliant_geometry::{CellKind, Mesh, Vector3, diagnose};
+use pliant_meshing::{
+    DEFAULT_CELL_LIMIT, Fewer, FittedShells, Hausdorff, ShellGoal, SurfaceRepairs, TriangleMesh,
+};
+use serde_json::{Value as Json, json};
+
+use crate::arguments::{MeshCells, MeshImage};
+use crate::mesh::{anatomy, image_line, image_object, meshing_failure, regions};
+use crate::report::{Bar, Failure, failed_output, say};
+
+/// Faces that meet at more than this angle meet at a crease, which a remeshed surface keeps [rad].
+const CREASE: f64 = std::f64::consts::FRAC_PI_3;
+
+/// Samples of distances along the diagonal.
+const SAMPLES: f64 = 400.0;
+
+/// A surface as it was found, and where.
+struct Found {
+    surface: TriangleMesh,
+    lines: Vec<String>,
+    object: Json,
+}
+
+pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
+    let goal = goal(arguments)?;
+    if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
+        let message = format!("`--scale` is {}; it must be positive and finite", arguments.scale);
+        return Err(Failure::plain(message, "for example `--scale 0.001` for a file in millimetres"));
+    }
+    require_surface_format(&arguments.out)?;
+    arguments.error_map.as_deref().map(require_surface_format).transpose()?;
+    let bar = Bar::new();
+    let made = found(arguments, &bar).and_then(|found| {
+        let made = make(arguments, &found.surface, goal, &bar)?;
+        Ok((found, made))
+    });
+    bar.finish();
+    let (found, made) = made?;
+    if !arguments.json {
+        say(found.lines.iter().chain(&made.lines).cloned().collect::<Vec<_>>().join("\n"))?;
+    }
+    let mut files = vec![(&arguments.out, &made.mesh)];
+    files.extend(arguments.error_map.as_ref().zip(made.error_map.as_ref()));
+    for (path, mesh) in &files {
+        if let Err(error) = io::write(path, mesh) {
+            return failed_output(&error, arguments.json);
+        }
+        eprintln!("wrote {}", path.display());
+    }
+    if arguments.json {
+        let mut object = made.object;
+        object["input"] = found.object;
+        object["files"] = json!(files.iter().map(|(path, _)| path).collect::<Vec<_>>());
+        say(object)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// How fine the result is to be.
+#[derive(Clone, Copy)]
+enum Goal {
+    Edge(f64),
+    Triangles(usize),
+    Shells(ShellGoal),
+}
+
+fn goal(arguments: &MeshImage) -> Result<Goal, Failure> {
+    let surface = matches!(arguments.cells, MeshCells::Surface);
+    match (arguments.edge, arguments.triangles, arguments.shells, arguments.error) {
+        (Some(edge), None, None, None) if surface => Ok(Goal::Edge(edge)),
+        (None, Some(number), None, None) if surface => Ok(Goal::Triangles(number)),
+        (None, None, Some(number), None) if !surface => Ok(Goal::Shells(ShellGoal::Shells(number))),
+        (None, None, None, Some(error)) if !surface => Ok(Goal::Shells(ShellGoal::Error(error))),
+        _ if surface => Err(Failure::plain(
+            "how fine the surface is to be is not said",
+            "`--edge 0.005` makes even triangles of 5 mm, `--cells 8000` as many triangles",
+        )),
+        _ => Err(Failure::plain(
+            "how close the shells are to be is not said",
+            "`--error 0.5%` is a largest distance in parts of the diagonal, `--shells 800` a number of shells",
+        )),
+    }
+}
+
+fn require_surface_format(path: &Path) -> Result<(), Failure> {
+    match Format::of_path(path) {
+        Some(format) if Format::WRITTEN.contains(&format) => Ok(()),
+        _ => {
+            let message = format!("`{}` is no name for a mesh of triangles", path.display());
+            Err(Failure::plain(message, "choose a name that ends in .vtu, .msh, .ply, .obj or .stl"))
+        }
+    }
+}
+
+/// The surface of a mesh file or of regions of an image.
+fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
+    let refused = |error| meshing_failure(&error, arguments.force);
+    if Format::of_path(&arguments.image).is_some() {
+        let mut file = io::read(&arguments.image).map_err(|error| Failure::plain(error, ""))?;
+        file.mesh.points.iter_mut().for_each(|x| *x *= arguments.scale);
+        let (surface, repairs) = TriangleMesh::from_mesh(&file.mesh).map_err(refused)?;
+        let mut lines =
+            vec![format!("{}: {}, {} triangles", arguments.image.display(), file.format, surface.len())];
+        lines.extend(file.notes.iter().map(|note| format!("note: {note}")));
+        lines.push(format!("mended           {repairs}"));
+        return Ok(Found { surface, lines, object: file_object(&file.format, &repairs) });
+    }
+    let (image, labels, chosen) = regions(arguments)?;
+    let (anatomy, cleaned) = anatomy(arguments, &labels, &chosen, bar)?;
+    let step = image.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    let surface = TriangleMesh::of_field(anatomy.field(), step, cell_limit(arguments)).map_err(refused)?;
+    let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
+    lines.extend(image.notes.iter().map(|note| format!("note: {note}")));
+    lines.push(format!("cleaned          {cleaned}"));
+    let mut object = image_object(&image);
+    object["cleaned"] = json!(cleaned);
+    Ok(Found { surface, lines, object })
+}
+
+fn file_object(format: &str, repairs: &SurfaceRepairs) -> Json {
+    json!({ "format": format, "repairs": repairs })
+}
+
+fn cell_limit(arguments: &MeshImage) -> usize {
+    if arguments.force { usize::MAX } else { DEFAULT_CELL_LIMIT }
+}
+
+/// A surface made, and what there is to know about it.
+struct Made {
+    mesh: Mesh,
+    error_map: Option<Mesh>,
+    lines: Vec<String>,
+    object: Json,
+}
+
+fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> Result<Made, Failure> {
+    let refused = |error| meshing_failure(&error, arguments.force);
+    let mut surface = found.clone();
+    bar.update_mesh(0.5, "making triangles");
+    match goal {
+        Goal::Shells(goal) => {
+            let progress = |done: f64| bar.update_mesh(0.3 + 0.7 * done, "fitting shells");
+            return FittedShells::new(found, goal, &progress).map(shells).map_err(refused);
+        }
+        Goal::Edge(edge) => {
+            surface.mark_creases(CREASE);
+            surface.remesh(edge, cell_limit(arguments)).map_err(refused)?;
+        }
+        Goal::Triangles(number) => {
+            surface.decimate(Fewer::Triangles(number)).map_err(refused)?;
+        }
+    }
+    bar.update_mesh(0.8, "measuring distances");
+    let diagonal = found.diagonal();
+    Ok(triangles(&surface, &Hausdorff::between(&surface, found, diagonal / SAMPLES), diagonal))
+}
+
+fn shells(fitted: FittedShells) -> Made {
+    let FittedShells { mesh, error_map, report } = fitted;
+    let mut lines = vec![report.to_string()];
+    if !report.reached {
+        lines.push(
+            "the error asked for was not reached: the surface may pass through itself or have creases".into(),
+        );
+    }
+    let object = json!({ "status": "done", "as": "shells", "report": report });
+    Made { mesh, error_map: Some(error_map), lines, object }
+}
+
+fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> Made {
+    let mesh = surface.to_mesh();
+    let of = |nodes: &[u32]| [0, 1, 2].map(|k| mesh.points[nodes[k] as usize]);
+    let block = mesh.block(CellKind::Triangle);
+    let corners: Vec<[Vector3; 3]> = block.into_iter().flat_map(|block| block.cells().map(of)).collect();
+    let area: f64 = corners.iter().map(|[a, b, c]| 0.5 * (b - a).cross(&(c - a)).norm()).sum();
+    let angle = corners.iter().map(least_angle).fold(f64::INFINITY, f64::min).to_degrees();
+    let diagnosis = diagnose(&mesh);
+    let (borders, pieces) = (diagnosis.open_edges.len(), diagnosis.components);
+    let volume =
+        (borders == 0).then(|| corners.iter().map(|[a, b, c]| a.dot(&b.cross(c)) / 6.0).sum::<f64>());
+    let mut lines = vec![
+        format!("nodes            {}", mesh.points.len()),
+        format!("triangles        {}", corners.len()),
+        format!("area             {:.2} cm²", area * 1e4),
+        volume.map_or("volume           none: the surface is open".into(), |volume| {
+            format!("volume           {:.2} ml", volume * 1e6)
+        }),
+        format!("angle            {angle:.1}° at least"),
+        format!("pieces           {pieces}"),
+        format!("border edges     {borders}"),
+    ];
+    lines.extend(distances.lines(diagonal, ["result to input ", "input to result "]));
+    let object = json!({
+        "status": "done", "as": "surface", "nodes": mesh.points.len(), "cells": corners.len(), "area": area,
+        "volume": volume, "least_angle": angle, "components": pieces, "border_edges": borders,
+        "distances": distances, "diagonal": diagonal,
+    });
+    Made { mesh, error_map: None, lines, object }
+}
+
+/// The least angle of a triangle [rad].
+fn least_angle(x: &[Vector3; 3]) -> f64 {
+    (0..3).map(|k| (x[(k + 1) % 3] - x[k]).angle(&(x[(k + 2) % 3] - x[k]))).fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,501 @@
+//! A surface of triangles that changes: edges collapse, are halved or flipped. Borders and creases are marked edges; a point where
+//! other than two of them meet is a corner and stays. Surfaces from files are made manifold first: points at one place are one, faces
+//! without area or given twice go, where more than two faces share an edge the surface is cut, faces are turned alike and outwards.
+//! Leaves out: finding and mending surfaces that pass through themselves.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::fmt;
+
+use pliant_geometry::{CellKind, Mesh, Surface, Vector3, boundary};
+use serde::Serialize;
+
+use crate::error::MeshingError;
+
+/// A triangle that is no more.
+const GONE: [u32; 3] = [u32::MAX; 3];
+
+/// Points closer than this part of the box's diagonal are one.
+const SAME: f64 = 1e-9;
+
+/// A triangulated surface, manifold with or without borders.
+#[derive(Clone, Debug)]
+pub struct TriangleMesh {
+    pub(crate) points: Vec<Vector3>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// The triangles round each point.
+    pub(crate) star: Vec<Vec<u32>>,
+    /// Edges that stay edges, smaller point first.
+    creases: BTreeSet<[u32; 2]>,
+}
+
+/// What was mended in a surface from a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct SurfaceRepairs {
+    /// Points joined to another at the same place.
+    pub joined_points: usize,
+    /// Faces without area, or given twice, that were dropped.
+    pub dropped_faces: usize,
+    /// Edges of more than two faces, along which the surface was cut.
+    pub cut_edges: usize,
+    /// Faces turned to look the same way as their neighbours, and outwards where the surface is closed.
+    pub turned_faces: usize,
+}
+
+impl fmt::Display for SurfaceRepairs {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parts = [
+            (self.joined_points, "points joined"),
+            (self.dropped_faces, "faces without area or given twice dropped"),
+            (self.cut_edges, "edges of more than two faces cut"),
+            (self.turned_faces, "faces turned"),
+        ];
+        let told: Vec<String> =
+            parts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        f.write_str(&if told.is_empty() { "nothing".into() } else { told.join(", ") })
+    }
+}
+
+pub(crate) fn key(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// Twice the area times the normal [m²].
+pub(crate) fn cross([a, b, c]: [Vector3; 3]) -> Vector3 {
+    (b - a).cross(&(c - a))
+}
+
+/// 4 √3 A / Σ l²: 1 of an equilateral triangle, 0 of a flat one.
+pub(crate) fn shape(x: [Vector3; 3]) -> f64 {
+    let squares = (x[1] - x[0]).norm_squared() + (x[2] - x[1]).norm_squared() + (x[0] - x[2]).norm_squared();
+    if squares > 0.0 { 2.0 * 3.0_f64.sqrt() * cross(x).norm() / squares } else { 0.0 }
+}
+
+impl TriangleMesh {
+    /// A surface of points [m] and triangles that is known to be manifold.
+    pub(crate) fn new(points: Vec<Vector3>, triangles: Vec<[u32; 3]>) -> Self {
+        let mut star = vec![Vec::new(); points.len()];
+        for (triangle, nodes) in (0..).zip(&triangles) {
+            nodes.iter().for_each(|&node| star[node as usize].push(triangle));
+        }
+        Self { points, triangles, star, creases: BTreeSet::new() }
+    }
+
+    /// The triangles and quads of a mesh (quads halved), or the boundary of its volume cells, mended where needed.
+    pub fn from_mesh(mesh: &Mesh) -> Result<(Self, SurfaceRepairs), MeshingError> {
+        Self::from_surface(&boundary(mesh), &mesh.points)
+    }
+
+    fn from_surface(surface: &Surface, points: &[Vector3]) -> Result<(Self, SurfaceRepairs), MeshingError> {
+        if let Some(&value) = points.iter().find(|x| !x.iter().all(|x| x.is_finite())) {
+            return Err(MeshingError::NotFinite { what: "a point of the surface", value });
+        }
+        let mut repairs = SurfaceRepairs::default();
+        let (own, points) = joined(&surface.nodes(), points, &mut repairs);
+        let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(surface.faces.len());
+        let mut seen = BTreeSet::new();
+        for face in &surface.faces {
+            let nodes: Vec<u32> = face.nodes().iter().map(|node| own[node]).collect();
+            for k in 2..nodes.len() {
+                let triangle = [nodes[0], nodes[k - 1], nodes[k]];
+                let mut sorted = triangle;
+                sorted.sort_unstable();
+                if shape(triangle.map(|n| points[n as usize])) > 1e-12 && seen.insert(sorted) {
+                    triangles.push(triangle);
+                } else {
+                    repairs.dropped_faces += 1;
+                }
+            }
+        }
+        if triangles.is_empty() {
+            return Err(MeshingError::NoSurface);
+        }
+        repairs.turned_faces = turn_alike(&mut triangles, &points);
+        let (points, triangles) = cut(points, triangles, &mut repairs);
+        Ok((Self::new(points, triangles), repairs))
+    }
+
+    /// The surface as a mesh, points that no triangle uses left out.
+    pub fn to_mesh(&self) -> Mesh {
+        let (points, triangles) = self.compact();
+        let mut mesh = Mesh { points, ..Mesh::default() };
+        mesh.block_mut(CellKind::Triangle).nodes = triangles.into_flattened();
+        mesh
+    }
+
+    /// Points in use and triangles of them.
+    pub(crate) fn compact(&self) -> (Vec<Vector3>, Vec<[u32; 3]>) {
+        let mut number = vec![u32::MAX; self.points.len()];
+        let mut points = Vec::new();
+        for (at, star) in self.star.iter().enumerate() {
+            if !star.is_empty() {
+                number[at] = points.len() as u32;
+                points.push(self.points[at]);
+            }
+        }
+        let triangles = self.alive().map(|t| self.triangles[t as usize].map(|node| number[node as usize]));
+        (points, triangles.collect())
+    }
+
+    /// Marks edges as creases where faces meet at more than an angle [rad].
+    pub fn mark_creases(&mut self, angle: f64) {
+        for [a, b] in self.edges() {
+            if let [Some(s), Some(t)] = self.sides(a, b)
+                && self.normal(s).dot(&self.normal(t)) < angle.cos()
+            {
+                self.creases.insert([a, b]);
+            }
+        }
+    }
+
+    /// Number of triangles.
+    pub fn len(&self) -> usize {
+        self.alive().count()
+    }
+
+    /// True without triangles.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Triangles that there are, in order.
+    pub(crate) fn alive(&self) -> impl Iterator<Item = u32> + '_ {
+        (0_u32..).zip(&self.triangles).filter(|(_, nodes)| **nodes != GONE).map(|(triangle, _)| triangle)
+    }
+
+    pub(crate) fn corners(&self, triangle: u32) -> [Vector3; 3] {
+        self.triangles[triangle as usize].map(|node| self.points[node as usize])
+    }
+
+    /// Area [m²].
+    pub(crate) fn area(&self, triangle: u32) -> f64 {
+        0.5 * cross(self.corners(triangle)).norm()
+    }
+
+    pub(crate) fn normal(&self, triangle: u32) -> Vector3 {
+        cross(self.corners(triangle)).try_normalize(0.0).unwrap_or_default()
+    }
+
+    /// Edges, increasing, each once.
+    pub(crate) fn edges(&self) -> Vec<[u32; 2]> {
+        let of = |t: u32| {
+            let [a, b, c] = self.triangles[t as usize];
+            [key(a, b), key(b, c), key(c, a)]
+        };
+        let mut edges: Vec<[u32; 2]> = self.alive().flat_map(of).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        edges
+    }
+
+    /// The triangles at an edge: two, one at a border, none if there is no such edge.
+    pub(crate) fn sides(&self, a: u32, b: u32) -> [Option<u32>; 2] {
+        let mut at = self.star[a as usize].iter().filter(|&&t| self.triangles[t as usize].contains(&b));
+        [at.next().copied(), at.next().copied()]
+    }
+
+    /// The third corner of a triangle at an edge.
+    pub(crate) fn opposite(&self, triangle: u32, a: u32, b: u32) -> u32 {
+        let [p, q, r] = self.triangles[triangle as usize];
+        if p != a && p != b {
+            p
+        } else if q != a && q != b {
+            q
+        } else {
+            r
+        }
+    }
+
+    /// Points joined to a point by an edge, increasing.
+    pub(crate) fn neighbours(&self, point: u32) -> Vec<u32> {
+        let star = self.star[point as usize].iter();
+        let mut found: Vec<u32> =
+            star.flat_map(|&t| self.triangles[t as usize]).filter(|&n| n != point).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    pub(crate) fn is_border(&self, a: u32, b: u32) -> bool {
+        matches!(self.sides(a, b), [Some(_), None])
+    }
+
+    /// Whether an edge is a border or a crease.
+    pub(crate) fn is_marked(&self, a: u32, b: u32) -> bool {
+        self.is_border(a, b) || self.creases.contains(&key(a, b))
+    }
+
+    /// The other ends of the marked edges at a point.
+    pub(crate) fn marked(&self, point: u32) -> Vec<u32> {
+        let mut found = self.neighbours(point);
+        found.retain(|&n| self.is_marked(point, n));
+        found
+    }
+
+    /// Whether the edge can collapse into its first end so that the surface keeps its topology and its marked lines: the link
+    /// condition (Dey et al. 1999), with the outside of a border as one more point.
+    pub(crate) fn may_collapse(&self, keep: u32, gone: u32) -> bool {
+        let lines = self.marked(gone);
+        if !(lines.is_empty() || lines.len() == 2 && lines.contains(&keep)) {
+            return false;
+        }
+        let sides = self.sides(keep, gone);
+        let on_border = |p: u32| self.neighbours(p).iter().any(|&n| self.is_border(p, n));
+        let border = sides[1].is_none();
+        if !border && on_border(keep) && on_border(gone) {
+            return false;
+        }
+        let apexes: Vec<u32> = sides.iter().flatten().map(|&t| self.opposite(t, keep, gone)).collect();
+        let (first, second) = (self.neighbours(keep), self.neighbours(gone));
+        let common = first.iter().filter(|n| second.binary_search(n).is_ok()).count();
+        if common != apexes.len() {
+            return false;
+        }
+        match apexes[..] {
+            // A tetrahedron, or a triangle all alone.
+            [c, d] => !self.sides(c, d).iter().flatten().any(|&t| {
+                let nodes = self.triangles[t as usize];
+                nodes.contains(&keep) || nodes.contains(&gone)
+            }),
+            [c] => !(self.is_border(keep, c) && self.is_border(gone, c)),
+            _ => false,
+        }
+    }
+
+    /// Whether all triangles round two points that stay keep their side and some shape if the points become one at `position`.
+    pub(crate) fn keeps_sides(&self, keep: u32, gone: u32, position: &Vector3, least_shape: f64) -> bool {
+        [(keep, gone), (gone, keep)].into_iter().all(|(own, other)| {
+            self.star[own as usize].iter().all(|&t| {
+                let nodes = self.triangles[t as usize];
+                if nodes.contains(&other) {
+                    return true;
+                }
+                let before = self.corners(t);
+                let after = [0, 1, 2].map(|k| if nodes[k] == own { *position } else { before[k] });
+                let (old, new) = (cross(before), cross(after));
+                old.dot(&new) > 0.5 * old.norm() * new.norm()
+                    && shape(after) > least_shape.min(0.5 * shape(before))
+            })
+        })
+    }
+
+    /// Makes two ends of an edge one point, at a position. The edge must be allowed to collapse.
+    pub(crate) fn collapse(&mut self, keep: u32, gone: u32, position: Vector3) {
+        for other in self.neighbours(gone) {
+            if self.creases.remove(&key(gone, other)) && other != keep {
+                self.creases.insert(key(keep, other));
+            }
+        }
+        for t in std::mem::take(&mut self.star[gone as usize]) {
+            let nodes = self.triangles[t as usize];
+            if nodes.contains(&keep) {
+                for node in nodes.into_iter().filter(|&n| n != gone) {
+                    self.star[node as usize].retain(|&s| s != t);
+                }
+                self.triangles[t as usize] = GONE;
+            } else {
+                self.triangles[t as usize] = nodes.map(|n| if n == gone { keep } else { n });
+                self.star[keep as usize].push(t);
+            }
+        }
+        self.points[keep as usize] = position;
+    }
+
+    /// Halves an edge at a position; returns the new point.
+    pub(crate) fn split(&mut self, a: u32, b: u32, position: Vector3) -> u32 {
+        let middle = self.points.len() as u32;
+        self.points.push(position);
+        self.star.push(Vec::new());
+        for t in self.sides(a, b).into_iter().flatten() {
+            let nodes = self.triangles[t as usize];
+            let fresh = self.triangles.len() as u32;
+            self.triangles[t as usize] = nodes.map(|n| if n == b { middle } else { n });
+            self.triangles.push(nodes.map(|n| if n == a { middle } else { n }));
+            let apex = nodes.into_iter().find(|&n| n != a && n != b).unwrap_or(a);
+            self.star[b as usize].retain(|&s| s != t);
+            self.star[b as usize].push(fresh);
+            self.star[apex as usize].push(fresh);
+            self.star[middle as usize].extend([t, fresh]);
+        }
+        if self.creases.remove(&key(a, b)) {
+            self.creases.extend([key(a, middle), key(b, middle)]);
+        }
+        middle
+    }
+
+    /// The two triangles that would stand in place of those at an edge, had it been flipped; `None` where it can't be.
+    pub(crate) fn flipped(&self, a: u32, b: u32) -> Option<[[u32; 3]; 2]> {
+        let [Some(s), Some(t)] = self.sides(a, b) else { return None };
+        let (c, d) = (self.opposite(s, a, b), self.opposite(t, a, b));
+        if self.is_marked(a, b) || c == d || self.sides(c, d)[0].is_some() {
+            return None;
+        }
+        let swap = |from: [u32; 3], out: u32, into: u32| from.map(|n| if n == out { into } else { n });
+        Some([swap(self.triangles[s as usize], b, d), swap(self.triangles[t as usize], a, c)])
+    }
+
+    /// Flips an edge. It must be one that can be flipped.
+    pub(crate) fn flip(&mut self, a: u32, b: u32, new: [[u32; 3]; 2]) {
+        let [Some(s), Some(t)] = self.sides(a, b) else { return };
+        let (c, d) = (self.opposite(s, a, b), self.opposite(t, a, b));
+        (self.triangles[s as usize], self.triangles[t as usize]) = (new[0], new[1]);
+        self.star[b as usize].retain(|&x| x != s);
+        self.star[a as usize].retain(|&x| x != t);
+        self.star[d as usize].push(s);
+        self.star[c as usize].push(t);
+    }
+
+    /// Worst shape of the triangles round a point, were it at a position.
+    pub(crate) fn worst_round(&self, point: u32, position: &Vector3) -> f64 {
+        let of = |&t: &u32| {
+            let nodes = self.triangles[t as usize];
+            let x = self.corners(t);
+            shape([0, 1, 2].map(|k| if nodes[k] == point { *position } else { x[k] }))
+        };
+        self.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Mean normal of the triangles round a point, weighted by their angles there (Thürmer and Wüthrich 1998).
+    pub(crate) fn point_normal(&self, point: u32) -> Vector3 {
+        let of = |&t: &u32| {
+            let at = self.triangles[t as usize].iter().position(|&n| n == point).unwrap_or(0);
+            let x = self.corners(t);
+            let (u, v) = (x[(at + 1) % 3] - x[at], x[(at + 2) % 3] - x[at]);
+            u.angle(&v) * self.normal(t)
+        };
+        self.star[point as usize].iter().map(of).sum::<Vector3>().try_normalize(0.0).unwrap_or_default()
+    }
+
+    /// Diagonal of its box [m].
+    pub fn diagonal(&self) -> f64 {
+        self.to_mesh().bounds().map_or(0.0, |(low, high)| (high - low).norm())
+    }
+}
+
+/// Points by place: for each old one its new number, and the new ones.
+fn joined(
+    nodes: &[u32],
+    points: &[Vector3],
+    repairs: &mut SurfaceRepairs,
+) -> (BTreeMap<u32, u32>, Vec<Vector3>) {
+    let of = |&n: &u32| points[n as usize];
+    let start = nodes.first().map(of).unwrap_or_default();
+    let (low, high) = nodes.iter().map(of).fold((start, start), |(l, h), x| (l.inf(&x), h.sup(&x)));
+    let size = (SAME * (high - low).norm()).max(f64::MIN_POSITIVE);
+    let mut places: BTreeMap<[i64; 3], u32> = BTreeMap::new();
+    let (mut own, mut kept) = (BTreeMap::new(), Vec::new());
+    for &node in nodes {
+        let place = (points[node as usize] - low) / size;
+        let number = *places.entry([0, 1, 2].map(|i| place[i].round() as i64)).or_insert_with(|| {
+            kept.push(points[node as usize]);
+            kept.len() as u32 - 1
+        });
+        own.insert(node, number);
+    }
+    repairs.joined_points = nodes.len() - kept.len();
+    (own, kept)
+}
+
+/// The sides of each edge: triangle and whether it runs from the smaller end to the larger.
+fn sides_of(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], Vec<(u32, bool)>> {
+    let mut sides: BTreeMap<[u32; 2], Vec<(u32, bool)>> = BTreeMap::new();
+    for (number, &[a, b, c]) in (0..).zip(triangles) {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            sides.entry(key(from, to)).or_default().push((number, from < to));
+        }
+    }
+    sides
+}
+
+/// Turns triangles to look the same way as their neighbours, the most of each piece as they are; closed pieces outwards.
+/// Returns how many were turned.
+fn turn_alike(triangles: &mut [[u32; 3]], points: &[Vector3]) -> usize {
+    let sides = sides_of(triangles);
+    let mut turn: Vec<Option<bool>> = vec![None; triangles.len()];
+    let mut turned = 0;
+    for first in 0..triangles.len() {
+        if turn[first].is_some() {
+            continue;
+        }
+        turn[first] = Some(false);
+        let (mut piece, mut closed) = (vec![first as u32], true);
+        let mut next = VecDeque::from([first as u32]);
+        while let Some(at) = next.pop_front() {
+            let [a, b, c] = triangles[at as usize];
+            for edge in [key(a, b), key(b, c), key(c, a)] {
+                let [(s, forward), (t, other)] = sides[&edge][..] else {
+                    closed = false;
+                    continue;
+                };
+                let across = if s == at { t } else { s };
+                if turn[across as usize].is_none() {
+                    turn[across as usize] = turn[at as usize].map(|own| own ^ (forward == other));
+                    piece.push(across);
+                    next.push_back(across);
+                }
+            }
+        }
+        let is_turned = |t: &&u32| turn[**t as usize] == Some(true);
+        let volume: f64 = piece
+            .iter()
+            .map(|t| {
+                let [a, b, c] = triangles[*t as usize].map(|n| points[n as usize] - points[0]);
+                if is_turned(&t) { -a.dot(&b.cross(&c)) } else { a.dot(&b.cross(&c)) }
+            })
+            .sum();
+        let count = piece.iter().filter(is_turned).count();
+        let inside_out = if closed { volume < 0.0 } else { 2 * count > piece.len() };
+        for &t in &piece {
+            if (turn[t as usize] == Some(true)) != inside_out {
+                triangles[t as usize].swap(1, 2);
+                turned += 1;
+            }
+        }
+    }
+    turned
+}
+
+/// Gives each fan of triangles round a point, joined by edges of two triangles that look the same way, a point of its own.
+fn cut(
+    mut points: Vec<Vector3>,
+    mut triangles: Vec<[u32; 3]>,
+    repairs: &mut SurfaceRepairs,
+) -> (Vec<Vector3>, Vec<[u32; 3]>) {
+    let sides = sides_of(&triangles);
+    repairs.cut_edges = sides.values().filter(|s| s.len() > 2 || s.len() == 2 && s[0].1 == s[1].1).count();
+    let mut star = vec![Vec::new(); points.len()];
+    for (t, nodes) in (0_u32..).zip(&triangles) {
+        nodes.iter().for_each(|&n| star[n as usize].push(t));
+    }
+    let before = triangles.clone();
+    for (point, star) in (0_u32..).zip(&star) {
+        let mut left = star.clone();
+        let mut first = true;
+        while let Some(start) = left.pop() {
+            let mut fan = vec![start];
+            let mut at = 0;
+            while at < fan.len() {
+                for other in before[fan[at] as usize].into_iter().filter(|&n| n != point) {
+                    if let [(s, forward), (t, back)] = sides[&key(point, other)][..]
+                        && forward != back
+                    {
+                        let across = if s == fan[at] { t } else { s };
+                        if let Some(place) = left.iter().position(|&l| l == across) {
+                            left.swap_remove(place);
+                            fan.push(across);
+                        }
+                    }
+                }
+                at += 1;
+            }
+            if !first {
+                let fresh = points.len() as u32;
+                points.push(points[point as usize]);
+                for t in fan {
+                    triangles[t as usize] = triangles[t as usize].map(|n| if n == point { fresh } else { n });
+                }
+            }
+            first = false;
+        }
+    }
+    (points, triangles)
+}
