@@ -191,7 +191,12 @@ impl FittedShells {
         }
         let mut shells = best.map_or(shells, |(_, best)| best);
         shells.polish(target);
-        shells.finished(target, rounds, reached)
+        let mut fitted = shells.finished(target, rounds, reached);
+        if let ShellGoal::Error(error) = goal {
+            // Both ways, which is more than what led the refinement.
+            fitted.report.reached = fitted.report.distances.largest() <= error * target.diagonal;
+        }
+        fitted
     }
 }
 
