@@ -10,7 +10,8 @@ use pliant_mechanics::curve::{Curve, Shape};
 use super::{BodyCells, Control};
 use crate::build::{Builder, SCENE, Target, suggestion};
 use crate::format::{
-    Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SpreadName,
+    Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SolverName, SpreadName,
+    StepChoice,
 };
 use crate::registry::LoadTable;
 
@@ -38,7 +39,21 @@ impl Builder<'_> {
         }
     }
 
+    /// Adds loads. What acts in full from the start grows within the first step of a static run, so that it can be halved.
     fn push_loads(&mut self, name: &str, kinds: Vec<corotational::LoadKind>, curve: Curve, controlled: bool) {
+        let run = &self.scene.run;
+        let at_once = curve.shape == Shape::Hold && curve.from <= 0.0 && !controlled;
+        let curve = match run.solver {
+            SolverName::Static if at_once => {
+                let until = self.scene.scene.until;
+                let step = match run.step {
+                    StepChoice::Seconds(step) => step.min(until),
+                    StepChoice::Auto(_) => until / f64::from(run.load_steps),
+                };
+                Curve { shape: Shape::Ramp, from: 0.0, to: step }
+            }
+            _ => curve,
+        };
         let Some(part) = &mut self.corotational else { return };
         let load =
             |kind| corotational::Load { name: name.to_owned(), kind, curve: curve.clone(), controlled };
