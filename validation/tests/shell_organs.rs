@@ -127,15 +127,15 @@ impl Organ {
         model
     }
 
-    /// The equilibrium at full pressure, in load steps.
-    fn equilibrium(&self, mesh: &Mesh, steps: u32) -> Result<(Model, State), String> {
+    /// The equilibrium at full pressure, in five load steps.
+    fn equilibrium(&self, mesh: &Mesh) -> Result<(Model, State), String> {
         let model = self.model(mesh);
         let start = Instant::now();
         let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
         let mut state = State::at_rest(&model);
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
         let rest = model.enclosed_volume(&cells, &model.rest);
-        let (mut parts, mut iterations) = (0, 0);
+        let (steps, mut parts, mut iterations) = (5, 0, 0);
         for part in 1..=steps {
             match solver.solve(&mut state, f64::from(part) / f64::from(steps)) {
                 Ok(step) => {
@@ -211,13 +211,13 @@ fn apart(one: &(Model, State), other: &(Model, State), map: impl Fn(usize) -> us
 }
 
 fn study(organ: &Organ, mesh: &Mesh) {
-    let still = organ.equilibrium(mesh, 5).unwrap();
+    let still = organ.equilibrium(mesh).unwrap();
     let (other, order) = renumbered(mesh, 1);
-    let again = organ.equilibrium(&other, 5).unwrap();
+    let again = organ.equilibrium(&other).unwrap();
     claim("renumbered", apart(&still, &again, |n| order[n] as usize), 1e-6);
     let moved = organ.motion(mesh);
     println!("  motion after 1 s off equilibrium: {:.2e}", apart(&still, &moved, |n| n));
-    match organ.equilibrium(&refined(mesh), 2) {
+    match organ.equilibrium(&refined(mesh)) {
         Ok(fine) => {
             println!("  each shell cut in four: displacements move by {:.2e}", apart(&still, &fine, |n| n))
         }
@@ -242,14 +242,14 @@ fn rectum_under_pressure() {
     let mesh = surface(data.join("organs-openhelp/Rectum_Lumen.stl"), 1e-3);
     let organ = Organ { young: 0.5e6, thickness: 3e-3, pressure: 3e3, membrane: Membrane::default() };
     // As it is, a pair of slivers of 0.2 mm folds over at 0.8 of the load; half of it is borne.
-    let failure = organ.equilibrium(&mesh, 5).unwrap_err();
+    let failure = organ.equilibrium(&mesh).unwrap_err();
     assert!(failure.contains("folded over"), "{failure}");
     study(&Organ { pressure: 1.5e3, ..organ }, &mesh);
     let mut better = mesh;
     println!("{} edges of slivers flipped", flip_slivers(&mut better));
-    if let Ok(still) = organ.equilibrium(&better, 5) {
+    if let Ok(still) = organ.equilibrium(&better) {
         let (other, order) = renumbered(&better, 1);
-        let again = organ.equilibrium(&other, 5).unwrap();
+        let again = organ.equilibrium(&other).unwrap();
         claim("renumbered", apart(&still, &again, |n| order[n] as usize), 1e-6);
         let moved = organ.motion(&better);
         println!("  motion after 1 s off equilibrium: {:.2e}", apart(&still, &moved, |n| n));
