@@ -15,6 +15,7 @@ use pliant_mechanics::fingerprint;
 use crate::build::Builder;
 use crate::diagnostic::counted;
 use crate::format::{BodyModel, BodyTable, SolverName};
+
 /// Shells and co-rotational solids of a scene. Nodes are those of the scene's model.
 #[derive(Clone, Debug)]
 pub struct Corotational {
