@@ -259,6 +259,27 @@ mod tests {
         clamped([(); 3].map(|()| random.number().abs()))
     }
 
+    /// How a point moves with one of the eighteen numbers of a patch, by central differences with 1e-6.
+    fn slope(
+        (p, n): ([Vector3<f64>; 3], [Vector3<f64>; 3]),
+        place: usize,
+        point: impl Fn([Vector3<f64>; 3], [Vector3<f64>; 3]) -> Vector3<f64>,
+    ) -> Vector3<f64> {
+        let h = 1e-6;
+        let at = |by: f64| {
+            let (mut p, mut n) = (p, n);
+            let mut change = Vector3::zeros();
+            change[place % 3] = by;
+            if place % 6 < 3 {
+                p[place / 6] += change;
+            } else {
+                n[place / 6] = exponential(&change) * n[place / 6];
+            }
+            point(p, n)
+        };
+        (at(h) - at(-h)) / (2.0 * h)
+    }
+
     /// Central differences with 1e-6: 1e-8.
     #[test]
     fn jacobian_is_the_derivative_of_the_point() {
@@ -268,20 +289,9 @@ mod tests {
                 let (p, n, rule) = patch(&mut random, rule);
                 let l = weights(&mut random);
                 let j = Patch::new(p, n, straight, rule).jacobian(l);
-                let h = 1e-6;
                 for place in 0..18 {
-                    let at = |by: f64| {
-                        let (mut p, mut n) = (p, n);
-                        let mut change = Vector3::zeros();
-                        change[place % 3] = by;
-                        if place % 6 < 3 {
-                            p[place / 6] += change;
-                        } else {
-                            n[place / 6] = exponential(&change) * n[place / 6];
-                        }
-                        Patch::new(p, n, straight, rule).point(l)
-                    };
-                    let off = (at(h) - at(-h)) / (2.0 * h) - j.column(place);
+                    let slope = slope((p, n), place, |p, n| Patch::new(p, n, straight, rule).point(l));
+                    let off = slope - j.column(place);
                     assert!(off.norm() < 1e-8, "{rule:?} {place}: {off}");
                 }
             }
@@ -335,20 +345,9 @@ mod tests {
                 let point = Carried { place, height: 0.3, aside: [-0.1, 0.2] };
                 let patch = Patch::new(p, n, straight, rule);
                 let j = patch.carried_jacobian(&point);
-                let h = 1e-6;
                 for place in 0..18 {
-                    let at = |by: f64| {
-                        let (mut p, mut n) = (p, n);
-                        let mut change = Vector3::zeros();
-                        change[place % 3] = by;
-                        if place % 6 < 3 {
-                            p[place / 6] += change;
-                        } else {
-                            n[place / 6] = exponential(&change) * n[place / 6];
-                        }
-                        Patch::new(p, n, straight, rule).carried(&point)
-                    };
-                    let off = (at(h) - at(-h)) / (2.0 * h) - j.column(place);
+                    let slope = slope((p, n), place, |p, n| Patch::new(p, n, straight, rule).carried(&point));
+                    let off = slope - j.column(place);
                     assert!(off.norm() < 1e-8, "{rule:?} {place}: {off}");
                 }
                 let (f, v) = (vector(&mut random), Vector18::from_fn(|_, _| random.number()));
