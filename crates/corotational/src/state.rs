@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::rotation::exponential;
 
 /// Where a model is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct State {
     /// Time [s], or the course of a quasi-static load.
     pub time: f64,
@@ -21,6 +21,29 @@ pub struct State {
     pub velocity: Vec<Vector3<f64>>,
     /// Spins [rad/s].
     pub spin: Vec<Vector3<f64>>,
+}
+
+impl Clone for State {
+    fn clone(&self) -> Self {
+        Self {
+            time: self.time,
+            load_factor: self.load_factor,
+            position: self.position.clone(),
+            rotation: self.rotation.clone(),
+            velocity: self.velocity.clone(),
+            spin: self.spin.clone(),
+        }
+    }
+
+    /// Into the arrays that are there: solvers do so in every step.
+    fn clone_from(&mut self, source: &Self) {
+        let Self { time, load_factor, position, rotation, velocity, spin } = source;
+        (self.time, self.load_factor) = (*time, *load_factor);
+        self.position.clone_from(position);
+        self.rotation.clone_from(rotation);
+        self.velocity.clone_from(velocity);
+        self.spin.clone_from(spin);
+    }
 }
 
 impl State {

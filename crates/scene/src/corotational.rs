@@ -34,6 +34,8 @@ pub(crate) struct Corotated<'m> {
     prescribed: Vec<bool>,
     /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its positions and rotations.
     before: Option<(Vec<f64>, corotational::State)>,
+    /// The same forces at the instant that is evaluated.
+    outside: Vec<f64>,
     energies: Energies,
     reactions: Vec<[f64; 3]>,
     evaluated: bool,
@@ -155,6 +157,7 @@ impl<'m> Corotated<'m> {
             steps: plan.steps,
             state: part.start.clone(),
             forces: Forces::new(model),
+            outside: vec![0.0; prescribed.len()],
             prescribed,
             before: None,
             energies: Energies::default(),
@@ -167,14 +170,16 @@ impl<'m> Corotated<'m> {
         })
     }
 
-    /// Forces from outside: loads on free components, what holds or moves the others.
-    fn outside(&self) -> Vec<f64> {
+    /// Finds the forces from outside: loads on free components, what holds or moves the others.
+    fn find_outside(&mut self) {
         let all = self.forces.loads().iter().zip(self.forces.internal()).zip(&self.prescribed);
-        all.map(|((load, internal), held)| if *held { *internal } else { *load }).collect()
+        for (own, ((load, internal), held)) in self.outside.iter_mut().zip(all) {
+            *own = if *held { *internal } else { *load };
+        }
     }
 
     /// Work of the forces from outside since the instant before [J], by the trapezoidal rule.
-    fn work(&self, outside: &[f64]) -> f64 {
+    fn work(&self) -> f64 {
         let Some((forces, state)) = &self.before else { return 0.0 };
         let node = |(node, (now, then)): (usize, (&[f64], &[f64]))| {
             let shift = self.state.position[node] - state.position[node];
@@ -182,7 +187,7 @@ impl<'m> Corotated<'m> {
             let mean = |first: usize| Vector3::from_fn(|c, _| 0.5 * (now[first + c] + then[first + c]));
             shift.dot(&mean(0)) + turn.dot(&mean(3))
         };
-        outside.chunks_exact(6).zip(forces.chunks_exact(6)).enumerate().map(node).sum()
+        self.outside.chunks_exact(6).zip(forces.chunks_exact(6)).enumerate().map(node).sum()
     }
 
     fn kinetic(&self) -> f64 {
@@ -195,11 +200,11 @@ impl<'m> Corotated<'m> {
     }
 
     fn find_energies(&mut self) {
-        let outside = self.outside();
+        self.find_outside();
         let kinetic = self.kinetic();
         let internal = self.forces.strain_energy();
         let external = match &self.before {
-            Some(_) => self.energies.external + self.work(&outside),
+            Some(_) => self.energies.external + self.work(),
             // What is given at the start.
             None => kinetic + internal,
         };
@@ -209,7 +214,13 @@ impl<'m> Corotated<'m> {
             _ => 0.0,
         };
         self.energies = Energies { kinetic, internal, damping, external, ..Energies::default() };
-        self.before = Some((outside, self.state.clone()));
+        match &mut self.before {
+            Some((forces, state)) => {
+                std::mem::swap(forces, &mut self.outside);
+                state.clone_from(&self.state);
+            }
+            None => self.before = Some((self.outside.clone(), self.state.clone())),
+        }
     }
 
     fn find_reactions(&mut self) {
