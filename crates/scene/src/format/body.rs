@@ -32,8 +32,12 @@ pub struct BodyTable {
     /// Thickness of a shell [m]: one, or one for each triangle.
     #[serde(default)]
     pub thickness: Option<Thickness>,
+    /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the mesh where it has
+    /// some and there is no `crease`, else from the triangles.
+    #[serde(default)]
+    pub normals: Option<Normals>,
     /// Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved surface has a kink; 45
-    /// if not given.
+    /// if not given. Not with the normals of a mesh.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 180.0))]
     pub crease: Option<f64>,
@@ -94,6 +98,16 @@ impl BodyModel {
             Self::Shell => "shell",
         }
     }
+}
+
+/// Where the normals at rest of a shell come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Normals {
+    /// The point data `normal` of its mesh, as `pliant mesh --as shells` writes them.
+    Mesh,
+    /// The mean of the triangles round each node.
+    Triangles,
 }
 
 /// Thickness of a shell [m].

@@ -8,7 +8,7 @@ mod output;
 
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
-    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Organ,
+    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Normals, Organ,
     PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule, TubeShape,
     TwistedStripShape,
 };
