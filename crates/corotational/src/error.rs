@@ -69,7 +69,9 @@ pub enum ModelError {
         count: usize,
     },
     /// A given normal that is none.
-    #[error("the normal given at node {node} of `{shell}` does not point away from the surface at element {cell}")]
+    #[error(
+        "the normal given at node {node} of `{shell}` does not point away from the surface at element {cell}"
+    )]
     Normal {
         /// Name of the part.
         shell: String,

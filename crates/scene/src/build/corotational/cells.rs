@@ -267,7 +267,8 @@ impl Builder<'_> {
             (Some(Normals::Triangles), _) | (None, None) => Some(BTreeMap::new()),
             (None, Some(_)) if table.crease.is_some() => Some(BTreeMap::new()),
             (Some(Normals::Mesh), None) => {
-                let message = format!("the mesh of `{name}` has no point data `{NORMAL}` of three components");
+                let message =
+                    format!("the mesh of `{name}` has no point data `{NORMAL}` of three components");
                 let help = "`pliant mesh --as shells` writes them into .vtu files; or leave `normals` out";
                 self.error(&["body", name, "normals"], message, "not in the mesh", help);
                 None
