@@ -146,6 +146,11 @@ impl Builder<'_> {
     fn check_keys_of_shells(&mut self, present: bool) {
         let run = &self.scene.run;
         let newton = present && matches!(run.solver, SolverName::Implicit | SolverName::Static);
+        let dynamic = matches!(run.solver, SolverName::Explicit | SolverName::Implicit);
+        if dynamic && self.source().node(&["run", "load-steps"]).is_some() {
+            let message = "`load-steps` is for `solver = \"quasi-static\"` and `\"static\"`; others take a `step` in seconds";
+            self.error(&["run", "load-steps"], message, "means nothing here", "remove it");
+        }
         for (key, wanted, of) in [
             ("iterations", newton, "`solver = \"implicit\"` and `\"static\"`"),
             ("linear", newton, "`solver = \"implicit\"` and `\"static\"`"),
