@@ -1,8 +1,8 @@
-//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields or image regions filled with tetrahedra
+//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields, image regions or closed surfaces filled with tetrahedra
 //! (isosurface stuffing) or cubes. Lengths are in metres. The same request gives the same mesh, bit for bit,
 //! on any number of threads.
 //! Surfaces of fields and files in even or few triangles, and curved shells fitted to them.
-//! Leaves out: bodies of surfaces, cubes weighted by how full they are.
+//! Leaves out: cubes weighted by how full they are.
 //!
 //! ```
 //! use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Organ, Phantom, Resolution, Stuffing, VolumeCell};
@@ -25,9 +25,11 @@
 
 mod anatomy;
 mod complex;
+mod crossings;
 mod cut;
 mod decimate;
 mod deviation;
+mod enclosed;
 mod error;
 mod extent;
 mod field;
@@ -36,6 +38,7 @@ mod hausdorff;
 mod isosurface;
 mod lattice;
 mod manifold;
+mod nesting;
 mod optimise;
 mod phantom;
 mod remesh;
@@ -45,17 +48,21 @@ mod stencil;
 mod structured;
 mod stuffing;
 mod surfaces;
+mod taubin;
 mod tets;
 mod topology;
 mod triangles;
 mod voxels;
+mod winding;
 
 use pliant_geometry::Mesh;
 
 pub use anatomy::Anatomy;
 pub use decimate::Fewer;
 pub use deviation::Deviation;
+pub use enclosed::{Closing, Enclosed, EnclosedReport};
 pub use error::MeshingError;
+pub use extent::require_room_for;
 pub use field::{Ellipsoid, ImplicitField};
 pub use hausdorff::Hausdorff;
 pub use phantom::{Organ, Phantom, brain_label};

@@ -1,6 +1,7 @@
 //! What the meshes of this crate promise: volume, conformity, quality, determinism, errors.
 
 mod checks;
+mod enclosed;
 mod errors;
 // Validation and an example share these; each uses its part.
 #[allow(dead_code)]
