@@ -5,8 +5,9 @@ use std::process::ExitCode;
 
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3, diagnose};
-use pliant_imaging::Smoothing;
-use pliant_meshing::{Fewer, FittedShells, Hausdorff, ShellGoal, SurfaceRepairs, TriangleMesh};
+use pliant_meshing::{
+    Fewer, FittedShells, Hausdorff, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh,
+};
 use serde_json::{Value as Json, json};
 
 use crate::arguments::{MeshCells, MeshImage};
@@ -20,11 +21,6 @@ const CREASE: f64 = std::f64::consts::FRAC_PI_3;
 
 /// Samples of distances along the diagonal.
 const SAMPLES: f64 = 400.0;
-
-/// How the field of an image is smoothed before its surface is taken, and by how many pairs of moves the surface after that: of those
-/// tried in `validation/tests/surfaces_of_images.rs` what stays closest to the analytic organs.
-const SMOOTHING: Smoothing = Smoothing { sigma: 0.55, clip: 6.0 };
-const PAIRS: usize = 50;
 
 /// A surface as it was found, and where.
 struct Found {
@@ -113,11 +109,11 @@ fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
         return Ok(Found { surface, lines, object: file_object(&file.format, &repairs) });
     }
     let (image, labels, chosen) = regions(arguments)?;
-    let (anatomy, cleaned) = anatomy(arguments, &labels, &chosen, &SMOOTHING, bar)?;
+    let (anatomy, cleaned) = anatomy(arguments, &labels, &chosen, &SURFACE_SMOOTHING, bar)?;
     let step = image.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
     let mut surface =
         TriangleMesh::of_field(anatomy.field(), step, cell_limit(arguments)).map_err(refused)?;
-    surface.smooth(PAIRS);
+    surface.smooth(SURFACE_PAIRS);
     let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
     lines.extend(image.notes.iter().map(|note| format!("note: {note}")));
     lines.push(format!("cleaned          {cleaned}"));

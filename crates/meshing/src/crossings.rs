@@ -90,7 +90,8 @@ mod tests {
         .map(Vector3::from);
         let (pairs, place) = crossings(&points, &[[0, 1, 2], [3, 4, 5]]);
         assert_eq!(pairs, [[0, 1]]);
-        assert!((place.unwrap() - points[6]).norm() < 1e-12);
+        // Where the long edge of the first passes through the second.
+        assert!((place.unwrap() - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-12);
         // A corner on the inside of the other, an edge in common, a corner in common.
         for triangles in [[[0, 1, 2], [6, 4, 5]], [[0, 1, 2], [0, 1, 4]], [[0, 1, 2], [0, 4, 5]]] {
             assert!(crossings(&points, &triangles).0.is_empty(), "{triangles:?}");
