@@ -2,7 +2,7 @@
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_meshing::{
-    Closing, DEFAULT_CELL_LIMIT, Enclosed, EnclosedReport, ImplicitField, MeshingError, OrganTets, sphere,
+    Closing, DEFAULT_CELL_LIMIT, Enclosed, EnclosedReport, MeshingError, OrganTets, sphere,
 };
 
 /// A ball of triangles of about a tenth of its radius, moved along x.

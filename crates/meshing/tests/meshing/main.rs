@@ -1,5 +1,6 @@
 //! What the meshes of this crate promise: volume, conformity, quality, determinism, errors.
 
+mod broken;
 mod checks;
 mod enclosed;
 mod errors;
@@ -8,6 +9,7 @@ mod errors;
 mod images;
 mod organs;
 mod phantoms;
+mod smoothing;
 mod structured;
 mod stuffing;
 mod voxels;
