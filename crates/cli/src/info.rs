@@ -14,7 +14,7 @@ use crate::arguments::Info;
 use crate::report::{Failure, say};
 
 /// Samples of distances along the diagonal.
-const SAMPLES: f64 = 400.0;
+const SAMPLES: f64 = 800.0;
 
 /// The shape of the surface of a mesh, as far as it has one.
 struct Shape {
