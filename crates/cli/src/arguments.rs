@@ -349,7 +349,7 @@ pub struct MeshImage {
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true, conflicts_with = "label")]
     pub threshold: Option<f64>,
     /// Edge of the cells: 0.008 in metres, or 8mm. Tets and hexes need it; a surface gets even triangles of this edge.
-    #[arg(long, value_name = "LENGTH", value_parser = length, allow_negative_numbers = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     pub edge: Option<f64>,
     /// Triangles of a surface, instead of their edge: as few, placed where the shape needs them.
     #[arg(long = "cells", value_name = "N", conflicts_with = "edge")]
@@ -374,7 +374,7 @@ pub struct MeshImage {
     pub out: PathBuf,
     /// Close gaps and channels of up to this width, of a surface its holes: 0.003 in metres, or 3mm. Holes of a surface that are
     /// narrower than the cells are always closed.
-    #[arg(long, value_name = "LENGTH", value_parser = length, default_value = "0", allow_negative_numbers = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = length, default_value = "0", allow_hyphen_values = true)]
     pub close_gaps: f64,
     /// Fill cavities without a way out.
     #[arg(long)]

@@ -8,7 +8,8 @@ use pliant_bench::{elastic, law, liver_matrix, soft_tissue};
 use pliant_geometry::io::{self, Format, MeshFile};
 use pliant_geometry::{CellKind, Mesh, QualityReport, Vector3, diagnose, volume};
 use pliant_imaging::{
-    Cleaned, Cleaning, Image, LabelError, LabelImage, ReadOptions, RegionReport, Smoothing, read,
+    Cleaned, Cleaning, Image, ImageError, ImageProblem, LabelError, LabelImage, ReadOptions, RegionReport,
+    Smoothing, read,
 };
 use pliant_meshing::{
     Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, MeshingError, OrganTets, TetReport, Voxels,
@@ -23,7 +24,7 @@ use crate::skin;
 
 pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
     let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
-    let image = read(&arguments.image, &options).map_err(|error| Failure::plain(error, ""))?;
+    let image = read(&arguments.image, &options).map_err(|error| image_failure(&error))?;
     let labels = image.labels().map_err(|error| label_failure(&error))?;
     let regions = labels.regions();
     if arguments.json {
@@ -47,9 +48,7 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
         let message = format!("`--scale` is {}; it must be positive and finite", arguments.scale);
         return Err(Failure::plain(message, "for example `--scale 0.001` for a file in millimetres"));
     }
-    if is_mesh_file(arguments) {
-        refuse_for_surfaces(arguments)?;
-    }
+    refuse_idle(arguments)?;
     if matches!(arguments.cells, MeshCells::Surface | MeshCells::Shells) {
         return skin::mesh(arguments);
     }
@@ -79,19 +78,26 @@ pub fn is_mesh_file(arguments: &MeshImage) -> bool {
     Format::of_path(&arguments.image).is_some()
 }
 
-/// Refuses what only images have.
-fn refuse_for_surfaces(arguments: &MeshImage) -> Result<(), Failure> {
-    let given = [
-        ("--threshold", arguments.threshold.is_some()),
-        ("--series", arguments.series.is_some()),
-        ("--label` more than once", arguments.label.len() > 1),
+/// Refuses options that would do nothing.
+fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
+    let skin = matches!(arguments.cells, MeshCells::Surface | MeshCells::Shells);
+    let file = is_mesh_file(arguments);
+    let cleans = arguments.close_gaps != 0.0 || arguments.fill_holes || arguments.keep_largest;
+    let tissue = arguments.law.is_some() || arguments.young.is_some();
+    let idle = [
+        (file && arguments.threshold.is_some(), "`--threshold` is for images"),
+        (file && arguments.series.is_some(), "`--series` is for images"),
+        (file && arguments.label.len() > 1, "`--label` more than once is for images"),
+        (file && skin && !arguments.label.is_empty(), "`--label` is for images, and for tets and hexes"),
+        (
+            file && skin && cleans,
+            "`--close-gaps`, `--fill-holes` and `--keep-largest` are for images, and for tets and hexes",
+        ),
+        (!file && arguments.scale != 1.0, "`--scale` is for mesh files: images know their lengths"),
+        (skin && tissue, "`--law` and `--young` are for tets and hexes"),
     ];
-    match given.into_iter().find(|(_, given)| *given) {
-        Some((option, _)) => {
-            let message =
-                format!("`{option}` is for images, and {} is a mesh file", arguments.image.display());
-            Err(Failure::plain(message.replace("once`", "once"), "leave it out"))
-        }
+    match idle.into_iter().find(|(idle, _)| *idle) {
+        Some((_, message)) => Err(Failure::plain(message, "leave it out")),
         None => Ok(()),
     }
 }
@@ -106,7 +112,7 @@ pub fn mesh_file(arguments: &MeshImage) -> Result<MeshFile, Failure> {
 /// The image, what is segmented in it, and the labels chosen.
 pub fn regions(arguments: &MeshImage) -> Result<(Image, LabelImage, Vec<i32>), Failure> {
     let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
-    let image = read(&arguments.image, &options).map_err(|error| Failure::plain(error, ""))?;
+    let image = read(&arguments.image, &options).map_err(|error| image_failure(&error))?;
     let (labels, chosen) = match arguments.threshold {
         Some(least) => (image.threshold(least..=f64::INFINITY), vec![1]),
         None => (image.labels().map_err(|error| label_failure(&error))?, arguments.label.clone()),
@@ -125,6 +131,11 @@ fn require_volume_format(arguments: &MeshImage) -> Result<(), Failure> {
     }
 }
 
+fn image_failure(error: &ImageError) -> Failure {
+    let several = matches!(error, ImageError::Content { problem, .. } if matches!(**problem, ImageProblem::MixedSeries { .. }));
+    Failure::plain(error, if several { "`--series UID` chooses one" } else { "" })
+}
+
 fn label_failure(error: &LabelError) -> Failure {
     let help = match error {
         LabelError::NotWhole { .. } => "`pliant mesh --threshold 0.5` takes a map of probabilities",
@@ -136,7 +147,7 @@ fn label_failure(error: &LabelError) -> Failure {
             "`--close-gaps 3mm` closes gaps of 3 mm; without a unit it is in metres"
         }
         LabelError::TooManyVoxels { .. } => {
-            "where gaps are closed, `--close-gaps` is in metres without a unit: 0.003 or 3mm"
+            "where gaps are closed, `--close-gaps 3mm` closes gaps of 3 mm; without a unit it is in metres"
         }
         _ => "",
     };

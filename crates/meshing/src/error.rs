@@ -89,7 +89,7 @@ pub enum MeshingError {
     /// No cell lies in the body.
     #[error(
         "no cell of edge {edge} m fits the body, whose box is {} × {} × {} m; use a shorter edge",
-        size.x, size.y, size.z
+        rounded(size.x), rounded(size.y), rounded(size.z)
     )]
     NoCells {
         /// Edge asked for [m].
@@ -141,6 +141,11 @@ pub enum MeshingError {
         /// A point of the body outside the box [m].
         point: Vector3,
     },
+}
+
+/// A length to a micrometre.
+fn rounded(length: f64) -> f64 {
+    (length * 1e6).round() / 1e6
 }
 
 /// By how much the edge must grow for the cells to fit, rounded up to two decimals.

@@ -91,7 +91,16 @@ impl TriangleMesh {
 
     /// The triangles and quads of a mesh (quads halved), or the boundary of its volume cells, mended where needed.
     pub fn from_mesh(mesh: &Mesh) -> Result<(Self, SurfaceRepairs), MeshingError> {
-        Self::from_surface(&boundary(mesh), &mesh.points)
+        let (surface, mut repairs) = Self::from_surface(&boundary(mesh), &mesh.points)?;
+        if mesh.volume_blocks().all(|block| block.is_empty()) {
+            // Faces with a point twice are none from the start.
+            let blocks = mesh.blocks.iter().filter(|block| block.kind.dimension() == 2);
+            let lines = |nodes: &&[u32]| {
+                nodes.iter().enumerate().filter(|(k, n)| !nodes[..*k].contains(n)).count() < 3
+            };
+            repairs.dropped_faces += blocks.flat_map(|block| block.cells()).filter(lines).count();
+        }
+        Ok((surface, repairs))
     }
 
     fn from_surface(surface: &Surface, points: &[Vector3]) -> Result<(Self, SurfaceRepairs), MeshingError> {
