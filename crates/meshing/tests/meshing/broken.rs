@@ -65,8 +65,8 @@ fn surfaces_at_random_never_panic() {
     };
     for round in 0..200 {
         let scale = [1.0, 1e-3, 1e-12, 1e9, 1e150][round % 5];
-        let mut mesh = Mesh::default();
-        mesh.points = (0..8).map(|_| Vector3::from_fn(|_, _| below(3) as f64) * scale).collect();
+        let points = (0..8).map(|_| Vector3::from_fn(|_, _| below(3) as f64) * scale).collect();
+        let mut mesh = Mesh { points, ..Mesh::default() };
         mesh.block_mut(pliant_geometry::CellKind::Triangle).nodes =
             (0..36).map(|_| below(8) as u32).collect();
         fill(&mesh);
