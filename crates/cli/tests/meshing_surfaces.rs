@@ -192,7 +192,7 @@ fn what_cannot_be_filled_is_refused_with_a_remedy() {
     put(&workshop, "plate.ply", &plate);
     workshop.write("lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n");
     workshop.write("cut.stl", [0_u8; 90]);
-    let cases: [(&str, &[&str], &[&str]); 16] = [
+    let cases: [(&str, &[&str], &[&str]); 17] = [
         ("missing.stl", &[], &["cannot open `missing.stl`"]),
         ("cut.stl", &[], &["cut.stl"]),
         ("lines.obj", &[], &["there is no surface"]),
@@ -216,6 +216,7 @@ fn what_cannot_be_filled_is_refused_with_a_remedy() {
             &["`--label` is for images, and for tets and hexes"],
         ),
         ("ball.ply", &["--as", "surface", "--young", "3e3"], &["are for tets and hexes"]),
+        ("ball.ply", &["--as", "surface", "--edge", "0.01mm"], &["exceed the limit", "--force"]),
         ("ball.ply", &["--edge", "0.05mm"], &["exceed the limit", "--force"]),
         ("ball.ply", &["--edge", "90mm"], &["no cell of edge 0.09 m fits"]),
         ("ball.ply", &["--edge", "-1"], &["edge is -1", "positive"]),
@@ -246,7 +247,8 @@ fn lengths_take_units_and_a_tissue_its_step() {
     let bytes: Vec<Vec<u8>> = edges
         .iter()
         .map(|edge| {
-            let arguments = ["mesh", "ball.ply", "--scale", "0.001", "--edge", edge, "-o", "out.vtu"];
+            let arguments =
+                ["mesh", "ball.ply", "--scale", "0.001", "--edge", edge, "--as", "hexes", "-o", "out.vtu"];
             assert_eq!(workshop.pliant(&arguments).code, 0);
             std::fs::read(workshop.path("out.vtu")).expect("a mesh")
         })
