@@ -387,9 +387,8 @@ impl Model {
                     Some(given) => (given * given.dot(&sum).signum()).normalize(),
                     None => sum.normalize(),
                 };
-                // A normal that is not a number is no more than zero either.
-                let lies = |&&(facet, _): &&(usize, usize)| !(face_normals[facet].dot(&direction) > 0.0);
-                if let Some(&(cell, _)) = fan.iter().find(lies).filter(|_| given.is_some()) {
+                let stands = |facet: usize| face_normals[facet].dot(&direction) > 0.0;
+                if let Some(&(cell, _)) = fan.iter().find(|corner| given.is_some() && !stands(corner.0)) {
                     return Err(ModelError::Normal { shell: shell.name.clone(), node, cell });
                 }
                 normals.push(Normal { node, direction });
