@@ -158,6 +158,30 @@ impl Image {
         }
     }
 
+    /// All that makes the image what it is, piece by piece, for a hash of its content.
+    pub fn content(&self, mut hear: impl FnMut(&[u8])) {
+        let Numbers { scalar, order, bytes } = &self.numbers;
+        hear(format!("{:?} {scalar:?} {order:?} {:?}", self.grid, self.scale).as_bytes());
+        hear(bytes);
+    }
+
+    /// The sum of the values of two images of the same voxels, such as maps of the probability of grey and white matter.
+    pub fn plus(&self, other: &Self) -> Result<Self, LabelError> {
+        let off =
+            (self.grid.axes - other.grid.axes).amax().max((self.grid.origin - other.grid.origin).amax());
+        let least = self.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        if self.grid.dims != other.grid.dims || off > 1e-3 * least {
+            return Err(LabelError::OtherVoxels { first: self.grid.dims, second: other.grid.dims });
+        }
+        let sums: Vec<[u8; 8]> = (0..self.grid.len())
+            .into_par_iter()
+            .map(|at| (self.value(at) + other.value(at)).to_le_bytes())
+            .collect();
+        let numbers = Numbers { scalar: Scalar::F64, order: Order::Little, bytes: sums.concat() };
+        let notes = self.notes.iter().chain(&other.notes).cloned().collect();
+        Ok(Self { grid: self.grid, format: self.format.clone(), notes, numbers, scale: [1.0, 0.0] })
+    }
+
     /// Label 1 where the value lies in a range, 0 elsewhere: a region of a probability map or a level set.
     pub fn threshold(&self, range: RangeInclusive<f64>) -> LabelImage {
         let label = |at| i32::from(range.contains(&self.value(at)));

@@ -45,7 +45,8 @@ impl Voxels {
     /// The cubes of the same grid of which the body fills more than 2 %, with the fraction that it fills as the cell data
     /// [`Self::FRACTION`], from 512 samples in each cube near the surface.
     pub fn immersed(&self, field: &(impl ImplicitField + ?Sized)) -> Result<FieldMesh, MeshingError> {
-        let (mut made, fractions) = self.fill(field, |centre| self.fraction(field, centre), LEAST_FRACTION)?;
+        let (mut made, fractions) =
+            self.fill(field, |centre| self.fraction(field, centre), LEAST_FRACTION)?;
         for block in &mut made.mesh.blocks {
             block.data.insert(Self::FRACTION.to_owned(), DataArray::scalar(fractions.clone()));
         }
@@ -69,8 +70,10 @@ impl Voxels {
         let at = |triple: [usize; 3], shift: f64| {
             origin + Vector3::from(triple.map(|i| i as f64 + shift)) * self.edge
         };
-        let measured: Vec<_> =
-            (0..grid.cell_count()).into_par_iter().map(|number| measure(&at(grid.cell(number), 0.5))).collect();
+        let measured: Vec<_> = (0..grid.cell_count())
+            .into_par_iter()
+            .map(|number| measure(&at(grid.cell(number), 0.5)))
+            .collect();
         let measured = measured.into_iter().collect::<Result<Vec<f64>, _>>()?;
         let inside: Vec<usize> = (0..measured.len()).filter(|&number| measured[number] > least).collect();
         require_at_most(inside.len() as f64, allowed(self.cell_limit))?;
@@ -87,11 +90,7 @@ impl Voxels {
     }
 
     /// The part of a cube that the body fills, by samples at the centres of smaller cubes.
-    fn fraction(
-        &self,
-        field: &(impl ImplicitField + ?Sized),
-        centre: &Vector3,
-    ) -> Result<f64, MeshingError> {
+    fn fraction(&self, field: &(impl ImplicitField + ?Sized), centre: &Vector3) -> Result<f64, MeshingError> {
         // A value is about the distance to the surface: twice the half diagonal away there is no surface in the cube.
         let value = finite(field, centre)?;
         if value.abs() > 3.0_f64.sqrt() * self.edge {

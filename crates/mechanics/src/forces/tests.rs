@@ -178,9 +178,11 @@ fn every_element() -> impl Iterator<Item = Model> {
 fn every_element_full_or_not() -> impl Iterator<Item = Model> {
     let mut random = Random(19);
     let filled = laws().into_iter().flat_map(|law| ELEMENTS.map(|element| (element, law)));
-    every_element().chain(filled.map(move |(element, law)| {
-        filled_cube(element, law, 700.0, 1000.0, |_| 0.55 + 0.9 * random.next())
-    }))
+    every_element().chain(
+        filled.map(move |(element, law)| {
+            filled_cube(element, law, 700.0, 1000.0, |_| 0.55 + 0.9 * random.next())
+        }),
+    )
 }
 
 fn largest(forces: impl IntoIterator<Item = Vector<f64>>) -> f64 {
