@@ -120,6 +120,9 @@ fn picked<T: Clone>(values: &[T], cells: &[u32]) -> Vec<T> {
     cells.iter().map(|&cell| values[cell as usize].clone()).collect()
 }
 
+/// A cell counts as filled by so much at least: nodes that hang on slivers alone would move wildly.
+pub const LEAST_FRACTION: f64 = 0.1;
+
 /// Cells of one element type.
 #[derive(Clone, Debug)]
 pub enum Cells {
@@ -180,11 +183,11 @@ pub struct Hourglass<R, const N: usize> {
 impl<const N: usize> CellBlock<N> {
     fn fill(&mut self, fractions: &[f64]) {
         for (rest, fraction) in self.rest.iter_mut().zip(fractions) {
-            rest.volume *= fraction;
+            rest.volume *= fraction.max(LEAST_FRACTION);
         }
         if let Some(control) = &mut self.hourglass {
             for (stiffness, fraction) in control.stiffness.iter_mut().zip(fractions) {
-                *stiffness *= fraction;
+                *stiffness *= fraction.max(LEAST_FRACTION);
             }
         }
     }
@@ -240,8 +243,8 @@ impl Cells {
     }
 
     /// The same cells, each filled only in part, as cubes at the border of a body are: its volume and with it its stiffness
-    /// and mass are those of its fraction, one per cell. Gradients stay, and with them element bounds. One constant weight a
-    /// cell is the simplest of the finite cells of Parvizian, Düster and Rank (2007).
+    /// and mass are those of its fraction, one per cell, of [`LEAST_FRACTION`] at least. Gradients stay, and with them element
+    /// bounds. One constant weight a cell is the simplest of the finite cells of Parvizian, Düster and Rank (2007).
     ///
     /// # Panics
     /// If there are not as many fractions as cells.
@@ -250,7 +253,7 @@ impl Cells {
         with_cells!(&mut self, block => block.fill(fractions));
         if let Self::FullHex8(_, points) = &mut self {
             for (points, fraction) in points.iter_mut().zip(fractions) {
-                points.weight.iter_mut().for_each(|weight| *weight *= fraction);
+                points.weight.iter_mut().for_each(|weight| *weight *= fraction.max(LEAST_FRACTION));
             }
         }
         self

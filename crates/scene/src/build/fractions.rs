@@ -8,11 +8,8 @@ use super::meshes::list_cells;
 use super::{Builder, suggestion};
 use crate::format::Cells;
 
-/// A cell counts as filled by so much at least: nodes that hang on slivers would move wildly.
-const LEAST: f64 = 0.1;
-
 impl Builder<'_> {
-    /// By how much of each of some cells of a body its stiffness and mass are; diagnostics where that can't be told.
+    /// How much of each of some cells of a body is filled; diagnostics where that can't be told.
     pub(super) fn fractions(
         &mut self,
         draft: &Draft<'_>,
@@ -48,7 +45,7 @@ impl Builder<'_> {
             self.error(&path, message, "these fractions", help);
             return None;
         }
-        Some(cells.iter().map(|&cell| data.values[cell as usize].max(LEAST)).collect())
+        Some(cells.iter().map(|&cell| data.values[cell as usize]).collect())
     }
 }
 
