@@ -152,10 +152,10 @@ fn make(arguments: &MeshImage, labels: &LabelImage, chosen: &[i32], bar: &Bar) -
     };
     bar.update_mesh(PARTS[0] + PARTS[1], "measuring distances");
     let deviation = Deviation::new(&mesh, anatomy.field(), edge).map_err(refused)?;
-    // Steps of cubes stay behind the body by up to half of their diagonal; immersed ones reach beyond it by up to a whole one.
+    // Steps of cubes stay behind the body by up to half of their diagonal; immersed ones hold all of it.
     let allowed = match arguments.cells {
         MeshCells::Tets => edge / 2.0,
-        MeshCells::ImmersedHexes => 2.0 * edge,
+        MeshCells::ImmersedHexes => f64::INFINITY,
         _ => edge,
     };
     let warnings = deviation.doubt(allowed).map(|doubt| format!("{doubt}; use a shorter edge"));

@@ -197,3 +197,42 @@ pub struct LabelImage {
     /// One label a voxel, i fastest; as long as the grid.
     pub labels: Vec<i32>,
 }
+
+#[cfg(test)]
+mod tests {
+    use pliant_geometry::Vector3;
+
+    use super::*;
+
+    fn image(values: [i16; 2], slope: f64, spacing: f64) -> Image {
+        let bytes = values.iter().flat_map(|value| value.to_be_bytes()).collect();
+        Image {
+            grid: Grid::along_axes([2, 1, 1], Vector3::zeros(), [spacing; 3]).unwrap(),
+            format: "here".into(),
+            notes: Vec::new(),
+            numbers: Numbers { scalar: Scalar::I16, order: Order::Big, bytes },
+            scale: [slope, 0.0],
+        }
+    }
+
+    #[test]
+    fn values_of_two_images_are_added_where_their_voxels_are_the_same() {
+        let sum = image([1, 300], 0.5, 1e-3).plus(&image([4, -100], 2.0, 1e-3)).unwrap();
+        assert_eq!([0, 1].map(|at| sum.value(at)), [8.5, -50.0]);
+        assert!(image([1, 2], 1.0, 1e-3).plus(&image([1, 2], 1.0, 2e-3)).is_err());
+    }
+
+    #[test]
+    fn the_content_tells_images_apart_and_not_their_names() {
+        let content = |image: &Image| {
+            let mut all = Vec::new();
+            image.content(|piece| all.extend_from_slice(piece));
+            all
+        };
+        let first = image([1, 2], 1.0, 1e-3);
+        assert_eq!(content(&first), content(&Image { format: "there".into(), ..first.clone() }));
+        for other in [image([1, 3], 1.0, 1e-3), image([1, 2], 0.5, 1e-3), image([1, 2], 1.0, 2e-3)] {
+            assert_ne!(content(&first), content(&other));
+        }
+    }
+}

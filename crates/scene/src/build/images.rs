@@ -289,10 +289,10 @@ fn fill(
     if pieces > 0 {
         notes.push(format!("{dropped} cells in {pieces} loose parts were dropped"));
     }
-    // Steps of cubes stay behind the body by up to half of their diagonal; immersed ones reach beyond it by up to a whole one.
+    // Steps of cubes stay behind the body by up to half of their diagonal; immersed ones hold all of it.
     let allowed = match cells {
         Cells::Tets => edge / 2.0,
-        Cells::ImmersedHexes => 2.0 * edge,
+        Cells::ImmersedHexes => f64::INFINITY,
         _ => edge,
     };
     let doubt = Deviation::new(&mesh, anatomy.field(), edge).ok().and_then(|found| found.doubt(allowed));
