@@ -74,9 +74,9 @@ const SCANS: [Scan; 9] = [
     },
     Scan {
         file: "brain-itksnap/MRIcrop-seg.gipl.gz",
-        labels: &[8, 7, 1, 2, 3, 6],
+        labels: &[8, 7, 1, 2, 3],
         tissue: Tissue::Brain,
-        soft: &[1, 2, 3, 6],
+        soft: &[1, 2, 3],
         ..abdomen("deep-brain", &[8], 0.003, "tets")
     },
     Scan {
