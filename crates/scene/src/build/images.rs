@@ -7,7 +7,7 @@ use pliant_geometry::Mesh;
 use pliant_imaging::{Cleaning, Image, ImageError, LabelError, ReadOptions, Smoothing};
 use pliant_meshing::{
     Anatomy, DEFAULT_CELL_LIMIT, Deviation, Fewer, FieldMesh, FittedShells, MeshingError, OrganTets,
-    ShellGoal, TriangleMesh, Voxels,
+    SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, TriangleMesh, Voxels,
 };
 
 use super::{Builder, MeshOrigin};
@@ -263,7 +263,11 @@ impl Recipe {
             Fault { key, message: error.to_string(), help }
         };
         let labels = labels.map_err(|error| fault("image", error))?;
-        Anatomy::from_image(&labels, &chosen, &self.cleaning, &Smoothing::default(), &|_| {})
+        let smoothing = match self.cells {
+            Goal::Volume(..) => Smoothing::default(),
+            _ => SURFACE_SMOOTHING,
+        };
+        Anatomy::from_image(&labels, &chosen, &self.cleaning, &smoothing, &|_| {})
             .map_err(|error| fault(key, error))
     }
 }
@@ -302,6 +306,7 @@ fn fill(
 /// The surface of an anatomy in triangles or shells, and what is doubtful about it.
 fn cover(anatomy: &Anatomy<'_>, goal: Goal, voxel: f64) -> Result<(Mesh, Vec<String>), MeshingError> {
     let mut surface = TriangleMesh::of_field(anatomy.field(), voxel, DEFAULT_CELL_LIMIT)?;
+    surface.smooth(SURFACE_PAIRS);
     match goal {
         Goal::Shells(goal) => {
             let FittedShells { mesh, report, .. } = FittedShells::new(&surface, goal, &|_| {})?;
