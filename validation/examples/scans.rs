@@ -77,7 +77,7 @@ const SCANS: [Scan; 9] = [
         labels: &[8, 7, 1, 2, 3],
         tissue: Tissue::Brain,
         soft: &[1, 2, 3],
-        ..abdomen("deep-brain", &[8], 0.003, "tets")
+        ..abdomen("deep-brain", &[8], 0.004, "immersed-hexes")
     },
     Scan {
         file: "brain-mni152/mni_icbm152_gm_2009a_sym.nii.gz",

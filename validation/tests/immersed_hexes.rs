@@ -12,7 +12,7 @@ const YOUNG: f64 = 3000.0;
 const POISSON: f64 = 0.45;
 const DENSITY: f64 = 1000.0;
 
-/// The liver in a box that is the same whole even number of cubes of 8 and 10 mm: all grids share the plane x = −40 mm.
+/// The liver in a box that is the same whole even number of cubes of 8, 10 and 20 mm: all grids share the plane x = −40 mm.
 struct Boxed(Phantom);
 
 impl ImplicitField for Boxed {
@@ -92,8 +92,7 @@ fn apart(a: &[Vector3], b: &[Vector3]) -> f64 {
     (squares / b.iter().map(Vector3::norm_squared).sum::<f64>()).sqrt()
 }
 
-fn row(name: &str, hanging: &Hanging, found: &[Vector3], truth: &[Vector3]) -> f64 {
-    let error = apart(found, truth);
+fn row(name: &str, hanging: &Hanging, found: &[Vector3], truth: &[Vector3]) {
     let least = found.iter().map(|u| u.z).fold(0.0, f64::min);
     println!(
         "| {name} | {} | {} | {:+.2} % | {:.3} | {:.2} | {:.2} % |",
@@ -102,9 +101,8 @@ fn row(name: &str, hanging: &Hanging, found: &[Vector3], truth: &[Vector3]) -> f
         (hanging.volume() / 774e-6 - 1.0) * 100.0,
         hanging.tau(),
         least * 1e3,
-        error * 100.0
+        apart(found, truth) * 100.0
     );
-    error
 }
 
 fn head() {
@@ -113,9 +111,24 @@ fn head() {
     );
 }
 
+/// A step as long as that of full cubes (0.9 and more), with the volume of the body.
 #[test]
-fn immersed_cubes_of_10_and_8_mm_hang_truer_than_cubes_by_majority() {
-    study(0.006, &[0.010, 0.008]);
+fn immersed_cubes_keep_the_volume_and_the_step() {
+    for edge in [0.010, 0.008] {
+        let mesh = Voxels::new(edge).immersed(&liver()).expect("the liver is meshed").mesh;
+        let immersed = Hanging::new(mesh);
+        // A cell counts for a tenth at least, which adds a little.
+        assert!((immersed.volume() / 774e-6 - 1.0).abs() < 0.01, "{}", immersed.volume());
+        assert!(immersed.tau() > 0.9, "{}", immersed.tau());
+    }
+}
+
+/// Cubes by majority are off to either side, by chance; immersed ones are too stiff, as their fractions are smeared over whole cubes:
+/// at 10 mm they are farther off than those by majority.
+#[test]
+#[ignore = "slow: a minute in release"]
+fn how_cubes_and_tets_hang() {
+    study(0.006, &[0.020, 0.010, 0.008]);
 }
 
 fn study(fine: f64, edges: &[f64]) {
@@ -132,14 +145,9 @@ fn study(fine: f64, edges: &[f64]) {
         row(&format!("tets {millimetres} mm"), &coarse, &coarse.displacements(&points), &truth);
         let majority = Hanging::new(Voxels::new(edge).mesh(&liver).expect("the liver is meshed").mesh);
         let by_majority = majority.displacements(&points);
-        let by_majority = row(&format!("hexes {millimetres} mm, majority"), &majority, &by_majority, &truth);
+        row(&format!("hexes {millimetres} mm, majority"), &majority, &by_majority, &truth);
         let immersed = Hanging::new(Voxels::new(edge).immersed(&liver).expect("the liver is meshed").mesh);
         let by_fraction = immersed.displacements(&points);
-        let by_fraction = row(&format!("hexes {millimetres} mm, immersed"), &immersed, &by_fraction, &truth);
-        assert!(by_fraction < by_majority);
-        // A cell counts for a tenth at least, which adds a little.
-        assert!((immersed.volume() / 774e-6 - 1.0).abs() < 0.01);
-        // A step as long as that of full cubes.
-        assert!(immersed.tau() > 0.85, "{}", immersed.tau());
+        row(&format!("hexes {millimetres} mm, immersed"), &immersed, &by_fraction, &truth);
     }
 }
