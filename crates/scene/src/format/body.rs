@@ -44,6 +44,10 @@ pub struct BodyTable {
     /// Whether more than two triangles of a shell may meet in an edge.
     #[serde(default)]
     pub branches: bool,
+    /// The name of a cell-data array of the mesh with the part of each cell that the body fills, above 0 and at most 1: its
+    /// stiffness and mass are so much smaller, but never less than a tenth. If not given, `fraction` of `immersed-hexes`.
+    #[serde(default)]
+    pub fraction: Option<String>,
     /// Mass-proportional damping [1/s]. All shells and co-rotational solids of a scene have the same.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
@@ -285,6 +289,9 @@ pub struct MeshTable {
     /// DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
     #[serde(default)]
     pub image: Option<PathBuf>,
+    /// Another image of the same voxels whose values are added before the `threshold`, as grey matter to white matter.
+    #[serde(default)]
+    pub add: Option<PathBuf>,
     /// Label of the image to mesh.
     #[serde(default)]
     pub label: Option<i32>,
@@ -334,6 +341,18 @@ pub struct MeshTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
+    /// Number of triangles of a `surface` of an image, instead of `edge`: as few, placed where the shape needs them.
+    #[serde(default)]
+    #[schemars(range(min = 4))]
+    pub triangles: Option<u32>,
+    /// Number of `shells` fitted to an image.
+    #[serde(default)]
+    #[schemars(range(min = 4))]
+    pub shells: Option<u32>,
+    /// Largest distance of `shells` from the surface of an image, both ways, as a part of the diagonal of its box.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub error: Option<f64>,
     /// Cells of a built-in shape or an image; tets if not given.
     #[serde(default, rename = "as")]
     pub cells: Option<Cells>,
@@ -354,8 +373,8 @@ fn one() -> f64 {
 }
 
 impl MeshTable {
-    /// The volume cells of a built-in shape or an image.
-    pub fn volume_cells(&self) -> Cells {
+    /// The cells of a built-in shape or an image.
+    pub fn made_of(&self) -> Cells {
         self.cells.unwrap_or_default()
     }
 }
@@ -417,6 +436,14 @@ pub enum Cells {
     Tets,
     /// Hexahedra: structured for blocks and tubes, cubes with a stepped surface for ellipsoids, organs and images.
     Hexes,
+    /// All cubes that an ellipsoid, an organ or an image fills by more than 2 %, with their stiffness and mass by the part that it
+    /// fills. A carried surface shows it smooth.
+    ImmersedHexes,
+    /// The smooth surface of an image in triangles: even ones of `edge`, as few as `triangles`, or for a carried surface as fine as
+    /// the voxels.
+    Surface,
+    /// Curved shells fitted to the smooth surface of an image: as many as `shells`, or as close as `error`.
+    Shells,
 }
 
 /// A box with one corner at the origin.
@@ -607,6 +634,7 @@ pub enum Organ {
 pub struct SurfaceTable {
     /// The body that carries it.
     pub on: String,
-    /// The surface: triangles or quads of a file, or the boundary of a built-in shape or an image.
+    /// The surface: triangles or quads of a file, the boundary of a built-in shape, or of an image its boundary or, with
+    /// `as = "surface"`, its smooth surface.
     pub mesh: MeshTable,
 }
