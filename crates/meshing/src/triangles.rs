@@ -252,9 +252,8 @@ impl TriangleMesh {
         }
         match apexes[..] {
             // A tetrahedron, or a triangle all alone.
-            [c, d] => !self.sides(c, d).iter().flatten().any(|&t| {
-                let nodes = self.triangles[t as usize];
-                nodes.contains(&keep) || nodes.contains(&gone)
+            [c, d] => ![keep, gone].iter().all(|end| {
+                self.sides(c, d).iter().flatten().any(|&t| self.triangles[t as usize].contains(end))
             }),
             [c] => !(self.is_border(keep, c) && self.is_border(gone, c)),
             _ => false,

@@ -1,0 +1,192 @@
+//! Distances between shells and their target, both ways.
+
+use pliant_geometry::{CellKind, CurvedTriangle, DataArray, Mesh, Surface, SurfaceLocator, Vector3, boundary};
+use rayon::prelude::*;
+
+use super::{FittedShells, ShellReport, Shells, Target};
+use crate::hausdorff::{Hausdorff, Sample, lattice, samples, spread};
+use crate::triangles::{TriangleMesh, shape};
+
+/// Parts of an edge of the flat triangles among which the nearest place of the shells is looked for.
+const FACETS: usize = 8;
+
+/// Parts of an edge between the places at which the last distances are measured.
+const DENSE: usize = 16;
+
+/// Where a point of the target is nearest to the shells.
+#[derive(Clone, Copy)]
+pub(super) struct Landing {
+    pub(super) point: Vector3,
+    pub(super) shell: u32,
+    pub(super) place: [f64; 3],
+    pub(super) off: f64,
+    /// Unit vector from the point to there.
+    pub(super) along: Vector3,
+}
+
+/// Distances of shells.
+pub(super) struct Distances {
+    /// The largest of each shell, by the number of its triangle, both ways [m].
+    pub(super) far: Vec<f64>,
+    pub(super) landings: Vec<Landing>,
+}
+
+impl Distances {
+    pub(super) fn worst(&self) -> f64 {
+        self.far.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+impl Shells {
+    pub(super) fn distances(&self, target: &Target) -> Distances {
+        let mut far = vec![0.0_f64; self.mesh.triangles.len()];
+        let places = lattice(FACETS);
+        let triangles: Vec<u32> = self.mesh.alive().collect();
+        let there = |&t: &u32| {
+            let patch = self.patch(t);
+            let off = |&w: &[f64; 3]| {
+                let x = patch.point(w);
+                (target.reference.closest(&x).0 - x).norm()
+            };
+            places.iter().map(off).fold(0.0, f64::max)
+        };
+        let there: Vec<f64> = triangles.par_iter().map(there).collect();
+        triangles.iter().zip(there).for_each(|(&t, off)| far[t as usize] = off);
+        let nearest = Nearest::new(self);
+        let landings: Vec<Landing> =
+            target.points.par_iter().filter_map(|point| nearest.landing(point)).collect();
+        for landing in &landings {
+            let far = &mut far[landing.shell as usize];
+            *far = far.max(landing.off);
+        }
+        Distances { far, landings }
+    }
+
+    pub(super) fn finished(mut self, target: &Target, rounds: usize, reached: bool) -> FittedShells {
+        let (points, triangles) = self.mesh.compact();
+        self.normals = self
+            .mesh
+            .star
+            .iter()
+            .zip(&self.normals)
+            .filter(|(s, _)| !s.is_empty())
+            .map(|(_, n)| *n)
+            .collect();
+        self.mesh = TriangleMesh::new(points, triangles);
+        let far = self.distances(target).far;
+        let (error_map, forward) = self.picture(target);
+        let nearest = Nearest::new(&self);
+        let back: Vec<f64> =
+            target.dense.par_iter().map(|sample| nearest.landing(&sample.point).map_or(f64::INFINITY, |landing| landing.off)).collect();
+        let shapes: Vec<f64> = self.mesh.alive().map(|t| shape(self.mesh.corners(t))).collect();
+        let flat = {
+            let locator = crate::hausdorff::locator(&self.mesh);
+            let own = samples(&self.mesh, target.diagonal / 200.0);
+            let off: Vec<f64> =
+                own.par_iter().map(|s| (target.reference.closest(&s.point).0 - s.point).norm()).collect();
+            let back: Vec<f64> =
+                target.dense.par_iter().map(|s| crate::hausdorff::distance(&locator, &s.point)).collect();
+            Hausdorff::of(spread(&own, &off), spread(&target.dense, &back))
+        };
+        let mut mesh = self.mesh.to_mesh();
+        let normals = self.normals.iter().flat_map(|n| [n.x, n.y, n.z]).collect();
+        mesh.point_data.insert("normal".into(), DataArray { components: 3, values: normals });
+        mesh.block_mut(CellKind::Triangle).data.insert("distance".into(), DataArray::scalar(far));
+        let report = ShellReport {
+            shells: shapes.len(),
+            nodes: self.mesh.points.len(),
+            shape: [
+                shapes.iter().copied().fold(f64::INFINITY, f64::min),
+                shapes.iter().sum::<f64>() / shapes.len().max(1) as f64,
+            ],
+            distances: Hausdorff::of(forward, spread(&target.dense, &back)),
+            flat,
+            diagonal: target.diagonal,
+            rounds,
+            reached,
+        };
+        FittedShells { mesh, error_map, report }
+    }
+
+    /// The curved surface in small triangles with its distances, and the spread of these.
+    fn picture(&self, target: &Target) -> (Mesh, (f64, f64)) {
+        let (places, pieces) = (lattice(DENSE), pieces(DENSE));
+        let triangles: Vec<u32> = self.mesh.alive().collect();
+        let of = |&t: &u32| {
+            let patch = self.patch(t);
+            let area = self.mesh.area(t) / places.len() as f64;
+            let place = |&w: &[f64; 3]| {
+                let point = patch.point(w);
+                (Sample { point, area }, (target.reference.closest(&point).0 - point).norm())
+            };
+            places.iter().map(place).collect::<Vec<_>>()
+        };
+        let all: Vec<(Sample, f64)> = triangles.par_iter().flat_map_iter(of).collect();
+        let (samples, far): (Vec<Sample>, Vec<f64>) = all.into_iter().unzip();
+        let mut mesh = Mesh { points: samples.iter().map(|s| s.point).collect(), ..Mesh::default() };
+        let corners = (0..triangles.len()).flat_map(|t| {
+            let places = places.len();
+            pieces.iter().flatten().map(move |&k| (t * places) as u32 + k)
+        });
+        mesh.block_mut(CellKind::Triangle).nodes = corners.collect();
+        let found = spread(&samples, &far);
+        mesh.point_data.insert("distance".into(), DataArray::scalar(far));
+        (mesh, found)
+    }
+}
+
+/// The small triangles between the places of a lattice.
+fn pieces(n: usize) -> Vec<[u32; 3]> {
+    // Row i of the lattice has n − i + 1 places.
+    let at = |i: usize, j: usize| ((i * (2 * n + 3 - i)) / 2 + j) as u32;
+    let mut found = Vec::with_capacity(n * n);
+    for i in 0..n {
+        for j in 0..n - i {
+            found.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
+            if j + 1 < n - i {
+                found.push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+    }
+    found
+}
+
+
+/// Finds the nearest place of all shells, from small flat triangles on.
+struct Nearest {
+    patches: Vec<CurvedTriangle>,
+    triangles: Vec<u32>,
+    locator: SurfaceLocator,
+    places: Vec<[f64; 3]>,
+}
+
+impl Nearest {
+    fn new(shells: &Shells) -> Self {
+        let (places, pieces) = (lattice(FACETS), pieces(FACETS));
+        let triangles: Vec<u32> = shells.mesh.alive().collect();
+        let patches: Vec<CurvedTriangle> = triangles.iter().map(|&t| shells.patch(t)).collect();
+        let mut mesh = Mesh {
+            points: patches.iter().flat_map(|patch| places.iter().map(|&w| patch.point(w))).collect(),
+            ..Mesh::default()
+        };
+        let count = places.len();
+        mesh.block_mut(CellKind::Triangle).nodes = (0..patches.len())
+            .flat_map(|t| pieces.iter().flatten().map(move |&k| (t * count) as u32 + k))
+            .collect();
+        let surface: Surface = boundary(&mesh);
+        let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
+        Self { patches, triangles, locator: SurfaceLocator::new(&surface, &faces, &mesh.points), places }
+    }
+
+    /// The nearest place of the shells.
+    fn landing(&self, point: &Vector3) -> Option<Landing> {
+        let at = self.locator.closest(point)?;
+        let count = self.places.len();
+        let shell = at.nodes[0] as usize / count;
+        let corners = at.nodes.map(|node| self.places[node as usize % count]);
+        let start = [0, 1, 2].map(|k| (0..3).map(|c| at.weights[c] * corners[c][k]).sum());
+        let (place, off) = self.patches[shell].closest(point, start);
+        let along = (self.patches[shell].point(place) - point).try_normalize(0.0).unwrap_or_default();
+        Some(Landing { point: *point, shell: self.triangles[shell], place, off, along })
+    }
+}

@@ -1,0 +1,133 @@
+//! Changes of the shells' triangles: evening out, halving, collapsing.
+
+use pliant_geometry::Vector3;
+
+use super::{Shells, Target};
+use crate::triangles::cross;
+
+/// Triangles of a better shape than this are left alone by moves that would make them worse.
+const GOOD_SHAPE: f64 = 0.75;
+
+impl Shells {
+    /// Puts a point on the target, or on its border, with the normal there.
+    pub(super) fn place(&mut self, point: u32, target: &Target) {
+        let here = self.mesh.points[point as usize];
+        let place = if self.on_border[point as usize] {
+            target.reference.closest_on_lines(&here)
+        } else {
+            target.reference.closest(&here).0
+        };
+        self.mesh.points[point as usize] = place;
+        let normal = target.reference.closest(&place).1;
+        if normal != Vector3::zeros() {
+            self.normals[point as usize] = normal;
+        }
+    }
+
+    /// Flips edges and moves points along the target to better shapes.
+    pub(super) fn even_out(&mut self, target: &Target, times: usize) {
+        for _ in 0..times {
+            for [a, b] in self.mesh.edges() {
+                let Some(new) = self.mesh.flipped(a, b) else { continue };
+                let [Some(s), Some(t)] = self.mesh.sides(a, b) else { continue };
+                let active = new.as_flattened().iter().all(|&n| self.active[n as usize]);
+                if active && self.mesh.flip_is_sound([s, t], new, 1.1) {
+                    self.mesh.flip(a, b, new);
+                }
+            }
+            for point in (0..self.mesh.points.len() as u32)
+                .filter(|&point| self.active[point as usize])
+                .collect::<Vec<_>>()
+            {
+                self.move_along(point, target);
+            }
+        }
+    }
+
+    /// Moves a point towards evener triangles, as long as no triangle there gets a worse shape than the worst, and where shapes are
+    /// poor to the best of some places around.
+    fn move_along(&mut self, point: u32, target: &Target) {
+        let Some(aim) = self.mesh.evener(point, &target.reference) else { return };
+        let here = self.mesh.points[point as usize];
+        let own = self.mesh.worst_round(point, &here);
+        let line = !self.mesh.marked(point).is_empty();
+        let project = |x: Vector3| {
+            if line { target.reference.closest_on_lines(&x) } else { target.reference.closest(&x).0 }
+        };
+        let mut aims = vec![project(here + 0.4 * (aim - here)), aim];
+        if own < GOOD_SHAPE {
+            let around = self.mesh.neighbours(point);
+            let lengths = around.iter().map(|&n| (self.mesh.points[n as usize] - here).norm());
+            let size = 0.15 * lengths.fold(f64::INFINITY, f64::min);
+            let normal = self.mesh.point_normal(point);
+            let first =
+                normal.cross(&(aim - here)).try_normalize(0.0).unwrap_or_else(|| normal.cross(&Vector3::x()));
+            let second = normal.cross(&first);
+            let around = |k: usize| (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
+            aims.extend((0..8).map(|k| project(here + size * (around(k).1 * first + around(k).0 * second))));
+        }
+        let best = aims
+            .into_iter()
+            .filter(|aim| self.keeps_its_side(point, aim))
+            .map(|aim| (self.mesh.worst_round(point, &aim), aim))
+            .max_by(|a, b| {
+                a.0.min(GOOD_SHAPE).total_cmp(&b.0.min(GOOD_SHAPE)).then(std::cmp::Ordering::Greater)
+            });
+        if let Some((shape, aim)) = best
+            && shape >= own.min(GOOD_SHAPE)
+        {
+            self.mesh.points[point as usize] = aim;
+            self.place(point, target);
+        }
+    }
+
+    fn keeps_its_side(&self, point: u32, aim: &Vector3) -> bool {
+        self.mesh.star[point as usize].iter().all(|&t| {
+            let nodes = self.mesh.triangles[t as usize];
+            let x = self.mesh.corners(t);
+            let new = cross([0, 1, 2].map(|k| if nodes[k] == point { *aim } else { x[k] }));
+            new.dot(&cross(x)) > 0.3 * new.norm() * cross(x).norm()
+        })
+    }
+
+    /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a number. Returns how many.
+    pub(super) fn refine(&mut self, far: &[f64], bound: f64, room: usize, target: &Target) -> usize {
+        let mut order: Vec<u32> = self.mesh.alive().filter(|&t| far[t as usize] > bound).collect();
+        order.sort_by(|&a, &b| far[b as usize].total_cmp(&far[a as usize]));
+        let mut touched = vec![false; far.len()];
+        let mut halved = 0;
+        let mut changed: Vec<u32> = order.iter().flat_map(|&t| self.mesh.triangles[t as usize]).collect();
+        for t in order {
+            if halved == room {
+                break;
+            }
+            let nodes = self.mesh.triangles[t as usize];
+            let length = |k: &usize| (self.mesh.corners(t)[*k] - self.mesh.corners(t)[(k + 1) % 3]).norm();
+            let longest = [0, 1, 2].into_iter().max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
+            let [a, b] = [nodes[longest], nodes[(longest + 1) % 3]];
+            let sides = self.mesh.sides(a, b);
+            if sides.iter().flatten().any(|&s| touched[s as usize]) {
+                continue;
+            }
+            sides.iter().flatten().for_each(|&s| touched[s as usize] = true);
+            let patch = self.patch(t);
+            let mut place = [0.0; 3];
+            (place[longest], place[(longest + 1) % 3]) = (0.5, 0.5);
+            let fresh = self.mesh.split(a, b, patch.point(place));
+            self.normals.push(patch.normal(place));
+            touched.resize(self.mesh.triangles.len(), true);
+            self.find_border();
+            self.place(fresh, target);
+            changed.push(fresh);
+            halved += 1;
+        }
+        self.find_border();
+        self.active = vec![false; self.mesh.points.len()];
+        for point in changed {
+            self.active[point as usize] = true;
+            self.mesh.neighbours(point).iter().for_each(|&n| self.active[n as usize] = true);
+        }
+        halved
+    }
+
+}
