@@ -58,7 +58,7 @@ impl Shells {
     }
 
     fn shapes_round(&self) -> Vec<f64> {
-        (0..).zip(&self.mesh.points).map(|(v, x)| self.mesh.worst_round(v, x)).collect()
+        (0..).zip(&self.mesh.points).map(|(v, x)| self.worth_round(v, x)).collect()
     }
 
     /// Sums over the rows of the shells round each vertex.
@@ -205,7 +205,7 @@ impl Shells {
 }
 
 /// Two unit tangents and the normal itself.
-fn frame(normal: &Vector3) -> [Vector3; 3] {
+pub(super) fn frame(normal: &Vector3) -> [Vector3; 3] {
     let axis = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
     let first = normal.cross(&axis).try_normalize(0.0).unwrap_or_else(Vector3::y);
     [first, normal.cross(&first), *normal]

@@ -243,7 +243,7 @@ impl Shells {
                 break;
             }
             let mut next = self.clone();
-            let scale = if aim > 0.0 { aim } else { now.worst() };
+            let scale = if aim > 0.0 { aim } else { share(&now.far, self.mesh.len(), now.worst()) };
             for _ in 0..2 {
                 next.fit(target, &now.landings, scale);
             }

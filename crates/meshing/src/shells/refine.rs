@@ -2,11 +2,15 @@
 
 use pliant_geometry::Vector3;
 
+use super::fit::frame;
 use super::{Shells, Target};
-use crate::triangles::cross;
+use crate::triangles::{cross, shape};
 
 /// Triangles of a better shape than this are left alone by moves that would make them worse.
 const GOOD_SHAPE: f64 = 0.75;
+
+/// A triangle looks along the normals of its corners where the cosines are above this.
+const UPRIGHT: f64 = 0.3;
 
 impl Shells {
     /// Puts a point on the target, or on its border, with the normal there.
@@ -24,70 +28,74 @@ impl Shells {
         }
     }
 
-    /// Flips edges and moves points along the target to better shapes.
+    /// Flips edges and moves points along the target to better triangles.
     pub(super) fn even_out(&mut self, target: &Target, times: usize) {
         for _ in 0..times {
             for [a, b] in self.mesh.edges() {
                 let Some(new) = self.mesh.flipped(a, b) else { continue };
                 let [Some(s), Some(t)] = self.mesh.sides(a, b) else { continue };
+                let worst = |of: [[u32; 3]; 2]| of.iter().map(|&nodes| self.worth(nodes, self.at(nodes))).fold(1.0, f64::min);
                 let active = new.as_flattened().iter().all(|&n| self.active[n as usize]);
-                if active && self.mesh.flip_is_sound([s, t], new, 1.1) {
+                if active && worst(new) > 1.1 * worst([s, t].map(|t| self.mesh.triangles[t as usize])) {
                     self.mesh.flip(a, b, new);
                 }
             }
-            for point in (0..self.mesh.points.len() as u32)
-                .filter(|&point| self.active[point as usize])
-                .collect::<Vec<_>>()
-            {
-                self.move_along(point, target);
+            for point in 0..self.mesh.points.len() as u32 {
+                if self.active[point as usize] {
+                    self.move_along(point, target);
+                }
             }
         }
     }
 
-    /// Moves a point towards evener triangles, as long as no triangle there gets a worse shape than the worst, and where shapes are
-    /// poor to the best of some places around.
+    fn at(&self, nodes: [u32; 3]) -> [Vector3; 3] {
+        nodes.map(|n| self.mesh.points[n as usize])
+    }
+
+    /// The shape of a triangle, less where it does not look along the normals of its corners, down to 0 where it stands across them.
+    fn worth(&self, nodes: [u32; 3], x: [Vector3; 3]) -> f64 {
+        let normal = cross(x).try_normalize(0.0).unwrap_or_default();
+        let along = nodes.iter().map(|&n| self.normals[n as usize].dot(&normal)).fold(1.0, f64::min);
+        shape(x) * (along / UPRIGHT).clamp(0.0, 1.0)
+    }
+
+    /// Least worth of the triangles round a point, were it at a position.
+    pub(super) fn worth_round(&self, point: u32, position: &Vector3) -> f64 {
+        let of = |&t: &u32| {
+            let nodes = self.mesh.triangles[t as usize];
+            self.worth(nodes, nodes.map(|n| if n == point { *position } else { self.mesh.points[n as usize] }))
+        };
+        self.mesh.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst, and where they are poor to the
+    /// best of some places around.
     fn move_along(&mut self, point: u32, target: &Target) {
         let Some(aim) = self.mesh.evener(point, &target.reference) else { return };
         let here = self.mesh.points[point as usize];
-        let own = self.mesh.worst_round(point, &here);
-        let line = !self.mesh.marked(point).is_empty();
+        let own = self.worth_round(point, &here);
         let project = |x: Vector3| {
-            if line { target.reference.closest_on_lines(&x) } else { target.reference.closest(&x).0 }
+            if self.on_border[point as usize] { target.reference.closest_on_lines(&x) } else { target.reference.closest(&x).0 }
         };
         let mut aims = vec![project(here + 0.4 * (aim - here)), aim];
         if own < GOOD_SHAPE {
             let around = self.mesh.neighbours(point);
             let lengths = around.iter().map(|&n| (self.mesh.points[n as usize] - here).norm());
             let size = 0.15 * lengths.fold(f64::INFINITY, f64::min);
-            let normal = self.mesh.point_normal(point);
-            let first =
-                normal.cross(&(aim - here)).try_normalize(0.0).unwrap_or_else(|| normal.cross(&Vector3::x()));
-            let second = normal.cross(&first);
-            let around = |k: usize| (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
-            aims.extend((0..8).map(|k| project(here + size * (around(k).1 * first + around(k).0 * second))));
+            let [first, second, _] = frame(&self.normals[point as usize]);
+            let way = |k: usize| (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
+            aims.extend((0..8).map(|k| project(here + size * (way(k).1 * first + way(k).0 * second))));
         }
         let best = aims
             .into_iter()
-            .filter(|aim| self.keeps_its_side(point, aim))
-            .map(|aim| (self.mesh.worst_round(point, &aim), aim))
-            .max_by(|a, b| {
-                a.0.min(GOOD_SHAPE).total_cmp(&b.0.min(GOOD_SHAPE)).then(std::cmp::Ordering::Greater)
-            });
-        if let Some((shape, aim)) = best
-            && shape >= own.min(GOOD_SHAPE)
+            .map(|aim| (self.worth_round(point, &aim).min(GOOD_SHAPE), aim))
+            .max_by(|a, b| a.0.total_cmp(&b.0).then(std::cmp::Ordering::Greater));
+        if let Some((worth, aim)) = best
+            && worth >= own.min(GOOD_SHAPE)
         {
             self.mesh.points[point as usize] = aim;
             self.place(point, target);
         }
-    }
-
-    fn keeps_its_side(&self, point: u32, aim: &Vector3) -> bool {
-        self.mesh.star[point as usize].iter().all(|&t| {
-            let nodes = self.mesh.triangles[t as usize];
-            let x = self.mesh.corners(t);
-            let new = cross([0, 1, 2].map(|k| if nodes[k] == point { *aim } else { x[k] }));
-            new.dot(&cross(x)) > 0.3 * new.norm() * cross(x).norm()
-        })
     }
 
     /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a number. Returns how many.
