@@ -16,6 +16,9 @@ const PARTS: usize = 5;
 /// The power of distances whose sum is made small.
 const POWER: i32 = 6;
 
+/// Points of the target count from this part of the distance asked for.
+const CLOSE: f64 = 0.3;
+
 /// Unknowns of a vertex: ways along two tangents and the normal, two turns of the normal; all in lengths.
 const UNKNOWNS: usize = 5;
 
@@ -23,9 +26,15 @@ const UNKNOWNS: usize = 5;
 const LARGEST_TURN: f64 = 0.3;
 const LARGEST_WAY: f64 = 0.2;
 
+/// Where a distance is taken: at a place of a shell, from the target or from one point of it along a direction.
+struct Probe {
+    shell: u32,
+    place: [f64; 3],
+    from: Option<(Vector3, Vector3)>,
+}
+
 /// One distance and its derivatives.
 struct Row {
-    shell: u32,
     nodes: [u32; 3],
     slope: [[f64; UNKNOWNS]; 3],
     off: f64,
@@ -35,83 +44,87 @@ impl Shells {
     /// One step for the active vertices; distances are compared with `scale` [m].
     pub(super) fn fit(&mut self, target: &Target, landings: &[Landing], scale: f64) {
         let sizes = self.sizes();
-        let power = |row: &Row| (row.off / scale).powi(POWER);
-        let rows = self.rows(target, landings, &sizes, scale);
-        let before = self.sums_round(&rows, power);
+        let probes = self.probes(landings, scale);
+        let rows: Vec<Row> = probes.par_iter().map(|probe| self.row(probe, target, &sizes)).collect();
+        let offs = rows.iter().map(|row| row.off).collect::<Vec<_>>();
+        let before = self.powers_round(&probes, &offs, scale);
         let step = self.solve(&rows, scale);
-        let shapes: Vec<f64> = self.shapes_round();
+        let worth = self.worth_of_all();
         let mut parts: Vec<f64> = self.active.iter().map(|&active| f64::from(u8::from(active))).collect();
-        for trial in 0..5 {
+        for (reduction, is_last) in [(0.4, false), (0.4, false), (0.4, false), (0.0, false), (0.0, true)] {
             let tried = self.stepped(&step, &sizes, &parts);
-            let after = tried.sums_round(&tried.rows(target, landings, &sizes, scale), power);
-            let now = tried.shapes_round();
-            let bad = |v: &usize| {
-                parts[*v] > 0.0 && (after[*v] > before[*v] || now[*v] < shapes[*v].min(LEAST_SHAPE))
+            let offs: Vec<f64> = probes.par_iter().map(|probe| tried.off(probe, target).1).collect();
+            let after = tried.powers_round(&probes, &offs, scale);
+            let now = tried.worth_of_all();
+            let is_worse = |v: &usize| {
+                parts[*v] > 0.0 && (after[*v] > before[*v] || now[*v] < worth[*v].min(LEAST_SHAPE))
             };
-            let bad: Vec<usize> = (0..parts.len()).filter(bad).collect();
-            if bad.is_empty() || after.iter().sum::<f64>() < before.iter().sum::<f64>() && trial == 4 {
+            let worse: Vec<usize> = (0..parts.len()).filter(is_worse).collect();
+            if worse.is_empty() || is_last && after.iter().sum::<f64>() < before.iter().sum::<f64>() {
                 *self = tried;
                 return;
             }
-            bad.into_iter().for_each(|v| parts[v] *= if trial < 3 { 0.4 } else { 0.0 });
+            worse.into_iter().for_each(|v| parts[v] *= reduction);
         }
     }
 
-    fn shapes_round(&self) -> Vec<f64> {
+    fn worth_of_all(&self) -> Vec<f64> {
         (0..).zip(&self.mesh.points).map(|(v, x)| self.worth_round(v, x)).collect()
     }
 
-    /// Sums over the rows of the shells round each vertex.
-    fn sums_round(&self, rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<f64> {
+    /// Sums of the powers of the distances of the shells round each vertex.
+    fn powers_round(&self, probes: &[Probe], offs: &[f64], scale: f64) -> Vec<f64> {
         let mut sums = vec![0.0; self.mesh.triangles.len()];
-        rows.iter().for_each(|row| sums[row.shell as usize] += of(row));
+        for (probe, off) in probes.iter().zip(offs) {
+            sums[probe.shell as usize] += (off / scale).powi(POWER);
+        }
         self.mesh.star.iter().map(|star| star.iter().map(|&t| sums[t as usize]).sum()).collect()
     }
 
-    /// Distances at places of the shells with active vertices, and at the points of the target that are not close already.
-    fn rows(&self, target: &Target, landings: &[Landing], sizes: &[f64], scale: f64) -> Vec<Row> {
+    /// Places of the shells that move, and of those that are not close to points of the target already.
+    fn probes(&self, landings: &[Landing], scale: f64) -> Vec<Probe> {
         let places = lattice(PARTS);
-        let moves = |t: &u32| self.mesh.triangles[*t as usize].iter().any(|&n| self.active[n as usize]);
-        let shells: Vec<u32> = self.mesh.alive().filter(moves).collect();
-        let there = |&t: &u32| {
-            let patch = self.patch(t);
-            let row = |&place: &[f64; 3]| {
-                let x = patch.point(place);
-                let (foot, normal) = target.reference.closest(&x);
-                let off = (x - foot).norm();
-                let along = if off > 1e-6 * scale { (x - foot) / off } else { normal };
-                self.row(t, &patch, place, along, off, sizes)
-            };
-            places.iter().map(row).collect::<Vec<_>>()
-        };
-        let back = |landing: &&Landing| landing.off > 0.3 * scale && moves(&landing.shell);
-        let back: Vec<&Landing> = landings.iter().filter(back).collect();
-        let back = back.into_par_iter().map(|landing| {
-            let patch = self.patch(landing.shell);
-            let off = (patch.point(landing.place) - landing.point).dot(&landing.along);
-            self.row(landing.shell, &patch, landing.place, off.signum() * landing.along, off.abs(), sizes)
+        let moving: Vec<u32> = self.mesh.alive().filter(|&t| self.moves(t)).collect();
+        let there = moving.iter().flat_map(|&shell| places.iter().map(move |&place| Probe { shell, place, from: None }));
+        let far = landings.iter().filter(|landing| landing.off > CLOSE * scale && self.moves(landing.shell));
+        let back = far.map(|landing| Probe {
+            shell: landing.shell,
+            place: landing.place,
+            from: Some((landing.point, landing.along)),
         });
-        shells.par_iter().flat_map_iter(there).chain(back).collect()
+        there.chain(back).collect()
     }
 
-    fn row(&self, shell: u32, patch: &CurvedTriangle, place: [f64; 3], along: Vector3, off: f64, sizes: &[f64]) -> Row {
-        let nodes = self.mesh.triangles[shell as usize];
-        let by = patch.derivatives(CurvedTriangle::weights(place));
-        let slope = [0, 1, 2].map(|corner| {
-            let [by_place, by_normal] = by[corner].map(|by: Matrix3<f64>| by.tr_mul(&along));
-            let [u, v, n] = frame(&self.normals[nodes[corner] as usize]);
-            let size = sizes[nodes[corner] as usize];
-            let turn = by_normal / size;
-            let mut slope = [by_place.dot(&u), by_place.dot(&v), by_place.dot(&n), turn.dot(&u), turn.dot(&v)];
-            let node = nodes[corner];
-            if !self.active[node as usize] {
-                slope = [0.0; UNKNOWNS];
-            } else if self.on_border[node as usize] {
-                slope[..3].fill(0.0);
+    /// The direction of the distance at a probe, and the distance [m].
+    fn off(&self, probe: &Probe, target: &Target) -> (Vector3, f64) {
+        let x = self.patch(probe.shell).point(probe.place);
+        match probe.from {
+            Some((point, along)) => {
+                let off = (x - point).dot(&along);
+                (off.signum() * along, off.abs())
             }
-            slope
-        });
-        Row { shell, nodes, slope, off }
+            None => {
+                let (foot, normal) = target.reference.closest(&x);
+                let off = (x - foot).norm();
+                (if off > 1e-9 * target.diagonal { (x - foot) / off } else { normal }, off)
+            }
+        }
+    }
+
+    fn row(&self, probe: &Probe, target: &Target, sizes: &[f64]) -> Row {
+        let (along, off) = self.off(probe, target);
+        let nodes = self.mesh.triangles[probe.shell as usize];
+        let by = self.patch(probe.shell).derivatives(CurvedTriangle::weights(probe.place));
+        let mut slope = [[0.0; UNKNOWNS]; 3];
+        for (corner, node) in nodes.into_iter().map(|n| n as usize).enumerate().filter(|(_, n)| self.active[*n]) {
+            let [by_place, by_normal] = by[corner].map(|by: Matrix3<f64>| by.tr_mul(&along));
+            let [u, v, n] = frame(&self.normals[node]);
+            let ways = if self.on_border[node] { [0.0; 3] } else { [u, v, n].map(|way| by_place.dot(&way)) };
+            slope[corner][..3].copy_from_slice(&ways);
+            slope[corner][3] = by_normal.dot(&u) / sizes[node];
+            slope[corner][4] = by_normal.dot(&v) / sizes[node];
+        }
+        Row { nodes, slope, off }
     }
 
     /// Mean length of the edges at each point [m].

@@ -26,23 +26,54 @@ pub(super) struct Landing {
 
 /// Distances of shells.
 pub(super) struct Distances {
-    /// The largest of each shell, by the number of its triangle, both ways [m].
-    pub(super) far: Vec<f64>,
+    /// The largest of each shell from the target, by the number of its triangle [m].
+    there: Vec<f64>,
     pub(super) landings: Vec<Landing>,
 }
 
 impl Distances {
-    pub(super) fn worst(&self) -> f64 {
-        self.far.iter().copied().fold(0.0, f64::max)
+    /// The largest of each shell, by the number of its triangle, both ways [m].
+    pub(super) fn far(&self) -> Vec<f64> {
+        let mut far = self.there.clone();
+        for landing in &self.landings {
+            let far = &mut far[landing.shell as usize];
+            *far = far.max(landing.off);
+        }
+        far
     }
 }
 
 impl Shells {
-    pub(super) fn distances(&self, target: &Target) -> Distances {
-        let mut far = vec![0.0_f64; self.mesh.triangles.len()];
+    /// All distances, with points of the target.
+    pub(super) fn distances(&self, target: &Target, points: &[Vector3]) -> Distances {
+        let shells: Vec<u32> = self.mesh.alive().collect();
+        let mut there = vec![0.0; self.mesh.triangles.len()];
+        self.measure(&shells, target, &mut there);
+        let nearest = Nearest::new(self, shells);
+        Distances { there, landings: points.par_iter().filter_map(|point| nearest.landing(point)).collect() }
+    }
+
+    /// Distances after some shells have moved. Points of the target that were nearest to these are looked for on them and their
+    /// neighbours; others are at most as far off as before.
+    pub(super) fn distances_after(&self, before: &Distances, target: &Target) -> Distances {
+        let (moving, resting): (Vec<u32>, Vec<u32>) = self.mesh.alive().partition(|&t| self.moves(t));
+        let mut there = before.there.clone();
+        there.resize(self.mesh.triangles.len(), 0.0);
+        self.measure(&moving, target, &mut there);
+        let mut near = vec![false; self.mesh.points.len()];
+        moving.iter().flat_map(|&t| self.mesh.triangles[t as usize]).for_each(|n| near[n as usize] = true);
+        let beside = resting.into_iter().filter(|&t| self.mesh.triangles[t as usize].iter().any(|&n| near[n as usize]));
+        let nearest = Nearest::new(self, moving.iter().copied().chain(beside).collect());
+        let again = |landing: &Landing| {
+            if self.moves(landing.shell) { nearest.landing(&landing.point).unwrap_or(*landing) } else { *landing }
+        };
+        Distances { there, landings: before.landings.par_iter().map(again).collect() }
+    }
+
+    /// The largest distance of shells from the target.
+    fn measure(&self, shells: &[u32], target: &Target, there: &mut [f64]) {
         let places = lattice(FACETS);
-        let triangles: Vec<u32> = self.mesh.alive().collect();
-        let there = |&t: &u32| {
+        let of = |&t: &u32| {
             let patch = self.patch(t);
             let off = |&w: &[f64; 3]| {
                 let x = patch.point(w);
@@ -50,16 +81,8 @@ impl Shells {
             };
             places.iter().map(off).fold(0.0, f64::max)
         };
-        let there: Vec<f64> = triangles.par_iter().map(there).collect();
-        triangles.iter().zip(there).for_each(|(&t, off)| far[t as usize] = off);
-        let nearest = Nearest::new(self);
-        let landings: Vec<Landing> =
-            target.points.par_iter().filter_map(|point| nearest.landing(point)).collect();
-        for landing in &landings {
-            let far = &mut far[landing.shell as usize];
-            *far = far.max(landing.off);
-        }
-        Distances { far, landings }
+        let found: Vec<f64> = shells.par_iter().map(of).collect();
+        shells.iter().zip(found).for_each(|(&t, off)| there[t as usize] = off);
     }
 
     pub(super) fn finished(mut self, target: &Target, rounds: usize, reached: bool) -> FittedShells {
@@ -73,11 +96,11 @@ impl Shells {
             .map(|(_, n)| *n)
             .collect();
         self.mesh = TriangleMesh::new(points, triangles);
-        let far = self.distances(target).far;
+        let dense: Vec<Vector3> = target.dense.iter().map(|sample| sample.point).collect();
+        let measured = self.distances(target, &dense);
+        let far = measured.far();
         let (error_map, forward) = self.picture(target);
-        let nearest = Nearest::new(&self);
-        let back: Vec<f64> =
-            target.dense.par_iter().map(|sample| nearest.landing(&sample.point).map_or(f64::INFINITY, |landing| landing.off)).collect();
+        let back: Vec<f64> = measured.landings.iter().map(|landing| landing.off).collect();
         let shapes: Vec<f64> = self.mesh.alive().map(|t| shape(self.mesh.corners(t))).collect();
         let flat = {
             let locator = crate::hausdorff::locator(&self.mesh);
@@ -161,9 +184,8 @@ struct Nearest {
 }
 
 impl Nearest {
-    fn new(shells: &Shells) -> Self {
+    fn new(shells: &Shells, triangles: Vec<u32>) -> Self {
         let (places, pieces) = (lattice(FACETS), pieces(FACETS));
-        let triangles: Vec<u32> = shells.mesh.alive().collect();
         let patches: Vec<CurvedTriangle> = triangles.iter().map(|&t| shells.patch(t)).collect();
         let mut mesh = Mesh {
             points: patches.iter().flat_map(|patch| places.iter().map(|&w| patch.point(w))).collect(),

@@ -136,53 +136,52 @@ impl FittedShells {
         for point in 0..shells.mesh.points.len() as u32 {
             shells.place(point, &target);
         }
-        shells.settle(&target, 0.0, 12);
+        let start = shells.distances(&target, &target.points);
+        shells.settle(start, 0.0, 12, &target);
         shells.finished(&target, 0, true)
     }
 
     fn refined(target: &Target, mesh: TriangleMesh, goal: ShellGoal, progress: &dyn Fn(f64)) -> Self {
         let mut shells = Shells::new(mesh, target);
-        let mut best: Option<(f64, Shells)> = None;
+        let aim = match goal {
+            ShellGoal::Error(error) => error * target.diagonal,
+            ShellGoal::Shells(_) => 0.0,
+        };
+        shells.even_out(target, 10);
+        let mut now = shells.distances(target, &target.points);
         let (mut rounds, mut reached) = (0, false);
         while rounds < MOST_ROUNDS {
             rounds += 1;
-            let t0 = std::time::Instant::now();
-            shells.even_out(target, if rounds == 1 { 10 } else { 3 });
             let t1 = std::time::Instant::now();
-            let aim = match goal {
-                ShellGoal::Error(error) => error * target.diagonal,
-                ShellGoal::Shells(_) => 0.0,
-            };
-            let now = shells.settle(target, aim, 4);
-            let count = shells.mesh.len();
-            let worst = now.worst();
+            now = shells.settle(now, aim, 4, target);
+            let (far, count) = (now.far(), shells.mesh.len());
+            let worst = far.iter().copied().fold(0.0, f64::max);
             if std::env::var("DBG").is_ok() {
-                let mut f: Vec<f64> = now.far.clone(); f.sort_by(|a, b| b.total_cmp(a));
-                println!("round {rounds}: {count} shells, worst {:.3}% 5th {:.3} 20th {:.3}, over {} active {} even {:?} settle {:?}", 100.0*worst/target.diagonal, 100.0*f[4]/target.diagonal, 100.0*f[19]/target.diagonal, f.iter().filter(|x| **x > aim).count(), shells.active.iter().filter(|a| **a).count(), t1-t0, t1.elapsed());
+                let mut f: Vec<f64> = far.clone(); f.sort_by(|a, b| b.total_cmp(a));
+                println!("round {rounds}: {count} shells, worst {:.3}% 5th {:.3} 20th {:.3}, over {} active {} settle {:?} points {}", 100.0*worst/target.diagonal, 100.0*f[4]/target.diagonal, 100.0*f[19]/target.diagonal, f.iter().filter(|x| **x > aim).count(), shells.active.iter().filter(|a| **a).count(), t1.elapsed(), now.landings.len());
             }
-            let ready = match goal {
+            reached = match goal {
                 ShellGoal::Error(_) => worst <= aim,
                 ShellGoal::Shells(number) => count + 1 >= number,
             };
-            // Among those that are ready the closest counts; until then the last.
-            if !ready || best.as_ref().is_none_or(|(least, _)| worst < *least) {
-                best = Some((worst, shells.clone()));
+            if reached {
+                break;
             }
-            reached = ready;
             let (bound, room) = match goal {
-                _ if ready => break,
                 ShellGoal::Error(_) => (aim, usize::MAX),
-                ShellGoal::Shells(number) => (share(&now.far, count, worst), (number - count) / 2),
+                ShellGoal::Shells(number) => (share(&far, count), (number - count) / 2),
             };
             progress(match goal {
                 ShellGoal::Error(_) => (aim / worst).min(1.0),
                 ShellGoal::Shells(number) => count as f64 / number as f64,
             });
-            if shells.refine(&now.far, bound, room, target) == 0 {
+            if shells.refine(&far, bound, room, target) == 0 {
                 break;
             }
+            shells.even_out(target, 3);
+            now = shells.distances_after(&now, target);
         }
-        let mut fitted = best.map_or(shells, |(_, best)| best).finished(target, rounds, reached);
+        let mut fitted = shells.finished(target, rounds, reached);
         if let ShellGoal::Error(error) = goal {
             // Both ways, which is more than what led the refinement.
             fitted.report.reached = fitted.report.distances.largest() <= error * target.diagonal;
@@ -193,17 +192,17 @@ impl FittedShells {
 
 /// The distance above which shells are halved on the way to a number of them: six tenths of the worst, or so many that there are a
 /// twentieth more.
-fn share(far: &[f64], count: usize, worst: f64) -> f64 {
+fn share(far: &[f64], count: usize) -> f64 {
     let mut sorted = far.to_vec();
     sorted.sort_unstable_by(|a, b| b.total_cmp(a));
-    sorted.get(count / 20).copied().unwrap_or(0.0).min(0.6 * worst)
+    sorted[count / 20].min(0.6 * sorted[0])
 }
 
 impl Target {
     fn new(mesh: &TriangleMesh) -> Self {
         let reference = Reference::new(mesh);
         let diagonal = mesh.diagonal();
-        let points = spaced(mesh, diagonal / 100.0);
+        let points = spaced(mesh, diagonal / 60.0);
         Self { points, dense: samples(mesh, diagonal / 300.0), reference, diagonal }
     }
 }
@@ -235,22 +234,26 @@ impl Shells {
         CurvedTriangle::new(p, n, [false; 6], EdgeRule::Arc)
     }
 
-    /// Fits until the worst distance is within `aim` or falls no more.
-    fn settle(&mut self, target: &Target, aim: f64, times: usize) -> Distances {
-        let mut now = self.distances(target);
+    /// Whether a corner of a shell may move.
+    fn moves(&self, shell: u32) -> bool {
+        self.mesh.triangles[shell as usize].iter().any(|&n| self.active[n as usize])
+    }
+
+    /// Fits until all distances are within `aim` [m], or they fall no more.
+    fn settle(&mut self, mut now: Distances, aim: f64, times: usize, target: &Target) -> Distances {
         for _ in 0..times {
-            if now.worst() <= aim {
+            let far = now.far();
+            if far.iter().all(|&off| off <= aim) {
                 break;
             }
+            let scale = if aim > 0.0 { aim } else { share(&far, self.mesh.len()) };
             let mut next = self.clone();
-            let scale = if aim > 0.0 { aim } else { share(&now.far, self.mesh.len(), now.worst()) };
             for _ in 0..2 {
                 next.fit(target, &now.landings, scale);
             }
-            let then = next.distances(target);
-            if std::env::var("DBG").as_deref() == Ok("2") { println!("   settle {:.4} -> {:.4}", 100.0*now.worst()/target.diagonal, 100.0*then.worst()/target.diagonal); }
-            let over = |d: &Distances| d.far.iter().map(|f| (f / scale).powi(8)).sum::<f64>();
-            if over(&then) > 0.98 * over(&now) {
+            let then = next.distances_after(&now, target);
+            let sum = |far: &[f64]| far.iter().map(|off| (off / scale).powi(8)).sum::<f64>();
+            if sum(&then.far()) > 0.98 * sum(&far) {
                 break;
             }
             (*self, now) = (next, then);
