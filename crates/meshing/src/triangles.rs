@@ -343,16 +343,6 @@ impl TriangleMesh {
         self.star[c as usize].push(t);
     }
 
-    /// Worst shape of the triangles round a point, were it at a position.
-    pub(crate) fn worst_round(&self, point: u32, position: &Vector3) -> f64 {
-        let of = |&t: &u32| {
-            let nodes = self.triangles[t as usize];
-            let x = self.corners(t);
-            shape([0, 1, 2].map(|k| if nodes[k] == point { *position } else { x[k] }))
-        };
-        self.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
-    }
-
     /// Mean normal of the triangles round a point, weighted by their angles there (Thürmer and Wüthrich 1998).
     pub(crate) fn point_normal(&self, point: u32) -> Vector3 {
         let of = |&t: &u32| {

@@ -3,15 +3,12 @@
 use pliant_geometry::{CellKind, CurvedTriangle, DataArray, Mesh, Surface, SurfaceLocator, Vector3, boundary};
 use rayon::prelude::*;
 
-use super::{FittedShells, ShellReport, Shells, Target};
-use crate::hausdorff::{Hausdorff, Sample, lattice, samples, spread};
-use crate::triangles::{TriangleMesh, shape};
+use super::{Detail, FittedShells, ShellGoal, ShellReport, Shells, Target};
+use crate::hausdorff::{Hausdorff, Sample, distance, lattice, locator, samples, spread};
+use crate::triangles::shape;
 
 /// Parts of an edge of the flat triangles among which the nearest place of the shells is looked for.
 const FACETS: usize = 8;
-
-/// Parts of an edge between the places at which the last distances are measured.
-const DENSE: usize = 16;
 
 /// Where a point of the target is nearest to the shells.
 #[derive(Clone, Copy)]
@@ -28,6 +25,9 @@ pub(super) struct Landing {
 pub(super) struct Distances {
     /// The largest of each shell from the target, by the number of its triangle [m].
     there: Vec<f64>,
+    /// Parts of an edge between the places of a shell that were looked at.
+    parts: usize,
+    /// Of the points of the target, in their order.
     pub(super) landings: Vec<Landing>,
 }
 
@@ -44,13 +44,14 @@ impl Distances {
 }
 
 impl Shells {
-    /// All distances, with points of the target.
-    pub(super) fn distances(&self, target: &Target, points: &[Vector3]) -> Distances {
+    /// All distances.
+    pub(super) fn distances(&self, detail: &Detail, target: &Target) -> Distances {
         let shells: Vec<u32> = self.mesh.alive().collect();
         let mut there = vec![0.0; self.mesh.triangles.len()];
-        self.measure(&shells, target, &mut there);
+        self.measure(&shells, detail.parts, target, &mut there);
         let nearest = Nearest::new(self, shells);
-        Distances { there, landings: points.par_iter().filter_map(|point| nearest.landing(point)).collect() }
+        let landings = detail.samples.par_iter().filter_map(|sample| nearest.landing(&sample.point)).collect();
+        Distances { there, parts: detail.parts, landings }
     }
 
     /// Distances after some shells have moved. Points of the target that were nearest to these are looked for on them and their
@@ -59,7 +60,7 @@ impl Shells {
         let (moving, resting): (Vec<u32>, Vec<u32>) = self.mesh.alive().partition(|&t| self.moves(t));
         let mut there = before.there.clone();
         there.resize(self.mesh.triangles.len(), 0.0);
-        self.measure(&moving, target, &mut there);
+        self.measure(&moving, before.parts, target, &mut there);
         let mut near = vec![false; self.mesh.points.len()];
         moving.iter().flat_map(|&t| self.mesh.triangles[t as usize]).for_each(|n| near[n as usize] = true);
         let beside = resting.into_iter().filter(|&t| self.mesh.triangles[t as usize].iter().any(|&n| near[n as usize]));
@@ -67,12 +68,12 @@ impl Shells {
         let again = |landing: &Landing| {
             if self.moves(landing.shell) { nearest.landing(&landing.point).unwrap_or(*landing) } else { *landing }
         };
-        Distances { there, landings: before.landings.par_iter().map(again).collect() }
+        Distances { there, parts: before.parts, landings: before.landings.par_iter().map(again).collect() }
     }
 
     /// The largest distance of shells from the target.
-    fn measure(&self, shells: &[u32], target: &Target, there: &mut [f64]) {
-        let places = lattice(FACETS);
+    fn measure(&self, shells: &[u32], parts: usize, target: &Target, there: &mut [f64]) {
+        let places = lattice(parts);
         let of = |&t: &u32| {
             let patch = self.patch(t);
             let off = |&w: &[f64; 3]| {
@@ -85,36 +86,19 @@ impl Shells {
         shells.iter().zip(found).for_each(|(&t, off)| there[t as usize] = off);
     }
 
-    pub(super) fn finished(mut self, target: &Target, rounds: usize, reached: bool) -> FittedShells {
-        let (points, triangles) = self.mesh.compact();
-        self.normals = self
-            .mesh
-            .star
-            .iter()
-            .zip(&self.normals)
-            .filter(|(s, _)| !s.is_empty())
-            .map(|(_, n)| *n)
-            .collect();
-        self.mesh = TriangleMesh::new(points, triangles);
-        let dense: Vec<Vector3> = target.dense.iter().map(|sample| sample.point).collect();
-        let measured = self.distances(target, &dense);
-        let far = measured.far();
+    /// Measures all and tells what was found.
+    pub(super) fn finished(self, target: &Target, rounds: usize, goal: ShellGoal) -> FittedShells {
+        let samples = &target.fine.samples;
+        let measured = self.distances(&target.fine, target);
         let (error_map, forward) = self.picture(target);
         let back: Vec<f64> = measured.landings.iter().map(|landing| landing.off).collect();
+        let distances = Hausdorff::of(forward, spread(samples, &back));
         let shapes: Vec<f64> = self.mesh.alive().map(|t| shape(self.mesh.corners(t))).collect();
-        let flat = {
-            let locator = crate::hausdorff::locator(&self.mesh);
-            let own = samples(&self.mesh, target.diagonal / 200.0);
-            let off: Vec<f64> =
-                own.par_iter().map(|s| (target.reference.closest(&s.point).0 - s.point).norm()).collect();
-            let back: Vec<f64> =
-                target.dense.par_iter().map(|s| crate::hausdorff::distance(&locator, &s.point)).collect();
-            Hausdorff::of(spread(&own, &off), spread(&target.dense, &back))
-        };
         let mut mesh = self.mesh.to_mesh();
         let normals = self.normals.iter().flat_map(|n| [n.x, n.y, n.z]).collect();
         mesh.point_data.insert("normal".into(), DataArray { components: 3, values: normals });
-        mesh.block_mut(CellKind::Triangle).data.insert("distance".into(), DataArray::scalar(far));
+        let far = DataArray::scalar(measured.far());
+        mesh.block_mut(CellKind::Triangle).data.insert("distance".into(), far);
         let report = ShellReport {
             shells: shapes.len(),
             nodes: self.mesh.points.len(),
@@ -122,18 +106,31 @@ impl Shells {
                 shapes.iter().copied().fold(f64::INFINITY, f64::min),
                 shapes.iter().sum::<f64>() / shapes.len().max(1) as f64,
             ],
-            distances: Hausdorff::of(forward, spread(&target.dense, &back)),
-            flat,
+            distances,
+            flat: self.flat(target),
             diagonal: target.diagonal,
             rounds,
-            reached,
+            reached: match goal {
+                ShellGoal::Error(error) => distances.largest() <= error * target.diagonal,
+                ShellGoal::Shells(number) => shapes.len() + 1 >= number,
+            },
         };
         FittedShells { mesh, error_map, report }
     }
 
+    /// Distances of the flat triangles.
+    fn flat(&self, target: &Target) -> Hausdorff {
+        let locator = locator(&self.mesh);
+        let own = samples(&self.mesh, target.diagonal / 200.0);
+        let there = |s: &Sample| (target.reference.closest(&s.point).0 - s.point).norm();
+        let there: Vec<f64> = own.par_iter().map(there).collect();
+        let back = target.fine.samples.par_iter().map(|s| distance(&locator, &s.point)).collect::<Vec<_>>();
+        Hausdorff::of(spread(&own, &there), spread(&target.fine.samples, &back))
+    }
+
     /// The curved surface in small triangles with its distances, and the spread of these.
     fn picture(&self, target: &Target) -> (Mesh, (f64, f64)) {
-        let (places, pieces) = (lattice(DENSE), pieces(DENSE));
+        let (places, pieces) = (lattice(target.fine.parts), pieces(target.fine.parts));
         let triangles: Vec<u32> = self.mesh.alive().collect();
         let of = |&t: &u32| {
             let patch = self.patch(t);

@@ -1,7 +1,6 @@
 //! A fine surface by few curved shells: cubic Bézier triangles ([`CurvedTriangle`]) whose vertices and normals are fitted to it.
-//! A decimated surface starts; then, round by round, triangles are evened out on the surface, vertices (along their normals) and normals
-//! are fitted by Gauss–Newton to the signed distances at 21 places of each shell, the distances of both ways are measured, and the
-//! shells that are too far off are halved at their longest edges. Large distances weigh more, so that the worst ones fall.
+//! A decimated surface starts; then, round by round, the shells that are too far off, either way, are halved at their longest edges, and
+//! round them triangles are evened out and fitted again, while the others rest. What is reached is looked at more closely before it counts.
 //! Leaves out: creases, as a vertex has one normal; edges that bend more than their end normals tell.
 
 mod fit;
@@ -21,12 +20,12 @@ use crate::triangles::TriangleMesh;
 use measure::Distances;
 
 /// Shells to start from where an error is asked for.
-const START: usize = 250;
+const START: usize = 100;
 
 /// Rounds of refinement at most.
 const MOST_ROUNDS: usize = 40;
 
-/// No move leaves a triangle of a worse shape, unless it was worse before.
+/// No step of the fit leaves a triangle of a worse shape, unless it was worse before.
 const LEAST_SHAPE: f64 = 0.62;
 
 /// When the shells are good enough.
@@ -93,11 +92,19 @@ impl fmt::Display for ShellReport {
 /// The surface to be fitted.
 struct Target {
     reference: Reference,
-    /// Points of it, measured in each round.
-    points: Vec<Vector3>,
-    /// Many more, measured at the end.
-    dense: Vec<Sample>,
+    /// Looked at in each round.
+    coarse: Detail,
+    /// Looked at when all seems well.
+    fine: Detail,
     diagonal: f64,
+}
+
+/// How closely distances are looked at.
+struct Detail {
+    /// Points of the target.
+    samples: Vec<Sample>,
+    /// Parts of an edge between places of the shells.
+    parts: usize,
 }
 
 /// Shells in the making.
@@ -105,10 +112,10 @@ struct Target {
 struct Shells {
     mesh: TriangleMesh,
     normals: Vec<Vector3>,
-    /// Points that may move: those near what has changed. The others keep what was fitted.
-    active: Vec<bool>,
     /// Points of borders, which stay there.
     on_border: Vec<bool>,
+    /// Points that may move: those near what has changed. The others keep what was fitted.
+    active: Vec<bool>,
 }
 
 impl FittedShells {
@@ -126,106 +133,109 @@ impl FittedShells {
         };
         let mut mesh = target.clone();
         mesh.decimate(Fewer::Triangles(start))?;
-        Ok(Self::refined(&Target::new(target), mesh, goal, progress))
+        Ok(Self::refined(&Target::new(target), &mesh, goal, progress))
     }
 
     /// Fits the shells of given triangles to a surface, without changing which points they join.
     pub fn on(target: &TriangleMesh, triangles: &TriangleMesh) -> Self {
         let target = Target::new(target);
-        let mut shells = Shells::new(triangles.clone(), &target);
+        let mut shells = Shells::new(triangles, &target);
         for point in 0..shells.mesh.points.len() as u32 {
             shells.place(point, &target);
         }
-        let start = shells.distances(&target, &target.points);
+        let start = shells.distances(&target.fine, &target);
         shells.settle(start, 0.0, 12, &target);
-        shells.finished(&target, 0, true)
+        shells.finished(&target, 0, ShellGoal::Shells(triangles.len()))
     }
 
-    fn refined(target: &Target, mesh: TriangleMesh, goal: ShellGoal, progress: &dyn Fn(f64)) -> Self {
-        let mut shells = Shells::new(mesh, target);
+    fn refined(target: &Target, mesh: &TriangleMesh, goal: ShellGoal, progress: &dyn Fn(f64)) -> Self {
         let aim = match goal {
             ShellGoal::Error(error) => error * target.diagonal,
             ShellGoal::Shells(_) => 0.0,
         };
+        let mut shells = Shells::new(mesh, target);
         shells.even_out(target, 10);
-        let mut now = shells.distances(target, &target.points);
-        let (mut rounds, mut reached) = (0, false);
+        let mut now = shells.distances(&target.coarse, target);
+        let (mut rounds, mut closely) = (0, false);
         while rounds < MOST_ROUNDS {
             rounds += 1;
-            let t1 = std::time::Instant::now();
             now = shells.settle(now, aim, 4, target);
             let (far, count) = (now.far(), shells.mesh.len());
             let worst = far.iter().copied().fold(0.0, f64::max);
-            if std::env::var("DBG").is_ok() {
-                let mut f: Vec<f64> = far.clone(); f.sort_by(|a, b| b.total_cmp(a));
-                println!("round {rounds}: {count} shells, worst {:.3}% 5th {:.3} 20th {:.3}, over {} active {} settle {:?} points {}", 100.0*worst/target.diagonal, 100.0*f[4]/target.diagonal, 100.0*f[19]/target.diagonal, f.iter().filter(|x| **x > aim).count(), shells.active.iter().filter(|a| **a).count(), t1.elapsed(), now.landings.len());
-            }
-            reached = match goal {
-                ShellGoal::Error(_) => worst <= aim,
-                ShellGoal::Shells(number) => count + 1 >= number,
+            let (part, bound, room) = match goal {
+                ShellGoal::Error(_) => (aim / worst, aim, usize::MAX),
+                ShellGoal::Shells(number) => {
+                    ((count + 1) as f64 / number as f64, share(&far), number.saturating_sub(count) / 2)
+                }
             };
-            if reached {
+            progress(part.min(1.0));
+            if part < 1.0 && shells.refine(&far, bound, room, target) > 0 {
+                shells.even_out(target, 3);
+                now = shells.distances_after(&now, target);
+            } else if closely {
                 break;
+            } else {
+                closely = true;
+                now = shells.distances(&target.fine, target);
+                let all = shells.mesh.alive().flat_map(|t| shells.mesh.triangles[t as usize]).collect();
+                shells.activate(all);
             }
-            let (bound, room) = match goal {
-                ShellGoal::Error(_) => (aim, usize::MAX),
-                ShellGoal::Shells(number) => (share(&far, count), (number - count) / 2),
-            };
-            progress(match goal {
-                ShellGoal::Error(_) => (aim / worst).min(1.0),
-                ShellGoal::Shells(number) => count as f64 / number as f64,
-            });
-            if shells.refine(&far, bound, room, target) == 0 {
-                break;
-            }
-            shells.even_out(target, 3);
-            now = shells.distances_after(&now, target);
         }
-        let mut fitted = shells.finished(target, rounds, reached);
-        if let ShellGoal::Error(error) = goal {
-            // Both ways, which is more than what led the refinement.
-            fitted.report.reached = fitted.report.distances.largest() <= error * target.diagonal;
-        }
-        fitted
+        shells.finished(target, rounds, goal)
     }
 }
 
 /// The distance above which shells are halved on the way to a number of them: six tenths of the worst, or so many that there are a
 /// twentieth more.
-fn share(far: &[f64], count: usize) -> f64 {
+fn share(far: &[f64]) -> f64 {
     let mut sorted = far.to_vec();
     sorted.sort_unstable_by(|a, b| b.total_cmp(a));
-    sorted[count / 20].min(0.6 * sorted[0])
+    sorted[far.len() / 20].min(0.6 * sorted[0])
 }
 
 impl Target {
     fn new(mesh: &TriangleMesh) -> Self {
-        let reference = Reference::new(mesh);
         let diagonal = mesh.diagonal();
-        let points = spaced(mesh, diagonal / 60.0);
-        Self { points, dense: samples(mesh, diagonal / 300.0), reference, diagonal }
+        Self {
+            reference: Reference::new(mesh),
+            coarse: Detail { samples: distinct(samples(mesh, diagonal / 60.0)), parts: 8 },
+            fine: Detail { samples: distinct(samples(mesh, diagonal / 300.0)), parts: 16 },
+            diagonal,
+        }
     }
 }
 
-/// Points of a surface no farther apart than `spacing` [m], each once.
-fn spaced(mesh: &TriangleMesh, spacing: f64) -> Vec<Vector3> {
-    let mut points: Vec<[f64; 3]> = samples(mesh, spacing).iter().map(|s| s.point.into()).collect();
-    points.sort_unstable_by(|a, b| a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal));
-    points.dedup();
-    points.into_iter().map(Vector3::from).collect()
+/// Samples at the same place made one.
+fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
+    let place = |sample: &Sample| <[f64; 3]>::from(sample.point).map(f64::to_bits);
+    samples.sort_by_key(place);
+    samples.dedup_by(|next, kept| {
+        let same = place(next) == place(kept);
+        kept.area += if same { next.area } else { 0.0 };
+        same
+    });
+    samples
 }
 
 impl Shells {
-    fn new(mesh: TriangleMesh, target: &Target) -> Self {
+    fn new(mesh: &TriangleMesh, target: &Target) -> Self {
         let (points, triangles) = mesh.compact();
-        let normals = points.iter().map(|x| target.reference.closest(x).1).collect();
-        let mut shells = Self { active: vec![true; points.len()], on_border: vec![], mesh: TriangleMesh::new(points, triangles), normals };
-        shells.find_border();
-        shells
+        let mesh = TriangleMesh::new(points, triangles);
+        Self {
+            normals: mesh.points.iter().map(|x| target.reference.closest(x).1).collect(),
+            on_border: (0..mesh.points.len() as u32).map(|n| !mesh.marked(n).is_empty()).collect(),
+            active: vec![true; mesh.points.len()],
+            mesh,
+        }
     }
 
-    fn find_border(&mut self) {
-        self.on_border = (0..self.mesh.points.len() as u32).map(|n| !self.mesh.marked(n).is_empty()).collect();
+    /// Lets points and their neighbours move, and no others.
+    fn activate(&mut self, points: Vec<u32>) {
+        self.active = vec![false; self.mesh.points.len()];
+        for point in points {
+            self.active[point as usize] = true;
+            self.mesh.neighbours(point).iter().for_each(|&n| self.active[n as usize] = true);
+        }
     }
 
     fn patch(&self, triangle: u32) -> CurvedTriangle {
@@ -246,7 +256,7 @@ impl Shells {
             if far.iter().all(|&off| off <= aim) {
                 break;
             }
-            let scale = if aim > 0.0 { aim } else { share(&far, self.mesh.len()) };
+            let scale = if aim > 0.0 { aim } else { share(&far) };
             let mut next = self.clone();
             for _ in 0..2 {
                 next.fit(target, &now.landings, scale);

@@ -3,7 +3,7 @@
 use pliant_geometry::Vector3;
 
 use super::fit::frame;
-use super::{Shells, Target};
+use super::{LEAST_SHAPE, Shells, Target};
 use crate::triangles::{cross, shape};
 
 /// Triangles of a better shape than this are left alone by moves that would make them worse.
@@ -11,6 +11,9 @@ const GOOD_SHAPE: f64 = 0.75;
 
 /// A triangle looks along the normals of its corners where the cosines are above this.
 const UPRIGHT: f64 = 0.3;
+
+/// Points of a border stay where they are if their edges there meet at less than this angle [rad].
+const BEND: f64 = 2.0;
 
 impl Shells {
     /// Puts a point on the target, or on its border, with the normal there.
@@ -71,8 +74,13 @@ impl Shells {
     /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst, and where they are poor to the
     /// best of some places around.
     fn move_along(&mut self, point: u32, target: &Target) {
-        let Some(aim) = self.mesh.evener(point, &target.reference) else { return };
         let here = self.mesh.points[point as usize];
+        if let [a, b] = self.mesh.marked(point)[..]
+            && (self.mesh.points[a as usize] - here).angle(&(self.mesh.points[b as usize] - here)) < BEND
+        {
+            return;
+        }
+        let Some(aim) = self.mesh.evener(point, &target.reference) else { return };
         let own = self.worth_round(point, &here);
         let project = |x: Vector3| {
             if self.on_border[point as usize] { target.reference.closest_on_lines(&x) } else { target.reference.closest(&x).0 }
@@ -123,19 +131,18 @@ impl Shells {
             (place[longest], place[(longest + 1) % 3]) = (0.5, 0.5);
             let fresh = self.mesh.split(a, b, patch.point(place));
             self.normals.push(patch.normal(place));
+            self.on_border.push(sides[1].is_none());
             touched.resize(self.mesh.triangles.len(), true);
-            self.find_border();
             self.place(fresh, target);
             changed.push(fresh);
             halved += 1;
         }
-        self.find_border();
-        self.active = vec![false; self.mesh.points.len()];
-        for point in changed {
-            self.active[point as usize] = true;
-            self.mesh.neighbours(point).iter().for_each(|&n| self.active[n as usize] = true);
-        }
+        let poor = |t: &u32| {
+            let nodes = self.mesh.triangles[*t as usize];
+            self.worth(nodes, self.at(nodes)) < LEAST_SHAPE
+        };
+        changed.extend(self.mesh.alive().filter(poor).flat_map(|t| self.mesh.triangles[t as usize]));
+        self.activate(changed);
         halved
     }
-
 }
