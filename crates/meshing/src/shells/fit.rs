@@ -68,7 +68,7 @@ impl Shells {
         }
     }
 
-    fn worth_of_all(&self) -> Vec<f64> {
+    pub(super) fn worth_of_all(&self) -> Vec<f64> {
         (0..).zip(&self.mesh.points).map(|(v, x)| self.worth_round(v, x)).collect()
     }
 

@@ -22,11 +22,17 @@ use measure::Distances;
 /// Shells to start from where an error is asked for.
 const START: usize = 100;
 
+/// Rounds after the number of shells asked for is reached.
+const LAST_ROUNDS: usize = 4;
+
 /// Rounds of refinement at most.
 const MOST_ROUNDS: usize = 40;
 
 /// No step of the fit leaves a triangle of a worse shape, unless it was worse before.
-const LEAST_SHAPE: f64 = 0.62;
+const LEAST_SHAPE: f64 = 0.65;
+
+/// Part of the way to the goal after which distances are looked at closely.
+const CLOSELY: f64 = 0.9;
 
 /// When the shells are good enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -156,7 +162,8 @@ impl FittedShells {
         let mut shells = Shells::new(mesh, target);
         shells.even_out(target, 10);
         let mut now = shells.distances(&target.coarse, target);
-        let (mut rounds, mut closely) = (0, false);
+        let (mut rounds, mut closely, mut left) = (0, false, LAST_ROUNDS);
+        let mut best: Option<(bool, f64, Shells)> = None;
         while rounds < MOST_ROUNDS {
             rounds += 1;
             now = shells.settle(now, aim, 4, target);
@@ -169,19 +176,27 @@ impl FittedShells {
                 }
             };
             progress(part.min(1.0));
-            if part < 1.0 && shells.refine(&far, bound, room, target) > 0 {
-                shells.even_out(target, 3);
-                now = shells.distances_after(&now, target);
-            } else if closely {
-                break;
-            } else {
+            if !closely && part >= CLOSELY {
                 closely = true;
                 now = shells.distances(&target.fine, target);
-                let all = shells.mesh.alive().flat_map(|t| shells.mesh.triangles[t as usize]).collect();
-                shells.activate(all);
+                shells.activate(shells.corners_of(&now.far(), bound));
+                continue;
             }
+            if part >= 1.0 {
+                let poor = shells.worth_of_all().into_iter().any(|worth| worth < LEAST_SHAPE);
+                if best.as_ref().is_none_or(|(was_poor, least, _)| (poor, worst) < (*was_poor, *least)) {
+                    best = Some((poor, worst, shells.clone()));
+                }
+                if left == 0 || worst <= aim {
+                    break;
+                }
+                left -= 1;
+            }
+            shells.refine(&far, bound, room, target);
+            shells.even_out(target, 3);
+            now = shells.distances_after(&now, target);
         }
-        shells.finished(target, rounds, goal)
+        best.map_or(shells, |(.., best)| best).finished(target, rounds, goal)
     }
 }
 
@@ -227,6 +242,12 @@ impl Shells {
             active: vec![true; mesh.points.len()],
             mesh,
         }
+    }
+
+    /// Corners of the shells that are farther off than a bound.
+    fn corners_of(&self, far: &[f64], bound: f64) -> Vec<u32> {
+        let off = self.mesh.alive().filter(|&t| far[t as usize] > bound);
+        off.flat_map(|t| self.mesh.triangles[t as usize]).collect()
     }
 
     /// Lets points and their neighbours move, and no others.

@@ -106,13 +106,14 @@ impl Shells {
         }
     }
 
-    /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a number. Returns how many.
-    pub(super) fn refine(&mut self, far: &[f64], bound: f64, room: usize, target: &Target) -> usize {
+    /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a number. They, their
+    /// neighbours and poor triangles may move from then on.
+    pub(super) fn refine(&mut self, far: &[f64], bound: f64, room: usize, target: &Target) {
         let mut order: Vec<u32> = self.mesh.alive().filter(|&t| far[t as usize] > bound).collect();
         order.sort_by(|&a, &b| far[b as usize].total_cmp(&far[a as usize]));
         let mut touched = vec![false; far.len()];
         let mut halved = 0;
-        let mut changed: Vec<u32> = order.iter().flat_map(|&t| self.mesh.triangles[t as usize]).collect();
+        let mut changed = self.corners_of(far, bound);
         for t in order {
             if halved == room {
                 break;
@@ -143,6 +144,5 @@ impl Shells {
         };
         changed.extend(self.mesh.alive().filter(poor).flat_map(|t| self.mesh.triangles[t as usize]));
         self.activate(changed);
-        halved
     }
 }
