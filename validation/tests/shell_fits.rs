@@ -25,7 +25,11 @@ fn organ(path: &str) -> Option<TriangleMesh> {
 fn require(name: &str, target: &TriangleMesh, goal: ShellGoal, percent: f64, shells: usize) {
     let start = Instant::now();
     let report = FittedShells::new(target, goal, &|_| {}).unwrap().report;
-    println!("{name} ({} triangles), {goal:?}: {:.1} s\n{report}", target.len(), start.elapsed().as_secs_f64());
+    println!(
+        "{name} ({} triangles), {goal:?}: {:.1} s\n{report}",
+        target.len(),
+        start.elapsed().as_secs_f64()
+    );
     assert!(report.reached && report.shells <= shells && report.shape[0] >= 0.6, "{report}");
     assert!(100.0 * report.distances.largest() <= percent * report.diagonal, "{report}");
 }

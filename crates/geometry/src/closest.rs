@@ -2,7 +2,7 @@
 //! means at the nodes, weighted by area, linear in between: on a curved surface they turn smoothly, on a flat one they
 //! are exact. Leaves out: which side a point is on.
 //! Triangles are halved at the median of their centres until few are left; the nearer half is searched first and a box farther off than
-//! what was found is skipped. Four times as fast as rstar's nearest neighbour, which keeps a heap of boxes.
+//! what was found is skipped. Of equally close triangles the first found counts.
 
 use crate::locate::{barycentric_of_closest, on_triangle};
 use crate::{Surface, Vector3};
@@ -101,7 +101,9 @@ impl SurfaceLocator {
             let axis = (high - low).imax();
             let centre = |triangle: &Triangle| triangle.corners.iter().map(|x| x[axis]).sum::<f64>();
             let middle = own.len() / 2;
-            own.select_nth_unstable_by(middle, |a, b| centre(a).total_cmp(&centre(b)).then(a.face.cmp(&b.face)));
+            own.select_nth_unstable_by(middle, |a, b| {
+                centre(a).total_cmp(&centre(b)).then(a.face.cmp(&b.face))
+            });
             self.sort(first, first + middle);
             self.parts[number].second = self.parts.len() as u32;
             self.sort(first + middle, end);

@@ -85,7 +85,9 @@ impl Shells {
     fn probes(&self, landings: &[Landing], scale: f64) -> Vec<Probe> {
         let places = lattice(PARTS);
         let moving: Vec<u32> = self.mesh.alive().filter(|&t| self.moves(t)).collect();
-        let there = moving.iter().flat_map(|&shell| places.iter().map(move |&place| Probe { shell, place, from: None }));
+        let there = moving
+            .iter()
+            .flat_map(|&shell| places.iter().map(move |&place| Probe { shell, place, from: None }));
         let far = landings.iter().filter(|landing| landing.off > CLOSE * scale && self.moves(landing.shell));
         let back = far.map(|landing| Probe {
             shell: landing.shell,
@@ -116,7 +118,9 @@ impl Shells {
         let nodes = self.mesh.triangles[probe.shell as usize];
         let by = self.patch(probe.shell).derivatives(CurvedTriangle::weights(probe.place));
         let mut slope = [[0.0; UNKNOWNS]; 3];
-        for (corner, node) in nodes.into_iter().map(|n| n as usize).enumerate().filter(|(_, n)| self.active[*n]) {
+        for (corner, node) in
+            nodes.into_iter().map(|n| n as usize).enumerate().filter(|(_, n)| self.active[*n])
+        {
             let [by_place, by_normal] = by[corner].map(|by: Matrix3<f64>| by.tr_mul(&along));
             let [u, v, n] = frame(&self.normals[node]);
             let ways = if self.on_border[node] { [0.0; 3] } else { [u, v, n].map(|way| by_place.dot(&way)) };
@@ -139,7 +143,8 @@ impl Shells {
 
     fn stepped(&self, step: &[[f64; UNKNOWNS]], sizes: &[f64], parts: &[f64]) -> Self {
         let mut next = self.clone();
-        for (point, (x, size)) in step.iter().zip(sizes).enumerate().filter(|(point, _)| parts[*point] > 0.0) {
+        for (point, (x, size)) in step.iter().zip(sizes).enumerate().filter(|(point, _)| parts[*point] > 0.0)
+        {
             let [u, v, n] = frame(&self.normals[point]);
             let way = (x[0] * u + x[1] * v + x[2] * n) * parts[point];
             let turn = (x[3] * u + x[4] * v) * (parts[point] / size);
@@ -164,7 +169,10 @@ impl Shells {
             for (row, value) in rows.iter().zip(values) {
                 for (node, slope) in row.nodes.iter().zip(&row.slope) {
                     let first = UNKNOWNS * *node as usize;
-                    sum[first..first + UNKNOWNS].iter_mut().zip(slope).for_each(|(s, slope)| *s += slope * value);
+                    sum[first..first + UNKNOWNS]
+                        .iter_mut()
+                        .zip(slope)
+                        .for_each(|(s, slope)| *s += slope * value);
                 }
             }
             sum
@@ -175,11 +183,15 @@ impl Shells {
                 diagonal[*node as usize].iter_mut().zip(slope).for_each(|(d, s)| *d += weight * s * s);
             }
         }
-        let damping: Vec<f64> = diagonal.iter().flat_map(|d| {
-            let whole = d.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-            [0.1 * whole, 0.1 * whole, 0.01 * whole, 0.01 * whole, 0.01 * whole]
-        }).collect();
-        let diagonal: Vec<f64> = diagonal.into_iter().flatten().zip(&damping).map(|(d, more)| d + more).collect();
+        let damping: Vec<f64> = diagonal
+            .iter()
+            .flat_map(|d| {
+                let whole = d.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+                [0.1 * whole, 0.1 * whole, 0.01 * whole, 0.01 * whole, 0.01 * whole]
+            })
+            .collect();
+        let diagonal: Vec<f64> =
+            diagonal.into_iter().flatten().zip(&damping).map(|(d, more)| d + more).collect();
         let apply = |x: &[f64]| {
             let along = |(row, weight): (&Row, &f64)| {
                 let of = |(node, slope): (&u32, &[f64; UNKNOWNS])| {

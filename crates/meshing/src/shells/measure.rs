@@ -1,6 +1,8 @@
 //! Distances between shells and their target, both ways.
 
-use pliant_geometry::{CellKind, CurvedTriangle, DataArray, Mesh, Surface, SurfaceLocator, Vector3, boundary};
+use pliant_geometry::{
+    CellKind, CurvedTriangle, DataArray, Mesh, Surface, SurfaceLocator, Vector3, boundary,
+};
 use rayon::prelude::*;
 
 use super::{Detail, FittedShells, ShellGoal, ShellReport, Shells, Target};
@@ -50,7 +52,8 @@ impl Shells {
         let mut there = vec![0.0; self.mesh.triangles.len()];
         self.measure(&shells, detail.parts, target, &mut there);
         let nearest = Nearest::new(self, shells);
-        let landings = detail.samples.par_iter().filter_map(|sample| nearest.landing(&sample.point)).collect();
+        let landings =
+            detail.samples.par_iter().filter_map(|sample| nearest.landing(&sample.point)).collect();
         Distances { there, parts: detail.parts, landings }
     }
 
@@ -63,10 +66,16 @@ impl Shells {
         self.measure(&moving, before.parts, target, &mut there);
         let mut near = vec![false; self.mesh.points.len()];
         moving.iter().flat_map(|&t| self.mesh.triangles[t as usize]).for_each(|n| near[n as usize] = true);
-        let beside = resting.into_iter().filter(|&t| self.mesh.triangles[t as usize].iter().any(|&n| near[n as usize]));
+        let beside = resting
+            .into_iter()
+            .filter(|&t| self.mesh.triangles[t as usize].iter().any(|&n| near[n as usize]));
         let nearest = Nearest::new(self, moving.iter().copied().chain(beside).collect());
         let again = |landing: &Landing| {
-            if self.moves(landing.shell) { nearest.landing(&landing.point).unwrap_or(*landing) } else { *landing }
+            if self.moves(landing.shell) {
+                nearest.landing(&landing.point).unwrap_or(*landing)
+            } else {
+                *landing
+            }
         };
         Distances { there, parts: before.parts, landings: before.landings.par_iter().map(again).collect() }
     }
@@ -170,7 +179,6 @@ fn pieces(n: usize) -> Vec<[u32; 3]> {
     }
     found
 }
-
 
 /// Finds the nearest place of all shells, from small flat triangles on.
 struct Nearest {

@@ -31,6 +31,9 @@ const MOST_ROUNDS: usize = 40;
 /// No step of the fit leaves a triangle of a worse shape, unless it was worse before.
 const LEAST_SHAPE: f64 = 0.65;
 
+/// Among the last rounds those without a triangle worse than this come first.
+const POOR: f64 = 0.6;
+
 /// Part of the way to the goal after which distances are looked at closely.
 const CLOSELY: f64 = 0.9;
 
@@ -183,7 +186,7 @@ impl FittedShells {
                 continue;
             }
             if part >= 1.0 {
-                let poor = shells.worth_of_all().into_iter().any(|worth| worth < LEAST_SHAPE);
+                let poor = shells.worth_of_all().into_iter().any(|worth| worth < POOR);
                 if best.as_ref().is_none_or(|(was_poor, least, _)| (poor, worst) < (*was_poor, *least)) {
                     best = Some((poor, worst, shells.clone()));
                 }

@@ -37,7 +37,9 @@ impl Shells {
             for [a, b] in self.mesh.edges() {
                 let Some(new) = self.mesh.flipped(a, b) else { continue };
                 let [Some(s), Some(t)] = self.mesh.sides(a, b) else { continue };
-                let worst = |of: [[u32; 3]; 2]| of.iter().map(|&nodes| self.worth(nodes, self.at(nodes))).fold(1.0, f64::min);
+                let worst = |of: [[u32; 3]; 2]| {
+                    of.iter().map(|&nodes| self.worth(nodes, self.at(nodes))).fold(1.0, f64::min)
+                };
                 let active = new.as_flattened().iter().all(|&n| self.active[n as usize]);
                 if active && worst(new) > 1.1 * worst([s, t].map(|t| self.mesh.triangles[t as usize])) {
                     self.mesh.flip(a, b, new);
@@ -66,7 +68,10 @@ impl Shells {
     pub(super) fn worth_round(&self, point: u32, position: &Vector3) -> f64 {
         let of = |&t: &u32| {
             let nodes = self.mesh.triangles[t as usize];
-            self.worth(nodes, nodes.map(|n| if n == point { *position } else { self.mesh.points[n as usize] }))
+            self.worth(
+                nodes,
+                nodes.map(|n| if n == point { *position } else { self.mesh.points[n as usize] }),
+            )
         };
         self.mesh.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
     }
@@ -83,7 +88,11 @@ impl Shells {
         let Some(aim) = self.mesh.evener(point, &target.reference) else { return };
         let own = self.worth_round(point, &here);
         let project = |x: Vector3| {
-            if self.on_border[point as usize] { target.reference.closest_on_lines(&x) } else { target.reference.closest(&x).0 }
+            if self.on_border[point as usize] {
+                target.reference.closest_on_lines(&x)
+            } else {
+                target.reference.closest(&x).0
+            }
         };
         let mut aims = vec![project(here + 0.4 * (aim - here)), aim];
         if own < GOOD_SHAPE {
