@@ -22,7 +22,7 @@ use measure::Distances;
 /// Shells to start from where an error is asked for.
 const START: usize = 100;
 
-/// Rounds after the number of shells asked for is reached.
+/// Rounds after the goal is reached, where distances can fall or triangles are poor.
 const LAST_ROUNDS: usize = 4;
 
 /// Rounds of refinement at most.
@@ -190,7 +190,7 @@ impl FittedShells {
                 if best.as_ref().is_none_or(|(was_poor, least, _)| (poor, worst) < (*was_poor, *least)) {
                     best = Some((poor, worst, shells.clone()));
                 }
-                if left == 0 || worst <= aim {
+                if left == 0 || worst <= aim && !poor {
                     break;
                 }
                 left -= 1;
