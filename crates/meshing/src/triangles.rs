@@ -270,9 +270,8 @@ impl TriangleMesh {
         }
         match apexes[..] {
             // A tetrahedron, or a triangle all alone.
-            [c, d] => !self.sides(c, d).iter().flatten().any(|&t| {
-                let nodes = self.triangles[t as usize];
-                nodes.contains(&keep) || nodes.contains(&gone)
+            [c, d] => ![keep, gone].iter().all(|end| {
+                self.sides(c, d).iter().flatten().any(|&t| self.triangles[t as usize].contains(end))
             }),
             [c] => !(self.is_border(keep, c) && self.is_border(gone, c)),
             _ => false,
@@ -360,16 +359,6 @@ impl TriangleMesh {
         self.star[a as usize].retain(|&x| x != t);
         self.star[d as usize].push(s);
         self.star[c as usize].push(t);
-    }
-
-    /// Worst shape of the triangles round a point, were it at a position.
-    pub(crate) fn worst_round(&self, point: u32, position: &Vector3) -> f64 {
-        let of = |&t: &u32| {
-            let nodes = self.triangles[t as usize];
-            let x = self.corners(t);
-            shape([0, 1, 2].map(|k| if nodes[k] == point { *position } else { x[k] }))
-        };
-        self.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
     }
 
     /// Mean normal of the triangles round a point, weighted by their angles there (Thürmer and Wüthrich 1998).
