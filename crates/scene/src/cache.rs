@@ -11,7 +11,6 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use pliant_geometry::{CellBlock, DataArray, Mesh, Vector3};
-use pliant_imaging::Image;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -55,12 +54,12 @@ struct Body {
 pub(crate) struct Key(String);
 
 impl Key {
-    /// Of an image and a recipe that says in full what is made of it.
-    pub fn new(image: &Image, recipe: &impl std::fmt::Debug) -> Self {
+    /// Of the content of an image or a surface, given in pieces, and a recipe that says in full what is made of it.
+    pub fn new(content: impl FnOnce(&mut dyn FnMut(&[u8])), recipe: &impl std::fmt::Debug) -> Self {
         let mut hash = Sha256::new();
         hash.update(env!("PLIANT_MESHER"));
         hash.update(format!("{recipe:?}"));
-        image.content(|piece| {
+        content(&mut |piece| {
             hash.update((piece.len() as u64).to_le_bytes());
             hash.update(piece);
         });

@@ -1,13 +1,14 @@
-//! Meshes of segmented images: read, cut out, cleaned and made of the cells asked for, or taken from the cache.
+//! Meshes of segmented images and of surface files: read, cut out, cleaned and made of the cells asked for, or taken from the cache.
 
 use std::f64::consts::FRAC_PI_3;
 use std::path::Path;
 
 use pliant_geometry::Mesh;
+use pliant_geometry::io::{self, MeshFile, MeshFileError};
 use pliant_imaging::{Cleaning, Image, ImageError, LabelError, ReadOptions, Smoothing};
 use pliant_meshing::{
-    Anatomy, DEFAULT_CELL_LIMIT, Deviation, Fewer, FieldMesh, FittedShells, MeshingError, OrganTets,
-    SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, TriangleMesh, Voxels,
+    Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
+    OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
 };
 
 use super::{Builder, MeshOrigin};
@@ -26,9 +27,18 @@ struct Recipe {
     cells: Goal,
 }
 
+/// What a body is made of.
+enum Scan {
+    Image(Image),
+    /// Triangles or quads in metres, and what is said about their file.
+    Surface(MeshFile),
+}
+
 /// What of an image is the body.
 #[derive(Clone, Debug)]
 enum Cut {
+    /// What the surface of a file encloses.
+    Enclosed,
     Labels(Vec<i32>),
     /// Voxels of at least this value.
     From(f64),
@@ -55,16 +65,16 @@ struct Fault {
 }
 
 impl Builder<'_> {
-    /// The mesh of what is segmented in an image.
-    pub(super) fn image(&mut self, image: &Path, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
-        let made = recipe(table).and_then(|recipe| Ok((self.read_images(image, table)?, recipe)));
-        let name = image.display().to_string();
-        let made = made.and_then(|(image, recipe)| {
-            let key = self.cache.is_on().then(|| Key::new(&image, &recipe));
+    /// The mesh of what is segmented in an image, or of what the surface of a file encloses.
+    pub(super) fn scanned(&mut self, file: &Path, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+        let made = recipe(table).and_then(|recipe| Ok((self.scan(file, table)?, recipe)));
+        let name = file.display().to_string();
+        let made = made.and_then(|(scan, recipe)| {
+            let key = self.cache.is_on().then(|| Key::new(|sink| scan.content(sink), &recipe));
             let kept = match key.as_ref().and_then(|key| self.cache.get(key)) {
                 Some(kept) => (kept, Some("from the cache".into())),
                 None => {
-                    let made = recipe.make(&image)?;
+                    let made = recipe.make(&scan)?;
                     let put = key.map(|key| self.cache.put(&key, &made));
                     let how = put.map(|put| match put {
                         Ok(()) => "made, and kept in the cache".into(),
@@ -73,24 +83,43 @@ impl Builder<'_> {
                     (made, how)
                 }
             };
-            Ok((image, recipe, kept))
+            Ok((scan, recipe, kept))
         });
-        let (image, recipe, (kept, how)) = match made {
+        let (scan, recipe, (kept, how)) = match made {
             Ok(made) => made,
             Err(Fault { key, message, help }) => {
                 self.error(&[path, &[key]].concat(), message, "here", help);
                 return None;
             }
         };
+        let (format, notes) = match &scan {
+            Scan::Image(image) => (image.format.to_string(), &image.notes),
+            Scan::Surface(file) => (file.format.clone(), &file.notes),
+        };
         self.notes.extend(how.map(|how| format!("mesh of {name}: {how}")));
-        self.notes.extend(image.notes.iter().chain(&kept.notes).map(|note| format!("{name}: {note}")));
+        self.notes.extend(notes.iter().chain(&kept.notes).map(|note| format!("{name}: {note}")));
         let place = self.source().span(path);
         self.out.extend(kept.doubts.into_iter().map(|doubt| {
             let help = "use finer cells, or `clean = { keep-largest = true }` for small pieces";
             Diagnostic::warning(doubt).at(place.clone(), "this mesh").help(help)
         }));
-        let origin = format!("{name} ({}), {}", image.format, recipe.words());
+        let origin = format!("{name} ({format}), {}", recipe.words());
         Some(MeshOrigin { mesh: kept.mesh, origin })
+    }
+
+    fn scan(&self, file: &Path, table: &MeshTable) -> Result<Scan, Fault> {
+        if table.image.is_some() {
+            return self.read_images(file, table).map(Scan::Image);
+        }
+        let mut read = io::read(&self.scene.folder.join(file)).map_err(|error| {
+            let help = match error {
+                MeshFileError::Open { .. } => "file names are relative to the scene file",
+                _ => "`pliant info` reads a mesh file on its own",
+            };
+            Fault { key: "file", message: error.to_string(), help }
+        })?;
+        read.mesh.points.iter_mut().for_each(|point| *point *= table.scale);
+        Ok(Scan::Surface(read))
     }
 
     /// The image, with the one that is added to it.
@@ -114,11 +143,42 @@ impl Builder<'_> {
     }
 }
 
+impl Scan {
+    /// Gives all bytes that a mesh can depend on, in pieces.
+    fn content(&self, sink: &mut dyn FnMut(&[u8])) {
+        match self {
+            Self::Image(image) => image.content(sink),
+            Self::Surface(file) => {
+                let points = file.mesh.points.iter().flat_map(|x| [x.x, x.y, x.z]);
+                sink(&points.flat_map(f64::to_le_bytes).collect::<Vec<u8>>());
+                for block in &file.mesh.blocks {
+                    sink(format!("{:?}", block.kind).as_bytes());
+                    sink(&block.nodes.iter().flat_map(|node| node.to_le_bytes()).collect::<Vec<u8>>());
+                }
+            }
+        }
+    }
+}
+
 /// What a table asks for.
 fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
     let refuse = |key, message: &str, help| Err(Fault { key, message: message.into(), help });
+    let CleanTable { close_gaps, fill_holes, keep_largest } = table.clean.unwrap_or_default();
+    let cleaning = Cleaning { close_gaps, fill_holes, keep_largest };
+    let cells = goal(table)?;
     if table.fix.is_some() {
-        return refuse("fix", "`fix` repairs mesh files", "`clean` cleans the labels of an image");
+        return refuse(
+            "fix",
+            "`fix` repairs the cells of a mesh file",
+            "`clean` cleans what new cells are made of",
+        );
+    }
+    if table.file.is_some() {
+        if table.clean.is_some() && !matches!(cells, Goal::Volume(..)) {
+            let help = "leave it out: a surface is mended, and stays as it is otherwise";
+            return refuse("clean", "`clean` is for tets and hexes in the surface of a file", help);
+        }
+        return Ok(Recipe { cut: Cut::Enclosed, cleaning, cells });
     }
     if table.scale != 1.0 {
         return refuse("scale", "`scale` does not go with `image`", "an image tells its own unit");
@@ -136,9 +196,7 @@ fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
     if table.add.is_some() && table.threshold.is_none() {
         return refuse("add", "`add` goes with `threshold` only", "labels are not added up");
     }
-    let CleanTable { close_gaps, fill_holes, keep_largest } = table.clean.unwrap_or_default();
-    let cleaning = Cleaning { close_gaps, fill_holes, keep_largest };
-    Ok(Recipe { cut, cleaning, cells: goal(table)? })
+    Ok(Recipe { cut, cleaning, cells })
 }
 
 /// The cells that a table asks for: of the sizes that it gives exactly one that goes with them.
@@ -158,6 +216,7 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
     let given: Vec<&'static str> =
         sizes.into_iter().filter(|(_, given)| *given).map(|(key, _)| key).collect();
     let words = words(cells);
+    let source = if table.file.is_some() { "file" } else { "image" };
     if let Some(key) = given.iter().copied().find(|key| !fitting.contains(key)) {
         let help = match cells {
             Cells::Shells => "shells are as many as `shells`, or as close as `error`",
@@ -174,14 +233,14 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
         (Cells::Shells, _, _, None, Some(error)) => Ok(Goal::Shells(ShellGoal::Error(error))),
         (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, Some(edge), ..) => Ok(Goal::Volume(cells, edge)),
         (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, None, ..) => Err(Fault {
-            key: "image",
-            message: "`image` needs `edge`".into(),
+            key: source,
+            message: format!("{words} of an image or a surface need `edge`"),
             help: "add `edge`, the size of a cell in metres, for example `edge = 0.008`",
         }),
         _ => Err(Fault {
-            key: "image",
+            key: source,
             message: format!(
-                "{words} of an image need exactly one of {}",
+                "{words} of an image or a surface need exactly one of {}",
                 fitting.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
             ),
             help: "for example `error = 0.005`, half a percent of the diagonal, or `shells = 800`",
@@ -203,6 +262,7 @@ pub(super) fn words(cells: Cells) -> &'static str {
 impl Recipe {
     fn words(&self) -> String {
         let cut = match &self.cut {
+            Cut::Enclosed => "what it encloses".into(),
             Cut::From(least) => format!("from {least} on"),
             Cut::Labels(labels) => {
                 format!("label {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))
@@ -212,7 +272,7 @@ impl Recipe {
             Goal::Volume(cells, edge) => format!("{} of {edge} m", words(cells)),
             Goal::Even(edge) => format!("surface in triangles of {edge} m"),
             Goal::Triangles(number) => format!("surface in {number} triangles"),
-            Goal::Finest => "surface as fine as the voxels".into(),
+            Goal::Finest => "surface as fine as it is given".into(),
             Goal::Shells(ShellGoal::Shells(number)) => format!("{number} shells"),
             Goal::Shells(ShellGoal::Error(error)) => format!("shells within {} %", 100.0 * error),
         };
@@ -220,30 +280,67 @@ impl Recipe {
     }
 
     /// Cuts the body out, cleans it and makes its cells.
-    fn make(&self, image: &Image) -> Result<Kept, Fault> {
-        let (anatomy, cleaned) = self.anatomy(image)?;
+    fn make(&self, scan: &Scan) -> Result<Kept, Fault> {
+        let key = match (self.cells, scan) {
+            (Goal::Volume(..) | Goal::Even(_), _) => "edge",
+            (Goal::Triangles(_), _) => "triangles",
+            (Goal::Finest, Scan::Image(_)) => "image",
+            (Goal::Finest, Scan::Surface(_)) => "file",
+            (Goal::Shells(ShellGoal::Shells(_)), _) => "shells",
+            (Goal::Shells(ShellGoal::Error(_)), _) => "error",
+        };
+        let fault = |error: MeshingError| Fault { key, message: error.to_string(), help: "" };
         let mut notes = Vec::new();
-        if self.cleaning != Cleaning::default() {
-            notes.push(cleaned.to_string());
+        let (mesh, doubts) = match (scan, self.cells) {
+            (Scan::Image(image), goal) => {
+                let (anatomy, cleaned) = self.anatomy(image)?;
+                if self.cleaning != Cleaning::default() {
+                    notes.push(cleaned.to_string());
+                }
+                match goal {
+                    Goal::Volume(cells, edge) => fill(&anatomy, cells, edge, &mut notes),
+                    goal => {
+                        let voxel = image.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+                        extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal))
+                    }
+                }
+            }
+            (Scan::Surface(file), Goal::Volume(cells, edge)) => self
+                .enclosed(&file.mesh, edge, &mut notes)
+                .map_err(|error| Fault { key: "file", ..fault(error) })
+                .map(|anatomy| fill(&anatomy, cells, edge, &mut notes))?,
+            (Scan::Surface(file), goal) => {
+                TriangleMesh::from_mesh(&file.mesh).and_then(|(surface, repairs)| {
+                    if repairs != SurfaceRepairs::default() {
+                        notes.push(repairs.to_string());
+                    }
+                    cover(surface, goal)
+                })
+            }
         }
-        let key = match self.cells {
-            Goal::Volume(..) | Goal::Even(_) => "edge",
-            Goal::Triangles(_) => "triangles",
-            Goal::Finest => "image",
-            Goal::Shells(ShellGoal::Shells(_)) => "shells",
-            Goal::Shells(ShellGoal::Error(_)) => "error",
-        };
-        let voxel = image.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        let made = match self.cells {
-            Goal::Volume(cells, edge) => fill(&anatomy, cells, edge, &mut notes),
-            goal => cover(&anatomy, goal, voxel),
-        };
-        let (mesh, doubts) = made.map_err(|error| Fault { key, message: error.to_string(), help: "" })?;
+        .map_err(fault)?;
         Ok(Kept { mesh, notes, doubts })
+    }
+
+    /// The body in a closed surface, which was mended where it had to be.
+    fn enclosed(
+        &self,
+        mesh: &Mesh,
+        edge: f64,
+        notes: &mut Vec<String>,
+    ) -> Result<Anatomy<'static>, MeshingError> {
+        let Cleaning { close_gaps, fill_holes, keep_largest } = self.cleaning;
+        let closing = Closing { holes: close_gaps, fill_cavities: fill_holes, keep_largest };
+        let surface = Enclosed::new(mesh, edge, &closing)?;
+        if surface.report.is_mended() {
+            notes.push(format!("mended: {}", surface.report));
+        }
+        surface.anatomy(1, edge, &|_| {})
     }
 
     fn anatomy(&self, image: &Image) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned), Fault> {
         let (key, labels, chosen) = match &self.cut {
+            Cut::Enclosed => ("image", image.labels(), Vec::new()),
             Cut::From(least) => ("threshold", Ok(image.threshold(*least..=f64::INFINITY)), vec![1]),
             Cut::Labels(labels) => {
                 let key = ["image", "label", "labels"][labels.len().min(2)];
@@ -303,10 +400,15 @@ fn fill(
     Ok((mesh, doubt.into_iter().collect()))
 }
 
-/// The surface of an anatomy in triangles or shells, and what is doubtful about it.
-fn cover(anatomy: &Anatomy<'_>, goal: Goal, voxel: f64) -> Result<(Mesh, Vec<String>), MeshingError> {
+/// The surface of an anatomy as fine as its voxels [m].
+fn extracted(anatomy: &Anatomy<'_>, voxel: f64) -> Result<TriangleMesh, MeshingError> {
     let mut surface = TriangleMesh::of_field(anatomy.field(), voxel, DEFAULT_CELL_LIMIT)?;
     surface.smooth(SURFACE_PAIRS);
+    Ok(surface)
+}
+
+/// A surface in the triangles or shells asked for, and what is doubtful about it.
+fn cover(mut surface: TriangleMesh, goal: Goal) -> Result<(Mesh, Vec<String>), MeshingError> {
     match goal {
         Goal::Shells(goal) => {
             let FittedShells { mesh, report, .. } = FittedShells::new(&surface, goal, &|_| {})?;

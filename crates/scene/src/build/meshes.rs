@@ -55,45 +55,46 @@ impl Builder<'_> {
             self.error(path, message, "this mesh", help);
             return None;
         };
-        let of_images = [
-            ("label", table.label.is_some()),
-            ("labels", table.labels.is_some()),
-            ("threshold", table.threshold.is_some()),
-            ("clean", table.clean.is_some()),
-            ("add", table.add.is_some()),
-            ("triangles", table.triangles.is_some()),
-            ("shells", table.shells.is_some()),
-            ("error", table.error.is_some()),
+        let from_file = source == "file" && table.cells.is_some();
+        let of_scans = [
+            ("label", table.label.is_some(), false),
+            ("labels", table.labels.is_some(), false),
+            ("threshold", table.threshold.is_some(), false),
+            ("add", table.add.is_some(), false),
+            ("clean", table.clean.is_some(), from_file),
+            ("triangles", table.triangles.is_some(), from_file),
+            ("shells", table.shells.is_some(), from_file),
+            ("error", table.error.is_some(), from_file),
         ];
-        if let Some((key, _)) = of_images.into_iter().find(|(_, given)| *given && source != "image") {
+        let misplaced = |&(_, given, fits): &(&str, bool, bool)| given && !fits && source != "image";
+        if let Some((key, ..)) = of_scans.into_iter().find(misplaced) {
             let message = format!("`{key}` is for images, and this mesh comes from `{source}`");
             self.error(&[path, &[key]].concat(), message, "here", "leave it out");
             return None;
         }
         let mut made = match (&table.file, &table.image) {
+            (Some(file), _) if from_file => self.scanned(file, table, path)?,
+            (_, Some(image)) => self.scanned(image, table, path)?,
             (Some(file), _) => self.file(file.clone(), table, path)?,
-            (_, Some(image)) => self.image(image, table, path)?,
             _ if SOLID_SHAPES.contains(&source) => self.shape(source, table, path)?,
             _ => self.sheet(source, table, path)?,
         };
         let shift = Vector3::from(table.at);
-        for point in &mut made.mesh.points {
-            *point = *point * table.scale + shift;
-        }
+        made.mesh.points.iter_mut().for_each(|point| *point += shift);
         Some(made)
     }
 
     fn file(&mut self, file: PathBuf, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let at = |key| [path, &[key]].concat();
-        for (key, given) in [("edge", table.edge.is_some()), ("as", table.cells.is_some())] {
-            if given {
-                let message = format!("`{key}` is for built-in shapes; a mesh file has its own cells");
-                self.error(&at(key), message, "here", "leave it out");
-                return None;
-            }
+        if table.edge.is_some() {
+            let message = "a mesh file has its own cells, whose `edge` is not for choosing";
+            let help = "leave it out, or add `as = \"tets\"` to make new cells in the surface of the file";
+            self.error(&at("edge"), message, "here", help);
+            return None;
         }
         match io::read(&self.scene.folder.join(&file)) {
-            Ok(read) => {
+            Ok(mut read) => {
+                read.mesh.points.iter_mut().for_each(|point| *point *= table.scale);
                 let name = file.display();
                 self.notes.extend(read.notes.iter().map(|note| format!("{name}: {note}")));
                 Some(MeshOrigin { mesh: read.mesh, origin: format!("{name} ({})", read.format) })
@@ -150,7 +151,7 @@ impl Builder<'_> {
             return None;
         }
         match make_shape(table, edge) {
-            Ok(FieldMesh { mut mesh, dropped_components, dropped_cells, non_manifold_edges }) => {
+            Ok(FieldMesh { mesh, dropped_components, dropped_cells, non_manifold_edges }) => {
                 if dropped_components > 0 {
                     let note = format!(
                         "{source}: {dropped_cells} cells in {dropped_components} loose parts were dropped"
@@ -161,10 +162,6 @@ impl Builder<'_> {
                     self.notes.push(format!(
                         "{source}: the surface touches itself along {non_manifold_edges} edges, where a gap is thinner than `edge`"
                     ));
-                }
-                if table.organ.is_some() {
-                    // `mesh` scales by `table.scale` afterwards.
-                    mesh.points.iter_mut().for_each(|p| *p /= table.scale);
                 }
                 Some(MeshOrigin { mesh, origin: describe_shape(source, table) })
             }

@@ -282,7 +282,8 @@ impl Element {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
-    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY.
+    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY. Its own cells are taken, unless `as`
+    /// asks for others made of its surface.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, or the folder of a
@@ -302,7 +303,7 @@ pub struct MeshTable {
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
     #[serde(default)]
     pub threshold: Option<f64>,
-    /// Cleaning of the labels of an image before they are meshed.
+    /// Cleaning of the labels of an image, or of what the surface of a file encloses, before new cells are made.
     #[serde(default)]
     pub clean: Option<CleanTable>,
     /// A box from the origin.
@@ -337,15 +338,15 @@ pub struct MeshTable {
     /// A strip of triangles along x that turns about the x axis. Point sets: `x-min`, `x-max`, `low`, `high`.
     #[serde(default)]
     pub twisted_strip: Option<TwistedStripShape>,
-    /// Target edge length of the cells of a built-in shape or an image [m].
+    /// Target edge length of the cells of a built-in shape, an image or what the surface of a file encloses [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
-    /// Number of triangles of a `surface` of an image, instead of `edge`: as few, placed where the shape needs them.
+    /// Number of triangles of a `surface` of an image or a file, instead of `edge`: as few, placed where the shape needs them.
     #[serde(default)]
     #[schemars(range(min = 4))]
     pub triangles: Option<u32>,
-    /// Number of `shells` fitted to an image.
+    /// Number of `shells` fitted to an image or to the surface of a file.
     #[serde(default)]
     #[schemars(range(min = 4))]
     pub shells: Option<u32>,
@@ -353,7 +354,7 @@ pub struct MeshTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub error: Option<f64>,
-    /// Cells of a built-in shape or an image; tets if not given.
+    /// Cells of a built-in shape or an image (tets if not given), or of the closed surface of a `file`.
     #[serde(default, rename = "as")]
     pub cells: Option<Cells>,
     /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).
