@@ -3,12 +3,13 @@
 use std::f64::consts::FRAC_PI_3;
 use std::path::Path;
 
-use pliant_geometry::Mesh;
 use pliant_geometry::io::{self, MeshFile, MeshFileError};
+use pliant_geometry::{CellKind, Mesh};
 use pliant_imaging::{Cleaning, Image, ImageError, LabelError, ReadOptions, Smoothing};
 use pliant_meshing::{
     Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
     OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
+    require_room_for,
 };
 
 use super::{Builder, MeshOrigin};
@@ -335,6 +336,9 @@ impl Recipe {
         if surface.report.is_mended() {
             notes.push(format!("mended: {}", surface.report));
         }
+        let kind =
+            if matches!(self.cells, Goal::Volume(Cells::Tets, _)) { CellKind::Tet } else { CellKind::Hex };
+        require_room_for(kind, edge, surface.volume(), DEFAULT_CELL_LIMIT)?;
         surface.anatomy(1, edge, &|_| {})
     }
 
