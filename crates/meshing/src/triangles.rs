@@ -12,6 +12,9 @@ use serde::Serialize;
 use crate::error::MeshingError;
 use crate::nesting::{Shell, containers, signed_volume};
 
+/// Triangles of a worse shape have a normal by round-off only.
+const LEAST_SIDED: f64 = 1e-6;
+
 /// A triangle that is no more.
 const GONE: [u32; 3] = [u32::MAX; 3];
 
@@ -289,8 +292,9 @@ impl TriangleMesh {
                 let before = self.corners(t);
                 let after = [0, 1, 2].map(|k| if nodes[k] == own { *position } else { before[k] });
                 let (old, new) = (cross(before), cross(after));
-                old.dot(&new) > 0.5 * old.norm() * new.norm()
-                    && shape(after) > least_shape.min(0.5 * shape(before))
+                // A triangle that is a line or a point has no side and no shape to keep.
+                let turned = shape(before) > LEAST_SIDED && old.dot(&new) <= 0.5 * old.norm() * new.norm();
+                !turned && shape(after) >= least_shape.min(0.5 * shape(before))
             })
         })
     }
