@@ -9,7 +9,9 @@ use pliant_geometry::{Mesh, QualityReport, Vector3, diagnose, volume};
 use pliant_imaging::{
     Cleaned, Cleaning, Image, LabelError, LabelImage, ReadOptions, RegionReport, Smoothing, read,
 };
-use pliant_meshing::{Anatomy, DEFAULT_CELL_LIMIT, Deviation, MeshingError, OrganTets, TetReport, Voxels};
+use pliant_meshing::{
+    Anatomy, DEFAULT_CELL_LIMIT, Deviation, MeshingError, Missed, OrganTets, TetReport, Voxels,
+};
 use pliant_scene::{element_bound, number};
 use serde_json::{Value as Json, json};
 
@@ -145,14 +147,14 @@ fn make(arguments: &MeshImage, labels: &LabelImage, chosen: &[i32], bar: &Bar) -
     let deviation = Deviation::new(&mesh, anatomy.field(), edge).map_err(refused)?;
     // Steps of cubes stay behind the body by up to half of their diagonal.
     let allowed = if matches!(arguments.cells, MeshCells::Tets) { edge / 2.0 } else { edge };
-    let warnings = deviation.doubt(allowed).map(|doubt| format!("{doubt}; use a shorter edge"));
+    let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed).map_err(refused)?;
     Ok(Made {
         materials: materials(&mesh, &anatomy),
         quality: QualityReport::new(&mesh),
         components: diagnose(&mesh).components,
         steps: [("brain-like", soft_tissue()), ("liver-like", liver_matrix())]
             .map(|(name, law)| (name, element_bound(&mesh, &elastic(law)).unwrap_or(0.0))),
-        warnings: warnings.into_iter().collect(),
+        warnings: missed.iter().map(|missed| format!("{missed}; use a shorter edge")).collect(),
         mesh,
         cells,
         cleaned,

@@ -25,6 +25,7 @@
 
 mod anatomy;
 mod complex;
+mod crests;
 mod cut;
 mod decimate;
 mod deviation;
@@ -36,6 +37,7 @@ mod hausdorff;
 mod isosurface;
 mod lattice;
 mod manifold;
+mod missed;
 mod optimise;
 mod phantom;
 mod remesh;
@@ -58,6 +60,7 @@ pub use deviation::Deviation;
 pub use error::MeshingError;
 pub use field::{Ellipsoid, ImplicitField};
 pub use hausdorff::Hausdorff;
+pub use missed::Missed;
 pub use phantom::{Organ, Phantom, brain_label};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use shells::{FittedShells, ShellGoal, ShellReport};

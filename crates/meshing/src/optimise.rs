@@ -5,7 +5,7 @@
 
 use pliant_geometry::{CellKind, Vector3};
 
-use crate::complex::{Complex, OUTSIDE, acoustic_length};
+use crate::complex::{Complex, OUTSIDE, Sides, acoustic_length};
 use crate::surfaces::Surfaces;
 
 /// Threshold of the first round, in ideal acoustic lengths.
@@ -41,6 +41,13 @@ const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
 
 /// Edges of the boundary may turn where the new one is no farther from the surface than this, in lattice constants.
 const FLIP_OFF: f64 = 0.03;
+
+/// A point's own length may be this part of the threshold of tets: the true limit feels it less than tets that meet.
+const POINT_PART: f64 = 0.85;
+
+/// Inner points are moved at last where a length round them is below this, in ideal acoustic lengths: it raised τ of the liver phantom
+/// at 10 mm from 0.63 to 0.66 on average.
+const POLISH: f64 = 0.9;
 
 /// Volumes nearer than this part to what they must be are left alone.
 const VOLUME_TOLERANCE: f64 = 2e-3;
@@ -86,7 +93,7 @@ impl<'a> Optimiser<'a> {
         let aim = (AIM * target).min(1.0);
         self.improve(aim, rounds, RAMP, &|done| progress(0.6 * done));
         for sweep in 0..FIT_SWEEPS {
-            self.fit(aim, FIT_REACH * self.edge * SHRINK.powi(sweep as i32));
+            self.fit(aim, FIT_REACH * self.edge * SHRINK.powi(sweep as i32), FIT_ENOUGH);
             if self.shift_surfaces(volumes, aim) {
                 self.improve(aim, rounds.div_ceil(2), 0.0, &|_| {});
             }
@@ -98,6 +105,12 @@ impl<'a> Optimiser<'a> {
             }
             self.slack = slack * self.edge;
             self.improve(aim, rounds.div_ceil(2), 0.0, &|_| {});
+        }
+        self.follow_crests(target);
+        // Inner points move freely, so that no surface pays for it.
+        for sweep in 0..SWEEPS {
+            let reach = REACH * self.edge * SHRINK.powi(sweep as i32);
+            self.relocate(POLISH * self.ideal, reach, &|sides| sides.count_ones() == 1);
         }
         self.done
     }
@@ -135,13 +148,16 @@ impl<'a> Optimiser<'a> {
         for round in 0..rounds {
             let ramp = ((round + 1) as f64 / (ramp * rounds as f64)).min(1.0);
             let threshold = self.ideal * (FIRST_THRESHOLD + (target - FIRST_THRESHOLD) * ramp);
-            let before = self.complex.worst();
+            let before = self.worst();
             let changes = self.peel(threshold) + self.collapse(threshold) + self.flip(threshold);
             // While the threshold rises, points just above it move too.
-            self.relocate(if ramp_over { threshold } else { 1.05 * threshold });
+            let threshold = if ramp_over { threshold } else { 1.05 * threshold };
+            for sweep in 0..SWEEPS {
+                self.relocate(threshold, REACH * self.edge * SHRINK.powi(sweep as i32), &|_| true);
+            }
             self.done.rounds += 1;
             progress((round + 1) as f64 / rounds as f64);
-            let worst = self.complex.worst();
+            let worst = self.worst();
             if worst >= target * self.ideal {
                 break;
             }
@@ -152,6 +168,14 @@ impl<'a> Optimiser<'a> {
         }
     }
 
+    /// Least length of all tets and points [m].
+    fn worst(&self) -> f64 {
+        let complex = &self.complex;
+        let used = (0..complex.points.len() as u32).filter(|&node| !complex.star[node as usize].is_empty());
+        used.map(|node| complex.nodal_length(node, &complex.points[node as usize]))
+            .fold(complex.worst(), f64::min)
+    }
+
     /// Tets below a length, the worst first.
     fn below(&self, threshold: f64) -> Vec<u32> {
         let lengths = self.complex.alive().map(|tet| (self.complex.length(tet), tet));
@@ -160,11 +184,19 @@ impl<'a> Optimiser<'a> {
         bad.into_iter().map(|(_, tet)| tet).collect()
     }
 
-    /// Removes tets of the boundary below half the threshold that the body does not need to hang together.
+    /// Removes tets of the boundary that the body does not need to hang together: those below half the threshold, and tips that
+    /// are light for their stiffness.
     fn peel(&mut self, threshold: f64) -> usize {
         let mut peeled = 0;
-        for tet in self.below(threshold / 2.0) {
-            if self.may_peel(tet) {
+        let short =
+            |node: &u32| self.complex.nodal_length(*node, &self.complex.points[*node as usize]) < threshold;
+        let is_tip = |tet: &u32| {
+            let nodes = self.complex.tets[*tet as usize];
+            nodes.iter().any(|node| self.complex.star[*node as usize].len() == 1 && short(node))
+        };
+        let tips: Vec<u32> = self.complex.alive().filter(is_tip).collect();
+        for tet in self.below(threshold / 2.0).into_iter().chain(tips) {
+            if self.complex.is_alive(tet) && self.may_peel(tet) {
                 let nodes = self.complex.tets[tet as usize];
                 self.complex.remove(tet);
                 for node in nodes {
@@ -293,9 +325,32 @@ impl<'a> Optimiser<'a> {
         best.map(|(_, place)| place)
     }
 
+    /// Lengths that a node at `place` is responsible for: least acoustic length of its tets, and its own, with the allowance for points;
+    /// stops once one is not above its floor.
+    fn lengths_round(&self, node: u32, place: &Vector3, floors: [f64; 2]) -> [f64; 2] {
+        let tets = self.star_min(node, place, u32::MAX, floors[0]);
+        [tets, if tets <= floors[0] { f64::NEG_INFINITY } else { self.of_node(node, place) }]
+    }
+
+    /// Length of a node at `place` with the allowance for points [m].
+    fn of_node(&self, node: u32, place: &Vector3) -> f64 {
+        self.complex.nodal_length(node, place) / POINT_PART
+    }
+
+    /// The lengths of a node where it is, cut at a threshold: what a move must not lower.
+    fn lengths_now(&self, node: u32, threshold: f64) -> [f64; 2] {
+        let here = &self.complex.points[node as usize];
+        self.lengths_round(node, here, [f64::NEG_INFINITY; 2]).map(|length| length.min(threshold))
+    }
+
+    /// Whether both lengths of a node are at least this [m].
+    pub(crate) fn is_long(&self, node: u32, least: f64) -> bool {
+        self.lengths_now(node, least).iter().all(|&length| length >= least)
+    }
+
     /// Least acoustic length of the tets round a node if it were at `place`, leaving out those with another node; stops
     /// once it is not above `floor`.
-    fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
+    pub(crate) fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
         let mut least = f64::INFINITY;
         for &tet in &self.complex.star[node as usize] {
             let nodes = self.complex.tets[tet as usize];
@@ -330,15 +385,15 @@ impl<'a> Optimiser<'a> {
 
     /// Slides points along their surface to where its facets follow the field best, as long as no tet falls below the
     /// target. What falls short of a crest moves onto it.
-    fn fit(&mut self, target: f64, reach: f64) {
+    pub(crate) fn fit(&mut self, target: f64, reach: f64, enough: f64) {
         for node in 0..self.complex.points.len() as u32 {
             if self.complex.sides[node as usize].count_ones() == 2 {
-                self.fit_one(node, target * self.ideal, reach);
+                self.fit_one(node, target * self.ideal, reach, enough);
             }
         }
     }
 
-    fn fit_one(&mut self, node: u32, least: f64, reach: f64) {
+    fn fit_one(&mut self, node: u32, least: f64, reach: f64, enough: f64) {
         let here = self.complex.points[node as usize];
         let sides = self.complex.sides[node as usize];
         let last = 63 - sides.leading_zeros();
@@ -347,15 +402,19 @@ impl<'a> Optimiser<'a> {
             _ => self.complex.rim_of(node, |_| true),
         };
         let [misfit, area] = self.misfit(node, &here, &faces);
-        if misfit < area * (FIT_ENOUGH * self.edge).powi(2) {
+        if misfit < area * (enough * self.edge).powi(2) {
             return;
         }
-        let floor = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY).min(least);
+        let floors = self.lengths_now(node, least);
+        let bears = |trial: &Vector3| {
+            let lengths = self.lengths_round(node, trial, [0.0; 2]);
+            lengths.iter().zip(floors).all(|(length, floor)| *length >= floor)
+        };
         let (mut best, mut place) = (0.99 * misfit, here);
         for direction in directions() {
             let Some(trial) = self.project(node, here + direction * reach) else { continue };
             let [misfit, _] = self.misfit(node, &trial, &faces);
-            if misfit < best && self.star_min(node, &trial, u32::MAX, 0.0) >= floor {
+            if misfit < best && bears(&trial) {
                 (best, place) = (misfit, trial);
             }
         }
@@ -385,21 +444,25 @@ impl<'a> Optimiser<'a> {
         faces.iter().map(of_face).fold([0.0; 2], |[misfit, all], [own, area]| [misfit + own, all + area])
     }
 
-    /// Moves the points whose worst tet is below the threshold to the best of some places round them.
-    fn relocate(&mut self, threshold: f64) {
-        for sweep in 0..SWEEPS {
-            let reach = REACH * self.edge * SHRINK.powi(sweep as i32);
-            for node in 0..self.complex.points.len() as u32 {
-                let here = self.complex.points[node as usize];
-                let now = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY);
-                if now < threshold {
-                    self.relocate_one(node, now, reach);
-                }
+    /// Moves the chosen points whose shortest length is below the threshold to the best of some places round them.
+    fn relocate(&mut self, threshold: f64, reach: f64, chosen: &dyn Fn(Sides) -> bool) {
+        for node in 0..self.complex.points.len() as u32 {
+            if chosen(self.complex.sides[node as usize]) && !self.complex.star[node as usize].is_empty() {
+                self.move_up(node, threshold, reach);
             }
         }
     }
 
-    fn relocate_one(&mut self, node: u32, now: f64, reach: f64) {
+    /// Moves a point if its shortest length is below the threshold.
+    pub(crate) fn move_up(&mut self, node: u32, threshold: f64, reach: f64) {
+        let [tets, own] = self.lengths_now(node, f64::INFINITY);
+        // Tets come first: a point that is short itself takes nothing from tets below the threshold.
+        if tets.min(own) < threshold {
+            self.relocate_one(node, [tets.min(threshold), own], reach);
+        }
+    }
+
+    fn relocate_one(&mut self, node: u32, now: [f64; 2], reach: f64) {
         let here = self.complex.points[node as usize];
         let neighbours = self.complex.neighbours(node);
         let sum: Vector3 = neighbours.iter().map(|&other| self.complex.points[other as usize]).sum();
@@ -409,12 +472,13 @@ impl<'a> Optimiser<'a> {
         let mut star = std::mem::take(&mut self.complex.star[node as usize]);
         star.sort_by(|&a, &b| self.complex.length(a).total_cmp(&self.complex.length(b)).then(a.cmp(&b)));
         self.complex.star[node as usize] = star;
-        let (mut best, mut place) = (now, here);
+        let (mut best, mut place) = (now[0].min(now[1]), here);
         for trial in std::iter::once(half_way).chain(directions().map(|direction| here + direction * reach)) {
             // Free trials that are no better are not worth projecting: their tets change little.
             if let Some(trial) = self.project(node, trial) {
-                let length = self.star_min(node, &trial, u32::MAX, best);
-                if length > best {
+                let [tets, own] = self.lengths_round(node, &trial, [best, 0.0]);
+                let length = tets.min(own);
+                if length > best && tets >= now[0] {
                     (best, place) = (length, trial);
                 }
             }

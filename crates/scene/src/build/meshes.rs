@@ -6,7 +6,7 @@ use pliant_geometry::io::{self, MeshFileError};
 use pliant_geometry::{CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose, reorder};
 use pliant_imaging::{Cleaning, ImageError, LabelError, ReadOptions, Smoothing};
 use pliant_meshing::{
-    Anatomy, Block, DEFAULT_CELL_LIMIT, Deviation, Ellipsoid, FieldMesh, ImplicitField, MeshingError,
+    Anatomy, Block, DEFAULT_CELL_LIMIT, Deviation, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Missed,
     OrganTets, Phantom, Resolution, Stuffing, Tube, VolumeCell, Voxels, brain_label,
 };
 
@@ -190,11 +190,12 @@ impl Builder<'_> {
         }
         // Steps of cubes stay behind the body by up to half of their diagonal.
         let allowed = if table.volume_cells() == Cells::Tets { edge / 2.0 } else { edge };
-        let doubt = Deviation::new(&mesh, anatomy.field(), edge).ok().and_then(|found| found.doubt(allowed));
-        if let Some(doubt) = doubt {
+        let missed = Deviation::new(&mesh, anatomy.field(), edge)
+            .and_then(|found| Missed::of(&mesh, anatomy.field(), edge, &found, allowed));
+        for missed in missed.unwrap_or_default() {
             let place = self.source().span(&at("edge"));
             let help = "use a shorter edge, or `clean = { keep-largest = true }` for small pieces";
-            self.out.push(Diagnostic::warning(doubt).at(place, "this size").help(help));
+            self.out.push(Diagnostic::warning(missed.to_string()).at(place, "this size").help(help));
         }
         let cells = describe_cells(table.volume_cells());
         let words = match threshold {
