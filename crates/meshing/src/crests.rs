@@ -26,7 +26,7 @@ impl Optimiser<'_> {
     /// Turns and halves edges of the boundary that cut off crests and grooves, leaving acoustic lengths of `aim` × ideal.
     pub(crate) fn follow_crests(&mut self, aim: f64) {
         for reach in SLIDES {
-            self.fit(aim, reach * self.edge, STEEP);
+            self.fit(aim, reach * self.edge, STEEP, &|sides| sides & OUTSIDE != 0);
         }
         for _ in 0..SWEEPS {
             let mut changes = 0;
