@@ -3,6 +3,7 @@
 mod arguments;
 mod bench;
 mod commands;
+mod info;
 mod mesh;
 mod page;
 mod report;

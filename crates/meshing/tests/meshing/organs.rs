@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use pliant_geometry::Vector3;
 use pliant_imaging::{Cleaning, Grid, LabelError, LabelImage, Smoothing};
-use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets, Phantom};
+use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets};
 
 use crate::checks::*;
 use crate::images;
