@@ -36,11 +36,21 @@ fn check_sound(made: &OrganMesh) -> Vec<Vec<u32>> {
 /// T1: a sphere of 50 mm at 8 to 20 mm, wherever the lattice lies.
 #[test]
 fn a_sphere_of_voxels_is_round_and_keeps_three_quarters_of_the_ideal_step() {
+    sphere_at(2);
+}
+
+#[test]
+#[ignore = "slow: twenty lattices at each of four sizes"]
+fn a_sphere_of_voxels_wherever_the_lattice_lies() {
+    sphere_at(20);
+}
+
+fn sphere_at(lattices: usize) {
     let ball = anatomy(&images::ball(0.05), &[1]);
     let exact = 4.0 / 3.0 * PI * 0.05_f64.powi(3);
     let mut offsets = Offsets(1);
     for edge in [0.008, 0.012, 0.016, 0.020] {
-        for _ in 0..20 {
+        for _ in 0..lattices {
             let made = meshed(&ball, edge, offsets.vector(edge));
             let faces = check_sound(&made);
             assert_eq!(euler_characteristic(&faces), 2);
