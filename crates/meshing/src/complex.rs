@@ -88,6 +88,12 @@ impl Complex {
         FACES.map(|face| face.map(|corner| self.tets[tet as usize][corner]))
     }
 
+    /// The tet behind a face of a tet.
+    pub(crate) fn behind(&self, tet: u32, face: [u32; 3]) -> Option<u32> {
+        let has = |other: &u32| face.iter().all(|node| self.tets[*other as usize].contains(node));
+        self.star[face[0] as usize].iter().copied().find(|&other| other != tet && has(&other))
+    }
+
     /// Edges, increasing, each once.
     pub(crate) fn edges(&self) -> Vec<[u32; 2]> {
         let mut edges = Vec::new();

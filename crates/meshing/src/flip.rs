@@ -25,21 +25,12 @@ impl Complex {
             || self.faces(tet).into_iter().zip(nodes).any(|(face, apex)| self.remove_face(tet, face, apex))
     }
 
-    fn remove_edge(&mut self, edge: [u32; 2], follows: &Follows<'_>) -> bool {
-        self.remove_edge_above(edge, f64::INFINITY, follows)
-    }
-
-    /// Turns an edge of the boundary if the new one follows the surface and its tets are as long as before, or as `enough`.
-    pub(crate) fn turn(&mut self, edge: [u32; 2], enough: f64, follows: &Follows<'_>) -> bool {
-        self.remove_edge_above(edge, enough, follows)
-    }
-
-    fn remove_edge_above(&mut self, [p, q]: [u32; 2], enough: f64, follows: &Follows<'_>) -> bool {
+    fn remove_edge(&mut self, [p, q]: [u32; 2], follows: &Follows<'_>) -> bool {
         let around = self.round_edge(p, q);
         let Some(Ring { nodes, open }) = self.ring(&around, p, q) else { return false };
         let old = around.iter().map(|&tet| self.length(tet)).fold(f64::INFINITY, f64::min);
         let Some((least, triangles)) = self.best_triangulation(&nodes, p, q) else { return false };
-        if least <= (GAIN * old).min(enough) {
+        if least <= GAIN * old {
             return false;
         }
         let joined =

@@ -25,7 +25,6 @@
 
 mod anatomy;
 mod complex;
-mod crests;
 mod crossings;
 mod curvature;
 mod cut;

@@ -54,6 +54,7 @@ const VOLUME_TOLERANCE: f64 = 2e-3;
 pub(crate) struct Optimised {
     pub(crate) rounds: usize,
     pub(crate) peeled: usize,
+    pub(crate) given: usize,
     pub(crate) collapsed: usize,
     pub(crate) flipped: usize,
     pub(crate) moved: usize,
@@ -61,21 +62,32 @@ pub(crate) struct Optimised {
 
 /// The optimiser of one mesh.
 pub(crate) struct Optimiser<'a> {
-    pub(crate) complex: &'a mut Complex,
-    pub(crate) surfaces: Surfaces<'a>,
+    complex: &'a mut Complex,
+    surfaces: Surfaces<'a>,
     /// Lattice constant [m].
-    pub(crate) edge: f64,
+    edge: f64,
     /// Acoustic length of an ideal tet [m].
-    pub(crate) ideal: f64,
+    ideal: f64,
     /// How far a point may be from the sides that it lies between [m].
     slack: f64,
+    /// Whether points where three materials meet, or two and the outside, only keep to the outside.
+    lines_are_free: bool,
     noise: u64,
     done: Optimised,
 }
 
 impl<'a> Optimiser<'a> {
     pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>, edge: f64, ideal: f64) -> Self {
-        Self { complex, surfaces, edge, ideal, slack: 0.0, noise: 1, done: Optimised::default() }
+        Self {
+            complex,
+            surfaces,
+            edge,
+            ideal,
+            slack: 0.0,
+            lines_are_free: false,
+            noise: 1,
+            done: Optimised::default(),
+        }
     }
 
     /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh
@@ -90,7 +102,7 @@ impl<'a> Optimiser<'a> {
         let aim = (AIM * target).min(1.0);
         self.improve(aim, rounds, RAMP, &|done| progress(0.6 * done));
         for sweep in 0..FIT_SWEEPS {
-            self.fit(aim, FIT_REACH * self.edge * SHRINK.powi(sweep as i32), FIT_ENOUGH, &|_| true);
+            self.fit(aim, FIT_REACH * self.edge * SHRINK.powi(sweep as i32));
             if self.shift_surfaces(volumes, aim) {
                 self.improve(aim, rounds.div_ceil(2), 0.0, &|_| {});
             }
@@ -103,7 +115,10 @@ impl<'a> Optimiser<'a> {
             self.slack = slack * self.edge;
             self.improve(aim, rounds.div_ceil(2), 0.0, &|_| {});
         }
-        self.follow_crests(target);
+        if self.complex.worst() < target * self.ideal {
+            self.lines_are_free = true;
+            self.improve(target, rounds.div_ceil(2), 0.0, &|_| {});
+        }
         // Inner points move freely, so that no surface pays for it.
         for sweep in 0..SWEEPS {
             let reach = REACH * self.edge * SHRINK.powi(sweep as i32);
@@ -119,9 +134,13 @@ impl<'a> Optimiser<'a> {
         for (surface, (wanted, [volume, area])) in volumes.iter().zip(measured).enumerate() {
             let Some(wanted) = wanted else { continue };
             if (volume / wanted - 1.0).abs() > VOLUME_TOLERANCE && area > 0.0 {
-                self.surfaces.shift(surface, (wanted - volume) / area, LARGEST_SHIFT * self.edge);
+                let moved = self.surfaces.shift(surface, (wanted - volume) / area, LARGEST_SHIFT * self.edge);
                 // Bit 0 of the sides is the outside, bit m the material m.
-                shifted |= if surface == 0 { OUTSIDE } else { 1 << (surface + 1) };
+                shifted |= match (moved, surface) {
+                    (false, _) => 0,
+                    (true, 0) => OUTSIDE,
+                    (true, _) => 1 << (surface + 1),
+                };
             }
         }
         for node in 0..self.complex.points.len() as u32 {
@@ -145,8 +164,11 @@ impl<'a> Optimiser<'a> {
         for round in 0..rounds {
             let ramp = ((round + 1) as f64 / (ramp * rounds as f64)).min(1.0);
             let threshold = self.ideal * (FIRST_THRESHOLD + (target - FIRST_THRESHOLD) * ramp);
-            let before = self.complex.worst();
-            let changes = self.peel(threshold) + self.collapse(threshold) + self.flip(threshold);
+            let before = self.state(target);
+            self.peel(threshold);
+            self.hand_over(threshold);
+            self.collapse(threshold);
+            self.flip(threshold);
             // While the threshold rises, points just above it move too.
             let threshold = if ramp_over { threshold } else { 1.05 * threshold };
             for sweep in 0..SWEEPS {
@@ -154,15 +176,24 @@ impl<'a> Optimiser<'a> {
             }
             self.done.rounds += 1;
             progress((round + 1) as f64 / rounds as f64);
-            let worst = self.complex.worst();
-            if worst >= target * self.ideal {
+            let after = self.state(target);
+            if after.0 >= target * self.ideal {
                 break;
             }
-            idle = if ramp == 1.0 && changes == 0 && worst <= before * (1.0 + 1e-6) { idle + 1 } else { 0 };
+            let better = after.0 > before.0 * (1.0 + 1e-6) || after.1 < before.1;
+            idle = if ramp == 1.0 && !better { idle + 1 } else { 0 };
             if idle == 2 {
                 break;
             }
         }
+    }
+
+    /// Least acoustic length [m], and how many tets are below `target` × ideal.
+    fn state(&self, target: f64) -> (f64, usize) {
+        let lengths = self.complex.alive().map(|tet| self.complex.length(tet));
+        lengths.fold((f64::INFINITY, 0), |(least, short), length| {
+            (least.min(length), short + usize::from(length < target * self.ideal))
+        })
     }
 
     /// Tets below a length, the worst first.
@@ -223,6 +254,39 @@ impl<'a> Optimiser<'a> {
             }
             _ => false,
         }
+    }
+
+    /// Gives tets below half the threshold, flat ones between materials, to the material that looks at more of their surface.
+    fn hand_over(&mut self, threshold: f64) -> usize {
+        let mut given = 0;
+        for tet in self.below(threshold / 2.0) {
+            let own = self.complex.material[tet as usize];
+            // Area [m²] of the faces towards each material.
+            let mut towards: Vec<(u8, f64)> = vec![(own, 0.0)];
+            for face in self.complex.faces(tet) {
+                let Some(other) = self.complex.behind(tet, face) else { continue };
+                let material = self.complex.material[other as usize];
+                let area = pliant_geometry::volume(
+                    CellKind::Triangle,
+                    &face.map(|node| self.complex.points[node as usize]),
+                );
+                match towards.iter_mut().find(|(known, _)| *known == material) {
+                    Some((_, sum)) => *sum += area,
+                    None => towards.push((material, area)),
+                }
+            }
+            let most = towards
+                .iter()
+                .skip(1)
+                .fold(towards[0], |most, other| if other.1 > most.1 { *other } else { most });
+            if most.0 != own {
+                self.complex.material[tet as usize] = most.0;
+                self.complex.tets[tet as usize].into_iter().for_each(|node| self.refresh(node));
+                given += 1;
+            }
+        }
+        self.done.given += given;
+        given
     }
 
     fn refresh(&mut self, node: u32) {
@@ -319,20 +383,9 @@ impl<'a> Optimiser<'a> {
         [self.star_min(node, place, u32::MAX, 0.0), self.complex.nodal_length(node, place)]
     }
 
-    /// The lengths of a node where it is, cut at a threshold: what a move must not lower.
-    fn lengths_now(&self, node: u32, threshold: f64) -> [f64; 2] {
-        let here = &self.complex.points[node as usize];
-        self.lengths_round(node, here).map(|length| length.min(threshold))
-    }
-
-    /// Whether both lengths of a node are at least this [m].
-    pub(crate) fn is_long(&self, node: u32, least: f64) -> bool {
-        self.lengths_now(node, least).iter().all(|&length| length >= least)
-    }
-
     /// Least acoustic length of the tets round a node if it were at `place`, leaving out those with another node; stops
     /// once it is not above `floor`.
-    pub(crate) fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
+    fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
         let mut least = f64::INFINITY;
         for &tet in &self.complex.star[node as usize] {
             let nodes = self.complex.tets[tet as usize];
@@ -351,7 +404,12 @@ impl<'a> Optimiser<'a> {
     /// The place nearest to `place` between the sides of a node, if it is on the same bank of the body: where its surface
     /// looks the same way, within 90°. The other bank of a gap or of a thin lobe may be nearer.
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
-        let sides = self.complex.sides[node as usize];
+        let mut sides = self.complex.sides[node as usize];
+        if self.lines_are_free && sides.count_ones() > 2 {
+            // The outside and the lowest material: what one of these says about the other is left out.
+            let materials = sides & !OUTSIDE;
+            sides = sides & OUTSIDE | materials & materials.wrapping_neg();
+        }
         if sides.count_ones() < 2 {
             return Some(place);
         }
@@ -367,16 +425,15 @@ impl<'a> Optimiser<'a> {
 
     /// Slides points along their surface to where its facets follow the field best, as long as no tet falls below the
     /// target. What falls short of a crest moves onto it.
-    pub(crate) fn fit(&mut self, target: f64, reach: f64, enough: f64, chosen: &dyn Fn(Sides) -> bool) {
+    fn fit(&mut self, target: f64, reach: f64) {
         for node in 0..self.complex.points.len() as u32 {
-            let sides = self.complex.sides[node as usize];
-            if sides.count_ones() == 2 && chosen(sides) {
-                self.fit_one(node, target * self.ideal, reach, enough);
+            if self.complex.sides[node as usize].count_ones() == 2 {
+                self.fit_one(node, target * self.ideal, reach);
             }
         }
     }
 
-    fn fit_one(&mut self, node: u32, least: f64, reach: f64, enough: f64) {
+    fn fit_one(&mut self, node: u32, least: f64, reach: f64) {
         let here = self.complex.points[node as usize];
         let sides = self.complex.sides[node as usize];
         let last = 63 - sides.leading_zeros();
@@ -385,10 +442,11 @@ impl<'a> Optimiser<'a> {
             _ => self.complex.rim_of(node, |_| true),
         };
         let [misfit, area] = self.misfit(node, &here, &faces);
-        if misfit < area * (enough * self.edge).powi(2) {
+        if misfit < area * (FIT_ENOUGH * self.edge).powi(2) {
             return;
         }
-        let floors = self.lengths_now(node, least);
+        // What a move must not lower.
+        let floors = self.lengths_round(node, &here).map(|length| length.min(least));
         let bears = |trial: &Vector3| {
             let lengths = self.lengths_round(node, trial);
             lengths.iter().zip(floors).all(|(length, floor)| *length >= floor)
@@ -430,17 +488,11 @@ impl<'a> Optimiser<'a> {
     /// Moves the chosen points whose worst tet is below the threshold to the best of some places round them.
     fn relocate(&mut self, threshold: f64, reach: f64, chosen: &dyn Fn(Sides) -> bool) {
         for node in 0..self.complex.points.len() as u32 {
-            if chosen(self.complex.sides[node as usize]) && !self.complex.star[node as usize].is_empty() {
-                self.move_up(node, threshold, reach);
+            let here = self.complex.points[node as usize];
+            let now = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY);
+            if now < threshold && chosen(self.complex.sides[node as usize]) {
+                self.relocate_one(node, now, reach);
             }
-        }
-    }
-
-    /// Moves a point if its worst tet is below the threshold.
-    pub(crate) fn move_up(&mut self, node: u32, threshold: f64, reach: f64) {
-        let now = self.star_min(node, &self.complex.points[node as usize], u32::MAX, f64::NEG_INFINITY);
-        if now < threshold {
-            self.relocate_one(node, now, reach);
         }
     }
 
