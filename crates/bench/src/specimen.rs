@@ -7,7 +7,7 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};
 use pliant_mechanics::tensor::Vector;
-use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
+use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell, Voxels};
 
 /// The hourglass coefficient of all hexahedra, the default of a scene.
 pub const HOURGLASS: f64 = 0.2;
@@ -46,7 +46,7 @@ impl Specimen {
         Self::of_elements(mesh, Tets::Plain, Hexes::UniformStrain(HOURGLASS), material, fibre)
     }
 
-    /// The volume cells of a mesh as certain elements.
+    /// The volume cells of a mesh as certain elements, filled by their fractions where they are immersed cubes.
     pub fn of_elements(
         mesh: Mesh,
         tets: Tets,
@@ -79,6 +79,10 @@ impl Specimen {
                         Hexes::Full => Cells::full_hex8(nodes, &model.rest),
                     }
                 }
+            };
+            let cells = match block.data.get(Voxels::FRACTION) {
+                Some(fractions) => cells.filled(&fractions.values),
+                None => cells,
             };
             let count = cells.len() * material.law.families();
             let original = (0..cells.len() as u32).collect();

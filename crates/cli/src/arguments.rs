@@ -190,6 +190,9 @@ pub struct Overrides {
     /// Where the solver runs; `auto`: on a graphics processor if there is one that can.
     #[arg(long)]
     pub device: Option<DeviceName>,
+    /// Make meshes of images anew, and keep none.
+    #[arg(long)]
+    pub no_cache: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -262,6 +265,9 @@ pub struct Sweep {
     /// Check and list the combinations; run nothing, write nothing.
     #[arg(long, alias = "list")]
     pub dry_run: bool,
+    /// Make meshes of images anew, and keep none.
+    #[arg(long)]
+    pub no_cache: bool,
     /// Write the series of fields (VTU) of each run, too.
     #[arg(long)]
     pub keep_fields: bool,
@@ -310,7 +316,9 @@ Examples:
   pliant mesh liver.stl --scale 0.001 --edge 8mm --young 5000 -o liver.vtu             # a surface in millimetres
   pliant mesh brain.nii.gz --label 1 --label 2 --edge 6mm --keep-largest -o brain.vtu   # two materials
   pliant mesh seg.nii.gz --label 5 --edge 0.01 --as hexes --close-gaps 3mm --fill-holes -o liver.msh
+  pliant mesh seg.nii.gz --label 5 --edge 1cm --as immersed-hexes -o liver.vtu         # cubes weighted by their fill
   pliant mesh grey.nii --threshold 0.5 --edge 8mm -o grey.vtu
+  pliant mesh grey.nii --add white.nii --threshold 0.5 --edge 8mm -o brain.vtu         # two maps of probabilities
 
   pliant mesh seg.nii.gz --label 5 --as surface --edge 5mm -o liver.ply              # even triangles
   pliant mesh liver.stl --as surface --cells 8000 -o coarse.stl                        # as few as asked for
@@ -341,6 +349,9 @@ pub struct MeshImage {
     /// An image file, the folder of a DICOM series, or a mesh file; for tets and hexes a closed surface.
     #[arg(value_name = "INPUT")]
     pub image: PathBuf,
+    /// Another image of the same voxels whose values are added before `--threshold`, as grey matter to white matter.
+    #[arg(long, value_name = "IMAGE", requires = "threshold")]
+    pub add: Option<PathBuf>,
     /// Label to mesh; several make one mesh of several materials. The first one takes what cleaning adds. With a surface, the
     /// label that its cells get.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
@@ -366,7 +377,8 @@ pub struct MeshImage {
     /// Also write the curved surface of the shells in small triangles, with its distance from the target as point data.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["edge", "triangles"])]
     pub error_map: Option<PathBuf>,
-    /// What to make: tetrahedra shaped for large stable steps, cubes with a stepped surface, a surface, or curved shells.
+    /// What to make: tetrahedra shaped for large stable steps, cubes with a stepped surface, all cubes that the body touches
+    /// with the fraction that it fills (cell data `fraction`), a surface, or curved shells.
     #[arg(long = "as", value_name = "CELLS", default_value = "tets")]
     pub cells: MeshCells,
     /// Name of the mesh; .vtu or .msh, of a surface also .ply, .obj or .stl.
@@ -415,6 +427,7 @@ pub enum Tissue {
 pub enum MeshCells {
     Tets,
     Hexes,
+    ImmersedHexes,
     Surface,
     Shells,
 }

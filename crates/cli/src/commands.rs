@@ -10,7 +10,8 @@ use pliant_gpu::{Adapter, GpuError};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim, reference, registry,
+    Built, Checkpoint, MeshCache, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim,
+    reference, registry,
 };
 use serde_json::{Value as Json, json};
 use tempfile::TempDir;
@@ -78,7 +79,7 @@ fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), F
         return Err(source.errors(mistakes).into());
     }
     let scene = Scene::from_source(source, folder)?;
-    let built = pliant_scene::build(&scene)?;
+    let built = pliant_scene::build_with(&scene, &mesh_cache(overrides.no_cache))?;
     if !built.warnings.is_empty() {
         report::show(&scene.source.errors(built.warnings.clone()));
     }
@@ -126,6 +127,11 @@ fn translate(model: &Path, file: &Path) -> Result<Vec<String>, Failure> {
     }
     fs::write(file, &imported.scene).map_err(|error| unwritable(&error))?;
     Ok(imported.notes)
+}
+
+/// The meshes of images that are kept for this user.
+fn mesh_cache(off: bool) -> MeshCache {
+    if off { MeshCache::off() } else { MeshCache::of_user() }
 }
 
 /// Runs something on the scene's number of threads.
@@ -228,7 +234,7 @@ fn devices(json: bool) -> Result<ExitCode, Failure> {
 
 fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     let (source, folder, _translated) = open(&arguments.scene)?;
-    let sweep = Sweep::new(source, folder, &arguments.set)?;
+    let sweep = Sweep::new(source, folder, &arguments.set)?.with_cache(mesh_cache(arguments.no_cache));
     let (runs, threads) = (sweep.runs(), arguments.threads.into());
     refuse_mistakes(&sweep, threads)?;
     if arguments.dry_run {

@@ -114,7 +114,13 @@ pub fn regions(arguments: &MeshImage) -> Result<(Image, LabelImage, Vec<i32>), F
     let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
     let image = read(&arguments.image, &options).map_err(|error| image_failure(&error))?;
     let (labels, chosen) = match arguments.threshold {
-        Some(least) => (image.threshold(least..=f64::INFINITY), vec![1]),
+        Some(least) => {
+            let added = arguments.add.as_ref().map(|path| read(path, &options)).transpose();
+            let added = added.map_err(|error| Failure::plain(error, ""))?;
+            let sum =
+                added.map(|added| image.plus(&added)).transpose().map_err(|error| label_failure(&error))?;
+            (sum.as_ref().unwrap_or(&image).threshold(least..=f64::INFINITY), vec![1])
+        }
         None => (image.labels().map_err(|error| label_failure(&error))?, arguments.label.clone()),
     };
     Ok((image, labels, chosen))
@@ -192,16 +198,23 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
             let made = request.mesh(anatomy, &filling).map_err(refused)?;
             (made.mesh, Cells::Tets(Box::new(made.report)))
         }
-        _ => {
-            let mut made = Voxels { edge, cell_limit }.mesh(anatomy.field()).map_err(refused)?;
+        cells => {
+            let (voxels, field) = (Voxels { edge, cell_limit }, anatomy.field());
+            let immersed = matches!(cells, MeshCells::ImmersedHexes);
+            let made = if immersed { voxels.immersed(field) } else { voxels.mesh(field) };
+            let mut made = made.map_err(refused)?;
             anatomy.label(&mut made.mesh);
-            (made.mesh, Cells::Hexes { dropped: [made.dropped_components, made.dropped_cells] })
+            (made.mesh, Cells::Hexes { immersed, dropped: [made.dropped_components, made.dropped_cells] })
         }
     };
     bar.update_mesh(PARTS[0] + PARTS[1], "measuring distances");
     let deviation = Deviation::new(&mesh, anatomy.field(), edge).map_err(refused)?;
-    // Steps of cubes stay behind the body by up to half of their diagonal.
-    let allowed = if matches!(arguments.cells, MeshCells::Tets) { edge / 2.0 } else { edge };
+    // Steps of cubes stay behind the body by up to half of their diagonal; immersed ones hold all of it.
+    let allowed = match arguments.cells {
+        MeshCells::Tets => edge / 2.0,
+        MeshCells::ImmersedHexes => f64::INFINITY,
+        _ => edge,
+    };
     let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed).map_err(refused)?;
     Ok(Made {
         materials: materials(&mesh, anatomy),
@@ -335,16 +348,18 @@ struct MaterialReport {
     input_volume: Option<f64>,
 }
 
-/// Cells and volume of each label of a mesh, beside the volume of the input.
+/// Cells and volume of each label of a mesh, filled by the fractions of its cells, beside the volume of the input.
 fn materials(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<MaterialReport> {
     let mut found: BTreeMap<i32, (usize, f64)> = BTreeMap::new();
     for block in &mesh.blocks {
         let labels = block.data.get("label").map_or(&[][..], |labels| &labels.values);
-        for (cell, label) in block.cells().zip(labels) {
+        let fractions = block.data.get(Voxels::FRACTION).map_or(&[][..], |fractions| &fractions.values);
+        let fractions = fractions.iter().copied().chain(std::iter::repeat(1.0));
+        for ((cell, label), fraction) in block.cells().zip(labels).zip(fractions) {
             let corners: Vec<Vector3> = cell.iter().map(|&node| mesh.points[node as usize]).collect();
             let (cells, sum) = found.entry(*label as i32).or_default();
             *cells += 1;
-            *sum += volume(block.kind, &corners);
+            *sum += fraction * volume(block.kind, &corners);
         }
     }
     let of_label = |(label, &input_volume): (i32, &Option<f64>)| {
@@ -357,8 +372,9 @@ fn materials(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<MaterialReport> {
 /// What is known of the cells of each kind.
 enum Cells {
     Tets(Box<TetReport>),
-    /// Loose parts left out, and the cells in them.
+    /// Whether they are weighted by fractions; loose parts left out, and the cells in them.
     Hexes {
+        immersed: bool,
         dropped: [usize; 2],
     },
 }
@@ -384,7 +400,7 @@ impl Made {
         let mut lines = self.lines.clone();
         match &self.cells {
             Cells::Tets(report) => lines.push(report.to_string()),
-            Cells::Hexes { dropped: [parts, cells] } => {
+            Cells::Hexes { dropped: [parts, cells], .. } => {
                 lines.push(format!("nodes            {}", self.quality.nodes));
                 lines.push(format!("hexes            {}", self.cell_count()));
                 lines.extend(self.materials.iter().map(MaterialReport::line));
@@ -439,8 +455,8 @@ impl Made {
                 object["crowded_edges_left"] = json!(report.crowded_edges_left);
                 object["optimiser"] = json!(report.steps);
             }
-            Cells::Hexes { dropped: [parts, cells] } => {
-                object["as"] = json!("hexes");
+            Cells::Hexes { immersed, dropped: [parts, cells] } => {
+                object["as"] = json!(if *immersed { "immersed-hexes" } else { "hexes" });
                 object["repairs"] = json!({ "dropped_pieces": parts, "dropped_cells": cells });
             }
         }

@@ -78,9 +78,15 @@ fn what_only_the_processor_can_do_is_refused_by_name_before_the_run() {
 
 #[test]
 fn an_adapter_that_is_not_there_or_not_used_is_refused_in_the_users_line() {
-    let unused = on("device = \"cpu\"\nadapter = \"x\"").run(&[]);
-    assert_eq!(unused.code, 2);
-    assert!(unused.underlines("adapter = \"x\"") && unused.words().contains("runs on the processor"));
+    for line in ["adapter = \"x\"", "design = \"blocks\""] {
+        let unused = on(&format!("device = \"cpu\"\n{line}")).run(&[]);
+        assert_eq!(unused.code, 2);
+        assert!(
+            unused.underlines(line) && unused.words().contains("runs on the processor"),
+            "{}",
+            unused.err
+        );
+    }
     if !has_graphics_processor() {
         return;
     }

@@ -41,6 +41,13 @@ impl Picture {
         })
     }
 
+    /// A ball on the left with a rod of 4 mm that sticks out to x = 18 mm.
+    fn ball_with_a_rod(label: i16) -> Self {
+        let ball = |[x, y, z]: [f64; 3]| (x + 8.0).powi(2) + y * y + z * z < 100.0;
+        let rod = |[x, y, z]: [f64; 3]| (-8.0..18.0).contains(&x) && y.abs() < 2.0 && z.abs() < 2.0;
+        Self::new(|point| if ball(point) || rod(point) { label } else { 0 })
+    }
+
     /// As NIfTI-1 (the published layout), packed.
     fn packed(&self) -> Vec<u8> {
         let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
@@ -276,10 +283,7 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
 #[test]
 fn a_part_thinner_than_the_cells_is_told_with_its_place() {
     let workshop = with_image();
-    // A ball on the left with a rod of 4 mm that sticks out to x = 18 mm.
-    let ball = |[x, y, z]: [f64; 3]| (x + 8.0).powi(2) + y * y + z * z < 100.0;
-    let rod = |[x, y, z]: [f64; 3]| (-8.0..18.0).contains(&x) && y.abs() < 2.0 && z.abs() < 2.0;
-    workshop.write("rod.nii", Picture::new(|point| i16::from(ball(point) || rod(point))).nifti());
+    workshop.write("rod.nii", Picture::ball_with_a_rod(1).nifti());
     let told =
         workshop.pliant(&["mesh", "rod.nii", "--label", "1", "--edge", "0.008", "-o", "rod.vtu", "--json"]);
     assert_eq!(told.code, 0, "{}", told.err);
@@ -335,6 +339,99 @@ fn a_scene_with_hexes_of_an_image_runs() {
         "\"tissue\"",
     );
     workshop.run(&[]).done();
+}
+
+#[test]
+fn immersed_hexes_weigh_what_the_organ_weighs_and_carry_its_smooth_surface() {
+    let labels = ["--label", "5", "--label", "8", "--keep-largest", "--fill-holes"];
+    let workshop = workshop(
+        "{ image = \"seg.nii.gz\", labels = [5, 8], edge = 0.004, as = \"immersed-hexes\", \
+         clean = { keep-largest = true, fill-holes = true } }",
+        "\"tissue\"",
+    );
+    let more = ["--edge", "0.004", "--as", "immersed-hexes", "-o", "cubes.vtu", "--json"];
+    let json = mesh(&workshop, &[&labels[..], &more].concat()).json();
+    assert_eq!(json["as"], "immersed-hexes");
+    let volume: f64 =
+        json["materials"].as_array().unwrap().iter().map(|part| part["volume"].as_f64().unwrap()).sum();
+    assert!((volume / 14.137e-6 - 1.0).abs() < 0.01, "{json}");
+    let fractions = io::read(&workshop.path("cubes.vtu")).unwrap().mesh.blocks[0].data["fraction"].clone();
+    assert_eq!(fractions.len() as u64, json["cells"].as_u64().unwrap());
+
+    let skin = "[surface.skin]\non = \"organ\"\nmesh = { image = \"seg.nii.gz\", labels = [5, 8], as = \"surface\", \
+                edge = 0.002, clean = { keep-largest = true, fill-holes = true } }\n\
+                [output.skin]\ntype = \"vtu\"\non = \"skin\"\nevery = 0.01\ndata = [\"displacement\"]\n";
+    workshop.write("case/scene.toml", format!("{}{skin}", workshop.read("case/scene.toml")));
+    let json = workshop.run(&["--out", "out"]).done();
+    assert!(close(&json["mass"], 14.137e-3, 0.015), "{json}");
+    // At rest the skin is the ball of 15 mm, not its cubes.
+    let first = &workshop.series("out/skin.pvd")[0].1.mesh;
+    assert!(first.points.len() > 500);
+    let off = first.points.iter().map(|x| (x.norm() - 0.015).abs()).fold(0.0, f64::max);
+    assert!(off < 0.5e-3, "{off}");
+}
+
+#[test]
+fn shells_of_an_image_become_a_wall() {
+    let mesh = "{ image = \"seg.nii.gz\", labels = [5, 8], as = \"shells\", shells = 80, \
+                clean = { keep-largest = true, fill-holes = true } }\nmodel = \"shell\"\nthickness = 1e-3";
+    let workshop = workshop(mesh, "\"tissue\"");
+    let text = workshop
+        .read("case/scene.toml")
+        .replace("[law.tissue]", "[run]\nsolver = \"static\"\n\n[law.tissue]");
+    workshop.write("case/scene.toml", text);
+    let told = workshop.pliant(&["check", "case"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.contains("label 5, 8, 80 shells"), "{}", told.out);
+}
+
+/// What a run says about the cache of meshes.
+fn cached(workshop: &Workshop, more: &[&str]) -> Option<bool> {
+    let told = workshop.run(&[&["--force"], more].concat());
+    assert_eq!(told.code, 0, "{}", told.err);
+    match (told.err.contains("seg.nii.gz: from the cache"), told.err.contains("kept in the cache")) {
+        (false, false) => None,
+        (hit, _) => Some(hit),
+    }
+}
+
+#[test]
+fn the_mesh_of_an_image_is_kept_and_made_anew_where_anything_changes() {
+    let workshop = with_image();
+    assert_eq!(cached(&workshop, &[]), Some(false));
+    let whole = workshop.run(&["--force"]).done();
+    assert_eq!(cached(&workshop, &[]), Some(true));
+    assert_eq!(cached(&workshop, &["--no-cache"]), None);
+    let told =
+        workshop.command(&["run", "case", "--force"]).env("PLIANT_CACHE", "off").output().expect("it starts");
+    assert!(!String::from_utf8_lossy(&told.stderr).contains("cache"));
+    for change in ["body.organ.mesh.edge=0.007", "body.organ.mesh.clean.keep-largest=true"] {
+        assert_eq!(cached(&workshop, &["--set", change]), Some(false), "{change}");
+        assert_eq!(cached(&workshop, &["--set", change]), Some(true), "{change}");
+    }
+    // What is kept gives the same bits.
+    assert_eq!(workshop.run(&["--force"]).done()["energies"], whole["energies"]);
+    for entry in std::fs::read_dir(workshop.path("cache")).unwrap() {
+        let path = entry.unwrap().path();
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    }
+    assert_eq!(cached(&workshop, &[]), Some(false));
+    assert_eq!(cached(&workshop, &[]), Some(true));
+    let mut other = Picture::organ();
+    other.voxels[0] = 5;
+    workshop.write("case/seg.nii.gz", other.packed());
+    assert_eq!(cached(&workshop, &[]), Some(false));
+}
+
+#[test]
+fn a_kept_mesh_still_warns() {
+    let workshop = workshop("{ image = \"seg.nii.gz\", label = 5, edge = 0.008 }", "\"tissue\"");
+    workshop.write("case/seg.nii.gz", Picture::ball_with_a_rod(5).packed());
+    for kept in ["kept in the cache", "from the cache"] {
+        let told = workshop.run(&["--force"]);
+        assert!(told.words().contains(kept) && told.words().contains("the mesh stays"), "{}", told.err);
+    }
 }
 
 #[test]

@@ -397,3 +397,54 @@ fn info_tells_curvature_and_thickness() {
     let page = info(&["ball.ply", "--scale", "1e-6"]).out;
     assert!(page.contains("smaller than any organ"), "{page}");
 }
+
+#[test]
+fn a_scene_fills_or_covers_the_surface_of_a_file() {
+    let scene = |mesh: &str, more: &str, solver: &str| {
+        format!(
+            "[scene]\nuntil = 0.002\n[run]\nsolver = \"{solver}\"\n[law.tissue]\ntype = \"neo-hookean\"\n\
+             young-modulus = 3000\npoisson-ratio = 0.45\n[body.organ]\nmesh = {{ file = \"ball.stl\", scale = 0.001, {mesh} }}\n\
+             law = \"tissue\"\ndensity = 1000\n{more}[constraint.base]\ntype = \"fix\"\nbody = \"organ\"\n\
+             nodes = {{ box = [[-1, -1, -1], [1, 1, -0.008]] }}\n"
+        )
+    };
+    let exact = 4.0 / 3.0 * std::f64::consts::PI * 0.015_f64.powi(3) * 1000.0;
+    let mut turned = inverted(ball(RADIUS, 0.0));
+    nodes(&mut turned).extend([0, 0, 1]);
+    for cells in ["tets", "hexes", "immersed-hexes"] {
+        let workshop = with("case/ball.stl", &turned);
+        let mesh = format!("edge = 0.004, as = \"{cells}\", clean = {{ keep-largest = true }}");
+        workshop.write("case/scene.toml", scene(&mesh, "", "explicit"));
+        let ran = workshop.run(&[]);
+        let json = ran.done();
+        assert!(close(&json["mass"], exact, if cells == "hexes" { 0.08 } else { 0.02 }), "{json}");
+        assert!(ran.words().contains("ball.stl: mended: "), "{}", ran.err);
+        let again = workshop.run(&["--force"]);
+        assert!(again.words().contains("mesh of ball.stl: from the cache"), "{}", again.err);
+    }
+    let workshop = with("case/ball.stl", &turned);
+    let wall = "model = \"shell\"\nthickness = 1e-3\n";
+    workshop.write("case/scene.toml", scene("shells = 80, as = \"shells\"", wall, "implicit"));
+    let told = workshop.pliant(&["check", "case"]);
+    assert!(told.code == 0 && told.out.contains("what it encloses, 80 shells"), "{}{}", told.out, told.err);
+    let ran = workshop.run(&[]);
+    ran.done();
+    assert!(ran.words().contains("`organ` is curved by the normals of its mesh"), "{}", ran.err);
+    for (mesh, says) in [
+        ("edge = 0.004", "a mesh file has its own cells"),
+        ("as = \"tets\"", "tets of an image or a surface need `edge`"),
+        ("as = \"tets\", edge = 0.004, fix = \"merge\"", "`fix` repairs the cells of a mesh file"),
+        ("as = \"tets\", edge = 0.004, label = 3", "`label` is for images"),
+        ("as = \"tets\", edge = 0.1e-3", "cells"),
+    ] {
+        workshop.write("case/scene.toml", scene(mesh, "", "explicit"));
+        let told = workshop.pliant(&["check", "case"]);
+        assert!(told.code == 2 && told.words().contains(says), "{mesh}: {}", told.err);
+    }
+    let mut open = ball(RADIUS, 0.0);
+    nodes(&mut open).drain(..1200);
+    put(&workshop, "case/ball.stl", &open);
+    workshop.write("case/scene.toml", scene("as = \"tets\", edge = 0.002", "", "explicit"));
+    let told = workshop.pliant(&["check", "case"]);
+    assert!(told.code == 2 && told.words().contains("hole"), "{}", told.err);
+}

@@ -24,6 +24,9 @@ fn the_list_names_every_case_in_a_line() {
         "fig-8.3",
         "fig-8.4",
         "obstacle-course",
+        "fig-9.1",
+        "fig-9.2",
+        "fig-9.3",
         "fig-9.4",
     ] {
         assert_eq!(told.out.lines().filter(|line| line.split(' ').next() == Some(id)).count(), 1, "{id}");

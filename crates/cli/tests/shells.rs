@@ -97,6 +97,10 @@ fn values_out_of_their_range_are_refused() {
         &[(THICK, "thickness = 0.002\ncrease = 200")],
         &["`body.wall.crease` must be at least 0 and at most 180"],
     );
+    for solver in ["explicit", "implicit"] {
+        let solver = format!("\"{solver}\"");
+        refused(&[("\"static\"", &solver)], &["`load-steps` is for `solver = \"quasi-static\"`"]);
+    }
 }
 
 /// A legacy OFF file.

@@ -68,6 +68,18 @@ pub enum ModelError {
         /// Triangles at it.
         count: usize,
     },
+    /// A given normal that is none.
+    #[error(
+        "the normal given at node {node} of `{shell}` does not point away from the surface at element {cell}"
+    )]
+    Normal {
+        /// Name of the part.
+        shell: String,
+        /// Node.
+        node: u32,
+        /// An element at it.
+        cell: usize,
+    },
     /// A surface with one side only.
     #[error(
         "shell `{shell}` has no two sides: following its triangles round comes back reversed at the edge of nodes \

@@ -73,6 +73,9 @@ pub struct Shell {
     pub formulation: Formulation,
     /// Triangles that meet at a larger angle [rad] have normals of their own: a crease.
     pub crease: f64,
+    /// Normals of nodes at rest, of any length and to either side: those of a surface that is known better than by its triangles.
+    /// Nodes without one take the mean of their triangles.
+    pub normals: BTreeMap<u32, Vector3<f64>>,
     /// Whether more than two triangles may meet in an edge.
     pub branches: bool,
 }
@@ -87,6 +90,7 @@ impl Shell {
             material: vec![material],
             formulation: Formulation::default(),
             crease: std::f64::consts::FRAC_PI_4,
+            normals: BTreeMap::new(),
             branches: false,
         }
     }
@@ -258,13 +262,15 @@ impl Model {
             facets.push(facet);
         }
         notes.inverted = self.inverted(&cells);
+        let (normals, corner_normals) = self.normals_of(shell, &facets)?;
+        self.normals.extend(normals);
+        self.corner_normals.extend(corner_normals);
         for facet in &facets {
             for node in facet.nodes {
                 self.mass[node as usize] += facet.mass;
                 self.inertia[node as usize] += facet.inertia;
             }
         }
-        self.add_normals(&facets, shell.crease);
         self.facets.extend(facets);
         Ok(notes)
     }
@@ -343,8 +349,13 @@ impl Model {
         Ok(())
     }
 
-    /// Angle-weighted normals, one for each fan of facets round a node that meet at less than the crease angle.
-    fn add_normals(&mut self, facets: &[Facet], crease: f64) {
+    /// The normals of the nodes of a shell, and those at the corners of its facets: the given ones, else angle-weighted means, one
+    /// for each fan of facets round a node that meet at less than the crease angle.
+    fn normals_of(
+        &self,
+        shell: &Shell,
+        facets: &[Facet],
+    ) -> Result<(Vec<Normal>, Vec<[u32; 3]>), ModelError> {
         let normal_of = |facet: &Facet| {
             let [a, b, c] = facet.nodes.map(|node| self.rest[node as usize]);
             (b - a).cross(&(c - a)).normalize()
@@ -356,20 +367,34 @@ impl Model {
                 around.entry(node).or_default().push((number, corner));
             }
         }
+        let mut normals = Vec::new();
         let mut corner_normals = vec![[0; 3]; facets.len()];
         for (&node, corners) in &around {
-            for fan in fans(facets, corners, &face_normals, crease.cos()) {
+            let given = shell.normals.get(&node);
+            let fans = match given {
+                Some(_) => vec![corners.clone()],
+                None => fans(facets, corners, &face_normals, shell.crease.cos()),
+            };
+            for fan in fans {
                 let mut sum = Vector3::zeros();
                 for &(facet, corner) in &fan {
                     let [at, next, last] =
                         [0, 1, 2].map(|i| self.rest[facets[facet].nodes[(corner + i) % 3] as usize]);
                     sum += face_normals[facet] * (next - at).angle(&(last - at));
-                    corner_normals[facet][corner] = self.normals.len() as u32;
+                    corner_normals[facet][corner] = (self.normals.len() + normals.len()) as u32;
                 }
-                self.normals.push(Normal { node, direction: sum.normalize() });
+                let direction = match given {
+                    Some(given) => (given * given.dot(&sum).signum()).normalize(),
+                    None => sum.normalize(),
+                };
+                let stands = |facet: usize| face_normals[facet].dot(&direction) > 0.0;
+                if let Some(&(cell, _)) = fan.iter().find(|corner| given.is_some() && !stands(corner.0)) {
+                    return Err(ModelError::Normal { shell: shell.name.clone(), node, cell });
+                }
+                normals.push(Normal { node, direction });
             }
         }
-        self.corner_normals.extend(corner_normals);
+        Ok((normals, corner_normals))
     }
 
     /// The volume [m³] that closed facets enclose at some positions, positive with normals outwards.

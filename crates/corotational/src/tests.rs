@@ -164,6 +164,14 @@ fn bad_shells_are_told_with_their_element() {
     assert!(refuse(&with([1, 10, 26])).contains("3 triangles"), "{}", refuse(&with([1, 10, 26])));
     let branched = Shell { branches: true, ..with([1, 10, 26]) };
     assert!(Model::new(points.clone()).add_shell(&branched).is_ok());
+    let with = |normal: [f64; 3]| Shell { normals: [(12, normal.into())].into(), ..good.clone() };
+    for normal in [[1.0, 0.0, 0.0], [0.0; 3], [f64::NAN; 3]] {
+        assert!(refuse(&with(normal)).contains("normal given at node 12"), "{normal:?}");
+    }
+    let mut given = Model::new(points.clone());
+    given.add_shell(&with([0.6, 0.0, -0.8])).unwrap();
+    let at = |node: u32| given.normals.iter().find(|n| n.node == node).unwrap().direction;
+    assert_eq!(at(12) * at(11).z, Vector3::new(-0.6, 0.0, 0.8), "to the side of the triangles");
     // Möbius.
     let ring = (0..5).map(|i| [i, (i + 1) % 5, (i + 2) % 5]).collect();
     let around = (0..5).map(|i| {

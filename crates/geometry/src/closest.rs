@@ -1,8 +1,8 @@
 //! The point of a surface that is closest to a point, and the direction in which the surface looks there. Normals are
 //! means at the nodes, weighted by area, linear in between: on a curved surface they turn smoothly, on a flat one they
 //! are exact. Leaves out: which side a point is on.
-
-use rstar::{AABB, PointDistance, RTree, RTreeObject};
+//! Triangles are halved at the median of their centres until few are left; the nearer half is searched first and a box farther off than
+//! what was found is skipped. Of equally close triangles the first found counts.
 
 use crate::locate::{barycentric_of_closest, on_triangle};
 use crate::{Surface, Vector3};
@@ -10,7 +10,30 @@ use crate::{Surface, Vector3};
 /// A search tree over faces of a surface.
 #[derive(Clone, Debug)]
 pub struct SurfaceLocator {
-    tree: RTree<Triangle>,
+    triangles: Vec<Triangle>,
+    /// Halves, each before the two that it is made of.
+    parts: Vec<Part>,
+}
+
+/// Triangles at most in a part that is not halved.
+const FEW: usize = 4;
+
+/// Some of the triangles and the box round them.
+#[derive(Clone, Debug)]
+struct Part {
+    low: Vector3,
+    high: Vector3,
+    first: u32,
+    end: u32,
+    /// The second of its two halves, the first stands next to it; 0 of a part that is not halved.
+    second: u32,
+}
+
+impl Part {
+    /// The square of the distance to the box [m²].
+    fn distance_2(&self, to: &Vector3) -> f64 {
+        (to.sup(&self.low).inf(&self.high) - to).norm_squared()
+    }
 }
 
 /// A point of a surface.
@@ -37,27 +60,10 @@ struct Triangle {
 }
 
 impl Triangle {
-    fn closest(&self, to: &Vector3) -> SurfacePoint {
-        let weights = barycentric_of_closest(&self.corners, to);
+    fn at(&self, weights: [f64; 3]) -> SurfacePoint {
         let normal = on_triangle(&self.normals, weights).try_normalize(1e-12).unwrap_or_default();
         let position = on_triangle(&self.corners, weights);
         SurfacePoint { position, normal, face: self.face, nodes: self.nodes, weights }
-    }
-}
-
-impl RTreeObject for Triangle {
-    type Envelope = AABB<[f64; 3]>;
-
-    fn envelope(&self) -> Self::Envelope {
-        let [a, b, c] = self.corners;
-        AABB::from_corners(a.inf(&b).inf(&c).into(), a.sup(&b).sup(&c).into())
-    }
-}
-
-impl PointDistance for Triangle {
-    fn distance_2(&self, point: &[f64; 3]) -> f64 {
-        let point = Vector3::from(*point);
-        (self.closest(&point).position - point).norm_squared()
     }
 }
 
@@ -77,12 +83,64 @@ impl SurfaceLocator {
             let nodes = face.nodes();
             (2..nodes.len()).map(move |k| (number, [nodes[0], nodes[k - 1], nodes[k]]))
         });
-        Self { tree: RTree::bulk_load(halves.map(triangle).collect()) }
+        let mut locator = Self { triangles: halves.map(triangle).collect(), parts: Vec::new() };
+        if !locator.triangles.is_empty() {
+            locator.sort(0, locator.triangles.len());
+        }
+        locator
     }
 
-    /// The closest point [m]; `None` without faces.
+    fn sort(&mut self, first: usize, end: usize) {
+        let own = &mut self.triangles[first..end];
+        let start = own[0].corners[0];
+        let corners = own.iter().flat_map(|triangle| &triangle.corners);
+        let (low, high) = corners.fold((start, start), |(low, high), x| (low.inf(x), high.sup(x)));
+        let number = self.parts.len();
+        self.parts.push(Part { low, high, first: first as u32, end: end as u32, second: 0 });
+        if own.len() > FEW {
+            let axis = (high - low).imax();
+            let centre = |triangle: &Triangle| triangle.corners.iter().map(|x| x[axis]).sum::<f64>();
+            let middle = own.len() / 2;
+            own.select_nth_unstable_by(middle, |a, b| {
+                centre(a).total_cmp(&centre(b)).then(a.face.cmp(&b.face))
+            });
+            self.sort(first, first + middle);
+            self.parts[number].second = self.parts.len() as u32;
+            self.sort(first + middle, end);
+        }
+    }
+
+    /// The closest point [m]; `None` without faces, or if `to` is not finite.
     pub fn closest(&self, to: &Vector3) -> Option<SurfacePoint> {
-        self.tree.nearest_neighbor((*to).into()).map(|triangle| triangle.closest(to))
+        let mut best: Option<(usize, [f64; 3])> = None;
+        let mut least = f64::INFINITY;
+        let mut ahead = [(0, 0.0); 64];
+        let mut count = usize::from(!self.parts.is_empty());
+        while count > 0 {
+            count -= 1;
+            let (number, distance) = ahead[count];
+            if distance >= least {
+                continue;
+            }
+            let part = &self.parts[number];
+            if part.second == 0 {
+                for at in part.first as usize..part.end as usize {
+                    let weights = barycentric_of_closest(&self.triangles[at].corners, to);
+                    let distance = (on_triangle(&self.triangles[at].corners, weights) - to).norm_squared();
+                    if distance < least {
+                        (best, least) = (Some((at, weights)), distance);
+                    }
+                }
+            } else {
+                let of = |half: usize| (half, self.parts[half].distance_2(to));
+                let (first, second) = (of(number + 1), of(part.second as usize));
+                // The nearer one comes next.
+                (ahead[count], ahead[count + 1]) =
+                    if second.1 < first.1 { (first, second) } else { (second, first) };
+                count += 2;
+            }
+        }
+        best.map(|(at, weights)| self.triangles[at].at(weights))
     }
 }
 

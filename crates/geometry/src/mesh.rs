@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::Vector3;
 
 /// Shape of a cell and the number and order of its nodes (the order of VTK).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum CellKind {
     /// One node.
     Vertex,
@@ -57,7 +59,7 @@ impl CellKind {
 }
 
 /// Values carried by each point or each cell.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DataArray {
     /// Numbers per item: 1 scalar, 3 vector, 9 tensor (row-major).
     pub components: usize,
@@ -88,7 +90,7 @@ impl DataArray {
 }
 
 /// All cells of one kind.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CellBlock {
     /// Their shape.
     pub kind: CellKind,

@@ -132,6 +132,7 @@ impl Region {
             self.inside.iter().enumerate().map(|(at, &inside)| inside && of_label(at)).collect();
         let part = Self { label, inside, ..*self };
         match part.voxels() {
+            0 if image.labels.contains(&label) => Err(LabelError::Emptied { label, operation: "cleaning" }),
             0 => Err(LabelError::Absent { label, present: image.present() }),
             _ => Ok(part),
         }

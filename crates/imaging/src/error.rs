@@ -245,6 +245,16 @@ pub enum LabelError {
         /// Its value [m].
         value: f64,
     },
+    /// Two images of which the sum was asked for.
+    #[error(
+        "the images have not the same voxels ({first:?} and {second:?}, or they lie elsewhere); resample one of them"
+    )]
+    OtherVoxels {
+        /// Voxels along i, j, k of the first.
+        first: [usize; 3],
+        /// Voxels of the second.
+        second: [usize; 3],
+    },
     /// More labels than a mesh can tell apart.
     #[error("{labels} labels asked for in one mesh, more than {limit}; mesh them in parts")]
     TooManyLabels {

@@ -158,6 +158,30 @@ impl Image {
         }
     }
 
+    /// All that makes the image what it is, piece by piece, for a hash of its content.
+    pub fn content(&self, mut hear: impl FnMut(&[u8])) {
+        let Numbers { scalar, order, bytes } = &self.numbers;
+        hear(format!("{:?} {scalar:?} {order:?} {:?}", self.grid, self.scale).as_bytes());
+        hear(bytes);
+    }
+
+    /// The sum of the values of two images of the same voxels, such as maps of the probability of grey and white matter.
+    pub fn plus(&self, other: &Self) -> Result<Self, LabelError> {
+        let off =
+            (self.grid.axes - other.grid.axes).amax().max((self.grid.origin - other.grid.origin).amax());
+        let least = self.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        if self.grid.dims != other.grid.dims || off > 1e-3 * least {
+            return Err(LabelError::OtherVoxels { first: self.grid.dims, second: other.grid.dims });
+        }
+        let sums: Vec<[u8; 8]> = (0..self.grid.len())
+            .into_par_iter()
+            .map(|at| (self.value(at) + other.value(at)).to_le_bytes())
+            .collect();
+        let numbers = Numbers { scalar: Scalar::F64, order: Order::Little, bytes: sums.concat() };
+        let notes = self.notes.iter().chain(&other.notes).cloned().collect();
+        Ok(Self { grid: self.grid, format: self.format.clone(), notes, numbers, scale: [1.0, 0.0] })
+    }
+
     /// Label 1 where the value lies in a range, 0 elsewhere: a region of a probability map or a level set.
     pub fn threshold(&self, range: RangeInclusive<f64>) -> LabelImage {
         let label = |at| i32::from(range.contains(&self.value(at)));
@@ -172,4 +196,43 @@ pub struct LabelImage {
     pub grid: Grid,
     /// One label a voxel, i fastest; as long as the grid.
     pub labels: Vec<i32>,
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_geometry::Vector3;
+
+    use super::*;
+
+    fn image(values: [i16; 2], slope: f64, spacing: f64) -> Image {
+        let bytes = values.iter().flat_map(|value| value.to_be_bytes()).collect();
+        Image {
+            grid: Grid::along_axes([2, 1, 1], Vector3::zeros(), [spacing; 3]).unwrap(),
+            format: "here".into(),
+            notes: Vec::new(),
+            numbers: Numbers { scalar: Scalar::I16, order: Order::Big, bytes },
+            scale: [slope, 0.0],
+        }
+    }
+
+    #[test]
+    fn values_of_two_images_are_added_where_their_voxels_are_the_same() {
+        let sum = image([1, 300], 0.5, 1e-3).plus(&image([4, -100], 2.0, 1e-3)).unwrap();
+        assert_eq!([0, 1].map(|at| sum.value(at)), [8.5, -50.0]);
+        assert!(image([1, 2], 1.0, 1e-3).plus(&image([1, 2], 1.0, 2e-3)).is_err());
+    }
+
+    #[test]
+    fn the_content_tells_images_apart_and_not_their_names() {
+        let content = |image: &Image| {
+            let mut all = Vec::new();
+            image.content(|piece| all.extend_from_slice(piece));
+            all
+        };
+        let first = image([1, 2], 1.0, 1e-3);
+        assert_eq!(content(&first), content(&Image { format: "there".into(), ..first.clone() }));
+        for other in [image([1, 3], 1.0, 1e-3), image([1, 2], 0.5, 1e-3), image([1, 2], 1.0, 2e-3)] {
+            assert_ne!(content(&first), content(&other));
+        }
+    }
 }

@@ -120,6 +120,9 @@ fn picked<T: Clone>(values: &[T], cells: &[u32]) -> Vec<T> {
     cells.iter().map(|&cell| values[cell as usize].clone()).collect()
 }
 
+/// A cell counts as filled by so much at least: nodes that hang on slivers alone would move wildly.
+pub const LEAST_FRACTION: f64 = 0.1;
+
 /// Cells of one element type.
 #[derive(Clone, Debug)]
 pub enum Cells {
@@ -160,7 +163,7 @@ pub(crate) use with_cells;
 pub struct CellBlock<const N: usize> {
     /// Nodes of each cell, numbered in the model.
     pub nodes: Vec<[u32; N]>,
-    /// Volume [m³] and mean gradients [1/m] of each cell.
+    /// Volume [m³], what of it is filled, and mean gradients [1/m] of each cell.
     pub rest: Vec<Rest<N>>,
     /// Stiffness against hourglass patterns; `None` for an element that has none.
     pub hourglass: Option<Hourglass<f64, N>>,
@@ -178,6 +181,17 @@ pub struct Hourglass<R, const N: usize> {
 }
 
 impl<const N: usize> CellBlock<N> {
+    fn fill(&mut self, fractions: &[f64]) {
+        for (rest, fraction) in self.rest.iter_mut().zip(fractions) {
+            rest.volume *= fraction.max(LEAST_FRACTION);
+        }
+        if let Some(control) = &mut self.hourglass {
+            for (stiffness, fraction) in control.stiffness.iter_mut().zip(fractions) {
+                *stiffness *= fraction.max(LEAST_FRACTION);
+            }
+        }
+    }
+
     fn in_order(&self, order: &[u32]) -> Self {
         Self {
             nodes: picked(&self.nodes, order),
@@ -226,6 +240,23 @@ impl Cells {
         let quantities = nodes.iter().map(|cell| hex8(&corners(cell)).rest).collect();
         let points = nodes.iter().map(|cell| gauss_points(&corners(cell))).collect();
         Self::FullHex8(CellBlock { nodes, rest: quantities, hourglass: None }, points)
+    }
+
+    /// The same cells, each filled only in part, as cubes at the border of a body are: its volume and with it its stiffness
+    /// and mass are those of its fraction, one per cell, of [`LEAST_FRACTION`] at least. Gradients stay, and with them element
+    /// bounds. One constant weight a cell is the simplest of the finite cells of Parvizian, Düster and Rank (2007).
+    ///
+    /// # Panics
+    /// If there are not as many fractions as cells.
+    pub fn filled(mut self, fractions: &[f64]) -> Self {
+        assert_eq!(fractions.len(), self.len(), "every cell has a fraction");
+        with_cells!(&mut self, block => block.fill(fractions));
+        if let Self::FullHex8(_, points) = &mut self {
+            for (points, fraction) in points.iter_mut().zip(fractions) {
+                points.weight.iter_mut().for_each(|weight| *weight *= fraction.max(LEAST_FRACTION));
+            }
+        }
+        self
     }
 
     /// The same cells in another order.
@@ -280,7 +311,7 @@ impl Cells {
         with_cells!(self, block => block.nodes[cell].as_slice())
     }
 
-    /// Rest volume [m³] of a cell.
+    /// Rest volume [m³] of a cell, what of it is filled.
     pub fn volume(&self, cell: usize) -> f64 {
         with_cells!(self, block => block.rest[cell].volume)
     }

@@ -75,6 +75,20 @@ pub struct EnclosedReport {
     pub dropped_pieces: usize,
 }
 
+impl EnclosedReport {
+    /// Whether anything was mended, joined, filled or left out.
+    pub fn is_mended(&self) -> bool {
+        let counts = [
+            self.closed_holes,
+            self.crossings,
+            self.swallowed_shells,
+            self.filled_cavities,
+            self.dropped_pieces,
+        ];
+        self.repairs != SurfaceRepairs::default() || counts.iter().any(|&count| count > 0)
+    }
+}
+
 impl fmt::Display for EnclosedReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut told = vec![self.repairs.to_string()];

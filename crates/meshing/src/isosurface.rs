@@ -59,7 +59,8 @@ impl TriangleMesh {
         let mut cuts = vec![[0; 2]; numbers.len()];
         numbers.into_iter().for_each(|(cut, number)| cuts[number as usize] = cut);
         let points = cuts.par_iter().map(|cut| grid.crossing(field, *cut, &values)).collect();
-        Ok(Self::new(points, triangles))
+        // Where the field is zero at a point of the grid, cuts of its edges lie at one place.
+        Ok(Self::from_mesh(&Self::new(points, triangles).to_mesh())?.0)
     }
 }
 
@@ -179,5 +180,15 @@ mod tests {
         assert!(mesh.alive().all(|t| mesh.normal(t).dot(&(mesh.corners(t)[0] - ball.centre)) >= 0.0));
         assert!(mesh.edges().iter().all(|&[a, b]| mesh.sides(a, b).iter().flatten().count() == 2));
         assert_eq!(mesh.points.len() + mesh.len() - mesh.edges().len(), 2);
+    }
+
+    /// The surface passes through points of the grid, which lies at multiples of the step.
+    #[test]
+    fn a_cut_at_a_point_of_the_grid_leaves_no_triangle_without_area() {
+        let ball = Ellipsoid::sphere(Vector3::zeros(), 0.5);
+        let mut mesh = TriangleMesh::of_field(&ball, 0.125, 100_000).unwrap();
+        assert!(mesh.alive().all(|t| mesh.area(t) > 1e-9));
+        assert_eq!(mesh.points.len() + mesh.len() - mesh.edges().len(), 2);
+        assert_eq!(mesh.decimate(crate::Fewer::Triangles(40)).unwrap(), 40);
     }
 }

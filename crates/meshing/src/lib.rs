@@ -2,7 +2,6 @@
 //! (isosurface stuffing) or cubes. Lengths are in metres. The same request gives the same mesh, bit for bit,
 //! on any number of threads.
 //! Surfaces of fields and files in even or few triangles, and curved shells fitted to them.
-//! Leaves out: cubes weighted by how full they are.
 //!
 //! ```
 //! use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Organ, Phantom, Resolution, Stuffing, VolumeCell};

@@ -17,7 +17,6 @@ const LEAST_SHAPE: f64 = 0.3;
 pub(crate) struct Reference {
     locator: SurfaceLocator,
     lines: RTree<Segment>,
-    pub(crate) points: Vec<Vector3>,
 }
 
 struct Segment([Vector3; 2]);
@@ -50,8 +49,7 @@ impl Reference {
         let marked = mesh.edges().into_iter().filter(|&[a, b]| mesh.is_marked(a, b));
         let lines = marked.map(|edge| Segment(edge.map(|n| mesh.points[n as usize]))).collect();
         let locator = crate::hausdorff::locator(mesh);
-        let points = mesh.compact().0;
-        Self { locator, lines: RTree::bulk_load(lines), points }
+        Self { locator, lines: RTree::bulk_load(lines) }
     }
 
     /// The nearest point of the surface and the normal there.

@@ -12,6 +12,9 @@ use serde::Serialize;
 use crate::error::MeshingError;
 use crate::nesting::{Shell, containers, signed_volume};
 
+/// Triangles of a worse shape have a normal by round-off only.
+const LEAST_SIDED: f64 = 1e-6;
+
 /// A triangle that is no more.
 const GONE: [u32; 3] = [u32::MAX; 3];
 
@@ -270,9 +273,8 @@ impl TriangleMesh {
         }
         match apexes[..] {
             // A tetrahedron, or a triangle all alone.
-            [c, d] => !self.sides(c, d).iter().flatten().any(|&t| {
-                let nodes = self.triangles[t as usize];
-                nodes.contains(&keep) || nodes.contains(&gone)
+            [c, d] => ![keep, gone].iter().all(|end| {
+                self.sides(c, d).iter().flatten().any(|&t| self.triangles[t as usize].contains(end))
             }),
             [c] => !(self.is_border(keep, c) && self.is_border(gone, c)),
             _ => false,
@@ -290,8 +292,9 @@ impl TriangleMesh {
                 let before = self.corners(t);
                 let after = [0, 1, 2].map(|k| if nodes[k] == own { *position } else { before[k] });
                 let (old, new) = (cross(before), cross(after));
-                old.dot(&new) > 0.5 * old.norm() * new.norm()
-                    && shape(after) > least_shape.min(0.5 * shape(before))
+                // A triangle that is a line or a point has no side and no shape to keep.
+                let turned = shape(before) > LEAST_SIDED && old.dot(&new) <= 0.5 * old.norm() * new.norm();
+                !turned && shape(after) >= least_shape.min(0.5 * shape(before))
             })
         })
     }
@@ -360,16 +363,6 @@ impl TriangleMesh {
         self.star[a as usize].retain(|&x| x != t);
         self.star[d as usize].push(s);
         self.star[c as usize].push(t);
-    }
-
-    /// Worst shape of the triangles round a point, were it at a position.
-    pub(crate) fn worst_round(&self, point: u32, position: &Vector3) -> f64 {
-        let of = |&t: &u32| {
-            let nodes = self.triangles[t as usize];
-            let x = self.corners(t);
-            shape([0, 1, 2].map(|k| if nodes[k] == point { *position } else { x[k] }))
-        };
-        self.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
     }
 
     /// Mean normal of the triangles round a point, weighted by their angles there (Thürmer and Wüthrich 1998).

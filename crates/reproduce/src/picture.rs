@@ -32,6 +32,21 @@ pub(crate) struct Body<'a> {
     pub displacement: Vec<Vector<f64>>,
     /// What the colour tells, at the nodes; grey without.
     pub value: Option<Vec<f64>>,
+    /// Whether the edges of the faces are drawn.
+    pub edges: bool,
+}
+
+impl<'a> Body<'a> {
+    /// A body where the points of its mesh are, grey, with its edges.
+    pub fn still(label: impl Into<String>, mesh: &'a Mesh) -> Self {
+        Self {
+            label: label.into(),
+            mesh,
+            displacement: vec![[0.0; 3]; mesh.points.len()],
+            value: None,
+            edges: true,
+        }
+    }
 }
 
 /// How bodies are looked at.
@@ -40,8 +55,6 @@ pub(crate) struct View<'a> {
     pub from: Vector<f64>,
     /// The direction that is up.
     pub up: Vector<f64>,
-    /// Whether the edges of the faces are drawn.
-    pub edges: bool,
     /// What the colour tells, with its unit.
     pub quantity: &'a str,
     /// Factor from the values to the unit.
@@ -126,7 +139,7 @@ pub(crate) fn figure(
     for (index, (body, [rest, now])) in bodies.iter().zip(&places).enumerate() {
         let (x, y) = ((index % columns) as f64 * WIDTH, (index / columns) as f64 * cell);
         let (faces, value) = (&surfaces[index], body.value.as_deref());
-        let image = png(&paint(faces, now, value, scale, &camera, view.edges))?;
+        let image = png(&paint(faces, now, value, scale, &camera, body.edges))?;
         let cover = paint(faces, rest, None, scale, &camera, false);
         let (middle, base) = (0.5 * WIDTH, camera.height + 20.0);
         // Writing to a string cannot fail.
@@ -202,8 +215,14 @@ fn bar(view: &View<'_>, [low, high]: [f64; 2], [corner, top, width]: [f64; 3]) -
     svg
 }
 
-/// Viridis from 0 to 1: red, green and blue up to 255.
+/// Grey, where there is no value.
+const GREY: [f64; 3] = [205.0, 208.0, 212.0];
+
+/// Viridis from 0 to 1: red, green and blue up to 255. What is not a number is grey.
 fn colour(part: f64) -> [f64; 3] {
+    if part.is_nan() {
+        return GREY;
+    }
     let RGBColor(r, g, b) = ViridisRGB.get_color(part.clamp(0.0, 1.0));
     [r, g, b].map(f64::from)
 }
@@ -262,7 +281,7 @@ fn paint(
         };
         let colour = |k: usize| match value {
             Some(value) => colour((value[nodes[k] as usize] - scale[0]) / (scale[1] - scale[0])),
-            None => [205.0, 208.0, 212.0],
+            None => GREY,
         };
         let light = |k: usize| {
             let normal = camera.turn(&normals[k]) * if seen { 1.0 } else { -1.0 };
@@ -397,8 +416,7 @@ mod tests {
     fn cube() -> (Mesh, Vec<Face>, Camera) {
         let block = Block::new([1.0; 3]);
         let mesh = block.mesh(Resolution::Counts([2; 3]), VolumeCell::Hex, DEFAULT_CELL_LIMIT).unwrap();
-        let view =
-            View { from: [1.0; 3], up: [0.0, 0.0, 1.0], edges: false, quantity: "", factor: 1.0, columns: 1 };
+        let view = View { from: [1.0; 3], up: [0.0, 0.0, 1.0], quantity: "", factor: 1.0, columns: 1 };
         let camera = Camera::new(&view, mesh.points.iter().copied());
         let faces = boundary(&mesh).faces;
         (mesh, faces, camera)

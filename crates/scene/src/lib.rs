@@ -34,6 +34,7 @@
 
 mod bound;
 mod build;
+mod cache;
 pub mod checker;
 mod checkpoint;
 mod corotational;
@@ -56,7 +57,8 @@ mod target;
 mod testing;
 
 pub use bound::element_bound;
-pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, PLAUSIBLE_SIZE, build};
+pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, PLAUSIBLE_SIZE, build, build_with};
+pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use output::{
     AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,

@@ -9,7 +9,8 @@ use std::sync::{Arc, Mutex};
 
 use pliant_mechanics::Energies;
 
-use crate::build::{Built, build};
+use crate::build::{Built, build_with};
+use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
 use crate::output::{AXES, ENERGIES, OutputError, OutputFolder, Summary, number};
 use crate::plan::{Plan, plan};
@@ -30,6 +31,7 @@ pub struct Sweep {
     /// The folder that file names in the scene are relative to.
     folder: PathBuf,
     axes: Vec<Axis>,
+    cache: MeshCache,
 }
 
 /// A key with its values, in the order given.
@@ -113,7 +115,17 @@ impl Sweep {
             let message = format!("the sweep has more than {MOST} combinations");
             mistakes.push(Diagnostic::error(message).help("take fewer values, or several sweeps"));
         }
-        if mistakes.is_empty() { Ok(Self { source, folder, axes }) } else { Err(source.errors(mistakes)) }
+        let cache = MeshCache::off();
+        if mistakes.is_empty() {
+            Ok(Self { source, folder, axes, cache })
+        } else {
+            Err(source.errors(mistakes))
+        }
+    }
+
+    /// The same with the meshes of images that are kept.
+    pub fn with_cache(self, cache: MeshCache) -> Self {
+        Self { cache, ..self }
     }
 
     /// Number of combinations.
@@ -155,7 +167,7 @@ impl Sweep {
 
     fn prepare(&self, run: usize) -> Result<(Scene, Built, Plan), SceneErrors> {
         let scene = self.scene(run)?;
-        let built = build(&scene)?;
+        let built = build_with(&scene, &self.cache)?;
         let plan = plan(&scene, &built)?;
         Ok((scene, built, plan))
     }

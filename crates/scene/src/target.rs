@@ -27,16 +27,18 @@ impl Target {
         let run = &scene.run;
         let corotational = built.corotational.is_some();
         match run.device {
-            DeviceName::Cpu => match &run.adapter {
-                None => Ok(Self::processor(run, None)),
-                Some(name) => {
-                    let message =
-                        format!("the adapter `{name}` is named, but the scene runs on the processor");
-                    let place = scene.source.span(&["run", "adapter"]);
-                    let error = Diagnostic::error(message).at(place, "not used");
-                    Err(Box::new(error.help("set `device = \"gpu\"` or `\"auto\"`, or leave `adapter` out")))
+            DeviceName::Cpu => {
+                let given = [("adapter", run.adapter.is_some()), ("design", run.design.is_some())];
+                match given.into_iter().find(|(_, given)| *given) {
+                    None => Ok(Self::processor(run, None)),
+                    Some((key, _)) => {
+                        let message = format!("`{key}` is given, but the scene runs on the processor");
+                        let place = scene.source.span(&["run", key]);
+                        let help = format!("set `device = \"gpu\"` or `\"auto\"`, or leave `{key}` out");
+                        Err(Box::new(Diagnostic::error(message).at(place, "not used").help(help)))
+                    }
                 }
-            },
+            }
             DeviceName::Gpu => match processor_only(run, corotational) {
                 None => match open(run) {
                     Ok(device) => {

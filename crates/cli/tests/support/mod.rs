@@ -197,6 +197,7 @@ impl Workshop {
     pub fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_pliant"));
         command.args(arguments).current_dir(self.folder.path());
+        command.env("PLIANT_CACHE", self.path("cache"));
         command
     }
 

@@ -29,6 +29,18 @@ fn every_element_in_every_design() {
 }
 
 #[test]
+fn cells_filled_in_part_of_every_element() {
+    let Some(device) = support::device() else { return };
+    for element in ELEMENTS {
+        let mut model = moved_cube(element, elastic(neo_hookean()));
+        let solid = &mut model.solids[0];
+        let fractions: Vec<f64> = (0..solid.cells.len()).map(|cell| 0.2 + 0.1 * (cell % 8) as f64).collect();
+        solid.cells = solid.cells.clone().filled(&fractions);
+        compare(&device, &format!("{element} in part"), &model, &[Design::Gather, Design::Blocks]);
+    }
+}
+
+#[test]
 fn several_bodies_elements_and_laws_in_one_model() {
     let Some(device) = support::device() else { return };
     let mut model = moved_cube("tet4", elastic(neo_hookean()));

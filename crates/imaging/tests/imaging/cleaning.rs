@@ -130,3 +130,15 @@ fn closing_adds_nothing_to_a_box() {
     let error = region.clean(&Cleaning { close_gaps: f64::NAN, ..Cleaning::default() }).unwrap_err();
     assert!(matches!(error, LabelError::BadLength { .. }), "{error}");
 }
+
+/// A label all of which lay in a smaller piece is not said to be absent.
+#[test]
+fn a_label_that_cleaning_removed_is_told_so() {
+    let two = image([8, 1, 1], [1e-3; 3], |[i, ..]| [1, 1, 1, 1, 0, 2, 0, 0][i]);
+    let cleaning = Cleaning { keep_largest: true, ..Cleaning::default() };
+    let (whole, _) = two.region(&[1, 2], 1).unwrap().clean(&cleaning).unwrap();
+    assert_eq!(whole.part(&two, 1).unwrap().voxels(), 4);
+    let error = whole.part(&two, 2).unwrap_err();
+    assert!(matches!(error, LabelError::Emptied { label: 2, .. }), "{error}");
+    assert!(matches!(whole.part(&two, 3).unwrap_err(), LabelError::Absent { label: 3, .. }));
+}

@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::State;
+use crate::critical_step;
 use crate::lanes::Instructions;
 use crate::law::samples::every_law;
 use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
@@ -31,6 +32,17 @@ const CELLS: u32 = 3;
 
 /// A cube of 3×3×3 cells of edge 0.1, interior nodes moved by up to 12 % of an edge.
 fn distorted_cube(element: &str, law: AnyLaw) -> Model {
+    filled_cube(element, law, 700.0, 1000.0, |_| 1.0)
+}
+
+/// The same with a shear modulus for the hourglass control, a density, and a fraction for each cell.
+fn filled_cube(
+    element: &str,
+    law: AnyLaw,
+    shear: f64,
+    density: f64,
+    fraction: impl FnMut(usize) -> f64,
+) -> Model {
     let mut random = Random(7);
     let n = CELLS + 1;
     let mut rest = Vec::new();
@@ -62,13 +74,15 @@ fn distorted_cube(element: &str, law: AnyLaw) -> Model {
         "tet4" => Cells::tet4(tets(), &rest),
         "tet4-anp" => Cells::averaged_tet4(tets(), &rest, Averaging::Nodal),
         "tet4-ianp" => Cells::averaged_tet4(tets(), &rest, Averaging::Variational),
-        "hex8" => Cells::hex8(hex_nodes.clone(), &rest, 0.2, 700.0),
+        "hex8" => Cells::hex8(hex_nodes.clone(), &rest, 0.2, shear),
         _ => Cells::full_hex8(hex_nodes.clone(), &rest),
     };
     assert_eq!(cells.element(), element);
+    let fractions: Vec<f64> = (0..cells.len()).map(fraction).collect();
+    let cells = cells.filled(&fractions);
     let mut model = Model { mass: vec![0.0; rest.len()], rest, ..Model::default() };
     model.bodies.push(Body { name: "cube".into(), nodes: 0..n.pow(3), damping: 0.0 });
-    let material = Material { law, prony: Prony::default(), density: 1000.0 };
+    let material = Material { law, prony: Prony::default(), density };
     let count = cells.len();
     let fibre = vec![[0.6, 0.0, 0.8]; count * material.law.families()];
     model.add_solid(Solid { body: 0, material, cells, fibre, original: (0..count as u32).collect() });
@@ -160,6 +174,17 @@ fn every_element() -> impl Iterator<Item = Model> {
     laws().into_iter().flat_map(|law| ELEMENTS.map(|element| distorted_cube(element, law)))
 }
 
+/// Each also with cells of which the body fills a part.
+fn every_element_full_or_not() -> impl Iterator<Item = Model> {
+    let mut random = Random(19);
+    let filled = laws().into_iter().flat_map(|law| ELEMENTS.map(|element| (element, law)));
+    every_element().chain(
+        filled.map(move |(element, law)| {
+            filled_cube(element, law, 700.0, 1000.0, |_| 0.55 + 0.9 * random.next())
+        }),
+    )
+}
+
 fn largest(forces: impl IntoIterator<Item = Vector<f64>>) -> f64 {
     forces.into_iter().flatten().fold(0.0, |a, b| f64::max(a, b.abs()))
 }
@@ -188,7 +213,7 @@ fn rigid_motion_costs_no_force_and_no_energy() {
         let along = scale(k, dot(k, x) * (1.0 - c));
         add(add(scale(x, c), scale(cross(k, x), s)), along)
     };
-    for model in every_element() {
+    for model in every_element_full_or_not() {
         let displacement: Vec<_> =
             model.rest.iter().map(|&x| add(sub(turn(x), x), [2.0, -1.0, 0.5])).collect();
         // Against the force of 1 % strain on a face of a cell: 50 Pa × 0.01 m².
@@ -200,7 +225,7 @@ fn rigid_motion_costs_no_force_and_no_energy() {
 #[test]
 fn force_is_the_derivative_of_energy() {
     let mut random = Random(3);
-    for model in every_element() {
+    for model in every_element_full_or_not() {
         let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.008)).collect();
         let (forces, _) = forces(&model, &displacement);
         let scale = largest(forces.iter().copied());
@@ -221,7 +246,7 @@ fn force_is_the_derivative_of_energy() {
 #[test]
 fn forces_and_torques_sum_to_zero() {
     let mut random = Random(5);
-    for model in every_element() {
+    for model in every_element_full_or_not() {
         let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
         let (forces, _) = forces(&model, &displacement);
         let scale = largest(forces.iter().copied());
@@ -244,9 +269,36 @@ fn a_lumped_mass_is_the_whole_mass() {
 }
 
 #[test]
+fn cells_filled_by_half_are_cells_of_half_the_modulus_and_half_the_density() {
+    let (shear, volumetric) = (350.0, Volumetric::quadratic(2500.0));
+    let soft = [
+        AnyLaw::NeoHookean(NeoHookean { shear, volumetric }),
+        AnyLaw::TransverselyIsotropic(TransverselyIsotropic { shear, fibre: 550.0, volumetric }),
+    ];
+    let mut random = Random(23);
+    for (law, soft) in laws().into_iter().zip(soft) {
+        for element in ELEMENTS {
+            let half = filled_cube(element, law, 700.0, 1000.0, |_| 0.5);
+            let light = filled_cube(element, soft, 350.0, 500.0, |_| 1.0);
+            let displacement: Vec<_> = half.rest.iter().map(|_| random.vector(0.01)).collect();
+            // A factor of a power of two commutes with every rounding but those of an averaged pressure.
+            let of = |model| forces(model, &displacement);
+            assert!(apart(&of(&light).0, &of(&half).0) < 1e-14, "{element}");
+            assert!((of(&light).1 - of(&half).1).abs() <= 1e-14 * of(&light).1, "{element}");
+            assert_eq!(half.mass, light.mass);
+            let full = distorted_cube(element, law);
+            let bounds = [&half, &full].map(|model| critical_step::element_bound(model).unwrap().step);
+            assert!((bounds[0] / bounds[1] - 1.0).abs() < 1e-14, "{element}: {bounds:?}");
+            let limits = [&half, &full].map(|model| critical_step::true_limit(model).unwrap().step);
+            assert!((limits[0] / limits[1] - 1.0).abs() < 1e-6, "{element}: {limits:?}");
+        }
+    }
+}
+
+#[test]
 fn single_precision_follows_double() {
     let mut random = Random(11);
-    for model in every_element() {
+    for model in every_element_full_or_not() {
         let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
         let (fine, _) = forces(&model, &displacement);
         let coarse_displacement: Vec<Vector<f32>> = displacement.iter().map(|&u| cast(u)).collect();

@@ -283,18 +283,16 @@ fn compute() -> Result<Findings, CaseError> {
     let size = averaged.displacement.iter().map(|&u| length(u)).collect();
     let mesh = &averaged.brain.mesh;
     let bodies = [
-        Body { label: "(a) at rest".into(), mesh, displacement: rest, value: None },
+        Body { displacement: rest, ..Body::still("(a) at rest", mesh) },
         Body {
-            label: "(b) shifted".into(),
-            mesh,
             displacement: averaged.displacement.clone(),
             value: Some(size),
+            ..Body::still("(b) shifted", mesh)
         },
     ];
     let view = View {
         from: [1.0, -0.75, 0.35],
         up: [0.0, 0.0, 1.0],
-        edges: true,
         quantity: "displacement [mm]",
         factor: 1e3,
         columns: 2,

@@ -114,15 +114,13 @@ fn compute() -> Result<Findings, CaseError> {
         ("(d) fibres along y = z", Some(oblique)),
     ]
     .map(|(label, displacement)| Body {
-        label: label.into(),
-        mesh: &cube.mesh,
         value: displacement.as_deref().map(lateral),
         displacement: displacement.unwrap_or_else(|| vec![[0.0; 3]; cube.mesh.points.len()]),
+        ..Body::still(label, &cube.mesh)
     });
     let view = View {
         from: [0.55, 0.45, 1.0],
         up: [0.0, 1.0, 0.0],
-        edges: true,
         quantity: "lateral displacement [mm]",
         factor: 1e3,
         columns: 2,

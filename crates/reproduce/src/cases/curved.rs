@@ -183,11 +183,6 @@ fn arrow(mesh: &mut Mesh, from: Vector3, to: Vector3, width: f64) {
     }
 }
 
-/// A body that is shown where its points are.
-fn still<'a>(label: &str, mesh: &'a Mesh, value: Option<Vec<f64>>) -> Body<'a> {
-    Body { label: label.into(), mesh, displacement: vec![[0.0; 3]; mesh.points.len()], value }
-}
-
 fn patch() -> Result<Findings, CaseError> {
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.05, 0.0], [0.35, 0.9, 0.0]].map(Vector3::from);
     let mut model_mesh = triangle_mesh(corners.to_vec(), [[0, 1, 2]]);
@@ -219,14 +214,13 @@ fn patch() -> Result<Findings, CaseError> {
     let mut heights = height(&curved_mesh).unwrap_or_default();
     heights.resize(loaded.points.len(), 0.0);
     let bodies = [
-        still("(a) flat, subdivided", &flat_mesh, height(&flat_mesh)),
-        still("(b) curved", &curved_mesh, height(&curved_mesh)),
-        still("(c) a force, and what comes to the nodes", &loaded, Some(heights)),
+        Body { value: height(&flat_mesh), ..Body::still("(a) flat, subdivided", &flat_mesh) },
+        Body { value: height(&curved_mesh), ..Body::still("(b) curved", &curved_mesh) },
+        Body { value: Some(heights), ..Body::still("(c) a force, and what comes to the nodes", &loaded) },
     ];
     let view = View {
         from: [0.25, -1.0, 0.75],
         up: [0.0, 0.0, 1.0],
-        edges: true,
         quantity: "height [m]",
         factor: 1.0,
         columns: 2,
@@ -314,18 +308,11 @@ fn layers() -> Result<Findings, CaseError> {
     let skin = surface.carried(model, &state, &carried[top]);
     arrow(&mut touching, skin - force, skin, 0.022);
     let bodies = [
-        still("shells, with what comes to them", &shells, None),
-        still("their curved surface", &curved, None),
-        still("a fine surface carried, touched", &touching, None),
+        Body::still("shells, with what comes to them", &shells),
+        Body::still("their curved surface", &curved),
+        Body::still("a fine surface carried, touched", &touching),
     ];
-    let view = View {
-        from: [0.2, 1.0, 0.55],
-        up: [0.0, 0.0, 1.0],
-        edges: true,
-        quantity: "",
-        factor: 1.0,
-        columns: 3,
-    };
+    let view = View { from: [0.2, 1.0, 0.55], up: [0.0, 0.0, 1.0], quantity: "", factor: 1.0, columns: 3 };
     let mut findings = Findings::default();
     let caption = "Half a bowl of 96 shells. Positions go from left to right, the force of the contact from right to left.";
     findings.figures.push(figure(&bodies, &view, caption)?);
@@ -485,20 +472,14 @@ fn rendering() -> Result<Findings, CaseError> {
             format!("sphere of 20 shells made an ellipsoid: {name}, largest distance, part of the diagonal");
         findings.rows.push(Row::shown(quantity, "%", off(mesh), ""));
     }
+    let smooth = |label: &str, mesh| Body { edges: false, ..Body::still(label, mesh) };
     let bodies = [
-        still("20 flat shells", &flat_mesh, None),
-        still("the thesis's surface: it gapes", &gaping, None),
-        still("the surface here, subdivided", &curved, None),
-        still("an irregular mesh, carried", &irregular, None),
+        smooth("20 flat shells", &flat_mesh),
+        smooth("the thesis's surface: it gapes", &gaping),
+        smooth("the surface here, subdivided", &curved),
+        smooth("an irregular mesh, carried", &irregular),
     ];
-    let view = View {
-        from: [0.4, -1.0, 0.5],
-        up: [0.0, 0.0, 1.0],
-        edges: false,
-        quantity: "",
-        factor: 1.0,
-        columns: 2,
-    };
+    let view = View { from: [0.4, -1.0, 0.5], up: [0.0, 0.0, 1.0], quantity: "", factor: 1.0, columns: 2 };
     let caption = "A sphere of 20 shells moved to an ellipsoid with axes 1.3, 1 and 0.7.";
     findings.figures.push(figure(&bodies, &view, caption)?);
     Ok(findings)

@@ -128,15 +128,13 @@ fn compute() -> Result<Findings, CaseError> {
     let mesh = &built.bodies[0].mesh;
     let bodies = [("(a) at rest", None), ("(b) TI", Some(elastic)), ("(c) TI + visco at 5 s", Some(relaxed))]
         .map(|(label, stretched)| Body {
-            label: label.into(),
-            mesh,
             value: stretched.as_ref().map(|stretched| at_nodes(cells, nodes, &stretched.stress)),
             displacement: stretched.map_or_else(|| vec![[0.0; 3]; nodes], |stretched| stretched.displacement),
+            ..Body::still(label, mesh)
         });
     let view = View {
         from: [0.15, -1.0, 0.35],
         up: [0.0, 0.0, 1.0],
-        edges: true,
         quantity: "von Mises stress [kPa]",
         factor: 1e-3,
         columns: 2,

@@ -9,6 +9,7 @@ pub mod framework;
 pub mod liver;
 pub mod obstacle_course;
 pub mod plate;
+pub mod reconstruction;
 pub mod relaxation;
 pub mod shear;
 pub mod shell_times;
@@ -31,6 +32,9 @@ pub const CASES: &[Case] = &[
     curved::LAYERS,
     curved::RENDERING,
     obstacle_course::CASE,
+    reconstruction::CYLINDER,
+    reconstruction::CAPSULE,
+    reconstruction::ANEURYSM,
     shell_times::CASE,
 ];
 

@@ -70,6 +70,11 @@ impl Builder<'_> {
         self.check_labels(name, ["density", "1000"], &table.density, mesh);
         self.check_labels(name, ["hourglass", "0.2"], &table.hourglass, mesh);
         if table.model != BodyModel::Solid {
+            if table.fraction.is_some() {
+                let message = format!("`{name}` is a {}, whose cells are all full", table.model.word());
+                let help = "leave it out, or set `model = \"solid\"`";
+                self.error(&["body", name, "fraction"], message, "plays no part", help);
+            }
             self.add_corotational(draft, first);
             return;
         }
@@ -164,6 +169,7 @@ impl Builder<'_> {
         }
         let Some(prony) = self.prony(&law_name, law) else { return };
         let Some(fibre) = self.fibres(draft, &law_name, law, block, &cells) else { return };
+        let Some(fractions) = self.fractions(draft, block, &cells) else { return };
         let material = Material { law: law.law, prony, density: density.0 };
         let first = self.model.bodies[body].nodes.start;
         let rest = &self.model.rest;
@@ -182,6 +188,7 @@ impl Builder<'_> {
             (_, Some(Element::Hex8Full)) => Cells::full_hex8(hexes(), rest),
             _ => Cells::hex8(hexes(), rest, hourglass.0, shear),
         };
+        let cells_of = cells_of.filled(&fractions);
         self.model.add_solid(Solid { body, material, cells: cells_of, fibre, original: cells });
     }
 

@@ -1,18 +1,18 @@
 //! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and repaired.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use pliant_geometry::io::{self, MeshFileError};
 use pliant_geometry::{CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose, reorder};
-use pliant_imaging::{Cleaning, ImageError, LabelError, ReadOptions, Smoothing};
 use pliant_meshing::{
-    Anatomy, Block, DEFAULT_CELL_LIMIT, Deviation, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Missed,
-    OrganTets, Phantom, Resolution, Stuffing, Tube, VolumeCell, Voxels, brain_label,
+    Block, DEFAULT_CELL_LIMIT, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Phantom, Resolution,
+    Stuffing, Tube, VolumeCell, Voxels, brain_label,
 };
 
 use super::Builder;
+use super::images::words;
 use crate::diagnostic::{Diagnostic, counted};
-use crate::format::{BodyModel, BodyTable, Cells, CleanTable, Fix, MeshTable, Organ};
+use crate::format::{BodyModel, BodyTable, Cells, Fix, MeshTable, Organ};
 use crate::output::number;
 
 /// A mesh and where it comes from.
@@ -55,41 +55,46 @@ impl Builder<'_> {
             self.error(path, message, "this mesh", help);
             return None;
         };
-        let of_images = [
-            ("label", table.label.is_some()),
-            ("labels", table.labels.is_some()),
-            ("threshold", table.threshold.is_some()),
-            ("clean", table.clean.is_some()),
+        let from_file = source == "file" && table.cells.is_some();
+        let of_scans = [
+            ("label", table.label.is_some(), false),
+            ("labels", table.labels.is_some(), false),
+            ("threshold", table.threshold.is_some(), false),
+            ("add", table.add.is_some(), false),
+            ("clean", table.clean.is_some(), from_file),
+            ("triangles", table.triangles.is_some(), from_file),
+            ("shells", table.shells.is_some(), from_file),
+            ("error", table.error.is_some(), from_file),
         ];
-        if let Some((key, _)) = of_images.into_iter().find(|(_, given)| *given && source != "image") {
+        let misplaced = |&(_, given, fits): &(&str, bool, bool)| given && !fits && source != "image";
+        if let Some((key, ..)) = of_scans.into_iter().find(misplaced) {
             let message = format!("`{key}` is for images, and this mesh comes from `{source}`");
             self.error(&[path, &[key]].concat(), message, "here", "leave it out");
             return None;
         }
         let mut made = match (&table.file, &table.image) {
+            (Some(file), _) if from_file => self.scanned(file, table, path)?,
+            (_, Some(image)) => self.scanned(image, table, path)?,
             (Some(file), _) => self.file(file.clone(), table, path)?,
-            (_, Some(image)) => self.image(image, table, path)?,
             _ if SOLID_SHAPES.contains(&source) => self.shape(source, table, path)?,
             _ => self.sheet(source, table, path)?,
         };
         let shift = Vector3::from(table.at);
-        for point in &mut made.mesh.points {
-            *point = *point * table.scale + shift;
-        }
+        made.mesh.points.iter_mut().for_each(|point| *point += shift);
         Some(made)
     }
 
     fn file(&mut self, file: PathBuf, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let at = |key| [path, &[key]].concat();
-        for (key, given) in [("edge", table.edge.is_some()), ("as", table.cells.is_some())] {
-            if given {
-                let message = format!("`{key}` is for built-in shapes; a mesh file has its own cells");
-                self.error(&at(key), message, "here", "leave it out");
-                return None;
-            }
+        if table.edge.is_some() {
+            let message = "a mesh file has its own cells, whose `edge` is not for choosing";
+            let help = "leave it out, or add `as = \"tets\"` to make new cells in the surface of the file";
+            self.error(&at("edge"), message, "here", help);
+            return None;
         }
         match io::read(&self.scene.folder.join(&file)) {
-            Ok(read) => {
+            Ok(mut read) => {
+                read.mesh.points.iter_mut().for_each(|point| *point *= table.scale);
                 let name = file.display();
                 self.notes.extend(read.notes.iter().map(|note| format!("{name}: {note}")));
                 Some(MeshOrigin { mesh: read.mesh, origin: format!("{name} ({})", read.format) })
@@ -103,106 +108,6 @@ impl Builder<'_> {
                 None
             }
         }
-    }
-
-    /// The cells of labels of an image.
-    fn image(&mut self, image: &Path, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
-        let at = |key| [path, &[key]].concat();
-        let refused = [
-            ("fix", table.fix.is_some(), "`fix` repairs mesh files", "`clean` cleans the labels of an image"),
-            ("scale", table.scale != 1.0, "`scale` does not go with `image`", "an image tells its own unit"),
-        ];
-        for (key, given, message, help) in refused {
-            if given {
-                self.error(&at(key), message, "here", help);
-                return None;
-            }
-        }
-        let Some(edge) = table.edge else {
-            let help = "add `edge`, the size of a cell in metres, for example `edge = 0.008`";
-            self.error(&at("image"), "`image` needs `edge`", "this image", help);
-            return None;
-        };
-        let (key, chosen, threshold) = match (table.label, &table.labels, table.threshold) {
-            (Some(label), None, None) => ("label", vec![label], None),
-            (None, Some(labels), None) => ("labels", labels.clone(), None),
-            (None, None, Some(threshold)) => ("threshold", vec![1], Some(threshold)),
-            (None, None, None) => ("image", Vec::new(), None),
-            _ => {
-                let message = "an image is cut out by exactly one of `label`, `labels`, `threshold`";
-                self.error(path, message, "this mesh", "leave the others out");
-                return None;
-            }
-        };
-        let read = match pliant_imaging::read(&self.scene.folder.join(image), &ReadOptions::default()) {
-            Ok(read) => read,
-            Err(error) => {
-                let help = match error {
-                    ImageError::Open { .. } => "file names are relative to the scene file",
-                    _ => "`pliant labels` reads an image on its own",
-                };
-                self.error(&at("image"), error.to_string(), "this image", help);
-                return None;
-            }
-        };
-        let name = image.display().to_string();
-        self.notes.extend(read.notes.iter().map(|note| format!("{name}: {note}")));
-        let labels = match threshold {
-            Some(least) => Ok(read.threshold(least..=f64::INFINITY)),
-            None => read.labels(),
-        };
-        let made = labels.map_err(|error| ("image", error)).and_then(|labels| {
-            let CleanTable { close_gaps, fill_holes, keep_largest } = table.clean.unwrap_or_default();
-            let cleaning = Cleaning { close_gaps, fill_holes, keep_largest };
-            Anatomy::from_image(&labels, &chosen, &cleaning, &Smoothing::default(), &|_| {}).map_err(
-                |error| (if matches!(error, LabelError::BadLength { .. }) { "clean" } else { key }, error),
-            )
-        });
-        let (anatomy, cleaned) = match made {
-            Ok(made) => made,
-            Err((key, error)) => {
-                let help = match error {
-                    LabelError::NoneChosen { .. } => {
-                        "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`"
-                    }
-                    LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
-                    LabelError::Absent { .. } if threshold.is_some() => {
-                        "no voxel is as large as that; use a lower threshold"
-                    }
-                    _ => "`pliant labels` lists the labels of an image",
-                };
-                self.error(&at(key), error.to_string(), "here", help);
-                return None;
-            }
-        };
-        if table.clean.is_some() {
-            self.notes.push(format!("{name}: {cleaned}"));
-        }
-        let (mesh, dropped, count) = match fill_anatomy(&anatomy, table.volume_cells(), edge) {
-            Ok(filled) => filled,
-            Err(error) => {
-                self.error(&at("edge"), error.to_string(), "this size", "");
-                return None;
-            }
-        };
-        if count > 0 {
-            self.notes.push(format!("{name}: {dropped} cells in {count} loose parts were dropped"));
-        }
-        // Steps of cubes stay behind the body by up to half of their diagonal.
-        let allowed = if table.volume_cells() == Cells::Tets { edge / 2.0 } else { edge };
-        let missed = Deviation::new(&mesh, anatomy.field(), edge)
-            .and_then(|found| Missed::of(&mesh, anatomy.field(), edge, &found, allowed));
-        for missed in missed.unwrap_or_default() {
-            let place = self.source().span(&at("edge"));
-            let help = "use a shorter edge, or `clean = { keep-largest = true }` for small pieces";
-            self.out.push(Diagnostic::warning(missed.to_string()).at(place, "this size").help(help));
-        }
-        let cells = describe_cells(table.volume_cells());
-        let words = match threshold {
-            Some(least) => format!("from {least} on"),
-            None => format!("label {}", chosen.iter().map(i32::to_string).collect::<Vec<_>>().join(", ")),
-        };
-        Some(MeshOrigin { mesh, origin: format!("{name} ({}), {words}, {cells} of {edge} m", read.format) })
     }
 
     fn shape(&mut self, source: &str, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
@@ -225,6 +130,20 @@ impl Builder<'_> {
             self.error(&at("fix"), "`fix` repairs mesh files; shapes need none", "here", "leave it out");
             return None;
         }
+        let cells = table.made_of();
+        let structured = matches!(source, "block" | "tube");
+        if matches!(cells, Cells::Surface | Cells::Shells) || structured && cells == Cells::ImmersedHexes {
+            let message = format!("`{source}` is not made of {}", words(cells));
+            let help =
+                "tets and hexes fit the faces of blocks and tubes; surfaces and shells are made of images";
+            self.error(
+                &at("as"),
+                message,
+                "here",
+                if structured { help } else { "take tets, hexes or immersed hexes" },
+            );
+            return None;
+        }
         // The scale of an organ is applied to its field, so that `edge` stays in metres; other shapes are in metres.
         if table.organ.is_none() && table.scale != 1.0 {
             let help = "give the shape in metres, or use `scale` with `file` or `organ`";
@@ -232,7 +151,7 @@ impl Builder<'_> {
             return None;
         }
         match make_shape(table, edge) {
-            Ok(FieldMesh { mut mesh, dropped_components, dropped_cells, non_manifold_edges }) => {
+            Ok(FieldMesh { mesh, dropped_components, dropped_cells, non_manifold_edges }) => {
                 if dropped_components > 0 {
                     let note = format!(
                         "{source}: {dropped_cells} cells in {dropped_components} loose parts were dropped"
@@ -243,10 +162,6 @@ impl Builder<'_> {
                     self.notes.push(format!(
                         "{source}: the surface touches itself along {non_manifold_edges} edges, where a gap is thinner than `edge`"
                     ));
-                }
-                if table.organ.is_some() {
-                    // `mesh` scales by `table.scale` afterwards.
-                    mesh.points.iter_mut().for_each(|p| *p /= table.scale);
                 }
                 Some(MeshOrigin { mesh, origin: describe_shape(source, table) })
             }
@@ -369,10 +284,7 @@ fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, 
 }
 
 fn make_shape(table: &MeshTable, edge: f64) -> Result<FieldMesh, MeshingError> {
-    let kind = match table.volume_cells() {
-        Cells::Tets => VolumeCell::Tet,
-        Cells::Hexes => VolumeCell::Hex,
-    };
+    let kind = if table.made_of() == Cells::Tets { VolumeCell::Tet } else { VolumeCell::Hex };
     let whole = |mesh| FieldMesh { mesh, dropped_components: 0, dropped_cells: 0, non_manifold_edges: 0 };
     if let Some(block) = &table.block {
         let resolution = match block.cells {
@@ -386,9 +298,10 @@ fn make_shape(table: &MeshTable, edge: f64) -> Result<FieldMesh, MeshingError> {
             Tube { inner_radius: tube.inner_radius, outer_radius: tube.outer_radius, length: tube.length };
         return tube.mesh(edge, kind, DEFAULT_CELL_LIMIT).map(whole);
     }
-    let fill = |field: &dyn ImplicitField| match table.volume_cells() {
+    let fill = |field: &dyn ImplicitField| match table.made_of() {
         Cells::Tets => Stuffing::new(edge).mesh(field),
-        Cells::Hexes => Voxels::new(edge).mesh(field),
+        Cells::ImmersedHexes => Voxels::new(edge).immersed(field),
+        _ => Voxels::new(edge).mesh(field),
     };
     if let Some(ellipsoid) = &table.ellipsoid {
         return fill(&Ellipsoid { centre: Vector3::zeros(), radii: Vector3::from(ellipsoid.radii) });
@@ -417,34 +330,8 @@ fn label_brain(mesh: &mut Mesh, scale: f64) {
     }
 }
 
-/// The mesh of an anatomy with its labels, and the cells in small pieces that were dropped with the number of these.
-fn fill_anatomy(
-    anatomy: &Anatomy<'_>,
-    cells: Cells,
-    edge: f64,
-) -> Result<(Mesh, usize, usize), MeshingError> {
-    match cells {
-        Cells::Tets => {
-            let made = OrganTets::new(edge).mesh(anatomy, &|_| {})?;
-            Ok((made.mesh, made.report.repairs.dropped_cells, made.report.repairs.dropped_pieces))
-        }
-        Cells::Hexes => {
-            let mut made = Voxels::new(edge).mesh(anatomy.field())?;
-            anatomy.label(&mut made.mesh);
-            Ok((made.mesh, made.dropped_cells, made.dropped_components))
-        }
-    }
-}
-
-fn describe_cells(cells: Cells) -> &'static str {
-    match cells {
-        Cells::Tets => "tets",
-        Cells::Hexes => "hexes",
-    }
-}
-
 fn describe_shape(source: &str, table: &MeshTable) -> String {
-    let cells = describe_cells(table.volume_cells());
+    let cells = words(table.made_of());
     let name = match table.organ {
         Some(Organ::Liver) => "built-in liver",
         Some(Organ::Brain) => "built-in brain",
@@ -555,6 +442,16 @@ mod tests {
             ("{ image = 'a.nii', edge = 1, label = 1, scale = 2 }", "`scale` does not go with `image`"),
             ("{ image = 'a.nii', edge = 1, label = 1, labels = [2] }", "exactly one of `label`"),
             ("{ image = 'a.nii', edge = 1, label = 1 }", "cannot open"),
+            ("{ image = 'a.nii', edge = 1, label = 1, shells = 9 }", "`shells` does not go with tets"),
+            ("{ image = 'a.nii', edge = 1, label = 1, as = 'shells' }", "`edge` does not go with shells"),
+            ("{ image = 'a.nii', label = 1, as = 'shells' }", "exactly one of `shells`, `error`"),
+            ("{ image = 'a.nii', edge = 1, label = 1, add = 'b.nii' }", "`add` goes with `threshold`"),
+            ("{ organ = 'liver', edge = 1, error = 0.1 }", "`error` is for images"),
+            ("{ organ = 'liver', edge = 1, as = 'shells' }", "`organ` is not made of shells"),
+            (
+                "{ block = { size = [1, 1, 1] }, edge = 1, as = 'immersed-hexes' }",
+                "not made of immersed hexes",
+            ),
         ] {
             let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
             let scene = read(&CUBE.replace(own, &format!("mesh = {mesh}")));

@@ -5,6 +5,8 @@ mod bodies;
 mod constraints;
 mod corotational;
 mod fibres;
+mod fractions;
+mod images;
 mod loads;
 mod mass;
 mod meshes;
@@ -16,6 +18,7 @@ use pliant_geometry::{Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 
+use crate::cache::MeshCache;
 use crate::checker::nearest;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{CurveShape, Timing};
@@ -73,13 +76,22 @@ impl BuiltBody {
     }
 }
 
-/// Builds the model of a scene.
+/// Builds the model of a scene; meshes of images are made anew.
 ///
 /// # Errors
 /// All mistakes that were found, with their places.
 pub fn build(scene: &Scene) -> Result<Built, SceneErrors> {
+    build_with(scene, &MeshCache::off())
+}
+
+/// Builds the model of a scene with the meshes of images that are kept.
+///
+/// # Errors
+/// All mistakes that were found, with their places.
+pub fn build_with(scene: &Scene, cache: &MeshCache) -> Result<Built, SceneErrors> {
     let mut builder = Builder {
         scene,
+        cache,
         model: Model::default(),
         corotational: None,
         bodies: Vec::new(),
@@ -112,6 +124,7 @@ pub fn build(scene: &Scene) -> Result<Built, SceneErrors> {
 
 struct Builder<'s> {
     scene: &'s Scene,
+    cache: &'s MeshCache,
     model: Model,
     corotational: Option<Corotational>,
     bodies: Vec<BuiltBody>,

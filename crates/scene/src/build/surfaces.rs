@@ -108,7 +108,7 @@ impl Builder<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::{built, mistakes};
+    use crate::testing::{CUBE, built, built_alone, mistakes};
 
     #[test]
     fn a_carried_surface_moves_rigidly_and_linearly_with_its_body() {
@@ -121,6 +121,56 @@ mod tests {
         for (point, rest) in carried.iter().zip(&surface.rest) {
             assert!(point.iter().zip(rest).all(|(a, b)| (a - b).abs() < 1e-12), "{point:?} {rest:?}");
         }
+    }
+
+    /// De Visser and Comas (2008): what goes down by J comes up by its exact transpose, with nodes beyond the body and with
+    /// points beyond the cubes.
+    #[test]
+    fn the_smooth_surface_of_immersed_cubes_follows_them_and_gives_its_forces_back() {
+        let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
+        let shape = "ellipsoid = { radii = [0.05, 0.04, 0.03] }";
+        let text = CUBE.replace(own, &format!("mesh = {{ {shape}, edge = 0.012, as = 'immersed-hexes' }}"));
+        let text = text.replace("{ set = \"z-min\" }", "{ box = [[-1, -1, -1], [1, 1, -0.02]] }");
+        let built =
+            built_alone(&format!("{text}[surface.skin]\non = 'cube'\nmesh = {{ {shape}, edge = 0.004 }}\n"));
+        let (skin, rest) = (&built.model.surfaces[0], &built.model.rest);
+        assert!(skin.rest.len() > 400 && built.warnings.is_empty());
+        let apart = |a: &[[f64; 3]], b: &[[f64; 3]]| {
+            a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        // At rest it is where it was made; turned by 70° about z and moved, and in any affine motion, it is where it goes.
+        assert!(apart(&skin.mapping.apply(rest), &skin.rest) < 1e-15);
+        let (s, c) = 70.0_f64.to_radians().sin_cos();
+        let rows = [
+            [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]],
+            [[1.2, 0.3, -0.1], [0.2, 0.7, 0.4], [-0.3, 0.1, 1.1]],
+        ];
+        for matrix in rows {
+            let moved = |points: &[[f64; 3]]| -> Vec<[f64; 3]> {
+                let of = |x: &[f64; 3], row: &[f64; 3]| row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + 0.7;
+                points.iter().map(|x| [0, 1, 2].map(|i| of(x, &matrix[i]))).collect()
+            };
+            assert!(apart(&skin.mapping.apply(&moved(rest)), &moved(&skin.rest)) < 1e-10);
+        }
+        // ⟨J v, f⟩ = ⟨v, Jᵀ f⟩.
+        let mut seed = 1_u64;
+        let mut random = |count: usize| -> Vec<[f64; 3]> {
+            let mut next = || {
+                seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+            };
+            (0..count).map(|_| [next(), next(), next()]).collect()
+        };
+        let (velocity, force) = (random(rest.len()), random(skin.rest.len()));
+        let mut up = vec![[0.0; 3]; rest.len()];
+        for (row, &f) in force.iter().enumerate() {
+            skin.mapping.apply_transpose_row(row, f, &mut up);
+        }
+        let inner = |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 {
+            a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
+        };
+        let (down, up) = (inner(&skin.mapping.apply(&velocity), &force), inner(&velocity, &up));
+        assert!((down - up).abs() < 1e-12, "{down} {up}");
     }
 
     #[test]

@@ -32,14 +32,22 @@ pub struct BodyTable {
     /// Thickness of a shell [m]: one, or one for each triangle.
     #[serde(default)]
     pub thickness: Option<Thickness>,
+    /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the mesh where it has
+    /// some and there is no `crease`, else from the triangles.
+    #[serde(default)]
+    pub normals: Option<Normals>,
     /// Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved surface has a kink; 45
-    /// if not given.
+    /// if not given. Not with the normals of a mesh.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 180.0))]
     pub crease: Option<f64>,
     /// Whether more than two triangles of a shell may meet in an edge.
     #[serde(default)]
     pub branches: bool,
+    /// The name of a cell-data array of the mesh with the part of each cell that the body fills, above 0 and at most 1: its
+    /// stiffness and mass are so much smaller, but never less than a tenth. If not given, `fraction` of `immersed-hexes`.
+    #[serde(default)]
+    pub fraction: Option<String>,
     /// Mass-proportional damping [1/s]. All shells and co-rotational solids of a scene have the same.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
@@ -94,6 +102,16 @@ impl BodyModel {
             Self::Shell => "shell",
         }
     }
+}
+
+/// Where the normals at rest of a shell come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Normals {
+    /// The point data `normal` of its mesh, as `pliant mesh --as shells` writes them.
+    Mesh,
+    /// The mean of the triangles round each node.
+    Triangles,
 }
 
 /// Thickness of a shell [m].
@@ -264,13 +282,17 @@ impl Element {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
-    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY.
+    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY. Its own cells are taken, unless `as`
+    /// asks for others made of its surface.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, or the folder of a
     /// DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
     #[serde(default)]
     pub image: Option<PathBuf>,
+    /// Another image of the same voxels whose values are added before the `threshold`, as grey matter to white matter.
+    #[serde(default)]
+    pub add: Option<PathBuf>,
     /// Label of the image to mesh.
     #[serde(default)]
     pub label: Option<i32>,
@@ -281,7 +303,7 @@ pub struct MeshTable {
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
     #[serde(default)]
     pub threshold: Option<f64>,
-    /// Cleaning of the labels of an image before they are meshed.
+    /// Cleaning of the labels of an image, or of what the surface of a file encloses, before new cells are made.
     #[serde(default)]
     pub clean: Option<CleanTable>,
     /// A box from the origin.
@@ -316,11 +338,23 @@ pub struct MeshTable {
     /// A strip of triangles along x that turns about the x axis. Point sets: `x-min`, `x-max`, `low`, `high`.
     #[serde(default)]
     pub twisted_strip: Option<TwistedStripShape>,
-    /// Target edge length of the cells of a built-in shape or an image [m].
+    /// Target edge length of the cells of a built-in shape, an image or what the surface of a file encloses [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
-    /// Cells of a built-in shape or an image; tets if not given.
+    /// Number of triangles of a `surface` of an image or a file, instead of `edge`: as few, placed where the shape needs them.
+    #[serde(default)]
+    #[schemars(range(min = 4))]
+    pub triangles: Option<u32>,
+    /// Number of `shells` fitted to an image or to the surface of a file.
+    #[serde(default)]
+    #[schemars(range(min = 4))]
+    pub shells: Option<u32>,
+    /// Largest distance of `shells` from the surface of an image, both ways, as a part of the diagonal of its box.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub error: Option<f64>,
+    /// Cells of a built-in shape or an image (tets if not given), or of the closed surface of a `file`.
     #[serde(default, rename = "as")]
     pub cells: Option<Cells>,
     /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).
@@ -340,8 +374,8 @@ fn one() -> f64 {
 }
 
 impl MeshTable {
-    /// The volume cells of a built-in shape or an image.
-    pub fn volume_cells(&self) -> Cells {
+    /// The cells of a built-in shape or an image.
+    pub fn made_of(&self) -> Cells {
         self.cells.unwrap_or_default()
     }
 }
@@ -403,6 +437,14 @@ pub enum Cells {
     Tets,
     /// Hexahedra: structured for blocks and tubes, cubes with a stepped surface for ellipsoids, organs and images.
     Hexes,
+    /// All cubes that an ellipsoid, an organ or an image fills by more than 2 %, with their stiffness and mass by the part that it
+    /// fills. A carried surface shows it smooth.
+    ImmersedHexes,
+    /// The smooth surface of an image in triangles: even ones of `edge`, as few as `triangles`, or for a carried surface as fine as
+    /// the voxels.
+    Surface,
+    /// Curved shells fitted to the smooth surface of an image: as many as `shells`, or as close as `error`.
+    Shells,
 }
 
 /// A box with one corner at the origin.
@@ -593,6 +635,7 @@ pub enum Organ {
 pub struct SurfaceTable {
     /// The body that carries it.
     pub on: String,
-    /// The surface: triangles or quads of a file, or the boundary of a built-in shape or an image.
+    /// The surface: triangles or quads of a file, the boundary of a built-in shape, or of an image its boundary or, with
+    /// `as = "surface"`, its smooth surface.
     pub mesh: MeshTable,
 }

@@ -12,10 +12,13 @@ use crate::build::bodies::{Draft, nodes};
 use crate::build::meshes::surface_of;
 use crate::build::{Builder, SCENE, bodies, suggestion};
 use crate::diagnostic::{Diagnostic, counted};
-use crate::format::{BodyModel, BodyTable, Element, Thickness, ThicknessRule};
+use crate::format::{BodyModel, BodyTable, Element, Normals, Thickness, ThicknessRule};
 
 /// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
 const DRILLING: f64 = 0.01;
+
+/// Point data with the normals of a surface.
+const NORMAL: &str = "normal";
 
 impl Builder<'_> {
     /// The mesh of a shell as triangles only: quads cut in two, volume cells left for their boundary.
@@ -86,6 +89,7 @@ impl Builder<'_> {
         let formulation = self.formulation(name, table)?;
         let material = self.materials(draft, block)?;
         let thickness = self.thickness(name, table, block)?;
+        let normals = self.normals(draft, first)?;
         let cells: Vec<[u32; 3]> = (0..block.len() as u32).map(|cell| nodes(block, cell, first)).collect();
         let count = cells.len();
         let shell = Shell {
@@ -95,6 +99,7 @@ impl Builder<'_> {
             material,
             formulation,
             crease: table.crease.unwrap_or(45.0).to_radians(),
+            normals,
             branches: table.branches,
         };
         let part = self.corotational.as_mut()?;
@@ -249,6 +254,36 @@ impl Builder<'_> {
         }
     }
 
+    /// The normals that the mesh gives to the nodes of a shell, by their numbers in the model.
+    fn normals(&mut self, draft: &Draft<'_>, first: u32) -> Option<BTreeMap<u32, Vector3>> {
+        let &Draft { name, table, mesh, .. } = draft;
+        if table.normals == Some(Normals::Mesh) && table.crease.is_some() {
+            let message = format!("`{name}` has its normals from the mesh, where there is no crease");
+            self.error(&["body", name, "crease"], message, "means nothing here", "remove it, or `normals`");
+            return None;
+        }
+        let found = mesh.point_data.get(NORMAL).filter(|data| data.components == 3);
+        match (table.normals, found) {
+            (Some(Normals::Triangles), _) | (None, None) => Some(BTreeMap::new()),
+            (None, Some(_)) if table.crease.is_some() => Some(BTreeMap::new()),
+            (Some(Normals::Mesh), None) => {
+                let message =
+                    format!("the mesh of `{name}` has no point data `{NORMAL}` of three components");
+                let help = "`pliant mesh --as shells` writes them into .vtu files; or leave `normals` out";
+                self.error(&["body", name, "normals"], message, "not in the mesh", help);
+                None
+            }
+            (_, Some(data)) => {
+                self.notes.push(format!("`{name}` is curved by the normals of its mesh"));
+                let of = |node: u32| {
+                    let given = data.item(node as usize);
+                    (first + node, Vector3::new(given[0], given[1], given[2]))
+                };
+                Some((0..mesh.points.len() as u32).map(of).collect())
+            }
+        }
+    }
+
     fn tell_notes(&mut self, name: &str, notes: corotational::Notes, count: usize) {
         if notes.turned > 0 {
             self.notes.push(format!(
@@ -295,6 +330,9 @@ impl Builder<'_> {
             }
             ModelError::OutOfRange { what, .. } if what.starts_with("density") => ("density", ""),
             ModelError::OutOfRange { .. } => ("law", "give the law other constants"),
+            ModelError::Normal { .. } => {
+                ("mesh", "`normals = \"triangles\"` takes the mean of the triangles instead")
+            }
             ModelError::Branch { .. } => {
                 ("mesh", "set `branches = true` if walls are meant to meet there, or repair the mesh")
             }

@@ -146,6 +146,11 @@ impl Builder<'_> {
     fn check_keys_of_shells(&mut self, present: bool) {
         let run = &self.scene.run;
         let newton = present && matches!(run.solver, SolverName::Implicit | SolverName::Static);
+        let dynamic = matches!(run.solver, SolverName::Explicit | SolverName::Implicit);
+        if dynamic && self.source().node(&["run", "load-steps"]).is_some() {
+            let message = "`load-steps` is for `solver = \"quasi-static\"` and `\"static\"`; others take a `step` in seconds";
+            self.error(&["run", "load-steps"], message, "means nothing here", "remove it");
+        }
         for (key, wanted, of) in [
             ("iterations", newton, "`solver = \"implicit\"` and `\"static\"`"),
             ("linear", newton, "`solver = \"implicit\"` and `\"static\"`"),
@@ -161,6 +166,7 @@ impl Builder<'_> {
             let others = [
                 ("thickness", shell, "a shell"),
                 ("crease", shell, "a shell"),
+                ("normals", shell, "a shell"),
                 ("branches", shell, "a shell"),
                 ("stiffness-damping", body.model != BodyModel::Solid, "shells and co-rotational solids"),
                 ("initial-displacement", body.model != BodyModel::Solid, "shells and co-rotational solids"),
@@ -296,10 +302,56 @@ impl Corotational {
 #[cfg(test)]
 mod tests {
     use pliant_corotational::Forces;
+    use pliant_geometry::{DataArray, Vector3, io};
 
     use crate::build::build;
     use crate::scene::Scene;
     use crate::source::Source;
+
+    /// A sphere of 20 triangles, whose mesh has the normals of an ellipsoid.
+    #[test]
+    fn the_normals_of_a_mesh_are_taken_unless_creases_are_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut mesh = pliant_meshing::sphere(0.1, 0, 100).unwrap();
+        let normal = |p: &Vector3| [-p.x, -p.y, -2.0 * p.z];
+        let values = mesh.points.iter().flat_map(normal).collect();
+        mesh.point_data.insert("normal".into(), DataArray { components: 3, values });
+        io::write(&folder.path().join("ball.vtu"), &mesh).unwrap();
+        mesh.point_data.clear();
+        io::write(&folder.path().join("plain.vtu"), &mesh).unwrap();
+        let built = |file: &str, more: &str| {
+            let text = format!(
+                "[scene]\nuntil = 1\n[run]\nsolver = 'implicit'\n[law.wall]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\n\
+                 poisson-ratio = 0.3\n[body.wall]\nmodel = 'shell'\nlaw = 'wall'\nmesh = {{ file = '{file}' }}\n\
+                 density = 1000\nthickness = 0.001\n{more}"
+            );
+            let source = Source::parse("ball.toml", text).unwrap();
+            build(&Scene::from_source(source, folder.path().into()).unwrap())
+        };
+        let off = |file: &str, more: &str| {
+            let model = built(file, more).unwrap().corotational.unwrap().model;
+            assert_eq!(model.normals.len(), 12);
+            let wanted = model.rest.iter().map(|p| Vector3::new(p.x, p.y, 2.0 * p.z).normalize());
+            let off = model.normals.iter().zip(wanted).map(|(n, wanted)| (n.direction - wanted).norm());
+            off.fold(0.0, f64::max)
+        };
+        for (file, more, same) in [
+            ("ball.vtu", "", true),
+            ("ball.vtu", "normals = 'mesh'", true),
+            ("ball.vtu", "normals = 'triangles'", false),
+            ("ball.vtu", "crease = 45", false),
+            ("plain.vtu", "", false),
+        ] {
+            assert_eq!(off(file, more) < 1e-12, same, "{file} {more}: {}", off(file, more));
+        }
+        for (file, more, says) in [
+            ("plain.vtu", "normals = 'mesh'", "has no point data `normal`"),
+            ("ball.vtu", "normals = 'mesh'\ncrease = 30", "has its normals from the mesh"),
+        ] {
+            let told = built(file, more).unwrap_err().plain().to_string();
+            assert!(told.contains(says), "{told}");
+        }
+    }
 
     /// A plate that starts turned by a right angle, as a table tells, is not strained: its nodes have turned with it.
     #[test]

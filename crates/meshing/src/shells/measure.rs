@@ -1,0 +1,219 @@
+//! Distances between shells and their target, both ways.
+
+use pliant_geometry::{
+    CellKind, CurvedTriangle, DataArray, Mesh, Surface, SurfaceLocator, Vector3, boundary,
+};
+use rayon::prelude::*;
+
+use super::{Detail, FittedShells, ShellGoal, ShellReport, Shells, Target};
+use crate::hausdorff::{Hausdorff, Sample, distance, lattice, locator, samples, spread};
+use crate::triangles::shape;
+
+/// Parts of an edge of the flat triangles among which the nearest place of the shells is looked for.
+const FACETS: usize = 8;
+
+/// Where a point of the target is nearest to the shells.
+#[derive(Clone, Copy)]
+pub(super) struct Landing {
+    pub(super) point: Vector3,
+    pub(super) shell: u32,
+    pub(super) place: [f64; 3],
+    pub(super) off: f64,
+    /// Unit vector from the point to there.
+    pub(super) along: Vector3,
+}
+
+/// Distances of shells.
+pub(super) struct Distances {
+    /// The largest of each shell from the target, by the number of its triangle [m].
+    there: Vec<f64>,
+    /// Parts of an edge between the places of a shell that were looked at.
+    parts: usize,
+    /// Of the points of the target, in their order.
+    pub(super) landings: Vec<Landing>,
+}
+
+impl Distances {
+    /// The largest of each shell, by the number of its triangle, both ways [m].
+    pub(super) fn far(&self) -> Vec<f64> {
+        let mut far = self.there.clone();
+        for landing in &self.landings {
+            let far = &mut far[landing.shell as usize];
+            *far = far.max(landing.off);
+        }
+        far
+    }
+}
+
+impl Shells {
+    /// All distances.
+    pub(super) fn distances(&self, detail: &Detail, target: &Target) -> Distances {
+        let shells: Vec<u32> = self.mesh.alive().collect();
+        let mut there = vec![0.0; self.mesh.triangles.len()];
+        self.measure(&shells, detail.parts, target, &mut there);
+        let nearest = Nearest::new(self, shells);
+        let landings =
+            detail.samples.par_iter().filter_map(|sample| nearest.landing(&sample.point)).collect();
+        Distances { there, parts: detail.parts, landings }
+    }
+
+    /// Distances after some shells have moved. Points of the target that were nearest to these are looked for on them and their
+    /// neighbours; others are at most as far off as before.
+    pub(super) fn distances_after(&self, before: &Distances, target: &Target) -> Distances {
+        let (moving, resting): (Vec<u32>, Vec<u32>) = self.mesh.alive().partition(|&t| self.moves(t));
+        let mut there = before.there.clone();
+        there.resize(self.mesh.triangles.len(), 0.0);
+        self.measure(&moving, before.parts, target, &mut there);
+        let mut near = vec![false; self.mesh.points.len()];
+        moving.iter().flat_map(|&t| self.mesh.triangles[t as usize]).for_each(|n| near[n as usize] = true);
+        let beside = resting
+            .into_iter()
+            .filter(|&t| self.mesh.triangles[t as usize].iter().any(|&n| near[n as usize]));
+        let nearest = Nearest::new(self, moving.iter().copied().chain(beside).collect());
+        let again = |landing: &Landing| {
+            if self.moves(landing.shell) {
+                nearest.landing(&landing.point).unwrap_or(*landing)
+            } else {
+                *landing
+            }
+        };
+        Distances { there, parts: before.parts, landings: before.landings.par_iter().map(again).collect() }
+    }
+
+    /// The largest distance of shells from the target.
+    fn measure(&self, shells: &[u32], parts: usize, target: &Target, there: &mut [f64]) {
+        let places = lattice(parts);
+        let of = |&t: &u32| {
+            let patch = self.patch(t);
+            let off = |&w: &[f64; 3]| {
+                let x = patch.point(w);
+                (target.reference.closest(&x).0 - x).norm()
+            };
+            places.iter().map(off).fold(0.0, f64::max)
+        };
+        let found: Vec<f64> = shells.par_iter().map(of).collect();
+        shells.iter().zip(found).for_each(|(&t, off)| there[t as usize] = off);
+    }
+
+    /// Measures all and tells what was found.
+    pub(super) fn finished(self, target: &Target, rounds: usize, goal: ShellGoal) -> FittedShells {
+        let samples = &target.fine.samples;
+        let measured = self.distances(&target.fine, target);
+        let (error_map, forward) = self.picture(target);
+        let back: Vec<f64> = measured.landings.iter().map(|landing| landing.off).collect();
+        let distances = Hausdorff::of(forward, spread(samples, &back));
+        let shapes: Vec<f64> = self.mesh.alive().map(|t| shape(self.mesh.corners(t))).collect();
+        let mut mesh = self.mesh.to_mesh();
+        let normals = self.normals.iter().flat_map(|n| [n.x, n.y, n.z]).collect();
+        mesh.point_data.insert("normal".into(), DataArray { components: 3, values: normals });
+        let far = DataArray::scalar(measured.far());
+        mesh.block_mut(CellKind::Triangle).data.insert("distance".into(), far);
+        let report = ShellReport {
+            shells: shapes.len(),
+            nodes: self.mesh.points.len(),
+            shape: [
+                shapes.iter().copied().fold(f64::INFINITY, f64::min),
+                shapes.iter().sum::<f64>() / shapes.len().max(1) as f64,
+            ],
+            distances,
+            flat: self.flat(target),
+            diagonal: target.diagonal,
+            rounds,
+            reached: match goal {
+                ShellGoal::Error(error) => distances.largest() <= error * target.diagonal,
+                ShellGoal::Shells(number) => shapes.len() + 1 >= number,
+            },
+        };
+        FittedShells { mesh, error_map, report }
+    }
+
+    /// Distances of the flat triangles.
+    fn flat(&self, target: &Target) -> Hausdorff {
+        let locator = locator(&self.mesh);
+        let own = samples(&self.mesh, target.diagonal / 200.0);
+        let there = |s: &Sample| (target.reference.closest(&s.point).0 - s.point).norm();
+        let there: Vec<f64> = own.par_iter().map(there).collect();
+        let back = target.fine.samples.par_iter().map(|s| distance(&locator, &s.point)).collect::<Vec<_>>();
+        Hausdorff::of(spread(&own, &there), spread(&target.fine.samples, &back))
+    }
+
+    /// The curved surface in small triangles with its distances, and the spread of these.
+    fn picture(&self, target: &Target) -> (Mesh, (f64, f64)) {
+        let (places, pieces) = (lattice(target.fine.parts), pieces(target.fine.parts));
+        let triangles: Vec<u32> = self.mesh.alive().collect();
+        let of = |&t: &u32| {
+            let patch = self.patch(t);
+            let area = self.mesh.area(t) / places.len() as f64;
+            let place = |&w: &[f64; 3]| {
+                let point = patch.point(w);
+                (Sample { point, area }, (target.reference.closest(&point).0 - point).norm())
+            };
+            places.iter().map(place).collect::<Vec<_>>()
+        };
+        let all: Vec<(Sample, f64)> = triangles.par_iter().flat_map_iter(of).collect();
+        let (samples, far): (Vec<Sample>, Vec<f64>) = all.into_iter().unzip();
+        let mut mesh = Mesh { points: samples.iter().map(|s| s.point).collect(), ..Mesh::default() };
+        let corners = (0..triangles.len()).flat_map(|t| {
+            let places = places.len();
+            pieces.iter().flatten().map(move |&k| (t * places) as u32 + k)
+        });
+        mesh.block_mut(CellKind::Triangle).nodes = corners.collect();
+        let found = spread(&samples, &far);
+        mesh.point_data.insert("distance".into(), DataArray::scalar(far));
+        (mesh, found)
+    }
+}
+
+/// The small triangles between the places of a lattice.
+fn pieces(n: usize) -> Vec<[u32; 3]> {
+    // Row i of the lattice has n − i + 1 places.
+    let at = |i: usize, j: usize| ((i * (2 * n + 3 - i)) / 2 + j) as u32;
+    let mut found = Vec::with_capacity(n * n);
+    for i in 0..n {
+        for j in 0..n - i {
+            found.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
+            if j + 1 < n - i {
+                found.push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+    }
+    found
+}
+
+/// Finds the nearest place of all shells, from small flat triangles on.
+struct Nearest {
+    patches: Vec<CurvedTriangle>,
+    triangles: Vec<u32>,
+    locator: SurfaceLocator,
+    places: Vec<[f64; 3]>,
+}
+
+impl Nearest {
+    fn new(shells: &Shells, triangles: Vec<u32>) -> Self {
+        let (places, pieces) = (lattice(FACETS), pieces(FACETS));
+        let patches: Vec<CurvedTriangle> = triangles.iter().map(|&t| shells.patch(t)).collect();
+        let mut mesh = Mesh {
+            points: patches.iter().flat_map(|patch| places.iter().map(|&w| patch.point(w))).collect(),
+            ..Mesh::default()
+        };
+        let count = places.len();
+        mesh.block_mut(CellKind::Triangle).nodes = (0..patches.len())
+            .flat_map(|t| pieces.iter().flatten().map(move |&k| (t * count) as u32 + k))
+            .collect();
+        let surface: Surface = boundary(&mesh);
+        let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
+        Self { patches, triangles, locator: SurfaceLocator::new(&surface, &faces, &mesh.points), places }
+    }
+
+    /// The nearest place of the shells.
+    fn landing(&self, point: &Vector3) -> Option<Landing> {
+        let at = self.locator.closest(point)?;
+        let count = self.places.len();
+        let shell = at.nodes[0] as usize / count;
+        let corners = at.nodes.map(|node| self.places[node as usize % count]);
+        let start = [0, 1, 2].map(|k| (0..3).map(|c| at.weights[c] * corners[c][k]).sum());
+        let (place, off) = self.patches[shell].closest(point, start);
+        let along = (self.patches[shell].point(place) - point).try_normalize(0.0).unwrap_or_default();
+        Some(Landing { point: *point, shell: self.triangles[shell], place, off, along })
+    }
+}

@@ -1,0 +1,157 @@
+//! Changes of the shells' triangles: evening out, halving, collapsing.
+
+use pliant_geometry::Vector3;
+
+use super::fit::frame;
+use super::{LEAST_SHAPE, Shells, Target};
+use crate::triangles::{cross, shape};
+
+/// Triangles of a better shape than this are left alone by moves that would make them worse.
+const GOOD_SHAPE: f64 = 0.75;
+
+/// A triangle looks along the normals of its corners where the cosines are above this.
+const UPRIGHT: f64 = 0.3;
+
+/// Points of a border stay where they are if their edges there meet at less than this angle [rad].
+const BEND: f64 = 2.0;
+
+impl Shells {
+    /// Puts a point on the target, or on its border, with the normal there.
+    pub(super) fn place(&mut self, point: u32, target: &Target) {
+        let here = self.mesh.points[point as usize];
+        let place = if self.on_border[point as usize] {
+            target.reference.closest_on_lines(&here)
+        } else {
+            target.reference.closest(&here).0
+        };
+        self.mesh.points[point as usize] = place;
+        let normal = target.reference.closest(&place).1;
+        if normal != Vector3::zeros() {
+            self.normals[point as usize] = normal;
+        }
+    }
+
+    /// Flips edges and moves points along the target to better triangles.
+    pub(super) fn even_out(&mut self, target: &Target, times: usize) {
+        for _ in 0..times {
+            for [a, b] in self.mesh.edges() {
+                let Some(new) = self.mesh.flipped(a, b) else { continue };
+                let [Some(s), Some(t)] = self.mesh.sides(a, b) else { continue };
+                let worst = |of: [[u32; 3]; 2]| {
+                    of.iter().map(|&nodes| self.worth(nodes, self.at(nodes))).fold(1.0, f64::min)
+                };
+                let active = new.as_flattened().iter().all(|&n| self.active[n as usize]);
+                if active && worst(new) > 1.1 * worst([s, t].map(|t| self.mesh.triangles[t as usize])) {
+                    self.mesh.flip(a, b, new);
+                }
+            }
+            for point in 0..self.mesh.points.len() as u32 {
+                if self.active[point as usize] {
+                    self.move_along(point, target);
+                }
+            }
+        }
+    }
+
+    fn at(&self, nodes: [u32; 3]) -> [Vector3; 3] {
+        nodes.map(|n| self.mesh.points[n as usize])
+    }
+
+    /// The shape of a triangle, less where it does not look along the normals of its corners, down to 0 where it stands across them.
+    fn worth(&self, nodes: [u32; 3], x: [Vector3; 3]) -> f64 {
+        let normal = cross(x).try_normalize(0.0).unwrap_or_default();
+        let along = nodes.iter().map(|&n| self.normals[n as usize].dot(&normal)).fold(1.0, f64::min);
+        shape(x) * (along / UPRIGHT).clamp(0.0, 1.0)
+    }
+
+    /// Least worth of the triangles round a point, were it at a position.
+    pub(super) fn worth_round(&self, point: u32, position: &Vector3) -> f64 {
+        let of = |&t: &u32| {
+            let nodes = self.mesh.triangles[t as usize];
+            self.worth(
+                nodes,
+                nodes.map(|n| if n == point { *position } else { self.mesh.points[n as usize] }),
+            )
+        };
+        self.mesh.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst, and where they are poor to the
+    /// best of some places around.
+    fn move_along(&mut self, point: u32, target: &Target) {
+        let here = self.mesh.points[point as usize];
+        if let [a, b] = self.mesh.marked(point)[..]
+            && (self.mesh.points[a as usize] - here).angle(&(self.mesh.points[b as usize] - here)) < BEND
+        {
+            return;
+        }
+        let Some(aim) = self.mesh.evener(point, &target.reference) else { return };
+        let own = self.worth_round(point, &here);
+        let project = |x: Vector3| {
+            if self.on_border[point as usize] {
+                target.reference.closest_on_lines(&x)
+            } else {
+                target.reference.closest(&x).0
+            }
+        };
+        let mut aims = vec![project(here + 0.4 * (aim - here)), aim];
+        if own < GOOD_SHAPE {
+            let around = self.mesh.neighbours(point);
+            let lengths = around.iter().map(|&n| (self.mesh.points[n as usize] - here).norm());
+            let size = 0.15 * lengths.fold(f64::INFINITY, f64::min);
+            let [first, second, _] = frame(&self.normals[point as usize]);
+            let way = |k: usize| (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
+            aims.extend((0..8).map(|k| project(here + size * (way(k).1 * first + way(k).0 * second))));
+        }
+        let best = aims
+            .into_iter()
+            .map(|aim| (self.worth_round(point, &aim).min(GOOD_SHAPE), aim))
+            .max_by(|a, b| a.0.total_cmp(&b.0).then(std::cmp::Ordering::Greater));
+        if let Some((worth, aim)) = best
+            && worth >= own.min(GOOD_SHAPE)
+        {
+            self.mesh.points[point as usize] = aim;
+            self.place(point, target);
+        }
+    }
+
+    /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a number. They, their
+    /// neighbours and poor triangles may move from then on.
+    pub(super) fn refine(&mut self, far: &[f64], bound: f64, room: usize, target: &Target) {
+        let mut order: Vec<u32> = self.mesh.alive().filter(|&t| far[t as usize] > bound).collect();
+        order.sort_by(|&a, &b| far[b as usize].total_cmp(&far[a as usize]));
+        let mut touched = vec![false; far.len()];
+        let mut halved = 0;
+        let mut changed = self.corners_of(far, bound);
+        for t in order {
+            if halved == room {
+                break;
+            }
+            let nodes = self.mesh.triangles[t as usize];
+            let length = |k: &usize| (self.mesh.corners(t)[*k] - self.mesh.corners(t)[(k + 1) % 3]).norm();
+            let longest = [0, 1, 2].into_iter().max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
+            let [a, b] = [nodes[longest], nodes[(longest + 1) % 3]];
+            let sides = self.mesh.sides(a, b);
+            if sides.iter().flatten().any(|&s| touched[s as usize]) {
+                continue;
+            }
+            sides.iter().flatten().for_each(|&s| touched[s as usize] = true);
+            let patch = self.patch(t);
+            let mut place = [0.0; 3];
+            (place[longest], place[(longest + 1) % 3]) = (0.5, 0.5);
+            let fresh = self.mesh.split(a, b, patch.point(place));
+            self.normals.push(patch.normal(place));
+            self.on_border.push(sides[1].is_none());
+            touched.resize(self.mesh.triangles.len(), true);
+            self.place(fresh, target);
+            changed.push(fresh);
+            halved += 1;
+        }
+        let poor = |t: &u32| {
+            let nodes = self.mesh.triangles[*t as usize];
+            self.worth(nodes, self.at(nodes)) < LEAST_SHAPE
+        };
+        changed.extend(self.mesh.alive().filter(poor).flat_map(|t| self.mesh.triangles[t as usize]));
+        self.activate(changed);
+    }
+}

@@ -1,0 +1,28 @@
+//! A number for the text of everything that makes meshes of images, as `PLIANT_MESHER`: another text, another key in the cache of
+//! meshes. Where the other crates do not lie beside this one, their version stands for them.
+
+use std::collections::hash_map::DefaultHasher;
+use std::fs;
+use std::hash::Hasher;
+use std::path::{Path, PathBuf};
+
+fn main() {
+    let mut hash = DefaultHasher::new();
+    for name in ["geometry", "imaging", "meshing"] {
+        let folder = Path::new("..").join(name).join("src");
+        println!("cargo:rerun-if-changed={}", folder.display());
+        for file in files(&folder) {
+            hash.write(&fs::read(&file).unwrap_or_default());
+        }
+    }
+    let version = std::env::var("CARGO_PKG_VERSION").unwrap_or_default();
+    println!("cargo:rustc-env=PLIANT_MESHER={version}-{:016x}", hash.finish());
+}
+
+/// All files in a folder and below, in the order of their names.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut entries: Vec<PathBuf> =
+        fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+    entries.sort();
+    entries.into_iter().flat_map(|entry| if entry.is_dir() { files(&entry) } else { vec![entry] }).collect()
+}

@@ -1,0 +1,240 @@
+//! Meshes of images, kept between runs. A mesh lies in a file that is named after what it is made of: the content of the image, all
+//! parameters and the mesher itself, so that it is never stale. A file appears under its name only once it is whole, and one that
+//! is damaged counts as missing; so any number of processes can share a folder. The files that were used last stay.
+//!
+//! The file: [`MAGIC`], the CRC-32 of the body (u32, little-endian), the body in postcard's encoding.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use pliant_geometry::{CellBlock, DataArray, Mesh, Vector3};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// The first bytes of every file.
+const MAGIC: [u8; 8] = *b"\x89PLMESH\n";
+/// Endings of files that are whole, and of those under way.
+const ENDINGS: [&str; 2] = ["pliant-mesh", "pliant-mesh-part"];
+/// Bytes that all files may take together unless the caller says otherwise.
+const DEFAULT_LIMIT: u64 = 1 << 30;
+/// Names the folder, or says `off`.
+const VARIABLE: &str = "PLIANT_CACHE";
+
+/// Where meshes of images are kept.
+#[derive(Clone, Debug, Default)]
+pub struct MeshCache {
+    folder: Option<PathBuf>,
+    /// Bytes that all files may take together; the ones used longest ago go first.
+    limit: u64,
+}
+
+/// A mesh as it was made, with all that was said about it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Kept {
+    pub mesh: Mesh,
+    pub notes: Vec<String>,
+    pub doubts: Vec<String>,
+}
+
+/// The body of a file.
+#[derive(Serialize, Deserialize)]
+struct Body {
+    points: Vec<[f64; 3]>,
+    blocks: Vec<CellBlock>,
+    point_data: BTreeMap<String, DataArray>,
+    notes: Vec<String>,
+    doubts: Vec<String>,
+}
+
+/// What a mesh is made of, as a number.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Key(String);
+
+impl Key {
+    /// Of the content of an image or a surface, given in pieces, and a recipe that says in full what is made of it.
+    pub fn new(content: impl FnOnce(&mut dyn FnMut(&[u8])), recipe: &impl std::fmt::Debug) -> Self {
+        let mut hash = Sha256::new();
+        hash.update(env!("PLIANT_MESHER"));
+        hash.update(format!("{recipe:?}"));
+        content(&mut |piece| {
+            hash.update((piece.len() as u64).to_le_bytes());
+            hash.update(piece);
+        });
+        Self(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+}
+
+impl MeshCache {
+    /// Keeps nothing.
+    pub fn off() -> Self {
+        Self::default()
+    }
+
+    /// A folder of its own, of a gigabyte at most; made when it is needed.
+    pub fn in_folder(folder: PathBuf) -> Self {
+        Self { folder: Some(folder), limit: DEFAULT_LIMIT }
+    }
+
+    /// The folder that the variable `PLIANT_CACHE` names, where it does not say `off`; else `pliant/meshes` in the user's
+    /// folder for caches.
+    pub fn of_user() -> Self {
+        match std::env::var_os(VARIABLE).filter(|value| !value.is_empty()) {
+            Some(value) if value == "off" => Self::off(),
+            Some(folder) => Self::in_folder(folder.into()),
+            None => etcetera::choose_base_strategy().map_or_else(
+                |_| Self::off(),
+                |user| {
+                    Self::in_folder(etcetera::BaseStrategy::cache_dir(&user).join("pliant").join("meshes"))
+                },
+            ),
+        }
+    }
+
+    /// The same folder for another number of bytes.
+    pub fn limited(self, limit: u64) -> Self {
+        Self { limit, ..self }
+    }
+
+    /// Whether anything is kept.
+    pub(crate) fn is_on(&self) -> bool {
+        self.folder.is_some()
+    }
+
+    /// What was kept under a key, where it is whole.
+    pub(crate) fn get(&self, key: &Key) -> Option<Kept> {
+        let path = self.path(key)?;
+        let bytes = fs::read(&path).ok()?;
+        let (crc, body) = bytes.strip_prefix(&MAGIC)?.split_first_chunk()?;
+        if u32::from_le_bytes(*crc) != crc32fast::hash(body) {
+            return None;
+        }
+        let Body { points, blocks, point_data, notes, doubts } = postcard::from_bytes(body).ok()?;
+        // Used now: it stays longer than others. Where that can't be noted, no harm is done.
+        let _ =
+            File::options().append(true).open(&path).and_then(|file| file.set_modified(SystemTime::now()));
+        let points = points.into_iter().map(Vector3::from).collect();
+        Some(Kept { mesh: Mesh { points, blocks, point_data, ..Mesh::default() }, notes, doubts })
+    }
+
+    /// Keeps a mesh under its key, and drops what was used longest ago where there is more than the limit.
+    pub(crate) fn put(&self, key: &Key, kept: &Kept) -> io::Result<()> {
+        let (Some(path), Some(folder)) = (self.path(key), &self.folder) else { return Ok(()) };
+        let Kept { mesh, notes, doubts } = kept.clone();
+        let points = mesh.points.into_iter().map(Into::into).collect();
+        let body = Body { points, blocks: mesh.blocks, point_data: mesh.point_data, notes, doubts };
+        let body = postcard::to_stdvec(&body).map_err(io::Error::other)?;
+        fs::create_dir_all(folder)?;
+        let mut file = tempfile::Builder::new().suffix(&format!(".{}", ENDINGS[1])).tempfile_in(folder)?;
+        file.write_all(&MAGIC)?;
+        file.write_all(&crc32fast::hash(&body).to_le_bytes())?;
+        file.write_all(&body)?;
+        file.persist(&path).map_err(|error| error.error)?;
+        self.drop_oldest(folder, &path)
+    }
+
+    fn path(&self, key: &Key) -> Option<PathBuf> {
+        Some(self.folder.as_ref()?.join(&key.0).with_extension(ENDINGS[0]))
+    }
+
+    /// Drops the files used longest ago but one, until all take no more than the limit.
+    fn drop_oldest(&self, folder: &Path, newest: &Path) -> io::Result<()> {
+        let own =
+            |path: &PathBuf| path.extension().is_some_and(|ending| ENDINGS.iter().any(|own| ending == *own));
+        let mut files: Vec<(SystemTime, PathBuf, u64)> = fs::read_dir(folder)?
+            .filter_map(|entry| Some(entry.ok()?.path()).filter(own))
+            .filter_map(|path| {
+                // Another process may drop it at the same time.
+                let about = fs::metadata(&path).ok()?;
+                Some((about.modified().ok()?, path, about.len()))
+            })
+            .collect();
+        files.sort();
+        let mut total: u64 = files.iter().map(|(.., size)| size).sum();
+        for (_, path, size) in files.iter().filter(|(_, path, _)| path != newest) {
+            if total <= self.limit {
+                break;
+            }
+            let _ = fs::remove_file(path);
+            total -= size;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use pliant_geometry::CellKind;
+
+    use super::*;
+
+    fn kept(size: usize) -> Kept {
+        let mut block = CellBlock::new(CellKind::Tet, vec![0, 1, 2, 3]);
+        block.data.insert("label".into(), DataArray::scalar(vec![0.1 + 0.2]));
+        let mut mesh = Mesh { points: vec![Vector3::new(0.1, -0.0, 1e-300); size], ..Mesh::default() };
+        mesh.blocks.push(block);
+        mesh.point_data.insert("normal".into(), DataArray { components: 3, values: vec![1.0; 3 * size] });
+        Kept { mesh, notes: vec!["a note".into()], doubts: vec!["a doubt".into()] }
+    }
+
+    fn key(name: &str) -> Key {
+        Key(name.into())
+    }
+
+    #[test]
+    fn what_is_kept_comes_back_bit_for_bit_and_nothing_where_it_is_off() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = MeshCache::in_folder(folder.path().join("deep"));
+        assert_eq!(cache.get(&key("a")), None);
+        cache.put(&key("a"), &kept(4)).unwrap();
+        assert_eq!(cache.get(&key("a")), Some(kept(4)));
+        assert_eq!(cache.get(&key("b")), None);
+        MeshCache::off().put(&key("a"), &kept(4)).unwrap();
+        assert_eq!(MeshCache::off().get(&key("a")), None);
+    }
+
+    #[test]
+    fn a_damaged_file_counts_as_missing_and_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = MeshCache::in_folder(folder.path().into());
+        cache.put(&key("a"), &kept(4)).unwrap();
+        let path = cache.path(&key("a")).unwrap();
+        let whole = fs::read(&path).unwrap();
+        for length in [0, 4, 9, 12, whole.len() / 2, whole.len() - 1] {
+            fs::write(&path, &whole[..length]).unwrap();
+            assert_eq!(cache.get(&key("a")), None, "{length} bytes");
+        }
+        let mut changed = whole.clone();
+        changed[whole.len() / 2] ^= 1;
+        fs::write(&path, changed).unwrap();
+        assert_eq!(cache.get(&key("a")), None);
+        cache.put(&key("a"), &kept(4)).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), whole);
+    }
+
+    #[test]
+    fn the_files_used_last_stay_and_those_of_others_are_let_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = MeshCache::in_folder(folder.path().into());
+        fs::write(folder.path().join("thesis.tex"), vec![0; 10_000]).unwrap();
+        let size = |cache: &MeshCache| fs::metadata(cache.path(&key("a")).unwrap()).unwrap().len();
+        for (age, name) in [(30, "a"), (20, "b"), (10, "c")] {
+            cache.put(&key(name), &kept(40)).unwrap();
+            let file = File::options().append(true).open(cache.path(&key(name)).unwrap()).unwrap();
+            file.set_modified(SystemTime::now() - Duration::from_secs(age)).unwrap();
+        }
+        // The first is used again, so that the second is the oldest.
+        assert!(cache.get(&key("a")).is_some());
+        let limit = 3 * size(&cache);
+        cache.clone().limited(limit).put(&key("d"), &kept(40)).unwrap();
+        let left = ["a", "b", "c", "d"].map(|name| cache.get(&key(name)).is_some());
+        assert_eq!(left, [true, false, true, true]);
+        cache.clone().limited(0).put(&key("e"), &kept(40)).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+        assert!(cache.get(&key("e")).is_some());
+    }
+}
