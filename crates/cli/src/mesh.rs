@@ -12,8 +12,8 @@ use pliant_imaging::{
     Smoothing, read,
 };
 use pliant_meshing::{
-    Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, MeshingError, OrganTets, TetReport, Voxels,
-    require_room_for,
+    Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, MeshingError, Missed, OrganTets, TetReport,
+    Voxels, require_room_for,
 };
 use pliant_scene::{element_bound, number};
 use serde_json::{Value as Json, json};
@@ -215,13 +215,13 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
         MeshCells::ImmersedHexes => f64::INFINITY,
         _ => edge,
     };
-    let warnings = deviation.doubt(allowed).map(|doubt| format!("{doubt}; use a shorter edge"));
+    let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed).map_err(refused)?;
     Ok(Made {
         materials: materials(&mesh, anatomy),
         quality: QualityReport::new(&mesh),
         components: diagnose(&mesh).components,
         steps: steps(arguments, &mesh),
-        warnings: warnings.into_iter().collect(),
+        warnings: missed.iter().map(|missed| format!("{missed}; use a shorter edge")).collect(),
         mesh,
         cells,
         lines: found.lines,

@@ -289,7 +289,8 @@ fn a_part_thinner_than_the_cells_is_told_with_its_place() {
     assert_eq!(told.code, 0, "{}", told.err);
     let json = told.json();
     assert!(
-        told.words().contains("warning: the mesh stays") && told.err.contains("shorter edge"),
+        told.words().contains("warning: the mesh leaves out a part of the body that is")
+            && told.err.contains("shorter edge"),
         "{}",
         told.err
     );

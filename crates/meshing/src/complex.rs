@@ -88,6 +88,12 @@ impl Complex {
         FACES.map(|face| face.map(|corner| self.tets[tet as usize][corner]))
     }
 
+    /// The tet behind a face of a tet.
+    pub(crate) fn behind(&self, tet: u32, face: [u32; 3]) -> Option<u32> {
+        let has = |other: &u32| face.iter().all(|node| self.tets[*other as usize].contains(node));
+        self.star[face[0] as usize].iter().copied().find(|&other| other != tet && has(&other))
+    }
+
     /// Edges, increasing, each once.
     pub(crate) fn edges(&self) -> Vec<[u32; 2]> {
         let mut edges = Vec::new();
@@ -101,6 +107,24 @@ impl Complex {
     /// Least acoustic length of all tets [m].
     pub(crate) fn worst(&self) -> f64 {
         self.alive().map(|tet| self.length(tet)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// What a point would bear on its own if it were at `place` [m]: 1 / √(K / m) with its stiffness K = Σ V |∇N|² and its mass m = Σ V / 4
+    /// over its tets, of material with a wave speed of 1. A step above twice that is unstable, since K c² / m is a Rayleigh quotient of
+    /// M⁻¹ K. In the ideal lattice it is the acoustic length; points with few tets can fall to half of theirs.
+    pub(crate) fn nodal_length(&self, point: u32, place: &Vector3) -> f64 {
+        let (mut stiffness, mut mass) = (0.0, 0.0);
+        for &tet in &self.star[point as usize] {
+            let nodes = self.tets[tet as usize];
+            let at = nodes.iter().position(|&node| node == point).unwrap_or(0);
+            let [a, b, c] = FACES[at].map(|corner| self.points[nodes[corner] as usize]);
+            let normal = (b - a).cross(&(c - a));
+            // Six times the volume; |∇N| = 2 A / 6 V.
+            let six = normal.dot(&(a - place)).abs();
+            stiffness += normal.norm_squared() / (6.0 * six);
+            mass += six / 24.0;
+        }
+        (mass / stiffness).sqrt()
     }
 
     /// Faces round a point that only one of the chosen tets has, outward from it.

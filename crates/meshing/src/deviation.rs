@@ -35,13 +35,12 @@ impl Deviation {
     /// Measures a mesh against a field. The surface is sampled where it crosses the edges of a grid of a quarter of `edge`
     /// [m], of a 160th of the box at least: parts thinner than that may be overlooked.
     pub fn new(mesh: &Mesh, field: &(impl ImplicitField + ?Sized), edge: f64) -> Result<Self, MeshingError> {
-        let (low, high) = checked_box(field)?;
-        let step = (edge / 4.0).max((high - low).amax() / MOST_SAMPLES);
+        let points = surface_points(field, edge)?;
         let surface = boundary(mesh);
         let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
         let locator = SurfaceLocator::new(&surface, &faces, &mesh.points);
         let mut found = Self::default();
-        let samples = Samples::new(crossings(field, &low, &high, step), edge);
+        let samples = Samples::new(points, edge);
         let (mut squares, mut weight) = (0.0, 0.0);
         let from_mesh = surface.faces.par_iter().map(|face| {
             let corners = face.nodes().iter().map(|&node| mesh.points[node as usize]);
@@ -66,20 +65,6 @@ impl Deviation {
         }
         found.rms_from_body = root_mean(distances.iter().map(|d| d * d).sum(), distances.len() as f64);
         Ok(found)
-    }
-}
-
-impl Deviation {
-    /// Where the mesh stays farther behind the body than `allowed` [m], in words.
-    pub fn doubt(&self, allowed: f64) -> Option<String> {
-        let [x, y, z] = self.farthest.map(|x| x * 1e3);
-        (self.largest_from_body > allowed).then(|| {
-            format!(
-                "the mesh stays {:.1} mm behind the body at ({x:.1}, {y:.1}, {z:.1}) mm: a part there is thinner than \
-                 the cells, or a small piece that was left out",
-                self.largest_from_body * 1e3
-            )
-        })
     }
 }
 
@@ -139,6 +124,16 @@ fn way_to_surface(field: &(impl ImplicitField + ?Sized), from: &Vector3, longest
         value = field.value(&point);
     }
     if value.abs() < 1e-2 * longest { (point - from).norm() + value.abs() } else { f64::INFINITY }
+}
+
+/// Points of the surface: where it crosses the edges of a grid of a quarter of `edge` [m], of a 160th of the box at least.
+pub(crate) fn surface_points(
+    field: &(impl ImplicitField + ?Sized),
+    edge: f64,
+) -> Result<Vec<Vector3>, MeshingError> {
+    let (low, high) = checked_box(field)?;
+    let step = (edge / 4.0).max((high - low).amax() / MOST_SAMPLES);
+    Ok(crossings(field, &low, &high, step))
 }
 
 /// Where the zero surface crosses the edges of a grid over a box.

@@ -5,7 +5,7 @@
 
 use pliant_geometry::{CellKind, Vector3};
 
-use crate::complex::{Complex, OUTSIDE, acoustic_length};
+use crate::complex::{Complex, OUTSIDE, Sides, acoustic_length};
 use crate::surfaces::Surfaces;
 
 /// Threshold of the first round, in ideal acoustic lengths.
@@ -42,6 +42,10 @@ const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
 /// Edges of the boundary may turn where the new one is no farther from the surface than this, in lattice constants.
 const FLIP_OFF: f64 = 0.03;
 
+/// Inner points are moved at last where their worst tet is below this, in ideal acoustic lengths: it raised τ of the liver phantom
+/// at 10 mm from 0.63 to 0.66 on average.
+const POLISH: f64 = 0.9;
+
 /// Volumes nearer than this part to what they must be are left alone.
 const VOLUME_TOLERANCE: f64 = 2e-3;
 
@@ -50,6 +54,7 @@ const VOLUME_TOLERANCE: f64 = 2e-3;
 pub(crate) struct Optimised {
     pub(crate) rounds: usize,
     pub(crate) peeled: usize,
+    pub(crate) given: usize,
     pub(crate) collapsed: usize,
     pub(crate) flipped: usize,
     pub(crate) moved: usize,
@@ -57,21 +62,32 @@ pub(crate) struct Optimised {
 
 /// The optimiser of one mesh.
 pub(crate) struct Optimiser<'a> {
-    pub(crate) complex: &'a mut Complex,
-    pub(crate) surfaces: Surfaces<'a>,
+    complex: &'a mut Complex,
+    surfaces: Surfaces<'a>,
     /// Lattice constant [m].
-    pub(crate) edge: f64,
+    edge: f64,
     /// Acoustic length of an ideal tet [m].
-    pub(crate) ideal: f64,
+    ideal: f64,
     /// How far a point may be from the sides that it lies between [m].
     slack: f64,
+    /// Whether points where three materials meet, or two and the outside, only keep to the outside.
+    lines_are_free: bool,
     noise: u64,
     done: Optimised,
 }
 
 impl<'a> Optimiser<'a> {
     pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>, edge: f64, ideal: f64) -> Self {
-        Self { complex, surfaces, edge, ideal, slack: 0.0, noise: 1, done: Optimised::default() }
+        Self {
+            complex,
+            surfaces,
+            edge,
+            ideal,
+            slack: 0.0,
+            lines_are_free: false,
+            noise: 1,
+            done: Optimised::default(),
+        }
     }
 
     /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh
@@ -99,6 +115,15 @@ impl<'a> Optimiser<'a> {
             self.slack = slack * self.edge;
             self.improve(aim, rounds.div_ceil(2), 0.0, &|_| {});
         }
+        if self.complex.worst() < target * self.ideal {
+            self.lines_are_free = true;
+            self.improve(target, rounds.div_ceil(2), 0.0, &|_| {});
+        }
+        // Inner points move freely, so that no surface pays for it.
+        for sweep in 0..SWEEPS {
+            let reach = REACH * self.edge * SHRINK.powi(sweep as i32);
+            self.relocate(POLISH * self.ideal, reach, &|sides| sides.count_ones() == 1);
+        }
         self.done
     }
 
@@ -109,9 +134,13 @@ impl<'a> Optimiser<'a> {
         for (surface, (wanted, [volume, area])) in volumes.iter().zip(measured).enumerate() {
             let Some(wanted) = wanted else { continue };
             if (volume / wanted - 1.0).abs() > VOLUME_TOLERANCE && area > 0.0 {
-                self.surfaces.shift(surface, (wanted - volume) / area, LARGEST_SHIFT * self.edge);
+                let moved = self.surfaces.shift(surface, (wanted - volume) / area, LARGEST_SHIFT * self.edge);
                 // Bit 0 of the sides is the outside, bit m the material m.
-                shifted |= if surface == 0 { OUTSIDE } else { 1 << (surface + 1) };
+                shifted |= match (moved, surface) {
+                    (false, _) => 0,
+                    (true, 0) => OUTSIDE,
+                    (true, _) => 1 << (surface + 1),
+                };
             }
         }
         for node in 0..self.complex.points.len() as u32 {
@@ -135,21 +164,36 @@ impl<'a> Optimiser<'a> {
         for round in 0..rounds {
             let ramp = ((round + 1) as f64 / (ramp * rounds as f64)).min(1.0);
             let threshold = self.ideal * (FIRST_THRESHOLD + (target - FIRST_THRESHOLD) * ramp);
-            let before = self.complex.worst();
-            let changes = self.peel(threshold) + self.collapse(threshold) + self.flip(threshold);
+            let before = self.state(target);
+            self.peel(threshold);
+            self.hand_over(threshold);
+            self.collapse(threshold);
+            self.flip(threshold);
             // While the threshold rises, points just above it move too.
-            self.relocate(if ramp_over { threshold } else { 1.05 * threshold });
+            let threshold = if ramp_over { threshold } else { 1.05 * threshold };
+            for sweep in 0..SWEEPS {
+                self.relocate(threshold, REACH * self.edge * SHRINK.powi(sweep as i32), &|_| true);
+            }
             self.done.rounds += 1;
             progress((round + 1) as f64 / rounds as f64);
-            let worst = self.complex.worst();
-            if worst >= target * self.ideal {
+            let after = self.state(target);
+            if after.0 >= target * self.ideal {
                 break;
             }
-            idle = if ramp == 1.0 && changes == 0 && worst <= before * (1.0 + 1e-6) { idle + 1 } else { 0 };
+            let better = after.0 > before.0 * (1.0 + 1e-6) || after.1 < before.1;
+            idle = if ramp == 1.0 && !better { idle + 1 } else { 0 };
             if idle == 2 {
                 break;
             }
         }
+    }
+
+    /// Least acoustic length [m], and how many tets are below `target` × ideal.
+    fn state(&self, target: f64) -> (f64, usize) {
+        let lengths = self.complex.alive().map(|tet| self.complex.length(tet));
+        lengths.fold((f64::INFINITY, 0), |(least, short), length| {
+            (least.min(length), short + usize::from(length < target * self.ideal))
+        })
     }
 
     /// Tets below a length, the worst first.
@@ -160,11 +204,19 @@ impl<'a> Optimiser<'a> {
         bad.into_iter().map(|(_, tet)| tet).collect()
     }
 
-    /// Removes tets of the boundary below half the threshold that the body does not need to hang together.
+    /// Removes tets of the boundary that the body does not need to hang together: those below half the threshold, and tips that
+    /// are light for their stiffness.
     fn peel(&mut self, threshold: f64) -> usize {
         let mut peeled = 0;
-        for tet in self.below(threshold / 2.0) {
-            if self.may_peel(tet) {
+        let short =
+            |node: &u32| self.complex.nodal_length(*node, &self.complex.points[*node as usize]) < threshold;
+        let is_tip = |tet: &u32| {
+            let nodes = self.complex.tets[*tet as usize];
+            nodes.iter().any(|node| self.complex.star[*node as usize].len() == 1 && short(node))
+        };
+        let tips: Vec<u32> = self.complex.alive().filter(is_tip).collect();
+        for tet in self.below(threshold / 2.0).into_iter().chain(tips) {
+            if self.complex.is_alive(tet) && self.may_peel(tet) {
                 let nodes = self.complex.tets[tet as usize];
                 self.complex.remove(tet);
                 for node in nodes {
@@ -202,6 +254,39 @@ impl<'a> Optimiser<'a> {
             }
             _ => false,
         }
+    }
+
+    /// Gives tets below half the threshold, flat ones between materials, to the material that looks at more of their surface.
+    fn hand_over(&mut self, threshold: f64) -> usize {
+        let mut given = 0;
+        for tet in self.below(threshold / 2.0) {
+            let own = self.complex.material[tet as usize];
+            // Area [m²] of the faces towards each material.
+            let mut towards: Vec<(u8, f64)> = vec![(own, 0.0)];
+            for face in self.complex.faces(tet) {
+                let Some(other) = self.complex.behind(tet, face) else { continue };
+                let material = self.complex.material[other as usize];
+                let area = pliant_geometry::volume(
+                    CellKind::Triangle,
+                    &face.map(|node| self.complex.points[node as usize]),
+                );
+                match towards.iter_mut().find(|(known, _)| *known == material) {
+                    Some((_, sum)) => *sum += area,
+                    None => towards.push((material, area)),
+                }
+            }
+            let most = towards
+                .iter()
+                .skip(1)
+                .fold(towards[0], |most, other| if other.1 > most.1 { *other } else { most });
+            if most.0 != own {
+                self.complex.material[tet as usize] = most.0;
+                self.complex.tets[tet as usize].into_iter().for_each(|node| self.refresh(node));
+                given += 1;
+            }
+        }
+        self.done.given += given;
+        given
     }
 
     fn refresh(&mut self, node: u32) {
@@ -293,6 +378,11 @@ impl<'a> Optimiser<'a> {
         best.map(|(_, place)| place)
     }
 
+    /// Lengths that a node at `place` is responsible for [m]: least acoustic length of its tets, and its own.
+    fn lengths_round(&self, node: u32, place: &Vector3) -> [f64; 2] {
+        [self.star_min(node, place, u32::MAX, 0.0), self.complex.nodal_length(node, place)]
+    }
+
     /// Least acoustic length of the tets round a node if it were at `place`, leaving out those with another node; stops
     /// once it is not above `floor`.
     fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
@@ -314,7 +404,12 @@ impl<'a> Optimiser<'a> {
     /// The place nearest to `place` between the sides of a node, if it is on the same bank of the body: where its surface
     /// looks the same way, within 90°. The other bank of a gap or of a thin lobe may be nearer.
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
-        let sides = self.complex.sides[node as usize];
+        let mut sides = self.complex.sides[node as usize];
+        if self.lines_are_free && sides.count_ones() > 2 {
+            // The outside and the lowest material: what one of these says about the other is left out.
+            let materials = sides & !OUTSIDE;
+            sides = sides & OUTSIDE | materials & materials.wrapping_neg();
+        }
         if sides.count_ones() < 2 {
             return Some(place);
         }
@@ -350,12 +445,17 @@ impl<'a> Optimiser<'a> {
         if misfit < area * (FIT_ENOUGH * self.edge).powi(2) {
             return;
         }
-        let floor = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY).min(least);
+        // What a move must not lower.
+        let floors = self.lengths_round(node, &here).map(|length| length.min(least));
+        let bears = |trial: &Vector3| {
+            let lengths = self.lengths_round(node, trial);
+            lengths.iter().zip(floors).all(|(length, floor)| *length >= floor)
+        };
         let (mut best, mut place) = (0.99 * misfit, here);
         for direction in directions() {
             let Some(trial) = self.project(node, here + direction * reach) else { continue };
             let [misfit, _] = self.misfit(node, &trial, &faces);
-            if misfit < best && self.star_min(node, &trial, u32::MAX, 0.0) >= floor {
+            if misfit < best && bears(&trial) {
                 (best, place) = (misfit, trial);
             }
         }
@@ -385,16 +485,13 @@ impl<'a> Optimiser<'a> {
         faces.iter().map(of_face).fold([0.0; 2], |[misfit, all], [own, area]| [misfit + own, all + area])
     }
 
-    /// Moves the points whose worst tet is below the threshold to the best of some places round them.
-    fn relocate(&mut self, threshold: f64) {
-        for sweep in 0..SWEEPS {
-            let reach = REACH * self.edge * SHRINK.powi(sweep as i32);
-            for node in 0..self.complex.points.len() as u32 {
-                let here = self.complex.points[node as usize];
-                let now = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY);
-                if now < threshold {
-                    self.relocate_one(node, now, reach);
-                }
+    /// Moves the chosen points whose worst tet is below the threshold to the best of some places round them.
+    fn relocate(&mut self, threshold: f64, reach: f64, chosen: &dyn Fn(Sides) -> bool) {
+        for node in 0..self.complex.points.len() as u32 {
+            let here = self.complex.points[node as usize];
+            let now = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY);
+            if now < threshold && chosen(self.complex.sides[node as usize]) {
+                self.relocate_one(node, now, reach);
             }
         }
     }

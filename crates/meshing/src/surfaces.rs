@@ -24,9 +24,10 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Moves the surface of the whole (0) or of an inner material (its number less one) outwards [m], by at most `most` in
-    /// all.
-    pub(crate) fn shift(&mut self, surface: usize, outwards: f64, most: f64) {
-        self.levels[surface] = (self.levels[surface] - outwards).clamp(-most, most);
+    /// all; whether it moves.
+    pub(crate) fn shift(&mut self, surface: usize, outwards: f64, most: f64) -> bool {
+        let level = (self.levels[surface] - outwards).clamp(-most, most);
+        std::mem::replace(&mut self.levels[surface], level) != level
     }
 
     /// How far a point is inside a material (numbered from 1) rather than in any other [m].

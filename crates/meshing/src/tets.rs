@@ -93,6 +93,7 @@ impl OrganTets {
         let steps = Steps {
             rounds: optimised.rounds,
             peeled: optimised.peeled,
+            given: optimised.given,
             collapsed: optimised.collapsed,
             flipped: optimised.flipped,
             moved: optimised.moved,
@@ -155,6 +156,8 @@ pub struct Steps {
     pub rounds: usize,
     /// Tets taken off the boundary.
     pub peeled: usize,
+    /// Flat tets between materials given to the other one.
+    pub given: usize,
     /// Edges collapsed.
     pub collapsed: usize,
     /// Edges and faces flipped.
@@ -296,10 +299,10 @@ impl fmt::Display for TetReport {
         if self.crowded_edges_left > 0 {
             writeln!(f, "still touching   {} edges", self.crowded_edges_left)?;
         }
-        let Steps { rounds, peeled, collapsed, flipped, moved } = self.steps;
+        let Steps { rounds, peeled, given, collapsed, flipped, moved } = self.steps;
         write!(
             f,
-            "optimiser        {rounds} rounds: {peeled} tets peeled, {collapsed} edges collapsed, {flipped} flips, {moved} moves"
+            "optimiser        {rounds} rounds: {peeled} tets peeled, {given} given to another label, {collapsed} edges collapsed, {flipped} flips, {moved} moves"
         )
     }
 }

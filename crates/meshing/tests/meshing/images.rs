@@ -1,6 +1,6 @@
 //! Label images of the analytic organs as their definition gives them, and the truth to measure meshes against.
 
-use pliant_geometry::{Mesh, SurfaceLocator, Vector3, boundary};
+use pliant_geometry::{CellKind, Mesh, SurfaceLocator, Vector3, boundary};
 use pliant_imaging::{Grid, LabelImage};
 use pliant_meshing::{ImplicitField, Organ, Phantom, Stuffing, brain_label};
 
@@ -74,4 +74,35 @@ pub fn distances(mesh: &Mesh, truth: &Truth) -> [f64; 3] {
         |point: &Vector3| (locator.closest(point).expect("the mesh has faces").position - point).norm();
     let back = truth.points.iter().map(to_mesh).fold(0.0, f64::max);
     [forth, back, (squares / weight).sqrt()]
+}
+
+/// Root mean square distance of the surface of a label from the true one [m], at the corners and middles of its faces.
+pub fn interface_rms(mesh: &Mesh, label: i32, organ: Organ) -> f64 {
+    let block = mesh.block(CellKind::Tet).expect("the mesh has tets");
+    let mut part = Mesh { points: mesh.points.clone(), ..Mesh::default() };
+    let of_label = |at: &usize| block.data["label"].item(*at)[0] == f64::from(label);
+    part.block_mut(CellKind::Tet).nodes =
+        (0..block.len()).filter(of_label).flat_map(|at| block.cell(at).to_vec()).collect();
+    let phantom = Phantom::new(organ, 1.0).expect("a positive scale");
+    let all = Stuffing::new(0.001);
+    // The ventricles do not meet: the fine mesh keeps one of them, and only its side of the middle counts.
+    let fine = all.mesh(&phantom).expect("the organ is meshed").mesh;
+    let surface = boundary(&fine);
+    let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
+    let locator = SurfaceLocator::new(&surface, &faces, &fine.points);
+    let one_sided = label == 2;
+    let (low, high) = fine.bounds().expect("the fine mesh has points");
+    let (mut squares, mut count) = (0.0, 0.0);
+    for face in boundary(&part).faces {
+        let corners: Vec<Vector3> = face.nodes().iter().map(|&node| mesh.points[node as usize]).collect();
+        let middle = corners.iter().sum::<Vector3>() / 3.0;
+        if one_sided && (middle.x > 0.0) != (0.5 * (low.x + high.x) > 0.0) {
+            continue;
+        }
+        for point in corners.into_iter().chain([middle]) {
+            squares += (locator.closest(&point).expect("there are faces").position - point).norm_squared();
+            count += 1.0;
+        }
+    }
+    (squares / count).sqrt()
 }

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use pliant_geometry::{CellKind, Mesh, SurfaceLocator, Vector3, boundary};
+use pliant_geometry::Vector3;
 use pliant_imaging::{Cleaning, Grid, LabelError, LabelImage, Smoothing};
-use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets, Phantom};
+use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets};
 
 use crate::checks::*;
 use crate::images;
@@ -36,11 +36,21 @@ fn check_sound(made: &OrganMesh) -> Vec<Vec<u32>> {
 /// T1: a sphere of 50 mm at 8 to 20 mm, wherever the lattice lies.
 #[test]
 fn a_sphere_of_voxels_is_round_and_keeps_three_quarters_of_the_ideal_step() {
+    sphere_at(2);
+}
+
+#[test]
+#[ignore = "slow: twenty lattices at each of four sizes"]
+fn a_sphere_of_voxels_wherever_the_lattice_lies() {
+    sphere_at(20);
+}
+
+fn sphere_at(lattices: usize) {
     let ball = anatomy(&images::ball(0.05), &[1]);
     let exact = 4.0 / 3.0 * PI * 0.05_f64.powi(3);
     let mut offsets = Offsets(1);
     for edge in [0.008, 0.012, 0.016, 0.020] {
-        for _ in 0..2 {
+        for _ in 0..lattices {
             let made = meshed(&ball, edge, offsets.vector(edge));
             let faces = check_sound(&made);
             assert_eq!(euler_characteristic(&faces), 2);
@@ -115,7 +125,7 @@ fn brain_at(lattices: usize) {
             assert!((material.volume / voxels - 1.0).abs() < 0.05, "{material:?}");
         }
         for (label, organ) in [(2, pliant_meshing::Organ::Ventricles), (3, pliant_meshing::Organ::Tumour)] {
-            let interface = interface_rms(&made.mesh, label, &organ);
+            let interface = images::interface_rms(&made.mesh, label, organ);
             println!("interface of label {label}: RMS {:.3} a", interface / edge);
             // The prototype of the specification had 0.15; its goal of 0.1 is missed by the ventricles, 12 mm thick, at 10 mm.
             assert!(interface <= 0.15 * edge);
@@ -123,51 +133,22 @@ fn brain_at(lattices: usize) {
     }
 }
 
-/// Root mean square distance of the surface of a label from the true one [m], at the corners and middles of its faces.
-fn interface_rms(mesh: &Mesh, label: i32, organ: &pliant_meshing::Organ) -> f64 {
-    let block = mesh.block(CellKind::Tet).expect("the mesh has tets");
-    let mut part = Mesh { points: mesh.points.clone(), ..Mesh::default() };
-    let of_label = |at: &usize| block.data["label"].item(*at)[0] == f64::from(label);
-    part.block_mut(CellKind::Tet).nodes =
-        (0..block.len()).filter(of_label).flat_map(|at| block.cell(at).to_vec()).collect();
-    let phantom = Phantom::new(*organ, 1.0).expect("a positive scale");
-    let all = pliant_meshing::Stuffing::new(0.001);
-    // The ventricles do not meet: the fine mesh keeps one of them, and only its side of the middle counts.
-    let fine = all.mesh(&phantom).expect("the organ is meshed").mesh;
-    let surface = boundary(&fine);
-    let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
-    let locator = SurfaceLocator::new(&surface, &faces, &fine.points);
-    let one_sided = label == 2;
-    let (low, high) = fine.bounds().expect("the fine mesh has points");
-    let (mut squares, mut count) = (0.0, 0.0);
-    for face in boundary(&part).faces {
-        let corners: Vec<Vector3> = face.nodes().iter().map(|&node| mesh.points[node as usize]).collect();
-        let middle = corners.iter().sum::<Vector3>() / 3.0;
-        if one_sided && (middle.x > 0.0) != (0.5 * (low.x + high.x) > 0.0) {
-            continue;
-        }
-        for point in corners.into_iter().chain([middle]) {
-            squares += (locator.closest(&point).expect("there are faces").position - point).norm_squared();
-            count += 1.0;
-        }
-    }
-    (squares / count).sqrt()
-}
-
-/// T4: the same bytes for any number of threads.
+/// T4: the whole mesher gives the same bytes for any number of threads: field, lattice, materials, gaps, optimiser.
 #[test]
 fn the_thread_count_never_changes_a_bit() {
-    let image = images::ball(0.04);
+    let image = images::brain();
     let with = |count| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("a pool");
-        pool.install(|| meshed(&anatomy(&image, &[1]), 0.01, Vector3::new(1e-3, 2e-3, 3e-3)))
+        pool.install(|| meshed(&anatomy(&image, &[1, 2, 3]), 0.012, Vector3::new(1e-3, 2e-3, 3e-3)))
     };
-    let (one, three) = (with(1), with(3));
     let bits = |made: &OrganMesh| -> Vec<u64> {
         made.mesh.points.iter().flat_map(|point| point.iter().map(|x| x.to_bits())).collect()
     };
-    assert_eq!(one.mesh.blocks, three.mesh.blocks);
-    assert_eq!(bits(&one), bits(&three));
+    let one = with(1);
+    for many in [with(2), with(8)] {
+        assert_eq!(one.mesh.blocks, many.mesh.blocks);
+        assert_eq!(bits(&one), bits(&many));
+    }
 }
 
 /// The same body in an image stored mirrored and turned gives the same mesh.

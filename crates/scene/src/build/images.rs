@@ -8,7 +8,7 @@ use pliant_geometry::{CellKind, Mesh};
 use pliant_imaging::{Cleaning, Image, ImageError, LabelError, ReadOptions, Smoothing};
 use pliant_meshing::{
     Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
-    OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
+    Missed, OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
     require_room_for,
 };
 
@@ -400,8 +400,9 @@ fn fill(
         Cells::ImmersedHexes => f64::INFINITY,
         _ => edge,
     };
-    let doubt = Deviation::new(&mesh, anatomy.field(), edge).ok().and_then(|found| found.doubt(allowed));
-    Ok((mesh, doubt.into_iter().collect()))
+    let deviation = Deviation::new(&mesh, anatomy.field(), edge)?;
+    let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed)?;
+    Ok((mesh, missed.iter().map(Missed::to_string).collect()))
 }
 
 /// The surface of an anatomy as fine as its voxels [m].

@@ -1,0 +1,250 @@
+//! What a mesh misses of the body it was made of: parts and gaps thinner than the lattice that the mesh leaves out or closes, with
+//! their place and thickness, and whatever else of the surface lies far from it.
+//! A part is thin where the way straight through it, from one point of the surface to the wall that looks back at it, is
+//! shorter than the lattice constant; it is missed where the middle of that way is not in the mesh. A gap likewise, in the background.
+
+use std::fmt;
+
+use pliant_geometry::{Locator, Mesh, SurfaceLocator, Vector3, boundary};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::deviation::{Deviation, surface_points};
+use crate::error::MeshingError;
+use crate::field::ImplicitField;
+
+/// Steps along the way through a thin part, per lattice constant.
+const STEPS: usize = 20;
+
+/// Walls look at each other where the cosine between their normals is below this: within 45°. Rims and notches do not count.
+const OPPOSITE: f64 = -0.7;
+
+/// The middle of a thin part is missed where it is this far from the mesh, in lattice constants; nearer, the mesh cuts a crest.
+const MARGIN: f64 = 0.25;
+
+/// Something of a body that its mesh misses. Places in metres, RAS where the body comes from an image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Missed {
+    /// A part of the body thinner than the lattice that the mesh leaves out.
+    ThinPart {
+        /// Its middle [m].
+        place: [f64; 3],
+        /// How thick it is there [m].
+        thickness: f64,
+        /// Lattice constant [m].
+        edge: f64,
+    },
+    /// A gap of the body thinner than the lattice that the mesh closes: its banks are glued together.
+    ThinGap {
+        /// Its middle [m].
+        place: [f64; 3],
+        /// How wide it is there [m].
+        thickness: f64,
+        /// Lattice constant [m].
+        edge: f64,
+    },
+    /// A part of the surface far from the mesh that is not thin: a crest, or a small piece that was left out.
+    Behind {
+        /// The point of the surface that is farthest from the mesh [m].
+        place: [f64; 3],
+        /// How far it is [m].
+        distance: f64,
+    },
+}
+
+impl Missed {
+    /// What a mesh with cells of `edge` [m] misses of the body of a field: the worst thin part, the worst thin gap, and the farthest
+    /// point of the surface if it is farther than `allowed` [m] and no thin part explains it.
+    ///
+    /// # Errors
+    /// If the box of the field is empty or not finite.
+    pub fn of(
+        mesh: &Mesh,
+        field: &(impl ImplicitField + ?Sized),
+        edge: f64,
+        deviation: &Deviation,
+        allowed: f64,
+    ) -> Result<Vec<Self>, MeshingError> {
+        let ways = thin_ways(field, edge)?;
+        let mut missed = Vec::new();
+        if !ways.is_empty() {
+            let locator = Locator::new(mesh);
+            let surface = boundary(mesh);
+            let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
+            let rim = SurfaceLocator::new(&surface, &faces, &mesh.points);
+            // By how much the mesh misses the middle of a way.
+            let by = |way: &ThinWay| {
+                let covered = locator.locate(way.middle).is_some_and(|found| found.distance == 0.0);
+                let far =
+                    rim.closest(&way.middle).map_or(f64::INFINITY, |at| (at.position - way.middle).norm());
+                if covered == way.inside { 0.0 } else { far }
+            };
+            let by: Vec<f64> = ways.par_iter().map(by).collect();
+            for inside in [true, false] {
+                let mut worst: Option<(f64, &ThinWay)> = None;
+                for (&by, way) in
+                    by.iter().zip(&ways).filter(|(by, way)| way.inside == inside && **by > MARGIN * edge)
+                {
+                    if worst.is_none_or(|(most, _)| by > most) {
+                        worst = Some((by, way));
+                    }
+                }
+                missed.extend(worst.map(|(_, way)| way.missed(edge)));
+            }
+        }
+        let thin = missed.iter().any(|missed| matches!(missed, Self::ThinPart { .. }));
+        if !thin && deviation.largest_from_body > allowed {
+            missed.push(Self::Behind { place: deviation.farthest, distance: deviation.largest_from_body });
+        }
+        Ok(missed)
+    }
+}
+
+impl fmt::Display for Missed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let at = |[x, y, z]: &[f64; 3]| format!("({x:.4}, {y:.4}, {z:.4}) m");
+        match self {
+            Self::ThinPart { place, thickness, edge } => write!(
+                f,
+                "the mesh leaves out a part of the body that is {:.1} mm thick at {}, thinner than the cells of {:.1} mm",
+                thickness * 1e3,
+                at(place),
+                edge * 1e3
+            ),
+            Self::ThinGap { place, thickness, edge } => write!(
+                f,
+                "the mesh closes a gap that is {:.1} mm wide at {}, thinner than the cells of {:.1} mm: its banks are glued \
+                 together",
+                thickness * 1e3,
+                at(place),
+                edge * 1e3
+            ),
+            Self::Behind { place, distance } => write!(
+                f,
+                "the mesh stays {:.1} mm behind the body at {}: a sharp crest, or a small piece that was left out",
+                distance * 1e3,
+                at(place)
+            ),
+        }
+    }
+}
+
+/// A way straight through a thin part or a thin gap.
+struct ThinWay {
+    middle: Vector3,
+    length: f64,
+    /// Through the body; else through the background.
+    inside: bool,
+}
+
+impl ThinWay {
+    fn missed(&self, edge: f64) -> Missed {
+        let (place, thickness) = (self.middle.into(), self.length);
+        match self.inside {
+            true => Missed::ThinPart { place, thickness, edge },
+            false => Missed::ThinGap { place, thickness, edge },
+        }
+    }
+}
+
+/// Ways shorter than the lattice constant between walls that look at each other, in the order of the points of the surface.
+fn thin_ways(field: &(impl ImplicitField + ?Sized), edge: f64) -> Result<Vec<ThinWay>, MeshingError> {
+    let points = surface_points(field, edge)?;
+    let ways = points
+        .par_iter()
+        .flat_map_iter(|point| [true, false].map(|inside| thin_way(field, point, edge, inside)));
+    Ok(ways.collect::<Vec<_>>().into_iter().flatten().collect())
+}
+
+/// From a point of the surface against its normal, or along it, to the next wall.
+fn thin_way(
+    field: &(impl ImplicitField + ?Sized),
+    start: &Vector3,
+    edge: f64,
+    inside: bool,
+) -> Option<ThinWay> {
+    // Towards larger values it goes into the body.
+    let uphill = |point: &Vector3| field.gradient(point).try_normalize(0.0);
+    let sign = if inside { 1.0 } else { -1.0 };
+    let inward = uphill(start)?;
+    let at = |length: f64| start + inward * (sign * length);
+    let beyond = |length: f64| sign * field.value(&at(length)) <= 0.0;
+    let step = edge / STEPS as f64;
+    // The start lies on the surface but for the error of a linear interpolation: one step is left out.
+    let wall = (2..STEPS).map(|steps| steps as f64 * step).find(|&length| beyond(length))?;
+    let (mut low, mut high) = (wall - step, wall);
+    for _ in 0..10 {
+        let middle = 0.5 * (low + high);
+        if beyond(middle) { high = middle } else { low = middle }
+    }
+    let facing = uphill(&at(high))?.dot(&inward) < OPPOSITE;
+    facing.then(|| ThinWay { middle: at(high / 2.0), length: high, inside })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Anatomy, OrganTets, Stuffing, Voxels};
+
+    /// Two slabs: 30 mm of body with a plate `thickness` thick on it, sticking out to x = 60 mm; a gap of `gap` between two blocks.
+    struct Plates {
+        plate: f64,
+        gap: f64,
+    }
+
+    impl ImplicitField for Plates {
+        fn value(&self, p: &Vector3) -> f64 {
+            let slab = |centre: [f64; 3], half: [f64; 3]| {
+                let q = (p - Vector3::from(centre)).abs() - Vector3::from(half);
+                -(q.sup(&Vector3::zeros()).norm() + q.max().min(0.0))
+            };
+            let block = slab([0.0, 0.0, 0.0], [0.03, 0.03, 0.03]);
+            let plate = slab([0.05, 0.0, 0.0], [0.03, 0.03, self.plate / 2.0]);
+            let cut = slab([-0.02, 0.0, 0.001], [0.03, 0.05, self.gap / 2.0]);
+            block.max(plate).min(-cut)
+        }
+
+        fn bounds(&self) -> (Vector3, Vector3) {
+            (Vector3::new(-0.032, -0.032, -0.032), Vector3::new(0.082, 0.032, 0.032))
+        }
+    }
+
+    fn missed(mesh: &Mesh, field: &Plates, edge: f64) -> Vec<Missed> {
+        let deviation = Deviation::new(mesh, field, edge).unwrap();
+        Missed::of(mesh, field, edge, &deviation, edge).unwrap()
+    }
+
+    #[test]
+    fn a_lost_plate_and_a_closed_gap_are_told_with_place_and_thickness() {
+        let body = Plates { plate: 0.002, gap: 0.002 };
+        // Centres of cubes at ± 4, 12, ... mm from the middle: none in the plate or the gap.
+        let cubes = Voxels::new(0.008).mesh(&body).unwrap().mesh;
+        let told = missed(&cubes, &body, 0.008);
+        let near = |found: f64| (found - 0.002).abs() < 2e-4;
+        let [Missed::ThinPart { place, thickness, .. }, Missed::ThinGap { place: gap, thickness: width, .. }] =
+            told[..]
+        else {
+            panic!("{told:?}")
+        };
+        assert!(near(thickness) && place[0] > 0.03 && place[2].abs() < 2e-4, "{told:?}");
+        assert!(near(width) && gap[0] < 0.01 && (gap[2] - 0.001).abs() < 2e-4, "{told:?}");
+        assert!(told[0].to_string().contains("2.0 mm thick at (0.0"), "{}", told[0]);
+    }
+
+    #[test]
+    fn tets_tell_a_lost_plate_and_keep_the_gap_open() {
+        let body = Plates { plate: 0.002, gap: 0.004 };
+        let request = OrganTets { origin: Some(Vector3::new(0.0, 0.0, 0.0025)), ..OrganTets::new(0.01) };
+        let mesh = request.mesh(&Anatomy::new(1, &body), &|_| {}).unwrap().mesh;
+        let told = missed(&mesh, &body, 0.01);
+        assert!(matches!(told[..], [Missed::ThinPart { .. }]), "{told:?}");
+    }
+
+    #[test]
+    fn what_is_thicker_than_the_lattice_is_no_news() {
+        let body = Plates { plate: 0.02, gap: 0.012 };
+        let mesh = Stuffing::new(0.008).mesh(&body).unwrap().mesh;
+        assert_eq!(missed(&mesh, &body, 0.008), []);
+    }
+}
