@@ -5,6 +5,8 @@ mod bench;
 mod commands;
 mod mesh;
 mod page;
+#[cfg_attr(not(feature = "viewer"), path = "no_pictures.rs")]
+mod pictures;
 mod report;
 mod reproduce;
 mod skin;

@@ -41,6 +41,7 @@ pub mod diagnostic;
 pub mod format;
 pub mod niftysim;
 mod output;
+mod live;
 mod overview;
 mod plan;
 pub mod reference;
@@ -52,6 +53,7 @@ pub mod source;
 mod starter;
 mod sweep;
 mod target;
+mod view;
 #[cfg(test)]
 mod testing;
 
@@ -62,6 +64,7 @@ pub use output::{
     AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,
     Summary, failed_input, failed_output, number,
 };
+pub use live::{Live, live};
 pub use overview::overview;
 pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};
 pub use run::{Options, Progress, run, run_with};
@@ -70,3 +73,4 @@ pub use solver::{Effort, LoadStepProgress};
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;
+pub use view::Draw;

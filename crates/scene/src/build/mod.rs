@@ -98,6 +98,7 @@ pub fn build(scene: &Scene) -> Result<Built, SceneErrors> {
     builder.add_constraints();
     builder.add_loads();
     builder.check_outputs();
+    builder.check_view();
     builder.check_free_bodies();
     builder.check_held();
     if !builder.failed() {
