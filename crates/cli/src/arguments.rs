@@ -208,7 +208,8 @@ pub type Numbers<const N: usize> = [f64; N];
 fn numbers<const N: usize>(typed: &str) -> Result<Numbers<N>, String> {
     let all: Option<Vec<f64>> =
         typed.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
-    all.and_then(|all| all.try_into().ok()).ok_or_else(|| format!("give {N} numbers with commas between them"))
+    all.and_then(|all| all.try_into().ok())
+        .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
 fn range(typed: &str) -> Result<Numbers<2>, String> {
@@ -331,7 +332,7 @@ pub struct Reproduce {
     pub table: Option<PathBuf>,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Overrides {
     /// Set any value of the scene; may be given several times. KEY is its path, with items of arrays by their number
     /// counted from 0; VALUE is TOML, a single word needs no quotes.

@@ -11,8 +11,8 @@ use pliant_gpu::{Adapter, GpuError};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, Draw, Options, OutputFolder, PLAUSIBLE_SIZE, Plan, Scene, Sweep, SweepOptions, niftysim,
-    number, reference, registry,
+    Built, Checkpoint, Draw, Options, OutputFolder, PLAUSIBLE_SIZE, Plan, Scene, Sweep, SweepOptions,
+    niftysim, number, reference, registry,
 };
 use serde_json::{Map, Value as Json, json};
 use tempfile::TempDir;

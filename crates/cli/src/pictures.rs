@@ -5,14 +5,14 @@ use std::process::ExitCode;
 
 use pliant_geometry::{Mesh, Vector3};
 use pliant_picture::{
-    AnimatedPng, Axis, Background, Camera, ColourMap, Film, Graphics, Legend, Look, Picture, PictureError, Plane,
-    Projection, Series, SeriesError, Style, ffmpeg,
+    AnimatedPng, Axis, Background, Camera, ColourMap, Film, Graphics, Legend, Look, Picture, PictureError,
+    Plane, Projection, Series, SeriesError, Style, ffmpeg,
 };
 use pliant_scene::format::{FieldName, UpName, VtuTable};
 use pliant_scene::registry::OutputTable;
 use pliant_scene::{Draw, Options, OutputFolder, Scene};
 
-use crate::arguments::{Frames, Render};
+use crate::arguments::{Frames, Overrides, Render};
 use crate::commands::{INTERRUPTED, prepare_changed, stopped_by_ctrl_c};
 use crate::report::{Bar, Failure, say};
 
@@ -169,15 +169,16 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
         return Err(Failure::plain("`--series` chooses among the series of a finished run", "leave it out"));
     }
     let space = tempfile::tempdir().map_err(|error| {
-        Failure::plain(format!("no temporary folder can be made: {error}"), "check the free space, or set TMPDIR")
+        Failure::plain(
+            format!("no temporary folder can be made: {error}"),
+            "check the free space, or set TMPDIR",
+        )
     })?;
-    let mut mistake = None;
-    let change = |scene: &mut Scene| mistake = watch_only(scene, arguments).err();
-    let prepared = prepare_changed(&arguments.what, &arguments.overrides, change);
-    if let Some(mistake) = mistake {
-        return Err(mistake);
-    }
-    let (scene, built, plan) = prepared?;
+    let overrides = with_colour(&arguments.overrides, arguments.colour.as_deref());
+    let mut every = 0.0;
+    let (mut scene, built, plan) =
+        prepare_changed(&arguments.what, &overrides, |scene| every = forget_outputs(scene, arguments))?;
+    scene.outputs = vec![("shown".into(), OutputTable::Vtu(scene.shown(every)))];
     let mut look = look_of(&scene);
     typed(&mut look, arguments);
     let run = OutputFolder::prepare(space.path().join("run"), &scene, false)
@@ -219,33 +220,35 @@ fn refuse_words_of_scenes(arguments: &Render) -> Result<(), Failure> {
         || changes.precision.is_some()
         || changes.device.is_some();
     if changed {
-        let message = format!("`{}` is a finished run: its scene can't be changed any more", arguments.what.display());
+        let message =
+            format!("`{}` is a finished run: its scene can't be changed any more", arguments.what.display());
         return Err(Failure::plain(message, "give the scene, or leave these options out"));
     }
     Ok(())
 }
 
-/// Replaces the outputs of a scene by the series that is shown.
-fn watch_only(scene: &mut Scene, arguments: &Render) -> Result<(), Failure> {
-    let own = scene.outputs.iter().find_map(|(_, output)| match output {
-        OutputTable::Vtu(VtuTable { every, .. }) => Some(*every),
+/// Takes the outputs away from a scene; simulated time between the frames that are shown instead [s].
+fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
+    let own = std::mem::take(&mut scene.outputs).into_iter().find_map(|(_, output)| match output {
+        OutputTable::Vtu(VtuTable { every, .. }) => Some(every),
         OutputTable::Csv(_) => None,
     });
-    let every = arguments.every.or(own).unwrap_or(0.01 * scene.scene.until);
-    if let Some(name) = &arguments.colour {
-        let own = name.split_once(':').map_or(name.as_str(), |(own, _)| own);
+    // Another field does without the component of the scene's.
+    if arguments.colour.as_ref().is_some_and(|name| !name.contains(':')) {
         scene.view.component = None;
-        scene.view.colour = match (own, FieldName::of_name(own)) {
-            ("none", _) => Some(pliant_scene::format::ColourBy::Nothing(pliant_scene::format::Nothing::None)),
-            (_, Some(field)) => Some(pliant_scene::format::ColourBy::Field(field)),
-            (_, None) => {
-                let message = format!("there is no field `{own}` to colour by");
-                return Err(Failure::plain(message, "`pliant schema --markdown` lists the fields at [view]"));
-            }
-        };
     }
-    scene.outputs = vec![("shown".into(), OutputTable::Vtu(scene.shown(every)))];
-    Ok(())
+    arguments.every.or(own).unwrap_or(0.01 * scene.scene.until)
+}
+
+/// The colour that was typed as values of the scene, so that they are checked with it.
+fn with_colour(overrides: &Overrides, colour: Option<&str>) -> Overrides {
+    let mut all = overrides.clone();
+    if let Some(name) = colour {
+        let (own, part) = name.split_once(':').map_or((name, None), |(own, part)| (own, Some(part)));
+        all.set.push(format!("view.colour={own}"));
+        all.set.extend(part.map(|part| format!("view.component={part}")));
+    }
+    all
 }
 
 /// The name of a picture in its folder.
@@ -254,7 +257,9 @@ fn picture_name(number: usize) -> String {
 }
 
 fn is_picture(name: &str) -> bool {
-    name.strip_prefix("frame-").and_then(|rest| rest.strip_suffix(".png")).is_some_and(|n| n.parse::<usize>().is_ok())
+    name.strip_prefix("frame-")
+        .and_then(|rest| rest.strip_suffix(".png"))
+        .is_some_and(|n| n.parse::<usize>().is_ok())
 }
 
 /// What a film is made of.
@@ -359,10 +364,13 @@ fn start_film(
     frames: &[usize],
     kind: Option<FilmKind>,
 ) -> Result<(Reel, Option<PathBuf>), Failure> {
-    let (Some(mut kind), Some(mut path)) = (kind, arguments.film.clone()) else { return Ok((Reel::None, None)) };
+    let (Some(mut kind), Some(mut path)) = (kind, arguments.film.clone()) else {
+        return Ok((Reel::None, None));
+    };
     let [from, to] = [frames[0], frames[frames.len() - 1]].map(|frame| series.frames[frame].0);
     let real_time = (frames.len() - 1) as f64 / (to - from).max(1e-9);
-    let rate = arguments.rate.unwrap_or_else(|| if frames.len() > 1 { real_time.clamp(5.0, 60.0) } else { 25.0 });
+    let rate =
+        arguments.rate.unwrap_or_else(|| if frames.len() > 1 { real_time.clamp(5.0, 60.0) } else { 25.0 });
     if kind == FilmKind::Mp4 && !ffmpeg() {
         path.set_extension("png");
         eprintln!("note: there is no ffmpeg here: the film is the animated PNG {}", path.display());
@@ -370,7 +378,9 @@ fn start_film(
     }
     let reel = match kind {
         FilmKind::Mp4 => Reel::Mp4(Film::start(&path, look.size, rate)?),
-        FilmKind::Png => Reel::Png(Box::new(AnimatedPng::start(&path, look.size, frames.len() as u32, rate)?)),
+        FilmKind::Png => {
+            Reel::Png(Box::new(AnimatedPng::start(&path, look.size, frames.len() as u32, rate)?))
+        }
     };
     Ok((reel, Some(path)))
 }

@@ -86,11 +86,17 @@ mod with_pictures {
         assert_eq!(names(&workshop, "all").len(), 6);
         assert_eq!(png(&workshop, "film.png"), ([80, 60], Some(6)));
 
-        done(&workshop.pliant(&[&["render", "out/case", "-o", "some", "--frames", "1..3"], &small[..]].concat()));
+        done(
+            &workshop
+                .pliant(&[&["render", "out/case", "-o", "some", "--frames", "1..3"], &small[..]].concat()),
+        );
         let two = BTreeSet::from(["frame-00001.png".into(), "frame-00002.png".into()]);
         assert_eq!(names(&workshop, "some"), two);
         // The same pictures again, with nothing asked twice.
-        done(&workshop.pliant(&[&["render", "out/case", "-o", "some", "--frames", "1..3"], &small[..]].concat()));
+        done(
+            &workshop
+                .pliant(&[&["render", "out/case", "-o", "some", "--frames", "1..3"], &small[..]].concat()),
+        );
     }
 
     #[test]
@@ -139,7 +145,7 @@ mod with_pictures {
             assert_ne!(take(&format!("other-{number}"), more), plain, "{more:?}");
         }
         assert_eq!(take("again", &["--camera", "20,22"]), plain);
-        let surface = take("surface", &["--set", "view.on=skin"]);
+        let surface = take("surface", &["--set", "view.on=skin", "--colour", "von-mises"]);
         assert_ne!(surface, plain);
         assert!(Picture::from_png_with_coverage(&plain).is_err(), "pictures are opaque");
     }
@@ -162,7 +168,7 @@ mod with_pictures {
             (&["render", "out/case", "--until", "2"], "give the scene"),
             (&["render", "out/case", "--film", "film.avi"], "end it in .mp4"),
             (&["render", "out/case", "-o", "full"], "it is not empty"),
-            (&["render", "case", "--colour", "presure"], "no field `presure`"),
+            (&["render", "case", "--colour", "presure"], "did you mean \"pressure\"?"),
             (&["render", "case", "--colour", "bending-moment:xx"], "have no `bending-moment`"),
         ];
         for (arguments, piece) in cases {

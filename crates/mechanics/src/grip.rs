@@ -1,12 +1,14 @@
 //! Grips: springs between points of bodies and places in space, that come and go while a run goes on, as a hand takes hold of
 //! tissue and lets it go. With the point x = Σ wᵢ (Xᵢ + uᵢ) and the place p, node i feels wᵢ k (p − x).
 
+use serde::{Deserialize, Serialize};
+
 use crate::Real;
 use crate::model::Model;
 use crate::tensor::{Vector, add, cast, scale, sub};
 
 /// A spring between a point of a body and a place.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grip {
     /// Nodes of the point, and their weights, which sum to 1.
     pub nodes: Vec<(u32, f64)>,
@@ -41,7 +43,12 @@ impl Grip {
     }
 
     /// Adds its forces on the nodes [N].
-    pub(crate) fn add_forces<R: Real>(&self, model: &Model, displacement: &[Vector<R>], to: &mut [Vector<f64>]) {
+    pub(crate) fn add_forces<R: Real>(
+        &self,
+        model: &Model,
+        displacement: &[Vector<R>],
+        to: &mut [Vector<f64>],
+    ) {
         let force = self.force(model, displacement);
         for &(node, weight) in &self.nodes {
             to[node as usize] = add(to[node as usize], scale(force, weight));

@@ -202,20 +202,44 @@ impl Camera {
                 let f = 1.0 / SPREAD;
                 let depth = 1.0 / (far - near);
                 Matrix4::new(
-                    f / aspect, 0.0, 0.0, 0.0, //
-                    0.0, f, 0.0, 0.0, //
-                    0.0, 0.0, -far * depth, -far * near * depth, //
-                    0.0, 0.0, -1.0, 0.0,
+                    f / aspect,
+                    0.0,
+                    0.0,
+                    0.0, //
+                    0.0,
+                    f,
+                    0.0,
+                    0.0, //
+                    0.0,
+                    0.0,
+                    -far * depth,
+                    -far * near * depth, //
+                    0.0,
+                    0.0,
+                    -1.0,
+                    0.0,
                 )
             }
             Projection::Orthographic => {
                 let f = 2.0 / self.height;
                 let depth = 1.0 / (far - near);
                 Matrix4::new(
-                    f / aspect, 0.0, 0.0, 0.0, //
-                    0.0, f, 0.0, 0.0, //
-                    0.0, 0.0, -depth, -near * depth, //
-                    0.0, 0.0, 0.0, 1.0,
+                    f / aspect,
+                    0.0,
+                    0.0,
+                    0.0, //
+                    0.0,
+                    f,
+                    0.0,
+                    0.0, //
+                    0.0,
+                    0.0,
+                    -depth,
+                    -near * depth, //
+                    0.0,
+                    0.0,
+                    0.0,
+                    1.0,
                 )
             }
         };
@@ -261,7 +285,9 @@ mod tests {
     const ALL: [Axis; 6] = [Axis::X, Axis::Y, Axis::Z, Axis::MinusX, Axis::MinusY, Axis::MinusZ];
 
     fn corners() -> Vec<Vector3> {
-        (0..8).map(|i| Vector3::new(f64::from(i & 1), f64::from(i >> 1 & 1) * 2.0, f64::from(i >> 2) * 0.3)).collect()
+        (0..8)
+            .map(|i| Vector3::new(f64::from(i & 1), f64::from(i >> 1 & 1) * 2.0, f64::from(i >> 2) * 0.3))
+            .collect()
     }
 
     #[test]

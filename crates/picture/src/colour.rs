@@ -128,7 +128,9 @@ mod tests {
 
     #[test]
     fn sequential_maps_grow_lighter_all_the_way() {
-        for map in [ColourMap::Viridis, ColourMap::Cividis, ColourMap::Magma, ColourMap::Inferno, ColourMap::Plasma] {
+        for map in
+            [ColourMap::Viridis, ColourMap::Cividis, ColourMap::Magma, ColourMap::Inferno, ColourMap::Plasma]
+        {
             let steps: Vec<f32> = (0..=20).map(|i| lightness(map.at(f64::from(i) / 20.0))).collect();
             assert!(steps.is_sorted(), "{map:?}: {steps:?}");
         }

@@ -17,7 +17,9 @@ pub enum PictureError {
         reason: String,
     },
     /// A picture of this size is more than the adapter draws.
-    #[error("a picture of {width} × {height} pixels cannot be drawn by `{adapter}`: it takes 1 to {largest} each way")]
+    #[error(
+        "a picture of {width} × {height} pixels cannot be drawn by `{adapter}`: it takes 1 to {largest} each way"
+    )]
     Size {
         /// Its name.
         adapter: String,

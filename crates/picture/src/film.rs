@@ -94,8 +94,14 @@ impl AnimatedPng {
     ///
     /// # Errors
     /// If the file can't be written, or there are no pictures.
-    pub fn start(path: &Path, [width, height]: [u32; 2], count: u32, rate: f64) -> Result<Self, PictureError> {
-        let failed = |error: std::io::Error| PictureError::Write { path: path.to_owned(), reason: error.to_string() };
+    pub fn start(
+        path: &Path,
+        [width, height]: [u32; 2],
+        count: u32,
+        rate: f64,
+    ) -> Result<Self, PictureError> {
+        let failed =
+            |error: std::io::Error| PictureError::Write { path: path.to_owned(), reason: error.to_string() };
         let file = File::create(path).map_err(failed)?;
         let mut encoder = png::Encoder::new(BufWriter::new(file), width, height);
         encoder.set_color(png::ColorType::Rgb);

@@ -76,8 +76,13 @@ impl Legend {
     ) {
         let ink = style.background.ink();
         let (unit, factor) = readable(&self.unit, low.abs().max(high.abs()));
-        let head = if unit.is_empty() { self.quantity.clone() } else { format!("{} [{unit}]", self.quantity) };
+        let head =
+            if unit.is_empty() { self.quantity.clone() } else { format!("{} [{unit}]", self.quantity) };
         let (right, top, bottom) = (width - 1.1 * size, 0.20 * height, 0.86 * height);
+        // In a tiny picture nobody could read it.
+        if bottom - top < 3.0 * size || width < 12.0 * size {
+            return;
+        }
         let thick = 1.1 * size;
         let bar = [(width - 5.2 * size).round(), (width - 5.2 * size + thick).round()];
         // Long names take two lines.
@@ -106,12 +111,14 @@ impl Legend {
         }
         let (values, step) = ticks([low * factor, high * factor], 6);
         let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
-        let decimals = if (step * 10_f64.powi(decimals as i32) - (step * 10_f64.powi(decimals as i32)).round()).abs() > 1e-6
-        {
-            decimals + 1
-        } else {
-            decimals
-        };
+        let decimals =
+            if (step * 10_f64.powi(decimals as i32) - (step * 10_f64.powi(decimals as i32)).round()).abs()
+                > 1e-6
+            {
+                decimals + 1
+            } else {
+                decimals
+            };
         for value in values {
             let part = (value / factor - low) / (high - low);
             let y = (bottom - part as f32 * (bottom - top)).clamp(top, bottom - 1.0);

@@ -11,7 +11,8 @@
 //! mesh.block_mut(CellKind::Tet).nodes.extend([0, 1, 2, 3]);
 //!
 //! let graphics = Graphics::open()?;
-//! let mut studio = Studio::new(&graphics, &Subject::new(&mesh), [640, 480])?;
+//! let subject = Subject::new(&mesh);
+//! let mut studio = Studio::new(&graphics, &subject, [640, 480])?;
 //! let frame = Frame { points: mesh.points.clone(), values: vec![0.0, 1.0, 2.0, 3.0] };
 //! let style = Style { range: Some([0.0, 3.0]), ..Style::default() };
 //! let mut camera = Camera::default();

@@ -77,7 +77,8 @@ impl Picture {
         if kind != (png::ColorType::Rgba, png::BitDepth::Eight) {
             return Err(PictureError::Coding(format!("its pixels are {:?} of {:?} bits", kind.0, kind.1)));
         }
-        let size = reader.output_buffer_size().ok_or_else(|| PictureError::Coding("it is too large".into()))?;
+        let size =
+            reader.output_buffer_size().ok_or_else(|| PictureError::Coding("it is too large".into()))?;
         let mut rgba = vec![0; size];
         reader.next_frame(&mut rgba).map_err(coding)?;
         Ok(Self { width, height, rgba })

@@ -225,7 +225,11 @@ fn storage<T: Pod>(device: &wgpu::Device, content: &[T]) -> wgpu::Buffer {
     device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
 }
 
-fn group(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
+fn group(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    buffers: &[&wgpu::Buffer],
+) -> wgpu::BindGroup {
     let entries: Vec<_> = (buffers.iter().zip(0..))
         .map(|(buffer, binding)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
         .collect();
@@ -266,11 +270,16 @@ impl Drawn {
         let colours = storage(device, &map.table());
         let view_group = group(device, &renderer.view, &[&view, &colours]);
         let used = subject.surface_points();
-        let low = used.iter().fold(Vector3::repeat(f64::INFINITY), |low, &p| low.inf(&subject.points[p as usize]));
-        let high =
-            used.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |high, &p| high.sup(&subject.points[p as usize]));
-        let (middle, size) =
-            if used.is_empty() { (Vector3::zeros(), 1.0) } else { (0.5 * (low + high), 0.5 * (high - low).norm()) };
+        let low =
+            used.iter().fold(Vector3::repeat(f64::INFINITY), |low, &p| low.inf(&subject.points[p as usize]));
+        let high = used
+            .iter()
+            .fold(Vector3::repeat(f64::NEG_INFINITY), |high, &p| high.sup(&subject.points[p as usize]));
+        let (middle, size) = if used.is_empty() {
+            (Vector3::zeros(), 1.0)
+        } else {
+            (0.5 * (low + high), 0.5 * (high - low).norm())
+        };
         Self {
             triangles,
             vertices,
@@ -311,15 +320,18 @@ impl Drawn {
             &renderer.shape,
             &[points, triangles, vertices, &pose.normals, &section[0], &section[1]],
         );
-        pose.compute = group(
-            device,
-            &renderer.normals,
-            &[points, triangles, vertices, &pose.normals, offsets, around],
-        );
+        pose.compute =
+            group(device, &renderer.normals, &[points, triangles, vertices, &pose.normals, offsets, around]);
     }
 
     /// Takes the triangles of a section; none for no section.
-    pub fn set_section(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, renderer: &Renderer, section: &Section) {
+    pub fn set_section(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        section: &Section,
+    ) {
         self.section_triangles = section.edges.len() as u32;
         let corners: &[u8] = bytemuck::cast_slice(&section.corners);
         if self.section[0].size() < corners.len() as u64 {

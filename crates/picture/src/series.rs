@@ -64,7 +64,9 @@ impl SeriesError {
             Self::UnknownSeries { .. } => "take one of these",
             Self::NoFrames(_) => "run the scene again",
             Self::File(_) => "",
-            Self::NoField { .. } => "take one of these, a component as in `displacement:z` or `cauchy-stress:xx`, or `none`",
+            Self::NoField { .. } => {
+                "take one of these, a component as in `displacement:z` or `cauchy-stress:xx`, or `none`"
+            }
             Self::OtherMesh(_) => "run the scene again into an empty folder",
             Self::Picture(error) => error.remedy(),
         }
@@ -97,7 +99,11 @@ impl Series {
             Some(name) if names.iter().any(|known| known == name) => name.to_owned(),
             Some(name) => {
                 let known = quoted(&names);
-                return Err(SeriesError::UnknownSeries { folder: folder.to_owned(), name: name.to_owned(), known });
+                return Err(SeriesError::UnknownSeries {
+                    folder: folder.to_owned(),
+                    name: name.to_owned(),
+                    known,
+                });
             }
         };
         let list = folder.join(format!("{name}.pvd"));
@@ -190,10 +196,8 @@ impl Look {
     fn frame(&self, mesh: &Mesh) -> Result<Frame, SeriesError> {
         let values = match &self.field {
             None => Vec::new(),
-            Some(field) => nodal_values(mesh, field).ok_or_else(|| SeriesError::NoField {
-                field: field.clone(),
-                known: quoted(&fields(mesh)),
-            })?,
+            Some(field) => nodal_values(mesh, field)
+                .ok_or_else(|| SeriesError::NoField { field: field.clone(), known: quoted(&fields(mesh)) })?,
         };
         let mut points = mesh.points.clone();
         if let Some(moved) = mesh.point_data.get("displacement").filter(|array| array.components == 3) {
@@ -224,7 +228,8 @@ impl Look {
     }
 
     fn finished(&self, mut picture: Picture, style: &Style, time: f64) -> Picture {
-        let note = if self.legend.note.is_empty() { format!("t = {time:.3} s") } else { self.legend.note.clone() };
+        let note =
+            if self.legend.note.is_empty() { format!("t = {time:.3} s") } else { self.legend.note.clone() };
         Legend { note, ..self.legend.clone() }.write(&mut picture, style);
         picture
     }
@@ -257,7 +262,8 @@ impl Look {
         let Some(&first) = frames.first() else { return Ok(()) };
         let mesh = series.mesh(first)?;
         let subject = Subject::new(&mesh);
-        let blocks = |mesh: &Mesh| mesh.blocks.iter().map(|block| (block.kind, block.len())).collect::<Vec<_>>();
+        let blocks =
+            |mesh: &Mesh| mesh.blocks.iter().map(|block| (block.kind, block.len())).collect::<Vec<_>>();
         let shape = (mesh.points.len(), blocks(&mesh));
         let read = |index: usize| {
             let mesh = series.mesh(index)?;

@@ -50,7 +50,11 @@ impl<'s> Studio<'s> {
     ///
     /// # Errors
     /// If the graphics processor draws no such size, or fails.
-    pub fn new(graphics: &Graphics, subject: &'s Subject, [width, height]: [u32; 2]) -> Result<Self, PictureError> {
+    pub fn new(
+        graphics: &Graphics,
+        subject: &'s Subject,
+        [width, height]: [u32; 2],
+    ) -> Result<Self, PictureError> {
         let device = &graphics.device;
         let largest = device.limits().max_texture_dimension_2d;
         if !(1..=largest).contains(&width) || !(1..=largest).contains(&height) {

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, vector_area, volume};
 
-/// Cosine of the angle between faces [60°] from which on their edge is sharp.
-const SHARP: f64 = 0.5;
+/// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
+const SHARP: f64 = 0.26;
 
 /// The surface and the cells of a mesh, ready to be drawn in any deformed state.
 #[derive(Clone, Debug)]
@@ -85,7 +85,9 @@ impl Subject {
 
     /// Volume cells with their nodes.
     pub(crate) fn volume_cells(&self) -> impl Iterator<Item = (CellKind, &[u32])> {
-        self.cells.iter().flat_map(|(kind, nodes)| nodes.chunks_exact(kind.node_count()).map(move |n| (*kind, n)))
+        self.cells
+            .iter()
+            .flat_map(|(kind, nodes)| nodes.chunks_exact(kind.node_count()).map(move |n| (*kind, n)))
     }
 }
 
@@ -231,7 +233,12 @@ pub(crate) mod tests {
         let mut mesh = Mesh { points: hexes.points.clone(), ..Mesh::default() };
         // Around the diagonal from 0 to 6 of each.
         let ring = [1, 2, 3, 7, 4, 5, 1];
-        let six = |hex: &[u32]| ring.map(|corner| hex[corner]).windows(2).map(|p| [hex[0], p[0], p[1], hex[6]]).collect::<Vec<_>>();
+        let six = |hex: &[u32]| {
+            ring.map(|corner| hex[corner])
+                .windows(2)
+                .map(|p| [hex[0], p[0], p[1], hex[6]])
+                .collect::<Vec<_>>()
+        };
         let nodes = hexes.blocks[0].cells().flat_map(six).flatten();
         mesh.block_mut(CellKind::Tet).nodes = nodes.collect();
         mesh
@@ -264,7 +271,9 @@ pub(crate) mod tests {
         let vectors = (0..8).flat_map(|i| [3.0 * f64::from(i), 4.0 * f64::from(i), 0.0]).collect();
         mesh.point_data.insert("displacement".into(), DataArray { components: 3, values: vectors });
         mesh.blocks[0].data.insert("von-mises".into(), DataArray::scalar(vec![7.0]));
-        mesh.blocks[0].data.insert("stress".into(), DataArray { components: 9, values: (0..9).map(f64::from).collect() });
+        mesh.blocks[0]
+            .data
+            .insert("stress".into(), DataArray { components: 9, values: (0..9).map(f64::from).collect() });
         assert_eq!(nodal_values(&mesh, "displacement").unwrap()[2], 10.0);
         assert_eq!(nodal_values(&mesh, "displacement:y").unwrap()[2], 8.0);
         assert_eq!(nodal_values(&mesh, "von-mises").unwrap(), vec![7.0; 8]);

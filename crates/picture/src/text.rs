@@ -66,7 +66,12 @@ impl Pen {
             outline.draw(|dx, dy, cover| {
                 // Light strokes look thin on a screen.
                 let cover = cover.min(1.0).powf(0.75);
-                picture.mix(bounds.min.x as i64 + i64::from(dx), bounds.min.y as i64 + i64::from(dy), ink, cover);
+                picture.mix(
+                    bounds.min.x as i64 + i64::from(dx),
+                    bounds.min.y as i64 + i64::from(dy),
+                    ink,
+                    cover,
+                );
             });
         }
     }

@@ -39,9 +39,9 @@ mod checkpoint;
 mod corotational;
 pub mod diagnostic;
 pub mod format;
+mod live;
 pub mod niftysim;
 mod output;
-mod live;
 mod overview;
 mod plan;
 pub mod reference;
@@ -53,18 +53,18 @@ pub mod source;
 mod starter;
 mod sweep;
 mod target;
-mod view;
 #[cfg(test)]
 mod testing;
+mod view;
 
 pub use bound::element_bound;
 pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, PLAUSIBLE_SIZE, build};
 pub use checkpoint::{Checkpoint, ResumeError};
+pub use live::{Live, live};
 pub use output::{
     AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,
     Summary, failed_input, failed_output, number,
 };
-pub use live::{Live, live};
 pub use overview::overview;
 pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};
 pub use run::{Options, Progress, run, run_with};

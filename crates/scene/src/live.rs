@@ -27,6 +27,9 @@ pub trait Live {
     /// Takes hold of points: these grips and no others act from the next step on. False where the solver knows none.
     fn hold(&mut self, grips: &[Grip]) -> bool;
 
+    /// Steps until grips that are taken now act: 1 where the instant was looked at and its forces are found, else 0.
+    fn delay(&self) -> u64;
+
     /// The point of a grip now [m], and its force on the body [N].
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2];
 
@@ -56,7 +59,11 @@ pub trait Live {
 ///
 /// # Errors
 /// If its solver can't be made.
-pub fn live<'b>(scene: &'b Scene, built: &'b Built, plan: &'b Plan) -> Result<Box<dyn Live + 'b>, FailureSummary> {
+pub fn live<'b>(
+    scene: &'b Scene,
+    built: &'b Built,
+    plan: &'b Plan,
+) -> Result<Box<dyn Live + 'b>, FailureSummary> {
     Ok(match (&plan.target.device, plan.target.precision, &built.corotational) {
         (Some(device), ..) => {
             let state = State::at_rest(&built.model);
@@ -121,6 +128,10 @@ impl<R: Real> Live for Played<'_, R> {
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
         self.solver.hold(grips)
+    }
+
+    fn delay(&self) -> u64 {
+        u64::from(self.evaluated.is_some())
     }
 
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {

@@ -37,8 +37,7 @@ pub struct Scene {
 }
 
 /// The tables a scene file can have.
-const TABLES: [&str; 9] =
-    ["scene", "run", "law", "body", "surface", "constraint", "load", "output", "view"];
+const TABLES: [&str; 9] = ["scene", "run", "law", "body", "surface", "constraint", "load", "output", "view"];
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]

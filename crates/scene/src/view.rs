@@ -22,9 +22,16 @@ impl Scene {
         match self.view.colour {
             Some(ColourBy::Field(field)) => Some(field),
             Some(ColourBy::Nothing(_)) => None,
-            None if self.shows_surface() => Some(FieldName::Displacement),
+            None if self.shows_surface_of_shell() => Some(FieldName::Displacement),
             None => Some(FieldName::VonMises),
         }
+    }
+
+    fn shows_surface_of_shell(&self) -> bool {
+        let shown = self.surfaces.iter().filter(|(name, _)| self.view.on.as_ref() == Some(name));
+        let solid =
+            |on: &str| self.bodies.iter().any(|(name, body)| name == on && body.model == BodyModel::Solid);
+        shown.into_iter().any(|(_, surface)| !solid(&surface.on))
     }
 
     fn shows_surface(&self) -> bool {
@@ -51,12 +58,17 @@ mod tests {
 
     #[test]
     fn a_view_shows_what_it_names_and_von_mises_stresses_otherwise() {
+        let skin =
+            "[surface.skin]\non = 'cube'\nmesh = { block = { size = [0.2, 0.1, 0.1], cells = [3, 2, 2] } }\n";
+        built(&format!("{skin}[view]\non = 'skin'\ncolour = 'pressure'\n"));
         let table = |more: &str| scene(more).shown(0.1);
         assert_eq!(table("").data, [FieldName::Displacement, FieldName::VonMises]);
         assert_eq!(table("[view]\ncolour = 'none'\n").data, [FieldName::Displacement]);
         assert_eq!(table("[view]\ncolour = 'pressure'\non = 'cube'\n").data[1], FieldName::Pressure);
         assert_eq!((table("").curved, table("").at), (None, At::Points), "a solid");
-        built("[view]\ncolour = 'displacement'\ncomponent = 'z'\nclip = { point = [0, 0, 0], normal = [1, 0, 0] }\n");
+        built(
+            "[view]\ncolour = 'displacement'\ncomponent = 'z'\nclip = { point = [0, 0, 0], normal = [1, 0, 0] }\n",
+        );
         built("[view]\ncolour = 'cauchy-stress'\ncomponent = 'xy'\n");
     }
 

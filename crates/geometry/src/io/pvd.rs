@@ -9,8 +9,8 @@ use super::{MeshFileError, MeshFileProblem, Place};
 
 /// Reads the list of the files of a series: time [s] and file of each frame. Files are relative to where the list is.
 pub fn read_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
-    let text = fs::read_to_string(path)
-        .map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
+    let text =
+        fs::read_to_string(path).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
     parse(path, &text)
 }
 

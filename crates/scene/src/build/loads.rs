@@ -6,7 +6,8 @@ use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
 use super::{Builder, SCENE, Target, suggestion};
 use crate::format::{
-    At, BodyModel, ColourBy, Component, CsvTable, FieldName, ForceTable, ProbeTable, Timing, Vectors, VtuTable,
+    At, BodyModel, ColourBy, Component, CsvTable, FieldName, ForceTable, ProbeTable, Timing, Vectors,
+    VtuTable,
 };
 use crate::registry::{LoadTable, OutputTable};
 
@@ -189,7 +190,12 @@ impl Builder<'_> {
         if let Some(clip) = &view.clip
             && clip.normal == [0.0; 3]
         {
-            self.error(&["view", "clip", "normal"], "a plane needs a normal", "no direction", "as in [1, 0, 0]");
+            self.error(
+                &["view", "clip", "normal"],
+                "a plane needs a normal",
+                "no direction",
+                "as in [1, 0, 0]",
+            );
         }
         if let Some([low, high]) = view.range
             && low >= high
@@ -200,8 +206,19 @@ impl Builder<'_> {
         match target {
             Some(None) => return,
             Some(Some(Target::Surface(surface))) => {
-                let help = "show the body for stresses";
-                self.refuse_cell_fields(&[field], surface, &["view", "colour"], help);
+                let body = self.model.surfaces[surface].body;
+                let model = self.scene.bodies[body].1.model;
+                if model != BodyModel::Solid && field != FieldName::Displacement {
+                    let message = format!(
+                        "surfaces that a body of model `{}` carries have a displacement and no `{}`",
+                        model.word(),
+                        field.name()
+                    );
+                    let help = "leave `on` out, to see the body itself";
+                    self.error(&["view", "colour"], message, "not on a surface", help);
+                } else {
+                    self.refuse_other_fields(&[field], Some(body), &["view", "colour"]);
+                }
             }
             Some(Some(Target::Body(body))) => {
                 self.refuse_other_fields(&[field], Some(body), &["view", "colour"]);

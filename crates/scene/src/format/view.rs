@@ -13,7 +13,7 @@ pub struct ViewTable {
     /// The body or the carried surface that is shown; if not given, all bodies together.
     #[serde(default)]
     pub on: Option<String>,
-    /// What the colours tell; `none`: the colour of tissue. If not given, `von-mises` on bodies, `displacement` on carried surfaces.
+    /// What the colours tell; `none`: the colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells or co-rotational solids carry.
     #[serde(default)]
     pub colour: Option<ColourBy>,
     /// A component of a vector (`x`, `y`, `z`) or a tensor (`xx`, `xy`, …), instead of the size of a vector; a tensor needs one.

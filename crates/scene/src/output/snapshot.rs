@@ -80,17 +80,7 @@ impl<R: Real> Snapshot<R> {
                     self.mesh.point_data.insert(name.into(), DataArray { components: 3, values });
                     return;
                 }
-                let mapping = &frame.built.model.surfaces[*index].mapping;
-                for &field in &self.fields {
-                    let parent: Vec<[f64; 3]> = (0..frame.built.model.node_count())
-                        .map(|node| {
-                            let value = fields::nodal(frame, field, node);
-                            [value[0], value[1], value[2]]
-                        })
-                        .collect();
-                    let values = mapping.apply(&parent).into_iter().flatten().collect();
-                    self.mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
-                }
+                fill_surface(&mut self.mesh, frame, &self.fields, *index);
             }
             Content::Bodies { nodes, cells } => {
                 fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
@@ -105,6 +95,49 @@ impl<R: Real> Snapshot<R> {
             }
             Content::Curved(curved) => curved.fill(&mut self.mesh, frame, &self.fields),
         }
+    }
+}
+
+/// Fields on a carried surface; those of cells as means at the nodes.
+fn fill_surface<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], surface: usize) {
+    let model = &frame.built.model;
+    let mapping = &model.surfaces[surface].mapping;
+    let (nodal, of_cells): (Vec<FieldName>, Vec<FieldName>) =
+        wanted.iter().partition(|field| field.is_nodal());
+    for field in nodal {
+        let value = |node| {
+            let value = fields::nodal(frame, field, node);
+            [value[0], value[1], value[2]]
+        };
+        let parent: Vec<[f64; 3]> = (0..model.node_count()).map(value).collect();
+        let values = mapping.apply(&parent).into_iter().flatten().collect();
+        mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
+    }
+    if of_cells.is_empty() {
+        return;
+    }
+    let recovery = Recovery::new(model, frame.state);
+    let mut averages = Averages::new(model.node_count(), &of_cells);
+    for (index, solid) in model.solids.iter().enumerate() {
+        let cells: Vec<_> =
+            (0..solid.cells.len()).into_par_iter().map(|cell| recovery.cell(index, cell)).collect();
+        for (cell, found) in cells.iter().enumerate() {
+            let volume = solid.cells.volume(cell);
+            for (slot, &field) in of_cells.iter().enumerate() {
+                let value = &fields::of_cell(found, field)[..field.components()];
+                averages.add(slot, solid.cells.nodes(cell), value, volume);
+            }
+        }
+    }
+    for (field, means) in of_cells.iter().zip(averages.means(&of_cells)) {
+        let components = field.components();
+        let carried = |point: usize| {
+            let mean =
+                |c: usize| mapping.row(point).map(|(node, w)| w * means[node * components + c]).sum::<f64>();
+            (0..components).map(mean).collect::<Vec<f64>>()
+        };
+        let values = (0..mapping.len()).flat_map(carried).collect();
+        mesh.point_data.insert(field.name().into(), DataArray { components, values });
     }
 }
 
@@ -315,15 +348,18 @@ impl Averages {
         }
     }
 
+    /// The means of each field.
+    fn means(self, wanted: &[FieldName]) -> Vec<Vec<f64>> {
+        let mean = |(field, (sums, volumes)): (&FieldName, (Vec<f64>, Vec<f64>))| {
+            let items = sums.chunks(field.components()).zip(volumes);
+            items.flat_map(|(s, v)| s.iter().map(move |s| s / v)).collect()
+        };
+        wanted.iter().zip(self.sums).map(mean).collect()
+    }
+
     fn write(self, data: &mut std::collections::BTreeMap<String, DataArray>, wanted: &[FieldName]) {
-        for (&field, (sums, volumes)) in wanted.iter().zip(self.sums) {
-            let components = field.components();
-            let values = sums
-                .chunks(components)
-                .zip(volumes)
-                .flat_map(|(s, v)| s.iter().map(move |s| s / v))
-                .collect();
-            data.insert(field.name().into(), DataArray { components, values });
+        for (&field, values) in wanted.iter().zip(self.means(wanted)) {
+            data.insert(field.name().into(), DataArray { components: field.components(), values });
         }
     }
 }

@@ -62,7 +62,6 @@ impl<R: Real> Series<R> {
             other => OutputError::new(&self.index, other),
         })
     }
-
 }
 
 impl<R: Real> Observer<R> for Series<R> {
