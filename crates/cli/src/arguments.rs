@@ -63,12 +63,15 @@ pub enum Command {
         out: PathBuf,
     },
     /// Say what a mesh file holds, how good it is, and what is wrong with it.
-    #[command(after_help = "Examples:\n  pliant info liver.msh\n  pliant info liver.msh --convert liver.vtu")]
+    #[command(
+        after_help = "Examples:\n  pliant info liver.msh\n  pliant info liver.msh --convert liver.vtu\n  \
+                            pliant info liver.vtu --against liver.stl --against-scale 0.001"
+    )]
     Info(Info),
     /// List the labels of a segmented image: volume, place and pieces of each.
     #[command(after_help = "Examples:\n  pliant labels seg.nii.gz\n  pliant labels seg.nii.gz --json")]
     Labels(Labels),
-    /// Make a mesh from labels of a segmented image: tets, hexes, a surface, curved shells. Surfaces and shells also from mesh files.
+    /// Make a mesh from labels of a segmented image or from a closed surface: tets, hexes, a surface, curved shells.
     #[command(after_help = MESH_HELP)]
     Mesh(MeshImage),
     /// Compute the results of the thesis and write them beside the printed ones.
@@ -454,6 +457,12 @@ pub struct Info {
     /// Write the mesh in another format, by the ending of the name.
     #[arg(long, value_name = "FILE")]
     pub convert: Option<PathBuf>,
+    /// Also measure how far the surface of the mesh and that of another one are apart, both ways.
+    #[arg(long, value_name = "OTHER")]
+    pub against: Option<PathBuf>,
+    /// Factor on all lengths of the other mesh; that of `--scale` if not given.
+    #[arg(long, value_name = "FACTOR", requires = "against", allow_negative_numbers = true)]
+    pub against_scale: Option<f64>,
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
@@ -462,20 +471,22 @@ pub struct Info {
 const MESH_HELP: &str = "\
 Images: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, or the folder of a DICOM series. The mesh is in metres, in
 the coordinates of the patient: x to the right, y to the front, z to the head.
+Closed surfaces: the triangles and quads of OBJ, OFF, STL, PLY, VTP, VTK, VTU or Gmsh files, in metres or with `--scale`.
 
 Examples:
   pliant labels seg.nii.gz
-  pliant mesh seg.nii.gz --label 5 --edge 0.008 -o liver.vtu
-  pliant mesh brain.nii.gz --label 1 --label 2 --edge 0.006 --keep-largest -o brain.vtu   # two materials
-  pliant mesh seg.nii.gz --label 5 --edge 0.01 --as hexes --close-gaps 0.003 --fill-holes -o liver.msh
-  pliant mesh grey.nii --threshold 0.5 --edge 0.008 -o grey.vtu
+  pliant mesh seg.nii.gz --label 5 --edge 8mm -o liver.vtu                             # or --edge 0.008
+  pliant mesh liver.stl --scale 0.001 --edge 8mm --young 5000 -o liver.vtu             # a surface in millimetres
+  pliant mesh brain.nii.gz --label 1 --label 2 --edge 6mm --keep-largest -o brain.vtu   # two materials
+  pliant mesh seg.nii.gz --label 5 --edge 0.01 --as hexes --close-gaps 3mm --fill-holes -o liver.msh
+  pliant mesh grey.nii --threshold 0.5 --edge 8mm -o grey.vtu
 
-  pliant mesh seg.nii.gz --label 5 --as surface --edge 0.005 -o liver.ply              # even triangles
+  pliant mesh seg.nii.gz --label 5 --as surface --edge 5mm -o liver.ply              # even triangles
   pliant mesh liver.stl --as surface --cells 8000 -o coarse.stl                        # as few as asked for
   pliant mesh liver.stl --as shells --error 0.5% -o liver.vtu --error-map off.vtu      # or --shells 800
 
-Surfaces and shells are also made from the triangles and quads of mesh files (OBJ, OFF, STL, PLY, VTP, VTK, VTU, Gmsh), or from the
-boundary of their cells. Shells are curved triangles: point data `normal` are the fitted normals of their nodes.
+Of a mesh of volume cells its boundary is taken. Shells are curved triangles: point data `normal` are the fitted normals of their
+nodes.
 
 The label of each volume cell is its cell data `label`. A scene can name the image itself:
   mesh = { image = \"seg.nii.gz\", label = 5, edge = 0.008 }
@@ -496,16 +507,18 @@ pub struct Labels {
 
 #[derive(Debug, clap::Args)]
 pub struct MeshImage {
-    /// An image file, or the folder of a DICOM series; for surfaces and shells also a mesh file.
+    /// An image file, the folder of a DICOM series, or a mesh file; for tets and hexes a closed surface.
+    #[arg(value_name = "INPUT")]
     pub image: PathBuf,
-    /// Label to mesh; several make one mesh of several materials. The first one takes what cleaning adds.
+    /// Label to mesh; several make one mesh of several materials. The first one takes what cleaning adds. With a surface, the
+    /// label that its cells get.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub label: Vec<i32>,
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true, conflicts_with = "label")]
     pub threshold: Option<f64>,
-    /// Edge of the cells [m]. Tets and hexes need it; a surface gets even triangles of this edge.
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    /// Edge of the cells: 0.008 in metres, or 8mm. Tets and hexes need it; a surface gets even triangles of this edge.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     pub edge: Option<f64>,
     /// Triangles of a surface, instead of their edge: as few, placed where the shape needs them.
     #[arg(long = "cells", value_name = "N", conflicts_with = "edge")]
@@ -528,8 +541,9 @@ pub struct MeshImage {
     /// Name of the mesh; .vtu or .msh, of a surface also .ply, .obj or .stl.
     #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Close gaps and channels of up to this width [m].
-    #[arg(long, value_name = "M", default_value_t = 0.0, allow_negative_numbers = true)]
+    /// Close gaps and channels of up to this width, of a surface its holes: 0.003 in metres, or 3mm. Holes of a surface that are
+    /// narrower than the cells are always closed.
+    #[arg(long, value_name = "LENGTH", value_parser = length, default_value = "0", allow_hyphen_values = true)]
     pub close_gaps: f64,
     /// Fill cavities without a way out.
     #[arg(long)]
@@ -543,9 +557,27 @@ pub struct MeshImage {
     /// UID of the DICOM series, where the folder holds several.
     #[arg(long, value_name = "UID")]
     pub series: Option<String>,
+    /// Tissue whose stable step is told: brain-like is E = 3000 Pa, liver-like E = 19 kPa; both without this. Both have ν = 0.45.
+    #[arg(long, value_name = "NAME", conflicts_with = "young")]
+    pub law: Option<Tissue>,
+    /// Young's modulus of the tissue whose stable step is told [Pa].
+    #[arg(long, value_name = "PA", value_parser = positive)]
+    pub young: Option<f64>,
+    /// Poisson's ratio of that tissue.
+    #[arg(long, value_name = "RATIO", default_value_t = 0.45, value_parser = poisson, requires = "young")]
+    pub poisson: f64,
+    /// Density of the tissue [kg/m³].
+    #[arg(long, value_name = "KG/M3", default_value_t = 1000.0, value_parser = positive)]
+    pub density: f64,
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum Tissue {
+    BrainLike,
+    LiverLike,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -554,6 +586,31 @@ pub enum MeshCells {
     Hexes,
     Surface,
     Shells,
+}
+
+/// A length [m]: a number of metres, or one with its unit.
+fn length(typed: &str) -> Result<f64, String> {
+    const UNITS: [(&str, f64); 5] = [("µm", 1e-6), ("um", 1e-6), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
+    let unit = UNITS.iter().find_map(|(unit, metres)| Some((typed.strip_suffix(unit)?, metres)));
+    let (number, metres) = unit.unwrap_or((typed, &1.0));
+    match number.trim_end().parse::<f64>() {
+        Ok(number) => Ok(number * metres),
+        Err(_) => Err("a length is a number of metres, as 0.008, or one with its unit, as 8mm".into()),
+    }
+}
+
+fn positive(typed: &str) -> Result<f64, String> {
+    match typed.parse() {
+        Ok(number) if number > 0.0 && f64::is_finite(number) => Ok(number),
+        _ => Err("it must be positive and finite".into()),
+    }
+}
+
+fn poisson(typed: &str) -> Result<f64, String> {
+    match typed.parse() {
+        Ok(number) if number > -1.0 && number < 0.5 => Ok(number),
+        _ => Err("a Poisson's ratio lies between -1 and 0.5".into()),
+    }
 }
 
 /// A part of one, or percent.

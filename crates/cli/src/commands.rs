@@ -5,20 +5,20 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use pliant_geometry::io::{self, MeshFile};
-use pliant_geometry::{Mesh, QualityReport, Spread, Vector3, diagnose};
+use pliant_geometry::io;
 use pliant_gpu::{Adapter, GpuError};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, Draw, Options, OutputFolder, PLAUSIBLE_SIZE, Plan, Scene, Sweep, SweepOptions,
-    niftysim, number, reference, registry,
+    Built, Checkpoint, Draw, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim, reference,
+    registry,
 };
-use serde_json::{Map, Value as Json, json};
+use serde_json::{Value as Json, json};
 use tempfile::TempDir;
 
-use crate::arguments::{self, Check, Command, DeviceName, Info, Overrides, Precision, Run};
+use crate::arguments::{self, Check, Command, DeviceName, Overrides, Precision, Run};
 use crate::bench::bench;
+use crate::info::info;
 use crate::mesh;
 use crate::pictures;
 use crate::report::{self, Bar, Failure, say};
@@ -337,72 +337,4 @@ fn import(model: &Path, out: &Path) -> Result<ExitCode, Failure> {
     }
     say(format_args!("wrote {}; try: pliant run {}", file.display(), out.display()))?;
     Ok(ExitCode::SUCCESS)
-}
-
-fn info(arguments: &Info) -> Result<ExitCode, Failure> {
-    if !(arguments.scale > 0.0 && arguments.scale.is_finite()) {
-        let message = format!("`--scale` must be greater than 0, found {}", arguments.scale);
-        return Err(Failure::plain(message, "0.001 for millimetres"));
-    }
-    let mut file = io::read(&arguments.mesh).map_err(|error| Failure::plain(error, ""))?;
-    file.mesh.points.iter_mut().for_each(|point| *point *= arguments.scale);
-    if arguments.json {
-        say(info_object(&file))?;
-    } else {
-        say(format_args!("{}: {}", arguments.mesh.display(), info_page(&file)))?;
-    }
-    if let Some(target) = &arguments.convert {
-        io::write(target, &file.mesh).map_err(|error| Failure::plain(error, ""))?;
-        eprintln!("wrote {}", target.display());
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-/// The named sets of a mesh with their numbers of nodes.
-fn sets(mesh: &Mesh) -> impl Iterator<Item = (&str, usize)> {
-    mesh.set_names().into_iter().map(|name| (name, mesh.set_points(name).map_or(0, |set| set.len())))
-}
-
-fn info_object(MeshFile { mesh, format, notes, .. }: &MeshFile) -> Json {
-    let (quality, found) = (QualityReport::new(mesh), diagnose(mesh));
-    let cells: Map<_, _> =
-        quality.cells.iter().map(|(kind, count)| (kind.name().to_owned(), json!(count))).collect();
-    let sets: Map<_, _> = sets(mesh).map(|(name, count)| (name.to_owned(), json!(count))).collect();
-    let spread = |s: Spread| json!({ "min": s.min, "median": s.median, "max": s.max });
-    json!({
-        "format": format,
-        "nodes": quality.nodes,
-        "cells": cells,
-        "bounds": mesh.bounds().map(|(low, high)| [<[f64; 3]>::from(low), <[f64; 3]>::from(high)]),
-        "volume": quality.volume,
-        "acoustic_length": quality.acoustic_length.map(spread),
-        "edge_length": quality.edge_length.map(spread),
-        "dihedral": quality.dihedral,
-        "scaled_jacobian": quality.scaled_jacobian,
-        "sets": sets,
-        "usable": found.is_usable(),
-        "problems": found.to_string(),
-        "notes": notes,
-    })
-}
-
-fn info_page(MeshFile { mesh, format, notes, .. }: &MeshFile) -> String {
-    let mut lines = vec![format.clone()];
-    if let Some((low, high)) = mesh.bounds() {
-        let at = |p: Vector3| format!("({}, {}, {})", number(p.x), number(p.y), number(p.z));
-        lines.push(format!("from {} to {} m", at(low), at(high)));
-        if (high - low).norm() > PLAUSIBLE_SIZE[1] {
-            lines.push("note: larger than any organ; for a mesh in millimetres give `--scale 0.001`".into());
-        }
-    }
-    lines.push(QualityReport::new(mesh).to_string().trim_end().to_owned());
-    lines.extend(sets(mesh).map(|(name, count)| format!("set `{name}`: {count} nodes")));
-    lines.extend(mesh.point_data.keys().map(|name| format!("point data `{name}`")));
-    for block in &mesh.blocks {
-        let kind = block.kind.name();
-        lines.extend(block.data.keys().map(|name| format!("cell data `{name}` of {kind} cells")));
-    }
-    lines.extend(notes.iter().map(|note| format!("note: {note}")));
-    lines.push(diagnose(mesh).to_string().trim_end().to_owned());
-    lines.join("\n")
 }

@@ -3,6 +3,7 @@
 mod arguments;
 mod bench;
 mod commands;
+mod info;
 mod mesh;
 mod page;
 #[cfg_attr(not(feature = "viewer"), path = "no_pictures.rs")]

@@ -1,25 +1,30 @@
-//! `pliant labels` and `pliant mesh`: what a segmented image holds, and cells of it. Surfaces and shells are in `skin.rs`.
+//! `pliant labels` and `pliant mesh`: what a segmented image holds, and cells of it or of what a closed surface encloses. Surfaces and
+//! shells are in `skin.rs`.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
-use pliant_bench::{elastic, liver_matrix, soft_tissue};
-use pliant_geometry::io::{self, Format};
-use pliant_geometry::{Mesh, QualityReport, Vector3, diagnose, volume};
+use pliant_bench::{elastic, law, liver_matrix, soft_tissue};
+use pliant_geometry::io::{self, Format, MeshFile};
+use pliant_geometry::{CellKind, Mesh, QualityReport, Vector3, diagnose, volume};
 use pliant_imaging::{
-    Cleaned, Cleaning, Image, LabelError, LabelImage, ReadOptions, RegionReport, Smoothing, read,
+    Cleaned, Cleaning, Image, ImageError, ImageProblem, LabelError, LabelImage, ReadOptions, RegionReport,
+    Smoothing, read,
 };
-use pliant_meshing::{Anatomy, DEFAULT_CELL_LIMIT, Deviation, MeshingError, OrganTets, TetReport, Voxels};
+use pliant_meshing::{
+    Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, MeshingError, OrganTets, TetReport, Voxels,
+    require_room_for,
+};
 use pliant_scene::{element_bound, number};
 use serde_json::{Value as Json, json};
 
-use crate::arguments::{Labels, MeshCells, MeshImage};
+use crate::arguments::{Labels, MeshCells, MeshImage, Tissue};
 use crate::report::{Bar, Failure, failed_output, say};
 use crate::skin;
 
 pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
     let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
-    let image = read(&arguments.image, &options).map_err(|error| Failure::plain(error, ""))?;
+    let image = read(&arguments.image, &options).map_err(|error| image_failure(&error))?;
     let labels = image.labels().map_err(|error| label_failure(&error))?;
     let regions = labels.regions();
     if arguments.json {
@@ -39,20 +44,21 @@ pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
 }
 
 pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
+    if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
+        let message = format!("`--scale` is {}; it must be positive and finite", arguments.scale);
+        return Err(Failure::plain(message, "for example `--scale 0.001` for a file in millimetres"));
+    }
+    refuse_idle(arguments)?;
     if matches!(arguments.cells, MeshCells::Surface | MeshCells::Shells) {
         return skin::mesh(arguments);
     }
     require_volume_format(arguments)?;
-    let (image, labels, chosen) = regions(arguments)?;
     let bar = Bar::new();
-    let made = make(arguments, &labels, &chosen, &bar);
+    let made = make(arguments, &bar);
     bar.finish();
     let made = made?;
     if !arguments.json {
-        let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
-        lines.extend(image.notes.iter().map(|note| format!("note: {note}")));
-        lines.push(made.page());
-        say(lines.join("\n"))?;
+        say(made.page())?;
     }
     made.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     if let Err(error) = io::write(&arguments.out, &made.mesh) {
@@ -61,17 +67,52 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     eprintln!("wrote {}", arguments.out.display());
     if arguments.json {
         let mut object = made.object();
-        object["image"] = image_object(&image);
         object["files"] = json!([arguments.out]);
         say(object)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
+/// Whether the input is a mesh file, by the ending of its name.
+pub fn is_mesh_file(arguments: &MeshImage) -> bool {
+    Format::of_path(&arguments.image).is_some()
+}
+
+/// Refuses options that would do nothing.
+fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
+    let skin = matches!(arguments.cells, MeshCells::Surface | MeshCells::Shells);
+    let file = is_mesh_file(arguments);
+    let cleans = arguments.close_gaps != 0.0 || arguments.fill_holes || arguments.keep_largest;
+    let tissue = arguments.law.is_some() || arguments.young.is_some();
+    let idle = [
+        (file && arguments.threshold.is_some(), "`--threshold` is for images"),
+        (file && arguments.series.is_some(), "`--series` is for images"),
+        (file && arguments.label.len() > 1, "`--label` more than once is for images"),
+        (file && skin && !arguments.label.is_empty(), "`--label` is for images, and for tets and hexes"),
+        (
+            file && skin && cleans,
+            "`--close-gaps`, `--fill-holes` and `--keep-largest` are for images, and for tets and hexes",
+        ),
+        (!file && arguments.scale != 1.0, "`--scale` is for mesh files: images know their lengths"),
+        (skin && tissue, "`--law` and `--young` are for tets and hexes"),
+    ];
+    match idle.into_iter().find(|(idle, _)| *idle) {
+        Some((_, message)) => Err(Failure::plain(message, "leave it out")),
+        None => Ok(()),
+    }
+}
+
+/// The mesh of a file in metres.
+pub fn mesh_file(arguments: &MeshImage) -> Result<MeshFile, Failure> {
+    let mut file = io::read(&arguments.image).map_err(|error| Failure::plain(error, ""))?;
+    file.mesh.points.iter_mut().for_each(|point| *point *= arguments.scale);
+    Ok(file)
+}
+
 /// The image, what is segmented in it, and the labels chosen.
 pub fn regions(arguments: &MeshImage) -> Result<(Image, LabelImage, Vec<i32>), Failure> {
     let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
-    let image = read(&arguments.image, &options).map_err(|error| Failure::plain(error, ""))?;
+    let image = read(&arguments.image, &options).map_err(|error| image_failure(&error))?;
     let (labels, chosen) = match arguments.threshold {
         Some(least) => (image.threshold(least..=f64::INFINITY), vec![1]),
         None => (image.labels().map_err(|error| label_failure(&error))?, arguments.label.clone()),
@@ -90,6 +131,11 @@ fn require_volume_format(arguments: &MeshImage) -> Result<(), Failure> {
     }
 }
 
+fn image_failure(error: &ImageError) -> Failure {
+    let several = matches!(error, ImageError::Content { problem, .. } if matches!(**problem, ImageProblem::MixedSeries { .. }));
+    Failure::plain(error, if several { "`--series UID` chooses one" } else { "" })
+}
+
 fn label_failure(error: &LabelError) -> Failure {
     let help = match error {
         LabelError::NotWhole { .. } => "`pliant mesh --threshold 0.5` takes a map of probabilities",
@@ -97,9 +143,11 @@ fn label_failure(error: &LabelError) -> Failure {
         LabelError::Absent { .. } | LabelError::Background { .. } => {
             "`pliant labels IMAGE` lists the labels with their sizes"
         }
-        LabelError::BadLength { .. } => "`--close-gaps` is in metres: 0.003 closes gaps of 3 mm",
+        LabelError::BadLength { .. } => {
+            "`--close-gaps 3mm` closes gaps of 3 mm; without a unit it is in metres"
+        }
         LabelError::TooManyVoxels { .. } => {
-            "where gaps are closed, `--close-gaps` is in metres: 0.003 closes gaps of 3 mm"
+            "where gaps are closed, `--close-gaps 3mm` closes gaps of 3 mm; without a unit it is in metres"
         }
         _ => "",
     };
@@ -109,9 +157,13 @@ fn label_failure(error: &LabelError) -> Failure {
 pub fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
     let help = match error {
         MeshingError::TooManyCells { .. } | MeshingError::LatticeTooLarge { .. } if !force => {
-            "lengths are in metres: `--edge 0.008` makes cells of 8 mm; `--force` makes so many all the same"
+            "lengths without a unit are in metres: `--edge 8mm` or 0.008; `--force` makes so many all the same"
         }
-        MeshingError::NotPositive { .. } => "for example `--edge 0.008`, in metres",
+        MeshingError::OpenSurface { .. } => {
+            "`--close-gaps 20mm` closes holes of up to 20 mm; a file in millimetres needs `--scale 0.001`"
+        }
+        MeshingError::NothingEnclosed => "`pliant info` tells what the file holds",
+        MeshingError::NotPositive { .. } => "for example `--edge 8mm`, or 0.008 in metres",
         _ => "",
     };
     Failure::plain(error, help)
@@ -120,19 +172,24 @@ pub fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
 /// The parts of the whole work, for the bar: the field, the cells, the distances.
 const PARTS: [f64; 3] = [0.3, 0.6, 0.1];
 
-fn make(arguments: &MeshImage, labels: &LabelImage, chosen: &[i32], bar: &Bar) -> Result<Made, Failure> {
+fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
     let Some(edge) = arguments.edge else {
-        return Err(Failure::plain("no edge for the cells", "for example `--edge 0.008`, in metres"));
+        return Err(Failure::plain("no edge for the cells", "for example `--edge 8mm`, or 0.008 in metres"));
     };
     let force = arguments.force;
-    let (anatomy, cleaned) = anatomy(arguments, labels, chosen, bar)?;
+    let found = if is_mesh_file(arguments) {
+        enclosed(arguments, edge, bar)
+    } else {
+        segmented(arguments, edge, bar)
+    }?;
+    let anatomy = &found.anatomy;
     let filling = |done: f64| bar.update_mesh(PARTS[0] + PARTS[1] * done, "making cells");
-    let cell_limit = if force { usize::MAX } else { DEFAULT_CELL_LIMIT };
+    let cell_limit = cell_limit(arguments);
     let refused = |error: MeshingError| meshing_failure(&error, force);
     let (mesh, cells) = match arguments.cells {
         MeshCells::Tets => {
             let request = OrganTets { cell_limit, ..OrganTets::new(edge) };
-            let made = request.mesh(&anatomy, &filling).map_err(refused)?;
+            let made = request.mesh(anatomy, &filling).map_err(refused)?;
             (made.mesh, Cells::Tets(Box::new(made.report)))
         }
         _ => {
@@ -147,17 +204,101 @@ fn make(arguments: &MeshImage, labels: &LabelImage, chosen: &[i32], bar: &Bar) -
     let allowed = if matches!(arguments.cells, MeshCells::Tets) { edge / 2.0 } else { edge };
     let warnings = deviation.doubt(allowed).map(|doubt| format!("{doubt}; use a shorter edge"));
     Ok(Made {
-        materials: materials(&mesh, &anatomy),
+        materials: materials(&mesh, anatomy),
         quality: QualityReport::new(&mesh),
         components: diagnose(&mesh).components,
-        steps: [("brain-like", soft_tissue()), ("liver-like", liver_matrix())]
-            .map(|(name, law)| (name, element_bound(&mesh, &elastic(law)).unwrap_or(0.0))),
+        steps: steps(arguments, &mesh),
         warnings: warnings.into_iter().collect(),
         mesh,
         cells,
-        cleaned,
+        lines: found.lines,
+        object: found.object,
         deviation,
     })
+}
+
+pub fn cell_limit(arguments: &MeshImage) -> usize {
+    if arguments.force { usize::MAX } else { DEFAULT_CELL_LIMIT }
+}
+
+/// The smallest element bound [s] for the tissue asked for, or for two by name.
+fn steps(arguments: &MeshImage, mesh: &Mesh) -> Vec<(String, f64)> {
+    let brain = ("brain-like".to_owned(), soft_tissue());
+    let liver = ("liver-like".to_owned(), liver_matrix());
+    let laws = match (arguments.young, arguments.law) {
+        (Some(young), _) => {
+            let poisson = arguments.poisson;
+            let parameters = json!({ "young-modulus": young, "poisson-ratio": poisson });
+            vec![(format!("E = {young} Pa, ν = {poisson}"), law("neo-hookean", parameters))]
+        }
+        (None, Some(Tissue::BrainLike)) => vec![brain],
+        (None, Some(Tissue::LiverLike)) => vec![liver],
+        (None, None) => vec![brain, liver],
+    };
+    let bound = |(name, law)| {
+        let mut material = elastic(law);
+        material.density = arguments.density;
+        (name, element_bound(mesh, &material).unwrap_or(0.0))
+    };
+    laws.into_iter().map(bound).collect()
+}
+
+/// A body to fill, and what there is to say of where it comes from.
+struct Found {
+    anatomy: Anatomy<'static>,
+    lines: Vec<String>,
+    object: Json,
+}
+
+/// The body of regions of an image.
+fn segmented(arguments: &MeshImage, edge: f64, bar: &Bar) -> Result<Found, Failure> {
+    let (image, labels, chosen) = regions(arguments)?;
+    let voxels = labels.labels.iter().filter(|label| chosen.contains(label)).count();
+    require_few(arguments, edge, voxels as f64 * image.grid.voxel_volume())?;
+    let (anatomy, cleaned) = anatomy(arguments, &labels, &chosen, &Smoothing::default(), bar)?;
+    let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
+    lines.extend(image.notes.iter().map(|note| format!("note: {note}")));
+    lines.push(format!("cleaned          {cleaned}"));
+    Ok(Found { anatomy, lines, object: json!({ "image": image_object(&image), "cleaned": cleaned }) })
+}
+
+/// The body that a closed surface encloses.
+fn enclosed(arguments: &MeshImage, edge: f64, bar: &Bar) -> Result<Found, Failure> {
+    let refused = |error| meshing_failure(&error, arguments.force);
+    let closing = Closing {
+        holes: arguments.close_gaps,
+        fill_cavities: arguments.fill_holes,
+        keep_largest: arguments.keep_largest,
+    };
+    if !(closing.holes >= 0.0 && closing.holes.is_finite()) {
+        return Err(label_failure(&LabelError::BadLength { what: "gaps to close", value: closing.holes }));
+    }
+    let file = mesh_file(arguments)?;
+    bar.update_mesh(0.0, "mending the surface");
+    let surface = Enclosed::new(&file.mesh, edge, &closing).map_err(refused)?;
+    require_few(arguments, edge, surface.volume())?;
+    let progress = |done: f64| bar.update_mesh(PARTS[0] * done, "measuring distances from the surface");
+    let label = arguments.label.first().copied().unwrap_or(1);
+    let anatomy = surface.anatomy(label, edge, &progress).map_err(refused)?;
+    let report = &surface.report;
+    let mut lines =
+        vec![format!("{}: {}, {} triangles", arguments.image.display(), file.format, report.triangles)];
+    lines.extend(file.notes.iter().map(|note| format!("note: {note}")));
+    lines.push(format!("mended           {report}"));
+    if report.shells > 1 {
+        let cavities = report.cavities;
+        let word = if cavities == 1 { "cavity" } else { "cavities" };
+        lines.push(format!("surface          {} pieces, of which {cavities} {word}", report.shells));
+    }
+    let object = json!({ "surface": { "format": file.format, "notes": file.notes }, "mended": report });
+    Ok(Found { anatomy, lines, object })
+}
+
+/// Refuses cells that would be too many for a volume [m³], before they are made.
+fn require_few(arguments: &MeshImage, edge: f64, volume: f64) -> Result<(), Failure> {
+    let kind = if matches!(arguments.cells, MeshCells::Tets) { CellKind::Tet } else { CellKind::Hex };
+    require_room_for(kind, edge, volume, cell_limit(arguments))
+        .map_err(|error| meshing_failure(&error, arguments.force))
 }
 
 /// The chosen regions, cleaned and smoothed.
@@ -165,6 +306,7 @@ pub fn anatomy(
     arguments: &MeshImage,
     labels: &LabelImage,
     chosen: &[i32],
+    smoothing: &Smoothing,
     bar: &Bar,
 ) -> Result<(Anatomy<'static>, Cleaned), Failure> {
     let cleaning = Cleaning {
@@ -173,7 +315,7 @@ pub fn anatomy(
         keep_largest: arguments.keep_largest,
     };
     let field = |done: f64| bar.update_mesh(PARTS[0] * done, "smoothing the surface");
-    Anatomy::from_image(labels, chosen, &cleaning, &Smoothing::default(), &field).map_err(|error| {
+    Anatomy::from_image(labels, chosen, &cleaning, smoothing, &field).map_err(|error| {
         match (&error, arguments.threshold) {
             (LabelError::Absent { .. }, Some(least)) => {
                 let message = format!("no voxel is {least} or more");
@@ -185,15 +327,16 @@ pub fn anatomy(
 }
 
 /// One material of a mesh.
-struct Material {
+struct MaterialReport {
     label: i32,
     cells: usize,
     volume: f64,
-    voxel_volume: Option<f64>,
+    /// Of its voxels after cleaning, or within the surface.
+    input_volume: Option<f64>,
 }
 
-/// Cells and volume of each label of a mesh, beside the volume of its voxels after cleaning.
-fn materials(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<Material> {
+/// Cells and volume of each label of a mesh, beside the volume of the input.
+fn materials(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<MaterialReport> {
     let mut found: BTreeMap<i32, (usize, f64)> = BTreeMap::new();
     for block in &mesh.blocks {
         let labels = block.data.get("label").map_or(&[][..], |labels| &labels.values);
@@ -204,9 +347,9 @@ fn materials(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<Material> {
             *sum += volume(block.kind, &corners);
         }
     }
-    let of_label = |(label, &voxel_volume): (i32, &Option<f64>)| {
+    let of_label = |(label, &input_volume): (i32, &Option<f64>)| {
         let (cells, volume) = found.get(&label).copied().unwrap_or_default();
-        Material { label, cells, volume, voxel_volume }
+        MaterialReport { label, cells, volume, input_volume }
     };
     anatomy.labels().into_iter().zip(anatomy.volumes()).map(of_label).collect()
 }
@@ -224,25 +367,27 @@ enum Cells {
 struct Made {
     mesh: Mesh,
     cells: Cells,
-    cleaned: Cleaned,
-    materials: Vec<Material>,
+    /// Where the body comes from, for people and for programs.
+    lines: Vec<String>,
+    object: Json,
+    materials: Vec<MaterialReport>,
     quality: QualityReport,
     deviation: Deviation,
     components: usize,
     /// The smallest element bound [s] for tissues by name.
-    steps: [(&'static str, f64); 2],
+    steps: Vec<(String, f64)>,
     warnings: Vec<String>,
 }
 
 impl Made {
     fn page(&self) -> String {
-        let mut lines = vec![format!("cleaned          {}", self.cleaned)];
+        let mut lines = self.lines.clone();
         match &self.cells {
             Cells::Tets(report) => lines.push(report.to_string()),
             Cells::Hexes { dropped: [parts, cells] } => {
                 lines.push(format!("nodes            {}", self.quality.nodes));
                 lines.push(format!("hexes            {}", self.cell_count()));
-                lines.extend(self.materials.iter().map(Material::line));
+                lines.extend(self.materials.iter().map(MaterialReport::line));
                 if let Some([low, high]) = self.quality.dihedral {
                     lines.push(format!("dihedral angle   {low:.1}° to {high:.1}°"));
                 }
@@ -263,13 +408,14 @@ impl Made {
         ] {
             lines.push(format!("{way} {:.3} mm rms, {:.3} mm at most", rms * 1e3, most * 1e3));
         }
-        let steps = self.steps.map(|(name, step)| format!("{} s {name}", number(step)));
+        let steps: Vec<String> =
+            self.steps.iter().map(|(name, step)| format!("{} s {name}", number(*step))).collect();
         lines.push(format!("stable step      {} (least element bound)", steps.join(", ")));
         lines.join("\n")
     }
 
     fn object(&self) -> Json {
-        let materials: Vec<Json> = self.materials.iter().map(Material::object).collect();
+        let materials: Vec<Json> = self.materials.iter().map(MaterialReport::object).collect();
         let mut object = json!({
             "status": "done",
             "nodes": self.quality.nodes,
@@ -279,10 +425,12 @@ impl Made {
             "dihedral": self.quality.dihedral,
             "acoustic_length": self.quality.acoustic_length.map(|length| length.min),
             "distances": self.deviation,
-            "element_bound": { self.steps[0].0: self.steps[0].1, self.steps[1].0: self.steps[1].1 },
-            "cleaned": self.cleaned,
+            "element_bound": self.steps.iter().cloned().collect::<BTreeMap<_, _>>(),
             "warnings": self.warnings,
         });
+        if let (Json::Object(object), Json::Object(input)) = (&mut object, &self.object) {
+            object.extend(input.clone());
+        }
         match &self.cells {
             Cells::Tets(report) => {
                 object["as"] = json!("tets");
@@ -304,19 +452,19 @@ impl Made {
     }
 }
 
-impl Material {
+impl MaterialReport {
     fn line(&self) -> String {
         let own = format!("label {:<10} {} cells, {:.2} ml", self.label, self.cells, self.volume * 1e6);
-        match self.voxel_volume {
-            Some(voxels) => format!("{own} ({:+.2} % of its voxels)", (self.volume / voxels - 1.0) * 100.0),
+        match self.input_volume {
+            Some(input) => format!("{own} ({:+.2} % of the input)", (self.volume / input - 1.0) * 100.0),
             None => own,
         }
     }
 
     fn object(&self) -> Json {
         json!({
-            "label": self.label, "cells": self.cells, "volume": self.volume, "voxel_volume": self.voxel_volume,
-            "volume_error": self.voxel_volume.map(|voxels| self.volume / voxels - 1.0),
+            "label": self.label, "cells": self.cells, "volume": self.volume, "input_volume": self.input_volume,
+            "volume_error": self.input_volume.map(|input| self.volume / input - 1.0),
         })
     }
 }

@@ -6,12 +6,14 @@ use std::process::ExitCode;
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3, diagnose};
 use pliant_meshing::{
-    DEFAULT_CELL_LIMIT, Fewer, FittedShells, Hausdorff, ShellGoal, SurfaceRepairs, TriangleMesh,
+    Fewer, FittedShells, Hausdorff, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh,
 };
 use serde_json::{Value as Json, json};
 
 use crate::arguments::{MeshCells, MeshImage};
-use crate::mesh::{anatomy, image_line, image_object, meshing_failure, regions};
+use crate::mesh::{
+    anatomy, cell_limit, image_line, image_object, is_mesh_file, mesh_file, meshing_failure, regions,
+};
 use crate::report::{Bar, Failure, failed_output, say};
 
 /// Faces that meet at more than this angle meet at a crease, which a remeshed surface keeps [rad].
@@ -29,10 +31,6 @@ struct Found {
 
 pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     let goal = goal(arguments)?;
-    if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
-        let message = format!("`--scale` is {}; it must be positive and finite", arguments.scale);
-        return Err(Failure::plain(message, "for example `--scale 0.001` for a file in millimetres"));
-    }
     require_surface_format(&arguments.out)?;
     arguments.error_map.as_deref().map(require_surface_format).transpose()?;
     let bar = Bar::new();
@@ -79,7 +77,7 @@ fn goal(arguments: &MeshImage) -> Result<Goal, Failure> {
         (None, None, None, Some(error)) if !surface => Ok(Goal::Shells(ShellGoal::Error(error))),
         _ if surface => Err(Failure::plain(
             "how fine the surface is to be is not said",
-            "`--edge 0.005` makes even triangles of 5 mm, `--cells 8000` as many triangles",
+            "`--edge 5mm` makes even triangles of 5 mm, `--cells 8000` as many triangles",
         )),
         _ => Err(Failure::plain(
             "how close the shells are to be is not said",
@@ -101,9 +99,8 @@ fn require_surface_format(path: &Path) -> Result<(), Failure> {
 /// The surface of a mesh file or of regions of an image.
 fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     let refused = |error| meshing_failure(&error, arguments.force);
-    if Format::of_path(&arguments.image).is_some() {
-        let mut file = io::read(&arguments.image).map_err(|error| Failure::plain(error, ""))?;
-        file.mesh.points.iter_mut().for_each(|x| *x *= arguments.scale);
+    if is_mesh_file(arguments) {
+        let file = mesh_file(arguments)?;
         let (surface, repairs) = TriangleMesh::from_mesh(&file.mesh).map_err(refused)?;
         let mut lines =
             vec![format!("{}: {}, {} triangles", arguments.image.display(), file.format, surface.len())];
@@ -112,9 +109,11 @@ fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
         return Ok(Found { surface, lines, object: file_object(&file.format, &repairs) });
     }
     let (image, labels, chosen) = regions(arguments)?;
-    let (anatomy, cleaned) = anatomy(arguments, &labels, &chosen, bar)?;
+    let (anatomy, cleaned) = anatomy(arguments, &labels, &chosen, &SURFACE_SMOOTHING, bar)?;
     let step = image.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
-    let surface = TriangleMesh::of_field(anatomy.field(), step, cell_limit(arguments)).map_err(refused)?;
+    let mut surface =
+        TriangleMesh::of_field(anatomy.field(), step, cell_limit(arguments)).map_err(refused)?;
+    surface.smooth(SURFACE_PAIRS);
     let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
     lines.extend(image.notes.iter().map(|note| format!("note: {note}")));
     lines.push(format!("cleaned          {cleaned}"));
@@ -125,10 +124,6 @@ fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
 
 fn file_object(format: &str, repairs: &SurfaceRepairs) -> Json {
     json!({ "format": format, "repairs": repairs })
-}
-
-fn cell_limit(arguments: &MeshImage) -> usize {
-    if arguments.force { usize::MAX } else { DEFAULT_CELL_LIMIT }
 }
 
 /// A surface made, and what there is to know about it.

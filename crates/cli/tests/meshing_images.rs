@@ -436,7 +436,7 @@ fn what_a_surface_or_shells_need_is_told() {
     let told = mesh(&workshop, &["--label", "5", "--as", "surface", "-o", "a.vtu"]);
     assert!(told.code == 2 && told.err.contains("--cells 8000"), "{}", told.err);
     let told = mesh(&workshop, &["--label", "5", "-o", "a.vtu"]);
-    assert!(told.code == 2 && told.err.contains("--edge 0.008"), "{}", told.err);
+    assert!(told.code == 2 && told.err.contains("--edge 8mm"), "{}", told.err);
     let told = mesh(&workshop, &["--label", "5", "--as", "shells", "--error", "3", "-o", "a.vtu"]);
     assert!(told.code == 2 && told.err.contains("0.5%"), "{}", told.err);
 }

@@ -66,6 +66,24 @@ impl DistanceField {
         Self::between(part, &rest, smoothing, progress)
     }
 
+    /// Of values at the points of a grid, positive inside [m], i fastest; `None` if none is, or their number is not that of the
+    /// grid, or the grid has less than two points along an axis.
+    pub fn of_values(grid: Grid, values: Vec<f32>) -> Option<Self> {
+        let fits = values.len() == grid.len() && grid.dims.iter().all(|&n| n > 1);
+        let bounds = fits.then(|| positive_box(&grid, &values)).flatten()?;
+        Some(Self { grid, values, bounds })
+    }
+
+    /// Volume of what is inside [m³]. A voxel counts by the part of it, one mean step thick, on the inner side of a plane at
+    /// the distance of its centre.
+    pub fn volume(&self) -> f64 {
+        let step = self.grid.voxel_volume().cbrt();
+        let parts = self.values.par_iter().map(|&f| (0.5 + f64::from(f) / step).clamp(0.0, 1.0));
+        // In chunks of a fixed length, so that the sum does not depend on threads.
+        let sums: Vec<f64> = parts.chunks(1 << 16).map(|chunk| chunk.iter().sum()).collect();
+        sums.iter().sum::<f64>() * self.grid.voxel_volume()
+    }
+
     fn between(
         region: &Region,
         other: &[bool],

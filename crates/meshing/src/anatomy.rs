@@ -37,6 +37,12 @@ impl<'a> Anatomy<'a> {
         Self { whole: Box::new(field), materials: vec![(label, None)], volumes: vec![None] }
     }
 
+    /// The same of one material with its volume known [m³], which meshes are to keep.
+    pub(crate) fn with_volume(mut self, volume: f64) -> Self {
+        self.volumes[0] = Some(volume);
+        self
+    }
+
     /// Adds a material: what of the body is inside `field` and not deeper inside that of another material. The rest is of
     /// the first material.
     pub fn with_inner(mut self, label: i32, field: impl ImplicitField + 'a) -> Self {

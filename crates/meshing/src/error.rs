@@ -2,6 +2,8 @@
 
 use pliant_geometry::Vector3;
 
+use crate::triangles::counted;
+
 /// Why no mesh was made. Lengths in metres.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshingError {
@@ -87,7 +89,7 @@ pub enum MeshingError {
     /// No cell lies in the body.
     #[error(
         "no cell of edge {edge} m fits the body, whose box is {} × {} × {} m; use a shorter edge",
-        size.x, size.y, size.z
+        rounded(size.x), rounded(size.y), rounded(size.z)
     )]
     NoCells {
         /// Edge asked for [m].
@@ -98,6 +100,27 @@ pub enum MeshingError {
     /// A surface without triangles of any area.
     #[error("there is no surface: no triangle or quad has an area")]
     NoSurface,
+    /// A surface with holes too wide to close.
+    #[error(
+        "the surface is open: {} with {edges} edges round them, the widest {:.2} mm wide, at ({:.2}, {:.2}, {:.2}) mm; \
+         holes of up to {:.2} mm are closed",
+        counted(*holes, "hole", "holes"), widest * 1e3, place.x * 1e3, place.y * 1e3, place.z * 1e3, closed * 1e3
+    )]
+    OpenSurface {
+        /// Its holes.
+        holes: usize,
+        /// Edges of one face only.
+        edges: usize,
+        /// Width of the widest hole [m]: the diagonal of its box.
+        widest: f64,
+        /// Its middle [m].
+        place: Vector3,
+        /// Width up to which holes are closed [m].
+        closed: f64,
+    },
+    /// A closed surface without inside.
+    #[error("the surface encloses nothing: it is flat, or thinner than the cells")]
+    NothingEnclosed,
     /// The field is NaN or infinite somewhere.
     #[error(
         "the field is {value} at ({}, {}, {}) m; it must be finite around the body",
@@ -118,6 +141,11 @@ pub enum MeshingError {
         /// A point of the body outside the box [m].
         point: Vector3,
     },
+}
+
+/// A length to a micrometre.
+fn rounded(length: f64) -> f64 {
+    (length * 1e6).round() / 1e6
 }
 
 /// By how much the edge must grow for the cells to fit, rounded up to two decimals.

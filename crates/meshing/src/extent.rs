@@ -1,9 +1,10 @@
 //! Before anything is allocated: is the box of a field sound, and how many cells will its body need?
 
-use pliant_geometry::Vector3;
+use pliant_geometry::{CellKind, Vector3};
 
-use crate::error::{MeshingError, require_at_most};
+use crate::error::{MeshingError, require_at_most, require_positive};
 use crate::field::ImplicitField;
+use crate::stuffing::TETS_PER_CUBE;
 
 /// Cells allowed at most, whatever the limit asked for: what 32-bit indices of lattice points bear.
 const MOST_CELLS: usize = 1 << 25;
@@ -47,6 +48,19 @@ pub(crate) fn require_room(
         return Err(MeshingError::LatticeTooLarge { cubes: cubes as u64, limit: cube_limit });
     }
     Ok(())
+}
+
+/// Checks, before anything is made of it, that a body of a volume [m³] filled with tets or hexes of `edge` [m] stays within the limit
+/// on cells.
+pub fn require_room_for(
+    kind: CellKind,
+    edge: f64,
+    volume: f64,
+    cell_limit: usize,
+) -> Result<(), MeshingError> {
+    require_positive("edge", edge)?;
+    let cells_per_cube = if kind == CellKind::Tet { TETS_PER_CUBE } else { 1.0 };
+    require_at_most(cells_per_cube * volume / edge.powi(3), allowed(cell_limit))
 }
 
 /// About the part of its box that a body fills.

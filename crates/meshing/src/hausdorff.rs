@@ -36,13 +36,20 @@ pub(crate) struct Sample {
 impl Hausdorff {
     /// Distances between two surfaces of triangles, with samples no more than `spacing` [m] apart.
     pub fn between(first: &TriangleMesh, second: &TriangleMesh, spacing: f64) -> Self {
+        Self::with_places(first, second, spacing).0
+    }
+
+    /// The same, and the points of the first and of the second surface [m] that are farthest from the other one.
+    pub fn with_places(first: &TriangleMesh, second: &TriangleMesh, spacing: f64) -> (Self, [[f64; 3]; 2]) {
         let one_way = |from: &TriangleMesh, to: &TriangleMesh| {
             let locator = locator(to);
             let samples = samples(from, spacing);
             let far: Vec<f64> = samples.par_iter().map(|sample| distance(&locator, &sample.point)).collect();
-            spread(&samples, &far)
+            let farthest = samples.iter().zip(&far).max_by(|a, b| a.1.total_cmp(b.1));
+            (spread(&samples, &far), farthest.map_or([0.0; 3], |(sample, _)| sample.point.into()))
         };
-        Self::of(one_way(first, second), one_way(second, first))
+        let ((forward, there), (backward, back)) = (one_way(first, second), one_way(second, first));
+        (Self::of(forward, backward), [there, back])
     }
 
     pub(crate) fn of(forward: (f64, f64), backward: (f64, f64)) -> Self {

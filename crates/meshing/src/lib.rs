@@ -1,8 +1,8 @@
-//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields or image regions filled with tetrahedra
+//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields, image regions or closed surfaces filled with tetrahedra
 //! (isosurface stuffing) or cubes. Lengths are in metres. The same request gives the same mesh, bit for bit,
 //! on any number of threads.
 //! Surfaces of fields and files in even or few triangles, and curved shells fitted to them.
-//! Leaves out: bodies of surfaces, cubes weighted by how full they are.
+//! Leaves out: cubes weighted by how full they are.
 //!
 //! ```
 //! use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Organ, Phantom, Resolution, Stuffing, VolumeCell};
@@ -25,9 +25,12 @@
 
 mod anatomy;
 mod complex;
+mod crossings;
+mod curvature;
 mod cut;
 mod decimate;
 mod deviation;
+mod enclosed;
 mod error;
 mod extent;
 mod field;
@@ -36,7 +39,9 @@ mod hausdorff;
 mod isosurface;
 mod lattice;
 mod manifold;
+mod nesting;
 mod optimise;
+mod percentiles;
 mod phantom;
 mod remesh;
 mod sheets;
@@ -45,25 +50,34 @@ mod stencil;
 mod structured;
 mod stuffing;
 mod surfaces;
+mod taubin;
 mod tets;
+mod thickness;
 mod topology;
 mod triangles;
 mod voxels;
+mod winding;
 
 use pliant_geometry::Mesh;
 
 pub use anatomy::Anatomy;
+pub use curvature::Curvature;
 pub use decimate::Fewer;
 pub use deviation::Deviation;
+pub use enclosed::{Closing, Enclosed, EnclosedReport};
 pub use error::MeshingError;
+pub use extent::require_room_for;
 pub use field::{Ellipsoid, ImplicitField};
 pub use hausdorff::Hausdorff;
+pub use percentiles::Percentiles;
 pub use phantom::{Organ, Phantom, brain_label};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use shells::{FittedShells, ShellGoal, ShellReport};
 pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
+pub use taubin::{SURFACE_PAIRS, SURFACE_SMOOTHING};
 pub use tets::{MaterialReport, OrganMesh, OrganTets, Repairs, Steps, TetReport};
+pub use thickness::Thickness;
 pub use triangles::{SurfaceRepairs, TriangleMesh};
 pub use voxels::Voxels;
 

@@ -28,7 +28,7 @@ const ALPHA_SHORT: f64 = 0.41189;
 const BISECTIONS: u32 = 24;
 
 /// Tetrahedra in a cube of the lattice.
-const TETS_PER_CUBE: f64 = 12.0;
+pub(crate) const TETS_PER_CUBE: f64 = 12.0;
 
 /// Marks a lattice point that was not warped.
 const UNMOVED: u32 = u32::MAX;

@@ -172,7 +172,7 @@ pub struct MaterialReport {
     pub tets: usize,
     /// Their volume [m³].
     pub volume: f64,
-    /// Volume of its voxels [m³], where it comes from an image.
+    /// Volume of its voxels, or within the surface it was made of [m³], where known.
     pub voxel_volume: Option<f64>,
 }
 
@@ -266,7 +266,7 @@ impl fmt::Display for TetReport {
             )?;
             match material.voxel_volume {
                 Some(voxels) => {
-                    writeln!(f, " ({:+.2} % of its voxels)", (material.volume / voxels - 1.0) * 100.0)?
+                    writeln!(f, " ({:+.2} % of the input)", (material.volume / voxels - 1.0) * 100.0)?
                 }
                 None => writeln!(f)?,
             }

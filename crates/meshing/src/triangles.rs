@@ -10,6 +10,7 @@ use pliant_geometry::{CellKind, Mesh, Surface, Vector3, boundary};
 use serde::Serialize;
 
 use crate::error::MeshingError;
+use crate::nesting::{Shell, containers, signed_volume};
 
 /// A triangle that is no more.
 const GONE: [u32; 3] = [u32::MAX; 3];
@@ -44,15 +45,23 @@ pub struct SurfaceRepairs {
 impl fmt::Display for SurfaceRepairs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let parts = [
-            (self.joined_points, "points joined"),
-            (self.dropped_faces, "faces without area or given twice dropped"),
-            (self.cut_edges, "edges of more than two faces cut"),
-            (self.turned_faces, "faces turned"),
+            (self.joined_points, ["point", "points"], "joined"),
+            (self.dropped_faces, ["face", "faces"], "without area or given twice dropped"),
+            (self.cut_edges, ["edge", "edges"], "of more than two faces cut"),
+            (self.turned_faces, ["face", "faces"], "turned"),
         ];
-        let told: Vec<String> =
-            parts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        let told: Vec<String> = parts
+            .iter()
+            .filter(|(n, ..)| *n > 0)
+            .map(|(n, [one, more], done)| format!("{} {done}", counted(*n, one, more)))
+            .collect();
         f.write_str(&if told.is_empty() { "nothing".into() } else { told.join(", ") })
     }
+}
+
+/// A number of things in words: `1 edge`, `2 edges`.
+pub(crate) fn counted(number: usize, one: &str, more: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { more })
 }
 
 pub(crate) fn key(a: u32, b: u32) -> [u32; 2] {
@@ -82,7 +91,16 @@ impl TriangleMesh {
 
     /// The triangles and quads of a mesh (quads halved), or the boundary of its volume cells, mended where needed.
     pub fn from_mesh(mesh: &Mesh) -> Result<(Self, SurfaceRepairs), MeshingError> {
-        Self::from_surface(&boundary(mesh), &mesh.points)
+        let (surface, mut repairs) = Self::from_surface(&boundary(mesh), &mesh.points)?;
+        if mesh.volume_blocks().all(|block| block.is_empty()) {
+            // Faces with a point twice are none from the start.
+            let blocks = mesh.blocks.iter().filter(|block| block.kind.dimension() == 2);
+            let lines = |nodes: &&[u32]| {
+                nodes.iter().enumerate().filter(|(k, n)| !nodes[..*k].contains(n)).count() < 3
+            };
+            repairs.dropped_faces += blocks.flat_map(|block| block.cells()).filter(lines).count();
+        }
+        Ok((surface, repairs))
     }
 
     fn from_surface(surface: &Surface, points: &[Vector3]) -> Result<(Self, SurfaceRepairs), MeshingError> {
@@ -406,52 +424,69 @@ fn sides_of(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], Vec<(u32, bool)>> {
     sides
 }
 
-/// Turns triangles to look the same way as their neighbours, the most of each piece as they are; closed pieces outwards.
-/// Returns how many were turned.
+/// Turns triangles to look the same way as their neighbours, the most of each piece as they are; closed pieces outwards, and with them
+/// what lies inside: a cavity looks into itself. Returns how many were turned.
 fn turn_alike(triangles: &mut [[u32; 3]], points: &[Vector3]) -> usize {
+    let before = triangles.to_vec();
+    let (pieces, closed) = turn_pieces(triangles);
+    let shell = |piece: &Vec<u32>| {
+        let nodes: Vec<[u32; 3]> = piece.iter().map(|&t| triangles[t as usize]).collect();
+        Shell { volume: signed_volume(points, &nodes), triangles: piece.clone() }
+    };
+    let shells: Vec<Shell> = pieces.iter().zip(&closed).filter(|(_, c)| **c).map(|(p, _)| shell(p)).collect();
+    let containers = containers(points, triangles, &shells);
+    for (own, shell) in shells.iter().enumerate() {
+        let around = containers[own].iter().chain([&own]);
+        let outermost = around.max_by(|&&a, &&b| shells[a].volume.abs().total_cmp(&shells[b].volume.abs()));
+        if outermost.is_some_and(|&at| shells[at].volume < 0.0) {
+            shell.triangles.iter().for_each(|&t| triangles[t as usize].swap(1, 2));
+        }
+    }
+    (0..before.len()).filter(|&t| before[t] != triangles[t]).count()
+}
+
+/// Turns the triangles of each piece alike, the most as they are. Returns the pieces, and whether each is closed.
+fn turn_pieces(triangles: &mut [[u32; 3]]) -> (Vec<Vec<u32>>, Vec<bool>) {
     let sides = sides_of(triangles);
     let mut turn: Vec<Option<bool>> = vec![None; triangles.len()];
-    let mut turned = 0;
+    let (mut pieces, mut closed) = (Vec::new(), Vec::new());
     for first in 0..triangles.len() {
         if turn[first].is_some() {
             continue;
         }
         turn[first] = Some(false);
-        let (mut piece, mut closed) = (vec![first as u32], true);
+        let mut piece = vec![first as u32];
         let mut next = VecDeque::from([first as u32]);
+        // Edges of one triangle or of more than two: how often they run one way more than the other.
+        let mut open: BTreeMap<[u32; 2], i32> = BTreeMap::new();
         while let Some(at) = next.pop_front() {
+            let own = turn[at as usize] == Some(true);
             let [a, b, c] = triangles[at as usize];
-            for edge in [key(a, b), key(b, c), key(c, a)] {
-                let [(s, forward), (t, other)] = sides[&edge][..] else {
-                    closed = false;
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                let [(s, forward), (t, other)] = sides[&key(from, to)][..] else {
+                    *open.entry(key(from, to)).or_default() += if (from < to) != own { 1 } else { -1 };
                     continue;
                 };
                 let across = if s == at { t } else { s };
                 if turn[across as usize].is_none() {
-                    turn[across as usize] = turn[at as usize].map(|own| own ^ (forward == other));
+                    turn[across as usize] = Some(own ^ (forward == other));
                     piece.push(across);
                     next.push_back(across);
                 }
             }
         }
-        let is_turned = |t: &&u32| turn[**t as usize] == Some(true);
-        let volume: f64 = piece
-            .iter()
-            .map(|t| {
-                let [a, b, c] = triangles[*t as usize].map(|n| points[n as usize] - points[0]);
-                if is_turned(&t) { -a.dot(&b.cross(&c)) } else { a.dot(&b.cross(&c)) }
-            })
-            .sum();
-        let count = piece.iter().filter(is_turned).count();
-        let inside_out = if closed { volume < 0.0 } else { 2 * count > piece.len() };
+        let turned = piece.iter().filter(|&&t| turn[t as usize] == Some(true)).count();
+        let most = 2 * turned > piece.len();
         for &t in &piece {
-            if (turn[t as usize] == Some(true)) != inside_out {
+            if (turn[t as usize] == Some(true)) != most {
                 triangles[t as usize].swap(1, 2);
-                turned += 1;
             }
         }
+        piece.sort_unstable();
+        pieces.push(piece);
+        closed.push(open.values().all(|&sum| sum == 0));
     }
-    turned
+    (pieces, closed)
 }
 
 /// Gives each fan of triangles round a point, joined by edges of two triangles that look the same way, a point of its own.

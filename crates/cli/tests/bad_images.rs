@@ -1,0 +1,101 @@
+//! Images that cannot be meshed, through the real binary: malformed files of every format, series with slices missing or mixed.
+
+mod support;
+
+#[allow(dead_code)]
+#[path = "../../imaging/tests/imaging/write.rs"]
+mod write;
+
+use std::fs;
+use std::path::Path;
+
+use support::{BLOCK, Told, Workshop};
+use write::{Form, Syntax, Volume, dicom, nifti1, nifti2};
+
+fn assert_refused(workshop: &Workshop, image: &str, says: &[&str]) {
+    let mesh = ["mesh", image, "--label", "1", "--edge", "5mm", "-o", "out.vtu", "--json"];
+    let told: [Told; 2] = [workshop.pliant(&mesh), workshop.pliant(&["labels", image, "--json"])];
+    for told in told {
+        assert_eq!(told.code, 2, "{image}: {}{}", told.err, told.out);
+        assert_eq!(told.json()["error"]["kind"], "input");
+        assert_eq!(told.err.matches("error:").count(), 1, "{image}: {}", told.err);
+        for piece in says {
+            assert!(told.words().contains(piece), "{image}: no `{piece}` in: {}", told.err);
+        }
+    }
+    assert!(!workshop.path("out.vtu").exists());
+}
+
+/// Truncated, of wrong byte order, with negative spacing, singular, not finite, with lengths that nothing bears out.
+#[test]
+fn malformed_images_are_refused() {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../imaging/tests/corpus");
+    let workshop = Workshop::new(BLOCK);
+    let mut count = 0;
+    for entry in fs::read_dir(corpus).expect("the corpus") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+        let ending = match name.split('-').next() {
+            Some("nifti") => "nii",
+            Some("nrrd") => "nrrd",
+            // A header that names another file as its data, which is all zeros: only background.
+            Some("meta") if name == "meta-other-file" => continue,
+            Some("meta") => "mha",
+            Some("gipl") => "gipl",
+            Some("dicom") => "dcm",
+            _ => continue,
+        };
+        let image = format!("{name}.{ending}");
+        workshop.write(&image, fs::read(&path).expect("a file"));
+        assert_refused(&workshop, &image, &[&image]);
+        count += 1;
+    }
+    assert!(count >= 20, "{count}");
+}
+
+/// A box of label 1 that fills the volume but for its rim.
+fn box_of_labels() -> Volume {
+    let dims = [12, 12, 12];
+    let inner = |i: usize| (2..10).contains(&i);
+    let label = |at: usize| i16::from(inner(at % 12) && inner(at / 12 % 12) && inner(at / 144));
+    let values = (0..1728).map(label).collect();
+    let axes = nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(2.0, 2.0, 2.5));
+    Volume { dims, values, axes, ..Volume::oblique() }
+}
+
+#[test]
+fn either_byte_order_and_both_versions_of_nifti_give_the_same_mesh() {
+    let workshop = Workshop::new(BLOCK);
+    let volume = box_of_labels();
+    let mut cells = Vec::new();
+    for (name, bytes) in [
+        ("little.nii", nifti1(&volume, Form::Sform, false)),
+        ("big.nii", nifti1(&volume, Form::Sform, true)),
+        ("two.nii", nifti2(&volume, false)),
+    ] {
+        workshop.write(name, bytes);
+        let told =
+            workshop.pliant(&["mesh", name, "--label", "1", "--edge", "5mm", "-o", "out.vtu", "--json"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        cells.push(told.json()["cells"].clone());
+    }
+    assert!(cells[0].as_u64() > Some(50) && cells.iter().all(|one| *one == cells[0]), "{cells:?}");
+}
+
+#[test]
+fn a_series_with_slices_missing_or_mixed_is_refused() {
+    let workshop = Workshop::new(BLOCK);
+    let volume = box_of_labels();
+    let put = |folder: &str, k: usize, series: &str| {
+        workshop.write(&format!("{folder}/{series}-{k:02}"), dicom(&volume, k, Syntax::Explicit, series));
+    };
+    (0..12).filter(|k| *k != 5).for_each(|k| put("missing", k, "1.2"));
+    assert_refused(&workshop, "missing", &["1.2-04", "1.2-06"]);
+    (0..12).for_each(|k| put("mixed", k, "1.2"));
+    (0..12).for_each(|k| put("mixed", k, "1.3"));
+    assert_refused(&workshop, "mixed", &["1.2", "1.3", "--series"]);
+    let chosen = ["labels", "mixed", "--series", "1.3", "--json"];
+    assert_eq!(workshop.pliant(&chosen).code, 0);
+    workshop.write("none/notes.txt", "no image\n");
+    assert_refused(&workshop, "none", &["none"]);
+}

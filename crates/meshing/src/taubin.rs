@@ -1,0 +1,36 @@
+//! Smoothing of a surface without shrinking it (Taubin 1995): each point moves towards the mean of its neighbours by the part λ, then
+//! away from it by a slightly larger part μ. Together they damp what changes from point to point and leave what is longer.
+
+use pliant_geometry::Vector3;
+use pliant_imaging::Smoothing;
+use rayon::prelude::*;
+
+use crate::triangles::TriangleMesh;
+
+/// How the field of an image is best smoothed where its surface is smoothed after that by [`SURFACE_PAIRS`]. Of what was tried on
+/// labels of the analytic liver and brain this stays closest to them: with sigma 1 and no pairs, which suits tetrahedra, the
+/// largest distance is half as large again on the liver and twice on the brain; without sigma the steps of the voxels remain.
+pub const SURFACE_SMOOTHING: Smoothing = Smoothing { sigma: 0.55, clip: 6.0 };
+
+/// Pairs of moves for [`TriangleMesh::smooth`] after that.
+pub const SURFACE_PAIRS: usize = 50;
+
+/// Part of the way to the mean, there and back.
+const PARTS: [f64; 2] = [0.5, -0.53];
+
+impl TriangleMesh {
+    /// Smooths the surface by a number of pairs of moves. Points at borders and creases stay.
+    pub fn smooth(&mut self, pairs: usize) {
+        let neighbours: Vec<Vec<u32>> = (0..self.points.len() as u32)
+            .into_par_iter()
+            .map(|p| if self.marked(p).is_empty() { self.neighbours(p) } else { Vec::new() })
+            .collect();
+        for part in (0..pairs).flat_map(|_| PARTS) {
+            let moved = |(x, near): (&Vector3, &Vec<u32>)| {
+                let sum: Vector3 = near.iter().map(|&n| self.points[n as usize]).sum();
+                if near.is_empty() { *x } else { x + part * (sum / near.len() as f64 - x) }
+            };
+            self.points = self.points.par_iter().zip(&neighbours).map(moved).collect();
+        }
+    }
+}
