@@ -85,7 +85,7 @@ pub enum Command {
     Bench(Bench),
     /// Take pictures or a film of a scene or of a finished run, without a screen.
     #[command(after_help = RENDER_HELP)]
-    Render(Render),
+    Render(Box<Render>),
     /// List the graphics processors a scene can run on.
     #[command(after_help = "Examples:\n  pliant devices\n  pliant run scenes/liver --device gpu\n  \
                             pliant run scenes/liver --device gpu --set run.adapter=nvidia\n\n\
