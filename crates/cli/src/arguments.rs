@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand, ValueEnum};
@@ -82,6 +83,9 @@ pub enum Command {
     /// Measure what a step costs on this machine.
     #[command(after_help = BENCH_HELP)]
     Bench(Bench),
+    /// Take pictures or a film of a scene or of a finished run, without a screen.
+    #[command(after_help = RENDER_HELP)]
+    Render(Box<Render>),
     /// List the graphics processors a scene can run on.
     #[command(after_help = "Examples:\n  pliant devices\n  pliant run scenes/liver --device gpu\n  \
                             pliant run scenes/liver --device gpu --set run.adapter=nvidia\n\n\
@@ -92,6 +96,168 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+}
+
+const RENDER_HELP: &str = "\
+Examples:
+  pliant render out/liver                                    the last frame of a run, into pictures/
+  pliant render out/liver --frames all --film liver.mp4      a film of all frames
+  pliant render out/liver --series skin --colour displacement --camera 90,10
+  pliant render scenes/liver --colour pressure --edges --clip 0,0,0,0,1,0
+  pliant render scenes/cube --colour displacement:z --map cividis --range 0,0.02 --ghost
+
+A scene is run first, without its own outputs; its table [view] tells how it is seen, the options below come before it. A film
+whose name ends in .mp4 takes ffmpeg; without one, or with a name that ends in .png, it is an animated PNG.
+
+Exit codes: 0 done, 1 the run or a picture failed, 2 the input is wrong or nothing draws here, 130 interrupted (Ctrl-C).";
+
+#[derive(Debug, clap::Args)]
+pub struct Render {
+    /// The folder of a finished run, or a scene file, a folder with a scene.toml, a NiftySim model (.xml).
+    pub what: PathBuf,
+    /// Frames: `all`, `last`, a number counted from 0, or several as in 0..20 (without the 20) and 10.. (to the end).
+    #[arg(long, value_name = "FRAMES")]
+    pub frames: Option<Frames>,
+    /// Folder for the pictures.
+    #[arg(short, long, value_name = "DIR", default_value = "pictures")]
+    pub out: PathBuf,
+    /// Write into a folder that holds other files.
+    #[arg(long)]
+    pub force: bool,
+    /// Also make a film of them (.mp4 or .png).
+    #[arg(long, value_name = "FILE")]
+    pub film: Option<PathBuf>,
+    /// Pictures a second of the film; if not given, so many that it plays in real time, 5 to 60.
+    #[arg(long, value_name = "N", value_parser = rate, requires = "film")]
+    pub rate: Option<f64>,
+    /// Width and height [pixels].
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// What colours tell: a field, a component of one as in `displacement:z` or `cauchy-stress:xx`, or `none`.
+    #[arg(long, value_name = "FIELD")]
+    pub colour: Option<String>,
+    /// Map of colours.
+    #[arg(long, value_name = "MAP", value_parser = ["viridis", "cividis", "magma", "inferno", "plasma", "turbo", "blue-red"])]
+    pub map: Option<String>,
+    /// Values of the first and the last colour.
+    #[arg(long, value_name = "LOW,HIGH", value_parser = range, allow_hyphen_values = true)]
+    pub range: Option<Numbers<2>>,
+    /// Angles of the camera around the axis that points up and above the horizon [°].
+    #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = angles, allow_hyphen_values = true)]
+    pub camera: Option<Numbers<2>>,
+    /// Magnification.
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    pub zoom: Option<f64>,
+    /// The axis that points up.
+    #[arg(long, value_name = "AXIS", value_parser = ["x", "y", "z", "-x", "-y", "-z"], allow_hyphen_values = true)]
+    pub up: Option<String>,
+    /// Parallel lines stay parallel.
+    #[arg(long)]
+    pub orthographic: bool,
+    /// Draw the edges of the elements.
+    #[arg(long)]
+    pub edges: bool,
+    /// Draw the shape at rest, as a ghost.
+    #[arg(long)]
+    pub ghost: bool,
+    /// A point and a normal: what lies on the side of the normal is taken away.
+    #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = plane, allow_hyphen_values = true)]
+    pub clip: Option<Numbers<6>>,
+    /// What stands behind.
+    #[arg(long, value_name = "WORD", value_parser = ["light", "white", "dark"])]
+    pub background: Option<String>,
+    /// The series of a finished run; the first one of the alphabet if not given.
+    #[arg(long, value_name = "NAME")]
+    pub series: Option<String>,
+    /// Simulated time between frames of a scene [s]; if not given, that of its first series, else a hundredth of it.
+    #[arg(long, value_name = "S", value_parser = factor)]
+    pub every: Option<f64>,
+    #[command(flatten)]
+    pub overrides: Overrides,
+}
+
+/// Which frames of a series.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Frames {
+    All,
+    Last,
+    One(usize),
+    /// From one on, and up to another one or the end.
+    Range(usize, Option<usize>),
+}
+
+impl FromStr for Frames {
+    type Err = String;
+
+    fn from_str(typed: &str) -> Result<Self, String> {
+        let wrong = || format!("`{typed}` is no choice of frames: try all, last, 12, 0..20 or 10..");
+        let number = |text: &str| text.parse::<usize>().map_err(|_| wrong());
+        match (typed, typed.split_once("..")) {
+            ("all", _) => Ok(Self::All),
+            ("last", _) => Ok(Self::Last),
+            (_, None) => Ok(Self::One(number(typed)?)),
+            (_, Some((from, to))) => {
+                let from = if from.is_empty() { 0 } else { number(from)? };
+                let to = if to.is_empty() { None } else { Some(number(to)?) };
+                if to.is_some_and(|to| to <= from) { Err(wrong()) } else { Ok(Self::Range(from, to)) }
+            }
+        }
+    }
+}
+
+/// Numbers with commas between them.
+pub type Numbers<const N: usize> = [f64; N];
+
+fn numbers<const N: usize>(typed: &str) -> Result<Numbers<N>, String> {
+    let all: Option<Vec<f64>> =
+        typed.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    all.and_then(|all| all.try_into().ok())
+        .ok_or_else(|| format!("give {N} numbers with commas between them"))
+}
+
+fn range(typed: &str) -> Result<Numbers<2>, String> {
+    match numbers(typed)? {
+        [low, high] if low < high => Ok([low, high]),
+        _ => Err("the first value must be below the second".into()),
+    }
+}
+
+fn angles(typed: &str) -> Result<Numbers<2>, String> {
+    let [azimuth, elevation] = numbers(typed)?;
+    if elevation.abs() > 90.0 {
+        return Err("the elevation lies between -90 and 90°".into());
+    }
+    Ok([azimuth, elevation])
+}
+
+fn plane(typed: &str) -> Result<Numbers<6>, String> {
+    let found: Numbers<6> = numbers(typed)?;
+    if found[3..] == [0.0; 3] {
+        return Err("a plane needs a normal, as in 0,0,0,1,0,0".into());
+    }
+    Ok(found)
+}
+
+fn factor(typed: &str) -> Result<f64, String> {
+    match typed.parse() {
+        Ok(factor) if factor > 0.0 && factor <= 1e6 => Ok(factor),
+        _ => Err("give a number greater than 0".into()),
+    }
+}
+
+fn rate(typed: &str) -> Result<f64, String> {
+    match typed.parse() {
+        Ok(rate) if (1.0..=240.0).contains(&rate) => Ok(rate),
+        _ => Err("a film takes 1 to 240 pictures a second".into()),
+    }
+}
+
+fn size(typed: &str) -> Result<[u32; 2], String> {
+    let sides = typed.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    match sides {
+        Some(sides) if sides.iter().all(|side| (16..=16_384).contains(side)) => Ok(sides),
+        _ => Err("give width and height from 16 to 16384, as in 1280x800".into()),
+    }
 }
 
 const BENCH_HELP: &str = "\
@@ -169,7 +335,7 @@ pub struct Reproduce {
     pub table: Option<PathBuf>,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Overrides {
     /// Set any value of the scene; may be given several times. KEY is its path, with items of arrays by their number
     /// counted from 0; VALUE is TOML, a single word needs no quotes.
@@ -226,6 +392,9 @@ pub struct Run {
     pub resume: Option<PathBuf>,
     #[command(flatten)]
     pub overrides: Overrides,
+    /// Also draw the last instant, as the scene's [view] shows it: picture.png, in the summary, too.
+    #[arg(long)]
+    pub picture: bool,
     /// Print one JSON object with the results on standard output.
     #[arg(long)]
     pub json: bool,
@@ -483,6 +652,7 @@ impl Command {
             | Self::New { .. }
             | Self::Schema { .. }
             | Self::Import { .. }
+            | Self::Render(_)
             | Self::Reproduce(_) => false,
         }
     }

@@ -10,7 +10,7 @@ use pliant_gpu::{Adapter, GpuError};
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, MeshCache, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim,
+    Built, Checkpoint, Draw, MeshCache, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim,
     reference, registry,
 };
 use serde_json::{Value as Json, json};
@@ -20,6 +20,7 @@ use crate::arguments::{self, Check, Command, DeviceName, Overrides, Precision, R
 use crate::bench::bench;
 use crate::info::info;
 use crate::mesh;
+use crate::pictures;
 use crate::report::{self, Bar, Failure, say};
 use crate::reproduce::reproduce;
 
@@ -43,12 +44,22 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Import { model, out } => import(&model, &out),
         Command::Reproduce(arguments) => reproduce(&arguments),
         Command::Bench(arguments) => bench(&arguments),
+        Command::Render(arguments) => pictures::render(&arguments),
         Command::Devices { json } => devices(json),
     }
 }
 
 /// Reads, builds and plans a scene; doubts go to standard error.
-fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), Failure> {
+pub fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), Failure> {
+    prepare_changed(path, overrides, |_| {})
+}
+
+/// As [`prepare`], of a scene that is changed once it is read.
+pub fn prepare_changed(
+    path: &Path,
+    overrides: &Overrides,
+    change: impl FnOnce(&mut Scene),
+) -> Result<(Scene, Built, Plan), Failure> {
     let (mut source, folder, _translated) = open(path)?;
     let mut mistakes: Vec<_> =
         overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
@@ -78,7 +89,8 @@ fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), F
     if !mistakes.is_empty() {
         return Err(source.errors(mistakes).into());
     }
-    let scene = Scene::from_source(source, folder)?;
+    let mut scene = Scene::from_source(source, folder)?;
+    change(&mut scene);
     let built = pliant_scene::build_with(&scene, &mesh_cache(overrides.no_cache))?;
     if !built.warnings.is_empty() {
         report::show(&scene.source.errors(built.warnings.clone()));
@@ -145,10 +157,10 @@ fn in_pool<T: Send>(
 }
 
 /// The exit code of a process that Ctrl-C ended.
-const INTERRUPTED: u8 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 /// Set by Ctrl-C; pressed again, it ends the process at once.
-fn stopped_by_ctrl_c() -> &'static AtomicBool {
+pub fn stopped_by_ctrl_c() -> &'static AtomicBool {
     static STOP: AtomicBool = AtomicBool::new(false);
     let handler = || {
         if STOP.swap(true, Ordering::Relaxed) {
@@ -182,8 +194,13 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     for note in built.notes.iter().chain(&plan.note).chain(&plan.target.note) {
         eprintln!("note: {note}");
     }
+    let photographer = arguments.picture.then(|| pictures::Photographer::new(&scene)).transpose()?;
     let bar = Bar::new();
-    let options = Options { resume: checkpoint.as_ref(), stop: Some(stopped_by_ctrl_c()) };
+    let options = Options {
+        resume: checkpoint.as_ref(),
+        stop: Some(stopped_by_ctrl_c()),
+        picture: photographer.as_ref().map(|photographer| photographer as &dyn Draw),
+    };
     let mut report = |progress| bar.update(progress);
     let result = pliant_scene::run_with(&scene, &built, &plan, &folder, options, &mut report);
     bar.finish();

@@ -6,6 +6,8 @@ mod commands;
 mod info;
 mod mesh;
 mod page;
+#[cfg_attr(not(feature = "viewer"), path = "no_pictures.rs")]
+mod pictures;
 mod report;
 mod reproduce;
 mod skin;

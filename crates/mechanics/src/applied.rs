@@ -1,6 +1,7 @@
 //! The forces of loads and gravity on the nodes of a model at one instant.
 
 use crate::Real;
+use crate::grip::Grip;
 use crate::load::LoadKind;
 use crate::model::Model;
 use crate::tensor::{Vector, add, cast};
@@ -13,6 +14,7 @@ pub(crate) struct AppliedForces<'m> {
     /// Acceleration [m/s²] by gravity, one per body.
     gravity: Vec<Vector<f64>>,
     body_of: Vec<u16>,
+    grips: Vec<Grip>,
 }
 
 impl<'m> AppliedForces<'m> {
@@ -26,12 +28,21 @@ impl<'m> AppliedForces<'m> {
             nodal: vec![[0.0; 3]; model.node_count()],
             gravity: vec![[0.0; 3]; model.bodies.len()],
             body_of,
+            grips: Vec::new(),
         }
+    }
+
+    /// Takes other grips; whether any force acts from now on.
+    pub(crate) fn hold(&mut self, grips: &[Grip]) -> bool {
+        self.grips.clear();
+        self.grips.extend_from_slice(grips);
+        self.nodal.fill([0.0; 3]);
+        !grips.is_empty() || !self.model.loads.is_empty()
     }
 
     /// Finds the forces at a time [s] and in a deformed place.
     pub(crate) fn update<R: Real>(&mut self, time: f64, displacement: &[Vector<R>]) {
-        if self.model.loads.is_empty() {
+        if self.model.loads.is_empty() && self.grips.is_empty() {
             return;
         }
         self.nodal.fill([0.0; 3]);
@@ -55,6 +66,9 @@ impl<'m> AppliedForces<'m> {
                     load.add_forces(time, None, place, &mut self.nodal);
                 }
             }
+        }
+        for grip in &self.grips {
+            grip.add_forces(model, displacement, &mut self.nodal);
         }
     }
 

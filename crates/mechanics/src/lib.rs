@@ -44,6 +44,7 @@ pub mod element;
 mod energies;
 mod fingerprint;
 mod forces;
+pub mod grip;
 pub mod harmonic;
 mod lanes;
 pub mod law;

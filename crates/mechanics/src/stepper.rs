@@ -16,6 +16,7 @@ use crate::Real;
 use crate::applied::AppliedForces;
 use crate::energies::{Energies, Sums, model_balance_floor};
 use crate::forces::{Deformed, InternalForces};
+use crate::grip::Grip;
 use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
 use crate::model::{Contradiction, FREE, Model};
 use crate::stability::{CHECK_EVERY, Monitor};
@@ -108,7 +109,7 @@ pub struct CentralDifference<'m, R> {
     /// α of each component [1/s].
     damping: Vec<Vector<R>>,
     applied: AppliedForces<'m>,
-    /// True if there is any load.
+    /// True if there is any load or grip.
     loaded: bool,
     processor: Processor,
     /// Factor on the amplitudes of each constraint now and after the step.
@@ -361,6 +362,11 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     pub fn watched(mut self, monitor: Monitor) -> Self {
         self.control.watch(monitor);
         self
+    }
+
+    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is external.
+    pub fn hold(&mut self, grips: &[Grip]) {
+        self.loaded = self.applied.hold(grips);
     }
 
     /// Runs in the lanes of certain instructions instead of the widest.

@@ -40,6 +40,7 @@ mod checkpoint;
 mod corotational;
 pub mod diagnostic;
 pub mod format;
+mod live;
 pub mod niftysim;
 mod output;
 mod overview;
@@ -55,11 +56,13 @@ mod sweep;
 mod target;
 #[cfg(test)]
 mod testing;
+mod view;
 
 pub use bound::element_bound;
 pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, PLAUSIBLE_SIZE, build, build_with};
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
+pub use live::{Live, live};
 pub use output::{
     AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,
     Summary, failed_input, failed_output, number,
@@ -72,3 +75,4 @@ pub use solver::{Effort, LoadStepProgress};
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;
+pub use view::Draw;

@@ -12,7 +12,8 @@ use crate::checker::{check_skipping, nearest, read_table};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
     BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MomentTable,
-    MoveTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable, TractionTable, VtuTable,
+    MoveTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable, TractionTable, ViewTable,
+    VtuTable,
 };
 use crate::source::{Source, Value};
 
@@ -209,6 +210,7 @@ pub fn sections() -> Vec<Section> {
     all.extend(typed::<ConstraintTable>("[constraint.NAME]"));
     all.extend(typed::<LoadTable>("[load.NAME]"));
     all.extend(typed::<OutputTable>("[output.NAME]"));
+    all.push(plain::<ViewTable>("[view]"));
     all
 }
 
@@ -266,7 +268,7 @@ mod tests {
     #[test]
     fn every_parameter_of_every_table_has_a_meaning() {
         let sections = sections();
-        assert_eq!(sections.len(), 4 + AnyLaw::NAMES.len() + 3 + 6 + 2);
+        assert_eq!(sections.len(), 4 + AnyLaw::NAMES.len() + 3 + 6 + 2 + 1);
         for Section { header, name, schema } in sections {
             for parameter in describe(&schema) {
                 assert!(!parameter.description.is_empty(), "{header} {name:?}: {}", parameter.key);
@@ -289,7 +291,7 @@ mod tests {
     fn the_schema_of_a_scene_takes_no_unknown_keys() {
         let schema = scene_schema();
         let properties = schema["properties"].as_object().unwrap();
-        assert_eq!(properties.len(), 8);
+        assert_eq!(properties.len(), 9);
         for (table, schema) in properties {
             let named = schema.get("additionalProperties").filter(|inner| inner.is_object());
             let one = named.unwrap_or(schema);

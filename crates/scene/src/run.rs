@@ -14,12 +14,13 @@ use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
 use crate::corotational::Corotated;
 use crate::format::{Precision, SolverName};
 use crate::output::{
-    FailureSummary, Frame, OutputError, OutputFolder, PLOT, SUMMARY, Schedule, Scheduled, Summary, markdown,
-    observers, plot, steps_to, summarise,
+    FailureSummary, Frame, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY, Schedule, Scheduled, Snapshot,
+    Summary, markdown, observers, plot, steps_to, summarise,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::solver::{Effort, LoadStepProgress, Memory, Solver, on_device, on_processor};
+use crate::view::Draw;
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +43,8 @@ pub struct Options<'a> {
     pub resume: Option<&'a Checkpoint>,
     /// Ends the run after the current step once it is true, with a checkpoint if the scene asks for some.
     pub stop: Option<&'a AtomicBool>,
+    /// Draws the last instant, as the scene's `[view]` shows it, into `picture.png`.
+    pub picture: Option<&'a dyn Draw>,
 }
 
 /// Samples of a run for plot and summary.
@@ -72,6 +75,8 @@ pub(crate) struct Outcome {
     pub reactions: Vec<[f64; 3]>,
     pub history: History,
     pub files: Vec<PathBuf>,
+    /// The picture of the last instant.
+    pub picture: Option<PathBuf>,
     pub threads: usize,
     /// The checkpoint it went on from, and its time [s].
     pub resumed: Option<(PathBuf, f64)>,
@@ -94,6 +99,7 @@ impl Outcome {
             reactions: vec![[0.0; 3]; built.model.constraints.len()],
             history: History::default(),
             files: Vec::new(),
+            picture: None,
             threads: rayon::current_num_threads(),
             resumed: None,
         }
@@ -236,6 +242,11 @@ fn go<'a, R: Real>(
             break Some(failure);
         }
     };
+    let picture = options.picture.filter(|_| failure.is_none());
+    let (drawn, failure) = match picture.map(|picture| course.draw(picture, folder)).transpose() {
+        Ok(drawn) => (drawn, failure),
+        Err(error) => (None, Some(FailureSummary::output(&error, Some(course.state.time)))),
+    };
     let solver = course.solver.observable();
     Ok(Outcome {
         failure,
@@ -254,7 +265,8 @@ fn go<'a, R: Real>(
         effort: course.solver.effort(),
         reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
         history: course.history,
-        files: course.files.into_iter().chain(course.kept).collect(),
+        files: course.files.into_iter().chain(course.kept).chain(drawn.clone()).collect(),
+        picture: drawn,
         threads: rayon::current_num_threads(),
         resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
     })
@@ -299,6 +311,8 @@ struct Course<'a, R> {
     /// The largest hourglass energy over the internal one, and its time [s].
     worst_hourglass: (f64, f64),
     checkpoints: Option<Checkpoints<'a>>,
+    /// Whether the last instant becomes a picture.
+    pictured: bool,
     /// Files written, without checkpoints.
     files: Vec<PathBuf>,
     /// The last checkpoint written.
@@ -334,6 +348,7 @@ impl<'a, R: Real> Course<'a, R> {
             checkpoints: Checkpoints::new(scene, built, plan, folder, state.time),
             state,
             solver,
+            pictured: options.picture.is_some(),
             files,
             kept: None,
         })
@@ -343,7 +358,7 @@ impl<'a, R: Real> Course<'a, R> {
     fn see(&mut self) -> Result<bool, FailureSummary> {
         let (time, step, last) = (self.state.time, self.plan.step, self.is_last());
         let looked_at = self.watching.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
-        let wanted = if looked_at { Wanted::Everything } else { Wanted::Energies };
+        let wanted = if looked_at || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies };
         self.solver.evaluate(&mut self.state, wanted)?;
         let observable = self.solver.observable();
         if self.state.work.largest > self.solver.balance_floor() {
@@ -356,12 +371,7 @@ impl<'a, R: Real> Course<'a, R> {
         if self.sampling.is_due(time, step, last) {
             self.history.sample(self.built, observable, &self.state);
         }
-        let frame = Frame {
-            built: self.built,
-            state: &self.state,
-            stepper: observable,
-            corotational: self.solver.corotational(),
-        };
+        let frame = frame(self.built, &self.state, self.solver.as_ref());
         look(&mut self.watching, &frame, step, last)
             .map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?;
         Ok(last)
@@ -419,12 +429,27 @@ impl<'a, R: Real> Course<'a, R> {
         Ok(())
     }
 
+    /// Draws the instant last seen.
+    fn draw(&self, picture: &dyn Draw, folder: &OutputFolder) -> Result<PathBuf, OutputError> {
+        let shown = self.scene.shown(self.scene.scene.until);
+        let mut snapshot =
+            Snapshot::<R>::new(self.built, shown.on.as_deref(), &shown.data, shown.at, shown.curved);
+        snapshot.fill(&frame(self.built, &self.state, self.solver.as_ref()));
+        let drawn = picture.draw(snapshot.mesh(), self.state.time);
+        let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
+        folder.write(PICTURE, &png)
+    }
+
     /// Ends the outputs where this run ends.
     fn finish(&mut self) -> Result<(), FailureSummary> {
         (self.watching.iter_mut())
             .try_for_each(|(_, observer)| observer.finish())
             .map_err(|error| FailureSummary::output(&error, Some(self.state.time)))
     }
+}
+
+fn frame<'a, R>(built: &'a Built, state: &'a State<R>, solver: &'a dyn Solver<R>) -> Frame<'a, R> {
+    Frame { built, state, stepper: solver.observable(), corotational: solver.corotational() }
 }
 
 fn look<R: Real>(

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::checker::{nearest, read_table};
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{BodyTable, RunTable, SceneTable, SurfaceTable};
+use crate::format::{BodyTable, RunTable, SceneTable, SurfaceTable, ViewTable};
 use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
 use crate::source::{Node, Source, Value};
 
@@ -32,10 +32,12 @@ pub struct Scene {
     pub loads: Vec<(String, LoadTable)>,
     /// `[output.NAME]`
     pub outputs: Vec<(String, OutputTable)>,
+    /// `[view]`
+    pub view: ViewTable,
 }
 
 /// The tables a scene file can have.
-const TABLES: [&str; 8] = ["scene", "run", "law", "body", "surface", "constraint", "load", "output"];
+const TABLES: [&str; 9] = ["scene", "run", "law", "body", "surface", "constraint", "load", "output", "view"];
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -93,16 +95,27 @@ impl Scene {
         let constraints = read_all(&source, "constraint", read_typed::<ConstraintTable>, &mut out);
         let loads = read_all(&source, "load", read_typed::<LoadTable>, &mut out);
         let outputs = read_all(&source, "output", read_typed::<OutputTable>, &mut out);
+        let view = read_table::<ViewTable>(&source, &["view"], &[], &mut out);
         check_probe_names(&source, &mut out);
         if source.node(&["body"]).is_none_or(|node| node.entries().is_empty()) {
             let help =
                 "add a table `[body.NAME]` with `mesh`, `law` and `density`; `pliant new` writes an example";
             out.push(Diagnostic::error("the scene has no body").help(help));
         }
-        match (scene, run) {
-            (Some(scene), Some(run)) if !out.iter().any(Diagnostic::is_error) => {
-                Ok(Self { source, folder, scene, run, laws, bodies, surfaces, constraints, loads, outputs })
-            }
+        match (scene, run, view) {
+            (Some(scene), Some(run), Some(view)) if !out.iter().any(Diagnostic::is_error) => Ok(Self {
+                source,
+                folder,
+                scene,
+                run,
+                laws,
+                bodies,
+                surfaces,
+                constraints,
+                loads,
+                outputs,
+                view,
+            }),
             _ => Err(source.errors(out)),
         }
     }

@@ -1,6 +1,7 @@
 //! The solvers of a scene behind one face, so that one run loop serves them all.
 
 use pliant_gpu::{Device, GpuStepper, Wanted};
+use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::stability::Monitor;
 use pliant_mechanics::{
@@ -93,6 +94,11 @@ pub(crate) trait Solver<R> {
     /// The most steps it takes in one go: more than one where the state is far away.
     fn stride(&self) -> u64 {
         1
+    }
+
+    /// Takes hold of points: these grips and no others act from the next evaluation on. False of a solver that knows none.
+    fn hold(&mut self, grips: &[Grip]) -> bool {
+        grips.is_empty()
     }
 
     /// Makes the state complete, as a checkpoint needs it.
@@ -238,6 +244,11 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
             CentralDifference::advance(self, state);
         }
         Ok(())
+    }
+
+    fn hold(&mut self, grips: &[Grip]) -> bool {
+        CentralDifference::hold(self, grips);
+        true
     }
 
     fn balance_floor(&self) -> f64 {

@@ -288,7 +288,7 @@ impl Sweep {
     }
 
     fn write(&self, folder: &OutputFolder, rows: &[Option<Row>]) -> Result<(), OutputError> {
-        folder.write(SWEEP, &self.table(rows)).map(|_| ())
+        folder.write(SWEEP, self.table(rows)).map(|_| ())
     }
 
     /// The table of the runs that have ended. Columns that a run has no value for stay empty.

@@ -13,6 +13,7 @@ mod gmsh;
 mod obj;
 mod off;
 mod ply;
+mod pvd;
 mod stl;
 mod surface_out;
 mod vtk;
@@ -28,6 +29,7 @@ use std::path::Path;
 use crate::Mesh;
 pub use base64::encode as encode_base64;
 pub use error::{MeshFileError, MeshFileProblem, Place};
+pub use pvd::read_pvd;
 use surface_out::SurfaceOut;
 pub use vtu_write::{VtuOptions, save_vtu, write_pvd, write_vtu};
 

@@ -5,7 +5,10 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
 use super::{Builder, SCENE, Target, suggestion};
-use crate::format::{At, BodyModel, CsvTable, FieldName, ForceTable, ProbeTable, Timing, Vectors, VtuTable};
+use crate::format::{
+    At, BodyModel, ColourBy, Component, CsvTable, FieldName, ForceTable, ProbeTable, Timing, Vectors,
+    VtuTable,
+};
 use crate::registry::{LoadTable, OutputTable};
 
 impl Builder<'_> {
@@ -177,6 +180,66 @@ impl Builder<'_> {
                 OutputTable::Vtu(vtu) => self.check_vtu(vtu, &path),
                 OutputTable::Csv(csv) => self.check_csv(csv, &path),
             }
+        }
+    }
+
+    /// Refuses a view of what there is not.
+    pub(super) fn check_view(&mut self) {
+        let view = &self.scene.view;
+        let target = view.on.as_ref().map(|on| self.find_target(on, &["view", "on"]));
+        if let Some(clip) = &view.clip
+            && clip.normal == [0.0; 3]
+        {
+            self.error(
+                &["view", "clip", "normal"],
+                "a plane needs a normal",
+                "no direction",
+                "as in [1, 0, 0]",
+            );
+        }
+        if let Some([low, high]) = view.range
+            && low >= high
+        {
+            self.error(&["view", "range"], "the range must grow", "here", "as in [0, 5e3]");
+        }
+        let Some(ColourBy::Field(field)) = view.colour else { return };
+        match target {
+            Some(None) => return,
+            Some(Some(Target::Surface(surface))) => {
+                let body = self.model.surfaces[surface].body;
+                let model = self.scene.bodies[body].1.model;
+                if model != BodyModel::Solid && field != FieldName::Displacement {
+                    let message = format!(
+                        "surfaces that a body of model `{}` carries have a displacement and no `{}`",
+                        model.word(),
+                        field.name()
+                    );
+                    let help = "leave `on` out, to see the body itself";
+                    self.error(&["view", "colour"], message, "not on a surface", help);
+                } else {
+                    self.refuse_other_fields(&[field], Some(body), &["view", "colour"]);
+                }
+            }
+            Some(Some(Target::Body(body))) => {
+                self.refuse_other_fields(&[field], Some(body), &["view", "colour"]);
+            }
+            None => self.refuse_other_fields(&[field], None, &["view", "colour"]),
+        }
+        let (numbers, asked) = (field.components(), view.component.map(Component::of));
+        let fits = match (numbers, asked) {
+            (1 | 3, None) => true,
+            (numbers, Some(of)) => numbers == of,
+            _ => false,
+        };
+        if !fits {
+            let help = match numbers {
+                9 => "give `component = \"xx\"`, `yy`, `zz`, `xy`, `yz` or `xz`",
+                3 => "`x`, `y` or `z`, or none for the size",
+                _ => "leave `component` out: it is a single number",
+            };
+            let at = if asked.is_some() { "component" } else { "colour" };
+            let message = format!("`{}` needs another `component`", field.name());
+            self.error(&["view", at], message, "here", help);
         }
     }
 

@@ -110,6 +110,7 @@ pub fn build_with(scene: &Scene, cache: &MeshCache) -> Result<Built, SceneErrors
     builder.add_constraints();
     builder.add_loads();
     builder.check_outputs();
+    builder.check_view();
     builder.check_free_bodies();
     builder.check_held();
     if !builder.failed() {

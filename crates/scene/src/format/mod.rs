@@ -5,6 +5,7 @@ mod body;
 mod linear;
 mod load;
 mod output;
+mod view;
 
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
@@ -18,6 +19,9 @@ pub use load::{
     NodeVectorSource, NodeVectors, PressureTable, SpreadName, SpringTable, Timing, TractionTable, Vectors,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
+pub use view::{
+    BackgroundName, CameraTable, ClipTable, ColourBy, Component, MapName, Nothing, UpName, ViewTable,
+};
 
 use pliant_gpu::Design;
 use pliant_mechanics::prony::{PronyTerm, PronyUpdate};

@@ -58,6 +58,31 @@ pub enum FieldName {
 }
 
 impl FieldName {
+    /// All of them.
+    pub const ALL: [Self; 21] = [
+        Self::Displacement,
+        Self::Velocity,
+        Self::Rotation,
+        Self::CauchyStress,
+        Self::Pk2Stress,
+        Self::VonMises,
+        Self::GreenStrain,
+        Self::Fibre,
+        Self::FibreStretch,
+        Self::Pressure,
+        Self::VolumeRatio,
+        Self::EnergyDensity,
+        Self::MembraneForce,
+        Self::BendingMoment,
+        Self::StressTop,
+        Self::StressMiddle,
+        Self::StressBottom,
+        Self::MembraneEnergy,
+        Self::BendingEnergy,
+        Self::DrillingEnergy,
+        Self::Thickness,
+    ];
+
     /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -81,6 +106,59 @@ impl FieldName {
             Self::MembraneEnergy => "membrane-energy",
             Self::BendingEnergy => "bending-energy",
             Self::DrillingEnergy => "drilling-energy",
+            Self::Thickness => "thickness",
+        }
+    }
+
+    /// The field of a name, as it stands in scenes and files.
+    pub fn of_name(name: &str) -> Option<Self> {
+        serde_json::from_value(name.into()).ok()
+    }
+
+    /// Its unit; empty for none.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Displacement | Self::Thickness => "m",
+            Self::Velocity => "m/s",
+            Self::Rotation => "rad",
+            Self::CauchyStress
+            | Self::Pk2Stress
+            | Self::VonMises
+            | Self::Pressure
+            | Self::StressTop
+            | Self::StressMiddle
+            | Self::StressBottom => "Pa",
+            Self::GreenStrain | Self::Fibre | Self::FibreStretch | Self::VolumeRatio => "",
+            Self::EnergyDensity => "J/m³",
+            Self::MembraneForce => "N/m",
+            Self::BendingMoment => "N",
+            Self::MembraneEnergy | Self::BendingEnergy | Self::DrillingEnergy => "J/m²",
+        }
+    }
+
+    /// Its name in a picture.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+            Self::Rotation => "rotation",
+            Self::CauchyStress => "Cauchy stress",
+            Self::Pk2Stress => "2nd Piola–Kirchhoff stress",
+            Self::VonMises => "von Mises stress",
+            Self::GreenStrain => "Green strain",
+            Self::Fibre => "fibre",
+            Self::FibreStretch => "fibre stretch",
+            Self::Pressure => "pressure",
+            Self::VolumeRatio => "volume ratio",
+            Self::EnergyDensity => "energy density",
+            Self::MembraneForce => "membrane force",
+            Self::BendingMoment => "bending moment",
+            Self::StressTop => "stress at the top",
+            Self::StressMiddle => "stress in the middle",
+            Self::StressBottom => "stress at the bottom",
+            Self::MembraneEnergy => "membrane energy",
+            Self::BendingEnergy => "bending energy",
+            Self::DrillingEnergy => "drilling energy",
             Self::Thickness => "thickness",
         }
     }

@@ -12,6 +12,8 @@ use crate::scene::Scene;
 pub(crate) const SUMMARY: &str = "summary.md";
 /// The plot in it.
 pub(crate) const PLOT: &str = "plot.svg";
+/// The picture of the last instant, if one was asked for.
+pub(crate) const PICTURE: &str = "picture.png";
 
 /// Where a run writes.
 #[derive(Clone, Debug)]
@@ -115,7 +117,7 @@ impl OutputFolder {
     ///
     /// # Errors
     /// If it can't be written.
-    pub fn write(&self, name: &str, content: &str) -> Result<PathBuf, OutputError> {
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<PathBuf, OutputError> {
         let (path, temporary) = (self.path.join(name), self.path.join(format!("{name}.tmp")));
         let written = fs::write(&temporary, content).and_then(|()| fs::rename(&temporary, &path));
         written.map_err(|error| {
@@ -137,7 +139,7 @@ fn probe(folder: &Path) -> std::io::Result<()> {
 /// Removes what an earlier run of the same outputs left, so that no file tells of another run than its neighbours.
 /// A CSV file stays until it is written anew.
 fn remove_earlier(folder: &Path, scene: &Scene) -> std::io::Result<()> {
-    for page in [SUMMARY, PLOT] {
+    for page in [SUMMARY, PLOT, PICTURE] {
         remove(&folder.join(page))?;
     }
     for entry in fs::read_dir(folder)? {

@@ -5,6 +5,7 @@ mod curved;
 mod fields;
 mod folder;
 mod plot;
+mod snapshot;
 mod stability;
 mod summary;
 mod vtu;
@@ -15,7 +16,7 @@ use pliant_mechanics::{Observable, Real, State};
 use serde::{Deserialize, Serialize};
 
 pub use folder::OutputFolder;
-pub(crate) use folder::{PLOT, SUMMARY};
+pub(crate) use folder::{PICTURE, PLOT, SUMMARY};
 pub use stability::{AddedMass, StabilitySummary};
 pub use summary::{
     BodySummary, FailureSummary, LoadStepSummary, Summary, failed_input, failed_output, number,
@@ -23,6 +24,7 @@ pub use summary::{
 
 pub(crate) use csv::{AXES, ENERGIES};
 pub(crate) use plot::plot;
+pub(crate) use snapshot::Snapshot;
 pub(crate) use summary::{bodies, markdown, summarise};
 
 use crate::build::Built;

@@ -342,6 +342,9 @@ fn write_page(
         scene.source.assignments().iter().try_for_each(|set| writeln!(page, "* `{set}`"))?;
         writeln!(page)?;
     }
+    if outcome.picture.is_some() {
+        writeln!(page, "![the last instant](picture.png)\n")?;
+    }
     writeln!(page, "![forces and energies over time](plot.svg)\n")?;
     writeln!(page, "## Model\n")?;
     writeln!(

@@ -3,19 +3,15 @@
 
 use std::fs;
 use std::io::{BufWriter, Write};
-use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::{MeshFileError, VtuOptions, write_pvd, write_vtu};
-use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_vtu};
 use pliant_mechanics::Real;
-use pliant_mechanics::recover::Recovery;
-use rayon::prelude::*;
 
-use super::fields::Cell;
-use super::{Frame, Observer, OutputError, Written, fields};
-use crate::build::{BodyCells, Built, Corotational};
-use crate::format::{At, FieldName, VtuTable};
+use super::snapshot::Snapshot;
+use super::{Frame, Observer, OutputError, Written};
+use crate::build::Built;
+use crate::format::VtuTable;
 
 pub(super) struct Series<R> {
     folder: PathBuf,
@@ -24,23 +20,7 @@ pub(super) struct Series<R> {
     times: Vec<f64>,
     /// Times of the frames that an interrupted run had written beyond these; their files stay until they are replaced.
     beyond: Vec<f64>,
-    fields: Vec<FieldName>,
-    at: At,
-    mesh: Mesh,
-    content: Content,
-    number: PhantomData<R>,
-}
-
-/// What the points and cells of the file are in the model.
-enum Content {
-    /// A carried surface.
-    Surface(usize),
-    /// Bodies: the model's node of each point, and (solid, cell) of each cell of each block.
-    Bodies { nodes: Vec<u32>, cells: Vec<Vec<(u32, u32)>> },
-    /// Shells and co-rotational solids: the model's node of each point, and the cells of each block.
-    Corotational { nodes: Vec<u32>, cells: Vec<Vec<Cell>>, fields: Box<fields::Corotated> },
-    /// The curved surface of shells.
-    Curved(Box<super::curved::Curved>),
+    snapshot: Snapshot<R>,
 }
 
 impl<R: Real> Series<R> {
@@ -50,19 +30,6 @@ impl<R: Real> Series<R> {
         folder: &Path,
         name: &str,
     ) -> Result<Self, OutputError> {
-        let on = table.on.as_deref();
-        let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
-        let (mesh, content) = match surface {
-            Some(index) => (bare(&built.surfaces[index]), Content::Surface(index)),
-            None => match (&built.corotational, table.curved) {
-                (None, _) => merged_bodies(built, on),
-                (Some(part), None) => merged_corotational(built, part, on),
-                (Some(part), Some(parts)) => {
-                    let (curved, mesh) = super::curved::Curved::new(built, part, on, parts);
-                    (mesh, Content::Curved(Box::new(curved)))
-                }
-            },
-        };
         let own = folder.join(name);
         fs::create_dir_all(&own).map_err(|error| OutputError::new(&own, error))?;
         Ok(Self {
@@ -71,11 +38,7 @@ impl<R: Real> Series<R> {
             name: name.into(),
             times: Vec::new(),
             beyond: Vec::new(),
-            fields: table.data.clone(),
-            at: table.at,
-            mesh,
-            content,
-            number: PhantomData,
+            snapshot: Snapshot::new(built, table.on.as_deref(), &table.data, table.at, table.curved),
         })
     }
 
@@ -99,54 +62,18 @@ impl<R: Real> Series<R> {
             other => OutputError::new(&self.index, other),
         })
     }
-
-    fn fill(&mut self, frame: &Frame<'_, R>) {
-        match &mut self.content {
-            Content::Surface(index) => {
-                if let Some(displacement) = carried_on_shell(frame, *index) {
-                    let values = displacement.iter().flat_map(|d| [d.x, d.y, d.z]).collect();
-                    let name = FieldName::Displacement.name();
-                    self.mesh.point_data.insert(name.into(), DataArray { components: 3, values });
-                    return;
-                }
-                let mapping = &frame.built.model.surfaces[*index].mapping;
-                for &field in &self.fields {
-                    let parent: Vec<[f64; 3]> = (0..frame.built.model.node_count())
-                        .map(|node| {
-                            let value = fields::nodal(frame, field, node);
-                            [value[0], value[1], value[2]]
-                        })
-                        .collect();
-                    let values = mapping.apply(&parent).into_iter().flatten().collect();
-                    self.mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
-                }
-            }
-            Content::Bodies { nodes, cells } => {
-                fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
-                fill_cells(&mut self.mesh, frame, &self.fields, self.at, cells);
-            }
-            Content::Corotational { nodes, cells, fields } => {
-                fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
-                if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
-                    fields.fill(&part.model, state);
-                    fill_corotational(&mut self.mesh, &part.model, fields, &self.fields, self.at, cells);
-                }
-            }
-            Content::Curved(curved) => curved.fill(&mut self.mesh, frame, &self.fields),
-        }
-    }
 }
 
 impl<R: Real> Observer<R> for Series<R> {
     fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
-        self.fill(frame);
+        self.snapshot.fill(frame);
         let file = frame_name(self.times.len());
         let (path, temporary) = (self.folder.join(&file), self.folder.join(format!("{file}.tmp")));
         let options =
             VtuOptions { compress: true, single: R::PRECISION == "single", time: Some(frame.time()) };
         let written = || -> Result<(), Box<dyn std::error::Error>> {
             let mut writer = BufWriter::new(fs::File::create(&temporary)?);
-            write_vtu(&mut writer, &self.mesh, &options)?;
+            write_vtu(&mut writer, self.snapshot.mesh(), &options)?;
             writer.flush()?;
             fs::rename(&temporary, &path)?;
             Ok(())
@@ -201,11 +128,8 @@ fn frame_name(index: usize) -> String {
 
 /// The times that a list of frames names.
 fn listed(index: &Path) -> Result<Vec<f64>, String> {
-    let text = fs::read_to_string(index).map_err(|error| error.to_string())?;
-    let document = roxmltree::Document::parse(&text).map_err(|error| error.to_string())?;
-    let frames = document.descendants().filter(|node| node.has_tag_name("DataSet"));
-    let time = |frame: roxmltree::Node<'_, '_>| frame.attribute("timestep")?.parse().ok();
-    frames.map(time).collect::<Option<_>>().ok_or_else(|| "it lists a frame without a time".into())
+    let frames = read_pvd(index).map_err(|error| error.to_string())?;
+    Ok(frames.into_iter().map(|(time, _)| time).collect())
 }
 
 /// Whether a series begins with frames of these times; the reason if not.
@@ -219,224 +143,4 @@ pub(super) fn verify(folder: &Path, name: &str, times: &[f64]) -> Result<(), Str
     }
     let missing = (0..times.len()).find(|&index| !folder.join(name).join(frame_name(index)).is_file());
     missing.map_or(Ok(()), |index| Err(format!("`{name}/{}` is missing", frame_name(index))))
-}
-
-/// Points and cells without data and sets.
-fn bare(mesh: &Mesh) -> Mesh {
-    let blocks = mesh.blocks.iter().map(|block| CellBlock::new(block.kind, block.nodes.clone())).collect();
-    Mesh { points: mesh.points.clone(), blocks, ..Mesh::default() }
-}
-
-/// The volume cells of one body or of all, with `label` and, for several bodies, the number of the `body`.
-fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
-    let chosen = |body: usize| on.is_none_or(|name| built.bodies[body].name == name);
-    let mut mesh = Mesh::default();
-    let mut nodes = Vec::new();
-    let mut offsets = vec![0; built.bodies.len()];
-    for (body, offset) in offsets.iter_mut().enumerate().filter(|(body, _)| chosen(*body)) {
-        *offset = mesh.points.len() as u32;
-        mesh.points.extend_from_slice(&built.bodies[body].mesh.points);
-        nodes.extend(built.model.bodies[body].nodes.clone());
-    }
-    let labelled =
-        built.bodies.iter().any(|b| b.mesh.volume_blocks().any(|block| block.data.contains_key("label")));
-    let mut cells = Vec::new();
-    for kind in [CellKind::Tet, CellKind::Hex] {
-        let mut block = CellBlock::new(kind, Vec::new());
-        let mut places = Vec::new();
-        let (mut body_of, mut labels) = (Vec::new(), Vec::new());
-        for (body, &offset) in offsets.iter().enumerate().filter(|(body, _)| chosen(*body)) {
-            let Some(own) = built.bodies[body].mesh.block(kind) else { continue };
-            block.nodes.extend(own.nodes.iter().map(|node| node + offset));
-            body_of.resize(body_of.len() + own.len(), body as f64);
-            match own.data.get("label") {
-                Some(label) => labels.extend_from_slice(&label.values),
-                None => labels.resize(labels.len() + own.len(), 0.0),
-            }
-            let first = places.len();
-            places.resize(first + own.len(), (0, 0));
-            for (index, solid) in built.model.solids.iter().enumerate() {
-                let fits = solid.body == body && solid.cells.nodes_per_cell() == kind.node_count();
-                for (cell, &original) in solid.original.iter().enumerate().filter(|_| fits) {
-                    places[first + original as usize] = (index as u32, cell as u32);
-                }
-            }
-        }
-        if block.is_empty() {
-            continue;
-        }
-        if built.bodies.len() > 1 {
-            block.data.insert("body".into(), DataArray::scalar(body_of));
-        }
-        if labelled {
-            block.data.insert("label".into(), DataArray::scalar(labels));
-        }
-        mesh.blocks.push(block);
-        cells.push(places);
-    }
-    (mesh, Content::Bodies { nodes, cells })
-}
-
-/// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
-pub(super) fn carried_on_shell<R>(frame: &Frame<'_, R>, surface: usize) -> Option<Vec<Vector3>> {
-    let part = frame.built.corotational.as_ref()?;
-    let (points, curved) = (part.carried.get(&surface)?, part.surface.as_ref()?);
-    let mut positions = vec![Vector3::zeros(); points.len()];
-    curved.carried_all(&part.model, frame.corotational?, points, &mut positions);
-    for (position, rest) in positions.iter_mut().zip(&frame.built.surfaces[surface].points) {
-        *position -= rest;
-    }
-    Some(positions)
-}
-
-/// The cells of one shell or co-rotational solid or of all, with the number of the `body` for several.
-fn merged_corotational(built: &Built, part: &Corotational, on: Option<&str>) -> (Mesh, Content) {
-    let mut mesh = Mesh::default();
-    let (mut nodes, mut cells) = (Vec::new(), Vec::new());
-    let kinds = [CellKind::Triangle, CellKind::Tet];
-    let mut blocks = kinds.map(|kind| (CellBlock::new(kind, Vec::new()), Vec::new(), Vec::new()));
-    for (number, body) in
-        built.bodies.iter().enumerate().filter(|(_, body)| on.is_none_or(|on| body.name == on))
-    {
-        let offset = mesh.points.len() as u32;
-        mesh.points.extend_from_slice(&body.mesh.points);
-        nodes.extend(built.model.bodies[number].nodes.clone());
-        let (at, range) = match &part.cells[number] {
-            BodyCells::Facets(range) => (0, range),
-            BodyCells::Tets(range) => (1, range),
-        };
-        let cell = [Cell::Facet, Cell::Tet][at];
-        let (block, places, owners) = &mut blocks[at];
-        let own = body.mesh.block(kinds[at]).map_or(&[][..], |own| &own.nodes[..]);
-        block.nodes.extend(own.iter().map(|node| node + offset));
-        places.extend(range.clone().map(cell));
-        owners.resize(places.len(), number as f64);
-    }
-    for (mut block, places, owners) in blocks.into_iter().filter(|(block, ..)| !block.is_empty()) {
-        if built.bodies.len() > 1 {
-            block.data.insert("body".into(), DataArray::scalar(owners));
-        }
-        mesh.blocks.push(block);
-        cells.push(places);
-    }
-    (mesh, Content::Corotational { nodes, cells, fields: Box::default() })
-}
-
-fn fill_corotational(
-    mesh: &mut Mesh,
-    model: &pliant_corotational::Model,
-    found: &fields::Corotated,
-    wanted: &[FieldName],
-    at: At,
-    cells: &[Vec<Cell>],
-) {
-    let wanted: Vec<FieldName> = wanted.iter().copied().filter(|field| !field.is_nodal()).collect();
-    let mut averages = Averages::new(mesh.points.len(), &wanted);
-    for (block, cells) in mesh.blocks.iter_mut().zip(cells) {
-        for (slot, &field) in wanted.iter().enumerate() {
-            let components = field.components();
-            if at == At::Cells {
-                let value = |&cell: &Cell| found.of(model, cell, field).into_iter().take(components);
-                let values = cells.iter().flat_map(value).collect();
-                block.data.insert(field.name().into(), DataArray { components, values });
-                continue;
-            }
-            for (index, &cell) in cells.iter().enumerate() {
-                let size = match cell {
-                    Cell::Facet(facet) => model.facets[facet as usize].area,
-                    Cell::Tet(tet) => model.tets[tet as usize].volume,
-                };
-                averages.add(slot, block.cell(index), &found.of(model, cell, field)[..components], size);
-            }
-        }
-    }
-    if at == At::Points {
-        averages.write(&mut mesh.point_data, &wanted);
-    }
-}
-
-fn fill_nodal<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], nodes: &[u32]) {
-    for &field in wanted.iter().filter(|field| field.is_nodal()) {
-        let value = |&node: &u32| {
-            let value = fields::nodal(frame, field, node as usize);
-            [value[0], value[1], value[2]]
-        };
-        let values = nodes.iter().flat_map(value).collect();
-        mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
-    }
-}
-
-fn fill_cells<R: Real>(
-    mesh: &mut Mesh,
-    frame: &Frame<'_, R>,
-    wanted: &[FieldName],
-    at: At,
-    cells: &[Vec<(u32, u32)>],
-) {
-    let wanted: Vec<FieldName> = wanted.iter().copied().filter(|field| !field.is_nodal()).collect();
-    if wanted.is_empty() {
-        return;
-    }
-    let model = &frame.built.model;
-    let recovery = Recovery::new(model, frame.state);
-    let mut averages = Averages::new(mesh.points.len(), &wanted);
-    for (block, places) in mesh.blocks.iter_mut().zip(cells) {
-        let recovered: Vec<_> =
-            (places.par_iter()).map(|&(solid, cell)| recovery.cell(solid as usize, cell as usize)).collect();
-        for (slot, &field) in wanted.iter().enumerate() {
-            let components = field.components();
-            if at == At::Cells {
-                let value = |cell| fields::of_cell(cell, field).into_iter().take(components);
-                let values = recovered.iter().flat_map(value).collect();
-                block.data.insert(field.name().into(), DataArray { components, values });
-                continue;
-            }
-            for (index, (cell, &(solid, own))) in recovered.iter().zip(places).enumerate() {
-                let volume = model.solids[solid as usize].cells.volume(own as usize);
-                averages.add(slot, block.cell(index), &fields::of_cell(cell, field)[..components], volume);
-            }
-        }
-    }
-    if at == At::Points {
-        averages.write(&mut mesh.point_data, &wanted);
-    }
-}
-
-/// Volume-weighted means of cell values at the points.
-struct Averages {
-    /// For each field: sums of value × volume, and of volume, at each point. Cells without a value don't count.
-    sums: Vec<(Vec<f64>, Vec<f64>)>,
-}
-
-impl Averages {
-    fn new(points: usize, wanted: &[FieldName]) -> Self {
-        let zeros = |field: &FieldName| (vec![0.0; points * field.components()], vec![0.0; points]);
-        Self { sums: wanted.iter().map(zeros).collect() }
-    }
-
-    fn add(&mut self, slot: usize, nodes: &[u32], value: &[f64], volume: f64) {
-        if value.iter().any(|v| v.is_nan()) {
-            return;
-        }
-        let (sums, volumes) = &mut self.sums[slot];
-        for &node in nodes {
-            let own = node as usize * value.len();
-            for (sum, v) in sums[own..].iter_mut().zip(value) {
-                *sum += v * volume;
-            }
-            volumes[node as usize] += volume;
-        }
-    }
-
-    fn write(self, data: &mut std::collections::BTreeMap<String, DataArray>, wanted: &[FieldName]) {
-        for (&field, (sums, volumes)) in wanted.iter().zip(self.sums) {
-            let components = field.components();
-            let values = sums
-                .chunks(components)
-                .zip(volumes)
-                .flat_map(|(s, v)| s.iter().map(move |s| s / v))
-                .collect();
-            data.insert(field.name().into(), DataArray { components, values });
-        }
-    }
 }

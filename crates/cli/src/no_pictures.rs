@@ -1,0 +1,37 @@
+//! What stands in for pictures in a build without the feature `viewer`.
+
+use std::process::ExitCode;
+
+use pliant_geometry::Mesh;
+use pliant_scene::{Draw, Scene};
+
+use crate::arguments::Render;
+use crate::report::Failure;
+
+fn missing() -> Failure {
+    Failure::plain(
+        "this `pliant` was built without pictures and the window",
+        "build it with `cargo build --release --features viewer`, or install it with `cargo install --path crates/cli \
+         --features viewer`",
+    )
+}
+
+pub fn render(_arguments: &Render) -> Result<ExitCode, Failure> {
+    Err(missing())
+}
+
+/// Draws nothing, and is never made.
+#[derive(Debug)]
+pub enum Photographer {}
+
+impl Photographer {
+    pub fn new(_scene: &Scene) -> Result<Self, Failure> {
+        Err(missing())
+    }
+}
+
+impl Draw for Photographer {
+    fn draw(&self, _mesh: &Mesh, _time: f64) -> Result<Vec<u8>, String> {
+        match *self {}
+    }
+}

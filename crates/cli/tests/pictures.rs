@@ -1,0 +1,205 @@
+//! Pictures and films through the real binary: what is taken of scenes and of finished runs, what is refused, and what a build
+//! without pictures tells. Without anything that draws, tests that need it are skipped with a notice; with `PLIANT_REQUIRE_GPU=1`
+//! they fail.
+
+mod support;
+
+#[cfg(not(feature = "viewer"))]
+use support::{BLOCK, Workshop};
+
+#[cfg(not(feature = "viewer"))]
+#[test]
+fn a_build_without_pictures_tells_how_to_make_one_with_them() {
+    let workshop = Workshop::new(BLOCK);
+    for arguments in [&["render", "case"][..], &["run", "case", "--picture"]] {
+        let told = workshop.pliant(arguments);
+        assert_eq!(told.code, 2, "{}", told.err);
+        assert!(told.err.contains("cargo build --release --features viewer"), "{}", told.err);
+        assert!(!workshop.path("out").join("case/history.csv").exists(), "nothing is run");
+    }
+}
+
+#[cfg(feature = "viewer")]
+mod with_pictures {
+    use std::collections::BTreeSet;
+    use std::fs;
+
+    use pliant_picture::Picture;
+
+    use super::support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
+
+    /// The sizes of a PNG file, and the number of its frames if it is animated.
+    fn png(workshop: &Workshop, name: &str) -> ([u32; 2], Option<u32>) {
+        let bytes = fs::read(workshop.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(bytes.starts_with(b"\x89PNG"), "{name}");
+        let number = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
+        let animated = bytes.windows(4).position(|window| window == b"acTL").map(|at| number(at + 4));
+        ([number(16), number(20)], animated)
+    }
+
+    fn names(workshop: &Workshop, folder: &str) -> BTreeSet<String> {
+        let entries = fs::read_dir(workshop.path(folder)).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[track_caller]
+    fn done(told: &Told) -> &Told {
+        assert_eq!(told.code, 0, "{}", told.err);
+        told
+    }
+
+    fn short(more: &str) -> Workshop {
+        Workshop::new(&format!("{BLOCK}\n[view]\nsize = [96, 64]\n{more}"))
+    }
+
+    #[test]
+    fn a_run_leaves_a_picture_in_its_folder_and_summary() {
+        if !has_graphics_processor() {
+            return;
+        }
+        let workshop = short("");
+        let told = workshop.run(&["--picture", "--step", "1e-3"]);
+        assert_eq!(png(&workshop, "out/case/picture.png"), ([96, 64], None));
+        assert!(workshop.read("out/case/summary.md").contains("![the last instant](picture.png)"));
+        let files = &told.done()["files"];
+        assert!(files.as_array().unwrap().iter().any(|file| file.as_str().unwrap().ends_with("picture.png")));
+        // Without the option the one of the last run goes.
+        workshop.run(&["--force", "--step", "1e-3"]).done();
+        assert!(!workshop.path("out/case/picture.png").exists());
+        assert!(!workshop.read("out/case/summary.md").contains("picture.png"));
+    }
+
+    #[test]
+    fn a_finished_run_becomes_pictures_and_a_film() {
+        if !has_graphics_processor() {
+            return;
+        }
+        let workshop = short("");
+        workshop.run(&["--step", "1e-3"]).done();
+        let small = ["--size", "80x60"];
+        done(&workshop.pliant(&[&["render", "out/case"], &small[..]].concat()));
+        assert_eq!(names(&workshop, "pictures"), BTreeSet::from(["frame-00005.png".into()]));
+        assert_eq!(png(&workshop, "pictures/frame-00005.png").0, [80, 60]);
+
+        let film = ["render", "out/case", "-o", "all", "--film", "film.png", "--colour", "displacement:z"];
+        done(&workshop.pliant(&[&film, &small[..]].concat()));
+        assert_eq!(names(&workshop, "all").len(), 6);
+        assert_eq!(png(&workshop, "film.png"), ([80, 60], Some(6)));
+
+        done(
+            &workshop
+                .pliant(&[&["render", "out/case", "-o", "some", "--frames", "1..3"], &small[..]].concat()),
+        );
+        let two = BTreeSet::from(["frame-00001.png".into(), "frame-00002.png".into()]);
+        assert_eq!(names(&workshop, "some"), two);
+        // The same pictures again, with nothing asked twice.
+        done(
+            &workshop
+                .pliant(&[&["render", "out/case", "-o", "some", "--frames", "1..3"], &small[..]].concat()),
+        );
+    }
+
+    #[test]
+    fn a_film_is_made_by_ffmpeg_or_else_an_animated_png() {
+        if !has_graphics_processor() {
+            return;
+        }
+        let workshop = short("");
+        let arguments = ["render", "case", "--film", "film.mp4", "--step", "1e-3", "--size", "81x61"];
+        let told = workshop.pliant(&arguments);
+        done(&told);
+        if pliant_picture::ffmpeg() {
+            let bytes = fs::read(workshop.path("film.mp4")).unwrap();
+            assert_eq!(&bytes[4..8], b"ftyp");
+        }
+        let mut without = workshop.command(&[&arguments[..], &["--force"]].concat());
+        let told: Told = without.env("PATH", "").output().unwrap().into();
+        assert!(done(&told).err.contains("there is no ffmpeg here"), "{}", told.err);
+        assert_eq!(png(&workshop, "film.png"), ([81, 61], Some(6)));
+    }
+
+    #[test]
+    fn a_scene_is_seen_as_its_table_and_then_the_options_say() {
+        if !has_graphics_processor() {
+            return;
+        }
+        let workshop = short("colour = 'displacement'\nedges = true\ncamera = { azimuth = 20, up = 'y' }\n");
+        let take = |folder: &str, more: &[&str]| -> Vec<u8> {
+            let all = [&["render", "case", "--step", "1e-3", "-o", folder], more].concat();
+            done(&workshop.pliant(&all));
+            fs::read(workshop.path(folder).join("frame-00005.png")).unwrap()
+        };
+        let plain = take("plain", &[]);
+        let different: [&[&str]; 9] = [
+            &["--colour", "pressure"],
+            &["--colour", "none"],
+            &["--colour", "cauchy-stress:zz"],
+            &["--map", "magma"],
+            &["--range", "-1e-3,1e-2"],
+            &["--camera", "-70,-10"],
+            &["--clip", "0.05,0.05,0.05,1,0.2,0"],
+            &["--ghost", "--background", "white", "--zoom", "0.7"],
+            &["--orthographic", "--up", "-z"],
+        ];
+        for (number, more) in different.iter().enumerate() {
+            assert_ne!(take(&format!("other-{number}"), more), plain, "{more:?}");
+        }
+        assert_eq!(take("again", &["--camera", "20,22"]), plain);
+        let surface = take("surface", &["--set", "view.on=skin", "--colour", "von-mises"]);
+        assert_ne!(surface, plain);
+        assert!(Picture::from_png_with_coverage(&plain).is_err(), "pictures are opaque");
+    }
+
+    #[test]
+    fn what_cannot_be_shown_is_refused_with_a_remedy() {
+        if !has_graphics_processor() {
+            return;
+        }
+        let workshop = short("");
+        workshop.run(&["--step", "1e-3"]).done();
+        workshop.write("full/letter.txt", "mine");
+        workshop.write("empty/letter.txt", "mine");
+        let cases: [(&[&str], &str); 10] = [
+            (&["render", "nowhere"], "nowhere"),
+            (&["render", "empty"], "holds no series of frames"),
+            (&["render", "out/case", "--series", "skin"], "there is `fields`"),
+            (&["render", "out/case", "--colour", "pressure"], "`displacement`, `von-mises`"),
+            (&["render", "out/case", "--frames", "9"], "has 6 frames, from 0 to 5"),
+            (&["render", "out/case", "--until", "2"], "give the scene"),
+            (&["render", "out/case", "--film", "film.avi"], "end it in .mp4"),
+            (&["render", "out/case", "-o", "full"], "it is not empty"),
+            (&["render", "case", "--colour", "presure"], "did you mean \"pressure\"?"),
+            (&["render", "case", "--colour", "bending-moment:xx"], "have no `bending-moment`"),
+        ];
+        for (arguments, piece) in cases {
+            let told = workshop.pliant(arguments);
+            assert_eq!(told.code, 2, "{arguments:?}: {}", told.err);
+            assert!(told.words().contains(piece), "{arguments:?}: {}", told.err);
+        }
+        for typed in [
+            ["--range", "2,1"],
+            ["--range", "1"],
+            ["--size", "5x5"],
+            ["--camera", "0,100"],
+            ["--clip", "0,0,0,0,0,0"],
+            ["--zoom", "-1"],
+            ["--frames", "3..2"],
+        ] {
+            assert_eq!(workshop.pliant(&[&["render", "out/case"], &typed[..]].concat()).code, 2, "{typed:?}");
+        }
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn without_anything_that_draws_the_packages_are_named() {
+        let workshop = short("");
+        for arguments in [&["render", "case"][..], &["run", "case", "--picture"]] {
+            // On Linux nothing answers to Direct3D.
+            let told: Told = workshop.command(arguments).env("WGPU_BACKEND", "dx12").output().unwrap().into();
+            assert_eq!(told.code, 2, "{}", told.err);
+            assert!(told.err.contains("mesa-vulkan-drivers libvulkan1"), "{}", told.err);
+        }
+        let scene = changed(BLOCK, "until = 0.02", "until = 0.002");
+        assert_eq!(Workshop::new(&scene).pliant(&["run", "case"]).code, 0, "everything else works");
+    }
+}

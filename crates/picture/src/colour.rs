@@ -1,0 +1,164 @@
+//! From values to colours: perceptual maps, most of them safe for the colour-blind, and the range that they span.
+
+/// A map of colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColourMap {
+    /// Dark violet over green to yellow; even to all eyes.
+    #[default]
+    Viridis,
+    /// Blue over grey to yellow; the same to those who see no red or green.
+    Cividis,
+    /// Black over red to pale yellow.
+    Magma,
+    /// Black over red to yellow.
+    Inferno,
+    /// Blue over red to yellow.
+    Plasma,
+    /// The rainbow, made even; not for the colour-blind.
+    Turbo,
+    /// Blue over white to red, for values around zero.
+    BlueRed,
+}
+
+impl ColourMap {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Viridis, Self::Cividis, Self::Magma, Self::Inferno, Self::Plasma, Self::Turbo, Self::BlueRed];
+
+    /// Its word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Viridis => "viridis",
+            Self::Cividis => "cividis",
+            Self::Magma => "magma",
+            Self::Inferno => "inferno",
+            Self::Plasma => "plasma",
+            Self::Turbo => "turbo",
+            Self::BlueRed => "blue-red",
+        }
+    }
+
+    /// The one of that word.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|map| map.name() == name)
+    }
+
+    /// The colour (sRGB) of a part of the range from 0 to 1.
+    pub fn at(self, part: f64) -> [u8; 3] {
+        let (gradient, part) = match self {
+            Self::Viridis => (colorous::VIRIDIS, part),
+            Self::Cividis => (colorous::CIVIDIS, part),
+            Self::Magma => (colorous::MAGMA, part),
+            Self::Inferno => (colorous::INFERNO, part),
+            Self::Plasma => (colorous::PLASMA, part),
+            Self::Turbo => (colorous::TURBO, part),
+            Self::BlueRed => (colorous::RED_BLUE, 1.0 - part),
+        };
+        gradient.eval_continuous(part).as_array()
+    }
+
+    /// 256 colours in linear light, for the shader.
+    pub(crate) fn table(self) -> Vec<[f32; 4]> {
+        let colour = |index: u32| {
+            let [r, g, b] = self.at(f64::from(index) / 255.0).map(linear);
+            [r, g, b, 1.0]
+        };
+        (0..256).map(colour).collect()
+    }
+}
+
+/// The light of a byte of sRGB (IEC 61966-2-1).
+pub(crate) fn linear(byte: u8) -> f32 {
+    let s = f32::from(byte) / 255.0;
+    if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Collects values to find the range that colours span: single corners with extreme values do not take the whole map.
+#[derive(Clone, Debug, Default)]
+pub struct Extremes {
+    values: Vec<f32>,
+}
+
+/// Part of the values that the range leaves out at each end.
+const LEFT_OUT: f64 = 0.005;
+
+impl Extremes {
+    /// Takes values of a frame; those that are not finite don't count.
+    pub fn add(&mut self, values: impl IntoIterator<Item = f64>) {
+        self.values.extend(values.into_iter().filter(|value| value.is_finite()).map(|value| value as f32));
+    }
+
+    /// The range: from zero where no value is negative, around zero where many of either sign are; without the outermost
+    /// values. `None` without any value.
+    pub fn range(mut self) -> Option<[f64; 2]> {
+        if self.values.is_empty() {
+            return None;
+        }
+        self.values.sort_unstable_by(f32::total_cmp);
+        let last = self.values.len() - 1;
+        let at = |part: f64| f64::from(self.values[(part * last as f64).round() as usize]);
+        let (least, most) = (f64::from(self.values[0]), f64::from(self.values[last]));
+        let (low, high) = (at(LEFT_OUT), at(1.0 - LEFT_OUT));
+        // Values that hardly differ keep their whole range.
+        let (low, high) = if high > low { (low, high) } else { (least, most) };
+        Some(if least >= 0.0 && low < 0.5 * high {
+            [0.0, high]
+        } else if low < 0.0 && high > 0.0 && low.abs().min(high) > 0.2 * low.abs().max(high) {
+            let reach = high.max(-low);
+            [-reach, reach]
+        } else if high > low {
+            [low, high]
+        } else {
+            let room = if low == 0.0 { 1.0 } else { 0.5 * low.abs() };
+            [low - if least >= 0.0 { low.min(room) } else { room }, high + room]
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lightness of a colour (CIE L*).
+    fn lightness(colour: [u8; 3]) -> f32 {
+        let [r, g, b] = colour.map(linear);
+        let y = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        if y > 0.008_856 { 116.0 * y.cbrt() - 16.0 } else { 903.3 * y }
+    }
+
+    #[test]
+    fn sequential_maps_grow_lighter_all_the_way() {
+        for map in
+            [ColourMap::Viridis, ColourMap::Cividis, ColourMap::Magma, ColourMap::Inferno, ColourMap::Plasma]
+        {
+            let steps: Vec<f32> = (0..=20).map(|i| lightness(map.at(f64::from(i) / 20.0))).collect();
+            assert!(steps.is_sorted(), "{map:?}: {steps:?}");
+        }
+        assert_eq!(ColourMap::Viridis.at(0.0), [0x44, 0x01, 0x54]);
+        assert!(ColourMap::BlueRed.at(0.0)[2] > 90 && ColourMap::BlueRed.at(1.0)[0] > 90);
+    }
+
+    #[test]
+    fn names_lead_back() {
+        assert!(ColourMap::ALL.into_iter().all(|map| ColourMap::of_name(map.name()) == Some(map)));
+        assert_eq!(ColourMap::of_name("jet"), None);
+    }
+
+    fn range(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
+        let mut extremes = Extremes::default();
+        extremes.add(values);
+        extremes.range()
+    }
+
+    #[test]
+    fn ranges_start_at_zero_or_lie_around_it_and_forget_single_corners() {
+        let many = (0..=1000).map(f64::from);
+        assert_eq!(range(many.clone()), Some([0.0, 995.0]));
+        assert_eq!(range(many.clone().chain([1e9])), Some([0.0, 996.0]));
+        assert_eq!(range(many.clone().map(|x| x - 400.0)), Some([-595.0, 595.0]));
+        assert_eq!(range(many.map(|x| x + 2000.0)), Some([2005.0, 2995.0]));
+        assert_eq!(range([f64::NAN]), None);
+        assert_eq!(range([0.0, 0.0]), Some([0.0, 1.0]));
+        assert_eq!(range([4.0, f64::NAN]), Some([2.0, 6.0]));
+    }
+}

@@ -1,0 +1,52 @@
+//! Pictures of bodies: surfaces in smooth light, coloured by a field, with the edges of their cells, the shape at rest as a
+//! ghost and sections with what lies inside; drawn by any graphics processor, Mesa's software Vulkan included, into a
+//! window or off screen. Films from a series of them. Leaves out: where bodies and fields come from.
+//!
+//! ```no_run
+//! use pliant_geometry::{CellKind, Mesh, Vector3};
+//! use pliant_picture::{Camera, Frame, Graphics, Studio, Style, Subject};
+//!
+//! let points = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.], [0., 0., 0.1]];
+//! let mut mesh = Mesh { points: points.map(Vector3::from).to_vec(), ..Mesh::default() };
+//! mesh.block_mut(CellKind::Tet).nodes.extend([0, 1, 2, 3]);
+//!
+//! let graphics = Graphics::open()?;
+//! let subject = Subject::new(&mesh);
+//! let mut studio = Studio::new(&graphics, &subject, [640, 480])?;
+//! let frame = Frame { points: mesh.points.clone(), values: vec![0.0, 1.0, 2.0, 3.0] };
+//! let style = Style { range: Some([0.0, 3.0]), ..Style::default() };
+//! let mut camera = Camera::default();
+//! camera.fit(&frame.points, 640.0 / 480.0);
+//! let picture = studio.draw(&frame, &camera, &style)?;
+//! std::fs::write("tet.png", picture.png()?)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod camera;
+mod colour;
+mod error;
+mod film;
+mod graphics;
+mod legend;
+mod picture;
+mod renderer;
+mod section;
+mod series;
+mod studio;
+mod style;
+mod subject;
+mod text;
+
+pub use camera::{Axis, Camera, Projection};
+pub use colour::{ColourMap, Extremes};
+pub use error::PictureError;
+pub use film::{AnimatedPng, Film, ffmpeg};
+pub use graphics::Graphics;
+pub use legend::{Legend, readable, ticks};
+pub use picture::{Difference, Picture};
+pub use renderer::{Drawn, Renderer, Target};
+pub use section::{Plane, Section};
+pub use series::{Look, Series, SeriesError};
+pub use studio::{Frame, Studio};
+pub use style::{Background, Style};
+pub use subject::{Subject, nodal_values};

@@ -1,0 +1,452 @@
+//! Draws subjects into any render pass: a window's or one off screen.
+
+use bytemuck::{Pod, Zeroable};
+use pliant_geometry::Vector3;
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+
+use crate::camera::{Camera, Projection};
+use crate::colour::{ColourMap, linear};
+use crate::section::Section;
+use crate::style::{PLAIN, Style};
+use crate::subject::Subject;
+
+/// What is drawn into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Target {
+    /// Format of its colours.
+    pub format: wgpu::TextureFormat,
+    /// Format of its depth.
+    pub depth: wgpu::TextureFormat,
+    /// Samples a pixel.
+    pub samples: u32,
+}
+
+/// The pipelines.
+#[derive(Debug)]
+pub struct Renderer {
+    target: Target,
+    view: wgpu::BindGroupLayout,
+    shape: wgpu::BindGroupLayout,
+    normals: wgpu::BindGroupLayout,
+    background: wgpu::RenderPipeline,
+    opaque: wgpu::RenderPipeline,
+    clipped: wgpu::RenderPipeline,
+    section: wgpu::RenderPipeline,
+    ghost: wgpu::RenderPipeline,
+    compute: wgpu::ComputePipeline,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct View {
+    projection_view: [[f32; 4]; 4],
+    right: [f32; 4],
+    up: [f32; 4],
+    towards: [f32; 4],
+    eye: [f32; 4],
+    plane: [f32; 4],
+    range: [f32; 4],
+    plain: [f32; 4],
+    ghost: [f32; 4],
+    top: [f32; 4],
+    bottom: [f32; 4],
+    edge: [f32; 4],
+}
+
+/// Cover of the edges of cells.
+const EDGES: f32 = 0.55;
+/// Cover of the shape at rest where it turns away.
+const GHOST: f32 = 0.85;
+/// Invocations of a group of the kernel of normals.
+const GROUP: u32 = 256;
+
+fn layout(
+    device: &wgpu::Device,
+    stages: wgpu::ShaderStages,
+    bindings: &[wgpu::BufferBindingType],
+) -> wgpu::BindGroupLayout {
+    let entry = |(binding, &ty): (usize, &wgpu::BufferBindingType)| wgpu::BindGroupLayoutEntry {
+        binding: binding as u32,
+        visibility: stages,
+        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+        count: None,
+    };
+    let entries: Vec<_> = bindings.iter().enumerate().map(entry).collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+}
+
+impl Renderer {
+    /// Compiles the shaders for a target.
+    pub fn new(device: &wgpu::Device, target: Target) -> Self {
+        use wgpu::{BufferBindingType, ShaderStages};
+        let read = BufferBindingType::Storage { read_only: true };
+        let write = BufferBindingType::Storage { read_only: false };
+        let view = layout(device, ShaderStages::VERTEX_FRAGMENT, &[BufferBindingType::Uniform, read]);
+        let shape = layout(device, ShaderStages::VERTEX, &[read; 6]);
+        let normals = layout(device, ShaderStages::COMPUTE, &[read, read, read, write, read, read]);
+        let module = device.create_shader_module(wgpu::include_wgsl!("shader.wgsl"));
+        let pipelines = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("surface"),
+            bind_group_layouts: &[Some(&view), Some(&shape)],
+            immediate_size: 0,
+        });
+        let pipeline = |vertex: &str, fragment: &str, kind: Kind| {
+            let (write, compare) = match kind {
+                Kind::Behind => (false, wgpu::CompareFunction::Always),
+                Kind::Solid => (true, wgpu::CompareFunction::Less),
+                Kind::Veil => (false, wgpu::CompareFunction::Less),
+            };
+            let over = wgpu::BlendComponent {
+                src_factor: wgpu::BlendFactor::SrcAlpha,
+                dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
+                operation: wgpu::BlendOperation::Add,
+            };
+            // A veil does not count as covered.
+            let keep = wgpu::BlendComponent {
+                src_factor: wgpu::BlendFactor::Zero,
+                dst_factor: wgpu::BlendFactor::One,
+                operation: wgpu::BlendOperation::Add,
+            };
+            let veil = matches!(kind, Kind::Veil);
+            // Where the shape at rest lies on the deformed one, it stays behind.
+            let bias = if veil {
+                wgpu::DepthBiasState { constant: 64, slope_scale: 4.0, clamp: 0.0 }
+            } else {
+                wgpu::DepthBiasState::default()
+            };
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(fragment),
+                layout: Some(&pipelines),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(vertex),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState {
+                    cull_mode: veil.then_some(wgpu::Face::Back),
+                    ..Default::default()
+                },
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: target.depth,
+                    depth_write_enabled: Some(write),
+                    depth_compare: Some(compare),
+                    stencil: Default::default(),
+                    bias,
+                }),
+                multisample: wgpu::MultisampleState { count: target.samples, ..Default::default() },
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(fragment),
+                    compilation_options: Default::default(),
+                    targets: &[Some(wgpu::ColorTargetState {
+                        format: target.format,
+                        blend: veil.then_some(wgpu::BlendState { color: over, alpha: keep }),
+                        write_mask: wgpu::ColorWrites::ALL,
+                    })],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        let compute_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("normals"),
+            bind_group_layouts: &[Some(&normals)],
+            immediate_size: 0,
+        });
+        let compute = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("normals"),
+            layout: Some(&compute_layout),
+            module: &device.create_shader_module(wgpu::include_wgsl!("normals.wgsl")),
+            entry_point: Some("main"),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        Self {
+            target,
+            background: pipeline("background", "sky", Kind::Behind),
+            opaque: pipeline("surface", "opaque", Kind::Solid),
+            clipped: pipeline("surface", "clipped", Kind::Solid),
+            section: pipeline("section", "opaque", Kind::Solid),
+            ghost: pipeline("surface", "ghost", Kind::Veil),
+            compute,
+            view,
+            shape,
+            normals,
+        }
+    }
+}
+
+/// How things cover each other.
+enum Kind {
+    Behind,
+    Solid,
+    Veil,
+}
+
+/// A subject on the device.
+#[derive(Debug)]
+pub struct Drawn {
+    triangles: wgpu::Buffer,
+    vertices: wgpu::Buffer,
+    offsets: wgpu::Buffer,
+    around: wgpu::Buffer,
+    /// As deformed, and at rest.
+    poses: [Pose; 2],
+    view: wgpu::Buffer,
+    colours: wgpu::Buffer,
+    view_group: wgpu::BindGroup,
+    map: ColourMap,
+    section: [wgpu::Buffer; 2],
+    section_triangles: u32,
+    corners: u32,
+    vertex_count: u32,
+    /// From the middle of the body to its farthest point [m], at rest.
+    size: f64,
+    middle: Vector3,
+    /// Position and value of each point, as last written.
+    staged: Vec<[f32; 4]>,
+}
+
+/// Points of a state and their normals.
+#[derive(Debug)]
+struct Pose {
+    points: wgpu::Buffer,
+    normals: wgpu::Buffer,
+    draw: wgpu::BindGroup,
+    compute: wgpu::BindGroup,
+}
+
+/// A buffer of at least one entry, as bindings want it.
+fn storage<T: Pod>(device: &wgpu::Device, content: &[T]) -> wgpu::Buffer {
+    let zero = [T::zeroed()];
+    let contents = bytemuck::cast_slice(if content.is_empty() { &zero } else { content });
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
+}
+
+fn group(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    buffers: &[&wgpu::Buffer],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = (buffers.iter().zip(0..))
+        .map(|(buffer, binding)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+}
+
+impl Drawn {
+    /// Brings a subject to the device, at rest.
+    pub fn new(device: &wgpu::Device, renderer: &Renderer, subject: &Subject) -> Self {
+        let triangles = storage(device, &subject.triangles);
+        let vertices = storage(device, &subject.vertices);
+        let offsets = storage(device, &subject.offsets);
+        let around = storage(device, &subject.around);
+        let rest: Vec<[f32; 4]> = subject.points.iter().map(|point| staged(point, f64::NAN)).collect();
+        let section = [storage::<[f32; 4]>(device, &[]), storage::<u32>(device, &[])];
+        let pose = |points: wgpu::Buffer| {
+            let normals = storage(device, &vec![[0.0_f32; 4]; subject.vertices.len()]);
+            let draw = group(
+                device,
+                &renderer.shape,
+                &[&points, &triangles, &vertices, &normals, &section[0], &section[1]],
+            );
+            let compute = group(
+                device,
+                &renderer.normals,
+                &[&points, &triangles, &vertices, &normals, &offsets, &around],
+            );
+            Pose { points, normals, draw, compute }
+        };
+        let poses = [pose(storage(device, &rest)), pose(storage(device, &rest))];
+        let view = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("view"),
+            size: size_of::<View>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let map = ColourMap::default();
+        let colours = storage(device, &map.table());
+        let view_group = group(device, &renderer.view, &[&view, &colours]);
+        let used = subject.surface_points();
+        let low =
+            used.iter().fold(Vector3::repeat(f64::INFINITY), |low, &p| low.inf(&subject.points[p as usize]));
+        let high = used
+            .iter()
+            .fold(Vector3::repeat(f64::NEG_INFINITY), |high, &p| high.sup(&subject.points[p as usize]));
+        let (middle, size) = if used.is_empty() {
+            (Vector3::zeros(), 1.0)
+        } else {
+            (0.5 * (low + high), 0.5 * (high - low).norm())
+        };
+        Self {
+            triangles,
+            vertices,
+            offsets,
+            around,
+            poses,
+            view,
+            colours,
+            view_group,
+            map,
+            section,
+            section_triangles: 0,
+            corners: 3 * subject.triangles.len() as u32,
+            vertex_count: subject.vertices.len() as u32,
+            size,
+            middle,
+            staged: rest,
+        }
+    }
+
+    /// Takes points [m] and a value at each; without values, or where one is not finite, the colour is that of tissue.
+    pub fn set(&mut self, queue: &wgpu::Queue, points: &[Vector3], values: &[f64]) {
+        let mut reach = 0.0_f64;
+        for (index, (own, point)) in self.staged.iter_mut().zip(points).enumerate() {
+            *own = staged(point, values.get(index).copied().unwrap_or(f64::NAN));
+            reach = reach.max((point - self.middle).norm_squared());
+        }
+        self.size = self.size.max(reach.sqrt());
+        queue.write_buffer(&self.poses[0].points, 0, bytemuck::cast_slice(&self.staged));
+    }
+
+    /// Draws from a buffer of someone else's, four numbers a point (position [m], value), such as a solver's on the same device.
+    pub fn bind_positions(&mut self, device: &wgpu::Device, renderer: &Renderer, points: &wgpu::Buffer) {
+        let Self { triangles, vertices, offsets, around, section, .. } = self;
+        let pose = &mut self.poses[0];
+        pose.draw = group(
+            device,
+            &renderer.shape,
+            &[points, triangles, vertices, &pose.normals, &section[0], &section[1]],
+        );
+        pose.compute =
+            group(device, &renderer.normals, &[points, triangles, vertices, &pose.normals, offsets, around]);
+    }
+
+    /// Takes the triangles of a section; none for no section.
+    pub fn set_section(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        section: &Section,
+    ) {
+        self.section_triangles = section.edges.len() as u32;
+        let corners: &[u8] = bytemuck::cast_slice(&section.corners);
+        if self.section[0].size() < corners.len() as u64 {
+            self.section = [storage(device, &section.corners), storage(device, &section.edges)];
+            for pose in &mut self.poses {
+                pose.draw = group(
+                    device,
+                    &renderer.shape,
+                    &[
+                        &pose.points,
+                        &self.triangles,
+                        &self.vertices,
+                        &pose.normals,
+                        &self.section[0],
+                        &self.section[1],
+                    ],
+                );
+            }
+        } else {
+            queue.write_buffer(&self.section[0], 0, corners);
+            queue.write_buffer(&self.section[1], 0, bytemuck::cast_slice(&section.edges));
+        }
+    }
+
+    /// Finds normals and writes how the subject is looked at, in a picture of so many widths a height.
+    pub fn prepare(
+        &mut self,
+        renderer: &Renderer,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        camera: &Camera,
+        style: &Style,
+        aspect: f64,
+    ) {
+        if style.map != self.map {
+            self.map = style.map;
+            queue.write_buffer(&self.colours, 0, bytemuck::cast_slice(&self.map.table()));
+        }
+        let reach = (camera.target - self.middle).norm() + 1.5 * self.size.max(1e-12);
+        let view = view(camera, style, aspect, reach, !renderer.target.format.is_srgb());
+        queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&renderer.compute);
+        let poses = if style.ghost { 2 } else { 1 };
+        for pose in &self.poses[..poses] {
+            pass.set_bind_group(0, &pose.compute, &[]);
+            pass.dispatch_workgroups(self.vertex_count.div_ceil(GROUP), 1, 1);
+        }
+    }
+
+    /// Draws, after [`Self::prepare`].
+    pub fn draw(&self, renderer: &Renderer, pass: &mut wgpu::RenderPass<'_>, style: &Style) {
+        pass.set_bind_group(0, &self.view_group, &[]);
+        pass.set_bind_group(1, &self.poses[0].draw, &[]);
+        pass.set_pipeline(&renderer.background);
+        pass.draw(0..3, 0..1);
+        if style.clip.is_some() {
+            pass.set_pipeline(&renderer.clipped);
+            pass.draw(0..self.corners, 0..1);
+            pass.set_pipeline(&renderer.section);
+            pass.draw(0..3 * self.section_triangles, 0..1);
+        } else {
+            pass.set_pipeline(&renderer.opaque);
+            pass.draw(0..self.corners, 0..1);
+        }
+        if style.ghost {
+            pass.set_bind_group(1, &self.poses[1].draw, &[]);
+            pass.set_pipeline(&renderer.ghost);
+            pass.draw(0..self.corners, 0..1);
+        }
+    }
+}
+
+/// Stands for no value, so that neither it nor anything interpolated with it takes a colour of the map: shaders may take NaN for
+/// any number.
+const NO_VALUE: f32 = 1e38;
+
+/// A position and a value as the shader takes them.
+pub(crate) fn staged(point: &Vector3, value: f64) -> [f32; 4] {
+    let value = if value.is_finite() { value.clamp(-1e29, 1e29) as f32 } else { NO_VALUE };
+    [point.x as f32, point.y as f32, point.z as f32, value]
+}
+
+fn four(v: &Vector3, w: f64) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+fn colour(bytes: [u8; 3], alpha: f32) -> [f32; 4] {
+    let [r, g, b] = bytes.map(linear);
+    [r, g, b, alpha]
+}
+
+/// What the shader knows of a picture.
+fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> View {
+    let [right, up, towards] = camera.axes();
+    let perspective = if camera.projection == Projection::Perspective { 1.0 } else { 0.0 };
+    let [low, high] = style.range.unwrap_or([0.0, 1.0]);
+    let [top, bottom] = style.background.colours();
+    View {
+        projection_view: camera.projection_view(aspect, reach).into(),
+        right: four(&right, 0.0),
+        up: four(&up, 0.0),
+        towards: four(&towards, 0.0),
+        eye: four(&camera.eye(), perspective),
+        plane: style.clip.map_or([0.0, 0.0, 0.0, 1.0], |plane| four(&plane.normal, plane.offset)),
+        range: [
+            low as f32,
+            (1.0 / (high - low).max(f64::MIN_POSITIVE)).min(f64::from(f32::MAX)) as f32,
+            if style.range.is_some() { 1.0 } else { 0.0 },
+            if code { 1.0 } else { 0.0 },
+        ],
+        plain: colour(PLAIN, 1.0),
+        ghost: colour(style.background.ghost(), GHOST),
+        top: colour(top, 1.0),
+        bottom: colour(bottom, 1.0),
+        edge: colour([18, 20, 26], if style.edges { EDGES } else { 0.0 }),
+    }
+}

@@ -1,0 +1,296 @@
+//! Pictures of a series: the frames that a run has written, seen alike in one range of colours.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pliant_geometry::io::{MeshFileError, read, read_pvd};
+use pliant_geometry::{Mesh, Vector3};
+
+use crate::camera::Camera;
+use crate::colour::Extremes;
+use crate::error::PictureError;
+use crate::graphics::Graphics;
+use crate::legend::Legend;
+use crate::picture::Picture;
+use crate::studio::{Frame, Studio};
+use crate::style::Style;
+use crate::subject::{Subject, nodal_values};
+
+/// A series of frames that can't be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum SeriesError {
+    /// The folder holds no series.
+    #[error("`{0}` holds no series of frames (`*.pvd`)")]
+    NoSeries(PathBuf),
+    /// The folder holds no series of that name.
+    #[error("`{folder}` holds no series `{name}`; there is {known}")]
+    UnknownSeries {
+        /// The folder.
+        folder: PathBuf,
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A list without a frame.
+    #[error("`{0}` lists no frames")]
+    NoFrames(PathBuf),
+    /// A file that can't be read.
+    #[error(transparent)]
+    File(#[from] MeshFileError),
+    /// The frames have no such field.
+    #[error("the frames have no field `{field}` of single numbers; they have {known}")]
+    NoField {
+        /// The field asked for.
+        field: String,
+        /// The fields there are.
+        known: String,
+    },
+    /// A frame of another mesh than the first.
+    #[error("frame {0} has another mesh than the first one")]
+    OtherMesh(usize),
+    /// A picture that can't be drawn.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+}
+
+impl SeriesError {
+    /// What to try.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::NoSeries(_) => {
+                "give a scene, or the folder of a run whose scene has an output of type `vtu`"
+            }
+            Self::UnknownSeries { .. } => "take one of these",
+            Self::NoFrames(_) => "run the scene again",
+            Self::File(_) => "",
+            Self::NoField { .. } => {
+                "take one of these, a component as in `displacement:z` or `cauchy-stress:xx`, or `none`"
+            }
+            Self::OtherMesh(_) => "run the scene again into an empty folder",
+            Self::Picture(error) => error.remedy(),
+        }
+    }
+}
+
+/// The frames of a series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Its name.
+    pub name: String,
+    /// Time [s] and file of each frame.
+    pub frames: Vec<(f64, PathBuf)>,
+}
+
+impl Series {
+    /// The series of a name in the folder of a run; without a name the first one in the order of the alphabet.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn find(folder: &Path, name: Option<&str>) -> Result<Self, SeriesError> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .map_err(|source| MeshFileError::Open { path: folder.to_owned(), source })?
+            .filter_map(|entry| Some(entry.ok()?.file_name().to_str()?.strip_suffix(".pvd")?.to_owned()))
+            .collect();
+        names.sort_unstable();
+        let first = names.first().ok_or_else(|| SeriesError::NoSeries(folder.to_owned()))?;
+        let name = match name {
+            None => first.clone(),
+            Some(name) if names.iter().any(|known| known == name) => name.to_owned(),
+            Some(name) => {
+                let known = quoted(&names);
+                return Err(SeriesError::UnknownSeries {
+                    folder: folder.to_owned(),
+                    name: name.to_owned(),
+                    known,
+                });
+            }
+        };
+        let list = folder.join(format!("{name}.pvd"));
+        let frames = read_pvd(&list)?;
+        if frames.is_empty() {
+            return Err(SeriesError::NoFrames(list));
+        }
+        Ok(Self { name, frames })
+    }
+
+    fn mesh(&self, index: usize) -> Result<Mesh, SeriesError> {
+        Ok(read(&self.frames[index].1)?.mesh)
+    }
+
+    /// The first of some fields that the frames have as single numbers at each point.
+    ///
+    /// # Errors
+    /// If the first frame can't be read.
+    pub fn first_field<'f>(&self, fields: &[&'f str]) -> Result<Option<&'f str>, SeriesError> {
+        let mesh = self.mesh(0)?;
+        Ok(fields.iter().copied().find(|field| nodal_values(&mesh, field).is_some()))
+    }
+}
+
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+/// How meshes with fields are looked at.
+#[derive(Clone, Debug, Default)]
+pub struct Look {
+    /// The field that colours tell (see [`nodal_values`]); `None` for the colour of tissue.
+    pub field: Option<String>,
+    /// How bodies are shown; without a range, that of the values.
+    pub style: Style,
+    /// The camera; its target and height are those that fit, but for the two below.
+    pub camera: Camera,
+    /// What is in the middle [m], if not what fits.
+    pub target: Option<Vector3>,
+    /// Magnification of what fits; 0 counts as 1.
+    pub zoom: f64,
+    /// Width and height of pictures [pixels].
+    pub size: [u32; 2],
+    /// What is written into them.
+    pub legend: Legend,
+}
+
+/// What frames have in common.
+#[derive(Default)]
+struct Common {
+    extremes: Extremes,
+    /// The middle of the points is enough for the camera: corners of the boxes around them.
+    points: Vec<Vector3>,
+}
+
+impl Common {
+    fn add(&mut self, subject: &Subject, frame: &Frame, ghost: bool) {
+        let surface = subject.surface_points();
+        self.extremes.add(surface.iter().filter_map(|&point| frame.values.get(point as usize)).copied());
+        self.points.extend(surface.iter().map(|&point| frame.points[point as usize]));
+        if ghost {
+            self.points.extend(surface.iter().map(|&point| subject.points[point as usize]));
+        }
+        // As many as can be far out: what lies within the others changes no camera.
+        if self.points.len() > MOST_POINTS {
+            let directions = spread_directions();
+            let outermost = directions.iter().filter_map(|direction| {
+                self.points.iter().copied().max_by(|a, b| direction.dot(a).total_cmp(&direction.dot(b)))
+            });
+            self.points = outermost.collect();
+        }
+    }
+}
+
+/// Points kept for the camera.
+const MOST_POINTS: usize = 100_000;
+
+/// Directions all around, about 8° apart (a spiral with the golden angle).
+fn spread_directions() -> Vec<Vector3> {
+    let count = 1000;
+    let direction = |index: i32| {
+        let z = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(count);
+        let (angle, r) = (f64::from(index) * 2.399_963_229_728_653, (1.0 - z * z).sqrt());
+        Vector3::new(r * angle.cos(), r * angle.sin(), z)
+    };
+    (0..count).map(direction).collect()
+}
+
+impl Look {
+    fn frame(&self, mesh: &Mesh) -> Result<Frame, SeriesError> {
+        let values = match &self.field {
+            None => Vec::new(),
+            Some(field) => nodal_values(mesh, field)
+                .ok_or_else(|| SeriesError::NoField { field: field.clone(), known: quoted(&fields(mesh)) })?,
+        };
+        let mut points = mesh.points.clone();
+        if let Some(moved) = mesh.point_data.get("displacement").filter(|array| array.components == 3) {
+            for (point, by) in points.iter_mut().zip(moved.values.chunks_exact(3)) {
+                *point += Vector3::new(by[0], by[1], by[2]);
+            }
+        }
+        Ok(Frame { points, values })
+    }
+
+    /// Camera and style for all frames.
+    fn settle(&self, common: Common) -> (Camera, Style) {
+        let mut style = self.style;
+        style.range = self.field.as_ref().and_then(|_| self.style.range.or_else(|| common.extremes.range()));
+        let [width, height] = self.size.map(f64::from);
+        // The scale of colours stands beside the body, not on it.
+        let taken = self.legend.width(&style, self.size);
+        let mut camera = self.camera;
+        camera.fit(&common.points, width * (1.0 - taken) / height);
+        if let Some(target) = self.target {
+            camera.target = target;
+        }
+        if self.zoom > 0.0 {
+            camera.zoom(1.0 / self.zoom);
+        }
+        camera.pan(-0.5 * taken * width / height, 0.0);
+        (camera, style)
+    }
+
+    fn finished(&self, mut picture: Picture, style: &Style, time: f64) -> Picture {
+        let note =
+            if self.legend.note.is_empty() { format!("t = {time:.3} s") } else { self.legend.note.clone() };
+        Legend { note, ..self.legend.clone() }.write(&mut picture, style);
+        picture
+    }
+
+    /// One picture of a mesh with fields at a time [s].
+    ///
+    /// # Errors
+    /// If it has no such field, or can't be drawn.
+    pub fn picture(&self, graphics: &Graphics, mesh: &Mesh, time: f64) -> Result<Picture, SeriesError> {
+        let subject = Subject::new(mesh);
+        let frame = self.frame(mesh)?;
+        let mut common = Common::default();
+        common.add(&subject, &frame, self.style.ghost);
+        let (camera, style) = self.settle(common);
+        let picture = Studio::new(graphics, &subject, self.size)?.draw(&frame, &camera, &style)?;
+        Ok(self.finished(picture, &style, time))
+    }
+
+    /// Pictures of chosen frames of a series: each goes to `take`, with how many were taken before it.
+    ///
+    /// # Errors
+    /// If a frame can't be read or drawn, or `take` fails.
+    pub fn pictures(
+        &self,
+        graphics: &Graphics,
+        series: &Series,
+        frames: &[usize],
+        mut take: impl FnMut(usize, Picture) -> Result<(), PictureError>,
+    ) -> Result<(), SeriesError> {
+        let Some(&first) = frames.first() else { return Ok(()) };
+        let mesh = series.mesh(first)?;
+        let subject = Subject::new(&mesh);
+        let blocks =
+            |mesh: &Mesh| mesh.blocks.iter().map(|block| (block.kind, block.len())).collect::<Vec<_>>();
+        let shape = (mesh.points.len(), blocks(&mesh));
+        let read = |index: usize| {
+            let mesh = series.mesh(index)?;
+            if (mesh.points.len(), blocks(&mesh)) != shape {
+                return Err(SeriesError::OtherMesh(index));
+            }
+            self.frame(&mesh)
+        };
+        let mut common = Common::default();
+        for &index in frames {
+            common.add(&subject, &read(index)?, self.style.ghost);
+        }
+        let (camera, style) = self.settle(common);
+        let mut studio = Studio::new(graphics, &subject, self.size)?;
+        for (count, &index) in frames.iter().enumerate() {
+            let picture = studio.draw(&read(index)?, &camera, &style)?;
+            take(count, self.finished(picture, &style, series.frames[index].0))?;
+        }
+        Ok(())
+    }
+}
+
+/// Names of the fields of points and cells.
+fn fields(mesh: &Mesh) -> Vec<String> {
+    let cells = mesh.blocks.iter().flat_map(|block| block.data.keys());
+    let mut names: Vec<String> = mesh.point_data.keys().chain(cells).cloned().collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}

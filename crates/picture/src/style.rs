@@ -1,0 +1,80 @@
+//! How a body is shown.
+
+use crate::colour::ColourMap;
+use crate::section::Plane;
+
+/// What stands behind a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Background {
+    /// Pale grey, lighter towards the bottom.
+    #[default]
+    Light,
+    /// Plain white, for print.
+    White,
+    /// Dark grey.
+    Dark,
+}
+
+impl Background {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Light, Self::White, Self::Dark];
+
+    /// Its word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Light => "light",
+            Self::White => "white",
+            Self::Dark => "dark",
+        }
+    }
+
+    /// The one of that word.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|background| background.name() == name)
+    }
+
+    /// Colours (sRGB) at top and bottom.
+    pub(crate) const fn colours(self) -> [[u8; 3]; 2] {
+        match self {
+            Self::Light => [[219, 226, 233], [250, 251, 252]],
+            Self::White => [[255, 255, 255], [255, 255, 255]],
+            Self::Dark => [[52, 57, 66], [24, 26, 31]],
+        }
+    }
+
+    /// Colour (sRGB) of what is written on it.
+    pub const fn ink(self) -> [u8; 3] {
+        match self {
+            Self::Light | Self::White => [32, 36, 42],
+            Self::Dark => [232, 235, 240],
+        }
+    }
+
+    /// Colour (sRGB) of the shape at rest.
+    pub(crate) const fn ghost(self) -> [u8; 3] {
+        match self {
+            Self::Light | Self::White => [70, 84, 104],
+            Self::Dark => [190, 204, 224],
+        }
+    }
+}
+
+/// Colour (sRGB) of what has no value: soft tissue.
+pub(crate) const PLAIN: [u8; 3] = [214, 148, 132];
+
+/// How a body is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Style {
+    /// Colours of values.
+    pub map: ColourMap,
+    /// The values of the first and the last colour; without, a body has the colour of tissue.
+    pub range: Option<[f64; 2]>,
+    /// Whether the edges of the cells are drawn.
+    pub edges: bool,
+    /// Whether the shape at rest is drawn, as a ghost.
+    pub ghost: bool,
+    /// Shows only what lies behind a plane, and what it cuts.
+    pub clip: Option<Plane>,
+    /// What stands behind.
+    pub background: Background,
+}

@@ -1,0 +1,285 @@
+//! What is drawn of a mesh: its surface as triangles whose corners share normals where the surface is smooth, and its volume
+//! cells for sections.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, vector_area, volume};
+
+/// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
+const SHARP: f64 = 0.26;
+
+/// The surface and the cells of a mesh, ready to be drawn in any deformed state.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// Points at rest [m].
+    pub points: Vec<Vector3>,
+    /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a cell.
+    pub(crate) triangles: Vec<[u32; 4]>,
+    /// The point of each vertex. Points on sharp edges are several vertices, each with a normal of its own.
+    pub(crate) vertices: Vec<u32>,
+    /// Where the triangles around each vertex begin in the next list; one more entry than vertices.
+    pub(crate) offsets: Vec<u32>,
+    /// Triangles around vertices.
+    pub(crate) around: Vec<u32>,
+    /// Volume cells: kind and nodes.
+    cells: Vec<(CellKind, Vec<u32>)>,
+}
+
+impl Subject {
+    /// The boundary of the volume cells, and triangles and quads that are not on it.
+    pub fn new(mesh: &Mesh) -> Self {
+        let faces = faces(mesh);
+        let normals: Vec<Vector3> = faces.iter().map(|face| normal(face, &mesh.points)).collect();
+        let (corners, vertices) = split_at_sharp_edges(&faces, &normals, mesh.points.len());
+        let mut triangles = Vec::with_capacity(2 * faces.len());
+        for corners in &corners {
+            match corners[..] {
+                [a, b, c] => triangles.push([a, b, c, 0b111]),
+                // The second bit of the first half and the third of the other are the diagonal.
+                [a, b, c, d] => triangles.extend([[a, b, c, 0b101], [a, c, d, 0b011]]),
+                _ => {}
+            }
+        }
+        let mut counts = vec![0_u32; vertices.len() + 1];
+        for triangle in &triangles {
+            triangle[..3].iter().for_each(|&vertex| counts[vertex as usize + 1] += 1);
+        }
+        let mut sum = 0;
+        let offsets: Vec<u32> = (counts.iter())
+            .map(|count| {
+                sum += count;
+                sum
+            })
+            .collect();
+        let mut next = offsets.clone();
+        let mut around = vec![0; sum as usize];
+        for (triangle, number) in triangles.iter().zip(0..) {
+            for &vertex in &triangle[..3] {
+                around[next[vertex as usize] as usize] = number;
+                next[vertex as usize] += 1;
+            }
+        }
+        let known = |block: &&CellBlock| block.nodes.iter().all(|&node| (node as usize) < mesh.points.len());
+        let cells =
+            mesh.volume_blocks().filter(known).map(|block| (block.kind, block.nodes.clone())).collect();
+        Self { points: mesh.points.clone(), triangles, vertices, offsets, around, cells }
+    }
+
+    /// Triangles drawn.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// The points of each triangle, in the order in which they are drawn.
+    pub fn triangles(&self) -> impl ExactSizeIterator<Item = [u32; 3]> + '_ {
+        self.triangles.iter().map(|&[a, b, c, _]| [a, b, c].map(|vertex| self.vertices[vertex as usize]))
+    }
+
+    /// Points on the surface, increasing, each once.
+    pub fn surface_points(&self) -> Vec<u32> {
+        let mut points = self.vertices.clone();
+        points.sort_unstable();
+        points.dedup();
+        points
+    }
+
+    /// Volume cells with their nodes.
+    pub(crate) fn volume_cells(&self) -> impl Iterator<Item = (CellKind, &[u32])> {
+        self.cells
+            .iter()
+            .flat_map(|(kind, nodes)| nodes.chunks_exact(kind.node_count()).map(move |n| (*kind, n)))
+    }
+}
+
+/// Nodes of the faces that are drawn, three or four each.
+fn faces(mesh: &Mesh) -> Vec<Vec<u32>> {
+    let mut faces: Vec<Vec<u32>> = boundary(mesh).faces.iter().map(|face| face.nodes().to_vec()).collect();
+    if mesh.volume_blocks().any(|block| !block.is_empty()) {
+        let key = |nodes: &[u32]| {
+            let mut key = nodes.to_vec();
+            key.sort_unstable();
+            key
+        };
+        let drawn: BTreeSet<Vec<u32>> = faces.iter().map(|face| key(face)).collect();
+        let flat = mesh.blocks.iter().filter(|block| block.kind.dimension() == 2);
+        let others = flat.flat_map(CellBlock::cells).filter(|nodes| !drawn.contains(&key(nodes)));
+        let known = others.filter(|nodes| nodes.iter().all(|&node| (node as usize) < mesh.points.len()));
+        faces.extend(known.map(<[u32]>::to_vec));
+    }
+    faces
+}
+
+fn normal(face: &[u32], points: &[Vector3]) -> Vector3 {
+    let corners: Vec<Vector3> = face.iter().map(|&node| points[node as usize]).collect();
+    vector_area(&corners).try_normalize(0.0).unwrap_or_default()
+}
+
+/// The vertices of each face, and the point of each vertex: around a point, faces that meet in edges that are not sharp share
+/// one.
+fn split_at_sharp_edges(faces: &[Vec<u32>], normals: &[Vector3], points: usize) -> (Vec<Vec<u32>>, Vec<u32>) {
+    let mut at_point: Vec<Vec<(u32, u32)>> = vec![Vec::new(); points];
+    for (face, number) in faces.iter().zip(0..) {
+        for (&node, corner) in face.iter().zip(0..) {
+            at_point[node as usize].push((number, corner));
+        }
+    }
+    let mut corners: Vec<Vec<u32>> = faces.iter().map(|face| vec![0; face.len()]).collect();
+    let mut vertices = Vec::new();
+    for (around, point) in at_point.iter().zip(0..) {
+        // Groups of the faces around the point, by the smallest index in it.
+        let mut group: Vec<usize> = (0..around.len()).collect();
+        let mut by_edge: BTreeMap<u32, usize> = BTreeMap::new();
+        for (index, &(face, corner)) in around.iter().enumerate() {
+            let nodes = &faces[face as usize];
+            let (corner, count) = (corner as usize, nodes.len());
+            for other in [nodes[(corner + 1) % count], nodes[(corner + count - 1) % count]] {
+                let Some(&first) = by_edge.get(&other) else {
+                    by_edge.insert(other, index);
+                    continue;
+                };
+                let angle = normals[face as usize].dot(&normals[around[first].0 as usize]);
+                if angle > SHARP {
+                    let (one, two) = (group[first], group[index]);
+                    group.iter_mut().filter(|g| **g == one.max(two)).for_each(|g| *g = one.min(two));
+                }
+            }
+        }
+        let mut number: BTreeMap<usize, u32> = BTreeMap::new();
+        for (&(face, corner), &own) in around.iter().zip(&group) {
+            let vertex = *number.entry(own).or_insert_with(|| {
+                vertices.push(point);
+                vertices.len() as u32 - 1
+            });
+            corners[face as usize][corner as usize] = vertex;
+        }
+    }
+    (corners, vertices)
+}
+
+/// The values of a field at the points of a mesh. Vectors count by their size, or by a component as in `displacement:z`; of
+/// tensors a component is named, as in `cauchy-stress:xx`. Values of cells are averaged, weighted by volume or area. `None` where
+/// there is no such field.
+pub fn nodal_values(mesh: &Mesh, field: &str) -> Option<Vec<f64>> {
+    let (name, component) = field.split_once(':').map_or((field, None), |(name, part)| (name, Some(part)));
+    let number = |item: &[f64]| -> Option<f64> {
+        match (item.len(), component) {
+            (1, None) => Some(item[0]),
+            (3, None) => Some(item.iter().map(|x| x * x).sum::<f64>().sqrt()),
+            (3, Some(part)) => item.get(["x", "y", "z"].iter().position(|name| *name == part)?).copied(),
+            (9, Some(part)) => {
+                let names = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
+                item.get(names.iter().position(|name| *name == part)?).copied()
+            }
+            _ => None,
+        }
+    };
+    if let Some(array) = mesh.point_data.get(name) {
+        return (0..array.len()).map(|index| number(array.item(index))).collect();
+    }
+    let mut sums = vec![0.0; mesh.points.len()];
+    let mut weights = vec![0.0; mesh.points.len()];
+    let mut found = false;
+    for block in &mesh.blocks {
+        let Some(array) = block.data.get(name) else { continue };
+        for (index, nodes) in block.cells().enumerate().take(array.len()) {
+            let value = number(array.item(index))?;
+            found = true;
+            if value.is_nan() {
+                continue;
+            }
+            let corners: Vec<Vector3> = nodes.iter().map(|&node| mesh.points[node as usize]).collect();
+            let weight = match block.kind.dimension() {
+                3 => volume(block.kind, &corners).abs(),
+                2 => vector_area(&corners).norm(),
+                _ => continue,
+            };
+            for &node in nodes {
+                sums[node as usize] += value * weight;
+                weights[node as usize] += weight;
+            }
+        }
+    }
+    found.then(|| sums.iter().zip(weights).map(|(sum, weight)| sum / weight).collect())
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use pliant_geometry::DataArray;
+
+    /// The unit cube in n³ hexes.
+    pub fn block(n: u32) -> Mesh {
+        let at = |i: u32, j: u32, k: u32| (k * (n + 1) + j) * (n + 1) + i;
+        let mut mesh = Mesh::default();
+        for k in 0..=n {
+            for j in 0..=n {
+                for i in 0..=n {
+                    mesh.points.push(Vector3::new(i.into(), j.into(), k.into()) / f64::from(n));
+                }
+            }
+        }
+        let nodes = &mut mesh.block_mut(CellKind::Hex).nodes;
+        for (i, j, k) in (0..n * n * n).map(|c| (c % n, c / n % n, c / n / n)) {
+            for k in [k, k + 1] {
+                nodes.extend([at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k)]);
+            }
+        }
+        mesh
+    }
+
+    /// The same in six tets a hex.
+    pub fn tets(n: u32) -> Mesh {
+        let hexes = block(n);
+        let mut mesh = Mesh { points: hexes.points.clone(), ..Mesh::default() };
+        // Around the diagonal from 0 to 6 of each.
+        let ring = [1, 2, 3, 7, 4, 5, 1];
+        let six = |hex: &[u32]| {
+            ring.map(|corner| hex[corner])
+                .windows(2)
+                .map(|p| [hex[0], p[0], p[1], hex[6]])
+                .collect::<Vec<_>>()
+        };
+        let nodes = hexes.blocks[0].cells().flat_map(six).flatten();
+        mesh.block_mut(CellKind::Tet).nodes = nodes.collect();
+        mesh
+    }
+
+    #[test]
+    fn corners_of_a_block_have_a_normal_a_side_and_its_sides_share_them() {
+        let subject = Subject::new(&block(2));
+        assert_eq!(subject.triangle_count(), 48);
+        // 8 corners with 3, 12 middles of edges with 2, 6 middles of sides with 1.
+        assert_eq!(subject.vertices.len(), 8 * 3 + 12 * 2 + 6);
+        assert_eq!(subject.around.len(), 48 * 3);
+        assert_eq!(subject.surface_points().len(), 26);
+        let diagonals = subject.triangles.iter().filter(|t| t[3].count_ones() == 2).count();
+        assert_eq!(diagonals, 48, "each half of a quad has two edges of its cell");
+    }
+
+    #[test]
+    fn a_sheet_that_is_bent_a_little_stays_smooth() {
+        let mut mesh = Mesh { points: block(1).points, ..Mesh::default() };
+        mesh.points[2].z = 0.2;
+        mesh.points[3].z = 0.2;
+        mesh.block_mut(CellKind::Triangle).nodes = vec![0, 1, 2, 2, 1, 3];
+        assert_eq!(Subject::new(&mesh).vertices.len(), 4);
+    }
+
+    #[test]
+    fn fields_of_points_and_cells_come_to_the_points() {
+        let mut mesh = block(1);
+        let vectors = (0..8).flat_map(|i| [3.0 * f64::from(i), 4.0 * f64::from(i), 0.0]).collect();
+        mesh.point_data.insert("displacement".into(), DataArray { components: 3, values: vectors });
+        mesh.blocks[0].data.insert("von-mises".into(), DataArray::scalar(vec![7.0]));
+        mesh.blocks[0]
+            .data
+            .insert("stress".into(), DataArray { components: 9, values: (0..9).map(f64::from).collect() });
+        assert_eq!(nodal_values(&mesh, "displacement").unwrap()[2], 10.0);
+        assert_eq!(nodal_values(&mesh, "displacement:y").unwrap()[2], 8.0);
+        assert_eq!(nodal_values(&mesh, "von-mises").unwrap(), vec![7.0; 8]);
+        assert_eq!(nodal_values(&mesh, "stress:yz").unwrap(), vec![5.0; 8]);
+        for none in ["pressure", "stress", "stress:ab", "displacement:w", "von-mises:x"] {
+            assert_eq!(nodal_values(&mesh, none), None, "{none}");
+        }
+    }
+}

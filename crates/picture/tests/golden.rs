@@ -1,0 +1,172 @@
+//! Pictures are what they were: held to stored ones, drawn by Mesa's software Vulkan. `PLIANT_RENEW_GOLDEN=1` stores them anew.
+
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+
+use pliant_geometry::{CellKind, DataArray, Mesh, Vector3};
+use pliant_picture::{
+    Background, Camera, ColourMap, Difference, Graphics, Legend, Look, Picture, Plane, Projection, Style,
+};
+
+/// Hexes of a grid whose corners from [0, 1]³ are put anywhere.
+fn hexes(mesh: &mut Mesh, [nx, ny, nz]: [u32; 3], place: impl Fn(Vector3) -> Vector3) {
+    let first = mesh.points.len() as u32;
+    let at = |i: u32, j: u32, k: u32| first + (k * (ny + 1) + j) * (nx + 1) + i;
+    for k in 0..=nz {
+        for j in 0..=ny {
+            for i in 0..=nx {
+                let part = |i: u32, n: u32| f64::from(i) / f64::from(n);
+                mesh.points.push(place(Vector3::new(part(i, nx), part(j, ny), part(k, nz))));
+            }
+        }
+    }
+    let nodes = &mut mesh.block_mut(CellKind::Hex).nodes;
+    for k in 0..nz {
+        for (i, j) in (0..nx * ny).map(|c| (c % nx, c / nx)) {
+            for k in [k, k + 1] {
+                nodes.extend([at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k)]);
+            }
+        }
+    }
+}
+
+/// A cube made round.
+fn ball(p: Vector3) -> Vector3 {
+    let [x, y, z] = p.map(|x| 2.0 * x - 1.0).into();
+    let round = |a: f64, b: f64, c: f64| a * (1.0 - b * b / 2.0 - c * c / 2.0 + b * b * c * c / 3.0).sqrt();
+    Vector3::new(round(x, y, z), round(y, z, x), round(z, x, y)) * 0.035
+}
+
+/// A straight beam, displaced to a bow; beside it a ball, displaced a little upwards.
+fn organs(with_ball: bool) -> Mesh {
+    let mut mesh = Mesh::default();
+    hexes(&mut mesh, [24, 6, 4], |p| Vector3::new(0.2 * p.x - 0.1, 0.05 * p.y - 0.025, 0.02 * p.z));
+    let beam = mesh.points.len();
+    if with_ball {
+        hexes(&mut mesh, [8, 8, 8], |p| ball(p) + Vector3::new(0.02, 0.08, 0.03));
+    }
+    let bent = |point: &Vector3| {
+        let (radius, angle) = (0.09 - point.z, point.x / 0.09);
+        Vector3::new(radius * angle.sin(), point.y, 0.09 - radius * angle.cos()) - point
+    };
+    let moved = mesh.points.iter().enumerate().flat_map(|(index, point)| {
+        let by = if index < beam { bent(point) } else { Vector3::new(0.0, 0.0, 0.012) };
+        [by.x, by.y, by.z]
+    });
+    let moved = DataArray { components: 3, values: moved.collect() };
+    let value = |point: &Vector3| 2e3 * (1.0 + (PI * point.x / 0.1).cos() * (point.z / 0.02)) + 1e4 * point.y;
+    let values = DataArray::scalar(mesh.points.iter().map(value).collect());
+    mesh.point_data.insert("displacement".into(), moved);
+    mesh.point_data.insert("von-mises".into(), values);
+    mesh
+}
+
+fn look() -> Look {
+    Look {
+        field: Some("von-mises".into()),
+        style: Style { range: Some([0.0, 5e3]), ..Style::default() },
+        size: [480, 320],
+        legend: Legend {
+            quantity: "von Mises stress".into(),
+            unit: "Pa".into(),
+            title: "A beam and a ball".into(),
+            ..Legend::default()
+        },
+        ..Look::default()
+    }
+}
+
+fn section() -> Look {
+    let plane = Plane::through(&Vector3::new(0.0, 0.06, 0.0), &Vector3::new(0.25, 1.0, 0.0));
+    let style = Style { edges: true, clip: plane, map: ColourMap::Cividis, ..look().style };
+    Look { style, camera: Camera { azimuth: 60.0, ..Camera::default() }, ..look() }
+}
+
+fn ghost() -> Look {
+    let style = Style { ghost: true, range: None, background: Background::Dark, ..Style::default() };
+    let camera = Camera { projection: Projection::Orthographic, elevation: 35.0, ..Camera::default() };
+    Look { field: None, style, camera, ..look() }
+}
+
+/// `None` where nothing draws, which is a failure where the gate asks for it.
+fn graphics() -> Option<Graphics> {
+    match Graphics::open() {
+        Ok(graphics) => Some(graphics),
+        Err(error) => {
+            assert!(std::env::var_os("PLIANT_REQUIRE_GPU").is_none(), "{error}; {}", error.remedy());
+            eprintln!("skipped: {error}");
+            None
+        }
+    }
+}
+
+fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{name}.png"))
+}
+
+fn stored(name: &str) -> Picture {
+    Picture::from_png_with_coverage(&std::fs::read(file(name)).unwrap()).unwrap()
+}
+
+fn difference(graphics: &Graphics, look: &Look, mesh: &Mesh, name: &str) -> Difference {
+    let drawn = look.picture(graphics, mesh, 0.25).unwrap();
+    if std::env::var_os("PLIANT_RENEW_GOLDEN").is_some() {
+        std::fs::write(file(name), drawn.png_with_coverage().unwrap()).unwrap();
+    }
+    drawn.difference(&stored(name)).unwrap()
+}
+
+#[test]
+fn pictures_are_as_stored() {
+    let Some(graphics) = graphics() else { return };
+    for (name, look) in [("bodies", look()), ("section", section()), ("ghost", ghost())] {
+        let difference = difference(&graphics, &look, &organs(true), name);
+        assert!(difference.is_same(), "{name}: {difference:?}");
+    }
+}
+
+#[test]
+fn a_missing_organ_and_wrong_colours_are_seen() {
+    let Some(graphics) = graphics() else { return };
+    let bodies = stored("bodies");
+    let seen = |look: &Look, mesh: &Mesh| {
+        let difference = look.picture(&graphics, mesh, 0.25).unwrap().difference(&bodies).unwrap();
+        assert!(!difference.is_same(), "{difference:?}");
+        difference
+    };
+    // The camera of all organs, so that only the missing one differs.
+    assert!(seen(&look(), &organs(false)).overlap < 0.98, "a missing organ");
+    let style = |style: Style| Look { style, ..look() };
+    let usual = look().style;
+    assert!(seen(&style(Style { map: ColourMap::Inferno, ..usual }), &organs(true)).on_bodies > 6.0);
+    assert!(seen(&style(Style { range: Some([0.0, 8e3]), ..usual }), &organs(true)).on_bodies > 6.0);
+    assert!(seen(&Look { field: None, ..look() }, &organs(true)).on_bodies > 6.0, "no colours");
+    let turned = Camera { azimuth: -45.0, ..Camera::default() };
+    seen(&Look { camera: turned, ..look() }, &organs(true));
+}
+
+#[test]
+fn a_section_shows_what_is_inside_and_nothing_beyond_the_plane() {
+    let Some(graphics) = graphics() else { return };
+    let mesh = organs(true);
+    let whole = Look { style: Style { clip: None, ..section().style }, ..section() };
+    let [cut, whole] = [&section(), &whole].map(|look| look.picture(&graphics, &mesh, 0.25).unwrap());
+    let covered = |picture: &Picture| picture.rgba.chunks(4).filter(|pixel| pixel[3] > 127).count();
+    assert!(covered(&cut) < covered(&whole));
+    assert!(covered(&cut) * 3 > covered(&whole), "the section is closed by what it cuts");
+}
+
+#[test]
+fn the_same_picture_has_the_same_pixels_and_any_size_is_drawn() {
+    let Some(graphics) = graphics() else { return };
+    let mesh = organs(true);
+    let draw = |size| Look { size, ..look() }.picture(&graphics, &mesh, 0.25).unwrap();
+    assert_eq!(draw([200, 130]), draw([200, 130]));
+    for size in [[1, 1], [63, 500], [1000, 17]] {
+        assert_eq!(draw(size).rgba.len(), 4 * (size[0] * size[1]) as usize);
+    }
+    let most = graphics.device.limits().max_texture_dimension_2d;
+    let refused =
+        Look { size: [most + 1, 10], ..look() }.picture(&graphics, &mesh, 0.0).unwrap_err().to_string();
+    assert!(refused.contains("cannot be drawn"), "{refused}");
+}

@@ -1,0 +1,268 @@
+//! How a scene is looked at, in pictures and in the window.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::FieldName;
+
+/// How pictures and films of the scene are taken (`pliant render`, `pliant run --picture`) and how the window opens (`pliant view`). It
+/// changes nothing of the run.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ViewTable {
+    /// The body or the carried surface that is shown; if not given, all bodies together.
+    #[serde(default)]
+    pub on: Option<String>,
+    /// What the colours tell; `none`: the colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells or co-rotational solids carry.
+    #[serde(default)]
+    pub colour: Option<ColourBy>,
+    /// A component of a vector (`x`, `y`, `z`) or a tensor (`xx`, `xy`, …), instead of the size of a vector; a tensor needs one.
+    #[serde(default)]
+    pub component: Option<Component>,
+    /// The map of colours; all but `turbo` are even to eyes that see no red or green.
+    #[serde(default)]
+    pub map: MapName,
+    /// Values of the first and the last colour, in SI units; if not given, those of all frames without the outermost 0.5 %.
+    #[serde(default)]
+    pub range: Option<[f64; 2]>,
+    /// Whether the edges of the elements are drawn.
+    #[serde(default)]
+    pub edges: bool,
+    /// Whether the shape at rest is drawn, as a ghost.
+    #[serde(default)]
+    pub ghost: bool,
+    /// A plane: what lies on the side of its normal is taken away, and shows what is inside.
+    #[serde(default)]
+    pub clip: Option<ClipTable>,
+    /// Where it is seen from.
+    #[serde(default)]
+    pub camera: CameraTable,
+    /// What stands behind.
+    #[serde(default)]
+    pub background: BackgroundName,
+    /// Width and height of pictures [pixels].
+    #[serde(default = "size")]
+    #[schemars(inner(range(min = 16, max = 16384)))]
+    pub size: [u32; 2],
+    /// Parts that each edge of a shell is cut into, to show its curved surface; 1: flat triangles.
+    #[serde(default = "four")]
+    #[schemars(range(min = 1, max = 100))]
+    pub curved: u32,
+}
+
+fn size() -> [u32; 2] {
+    [1280, 800]
+}
+
+fn four() -> u32 {
+    4
+}
+
+/// What colours tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ColourBy {
+    /// Nothing.
+    Nothing(Nothing),
+    /// A field.
+    Field(FieldName),
+}
+
+/// The word `none`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Nothing {
+    /// No field.
+    None,
+}
+
+/// A component of a vector or a tensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Component {
+    X,
+    Y,
+    Z,
+    Xx,
+    Yy,
+    Zz,
+    Xy,
+    Yz,
+    Xz,
+}
+
+impl Component {
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+            Self::Xx => "xx",
+            Self::Yy => "yy",
+            Self::Zz => "zz",
+            Self::Xy => "xy",
+            Self::Yz => "yz",
+            Self::Xz => "xz",
+        }
+    }
+
+    /// Numbers of the values that have it: 3 of vectors, 9 of tensors.
+    pub fn of(self) -> usize {
+        if self.word().len() == 1 { 3 } else { 9 }
+    }
+}
+
+/// A map of colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MapName {
+    /// Dark violet over green to yellow.
+    #[default]
+    Viridis,
+    /// Blue over grey to yellow.
+    Cividis,
+    /// Black over red to pale yellow.
+    Magma,
+    /// Black over red to yellow.
+    Inferno,
+    /// Blue over red to yellow.
+    Plasma,
+    /// The rainbow, made even.
+    Turbo,
+    /// Blue over white to red, for values around zero.
+    BlueRed,
+}
+
+impl MapName {
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Viridis => "viridis",
+            Self::Cividis => "cividis",
+            Self::Magma => "magma",
+            Self::Inferno => "inferno",
+            Self::Plasma => "plasma",
+            Self::Turbo => "turbo",
+            Self::BlueRed => "blue-red",
+        }
+    }
+}
+
+/// What stands behind a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BackgroundName {
+    /// Pale grey, lighter towards the bottom.
+    #[default]
+    Light,
+    /// Plain white, for print.
+    White,
+    /// Dark grey.
+    Dark,
+}
+
+impl BackgroundName {
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Light => "light",
+            Self::White => "white",
+            Self::Dark => "dark",
+        }
+    }
+}
+
+/// A plane.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ClipTable {
+    /// A point on it [m].
+    pub point: [f64; 3],
+    /// Its normal, of any length but 0.
+    pub normal: [f64; 3],
+}
+
+/// A camera that orbits what is shown.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CameraTable {
+    /// Angle around the axis that points up [°]; with `up = "z"` 0 looks from the side of x, 90 from that of y.
+    #[serde(default = "azimuth")]
+    pub azimuth: f64,
+    /// Angle above the horizon [°].
+    #[serde(default = "elevation")]
+    #[schemars(range(min = -90.0, max = 90.0))]
+    pub elevation: f64,
+    /// Magnification of what fits the picture.
+    #[serde(default = "one")]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1000.0))]
+    pub zoom: f64,
+    /// What is in the middle [m]; if not given, what fits the picture best.
+    #[serde(default)]
+    pub target: Option<[f64; 3]>,
+    /// The axis that points up; if not given, against gravity, and `z` without gravity.
+    #[serde(default)]
+    pub up: Option<UpName>,
+    /// Whether parallel lines stay parallel.
+    #[serde(default)]
+    pub orthographic: bool,
+}
+
+fn azimuth() -> f64 {
+    -55.0
+}
+
+fn elevation() -> f64 {
+    22.0
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Default for CameraTable {
+    fn default() -> Self {
+        Self {
+            azimuth: azimuth(),
+            elevation: elevation(),
+            zoom: one(),
+            target: None,
+            up: None,
+            orthographic: false,
+        }
+    }
+}
+
+/// An axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[allow(missing_docs)]
+pub enum UpName {
+    #[serde(rename = "x")]
+    X,
+    #[serde(rename = "y")]
+    Y,
+    #[serde(rename = "z")]
+    Z,
+    #[serde(rename = "-x")]
+    MinusX,
+    #[serde(rename = "-y")]
+    MinusY,
+    #[serde(rename = "-z")]
+    MinusZ,
+}
+
+impl UpName {
+    /// Its direction.
+    pub fn direction(self) -> [f64; 3] {
+        match self {
+            Self::X => [1.0, 0.0, 0.0],
+            Self::Y => [0.0, 1.0, 0.0],
+            Self::Z => [0.0, 0.0, 1.0],
+            Self::MinusX => [-1.0, 0.0, 0.0],
+            Self::MinusY => [0.0, -1.0, 0.0],
+            Self::MinusZ => [0.0, 0.0, -1.0],
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! A body, all bodies or a carried surface as a mesh with the fields of an instant. Points are at rest.
+
+use std::marker::PhantomData;
+
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use pliant_mechanics::Real;
+use pliant_mechanics::recover::Recovery;
+use rayon::prelude::*;
+
+use super::fields::Cell;
+use super::{Frame, fields};
+use crate::build::{BodyCells, Built, Corotational};
+use crate::format::{At, FieldName};
+
+/// A mesh that takes the fields of instants.
+pub(crate) struct Snapshot<R> {
+    mesh: Mesh,
+    fields: Vec<FieldName>,
+    at: At,
+    content: Content,
+    number: PhantomData<R>,
+}
+
+/// What the points and cells of the mesh are in the model.
+enum Content {
+    /// A carried surface.
+    Surface(usize),
+    /// Bodies: the model's node of each point, and (solid, cell) of each cell of each block.
+    Bodies { nodes: Vec<u32>, cells: Vec<Vec<(u32, u32)>> },
+    /// Shells and co-rotational solids: the model's node of each point, and the cells of each block.
+    Corotational { nodes: Vec<u32>, cells: Vec<Vec<Cell>>, fields: Box<fields::Corotated> },
+    /// The curved surface of shells.
+    Curved(Box<super::curved::Curved>),
+}
+
+impl<R: Real> Snapshot<R> {
+    /// Of a body or surface by name, or of all bodies; with `curved`, of the curved surface of shells.
+    pub fn new(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Self {
+        let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
+        let (mesh, content) = match surface {
+            Some(index) => (bare(&built.surfaces[index]), Content::Surface(index)),
+            None => match (&built.corotational, curved) {
+                (None, _) => merged_bodies(built, on),
+                (Some(part), None) => merged_corotational(built, part, on),
+                (Some(part), Some(parts)) => {
+                    let (curved, mesh) = super::curved::Curved::new(built, part, on, parts);
+                    (mesh, Content::Curved(Box::new(curved)))
+                }
+            },
+        };
+        Self { mesh, fields: fields.to_vec(), at, content, number: PhantomData }
+    }
+
+    /// The mesh, with the fields of the last instant.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// A point of the mesh as a combination of nodes of the model; nothing where it is none, as on curved surfaces.
+    pub fn nodes_of(&self, built: &Built, point: u32) -> Vec<(u32, f64)> {
+        match &self.content {
+            Content::Surface(index) => {
+                let row = built.model.surfaces[*index].mapping.row(point as usize);
+                row.map(|(node, weight)| (node as u32, weight)).collect()
+            }
+            Content::Bodies { nodes, .. } | Content::Corotational { nodes, .. } => {
+                vec![(nodes[point as usize], 1.0)]
+            }
+            Content::Curved(_) => Vec::new(),
+        }
+    }
+
+    /// Takes the fields of an instant.
+    pub fn fill(&mut self, frame: &Frame<'_, R>) {
+        match &mut self.content {
+            Content::Surface(index) => {
+                if let Some(displacement) = carried_on_shell(frame, *index) {
+                    let values = displacement.iter().flat_map(|d| [d.x, d.y, d.z]).collect();
+                    let name = FieldName::Displacement.name();
+                    self.mesh.point_data.insert(name.into(), DataArray { components: 3, values });
+                    return;
+                }
+                fill_surface(&mut self.mesh, frame, &self.fields, *index);
+            }
+            Content::Bodies { nodes, cells } => {
+                fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
+                fill_cells(&mut self.mesh, frame, &self.fields, self.at, cells);
+            }
+            Content::Corotational { nodes, cells, fields } => {
+                fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
+                if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
+                    fields.fill(&part.model, state);
+                    fill_corotational(&mut self.mesh, &part.model, fields, &self.fields, self.at, cells);
+                }
+            }
+            Content::Curved(curved) => curved.fill(&mut self.mesh, frame, &self.fields),
+        }
+    }
+}
+
+/// Fields on a carried surface; those of cells as means at the nodes.
+fn fill_surface<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], surface: usize) {
+    let model = &frame.built.model;
+    let mapping = &model.surfaces[surface].mapping;
+    let (nodal, of_cells): (Vec<FieldName>, Vec<FieldName>) =
+        wanted.iter().partition(|field| field.is_nodal());
+    for field in nodal {
+        let value = |node| {
+            let value = fields::nodal(frame, field, node);
+            [value[0], value[1], value[2]]
+        };
+        let parent: Vec<[f64; 3]> = (0..model.node_count()).map(value).collect();
+        let values = mapping.apply(&parent).into_iter().flatten().collect();
+        mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
+    }
+    if of_cells.is_empty() {
+        return;
+    }
+    let recovery = Recovery::new(model, frame.state);
+    let mut averages = Averages::new(model.node_count(), &of_cells);
+    for (index, solid) in model.solids.iter().enumerate() {
+        let cells: Vec<_> =
+            (0..solid.cells.len()).into_par_iter().map(|cell| recovery.cell(index, cell)).collect();
+        for (cell, found) in cells.iter().enumerate() {
+            let volume = solid.cells.volume(cell);
+            for (slot, &field) in of_cells.iter().enumerate() {
+                let value = &fields::of_cell(found, field)[..field.components()];
+                averages.add(slot, solid.cells.nodes(cell), value, volume);
+            }
+        }
+    }
+    for (field, means) in of_cells.iter().zip(averages.means(&of_cells)) {
+        let components = field.components();
+        let carried = |point: usize| {
+            let mean =
+                |c: usize| mapping.row(point).map(|(node, w)| w * means[node * components + c]).sum::<f64>();
+            (0..components).map(mean).collect::<Vec<f64>>()
+        };
+        let values = (0..mapping.len()).flat_map(carried).collect();
+        mesh.point_data.insert(field.name().into(), DataArray { components, values });
+    }
+}
+
+/// Points and cells without data and sets.
+fn bare(mesh: &Mesh) -> Mesh {
+    let blocks = mesh.blocks.iter().map(|block| CellBlock::new(block.kind, block.nodes.clone())).collect();
+    Mesh { points: mesh.points.clone(), blocks, ..Mesh::default() }
+}
+
+/// The volume cells of one body or of all, with `label` and, for several bodies, the number of the `body`.
+fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
+    let chosen = |body: usize| on.is_none_or(|name| built.bodies[body].name == name);
+    let mut mesh = Mesh::default();
+    let mut nodes = Vec::new();
+    let mut offsets = vec![0; built.bodies.len()];
+    for (body, offset) in offsets.iter_mut().enumerate().filter(|(body, _)| chosen(*body)) {
+        *offset = mesh.points.len() as u32;
+        mesh.points.extend_from_slice(&built.bodies[body].mesh.points);
+        nodes.extend(built.model.bodies[body].nodes.clone());
+    }
+    let labelled =
+        built.bodies.iter().any(|b| b.mesh.volume_blocks().any(|block| block.data.contains_key("label")));
+    let mut cells = Vec::new();
+    for kind in [CellKind::Tet, CellKind::Hex] {
+        let mut block = CellBlock::new(kind, Vec::new());
+        let mut places = Vec::new();
+        let (mut body_of, mut labels) = (Vec::new(), Vec::new());
+        for (body, &offset) in offsets.iter().enumerate().filter(|(body, _)| chosen(*body)) {
+            let Some(own) = built.bodies[body].mesh.block(kind) else { continue };
+            block.nodes.extend(own.nodes.iter().map(|node| node + offset));
+            body_of.resize(body_of.len() + own.len(), body as f64);
+            match own.data.get("label") {
+                Some(label) => labels.extend_from_slice(&label.values),
+                None => labels.resize(labels.len() + own.len(), 0.0),
+            }
+            let first = places.len();
+            places.resize(first + own.len(), (0, 0));
+            for (index, solid) in built.model.solids.iter().enumerate() {
+                let fits = solid.body == body && solid.cells.nodes_per_cell() == kind.node_count();
+                for (cell, &original) in solid.original.iter().enumerate().filter(|_| fits) {
+                    places[first + original as usize] = (index as u32, cell as u32);
+                }
+            }
+        }
+        if block.is_empty() {
+            continue;
+        }
+        if built.bodies.len() > 1 {
+            block.data.insert("body".into(), DataArray::scalar(body_of));
+        }
+        if labelled {
+            block.data.insert("label".into(), DataArray::scalar(labels));
+        }
+        mesh.blocks.push(block);
+        cells.push(places);
+    }
+    (mesh, Content::Bodies { nodes, cells })
+}
+
+/// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
+pub(super) fn carried_on_shell<R>(frame: &Frame<'_, R>, surface: usize) -> Option<Vec<Vector3>> {
+    let part = frame.built.corotational.as_ref()?;
+    let (points, curved) = (part.carried.get(&surface)?, part.surface.as_ref()?);
+    let mut positions = vec![Vector3::zeros(); points.len()];
+    curved.carried_all(&part.model, frame.corotational?, points, &mut positions);
+    for (position, rest) in positions.iter_mut().zip(&frame.built.surfaces[surface].points) {
+        *position -= rest;
+    }
+    Some(positions)
+}
+
+/// The cells of one shell or co-rotational solid or of all, with the number of the `body` for several.
+fn merged_corotational(built: &Built, part: &Corotational, on: Option<&str>) -> (Mesh, Content) {
+    let mut mesh = Mesh::default();
+    let (mut nodes, mut cells) = (Vec::new(), Vec::new());
+    let kinds = [CellKind::Triangle, CellKind::Tet];
+    let mut blocks = kinds.map(|kind| (CellBlock::new(kind, Vec::new()), Vec::new(), Vec::new()));
+    for (number, body) in
+        built.bodies.iter().enumerate().filter(|(_, body)| on.is_none_or(|on| body.name == on))
+    {
+        let offset = mesh.points.len() as u32;
+        mesh.points.extend_from_slice(&body.mesh.points);
+        nodes.extend(built.model.bodies[number].nodes.clone());
+        let (at, range) = match &part.cells[number] {
+            BodyCells::Facets(range) => (0, range),
+            BodyCells::Tets(range) => (1, range),
+        };
+        let cell = [Cell::Facet, Cell::Tet][at];
+        let (block, places, owners) = &mut blocks[at];
+        let own = body.mesh.block(kinds[at]).map_or(&[][..], |own| &own.nodes[..]);
+        block.nodes.extend(own.iter().map(|node| node + offset));
+        places.extend(range.clone().map(cell));
+        owners.resize(places.len(), number as f64);
+    }
+    for (mut block, places, owners) in blocks.into_iter().filter(|(block, ..)| !block.is_empty()) {
+        if built.bodies.len() > 1 {
+            block.data.insert("body".into(), DataArray::scalar(owners));
+        }
+        mesh.blocks.push(block);
+        cells.push(places);
+    }
+    (mesh, Content::Corotational { nodes, cells, fields: Box::default() })
+}
+
+fn fill_corotational(
+    mesh: &mut Mesh,
+    model: &pliant_corotational::Model,
+    found: &fields::Corotated,
+    wanted: &[FieldName],
+    at: At,
+    cells: &[Vec<Cell>],
+) {
+    let wanted: Vec<FieldName> = wanted.iter().copied().filter(|field| !field.is_nodal()).collect();
+    let mut averages = Averages::new(mesh.points.len(), &wanted);
+    for (block, cells) in mesh.blocks.iter_mut().zip(cells) {
+        for (slot, &field) in wanted.iter().enumerate() {
+            let components = field.components();
+            if at == At::Cells {
+                let value = |&cell: &Cell| found.of(model, cell, field).into_iter().take(components);
+                let values = cells.iter().flat_map(value).collect();
+                block.data.insert(field.name().into(), DataArray { components, values });
+                continue;
+            }
+            for (index, &cell) in cells.iter().enumerate() {
+                let size = match cell {
+                    Cell::Facet(facet) => model.facets[facet as usize].area,
+                    Cell::Tet(tet) => model.tets[tet as usize].volume,
+                };
+                averages.add(slot, block.cell(index), &found.of(model, cell, field)[..components], size);
+            }
+        }
+    }
+    if at == At::Points {
+        averages.write(&mut mesh.point_data, &wanted);
+    }
+}
+
+fn fill_nodal<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], nodes: &[u32]) {
+    for &field in wanted.iter().filter(|field| field.is_nodal()) {
+        let value = |&node: &u32| {
+            let value = fields::nodal(frame, field, node as usize);
+            [value[0], value[1], value[2]]
+        };
+        let values = nodes.iter().flat_map(value).collect();
+        mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
+    }
+}
+
+fn fill_cells<R: Real>(
+    mesh: &mut Mesh,
+    frame: &Frame<'_, R>,
+    wanted: &[FieldName],
+    at: At,
+    cells: &[Vec<(u32, u32)>],
+) {
+    let wanted: Vec<FieldName> = wanted.iter().copied().filter(|field| !field.is_nodal()).collect();
+    if wanted.is_empty() {
+        return;
+    }
+    let model = &frame.built.model;
+    let recovery = Recovery::new(model, frame.state);
+    let mut averages = Averages::new(mesh.points.len(), &wanted);
+    for (block, places) in mesh.blocks.iter_mut().zip(cells) {
+        let recovered: Vec<_> =
+            (places.par_iter()).map(|&(solid, cell)| recovery.cell(solid as usize, cell as usize)).collect();
+        for (slot, &field) in wanted.iter().enumerate() {
+            let components = field.components();
+            if at == At::Cells {
+                let value = |cell| fields::of_cell(cell, field).into_iter().take(components);
+                let values = recovered.iter().flat_map(value).collect();
+                block.data.insert(field.name().into(), DataArray { components, values });
+                continue;
+            }
+            for (index, (cell, &(solid, own))) in recovered.iter().zip(places).enumerate() {
+                let volume = model.solids[solid as usize].cells.volume(own as usize);
+                averages.add(slot, block.cell(index), &fields::of_cell(cell, field)[..components], volume);
+            }
+        }
+    }
+    if at == At::Points {
+        averages.write(&mut mesh.point_data, &wanted);
+    }
+}
+
+/// Volume-weighted means of cell values at the points.
+struct Averages {
+    /// For each field: sums of value × volume, and of volume, at each point. Cells without a value don't count.
+    sums: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+impl Averages {
+    fn new(points: usize, wanted: &[FieldName]) -> Self {
+        let zeros = |field: &FieldName| (vec![0.0; points * field.components()], vec![0.0; points]);
+        Self { sums: wanted.iter().map(zeros).collect() }
+    }
+
+    fn add(&mut self, slot: usize, nodes: &[u32], value: &[f64], volume: f64) {
+        if value.iter().any(|v| v.is_nan()) {
+            return;
+        }
+        let (sums, volumes) = &mut self.sums[slot];
+        for &node in nodes {
+            let own = node as usize * value.len();
+            for (sum, v) in sums[own..].iter_mut().zip(value) {
+                *sum += v * volume;
+            }
+            volumes[node as usize] += volume;
+        }
+    }
+
+    /// The means of each field.
+    fn means(self, wanted: &[FieldName]) -> Vec<Vec<f64>> {
+        let mean = |(field, (sums, volumes)): (&FieldName, (Vec<f64>, Vec<f64>))| {
+            let items = sums.chunks(field.components()).zip(volumes);
+            items.flat_map(|(s, v)| s.iter().map(move |s| s / v)).collect()
+        };
+        wanted.iter().zip(self.sums).map(mean).collect()
+    }
+
+    fn write(self, data: &mut std::collections::BTreeMap<String, DataArray>, wanted: &[FieldName]) {
+        for (&field, values) in wanted.iter().zip(self.means(wanted)) {
+            data.insert(field.name().into(), DataArray { components: field.components(), values });
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! What of a scene is shown, as its table `[view]` asks.
+
+use std::fmt;
+
+use pliant_geometry::Mesh;
+
+use crate::format::{At, BodyModel, ColourBy, FieldName, VtuTable};
+use crate::scene::Scene;
+
+/// Draws an instant of a run.
+pub trait Draw: fmt::Debug + Sync {
+    /// A PNG file of a mesh at rest with the fields of an instant, at a time [s].
+    ///
+    /// # Errors
+    /// Why there is no picture.
+    fn draw(&self, mesh: &Mesh, time: f64) -> Result<Vec<u8>, String>;
+}
+
+impl Scene {
+    /// The field that colours tell; `None` for the colour of tissue.
+    pub fn shown_field(&self) -> Option<FieldName> {
+        match self.view.colour {
+            Some(ColourBy::Field(field)) => Some(field),
+            Some(ColourBy::Nothing(_)) => None,
+            None if self.shows_surface_of_shell() => Some(FieldName::Displacement),
+            None => Some(FieldName::VonMises),
+        }
+    }
+
+    fn shows_surface_of_shell(&self) -> bool {
+        let shown = self.surfaces.iter().filter(|(name, _)| self.view.on.as_ref() == Some(name));
+        let solid =
+            |on: &str| self.bodies.iter().any(|(name, body)| name == on && body.model == BodyModel::Solid);
+        shown.into_iter().any(|(_, surface)| !solid(&surface.on))
+    }
+
+    fn shows_surface(&self) -> bool {
+        self.view.on.as_ref().is_some_and(|on| self.surfaces.iter().any(|(name, _)| name == on))
+    }
+
+    /// A series of what is shown, with displacements and the field of the colours.
+    pub fn shown(&self, every: f64) -> VtuTable {
+        let mut data = vec![FieldName::Displacement];
+        data.extend(self.shown_field().filter(|field| *field != FieldName::Displacement));
+        let on = self.view.on.as_ref();
+        let mut models = self.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
+        let shells = !self.shows_surface() && models.all(|(_, body)| body.model == BodyModel::Shell);
+        let curved = (shells && self.view.curved > 1).then_some(self.view.curved);
+        let at = if curved.is_some() { At::Cells } else { At::Points };
+        VtuTable { on: on.cloned(), every, data, at, curved }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{built, mistakes, scene};
+
+    #[test]
+    fn a_view_shows_what_it_names_and_von_mises_stresses_otherwise() {
+        let skin =
+            "[surface.skin]\non = 'cube'\nmesh = { block = { size = [0.2, 0.1, 0.1], cells = [3, 2, 2] } }\n";
+        built(&format!("{skin}[view]\non = 'skin'\ncolour = 'pressure'\n"));
+        let table = |more: &str| scene(more).shown(0.1);
+        assert_eq!(table("").data, [FieldName::Displacement, FieldName::VonMises]);
+        assert_eq!(table("[view]\ncolour = 'none'\n").data, [FieldName::Displacement]);
+        assert_eq!(table("[view]\ncolour = 'pressure'\non = 'cube'\n").data[1], FieldName::Pressure);
+        assert_eq!((table("").curved, table("").at), (None, At::Points), "a solid");
+        built(
+            "[view]\ncolour = 'displacement'\ncomponent = 'z'\nclip = { point = [0, 0, 0], normal = [1, 0, 0] }\n",
+        );
+        built("[view]\ncolour = 'cauchy-stress'\ncomponent = 'xy'\n");
+    }
+
+    #[test]
+    fn a_view_of_what_there_is_not_is_refused_with_a_remedy() {
+        for (view, piece) in [
+            ("on = 'cub'", "did you mean `cube`?"),
+            ("colour = 'bending-moment'", "have no `bending-moment`"),
+            ("colour = 'cauchy-stress'", "give `component = \"xx\"`"),
+            ("colour = 'von-mises'\ncomponent = 'x'", "leave `component` out"),
+            ("colour = 'displacement'\ncomponent = 'xx'", "`x`, `y` or `z`"),
+            ("clip = { point = [0, 0, 0], normal = [0, 0, 0] }", "a plane needs a normal"),
+            ("range = [2, 1]", "the range must grow"),
+        ] {
+            let told = mistakes(&format!("[view]\n{view}\n")).plain().to_string();
+            assert!(told.contains(piece), "{view}: {told}");
+        }
+    }
+}
