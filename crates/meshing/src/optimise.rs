@@ -1,5 +1,5 @@
 //! Improves a tetrahedral mesh for explicit dynamics, where the least acoustic length sets the time step: tets below a
-//! rising threshold lose an edge or are flipped, then points move to where their worst tet is best. Points between
+//! rising threshold lose an edge, are flipped or change their material, then points move to where their worst tet is best. Points between
 //! sides stay between them. Deterministic: everything goes in the order of numbers, and the directions of trial moves
 //! are turned by a fixed sequence.
 
@@ -206,7 +206,7 @@ impl<'a> Optimiser<'a> {
 
     /// Removes tets of the boundary that the body does not need to hang together: those below half the threshold, and tips that
     /// are light for their stiffness.
-    fn peel(&mut self, threshold: f64) -> usize {
+    fn peel(&mut self, threshold: f64) {
         let mut peeled = 0;
         let short =
             |node: &u32| self.complex.nodal_length(*node, &self.complex.points[*node as usize]) < threshold;
@@ -226,7 +226,6 @@ impl<'a> Optimiser<'a> {
             }
         }
         self.done.peeled += peeled;
-        peeled
     }
 
     /// Three boundary faces: a tip. Two: a wedge, if the edge that its removal lays open is not on the boundary yet.
@@ -257,7 +256,7 @@ impl<'a> Optimiser<'a> {
     }
 
     /// Gives tets below half the threshold, flat ones between materials, to the material that looks at more of their surface.
-    fn hand_over(&mut self, threshold: f64) -> usize {
+    fn hand_over(&mut self, threshold: f64) {
         let mut given = 0;
         for tet in self.below(threshold / 2.0) {
             let own = self.complex.material[tet as usize];
@@ -286,7 +285,6 @@ impl<'a> Optimiser<'a> {
             }
         }
         self.done.given += given;
-        given
     }
 
     fn refresh(&mut self, node: u32) {
@@ -296,7 +294,7 @@ impl<'a> Optimiser<'a> {
         self.complex.sides[node as usize] = materials | if open { OUTSIDE } else { 0 };
     }
 
-    fn collapse(&mut self, threshold: f64) -> usize {
+    fn collapse(&mut self, threshold: f64) {
         let mut collapsed = 0;
         for tet in self.below(threshold) {
             let nodes = self.complex.tets[tet as usize];
@@ -309,11 +307,10 @@ impl<'a> Optimiser<'a> {
             }
         }
         self.done.collapsed += collapsed;
-        collapsed
     }
 
     /// Flips edges and faces of tets below a length.
-    fn flip(&mut self, threshold: f64) -> usize {
+    fn flip(&mut self, threshold: f64) {
         let surfaces = &self.surfaces;
         let follows = |middle: &Vector3| surfaces.off(OUTSIDE, middle) <= FLIP_OFF * self.edge;
         let mut flipped = 0;
@@ -323,7 +320,6 @@ impl<'a> Optimiser<'a> {
             }
         }
         self.done.flipped += flipped;
-        flipped
     }
 
     /// Tries the edges of a tet, the shortest first, both ways.

@@ -30,6 +30,16 @@ pub fn ball(radius: f64) -> LabelImage {
     labelled(|point| i32::from(point.norm() < radius))
 }
 
+/// A ball of a core (1) and four quarters round it (2 to 5): they meet in lines and corners.
+pub fn parted_ball(radius: f64) -> LabelImage {
+    let quarter = |p: &Vector3| 2 + i32::from(p.x > 0.0) + 2 * i32::from(p.y > 0.0);
+    labelled(|point| match point.norm() {
+        r if r > radius => 0,
+        r if r < 0.4 * radius => 1,
+        _ => quarter(point),
+    })
+}
+
 /// The true surface of an organ: points on it about 1.5 mm apart, on a fine mesh of its field.
 pub struct Truth {
     points: Vec<Vector3>,

@@ -65,6 +65,15 @@ fn sphere_at(lattices: usize) {
     }
 }
 
+/// Where labels meet in lines and corners, no flat tets are left between them.
+#[test]
+fn many_labels_keep_three_quarters_of_the_ideal_step() {
+    let ball = anatomy(&images::parted_ball(0.05), &[1, 2, 3, 4, 5]);
+    let made = meshed(&ball, 0.008, Vector3::zeros());
+    check_sound(&made);
+    assert!(made.report.acoustic_part >= 0.75, "{}", made.report);
+}
+
 /// T2 for one lattice; the other seven, and 5 mm, are in the slow test.
 #[test]
 fn the_liver_keeps_its_shape_its_volume_and_its_step() {
