@@ -76,7 +76,12 @@ impl<'a> Anatomy<'a> {
         volumes[0] = Some(whole.volume() - others);
         if labels.len() > 2 {
             // What several others leave is no good measure of the first one: where two of them meet, it is as near as they are.
-            let first = DistanceField::within(&whole.part(image, labels[0])?, &whole, smoothing, &part(labels.len()))?;
+            let first = DistanceField::within(
+                &whole.part(image, labels[0])?,
+                &whole,
+                smoothing,
+                &part(labels.len()),
+            )?;
             materials[0].1 = Some(Box::new(first));
         }
         Ok((Anatomy { whole: Box::new(field), materials, volumes }, done))
