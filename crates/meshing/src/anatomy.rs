@@ -74,12 +74,27 @@ impl<'a> Anatomy<'a> {
             materials.push((label, Some(Box::new(inner) as Box<dyn ImplicitField>)));
         }
         volumes[0] = Some(whole.volume() - others);
+        if labels.len() > 2 {
+            // What several others leave is no good measure of the first one: where two of them meet, it is as near as they are.
+            let first = DistanceField::within(
+                &whole.part(image, labels[0])?,
+                &whole,
+                smoothing,
+                &part(labels.len()),
+            )?;
+            materials[0].1 = Some(Box::new(first));
+        }
         Ok((Anatomy { whole: Box::new(field), materials, volumes }, done))
     }
 
     /// Field of a material from 2 on.
     pub(crate) fn inner(&self, material: usize) -> &dyn ImplicitField {
         self.materials[material - 1].1.as_deref().unwrap_or(&*self.whole)
+    }
+
+    /// Field of the first material, if it is more than what the others leave.
+    pub(crate) fn first(&self) -> Option<&dyn ImplicitField> {
+        self.materials[0].1.as_deref().map(|field| field as &dyn ImplicitField)
     }
 
     /// The field of the whole body.

@@ -40,9 +40,10 @@ impl<'a> Surfaces<'a> {
     /// Field of a material [m]. The first one has none of its own and is what the others leave: minus the deepest of
     /// them.
     fn depth(&self, material: usize, point: &Vector3) -> f64 {
-        match material {
-            1 => -self.inner().map(|m| self.depth(m, point)).fold(f64::NEG_INFINITY, f64::max),
-            m => self.anatomy.inner(m).value(point) - self.levels[m - 1],
+        match (material, self.anatomy.first()) {
+            (1, Some(first)) => first.value(point),
+            (1, None) => -self.inner().map(|m| self.depth(m, point)).fold(f64::NEG_INFINITY, f64::max),
+            (m, _) => self.anatomy.inner(m).value(point) - self.levels[m - 1],
         }
     }
 
@@ -53,7 +54,7 @@ impl<'a> Surfaces<'a> {
 
     /// Gradient of the field of a material.
     fn slope(&self, material: usize, point: &Vector3) -> Vector3 {
-        if material > 1 {
+        if material > 1 || self.anatomy.first().is_some() {
             return self.anatomy.inner(material).gradient(point);
         }
         let deepest = self.inner().max_by(|&a, &b| self.depth(a, point).total_cmp(&self.depth(b, point)));
