@@ -430,7 +430,11 @@ fn a_kept_mesh_still_warns() {
     workshop.write("case/seg.nii.gz", Picture::ball_with_a_rod(5).packed());
     for kept in ["kept in the cache", "from the cache"] {
         let told = workshop.run(&["--force"]);
-        assert!(told.words().contains(kept) && told.words().contains("the mesh leaves out a part of the body"), "{}", told.err);
+        assert!(
+            told.words().contains(kept) && told.words().contains("the mesh leaves out a part of the body"),
+            "{}",
+            told.err
+        );
     }
 }
 
