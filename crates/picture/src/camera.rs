@@ -1,6 +1,6 @@
 //! Where a picture is taken from: a camera that orbits a point.
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix4, RowVector4, Vector4};
 use pliant_geometry::Vector3;
 
 /// An axis that points up.
@@ -192,57 +192,19 @@ impl Camera {
         let row = |axis: Vector3| Vector4::new(axis.x, axis.y, axis.z, -axis.dot(&eye)).transpose();
         let view = Matrix4::from_rows(&[row(x), row(y), row(z), Vector4::w().transpose()]);
         let distance = self.distance();
+        let far = distance + reach;
         // The camera may stand within what it looks at.
-        let (near, far) = match self.projection {
-            Projection::Perspective => ((distance - reach).max(0.01 * distance), distance + reach),
-            Projection::Orthographic => (distance - reach, distance + reach),
+        let (near, scale) = match self.projection {
+            Projection::Perspective => ((distance - reach).max(0.01 * distance), 1.0 / SPREAD),
+            Projection::Orthographic => (distance - reach, 2.0 / self.height),
         };
-        let projection = match self.projection {
-            Projection::Perspective => {
-                let f = 1.0 / SPREAD;
-                let depth = 1.0 / (far - near);
-                Matrix4::new(
-                    f / aspect,
-                    0.0,
-                    0.0,
-                    0.0, //
-                    0.0,
-                    f,
-                    0.0,
-                    0.0, //
-                    0.0,
-                    0.0,
-                    -far * depth,
-                    -far * near * depth, //
-                    0.0,
-                    0.0,
-                    -1.0,
-                    0.0,
-                )
-            }
-            Projection::Orthographic => {
-                let f = 2.0 / self.height;
-                let depth = 1.0 / (far - near);
-                Matrix4::new(
-                    f / aspect,
-                    0.0,
-                    0.0,
-                    0.0, //
-                    0.0,
-                    f,
-                    0.0,
-                    0.0, //
-                    0.0,
-                    0.0,
-                    -depth,
-                    -near * depth, //
-                    0.0,
-                    0.0,
-                    0.0,
-                    1.0,
-                )
-            }
+        let depth = 1.0 / (far - near);
+        let (depths, divisor) = match self.projection {
+            Projection::Perspective => ([0.0, 0.0, -far * depth, -far * near * depth], [0.0, 0.0, -1.0, 0.0]),
+            Projection::Orthographic => ([0.0, 0.0, -depth, -near * depth], [0.0, 0.0, 0.0, 1.0]),
         };
+        let rows = [[scale / aspect, 0.0, 0.0, 0.0], [0.0, scale, 0.0, 0.0], depths, divisor];
+        let projection = Matrix4::from_rows(&rows.map(RowVector4::from));
         (projection * view).cast()
     }
 
