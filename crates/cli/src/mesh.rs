@@ -209,12 +209,7 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
     };
     bar.update_mesh(PARTS[0] + PARTS[1], "measuring distances");
     let deviation = Deviation::new(&mesh, anatomy.field(), edge).map_err(refused)?;
-    // Steps of cubes stay behind the body by up to half of their diagonal; immersed ones hold all of it.
-    let allowed = match arguments.cells {
-        MeshCells::Tets => edge / 2.0,
-        MeshCells::ImmersedHexes => f64::INFINITY,
-        _ => edge,
-    };
+    let allowed = Missed::allowed(&mesh, edge);
     let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed).map_err(refused)?;
     Ok(Made {
         materials: materials(&mesh, anatomy),

@@ -5,13 +5,14 @@
 
 use std::fmt;
 
-use pliant_geometry::{Locator, Mesh, SurfaceLocator, Vector3, boundary};
+use pliant_geometry::{CellKind, Locator, Mesh, SurfaceLocator, Vector3, boundary};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::deviation::{Deviation, surface_points};
 use crate::error::MeshingError;
 use crate::field::ImplicitField;
+use crate::voxels::Voxels;
 
 /// Steps along the way through a thin part, per lattice constant.
 const STEPS: usize = 20;
@@ -54,6 +55,16 @@ pub enum Missed {
 }
 
 impl Missed {
+    /// How far [m] the surface of a body may be from a mesh with cells of `edge` [m] before it is told: half an edge of tets; steps of
+    /// cubes stay behind the body by up to half of their diagonal, and immersed ones hold all of it.
+    pub fn allowed(mesh: &Mesh, edge: f64) -> f64 {
+        match mesh.block(CellKind::Hex) {
+            None => edge / 2.0,
+            Some(cubes) if cubes.data.contains_key(Voxels::FRACTION) => f64::INFINITY,
+            Some(_) => edge,
+        }
+    }
+
     /// What a mesh with cells of `edge` [m] misses of the body of a field: the worst thin part, the worst thin gap, and the farthest
     /// point of the surface if it is farther than `allowed` [m] and no thin part explains it.
     ///
@@ -185,7 +196,7 @@ fn thin_way(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Anatomy, OrganTets, Stuffing, Voxels};
+    use crate::{Anatomy, OrganTets, Stuffing};
 
     /// Two slabs: 30 mm of body with a plate `thickness` thick on it, sticking out to x = 60 mm; a gap of `gap` between two blocks.
     struct Plates {

@@ -394,12 +394,7 @@ fn fill(
     if pieces > 0 {
         notes.push(format!("{dropped} cells in {pieces} loose parts were dropped"));
     }
-    // Steps of cubes stay behind the body by up to half of their diagonal; immersed ones hold all of it.
-    let allowed = match cells {
-        Cells::Tets => edge / 2.0,
-        Cells::ImmersedHexes => f64::INFINITY,
-        _ => edge,
-    };
+    let allowed = Missed::allowed(&mesh, edge);
     let deviation = Deviation::new(&mesh, anatomy.field(), edge)?;
     let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed)?;
     Ok((mesh, missed.iter().map(Missed::to_string).collect()))
