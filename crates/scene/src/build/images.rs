@@ -23,14 +23,13 @@ const CREASE: f64 = FRAC_PI_3;
 /// All that a mesh is made by, but for the image. Its debug text is its part of the key in the cache.
 #[derive(Clone, Debug)]
 struct Recipe {
-    cut: Cut,
     cleaning: Cleaning,
     cells: Goal,
 }
 
 /// What a body is made of.
 enum Scan {
-    Image(Image),
+    Image(Image, Cut),
     /// Triangles or quads in metres, and what is said about their file.
     Surface(MeshFile),
 }
@@ -38,8 +37,6 @@ enum Scan {
 /// What of an image is the body.
 #[derive(Clone, Debug)]
 enum Cut {
-    /// What the surface of a file encloses.
-    Enclosed,
     Labels(Vec<i32>),
     /// Voxels of at least this value.
     From(f64),
@@ -94,7 +91,7 @@ impl Builder<'_> {
             }
         };
         let (format, notes) = match &scan {
-            Scan::Image(image) => (image.format.to_string(), &image.notes),
+            Scan::Image(image, _) => (image.format.to_string(), &image.notes),
             Scan::Surface(file) => (file.format.clone(), &file.notes),
         };
         self.notes.extend(how.map(|how| format!("mesh of {name}: {how}")));
@@ -104,13 +101,14 @@ impl Builder<'_> {
             let help = "use finer cells, or `clean = { keep-largest = true }` for small pieces";
             Diagnostic::warning(doubt).at(place.clone(), "this mesh").help(help)
         }));
-        let origin = format!("{name} ({format}), {}", recipe.words());
+        let origin = format!("{name} ({format}), {}", recipe.words(&scan));
         Some(MeshOrigin { mesh: kept.mesh, origin })
     }
 
     fn scan(&self, file: &Path, table: &MeshTable) -> Result<Scan, Fault> {
         if table.image.is_some() {
-            return self.read_images(file, table).map(Scan::Image);
+            let cut = cut(table)?;
+            return self.read_images(file, table).map(|image| Scan::Image(image, cut));
         }
         let mut read = io::read(&self.scene.folder.join(file)).map_err(|error| {
             let help = match error {
@@ -148,7 +146,10 @@ impl Scan {
     /// Gives all bytes that a mesh can depend on, in pieces.
     fn content(&self, sink: &mut dyn FnMut(&[u8])) {
         match self {
-            Self::Image(image) => image.content(sink),
+            Self::Image(image, cut) => {
+                sink(format!("{cut:?}").as_bytes());
+                image.content(sink);
+            }
             Self::Surface(file) => {
                 let points = file.mesh.points.iter().flat_map(|x| [x.x, x.y, x.z]);
                 sink(&points.flat_map(f64::to_le_bytes).collect::<Vec<u8>>());
@@ -179,11 +180,17 @@ fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
             let help = "leave it out: a surface is mended, and stays as it is otherwise";
             return refuse("clean", "`clean` is for tets and hexes in the surface of a file", help);
         }
-        return Ok(Recipe { cut: Cut::Enclosed, cleaning, cells });
+        return Ok(Recipe { cleaning, cells });
     }
     if table.scale != 1.0 {
         return refuse("scale", "`scale` does not go with `image`", "an image tells its own unit");
     }
+    Ok(Recipe { cleaning, cells })
+}
+
+/// What of an image a table asks for.
+fn cut(table: &MeshTable) -> Result<Cut, Fault> {
+    let refuse = |key, message: &str, help| Err(Fault { key, message: message.into(), help });
     let cut = match (table.label, &table.labels, table.threshold) {
         (Some(label), None, None) => Cut::Labels(vec![label]),
         (None, Some(labels), None) => Cut::Labels(labels.clone()),
@@ -197,7 +204,7 @@ fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
     if table.add.is_some() && table.threshold.is_none() {
         return refuse("add", "`add` goes with `threshold` only", "labels are not added up");
     }
-    Ok(Recipe { cut, cleaning, cells })
+    Ok(cut)
 }
 
 /// The cells that a table asks for: of the sizes that it gives exactly one that goes with them.
@@ -261,11 +268,11 @@ pub(super) fn words(cells: Cells) -> &'static str {
 }
 
 impl Recipe {
-    fn words(&self) -> String {
-        let cut = match &self.cut {
-            Cut::Enclosed => "what it encloses".into(),
-            Cut::From(least) => format!("from {least} on"),
-            Cut::Labels(labels) => {
+    fn words(&self, scan: &Scan) -> String {
+        let cut = match scan {
+            Scan::Surface(_) => "what it encloses".into(),
+            Scan::Image(_, Cut::From(least)) => format!("from {least} on"),
+            Scan::Image(_, Cut::Labels(labels)) => {
                 format!("label {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))
             }
         };
@@ -285,7 +292,7 @@ impl Recipe {
         let key = match (self.cells, scan) {
             (Goal::Volume(..) | Goal::Even(_), _) => "edge",
             (Goal::Triangles(_), _) => "triangles",
-            (Goal::Finest, Scan::Image(_)) => "image",
+            (Goal::Finest, Scan::Image(..)) => "image",
             (Goal::Finest, Scan::Surface(_)) => "file",
             (Goal::Shells(ShellGoal::Shells(_)), _) => "shells",
             (Goal::Shells(ShellGoal::Error(_)), _) => "error",
@@ -293,8 +300,8 @@ impl Recipe {
         let fault = |error: MeshingError| Fault { key, message: error.to_string(), help: "" };
         let mut notes = Vec::new();
         let (mesh, doubts) = match (scan, self.cells) {
-            (Scan::Image(image), goal) => {
-                let (anatomy, cleaned) = self.anatomy(image)?;
+            (Scan::Image(image, cut), goal) => {
+                let (anatomy, cleaned) = self.anatomy(image, cut)?;
                 if self.cleaning != Cleaning::default() {
                     notes.push(cleaned.to_string());
                 }
@@ -342,9 +349,12 @@ impl Recipe {
         surface.anatomy(1, edge, &|_| {})
     }
 
-    fn anatomy(&self, image: &Image) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned), Fault> {
-        let (key, labels, chosen) = match &self.cut {
-            Cut::Enclosed => ("image", image.labels(), Vec::new()),
+    fn anatomy(
+        &self,
+        image: &Image,
+        cut: &Cut,
+    ) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned), Fault> {
+        let (key, labels, chosen) = match cut {
             Cut::From(least) => ("threshold", Ok(image.threshold(*least..=f64::INFINITY)), vec![1]),
             Cut::Labels(labels) => {
                 let key = ["image", "label", "labels"][labels.len().min(2)];
@@ -355,7 +365,7 @@ impl Recipe {
             let help = match error {
                 LabelError::NoneChosen { .. } => "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`",
                 LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
-                LabelError::Absent { .. } if matches!(self.cut, Cut::From(_)) => {
+                LabelError::Absent { .. } if matches!(cut, Cut::From(_)) => {
                     "no voxel is as large as that; use a lower threshold"
                 }
                 _ => "`pliant labels` lists the labels of an image",
