@@ -83,6 +83,13 @@ pub enum Command {
     /// Measure what a step costs on this machine.
     #[command(after_help = BENCH_HELP)]
     Bench(Bench),
+    /// Open a scene in a window: play it, pull it, look at it from all sides.
+    #[command(
+        after_help = "Examples:\n  pliant view scenes/liver\n  pliant view scenes/cube --threads 1 --set run.precision=single\n  \
+                            pliant view scenes/liver --record drag.pliant && pliant view scenes/liver --replay drag.pliant\n\n\
+                            H in the window lists its keys. The scene is read anew when its file changes."
+    )]
+    View(View),
     /// Take pictures or a film of a scene or of a finished run, without a screen.
     #[command(after_help = RENDER_HELP)]
     Render(Box<Render>),
@@ -96,6 +103,23 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+}
+
+#[derive(Debug, clap::Args)]
+pub struct View {
+    /// A scene file, or a folder with a scene.toml.
+    pub scene: PathBuf,
+    /// Write what the hand did when the window closes, to repeat it.
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Repeat what the hand did, without a window, and print what it came to as JSON: the same bits every time.
+    #[arg(long, value_name = "FILE", conflicts_with = "record")]
+    pub replay: Option<PathBuf>,
+    /// Draw so many frames, pull at the middle of the picture meanwhile, tell how it went and close.
+    #[arg(long, value_name = "N", hide = true, conflicts_with = "replay")]
+    pub test_frames: Option<u64>,
+    #[command(flatten)]
+    pub overrides: Overrides,
 }
 
 const RENDER_HELP: &str = "\
@@ -653,6 +677,7 @@ impl Command {
             | Self::Schema { .. }
             | Self::Import { .. }
             | Self::Render(_)
+            | Self::View(_)
             | Self::Reproduce(_) => false,
         }
     }

@@ -44,6 +44,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Import { model, out } => import(&model, &out),
         Command::Reproduce(arguments) => reproduce(&arguments),
         Command::Bench(arguments) => bench(&arguments),
+        Command::View(arguments) => pictures::view(&arguments),
         Command::Render(arguments) => pictures::render(&arguments),
         Command::Devices { json } => devices(json),
     }

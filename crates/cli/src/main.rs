@@ -11,6 +11,8 @@ mod pictures;
 mod report;
 mod reproduce;
 mod skin;
+#[cfg(feature = "viewer")]
+mod view;
 
 use std::process::ExitCode;
 

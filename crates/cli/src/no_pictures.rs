@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use pliant_geometry::Mesh;
 use pliant_scene::{Draw, Scene};
 
-use crate::arguments::Render;
+use crate::arguments::{Render, View};
 use crate::report::Failure;
 
 fn missing() -> Failure {
@@ -17,6 +17,10 @@ fn missing() -> Failure {
 }
 
 pub fn render(_arguments: &Render) -> Result<ExitCode, Failure> {
+    Err(missing())
+}
+
+pub fn view(_arguments: &View) -> Result<ExitCode, Failure> {
     Err(missing())
 }
 

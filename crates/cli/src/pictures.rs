@@ -15,6 +15,7 @@ use pliant_scene::{Draw, Options, OutputFolder, Scene};
 use crate::arguments::{Frames, Overrides, Render};
 use crate::commands::{INTERRUPTED, prepare_changed, stopped_by_ctrl_c};
 use crate::report::{Bar, Failure, say};
+pub use crate::view::view;
 
 impl From<PictureError> for Failure {
     fn from(error: PictureError) -> Self {
@@ -29,7 +30,7 @@ impl From<SeriesError> for Failure {
 }
 
 /// How a scene asks to be seen.
-fn look_of(scene: &Scene) -> Look {
+pub fn look_of(scene: &Scene) -> Look {
     let view = &scene.view;
     let camera = &view.camera;
     let mut look = Look {

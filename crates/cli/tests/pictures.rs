@@ -11,7 +11,7 @@ use support::{BLOCK, Workshop};
 #[test]
 fn a_build_without_pictures_tells_how_to_make_one_with_them() {
     let workshop = Workshop::new(BLOCK);
-    for arguments in [&["render", "case"][..], &["run", "case", "--picture"]] {
+    for arguments in [&["render", "case"][..], &["view", "case"], &["run", "case", "--picture"]] {
         let told = workshop.pliant(arguments);
         assert_eq!(told.code, 2, "{}", told.err);
         assert!(told.err.contains("cargo build --release --features viewer"), "{}", told.err);

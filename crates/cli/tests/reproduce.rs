@@ -15,6 +15,7 @@ fn the_list_names_every_case_in_a_line() {
         "fig-6.5",
         "fig-6.6",
         "fig-6.7",
+        "fig-6.8",
         "fig-6.9",
         "fig-6.10",
         "elements",

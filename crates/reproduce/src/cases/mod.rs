@@ -10,6 +10,7 @@ pub mod liver;
 pub mod obstacle_course;
 pub mod plate;
 pub mod reconstruction;
+pub mod real_time;
 pub mod relaxation;
 pub mod shear;
 pub mod shell_times;
@@ -23,6 +24,7 @@ pub const CASES: &[Case] = &[
     cube::DEFORMED,
     relaxation::CASE,
     cost::CASE,
+    real_time::CASE,
     framework::CASE,
     liver::CASE,
     elements::CASE,

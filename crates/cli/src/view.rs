@@ -1,0 +1,78 @@
+//! `pliant view`: what the window is given, and what it tells in the end.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use pliant_viewer::{Opening, Recording, Rehearsal, Stage, WindowError, open, replay};
+
+use crate::arguments::{Overrides, View};
+use crate::commands::prepare;
+use crate::pictures::look_of;
+use crate::report::{Failure, say};
+
+impl From<WindowError> for Failure {
+    fn from(error: WindowError) -> Self {
+        Self::plain(&error, error.remedy())
+    }
+}
+
+fn stage(path: &Path, overrides: &Overrides) -> Result<Stage, Failure> {
+    let (scene, built, plan) = prepare(path, overrides)?;
+    Ok(Stage { scene, built, plan })
+}
+
+pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
+    let stage_now = stage(&arguments.scene, &arguments.overrides)?;
+    for note in stage_now.built.notes.iter().chain(&stage_now.plan.note).chain(&stage_now.plan.target.note) {
+        eprintln!("note: {note}");
+    }
+    if let Some(file) = &arguments.replay {
+        return repeat(&stage_now, file);
+    }
+    let look = look_of(&stage_now.scene);
+    let overrides = arguments.overrides.clone();
+    let read = move |path: &Path| {
+        stage(path, &overrides).map_err(|failure| match failure {
+            Failure::Scene(errors) => errors.plain().to_string(),
+            Failure::Plain { message, .. } => message,
+        })
+    };
+    let told = open(Opening {
+        style: look.style,
+        camera: look.camera,
+        field: stage_now.scene.shown_field(),
+        component: stage_now.scene.view.component.map(|component| component.word()),
+        file: pliant_scene::scene_file(&arguments.scene),
+        stage: stage_now,
+        read: Arc::new(read),
+        record: arguments.record.clone(),
+        rehearsal: arguments.test_frames.map(|frames| Rehearsal { frames }),
+    })?;
+    if let Some(told) = told {
+        say(told)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Repeats a recording without a window, and tells what it came to.
+fn repeat(stage: &Stage, file: &Path) -> Result<ExitCode, Failure> {
+    let wrong = |error: &dyn std::fmt::Display| {
+        Failure::plain(
+            format!("`{}` is no recording: {error}", file.display()),
+            "`pliant view --record FILE` makes one",
+        )
+    };
+    let bytes = std::fs::read(file).map_err(|error| wrong(&error))?;
+    let recording = Recording::from_bytes(&bytes).map_err(|error| wrong(&error))?;
+    match replay(stage, &recording) {
+        Ok(replayed) => {
+            say(serde_json::to_string(&replayed).map_err(|error| wrong(&error))?)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Err(message) => {
+            eprintln!("error: {message}");
+            Ok(ExitCode::from(1))
+        }
+    }
+}
