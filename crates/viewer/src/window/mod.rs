@@ -1,0 +1,403 @@
+//! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
+
+mod paint;
+mod panels;
+mod picture;
+mod rehearsal;
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
+
+use eframe::egui::{self, Key};
+use eframe::wgpu;
+use pliant_geometry::Vector3;
+use pliant_picture::{Background, Camera, Extremes, Projection, Style, Subject, Target};
+use pliant_scene::format::FieldName;
+
+use self::paint::{SAMPLES, place};
+pub use self::rehearsal::Rehearsal;
+use crate::hand::Hand;
+use crate::session::{Frame, Order, Session, Stage};
+
+/// What a window opens with.
+pub struct Opening {
+    /// The scene.
+    pub stage: Stage,
+    /// How it is looked at.
+    pub style: Style,
+    /// From where; target and height are those that fit.
+    pub camera: Camera,
+    /// The field that is shown, and a component of it.
+    pub field: Option<FieldName>,
+    /// Component of that field.
+    pub component: Option<&'static str>,
+    /// The file of the scene, watched for changes.
+    pub file: PathBuf,
+    /// Reads a scene, at the start of another one or after a change; the message of what is wrong with it.
+    pub read: Arc<dyn Fn(&std::path::Path) -> Result<Stage, String> + Send + Sync>,
+    /// Where what the hand did is written when the window closes or the scene starts anew.
+    pub record: Option<PathBuf>,
+    /// Opens, does by itself what a user would, and closes.
+    pub rehearsal: Option<Rehearsal>,
+}
+
+/// A window that could not be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum WindowError {
+    /// Neither a screen nor a graphics processor, or no thread.
+    #[error("no window can be opened: {0}")]
+    Window(String),
+    /// A rehearsal that went wrong.
+    #[error("the window tried itself and failed: {0}")]
+    Rehearsal(String),
+}
+
+impl WindowError {
+    /// What to try.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Window(_) => {
+                "a window needs a screen (X11 or Wayland, with libxkbcommon-x11) and Vulkan, Metal or Direct3D 12 (Debian, \
+                 Ubuntu: `apt-get install mesa-vulkan-drivers libvulkan1 libxkbcommon-x11-0`); `pliant render` needs no screen"
+            }
+            Self::Rehearsal(_) => "",
+        }
+    }
+}
+
+/// Opens the window, and comes back once it is closed.
+///
+/// # Errors
+/// If it can't be opened, or its rehearsal fails.
+pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
+    let options = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("Pliant")
+            .with_inner_size([1280.0, 800.0])
+            .with_drag_and_drop(true),
+        depth_buffer: 32,
+        multisampling: SAMPLES as u16,
+        renderer: eframe::Renderer::Wgpu,
+        ..Default::default()
+    };
+    let outcome = Arc::<Mutex<Option<Result<String, String>>>>::default();
+    let told = outcome.clone();
+    let create = Box::new(move |context: &eframe::CreationContext<'_>| {
+        App::new(context, opening, told).map(|app| Box::new(app) as Box<dyn eframe::App>).map_err(Into::into)
+    });
+    eframe::run_native("Pliant", options, create).map_err(|error| WindowError::Window(error.to_string()))?;
+    let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
+    outcome.transpose().map_err(WindowError::Rehearsal)
+}
+
+/// Points of the curves kept.
+const MOST_SAMPLES: usize = 4000;
+
+/// What is plotted: time [s], kinetic and internal energy [J], force of the hand [N].
+type Sample = [f64; 4];
+
+struct App {
+    target: Target,
+    stage: Stage,
+    session: Session,
+    subject: Arc<Subject>,
+    frame: Frame,
+    points: Arc<Vec<Vector3>>,
+    values: Arc<Vec<f64>>,
+    fresh: bool,
+    camera: Camera,
+    home: Camera,
+    style: Style,
+    /// Whether the range stays as it is.
+    locked: bool,
+    field: Option<FieldName>,
+    component: Option<&'static str>,
+    /// Where the clip plane is, as a part of the body's extent, and its axis.
+    clip: (bool, f64, usize),
+    stiffness: f64,
+    speed: f64,
+    /// Depth plane of what the hand holds: a point on it.
+    holding: Option<Vector3>,
+    orbiting: bool,
+    help: bool,
+    samples: Vec<Sample>,
+    file: PathBuf,
+    changed: Option<SystemTime>,
+    looked: Instant,
+    read: Arc<dyn Fn(&std::path::Path) -> Result<Stage, String> + Send + Sync>,
+    /// A scene that is being read.
+    reading: Option<std::sync::mpsc::Receiver<(PathBuf, Result<Stage, String>)>>,
+    message: Option<String>,
+    frame_seconds: f64,
+    painted: Instant,
+    rehearsal: Option<Rehearsal>,
+    drawn: u64,
+    record: Option<PathBuf>,
+    outcome: Arc<Mutex<Option<Result<String, String>>>>,
+}
+
+impl App {
+    fn new(
+        context: &eframe::CreationContext<'_>,
+        opening: Opening,
+        outcome: Arc<Mutex<Option<Result<String, String>>>>,
+    ) -> Result<Self, String> {
+        let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
+        let target = Target {
+            format: state.target_format,
+            depth: wgpu::TextureFormat::Depth32Float,
+            samples: SAMPLES,
+        };
+        context.egui_ctx.set_visuals(egui::Visuals::light());
+        let Opening { stage, style, camera, field, component, file, read, record, rehearsal } = opening;
+        let (session, subject) = begin(&stage, &context.egui_ctx)?;
+        place(state, target, &subject);
+        let mut app = Self {
+            target,
+            session,
+            frame: Frame { points: subject.points.clone(), ..Frame::default() },
+            points: Arc::new(subject.points.clone()),
+            values: Arc::default(),
+            fresh: true,
+            subject,
+            stage,
+            home: camera,
+            camera,
+            locked: style.range.is_some(),
+            style: Style { background: Background::Light, ..style },
+            field,
+            component,
+            clip: (style.clip.is_some(), 0.5, 0),
+            stiffness: 200.0,
+            speed: 1.0,
+            holding: None,
+            orbiting: false,
+            help: false,
+            samples: Vec::new(),
+            changed: modified(&file),
+            file,
+            looked: Instant::now(),
+            read,
+            reading: None,
+            message: None,
+            frame_seconds: 0.0,
+            painted: Instant::now(),
+            rehearsal,
+            drawn: 0,
+            record,
+            outcome,
+        };
+        app.fit();
+        Ok(app)
+    }
+
+    fn fit(&mut self) {
+        self.camera = self.home;
+        let surface = self.subject.surface_points();
+        self.camera.fit(surface.iter().map(|&point| &self.points[point as usize]), 1.3);
+    }
+
+    /// Takes the newest instant.
+    fn look(&mut self) {
+        let (new, frame) = self.session.look();
+        if !new {
+            return;
+        }
+        // After a failure at the first instant there is nothing but the message.
+        if frame.points.len() == self.subject.points.len() {
+            Arc::make_mut(&mut self.points).clone_from(&frame.points);
+            Arc::make_mut(&mut self.values).clone_from(&frame.values);
+            self.fresh = true;
+        }
+        self.frame = frame.clone();
+        if !self.locked {
+            let mut extremes = Extremes::default();
+            extremes.add(
+                self.subject.surface_points().iter().filter_map(|&p| self.values.get(p as usize)).copied(),
+            );
+            self.style.range = extremes.range();
+        }
+        let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
+        let last = self.samples.last().map_or(-1.0, |sample| sample[0]);
+        if self.frame.time < last {
+            self.samples.clear();
+        }
+        if self.frame.time > last {
+            let energies = &self.frame.energies;
+            self.samples.push([self.frame.time, energies.kinetic, energies.internal, force]);
+            // Every second one goes, so that memory stays flat and the curve whole.
+            if self.samples.len() > MOST_SAMPLES {
+                let mut index = 0;
+                self.samples.retain(|_| {
+                    index += 1;
+                    index % 2 == 0
+                });
+            }
+        }
+    }
+
+    fn order(&self, order: Order) {
+        self.session.order(order);
+    }
+
+    fn act(&mut self, hand: Hand) {
+        self.order(Order::Hand(hand));
+    }
+
+    /// Reads the scene anew after a change of its file, or another one that was dropped.
+    fn watch(&mut self, context: &egui::Context) {
+        let dropped =
+            context.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
+        if let Some(path) = dropped {
+            self.begin_reading(path, context);
+        } else if self.looked.elapsed() > Duration::from_millis(500) && self.reading.is_none() {
+            self.looked = Instant::now();
+            let now = modified(&self.file);
+            if now.is_some() && now != self.changed {
+                self.changed = now;
+                self.begin_reading(self.file.clone(), context);
+            }
+        }
+        let Some(Ok((path, read))) = self.reading.as_ref().map(|reading| reading.try_recv()) else { return };
+        self.reading = None;
+        match read {
+            Ok(stage) => self.message = self.replace(path, stage, context).err(),
+            Err(message) => self.message = Some(message),
+        }
+    }
+
+    fn begin_reading(&mut self, path: PathBuf, context: &egui::Context) {
+        let (send, receive) = std::sync::mpsc::channel();
+        let (read, context) = (self.read.clone(), context.clone());
+        let work = move || {
+            let result = read(&path);
+            // The window may be closed by now.
+            let _ = send.send((path, result));
+            context.request_repaint();
+        };
+        self.message = Some("reading the scene …".into());
+        match std::thread::Builder::new().name("reader".into()).spawn(work) {
+            Ok(_) => self.reading = Some(receive),
+            Err(error) => self.message = Some(error.to_string()),
+        }
+    }
+
+    fn replace(&mut self, path: PathBuf, stage: Stage, context: &egui::Context) -> Result<(), String> {
+        let (session, subject) = begin(&stage, context)?;
+        self.session = session;
+        self.points = Arc::new(subject.points.clone());
+        self.values = Arc::default();
+        let other = path != self.file;
+        self.subject = subject;
+        self.stage = stage;
+        self.changed = modified(&path);
+        self.file = path;
+        self.samples.clear();
+        self.holding = None;
+        if other {
+            self.fit();
+        }
+        self.fresh = true;
+        self.session.order(Order::Show(self.field, self.component));
+        self.session.order(Order::Speed(self.speed));
+        Err(REPLACED.into())
+    }
+
+    fn keys(&mut self, context: &egui::Context) {
+        if context.egui_wants_keyboard_input() {
+            return;
+        }
+        let pressed = |key| context.input(|input| input.key_pressed(key));
+        if pressed(Key::Space) {
+            self.order(Order::Play(!self.frame.playing));
+        }
+        if pressed(Key::Period) {
+            self.order(Order::Step(1));
+        }
+        if pressed(Key::R) {
+            self.reset();
+        }
+        if pressed(Key::F) {
+            self.fit();
+        }
+        if pressed(Key::E) {
+            self.style.edges = !self.style.edges;
+        }
+        if pressed(Key::G) {
+            self.style.ghost = !self.style.ghost;
+        }
+        if pressed(Key::C) {
+            self.clip.0 = !self.clip.0;
+        }
+        if pressed(Key::L) {
+            self.locked = !self.locked;
+        }
+        if pressed(Key::O) {
+            self.home.projection = match self.camera.projection {
+                Projection::Perspective => Projection::Orthographic,
+                Projection::Orthographic => Projection::Perspective,
+            };
+            self.camera.projection = self.home.projection;
+        }
+        if pressed(Key::H) {
+            self.help = !self.help;
+        }
+    }
+
+    fn reset(&mut self) {
+        self.holding = None;
+        self.samples.clear();
+        self.order(Order::Reset);
+    }
+}
+
+/// What is told after a scene was read anew.
+const REPLACED: &str = "the scene was read anew";
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        let context = ui.ctx().clone();
+        let painted = std::mem::replace(&mut self.painted, Instant::now());
+        self.frame_seconds = 0.8 * self.frame_seconds + 0.2 * painted.elapsed().as_secs_f64();
+        let before = Arc::as_ptr(&self.subject);
+        self.watch(&context);
+        if before != Arc::as_ptr(&self.subject)
+            && let Some(state) = frame.wgpu_render_state()
+        {
+            place(state, self.target, &self.subject);
+        }
+        self.look();
+        self.keys(&context);
+        egui::Panel::top("top").show(ui, |ui| self.top(ui));
+        egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));
+        egui::Panel::bottom("plots").show(ui, |ui| self.plots(ui));
+        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.scene(ui));
+        self.rehearse(&context);
+        context.request_repaint_after(Duration::from_millis(250));
+    }
+
+    fn on_exit(&mut self) {
+        let (Some(path), Some(recording)) = (&self.record, self.session.end()) else { return };
+        let written =
+            recording.to_bytes().and_then(|bytes| std::fs::write(path, bytes).map_err(|e| e.to_string()));
+        if let Err(reason) = written {
+            eprintln!("error: `{}` cannot be written: {reason}", path.display());
+        }
+    }
+}
+
+/// Starts to play a scene, and what is drawn of it.
+fn begin(stage: &Stage, context: &egui::Context) -> Result<(Session, Arc<Subject>), String> {
+    let mut live =
+        pliant_scene::live(&stage.scene, &stage.built, &stage.plan).map_err(|failure| failure.message)?;
+    let subject = Arc::new(Subject::new(live.mesh().map_err(|failure| failure.message)?));
+    drop(live);
+    let context = context.clone();
+    let session = Session::start(stage.clone(), move || context.request_repaint());
+    Ok((session.map_err(|error| error.to_string())?, subject))
+}
+
+fn modified(path: &std::path::Path) -> Option<SystemTime> {
+    std::fs::metadata(path).ok()?.modified().ok()
+}

@@ -1,0 +1,73 @@
+//! What the window draws of bodies: the renderer in a paint callback of egui.
+
+use std::sync::Arc;
+
+use eframe::egui_wgpu::{self, CallbackResources, CallbackTrait, ScreenDescriptor};
+use eframe::{egui, wgpu};
+use pliant_geometry::Vector3;
+use pliant_picture::{Camera, Drawn, Renderer, Section, Style, Subject, Target};
+
+/// Samples a pixel.
+pub const SAMPLES: u32 = 4;
+
+/// What the paint callback draws, kept among egui's resources.
+struct Stageset {
+    renderer: Renderer,
+    drawn: Drawn,
+    section: Section,
+    subject: Arc<Subject>,
+}
+
+/// One frame for the device.
+pub struct Paint {
+    pub points: Arc<Vec<Vector3>>,
+    pub values: Arc<Vec<f64>>,
+    pub camera: Camera,
+    pub style: Style,
+    pub aspect: f64,
+    /// Set if points or values are other than at the last paint.
+    pub fresh: bool,
+}
+
+impl CallbackTrait for Paint {
+    fn prepare(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        _screen: &ScreenDescriptor,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut CallbackResources,
+    ) -> Vec<wgpu::CommandBuffer> {
+        let Some(Stageset { renderer, drawn, section, subject }) = resources.get_mut() else {
+            return Vec::new();
+        };
+        if self.fresh {
+            drawn.set(queue, &self.points, &self.values);
+        }
+        if let Some(plane) = &self.style.clip {
+            section.cut(subject, &self.points, &self.values, plane);
+            drawn.set_section(device, queue, renderer, section);
+        }
+        drawn.prepare(renderer, queue, encoder, &self.camera, &self.style, self.aspect);
+        Vec::new()
+    }
+
+    fn paint(
+        &self,
+        _info: egui::PaintCallbackInfo,
+        pass: &mut wgpu::RenderPass<'static>,
+        resources: &CallbackResources,
+    ) {
+        if let Some(Stageset { renderer, drawn, .. }) = resources.get() {
+            drawn.draw(renderer, pass, &self.style);
+        }
+    }
+}
+
+/// Brings what is drawn to the device.
+pub fn place(state: &egui_wgpu::RenderState, target: Target, subject: &Arc<Subject>) {
+    let renderer = Renderer::new(&state.device, target);
+    let drawn = Drawn::new(&state.device, &renderer, subject);
+    let stageset = Stageset { renderer, drawn, section: Section::default(), subject: subject.clone() };
+    state.renderer.write().callback_resources.insert(stageset);
+}
