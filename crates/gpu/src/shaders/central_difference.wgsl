@@ -43,12 +43,28 @@ struct Motion {
     shock: vec3f,
 }
 
+// What grips pull with at a node [N].
+fn grip_force(node: u32) -> vec3f {
+    let count = grip_count();
+    var force = vec3f(0.0);
+    for (var k = 0u; k < grip_entries(); k++) {
+        let entry = grips[1u + 2u * count + k];
+        if bitcast<u32>(entry.x) == node {
+            force += entry.y * grips[1u + count + bitcast<u32>(entry.z)].xyz;
+        }
+    }
+    return force;
+}
+
 fn motion(node: u32, internal: vec3f) -> Motion {
     let of_node = nodes[node];
     let inertia = of_node.x;
     let damping = of_node.y;
-    let held = bitcast<u32>(of_node.w);
+    let held = hold_of(of_node.w);
     var applied = external_force(node, of_node.z);
+    if (bitcast<u32>(of_node.w) & GRIPPED) != 0u {
+        applied += grip_force(node);
+    }
     var before = increment[node].xyz;
     var shock = vec3f(0.0);
     if does(STARTS) {
