@@ -49,7 +49,7 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
         record: arguments.record.clone(),
         errand: errand(arguments),
     })?;
-    if let Some(told) = told.filter(|told| !told.is_empty()) {
+    if let Some(told) = told {
         say(told)?;
     }
     Ok(ExitCode::SUCCESS)

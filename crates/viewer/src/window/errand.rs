@@ -77,30 +77,25 @@ impl Cue {
 pub(super) struct Errands {
     cues: VecDeque<Cue>,
     since: Instant,
-    told: String,
+    told: fn(&App) -> String,
 }
 
 impl Errands {
     pub(super) fn new(errand: Errand) -> Self {
-        let (cues, told) = match errand {
+        let (cues, told): (_, fn(&App) -> String) = match errand {
             Errand::Portrait { after, file } => {
                 let mut cues = VecDeque::from([
                     Cue::key("Space plays", Key::Space, |app| app.frame.playing),
                     Cue::wait("it plays", move |app| app.frame.time >= after || app.frame.failure.is_some()),
                 ]);
                 cues.extend(portrait(file));
-                (cues, String::new())
+                (cues, shown)
             }
             Errand::Rehearsal { file } => {
                 let mut cues: VecDeque<Cue> = drawing().chain((0..PICKS).map(picking)).collect();
                 cues.extend(keys().into_iter().chain(camera()).chain(pinning()).chain(pulling()));
                 cues.extend(file.into_iter().flat_map(portrait));
-                (
-                    cues,
-                    format!(
-                        "{FRAMES} frames drawn, {PICKS} pixels picked, keys, camera, pins and hand tried"
-                    ),
-                )
+                (cues, tried)
             }
         };
         Self { cues, since: Instant::now(), told }
@@ -116,7 +111,7 @@ impl Errands {
 
     /// After a frame: what is to be told once all is done, or what went wrong.
     pub(super) fn check(&mut self, app: &App) -> Option<Result<String, String>> {
-        let Some(cue) = self.cues.front_mut() else { return Some(Ok(self.told.clone())) };
+        let Some(cue) = self.cues.front_mut() else { return Some(Ok((self.told)(app))) };
         if cue.give.is_some() {
             return None;
         }
@@ -130,6 +125,17 @@ impl Errands {
             Err(wrong) => Some(Err(format!("{}: {wrong}", cue.what))),
         }
     }
+}
+
+/// What was tried.
+fn tried(_app: &App) -> String {
+    format!("{FRAMES} frames drawn, {PICKS} pixels picked, keys, camera, pins and hand tried")
+}
+
+/// What a picture of the window shows.
+fn shown(app: &App) -> String {
+    let told = app.banner().map(|text| format!(": {text}")).unwrap_or_default();
+    format!("{} at t = {:.3} s{told}", app.title(), app.frame.time)
 }
 
 fn press(key: Key, pressed: bool) -> Event {

@@ -19,7 +19,7 @@ use pliant_scene::format::FieldName;
 pub use self::errand::Errand;
 use self::errand::Errands;
 use self::paint::{SAMPLES, place};
-use self::picture::Cut;
+use self::picture::{Cut, SCALE};
 use crate::hand::{Hand, Point};
 use crate::session::{Frame, Order, Session, Stage};
 
@@ -125,8 +125,10 @@ struct App {
     hover: Option<(Point, Vector3)>,
     stiffness: f64,
     speed: f64,
-    /// Depth plane of what the hand holds: a point on it.
+    /// Where the hand is [m], while it holds something.
     holding: Option<Vector3>,
+    /// The largest force of this pull [N].
+    strongest: f64,
     orbiting: bool,
     help: bool,
     samples: Vec<Sample>,
@@ -186,6 +188,7 @@ impl App {
             stiffness: 200.0,
             speed: 1.0,
             holding: None,
+            strongest: 0.0,
             orbiting: false,
             help: false,
             samples: Vec::new(),
@@ -205,6 +208,18 @@ impl App {
         };
         app.fit();
         Ok(app)
+    }
+
+    /// What a user should know now: why it cannot go on, what was done last, what the scene warns of.
+    fn banner(&self) -> Option<String> {
+        let warnings = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
+        self.frame.failure.clone().or_else(|| self.message.clone()).or_else(|| warnings.last())
+    }
+
+    /// The scene's title, or the name of its file.
+    fn title(&self) -> String {
+        let title = &self.stage.scene.scene.title;
+        if title.is_empty() { self.file.display().to_string() } else { title.clone() }
     }
 
     /// Goes on with an errand; ends the window once it is done.
@@ -229,7 +244,11 @@ impl App {
     /// The camera that sees all, from where it starts.
     fn fitted(&self) -> Camera {
         let mut camera = self.home;
-        camera.fit(self.surface.iter().map(|&point| &self.points[point as usize]), self.aspect());
+        // Beside the scale of colours.
+        let scale = f64::from(SCALE / self.picture.height().max(SCALE));
+        let aspect = (self.aspect() - scale).max(0.5);
+        camera.fit(self.surface.iter().map(|&point| &self.points[point as usize]), aspect);
+        camera.pan(-0.5 * scale, 0.0);
         camera
     }
 
@@ -256,6 +275,7 @@ impl App {
             self.style.range = extremes.range();
         }
         let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
+        self.strongest = self.strongest.max(force);
         let last = self.samples.last().map_or(-1.0, |sample| sample[0]);
         if self.frame.time < last {
             self.samples.clear();
@@ -341,6 +361,7 @@ impl App {
         self.fresh = true;
         self.session.order(Order::Show(self.field, self.component));
         self.session.order(Order::Speed(self.speed));
+        self.session.order(Order::Play(self.frame.playing));
         Ok(())
     }
 

@@ -36,7 +36,7 @@ impl App {
                 self.help = !self.help;
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.label(&self.stage.scene.scene.title);
+                ui.label(self.title());
             });
         });
     }

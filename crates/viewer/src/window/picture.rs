@@ -5,12 +5,16 @@ use eframe::egui::{
 };
 use eframe::egui_wgpu::Callback;
 use pliant_geometry::Vector3;
-use pliant_picture::{Camera, Plane, Subject, ticks};
+use pliant_picture::{Background, Camera, Plane, Subject, ticks};
 
 use super::App;
 use super::paint::Paint;
 use crate::hand::{Hand, Point, pick};
 
+/// Width of the scale of colours on the screen.
+pub(super) const SCALE: f32 = 110.0;
+/// Length of the arrow of the strongest force of a pull on the screen.
+const ARROW: f32 = 120.0;
 /// Radius of a pin on the screen.
 const PIN_SIZE: f32 = 5.0;
 const PIN: Color32 = Color32::from_rgb(20, 90, 170);
@@ -130,6 +134,7 @@ impl App {
             match self.hit(in_picture(origin, rect)) {
                 Some((point, at)) => {
                     self.holding = Some(at);
+                    self.strongest = 0.0;
                     self.act(Hand::Take(point, self.stiffness));
                 }
                 None => self.orbiting = true,
@@ -139,6 +144,7 @@ impl App {
         if let Some(at) = self.holding {
             if response.dragged_by(PointerButton::Primary) {
                 let to = on_plane(&self.camera, &at, place, self.aspect());
+                self.holding = Some(to);
                 self.act(Hand::Pull(to.into()));
             } else {
                 self.holding = None;
@@ -189,24 +195,38 @@ impl App {
             .map(|(pin, _)| pin)
     }
 
-    /// The force of the hand as an arrow with its newtons, and pins.
+    /// The force of the hand as an arrow with its newtons, the longest where it was strongest; and pins.
     fn draw_held(&self, painter: &egui::Painter, rect: Rect) {
         let hand = self.holding.is_some();
         for (index, [point, force]) in self.frame.held.iter().enumerate() {
-            let Some(from) = to_screen(&self.camera, &Vector3::from(*point), rect) else { continue };
+            let [point, force] = [point, force].map(|v| Vector3::from(*v));
+            let Some(from) = to_screen(&self.camera, &point, rect) else { continue };
             if index > 0 || !hand {
                 painter.circle(from, PIN_SIZE, PIN, Stroke::new(1.5, Color32::WHITE));
                 continue;
             }
-            let newtons = Vector3::from(*force).norm();
-            let along = Vector3::from(*force) / self.stiffness.max(1e-9);
-            let Some(to) = to_screen(&self.camera, &(Vector3::from(*point) + along), rect) else { continue };
-            painter.circle_filled(from, 4.0, FORCE);
-            painter.arrow(from, to - from, Stroke::new(2.5, FORCE));
+            painter.circle(from, 4.0, FORCE, Stroke::new(1.0, Color32::WHITE));
+            let newtons = force.norm();
+            let unit = f64::from(ARROW / rect.height()) * self.camera.height / self.strongest.max(1e-12);
+            let Some(to) = to_screen(&self.camera, &(point + force * unit), rect) else { continue };
+            if from.distance(to) > 2.0 {
+                painter.arrow(from, to - from, Stroke::new(5.0, Color32::WHITE));
+                painter.arrow(from, to - from, Stroke::new(3.0, FORCE));
+            }
             let text =
                 if newtons >= 1.0 { format!("{newtons:.2} N") } else { format!("{:.1} mN", 1e3 * newtons) };
-            painter.text(to + vec2(10.0, -8.0), Align2::LEFT_BOTTOM, text, FontId::proportional(16.0), FORCE);
+            let galley = painter.layout_no_wrap(text, FontId::proportional(16.0), FORCE);
+            let place = Rect::from_min_size(to + vec2(14.0, -galley.size().y), galley.size());
+            self.card(painter, place);
+            painter.galley(place.min, galley, FORCE);
         }
+    }
+
+    /// What text stands on, so that it can be read over a body.
+    fn card(&self, painter: &egui::Painter, place: Rect) {
+        let dark = self.style.background == Background::Dark;
+        let pale = if dark { Color32::from_black_alpha(150) } else { Color32::from_white_alpha(170) };
+        painter.rect_filled(place.expand(6.0), 5.0, pale);
     }
 
     /// The colour of what is written over the picture.
@@ -223,6 +243,7 @@ impl App {
             Pos2::new(rect.right() - 60.0, (rect.bottom() - 60.0).max(rect.top() + 90.0)),
         );
         let ink = self.ink();
+        self.card(painter, Rect::from_min_max(bar.min - vec2(36.0, 46.0), bar.max + vec2(52.0, 8.0)));
         let component = self.component.map(|part| format!(" {part}")).unwrap_or_default();
         let head = format!("{}{component}", field.title());
         let right = Pos2::new(rect.right() - 12.0, bar.top() - 34.0);
@@ -277,16 +298,11 @@ impl App {
         let energies = &frame.energies;
         lines.push(format!("kinetic {:.3e} J, internal {:.3e} J", energies.kinetic, energies.internal));
         let ink = self.ink();
-        painter.text(
-            rect.min + vec2(12.0, 10.0),
-            Align2::LEFT_TOP,
-            lines.join("\n"),
-            FontId::proportional(14.0),
-            ink,
-        );
-        let notes = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
-        let banner = frame.failure.clone().or_else(|| self.message.clone()).or_else(|| notes.last());
-        if let Some(text) = banner {
+        let galley = painter.layout_no_wrap(lines.join("\n"), FontId::proportional(14.0), ink);
+        let place = Rect::from_min_size(rect.min + vec2(12.0, 10.0), galley.size());
+        self.card(painter, place);
+        painter.galley(place.min, galley, ink);
+        if let Some(text) = self.banner() {
             let colour = if frame.failure.is_some() { FAILED } else { WARNING };
             let width = rect.width() - 40.0;
             let galley = painter.layout(text, FontId::proportional(15.0), Color32::from_gray(20), width);
