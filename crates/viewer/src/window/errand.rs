@@ -87,6 +87,7 @@ impl Errands {
                 let mut cues = VecDeque::from([
                     Cue::key("Space plays", Key::Space, |app| app.frame.playing),
                     Cue::wait("it plays", move |app| app.frame.time >= after || app.frame.failure.is_some()),
+                    Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
                 ]);
                 cues.extend(portrait(file));
                 (cues, shown)
