@@ -11,4 +11,4 @@ pub use hand::{Hand, Hold, Point, Recording, pick};
 pub use replay::{Replayed, replay};
 pub use session::{Frame, Order, Session, Stage};
 #[cfg(feature = "window")]
-pub use window::{Opening, Rehearsal, WindowError, open};
+pub use window::{Errand, Opening, WindowError, open};
