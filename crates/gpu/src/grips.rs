@@ -33,11 +33,15 @@ impl DeviceGrips {
     /// Takes these grips; as instant.wgsl reads them.
     pub(crate) fn take(&mut self, model: &Model, grips: &[Grip]) -> Vec<Four> {
         let number = |n: usize| f32::from_bits(n as u32);
-        self.nodes = grips.iter().flat_map(|grip| &grip.nodes).map(|&(node, _)| node).collect();
-        let entries = self.nodes.len();
-        self.nodes.sort_unstable();
+        self.kernel.dispatch_groups(grips.len() as u32);
+        let of_grip = |(index, grip): (usize, &'_ Grip)| {
+            grip.nodes.iter().map(|&(node, weight)| (node, weight, index)).collect::<Vec<_>>()
+        };
+        let mut entries: Vec<_> = grips.iter().enumerate().flat_map(of_grip).collect();
+        entries.sort_by_key(|&(node, ..)| node);
+        self.nodes = entries.iter().map(|&(node, ..)| node).collect();
         self.nodes.dedup();
-        let mut numbers = vec![[number(grips.len()), number(entries), 0.0, 0.0]];
+        let mut numbers = vec![[number(grips.len()), number(entries.len()), 0.0, 0.0]];
         for grip in grips {
             let rest = grip
                 .nodes
@@ -47,11 +51,8 @@ impl DeviceGrips {
             numbers.push([x, y, z, grip.stiffness as f32]);
         }
         numbers.resize(1 + 2 * grips.len(), Four::default());
-        for (index, grip) in grips.iter().enumerate() {
-            let entry =
-                |&(node, weight): &(u32, f64)| [f32::from_bits(node), weight as f32, number(index), 0.0];
-            numbers.extend(grip.nodes.iter().map(entry));
-        }
+        let entry = |(node, weight, grip)| [f32::from_bits(node), weight as f32, number(grip), 0.0];
+        numbers.extend(entries.into_iter().map(entry));
         numbers
     }
 }

@@ -45,13 +45,22 @@ struct Motion {
 
 // What grips pull with at a node [N].
 fn grip_force(node: u32) -> vec3f {
-    let count = grip_count();
-    var force = vec3f(0.0);
-    for (var k = 0u; k < grip_entries(); k++) {
-        let entry = grips[1u + 2u * count + k];
-        if bitcast<u32>(entry.x) == node {
-            force += entry.y * grips[1u + count + bitcast<u32>(entry.z)].xyz;
+    let forces = 1u + grip_count();
+    let first = forces + grip_count();
+    let end = first + grip_entries();
+    // The first entry of the node: they are in the order of nodes.
+    var k = first;
+    for (var most = end; k < most;) {
+        let middle = (k + most) / 2u;
+        if bitcast<u32>(grips[middle].x) < node {
+            k = middle + 1u;
+        } else {
+            most = middle;
         }
+    }
+    var force = vec3f(0.0);
+    for (; k < end && bitcast<u32>(grips[k].x) == node; k++) {
+        force += grips[k].y * grips[forces + bitcast<u32>(grips[k].z)].xyz;
     }
     return force;
 }

@@ -40,8 +40,8 @@ const LARGEST_STRAIN = 3u;
 // For each instant of a submission the factors of constraints, those of loads, and the gravity of bodies.
 @group(0) @binding(2) var<storage, read> table: array<f32>;
 
-// How many grips and entries there are; of each grip p − Σ wᵢ Xᵢ [m] and its stiffness [N/m]; the force of each [N]; entries: a
-// node, its weight wᵢ and its grip.
+// How many grips and entries there are; of each grip p − Σ wᵢ Xᵢ [m] and its stiffness [N/m]; the force of each [N]; entries in
+// the order of nodes: a node, its weight wᵢ and its grip.
 @group(0) @binding(3) var<storage, read_write> grips: array<vec4f>;
 
 fn grip_count() -> u32 {
