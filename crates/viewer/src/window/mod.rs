@@ -2,9 +2,12 @@
 
 mod paint;
 mod panels;
+mod parameters;
 mod picture;
+mod plots;
 mod rehearsal;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
@@ -16,8 +19,10 @@ use pliant_picture::{Background, Camera, Extremes, Projection, Style, Subject, T
 use pliant_scene::format::FieldName;
 
 use self::paint::{SAMPLES, place};
+use self::parameters::Numbers;
 pub use self::rehearsal::Rehearsal;
 use crate::hand::Hand;
+use crate::samples::Samples;
 use crate::session::{Frame, Order, Session, Stage};
 
 /// What a window opens with.
@@ -91,12 +96,6 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     outcome.transpose().map_err(WindowError::Rehearsal)
 }
 
-/// Points of the curves kept.
-const MOST_SAMPLES: usize = 4000;
-
-/// What is plotted: time [s], kinetic and internal energy [J], force of the hand [N].
-type Sample = [f64; 4];
-
 struct App {
     target: Target,
     stage: Stage,
@@ -121,7 +120,12 @@ struct App {
     holding: Option<Vector3>,
     orbiting: bool,
     help: bool,
-    samples: Vec<Sample>,
+    numbers: Numbers,
+    samples: Samples,
+    /// Names of the curves that are plotted.
+    plotted: BTreeSet<String>,
+    /// Points that the user follows.
+    probes: usize,
     file: PathBuf,
     changed: Option<SystemTime>,
     looked: Instant,
@@ -161,6 +165,7 @@ impl App {
             values: Arc::default(),
             fresh: true,
             subject,
+            numbers: Numbers::of(&stage.scene),
             stage,
             home: camera,
             camera,
@@ -174,7 +179,9 @@ impl App {
             holding: None,
             orbiting: false,
             help: false,
-            samples: Vec::new(),
+            samples: Samples::default(),
+            plotted: plots::usual(),
+            probes: 0,
             changed: modified(&file),
             file,
             looked: Instant::now(),
@@ -189,6 +196,9 @@ impl App {
             outcome,
         };
         app.fit();
+        if app.record.is_some() {
+            app.order(Order::Record);
+        }
         Ok(app)
     }
 
@@ -218,23 +228,7 @@ impl App {
             );
             self.style.range = extremes.range();
         }
-        let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
-        let last = self.samples.last().map_or(-1.0, |sample| sample[0]);
-        if self.frame.time < last {
-            self.samples.clear();
-        }
-        if self.frame.time > last {
-            let energies = &self.frame.energies;
-            self.samples.push([self.frame.time, energies.kinetic, energies.internal, force]);
-            // Every second one goes, so that memory stays flat and the curve whole.
-            if self.samples.len() > MOST_SAMPLES {
-                let mut index = 0;
-                self.samples.retain(|_| {
-                    index += 1;
-                    index % 2 == 0
-                });
-            }
-        }
+        self.samples.take(&self.frame);
     }
 
     fn order(&self, order: Order) {
@@ -290,6 +284,8 @@ impl App {
         self.values = Arc::default();
         let other = path != self.file;
         self.subject = subject;
+        self.numbers = Numbers::of(&stage.scene);
+        self.forget_probes();
         self.stage = stage;
         self.changed = modified(&path);
         self.file = path;
@@ -299,6 +295,9 @@ impl App {
             self.fit();
         }
         self.fresh = true;
+        if self.record.is_some() {
+            self.session.order(Order::Record);
+        }
         self.session.order(Order::Show(self.field, self.component));
         self.session.order(Order::Speed(self.speed));
         Err(REPLACED.into())

@@ -242,7 +242,8 @@ impl App {
             ink,
         );
         let notes = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
-        let banner = frame.failure.clone().or_else(|| self.message.clone()).or_else(|| notes.last());
+        let banner = frame.failure.clone().or_else(|| self.message.clone());
+        let banner = banner.or_else(|| frame.note.clone()).or_else(|| notes.last());
         if let Some(text) = banner {
             let colour = if frame.failure.is_some() { FAILED } else { WARNING };
             let width = rect.width() - 40.0;
