@@ -115,9 +115,15 @@ pub struct View {
     /// Repeat what the hand did, without a window, and print what it came to as JSON: the same bits every time.
     #[arg(long, value_name = "FILE", conflicts_with = "record")]
     pub replay: Option<PathBuf>,
-    /// Draw so many frames, pull at the middle of the picture meanwhile, tell how it went and close.
-    #[arg(long, value_name = "N", hide = true, conflicts_with = "replay")]
-    pub test_frames: Option<u64>,
+    /// Play, write a picture of the window as PNG, and close.
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    pub screenshot: Option<PathBuf>,
+    /// Simulated time before the picture of the window [s].
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, requires = "screenshot")]
+    pub after: f64,
+    /// Try mouse and keys by itself, tell how it went and close; the picture of the window is taken while the hand pulls.
+    #[arg(long, conflicts_with = "replay")]
+    pub rehearse: bool,
     #[command(flatten)]
     pub overrides: Overrides,
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use pliant_viewer::{Opening, Recording, Rehearsal, Stage, WindowError, open, replay};
+use pliant_viewer::{Errand, Opening, Recording, Stage, WindowError, open, replay};
 
 use crate::arguments::{Overrides, View};
 use crate::commands::prepare;
@@ -47,12 +47,22 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
         stage: stage_now,
         read: Arc::new(read),
         record: arguments.record.clone(),
-        rehearsal: arguments.test_frames.map(|frames| Rehearsal { frames }),
+        errand: errand(arguments),
     })?;
     if let Some(told) = told {
         say(told)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What the window does by itself.
+fn errand(arguments: &View) -> Option<Errand> {
+    let file = arguments.screenshot.clone();
+    match file {
+        _ if arguments.rehearse => Some(Errand::Rehearsal { file }),
+        Some(file) => Some(Errand::Portrait { after: arguments.after, file }),
+        None => None,
+    }
 }
 
 /// Repeats a recording without a window, and tells what it came to.

@@ -6,6 +6,7 @@ mod support;
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 use support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
 
@@ -45,28 +46,93 @@ fn view(workshop: &Workshop, screen: &Screen, more: &[&str]) -> Told {
     command.output().expect("the binary starts").into()
 }
 
+/// A ball that is held at one end and damped, so that it comes to rest where it is pulled.
+const BALL: &str = r#"[scene]
+title = "A ball"
+until = 100
+[run]
+threads = 1
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 5e3
+poisson-ratio = 0.4
+[body.ball]
+mesh = { ellipsoid = { radii = [0.05, 0.04, 0.03] }, edge = 0.012 }
+law = "tissue"
+density = 1000
+damping = 60
+[constraint.base]
+type = "fix"
+body = "ball"
+nodes = { half-space = { point = [-0.03, 0, 0], normal = [-1, 0, 0] } }
+"#;
+
 #[test]
-fn the_window_opens_draws_pulls_and_what_it_did_is_repeated_bit_by_bit() {
+fn the_window_draws_picks_pins_and_pulls_and_what_holds_the_body_holds_against_the_hand() {
     if !has_graphics_processor() {
         return;
     }
     let Some(screen) = Screen::start() else { return };
-    let workshop = Workshop::new(&changed(BLOCK, "until = 0.02", "until = 20"));
-    let told = view(&workshop, &screen, &["--test-frames", "10", "--record", "drag"]);
+    let workshop = Workshop::new(BALL);
+    let told = view(&workshop, &screen, &["--rehearse", "--record", "drag", "--screenshot", "window.png"]);
     assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.out.contains("10 frames drawn") && told.out.contains("the hand pulls with"), "{}", told.out);
-    assert!(told.out.contains("input lag"), "{}", told.out);
-    let repeat = || workshop.pliant(&["view", "case", "--replay", "drag"]);
-    let (once, twice) = (repeat(), repeat());
+    assert!(told.out.contains("10 frames drawn, 100 pixels picked"), "{}", told.out);
+    let picture = std::fs::read(workshop.path("window.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG") && picture.len() > 20_000, "{} bytes", picture.len());
+
+    // The hand still pulled when it closed: the base holds with the same force, and a replay comes to the same bits.
+    let replay = || workshop.pliant(&["view", "case", "--replay", "drag"]);
+    let (once, twice) = (replay(), replay());
     assert_eq!(once.code, 0, "{}", once.err);
-    assert_eq!(once.json(), twice.json());
-    assert!(once.json()["largest_force"].as_f64().unwrap() > 0.0, "{}", once.out);
+    let (once, twice) = (once.json(), twice.json());
+    assert_eq!(once, twice);
+    let vector = |value: &serde_json::Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    let (hand, base) = (vector(&once["held"][1]), vector(&once["reactions"][0]));
+    let size = hand.iter().map(|f| f * f).sum::<f64>().sqrt();
+    assert!(size > 0.01, "{once}");
+    for (hand, base) in hand.iter().zip(base) {
+        assert!((hand + base).abs() < 1e-3 * size, "{once}");
+    }
+}
+
+#[test]
+fn the_window_takes_a_picture_of_itself_and_reads_a_scene_that_changed_while_it_is_open() {
+    if !has_graphics_processor() {
+        return;
+    }
+    let Some(screen) = Screen::start() else { return };
+    let workshop = Workshop::new(BALL);
+    let start = |after: &str| {
+        let mut command = workshop.command(&["view", "case", "--screenshot", "window.png", "--after", after]);
+        command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary starts")
+    };
+    let window = start("0.1");
+    let told: Told = window.wait_with_output().unwrap().into();
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.starts_with("A ball at t = "), "{}", told.out);
+    assert!(std::fs::read(workshop.path("window.png")).unwrap().starts_with(b"\x89PNG"));
+
+    // Simulated time begins anew with the scene that was read.
+    let window = start("8");
+    std::thread::sleep(Duration::from_secs(5));
+    workshop.write("case/scene.toml", changed(BALL, "A ball", "Another ball"));
+    let told: Told = window.wait_with_output().unwrap().into();
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.starts_with("Another ball at t = "), "{}", told.out);
+    assert!(told.out.contains("the scene was read anew"), "{}", told.out);
+
+    let told = view(&workshop, &screen, &["--screenshot", "nowhere/window.png", "--after", "0"]);
+    assert_eq!(told.code, 2, "{}", told.err);
+    assert!(told.err.contains("nowhere/window.png"), "{}", told.err);
 }
 
 #[test]
 fn without_a_screen_it_says_what_it_needs() {
     let workshop = Workshop::new(BLOCK);
-    let mut command = workshop.command(&["view", "case", "--test-frames", "1"]);
+    let mut command = workshop.command(&["view", "case", "--rehearse"]);
     let told: Told = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().unwrap().into();
     assert_eq!(told.code, 2, "{}", told.err);
     assert!(

@@ -15,4 +15,4 @@ pub use replay::{Done, Lags, Move, Recording, Replayed, replay, replay_in_real_t
 pub use samples::Samples;
 pub use session::{Frame, Order, Session, Stage};
 #[cfg(feature = "window")]
-pub use window::{Opening, Rehearsal, WindowError, open};
+pub use window::{Errand, Opening, WindowError, open};

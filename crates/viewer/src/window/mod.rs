@@ -1,27 +1,30 @@
 //! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
 
+mod errand;
 mod paint;
 mod panels;
 mod parameters;
 mod picture;
 mod plots;
-mod rehearsal;
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
-use eframe::egui::{self, Key};
+use eframe::egui::{self, Key, Rect};
 use eframe::wgpu;
 use pliant_geometry::Vector3;
-use pliant_picture::{Background, Camera, Extremes, Projection, Style, Subject, Target};
+use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
 use pliant_scene::format::FieldName;
 
+pub use self::errand::Errand;
+use self::errand::Errands;
 use self::paint::{SAMPLES, place};
 use self::parameters::Numbers;
-pub use self::rehearsal::Rehearsal;
-use crate::hand::Hand;
+use self::picture::{Cut, SCALE};
+use crate::hand::{Hand, Point};
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session, Stage};
 
@@ -43,8 +46,8 @@ pub struct Opening {
     pub read: Arc<dyn Fn(&std::path::Path) -> Result<Stage, String> + Send + Sync>,
     /// Where what the hand did is written when the window closes or the scene starts anew.
     pub record: Option<PathBuf>,
-    /// Opens, does by itself what a user would, and closes.
-    pub rehearsal: Option<Rehearsal>,
+    /// What it does by itself before it closes; without, it stays open.
+    pub errand: Option<Errand>,
 }
 
 /// A window that could not be opened.
@@ -53,9 +56,9 @@ pub enum WindowError {
     /// Neither a screen nor a graphics processor, or no thread.
     #[error("no window can be opened: {0}")]
     Window(String),
-    /// A rehearsal that went wrong.
-    #[error("the window tried itself and failed: {0}")]
-    Rehearsal(String),
+    /// An errand that went wrong.
+    #[error("the window: {0}")]
+    Errand(String),
 }
 
 impl WindowError {
@@ -66,7 +69,7 @@ impl WindowError {
                 "a window needs a screen (X11 or Wayland, with libxkbcommon-x11) and Vulkan, Metal or Direct3D 12 (Debian, \
                  Ubuntu: `apt-get install mesa-vulkan-drivers libvulkan1 libxkbcommon-x11-0`); `pliant render` needs no screen"
             }
-            Self::Rehearsal(_) => "",
+            Self::Errand(_) => "",
         }
     }
 }
@@ -74,7 +77,7 @@ impl WindowError {
 /// Opens the window, and comes back once it is closed.
 ///
 /// # Errors
-/// If it can't be opened, or its rehearsal fails.
+/// If it can't be opened, or its errand fails.
 pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
@@ -93,7 +96,7 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     });
     eframe::run_native("Pliant", options, create).map_err(|error| WindowError::Window(error.to_string()))?;
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
-    outcome.transpose().map_err(WindowError::Rehearsal)
+    outcome.transpose().map_err(WindowError::Errand)
 }
 
 struct App {
@@ -112,12 +115,19 @@ struct App {
     locked: bool,
     field: Option<FieldName>,
     component: Option<&'static str>,
-    /// Where the clip plane is, as a part of the body's extent, and its axis.
-    clip: (bool, f64, usize),
+    cut: Cut,
+    /// Points on the surface, increasing.
+    surface: Vec<u32>,
+    /// Where the picture is in the window, in egui's points.
+    picture: Rect,
+    /// What lies under the mouse, and where.
+    hover: Option<(Point, Vector3)>,
     stiffness: f64,
     speed: f64,
-    /// Depth plane of what the hand holds: a point on it.
+    /// Where the hand is [m], while it holds something.
     holding: Option<Vector3>,
+    /// The largest force of this pull [N].
+    strongest: f64,
     orbiting: bool,
     help: bool,
     numbers: Numbers,
@@ -131,12 +141,14 @@ struct App {
     looked: Instant,
     read: Arc<dyn Fn(&std::path::Path) -> Result<Stage, String> + Send + Sync>,
     /// A scene that is being read.
-    reading: Option<std::sync::mpsc::Receiver<(PathBuf, Result<Stage, String>)>>,
+    reading: Option<Receiver<(PathBuf, Result<(Stage, Arc<Subject>), String>)>>,
     message: Option<String>,
     frame_seconds: f64,
     painted: Instant,
-    rehearsal: Option<Rehearsal>,
+    errands: Option<Errands>,
+    /// Frames drawn.
     drawn: u64,
+    context: egui::Context,
     record: Option<PathBuf>,
     outcome: Arc<Mutex<Option<Result<String, String>>>>,
 }
@@ -154,8 +166,9 @@ impl App {
             samples: SAMPLES,
         };
         context.egui_ctx.set_visuals(egui::Visuals::light());
-        let Opening { stage, style, camera, field, component, file, read, record, rehearsal } = opening;
-        let (session, subject) = begin(&stage, &context.egui_ctx)?;
+        let Opening { stage, style, camera, field, component, file, read, record, errand } = opening;
+        let subject = seen(&stage)?;
+        let session = begin(&stage, &context.egui_ctx)?;
         place(state, target, &subject);
         let mut app = Self {
             target,
@@ -164,19 +177,23 @@ impl App {
             points: Arc::new(subject.points.clone()),
             values: Arc::default(),
             fresh: true,
-            subject,
             numbers: Numbers::of(&stage.scene),
             stage,
             home: camera,
             camera,
             locked: style.range.is_some(),
-            style: Style { background: Background::Light, ..style },
+            style,
             field,
             component,
-            clip: (style.clip.is_some(), 0.5, 0),
+            cut: Cut::new(style.clip, &subject),
+            surface: subject.surface_points(),
+            subject,
+            picture: Rect::ZERO,
+            hover: None,
             stiffness: 200.0,
             speed: 1.0,
             holding: None,
+            strongest: 0.0,
             orbiting: false,
             help: false,
             samples: Samples::default(),
@@ -190,8 +207,9 @@ impl App {
             message: None,
             frame_seconds: 0.0,
             painted: Instant::now(),
-            rehearsal,
+            errands: errand.map(Errands::new),
             drawn: 0,
+            context: context.egui_ctx.clone(),
             record,
             outcome,
         };
@@ -202,10 +220,51 @@ impl App {
         Ok(app)
     }
 
+    /// What a user should know now: why it cannot go on, what was done last, what the scene warns of.
+    fn banner(&self) -> Option<String> {
+        let warnings = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
+        let told = self.frame.failure.clone().or_else(|| self.message.clone());
+        told.or_else(|| self.frame.note.clone()).or_else(|| warnings.last())
+    }
+
+    /// The scene's title, or the name of its file.
+    fn title(&self) -> String {
+        let title = &self.stage.scene.scene.title;
+        if title.is_empty() { self.file.display().to_string() } else { title.clone() }
+    }
+
+    /// Goes on with an errand; ends the window once it is done.
+    fn go_on_errand(&mut self) {
+        let Some(mut errands) = self.errands.take() else { return };
+        self.context.request_repaint();
+        match errands.check(self) {
+            None => self.errands = Some(errands),
+            Some(told) => {
+                *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(told);
+                self.context.send_viewport_cmd(egui::ViewportCommand::Close);
+            }
+        }
+    }
+
+    /// Widths a height of the picture.
+    fn aspect(&self) -> f64 {
+        let size = self.picture.size();
+        if size.y > 0.0 { f64::from(size.x / size.y) } else { 1.3 }
+    }
+
+    /// The camera that sees all, from where it starts.
+    fn fitted(&self) -> Camera {
+        let mut camera = self.home;
+        // Beside the scale of colours.
+        let scale = f64::from(SCALE / self.picture.height().max(SCALE));
+        let aspect = (self.aspect() - scale).max(0.5);
+        camera.fit(self.surface.iter().map(|&point| &self.points[point as usize]), aspect);
+        camera.pan(-0.5 * scale, 0.0);
+        camera
+    }
+
     fn fit(&mut self) {
-        self.camera = self.home;
-        let surface = self.subject.surface_points();
-        self.camera.fit(surface.iter().map(|&point| &self.points[point as usize]), 1.3);
+        self.camera = self.fitted();
     }
 
     /// Takes the newest instant.
@@ -223,11 +282,11 @@ impl App {
         self.frame = frame.clone();
         if !self.locked {
             let mut extremes = Extremes::default();
-            extremes.add(
-                self.subject.surface_points().iter().filter_map(|&p| self.values.get(p as usize)).copied(),
-            );
+            extremes.add(self.surface.iter().filter_map(|&point| self.values.get(point as usize)).copied());
             self.style.range = extremes.range();
         }
+        let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
+        self.strongest = self.strongest.max(force);
         self.samples.take(&self.frame);
     }
 
@@ -255,17 +314,18 @@ impl App {
         }
         let Some(Ok((path, read))) = self.reading.as_ref().map(|reading| reading.try_recv()) else { return };
         self.reading = None;
-        match read {
-            Ok(stage) => self.message = self.replace(path, stage, context).err(),
-            Err(message) => self.message = Some(message),
-        }
+        let replaced = read.and_then(|(stage, subject)| self.replace(path, stage, subject));
+        self.message = Some(replaced.err().unwrap_or_else(|| REPLACED.into()));
     }
 
     fn begin_reading(&mut self, path: PathBuf, context: &egui::Context) {
-        let (send, receive) = std::sync::mpsc::channel();
+        let (send, receive) = channel();
         let (read, context) = (self.read.clone(), context.clone());
         let work = move || {
-            let result = read(&path);
+            let result = read(&path).and_then(|stage| {
+                let subject = seen(&stage)?;
+                Ok((stage, subject))
+            });
             // The window may be closed by now.
             let _ = send.send((path, result));
             context.request_repaint();
@@ -277,12 +337,14 @@ impl App {
         }
     }
 
-    fn replace(&mut self, path: PathBuf, stage: Stage, context: &egui::Context) -> Result<(), String> {
-        let (session, subject) = begin(&stage, context)?;
-        self.session = session;
+    fn replace(&mut self, path: PathBuf, stage: Stage, subject: Arc<Subject>) -> Result<(), String> {
+        let before = std::mem::replace(&mut self.session, begin(&stage, &self.context)?);
+        // A long step ends in its own time.
+        std::thread::spawn(move || drop(before));
         self.points = Arc::new(subject.points.clone());
         self.values = Arc::default();
         let other = path != self.file;
+        self.surface = subject.surface_points();
         self.subject = subject;
         self.numbers = Numbers::of(&stage.scene);
         self.forget_probes();
@@ -300,7 +362,8 @@ impl App {
         }
         self.session.order(Order::Show(self.field, self.component));
         self.session.order(Order::Speed(self.speed));
-        Err(REPLACED.into())
+        self.session.order(Order::Play(self.frame.playing));
+        Ok(())
     }
 
     fn keys(&mut self, context: &egui::Context) {
@@ -327,7 +390,7 @@ impl App {
             self.style.ghost = !self.style.ghost;
         }
         if pressed(Key::C) {
-            self.clip.0 = !self.clip.0;
+            self.cut.on = !self.cut.on;
         }
         if pressed(Key::L) {
             self.locked = !self.locked;
@@ -372,8 +435,16 @@ impl eframe::App for App {
         egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));
         egui::Panel::bottom("plots").show(ui, |ui| self.plots(ui));
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.scene(ui));
-        self.rehearse(&context);
+        self.drawn += 1;
+        self.go_on_errand();
         context.request_repaint_after(Duration::from_millis(250));
+    }
+
+    fn raw_input_hook(&mut self, _context: &egui::Context, input: &mut egui::RawInput) {
+        if let Some(mut errands) = self.errands.take() {
+            errands.give(self, &mut input.events);
+            self.errands = Some(errands);
+        }
     }
 
     fn on_exit(&mut self) {
@@ -386,15 +457,17 @@ impl eframe::App for App {
     }
 }
 
-/// Starts to play a scene, and what is drawn of it.
-fn begin(stage: &Stage, context: &egui::Context) -> Result<(Session, Arc<Subject>), String> {
-    let mut live =
-        pliant_scene::live(&stage.scene, &stage.built, &stage.plan).map_err(|failure| failure.message)?;
-    let subject = Arc::new(Subject::new(live.mesh().map_err(|failure| failure.message)?));
-    drop(live);
+/// What is drawn of a scene.
+fn seen(stage: &Stage) -> Result<Arc<Subject>, String> {
+    let live = pliant_scene::live(&stage.scene, &stage.built, &stage.plan);
+    let mut live = live.map_err(|failure| failure.message)?;
+    Ok(Arc::new(Subject::new(live.mesh().map_err(|failure| failure.message)?)))
+}
+
+/// Starts to play a scene.
+fn begin(stage: &Stage, context: &egui::Context) -> Result<Session, String> {
     let context = context.clone();
-    let session = Session::start(stage.clone(), move || context.request_repaint());
-    Ok((session.map_err(|error| error.to_string())?, subject))
+    Session::start(stage.clone(), move || context.request_repaint()).map_err(|error| error.to_string())
 }
 
 fn modified(path: &std::path::Path) -> Option<SystemTime> {

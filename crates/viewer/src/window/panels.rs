@@ -35,7 +35,7 @@ impl App {
                 self.help = !self.help;
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.label(&self.stage.scene.scene.title);
+                ui.label(self.title());
             });
         });
     }
@@ -86,14 +86,15 @@ impl App {
         ui.heading("Shape");
         ui.checkbox(&mut self.style.edges, "Edges of the elements").on_hover_text("E");
         ui.checkbox(&mut self.style.ghost, "Shape at rest").on_hover_text("G");
-        ui.checkbox(&mut self.clip.0, "Section").on_hover_text("C");
-        if self.clip.0 {
+        ui.checkbox(&mut self.cut.on, "Section").on_hover_text("C");
+        if self.cut.on {
             ui.horizontal(|ui| {
-                for (axis, word) in ["x", "y", "z"].into_iter().enumerate() {
-                    ui.selectable_value(&mut self.clip.2, axis, word);
+                for (word, normal) in [("x", Vector3::x()), ("y", Vector3::y()), ("z", Vector3::z())] {
+                    ui.selectable_value(&mut self.cut.normal, normal, word);
+                    ui.selectable_value(&mut self.cut.normal, -normal, format!("−{word}"));
                 }
             });
-            ui.add(egui::Slider::new(&mut self.clip.1, 0.0..=1.0).show_value(false));
+            ui.add(egui::Slider::new(&mut self.cut.part, 0.0..=1.0).show_value(false));
         }
         ui.separator();
         ui.heading("Hand");

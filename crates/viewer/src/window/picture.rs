@@ -1,16 +1,22 @@
 //! The picture in the middle: what the mouse does in it, and what is written over it.
 
 use eframe::egui::{
-    self, Align2, Color32, FontId, Key, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, vec2,
+    self, Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, vec2,
 };
 use eframe::egui_wgpu::Callback;
 use pliant_geometry::Vector3;
-use pliant_picture::{Camera, Plane, ticks};
+use pliant_picture::{Background, Camera, Plane, Subject, ticks};
 
 use super::App;
 use super::paint::Paint;
-use crate::hand::{Hand, pick};
+use crate::hand::{Hand, Point, pick};
 
+/// Width of the scale of colours on the screen.
+pub(super) const SCALE: f32 = 110.0;
+/// Length of the arrow of the strongest force of a pull on the screen.
+const ARROW: f32 = 120.0;
+/// Radius of a pin on the screen.
+const PIN_SIZE: f32 = 5.0;
 const PIN: Color32 = Color32::from_rgb(20, 90, 170);
 const FORCE: Color32 = Color32::from_rgb(190, 40, 40);
 const WARNING: Color32 = Color32::from_rgb(250, 225, 150);
@@ -19,7 +25,7 @@ const FAILED: Color32 = Color32::from_rgb(245, 180, 170);
 /// Keys and what they do, as in `docs/viewer.md`.
 const KEYS: [(&str, &str); 14] = [
     ("drag the body", "pull it"),
-    ("Ctrl + click the body", "pin it"),
+    ("Ctrl or P + click", "pin it; on a pin, take it away"),
     ("drag beside it", "turn the view"),
     ("right drag", "turn the view; with Shift move it"),
     ("wheel", "zoom"),
@@ -34,26 +40,46 @@ const KEYS: [(&str, &str); 14] = [
     ("drop a scene", "open it"),
 ];
 
-impl App {
-    pub(super) fn plane(&self) -> Option<Plane> {
-        let (on, part, axis) = self.clip;
-        if !on {
-            return None;
-        }
-        let mut normal = Vector3::zeros();
-        normal[axis] = 1.0;
-        let surface = self.subject.surface_points();
-        let along = surface.iter().map(|&point| self.subject.points[point as usize][axis]);
-        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-        Some(Plane { normal, offset: low + part * (high - low) })
+/// A section: whether it is on, its normal, and how far along it the plane lies, as a part of the body's extent at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cut {
+    pub on: bool,
+    pub normal: Vector3,
+    pub part: f64,
+}
+
+impl Cut {
+    /// The section at a plane; across the middle of x for none.
+    pub fn new(plane: Option<Plane>, subject: &Subject) -> Self {
+        let Some(plane) = plane else { return Self { on: false, normal: Vector3::x(), part: 0.5 } };
+        let [low, high] = extent(subject, &plane.normal);
+        Self { on: true, normal: plane.normal, part: (plane.offset - low) / (high - low).max(1e-12) }
     }
 
+    /// Its plane, if it is on.
+    fn plane(&self, subject: &Subject) -> Option<Plane> {
+        let [low, high] = extent(subject, &self.normal);
+        self.on.then_some(Plane { normal: self.normal, offset: low + self.part * (high - low) })
+    }
+}
+
+/// From where to where a body reaches along a direction [m], at rest.
+fn extent(subject: &Subject, along: &Vector3) -> [f64; 2] {
+    let places = subject.points.iter().map(|point| point.dot(along));
+    places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}
+
+impl App {
     pub(super) fn scene(&mut self, ui: &mut egui::Ui) {
         let rect = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
-        let aspect = f64::from(rect.width() / rect.height().max(1.0));
-        self.style.clip = self.plane();
-        self.mouse(ui.ctx(), &response, rect, aspect);
+        self.picture = rect;
+        if self.drawn == 0 {
+            self.fit();
+        }
+        let aspect = self.aspect();
+        self.style.clip = self.cut.plane(&self.subject);
+        self.mouse(ui.ctx(), &response, rect);
         let mut style = self.style;
         if self.values.is_empty() {
             style.range = None;
@@ -68,7 +94,7 @@ impl App {
         };
         ui.painter().add(Callback::new_paint_callback(rect, paint));
         let painter = ui.painter_at(rect);
-        self.draw_held(&painter, rect, aspect);
+        self.draw_held(&painter, rect);
         if style.range.is_some() {
             self.draw_scale(&painter, rect);
         }
@@ -85,26 +111,40 @@ impl App {
         }
     }
 
-    fn mouse(&mut self, context: &egui::Context, response: &egui::Response, rect: Rect, aspect: f64) {
+    fn mouse(&mut self, context: &egui::Context, response: &egui::Response, rect: Rect) {
         let Some(pointer) = context.pointer_latest_pos() else { return };
         let place = in_picture(pointer, rect);
-        if response.drag_started_by(PointerButton::Primary) || response.clicked() {
+        self.hover =
+            if response.contains_pointer() && self.holding.is_none() { self.hit(place) } else { None };
+        if self.holding.is_some() {
+            context.set_cursor_icon(CursorIcon::Grabbing);
+        } else if self.hover.is_some() {
+            context.set_cursor_icon(CursorIcon::Grab);
+        }
+        let pinning = context.input(|input| input.modifiers.command || input.key_down(Key::P));
+        if response.clicked() && pinning {
+            match (self.pin_at(pointer, rect), self.hit(place)) {
+                (Some(pin), _) => self.act(Hand::Unpin(pin)),
+                (None, Some((point, _))) => self.act(Hand::Pin(point)),
+                (None, None) => {}
+            }
+        }
+        if response.drag_started_by(PointerButton::Primary) {
             let origin = context.input(|input| input.pointer.press_origin()).unwrap_or(pointer);
-            let hit = self.hit(in_picture(origin, rect), aspect);
-            let pinning = context.input(|input| input.modifiers.command || input.key_down(Key::P));
-            match hit {
-                Some((point, _)) if response.clicked() && pinning => self.act(Hand::Pin(point)),
-                Some((point, at)) if response.drag_started() => {
+            match self.hit(in_picture(origin, rect)) {
+                Some((point, at)) => {
                     self.holding = Some(at);
+                    self.strongest = 0.0;
                     self.act(Hand::Take(point, self.stiffness));
                 }
-                _ => self.orbiting = response.drag_started(),
+                None => self.orbiting = true,
             }
         }
         let by = response.drag_delta();
         if let Some(at) = self.holding {
             if response.dragged_by(PointerButton::Primary) {
-                let to = on_plane(&self.camera, &at, place, aspect);
+                let to = on_plane(&self.camera, &at, place, self.aspect());
+                self.holding = Some(to);
                 self.act(Hand::Pull(to.into()));
             } else {
                 self.holding = None;
@@ -138,38 +178,61 @@ impl App {
     }
 
     /// What lies under a place of the picture.
-    pub(super) fn hit(&self, place: [f64; 2], aspect: f64) -> Option<(crate::hand::Point, Vector3)> {
-        let (from, along) = self.camera.ray(place, aspect);
+    pub(super) fn hit(&self, place: [f64; 2]) -> Option<(Point, Vector3)> {
+        let (from, along) = self.camera.ray(place, self.aspect());
         let clip = self.style.clip;
         pick(&self.subject, &self.points, &from, &along, |point| {
             clip.is_none_or(|plane| plane.distance(point) <= 0.0)
         })
     }
 
-    fn to_screen(&self, point: &Vector3, rect: Rect, aspect: f64) -> Option<Pos2> {
-        let [x, y] = self.camera.place(point, aspect)?;
-        let half = 0.5 * rect.size();
-        Some(rect.center() + vec2(half.x * x as f32, -half.y * y as f32))
+    /// The pin that is shown there.
+    fn pin_at(&self, place: Pos2, rect: Rect) -> Option<usize> {
+        let pins = self.frame.held.iter().skip(usize::from(self.holding.is_some()));
+        let seen = pins.map(|[point, _]| to_screen(&self.camera, &Vector3::from(*point), rect));
+        seen.enumerate()
+            .find(|(_, at)| at.is_some_and(|at| at.distance(place) <= PIN_SIZE + 3.0))
+            .map(|(pin, _)| pin)
     }
 
-    /// The force of the hand as an arrow with its newtons, and pins.
-    fn draw_held(&self, painter: &egui::Painter, rect: Rect, aspect: f64) {
+    /// The force of the hand as an arrow with its newtons, the longest where it was strongest; and pins.
+    fn draw_held(&self, painter: &egui::Painter, rect: Rect) {
         let hand = self.holding.is_some();
         for (index, [point, force]) in self.frame.held.iter().enumerate() {
-            let Some(from) = self.to_screen(&Vector3::from(*point), rect, aspect) else { continue };
+            let [point, force] = [point, force].map(|v| Vector3::from(*v));
+            let Some(from) = to_screen(&self.camera, &point, rect) else { continue };
             if index > 0 || !hand {
-                painter.circle(from, 5.0, PIN, Stroke::new(1.5, Color32::WHITE));
+                painter.circle(from, PIN_SIZE, PIN, Stroke::new(1.5, Color32::WHITE));
                 continue;
             }
-            let newtons = Vector3::from(*force).norm();
-            let along = Vector3::from(*force) / self.stiffness.max(1e-9);
-            let Some(to) = self.to_screen(&(Vector3::from(*point) + along), rect, aspect) else { continue };
-            painter.circle_filled(from, 4.0, FORCE);
-            painter.arrow(from, to - from, Stroke::new(2.5, FORCE));
+            painter.circle(from, 4.0, FORCE, Stroke::new(1.0, Color32::WHITE));
+            let newtons = force.norm();
+            let unit = f64::from(ARROW / rect.height()) * self.camera.height / self.strongest.max(1e-12);
+            let Some(to) = to_screen(&self.camera, &(point + force * unit), rect) else { continue };
+            if from.distance(to) > 2.0 {
+                painter.arrow(from, to - from, Stroke::new(5.0, Color32::WHITE));
+                painter.arrow(from, to - from, Stroke::new(3.0, FORCE));
+            }
             let text =
                 if newtons >= 1.0 { format!("{newtons:.2} N") } else { format!("{:.1} mN", 1e3 * newtons) };
-            painter.text(to + vec2(10.0, -8.0), Align2::LEFT_BOTTOM, text, FontId::proportional(16.0), FORCE);
+            let galley = painter.layout_no_wrap(text, FontId::proportional(16.0), FORCE);
+            let place = Rect::from_min_size(to + vec2(14.0, -galley.size().y), galley.size());
+            self.card(painter, place);
+            painter.galley(place.min, galley, FORCE);
         }
+    }
+
+    /// What text stands on, so that it can be read over a body.
+    fn card(&self, painter: &egui::Painter, place: Rect) {
+        let dark = self.style.background == Background::Dark;
+        let pale = if dark { Color32::from_black_alpha(150) } else { Color32::from_white_alpha(170) };
+        painter.rect_filled(place.expand(6.0), 5.0, pale);
+    }
+
+    /// The colour of what is written over the picture.
+    fn ink(&self) -> Color32 {
+        let [r, g, b] = self.style.background.ink();
+        Color32::from_rgb(r, g, b)
     }
 
     fn draw_scale(&self, painter: &egui::Painter, rect: Rect) {
@@ -179,7 +242,8 @@ impl App {
             rect.right_top() + vec2(-78.0, 70.0),
             Pos2::new(rect.right() - 60.0, (rect.bottom() - 60.0).max(rect.top() + 90.0)),
         );
-        let ink = Color32::from_gray(40);
+        let ink = self.ink();
+        self.card(painter, Rect::from_min_max(bar.min - vec2(36.0, 46.0), bar.max + vec2(52.0, 8.0)));
         let component = self.component.map(|part| format!(" {part}")).unwrap_or_default();
         let head = format!("{}{component}", field.title());
         let right = Pos2::new(rect.right() - 12.0, bar.top() - 34.0);
@@ -233,18 +297,12 @@ impl App {
         ));
         let energies = &frame.energies;
         lines.push(format!("kinetic {:.3e} J, internal {:.3e} J", energies.kinetic, energies.internal));
-        let ink = Color32::from_gray(40);
-        painter.text(
-            rect.min + vec2(12.0, 10.0),
-            Align2::LEFT_TOP,
-            lines.join("\n"),
-            FontId::proportional(14.0),
-            ink,
-        );
-        let notes = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
-        let banner = frame.failure.clone().or_else(|| self.message.clone());
-        let banner = banner.or_else(|| frame.note.clone()).or_else(|| notes.last());
-        if let Some(text) = banner {
+        let ink = self.ink();
+        let galley = painter.layout_no_wrap(lines.join("\n"), FontId::proportional(14.0), ink);
+        let place = Rect::from_min_size(rect.min + vec2(12.0, 10.0), galley.size());
+        self.card(painter, place);
+        painter.galley(place.min, galley, ink);
+        if let Some(text) = self.banner() {
             let colour = if frame.failure.is_some() { FAILED } else { WARNING };
             let width = rect.width() - 40.0;
             let galley = painter.layout(text, FontId::proportional(15.0), Color32::from_gray(20), width);
@@ -259,15 +317,22 @@ impl App {
 }
 
 /// A place of the window in the picture: x to the right and y up, from −1 to 1.
-fn in_picture(at: Pos2, rect: Rect) -> [f64; 2] {
+pub(super) fn in_picture(at: Pos2, rect: Rect) -> [f64; 2] {
     let from = at - rect.center();
     [f64::from(2.0 * from.x / rect.width().max(1.0)), f64::from(-2.0 * from.y / rect.height().max(1.0))]
 }
 
 /// Where the ray through a place meets the plane through a point that faces the camera.
-fn on_plane(camera: &Camera, point: &Vector3, place: [f64; 2], aspect: f64) -> Vector3 {
+pub(super) fn on_plane(camera: &Camera, point: &Vector3, place: [f64; 2], aspect: f64) -> Vector3 {
     let (from, along) = camera.ray(place, aspect);
     let towards = camera.axes()[2];
     let slope = along.dot(&towards);
     if slope.abs() < 1e-9 { *point } else { from + along * ((point - from).dot(&towards) / slope) }
+}
+
+/// Where a point is seen; `None` behind the eye.
+pub(super) fn to_screen(camera: &Camera, point: &Vector3, rect: Rect) -> Option<Pos2> {
+    let half = 0.5 * rect.size();
+    let [x, y] = camera.place(point, f64::from(half.x / half.y.max(1.0)))?;
+    Some(rect.center() + vec2(half.x * x as f32, -half.y * y as f32))
 }

@@ -1,0 +1,420 @@
+//! What a window does by itself before it closes: it takes a picture of itself, or rehearses what a user would do, with events of
+//! mouse and keys that it gives to itself.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use eframe::egui::{self, ColorImage, Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, vec2};
+use pliant_geometry::Vector3;
+use pliant_picture::{Camera, Picture, Projection};
+
+use super::App;
+use super::picture::{in_picture, on_plane, to_screen};
+
+/// What a window does by itself before it closes.
+#[derive(Clone, Debug)]
+pub enum Errand {
+    /// Plays, and writes a picture of itself.
+    Portrait {
+        /// Simulated time [s] until then.
+        after: f64,
+        /// Where to, as PNG.
+        file: PathBuf,
+    },
+    /// Tries what a user would: looks, picks, presses keys, pins, plays, and pulls; the hand still holds when it closes.
+    Rehearsal {
+        /// Where to write a picture of itself meanwhile.
+        file: Option<PathBuf>,
+    },
+}
+
+/// Frames drawn before anything else.
+const FRAMES: u64 = 10;
+/// Pixels at which is picked.
+const PICKS: u64 = 100;
+/// Wall time in which what has to happen does.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Simulated time [s] in which what is pulled comes to rest.
+const SETTLING: f64 = 2.0;
+
+/// Events of one frame.
+type Give = Box<dyn FnOnce(&App) -> Vec<Event>>;
+/// Whether what has to come of them did; what is wrong.
+type Check = Box<dyn FnMut(&App) -> Result<bool, String>>;
+
+/// What is done in one frame, and what has to come of it before the next.
+struct Cue {
+    what: String,
+    give: Option<Give>,
+    check: Check,
+}
+
+impl Cue {
+    fn new(
+        what: impl Into<String>,
+        give: impl FnOnce(&App) -> Vec<Event> + 'static,
+        check: impl FnMut(&App) -> Result<bool, String> + 'static,
+    ) -> Self {
+        Self { what: what.into(), give: Some(Box::new(give)), check: Box::new(check) }
+    }
+
+    /// Keys of the keyboard, and what has to come of them.
+    fn key(what: &str, key: Key, mut check: impl FnMut(&App) -> bool + 'static) -> Self {
+        Self::new(what, move |_| vec![press(key, true), press(key, false)], move |app| Ok(check(app)))
+    }
+
+    /// Waits.
+    fn wait(what: &str, mut check: impl FnMut(&App) -> bool + 'static) -> Self {
+        Self::new(what, |_| Vec::new(), move |app| Ok(check(app)))
+    }
+}
+
+/// An errand under way.
+pub(super) struct Errands {
+    cues: VecDeque<Cue>,
+    since: Instant,
+    told: fn(&App) -> String,
+}
+
+impl Errands {
+    pub(super) fn new(errand: Errand) -> Self {
+        let (cues, told): (_, fn(&App) -> String) = match errand {
+            Errand::Portrait { after, file } => {
+                let mut cues = VecDeque::from([
+                    Cue::key("Space plays", Key::Space, |app| app.frame.playing),
+                    Cue::wait("it plays", move |app| app.frame.time >= after || app.frame.failure.is_some()),
+                    Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
+                ]);
+                cues.extend(portrait(file));
+                (cues, shown)
+            }
+            Errand::Rehearsal { file } => {
+                let mut cues: VecDeque<Cue> = drawing().chain((0..PICKS).map(picking)).collect();
+                cues.extend(keys().into_iter().chain(camera()).chain(pinning()).chain(pulling()));
+                cues.extend(file.into_iter().flat_map(portrait));
+                (cues, tried)
+            }
+        };
+        Self { cues, since: Instant::now(), told }
+    }
+
+    /// The events of a frame.
+    pub(super) fn give(&mut self, app: &App, events: &mut Vec<Event>) {
+        if let Some(give) = self.cues.front_mut().and_then(|cue| cue.give.take()) {
+            events.extend(give(app));
+            self.since = Instant::now();
+        }
+    }
+
+    /// After a frame: what is to be told once all is done, or what went wrong.
+    pub(super) fn check(&mut self, app: &App) -> Option<Result<String, String>> {
+        let Some(cue) = self.cues.front_mut() else { return Some(Ok((self.told)(app))) };
+        if cue.give.is_some() {
+            return None;
+        }
+        match (cue.check)(app) {
+            Ok(true) => {
+                self.cues.pop_front();
+                None
+            }
+            Ok(false) if self.since.elapsed() < PATIENCE => None,
+            Ok(false) => Some(Err(format!("waited in vain: {}", cue.what))),
+            Err(wrong) => Some(Err(format!("{}: {wrong}", cue.what))),
+        }
+    }
+}
+
+/// What was tried.
+fn tried(_app: &App) -> String {
+    format!("{FRAMES} frames drawn, {PICKS} pixels picked, keys, camera, pins and hand tried")
+}
+
+/// What a picture of the window shows.
+fn shown(app: &App) -> String {
+    let told = app.banner().map(|text| format!(": {text}")).unwrap_or_default();
+    format!("{} at t = {:.3} s{told}", app.title(), app.frame.time)
+}
+
+fn press(key: Key, pressed: bool) -> Event {
+    Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: Modifiers::NONE }
+}
+
+fn button(pos: Pos2, button: PointerButton, pressed: bool) -> Event {
+    Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE }
+}
+
+fn drawing() -> impl Iterator<Item = Cue> {
+    [Cue::wait("frames are drawn", |app| app.drawn >= FRAMES && !app.frame.points.is_empty())].into_iter()
+}
+
+/// The pixel of that number on the body, and the triangle that covers it, if it is far from all edges; found by projecting all
+/// triangles, where picking sends a ray.
+fn known_pixel(app: &App, number: u64) -> Option<(Pos2, u32)> {
+    let rect = app.picture;
+    let aspect = f64::from(rect.width() / rect.height());
+    // Halton's sequence over the picture: places on the body, counted.
+    let places = (1..20_000).map(|index| rect.min + vec2(halton(index, 2), halton(index, 3)) * rect.size());
+    let known = |place: Pos2| Some((place, covering(app, in_picture(place, rect), aspect)?));
+    places.filter_map(known).nth(number as usize)
+}
+
+/// The number of that index in Halton's sequence (1960) to a base.
+fn halton(mut index: u32, base: u32) -> f32 {
+    let (mut sum, mut part) = (0.0, 1.0);
+    while index > 0 {
+        part /= base as f32;
+        sum += part * (index % base) as f32;
+        index /= base;
+    }
+    sum
+}
+
+/// The nearest triangle whose projection covers a place.
+fn covering(app: &App, [x, y]: [f64; 2], aspect: f64) -> Option<u32> {
+    let camera = &app.camera;
+    let mut nearest: Option<(f64, u32, f64)> = None;
+    for (corners, number) in app.subject.triangles().zip(0..) {
+        let corners = corners.map(|point| app.points[point as usize]);
+        let [Some(a), Some(b), Some(c)] = corners.map(|corner| camera.place(&corner, aspect)) else {
+            continue;
+        };
+        let cross = |p: [f64; 2], q: [f64; 2]| (p[0] - x) * (q[1] - y) - (p[1] - y) * (q[0] - x);
+        let areas = [cross(b, c), cross(c, a), cross(a, b)];
+        let weights = areas.map(|area| area / areas.iter().sum::<f64>());
+        let least = weights.into_iter().fold(f64::INFINITY, f64::min);
+        if !(least >= 0.0) {
+            continue;
+        }
+        let depth = depth(camera, &corners, &weights);
+        if nearest.is_none_or(|(known, ..)| depth < known) {
+            nearest = Some((depth, number, least));
+        }
+    }
+    nearest.filter(|(.., least)| *least > 0.02).map(|(_, number, _)| number)
+}
+
+/// Distance [m] along the view of a point with these weights in the projection: 1/z is linear there in perspective, z otherwise.
+fn depth(camera: &Camera, corners: &[Vector3; 3], weights: &[f64; 3]) -> f64 {
+    let (eye, towards) = (camera.eye(), camera.axes()[2]);
+    let depths = corners.iter().map(|corner| (eye - corner).dot(&towards)).zip(weights);
+    match camera.projection {
+        Projection::Perspective => 1.0 / depths.map(|(z, weight)| weight / z).sum::<f64>(),
+        Projection::Orthographic => depths.map(|(z, weight)| weight * z).sum(),
+    }
+}
+
+/// The mouse over a pixel on the body finds the triangle that lies there.
+fn picking(number: u64) -> Cue {
+    let known = Rc::new(RefCell::new(None));
+    let found = known.clone();
+    Cue::new(
+        format!("picking at pixel {number}"),
+        move |app| {
+            *known.borrow_mut() = known_pixel(app, number);
+            known.borrow().iter().map(|(place, _)| Event::PointerMoved(*place)).collect()
+        },
+        move |app| {
+            let Some((place, triangle)) = *found.borrow() else {
+                return Err("the body covers too few pixels".into());
+            };
+            match app.hover {
+                Some((point, _)) if point.triangle == triangle => Ok(true),
+                other => Err(format!("{place:?} shows triangle {triangle}, picked was {other:?}")),
+            }
+        },
+    )
+}
+
+fn keys() -> Vec<Cue> {
+    vec![
+        Cue::key("`.` does one step", Key::Period, |app| app.frame.steps == 1),
+        Cue::key("R starts anew", Key::R, |app| app.frame.steps == 0),
+        Cue::key("Space plays", Key::Space, |app| app.frame.playing && app.frame.steps > 0),
+        Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
+        Cue::key("R starts anew", Key::R, |app| app.frame.steps == 0),
+        turns("E shows or hides edges", Key::E, |app| app.style.edges),
+        turns("G shows or hides the shape at rest", Key::G, |app| app.style.ghost),
+        turns("C shows or hides a section", Key::C, |app| app.style.clip.is_some()),
+        turns("C shows or hides a section", Key::C, |app| app.style.clip.is_some()),
+        turns("G shows or hides the shape at rest", Key::G, |app| app.style.ghost),
+        turns("E shows or hides edges", Key::E, |app| app.style.edges),
+    ]
+}
+
+/// A key that turns a switch.
+fn turns(what: &str, key: Key, switch: fn(&App) -> bool) -> Cue {
+    let before = Rc::new(RefCell::new(false));
+    let then = before.clone();
+    let give = move |app: &App| {
+        *before.borrow_mut() = switch(app);
+        vec![press(key, true), press(key, false)]
+    };
+    Cue::new(what, give, move |app| Ok(switch(app) != *then.borrow()))
+}
+
+/// Turns, comes nearer, and goes back to where all is seen.
+fn camera() -> Vec<Cue> {
+    let beside = |app: &App| app.picture.min + vec2(20.0, 150.0);
+    let right = PointerButton::Secondary;
+    vec![
+        Cue::new(
+            "the mouse goes beside the body",
+            move |app| vec![Event::PointerMoved(beside(app)), button(beside(app), right, true)],
+            |_| Ok(true),
+        ),
+        Cue::new(
+            "the right button turns",
+            move |app| vec![Event::PointerMoved(beside(app) + vec2(60.0, 10.0))],
+            |app| Ok((app.camera.azimuth - app.home.azimuth).abs() > 5.0),
+        ),
+        Cue::new(
+            "the wheel comes nearer",
+            move |app| {
+                let place = beside(app) + vec2(60.0, 10.0);
+                vec![
+                    button(place, right, false),
+                    Event::MouseWheel {
+                        unit: MouseWheelUnit::Line,
+                        delta: vec2(0.0, 3.0),
+                        phase: egui::TouchPhase::Move,
+                        source: egui::MouseWheelSource::Wheel,
+                        modifiers: Modifiers::NONE,
+                    },
+                ]
+            },
+            |app| Ok(app.camera.height < 0.95 * app.fitted().height),
+        ),
+        // A wheel glides.
+        Cue::wait("the wheel comes to rest", {
+            let mut before = 0.0;
+            move |app| std::mem::replace(&mut before, app.camera.height) == app.camera.height
+        }),
+        Cue::key("F shows all", Key::F, |app| (app.camera.height / app.fitted().height - 1.0).abs() < 1e-6),
+    ]
+}
+
+/// A pixel on the body, well inside it.
+fn inside(app: &App) -> Pos2 {
+    let rect = app.picture;
+    let seen = app.subject.surface_points();
+    let places = seen.iter().filter_map(|&point| to_screen(&app.camera, &app.points[point as usize], rect));
+    let (sum, count) = places.fold((egui::Vec2::ZERO, 0.0_f32), |(sum, n), p| (sum + p.to_vec2(), n + 1.0));
+    let middle = (sum / count.max(1.0)).to_pos2();
+    let hit = |place: &Pos2| app.hit(in_picture(*place, rect)).is_some();
+    if hit(&middle) { middle } else { known_pixel(app, 0).map_or(middle, |(place, _)| place) }
+}
+
+/// A click with P pins, another one on the pin takes it away.
+fn pinning() -> Vec<Cue> {
+    let left = PointerButton::Primary;
+    let click = |what: &str, pins: usize| {
+        [
+            Cue::new(
+                "the mouse goes to the body",
+                move |app| vec![Event::PointerMoved(inside(app)), press(Key::P, true)],
+                |_| Ok(true),
+            ),
+            Cue::new("a press", move |app| vec![button(inside(app), left, true)], |_| Ok(true)),
+            Cue::new(
+                what,
+                move |app| vec![button(inside(app), left, false)],
+                move |app| Ok(app.frame.held.len() == pins),
+            ),
+            Cue::new("P is let go", |_| vec![press(Key::P, false)], |_| Ok(true)),
+        ]
+    };
+    click("a click with P pins", 1)
+        .into_iter()
+        .chain(click("a click with P on a pin takes it away", 0))
+        .collect()
+}
+
+/// Plays, takes hold and pulls upwards, until all is at rest: the hand's force is that of its spring.
+fn pulling() -> Vec<Cue> {
+    let start = Rc::new(RefCell::new(Pos2::ZERO));
+    let reach = |app: &App| 0.12 * app.picture.height();
+    let mut cues = vec![Cue::key("Space plays", Key::Space, |app| app.frame.playing)];
+    let from = start.clone();
+    cues.push(Cue::new(
+        "the mouse takes hold",
+        move |app| {
+            let place = inside(app);
+            *from.borrow_mut() = place;
+            vec![Event::PointerMoved(place), button(place, PointerButton::Primary, true)]
+        },
+        |_| Ok(true),
+    ));
+    for part in 1..=10 {
+        let from = start.clone();
+        cues.push(Cue::new(
+            "the mouse pulls",
+            move |app| vec![Event::PointerMoved(*from.borrow() - vec2(0.0, reach(app) * part as f32 / 10.0))],
+            move |app| Ok(part < 3 || app.holding.is_some()),
+        ));
+    }
+    cues.push(Cue::wait("the hand pulls", |app| {
+        app.frame.held.first().is_some_and(|[_, force]| Vector3::from(*force).norm() > 0.0)
+    }));
+    cues.push(Cue::new("what is pulled comes to rest", |_| Vec::new(), {
+        let mut began = None;
+        move |app| match &app.frame.failure {
+            Some(failure) => Err(failure.clone()),
+            None => Ok(app.frame.time - *began.get_or_insert(app.frame.time) >= SETTLING),
+        }
+    }));
+    cues.push(Cue::new(
+        "the force is that of the spring",
+        |_| Vec::new(),
+        move |app| {
+            let place = *start.borrow() - vec2(0.0, reach(app));
+            spring(app, in_picture(place, app.picture)).map(|()| true)
+        },
+    ));
+    cues
+}
+
+/// Whether the hand's force points from where it holds to where the mouse is, with no more than its stiffness.
+fn spring(app: &App, place: [f64; 2]) -> Result<(), String> {
+    let (Some([point, force]), Some(held)) = (app.frame.held.first(), &app.holding) else {
+        return Err("nothing is held".into());
+    };
+    let [point, force] = [point, force].map(|v| Vector3::from(*v));
+    let along = on_plane(&app.camera, held, place, app.aspect()) - point;
+    let stiffness = force.dot(&along) / along.norm_squared();
+    let off = (force - along * stiffness).norm() / force.norm();
+    if off < 1e-3 && stiffness > 0.0 && stiffness <= app.stiffness * 1.001 {
+        return Ok(());
+    }
+    Err(format!("{force:?} N at {along:?} m from the mouse, by a spring of {} N/m", app.stiffness))
+}
+
+/// Writes what the window shows.
+fn portrait(file: PathBuf) -> [Cue; 1] {
+    let taken = Arc::<Mutex<Option<Arc<ColorImage>>>>::default();
+    let seen = taken.clone();
+    let cue = Cue::new(
+        "a picture of the window",
+        move |app| {
+            app.context.request_screenshot(move |image| {
+                *taken.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
+            });
+            Vec::new()
+        },
+        move |_| {
+            let Some(image) = seen.lock().unwrap_or_else(PoisonError::into_inner).take() else {
+                return Ok(false);
+            };
+            let [width, height] = image.size.map(|n| n as u32);
+            let rgba = image.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
+            let png = Picture { width, height, rgba }.png().map_err(|error| error.to_string())?;
+            std::fs::write(&file, png)
+                .map_err(|error| format!("`{}` cannot be written: {error}", file.display()))?;
+            Ok(true)
+        },
+    );
+    [cue]
+}
