@@ -217,6 +217,16 @@ impl<'m> GpuStepper<'m> {
         self
     }
 
+    /// How another stepper goes on from a state of this one.
+    pub fn clock(&self, state: &State<f32>) -> pliant_mechanics::Clock {
+        self.control.clock(state)
+    }
+
+    /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the velocities there.
+    pub fn go_on(&mut self, clock: &pliant_mechanics::Clock, step: f64, state: &State<f32>) {
+        self.control.go_on(clock, step, state);
+    }
+
     /// The length [s] of a whole step.
     pub fn step(&self) -> f64 {
         self.control.step()

@@ -5,7 +5,8 @@ use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::stability::Monitor;
 use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Equilibrium, Iteration, Observable, Real, RelaxationSettings, State,
+    CentralDifference, Clock, DynamicRelaxation, Equilibrium, Iteration, Observable, Real,
+    RelaxationSettings, State,
 };
 
 use serde::{Deserialize, Serialize};
@@ -121,6 +122,14 @@ pub(crate) trait Solver<R> {
     /// Takes that up again.
     fn resume(&mut self, _memory: Memory<R>) {}
 
+    /// How its steps are counted, of a solver whose increments tell velocities.
+    fn clock(&self, _state: &State<R>) -> Option<Clock> {
+        None
+    }
+
+    /// Goes on where another solver, with steps of length `step` [s], has stood at a state.
+    fn go_on(&mut self, _clock: &Clock, _step: f64, _state: &State<R>) {}
+
     /// Of shells and co-rotational solids: their state, with rotations.
     fn corotational(&self) -> Option<&pliant_corotational::State> {
         None
@@ -217,6 +226,14 @@ impl Solver<f32> for GpuStepper<'_> {
         GpuStepper::bring_back(self, state).map_err(|failure| FailureSummary::step(&failure, state.time))
     }
 
+    fn clock(&self, state: &State<f32>) -> Option<Clock> {
+        Some(GpuStepper::clock(self, state))
+    }
+
+    fn go_on(&mut self, clock: &Clock, step: f64, state: &State<f32>) {
+        GpuStepper::go_on(self, clock, step, state);
+    }
+
     fn balance_floor(&self) -> f64 {
         GpuStepper::balance_floor(self)
     }
@@ -249,6 +266,14 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
     fn hold(&mut self, grips: &[Grip]) -> bool {
         CentralDifference::hold(self, grips);
         true
+    }
+
+    fn clock(&self, state: &State<R>) -> Option<Clock> {
+        Some(CentralDifference::clock(self, state))
+    }
+
+    fn go_on(&mut self, clock: &Clock, step: f64, state: &State<R>) {
+        CentralDifference::go_on(self, clock, step, state);
     }
 
     fn balance_floor(&self) -> f64 {

@@ -2,13 +2,17 @@
 //! window itself works without one: [`Session`] plays, [`pick`] finds what lies under a pixel, [`replay()`] repeats what a hand did.
 
 mod hand;
+mod parameters;
 mod replay;
+mod samples;
 mod session;
 #[cfg(feature = "window")]
 mod window;
 
-pub use hand::{Hand, Hold, Point, Recording, pick};
-pub use replay::{Replayed, replay};
+pub use hand::{Hand, Hold, Point, pick};
+pub use parameters::{Number, Parameter, parameters, with_numbers};
+pub use replay::{Done, Lags, Move, Recording, Replayed, replay, replay_in_real_time};
+pub use samples::Samples;
 pub use session::{Frame, Order, Session, Stage};
 #[cfg(feature = "window")]
 pub use window::{Errand, Opening, WindowError, open};

@@ -3,8 +3,11 @@
 mod errand;
 mod paint;
 mod panels;
+mod parameters;
 mod picture;
+mod plots;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,8 +22,10 @@ use pliant_scene::format::FieldName;
 pub use self::errand::Errand;
 use self::errand::Errands;
 use self::paint::{SAMPLES, place};
+use self::parameters::Numbers;
 use self::picture::{Cut, SCALE};
 use crate::hand::{Hand, Point};
+use crate::samples::Samples;
 use crate::session::{Frame, Order, Session, Stage};
 
 /// What a window opens with.
@@ -94,12 +99,6 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     outcome.transpose().map_err(WindowError::Errand)
 }
 
-/// Points of the curves kept.
-const MOST_SAMPLES: usize = 4000;
-
-/// What is plotted: time [s], kinetic and internal energy [J], force of the hand [N].
-type Sample = [f64; 4];
-
 struct App {
     target: Target,
     stage: Stage,
@@ -131,7 +130,12 @@ struct App {
     strongest: f64,
     orbiting: bool,
     help: bool,
-    samples: Vec<Sample>,
+    numbers: Numbers,
+    samples: Samples,
+    /// Names of the curves that are plotted.
+    plotted: BTreeSet<String>,
+    /// Points that the user follows.
+    probes: usize,
     file: PathBuf,
     changed: Option<SystemTime>,
     looked: Instant,
@@ -173,6 +177,7 @@ impl App {
             points: Arc::new(subject.points.clone()),
             values: Arc::default(),
             fresh: true,
+            numbers: Numbers::of(&stage.scene),
             stage,
             home: camera,
             camera,
@@ -191,7 +196,9 @@ impl App {
             strongest: 0.0,
             orbiting: false,
             help: false,
-            samples: Vec::new(),
+            samples: Samples::default(),
+            plotted: plots::usual(),
+            probes: 0,
             changed: modified(&file),
             file,
             looked: Instant::now(),
@@ -207,13 +214,17 @@ impl App {
             outcome,
         };
         app.fit();
+        if app.record.is_some() {
+            app.order(Order::Record);
+        }
         Ok(app)
     }
 
     /// What a user should know now: why it cannot go on, what was done last, what the scene warns of.
     fn banner(&self) -> Option<String> {
         let warnings = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
-        self.frame.failure.clone().or_else(|| self.message.clone()).or_else(|| warnings.last())
+        let told = self.frame.failure.clone().or_else(|| self.message.clone());
+        told.or_else(|| self.frame.note.clone()).or_else(|| warnings.last())
     }
 
     /// The scene's title, or the name of its file.
@@ -276,22 +287,7 @@ impl App {
         }
         let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
         self.strongest = self.strongest.max(force);
-        let last = self.samples.last().map_or(-1.0, |sample| sample[0]);
-        if self.frame.time < last {
-            self.samples.clear();
-        }
-        if self.frame.time > last {
-            let energies = &self.frame.energies;
-            self.samples.push([self.frame.time, energies.kinetic, energies.internal, force]);
-            // Every second one goes, so that memory stays flat and the curve whole.
-            if self.samples.len() > MOST_SAMPLES {
-                let mut index = 0;
-                self.samples.retain(|_| {
-                    index += 1;
-                    index % 2 == 0
-                });
-            }
-        }
+        self.samples.take(&self.frame);
     }
 
     fn order(&self, order: Order) {
@@ -350,6 +346,8 @@ impl App {
         let other = path != self.file;
         self.surface = subject.surface_points();
         self.subject = subject;
+        self.numbers = Numbers::of(&stage.scene);
+        self.forget_probes();
         self.stage = stage;
         self.changed = modified(&path);
         self.file = path;
@@ -359,6 +357,9 @@ impl App {
             self.fit();
         }
         self.fresh = true;
+        if self.record.is_some() {
+            self.session.order(Order::Record);
+        }
         self.session.order(Order::Show(self.field, self.component));
         self.session.order(Order::Speed(self.speed));
         self.session.order(Order::Play(self.frame.playing));
