@@ -17,10 +17,10 @@ const LONG: Duration = Duration::from_secs(100);
 fn grips(model: &Model, step: f64) -> Vec<Grip> {
     let last = model.node_count() as u32 - 1;
     let nodes = [vec![(last, 0.25), (last / 2, 0.75)], vec![(0, 0.5), (last - 1, 0.3), (last - 7, 0.2)]];
-    (nodes.into_iter().zip([[0.01, -0.02, 0.03], [0.0; 3]]))
+    (nodes.into_iter().zip([[1e-3, -2e-3, 3e-3], [0.0; 3]]))
         .map(|(nodes, by)| {
             let mut grip = Grip { nodes, ..Grip::default() };
-            grip.stiffness = 0.4 * grip.stiffest(model, step);
+            grip.stiffness = 0.1 * grip.stiffest(model, step);
             let point = grip.point(model, &vec![[0.0_f64; 3]; model.node_count()]);
             grip.place = [0, 1, 2].map(|c| point[c] + by[c]);
             grip
