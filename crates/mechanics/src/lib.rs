@@ -73,6 +73,6 @@ pub use lanes::{Instructions, MissingInstructions, PACK, Pack};
 pub use model::Model;
 pub use real::{Number, Real};
 pub use state::{History, State, Work};
-pub use step_control::{Lengths, StepControl};
+pub use step_control::{Clock, Lengths, StepControl};
 pub use step_error::StepError;
 pub use stepper::{CentralDifference, Observable};

@@ -129,6 +129,14 @@ impl Stability {
             && self.last.iter().chain(&self.smallest).all(known)
     }
 
+    /// Forgets what was seen of the limit of another model; how steps are cut stays until the first look.
+    pub(crate) fn forget(&mut self) {
+        let unseen = Self::default();
+        (self.checks, self.last, self.smallest) = (unseen.checks, unseen.last, unseen.smallest);
+        (self.reference, self.deformed, self.looked_at) =
+            (unseen.reference, unseen.deformed, unseen.looked_at);
+    }
+
     /// Records a look and the deformation it was taken at.
     pub(crate) fn note(&mut self, look: Look, deformed: Deformed, steps: u64) {
         self.checks += 1;

@@ -118,6 +118,20 @@ impl<R: Real> State<R> {
         }
     }
 
+    /// Brings it from a model to another one of the same mesh, after a (sub)step of a length [s]: displacements, velocities and what
+    /// relaxing laws remember stay. The kinetic energy of mass that comes or goes is external work.
+    pub fn change_model(&mut self, from: &Model, to: &Model, before: f64) {
+        let speed_squared = |u: &Vector<R>| u.iter().map(|x| (x.to_f64() / before).powi(2)).sum::<f64>();
+        let gained = self
+            .increment
+            .iter()
+            .enumerate()
+            .map(|(node, u)| 0.5 * (to.inertia(node) - from.inertia(node)) * speed_squared(u));
+        self.work.external += gained.sum::<f64>();
+        self.stability.forget();
+        self.reference.fill([R::ZERO; 3]);
+    }
+
     /// True before the first step.
     pub fn is_at_start(&self) -> bool {
         self.steps == 0 && self.is_between_steps()

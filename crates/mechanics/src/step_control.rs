@@ -30,9 +30,24 @@ impl Lengths {
     }
 }
 
+/// How a run goes on with steps of another length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clock {
+    /// Time [s] from which whole steps are counted …
+    pub since: f64,
+    /// … and those done before.
+    pub steps: u64,
+    /// Length of the (sub)step that led to the state's instant [s].
+    pub before: f64,
+}
+
 /// Whole steps of one length, cut where the limit asks for it.
 pub struct StepControl {
     step: f64,
+    /// From which time [s] and number they are counted.
+    since: (f64, u64),
+    /// The length [s] of the (sub)step before, where it was no part of such a step.
+    before: Option<f64>,
     monitor: Option<Monitor>,
     /// Parts of the step to come.
     substeps: u32,
@@ -41,7 +56,19 @@ pub struct StepControl {
 impl StepControl {
     /// Steps of `step` seconds, not watched.
     pub fn new(step: f64) -> Self {
-        Self { step, monitor: None, substeps: 1 }
+        Self { step, since: (0.0, 0), before: None, monitor: None, substeps: 1 }
+    }
+
+    /// How another control goes on from a state.
+    pub fn clock<R>(&self, state: &State<R>) -> Clock {
+        let (since, steps) = self.since;
+        Clock { since, steps, before: self.lengths(state).before }
+    }
+
+    /// Goes on where another control, with steps of length `step` [s], has stood at a state. Steps of the same length are counted on.
+    pub fn go_on<R>(&mut self, clock: &Clock, step: f64, state: &State<R>) {
+        self.since = if step == self.step { (clock.since, clock.steps) } else { (state.time, state.steps) };
+        self.before = Some(clock.before);
     }
 
     /// Watches the limit from now on.
@@ -67,7 +94,8 @@ impl StepControl {
     /// The (sub)step before the state's instant and the one to come.
     pub fn lengths<R>(&self, state: &State<R>) -> Lengths {
         let part = |parts: u32| self.step / f64::from(parts);
-        Lengths { before: part(state.stability.substeps), next: part(self.substeps) }
+        let before = self.before.unwrap_or_else(|| part(state.stability.substeps));
+        Lengths { before, next: part(self.substeps) }
     }
 
     /// Whether a look at the limit is due: the first one, `every` steps after the last, or where the deformation differs.
@@ -125,7 +153,8 @@ impl StepControl {
     }
 
     /// Moves the clock of a state on by the (sub)step to come.
-    pub fn count<R>(&self, state: &mut State<R>) {
+    pub fn count<R>(&mut self, state: &mut State<R>) {
+        self.before = None;
         state.stability.substeps = self.substeps;
         state.stability.done += 1;
         if state.stability.done == self.substeps {
@@ -133,7 +162,8 @@ impl StepControl {
             state.steps += 1;
         }
         let part = f64::from(state.stability.done) / f64::from(self.substeps);
-        state.time = (state.steps as f64 + part) * self.step;
+        let (since, steps) = self.since;
+        state.time = since + ((state.steps - steps) as f64 + part) * self.step;
     }
 }
 

@@ -21,7 +21,7 @@ use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
 use crate::model::{Contradiction, FREE, Model};
 use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
-use crate::step_control::{Lengths, StepControl};
+use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
 use crate::tensor::Vector;
 
@@ -362,6 +362,16 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     pub fn watched(mut self, monitor: Monitor) -> Self {
         self.control.watch(monitor);
         self
+    }
+
+    /// How another stepper goes on from a state of this one.
+    pub fn clock(&self, state: &State<R>) -> Clock {
+        self.control.clock(state)
+    }
+
+    /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the velocities there.
+    pub fn go_on(&mut self, clock: &Clock, step: f64, state: &State<R>) {
+        self.control.go_on(clock, step, state);
     }
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is external.

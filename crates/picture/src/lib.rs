@@ -44,7 +44,7 @@ pub use film::{AnimatedPng, Film, ffmpeg};
 pub use graphics::Graphics;
 pub use legend::{Legend, readable, ticks};
 pub use picture::{Difference, Picture};
-pub use renderer::{Drawn, Renderer, Target};
+pub use renderer::{Drawn, Renderer, Target, drawn_value};
 pub use section::{Plane, Section};
 pub use series::{Look, Series, SeriesError};
 pub use studio::{Frame, Studio};

@@ -311,6 +311,12 @@ impl Drawn {
         queue.write_buffer(&self.poses[0].points, 0, bytemuck::cast_slice(&self.staged));
     }
 
+    /// Takes note of how far points [m] reach that are drawn from a buffer of someone else's.
+    pub fn reach(&mut self, points: &[Vector3]) {
+        let reach = points.iter().map(|point| (point - self.middle).norm_squared()).fold(0.0, f64::max);
+        self.size = self.size.max(reach.sqrt());
+    }
+
     /// Draws from a buffer of someone else's, four numbers a point (position [m], value), such as a solver's on the same device.
     pub fn bind_positions(&mut self, device: &wgpu::Device, renderer: &Renderer, points: &wgpu::Buffer) {
         let Self { triangles, vertices, offsets, around, section, .. } = self;
@@ -322,6 +328,7 @@ impl Drawn {
         );
         pose.compute =
             group(device, &renderer.normals, &[points, triangles, vertices, &pose.normals, offsets, around]);
+        pose.points = points.clone();
     }
 
     /// Takes the triangles of a section; none for no section.
@@ -409,10 +416,14 @@ impl Drawn {
 /// any number.
 const NO_VALUE: f32 = 1e38;
 
+/// A value as the shader takes it; where it is not finite, the colour is that of tissue.
+pub fn drawn_value(value: f64) -> f32 {
+    if value.is_finite() { value.clamp(-1e29, 1e29) as f32 } else { NO_VALUE }
+}
+
 /// A position and a value as the shader takes them.
 pub(crate) fn staged(point: &Vector3, value: f64) -> [f32; 4] {
-    let value = if value.is_finite() { value.clamp(-1e29, 1e29) as f32 } else { NO_VALUE };
-    [point.x as f32, point.y as f32, point.z as f32, value]
+    [point.x as f32, point.y as f32, point.z as f32, drawn_value(value)]
 }
 
 fn four(v: &Vector3, w: f64) -> [f32; 4] {

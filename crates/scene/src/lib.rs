@@ -42,6 +42,7 @@ pub mod diagnostic;
 pub mod format;
 mod live;
 pub mod niftysim;
+mod of_mesh;
 mod output;
 mod overview;
 mod plan;
@@ -62,10 +63,11 @@ pub use bound::element_bound;
 pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, PLAUSIBLE_SIZE, build, build_with};
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
-pub use live::{Live, live};
+pub use live::{Live, Standing, go_on, live};
+pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
 pub use output::{
-    AddedMass, BodySummary, FailureSummary, LoadStepSummary, OutputError, OutputFolder, StabilitySummary,
-    Summary, failed_input, failed_output, number,
+    AddedMass, BodySummary, Column, FailureSummary, LoadStepSummary, OutputError, OutputFolder,
+    StabilitySummary, Summary, failed_input, failed_output, number,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};

@@ -1,11 +1,14 @@
 //! The solvers of a scene behind one face, so that one run loop serves them all.
 
-use pliant_gpu::{Device, GpuStepper, Wanted};
+use std::time::Duration;
+
+use pliant_gpu::{Device, DeviceMapping, GpuStepper, PointValue, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::stability::Monitor;
 use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Equilibrium, Iteration, Observable, Real, RelaxationSettings, State,
+    CentralDifference, Clock, DynamicRelaxation, Equilibrium, Iteration, Observable, Real,
+    RelaxationSettings, State,
 };
 
 use serde::{Deserialize, Serialize};
@@ -15,6 +18,9 @@ use crate::corotational::Remembered;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
+
+/// The place of a point at rest [m], and its nodes with their weights.
+pub(crate) type MappedPoint = ([f64; 3], Vec<(u32, f64)>);
 
 /// How far a load step is.
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +102,29 @@ pub(crate) trait Solver<R> {
         1
     }
 
+    /// Goes up to `steps` steps on without looking, as many as take about `within`: nothing comes back to ordinary memory. How many;
+    /// `None` of a solver whose state lies there.
+    fn coast(
+        &mut self,
+        _state: &mut State<R>,
+        _steps: u64,
+        _within: Duration,
+    ) -> Option<Result<u64, FailureSummary>> {
+        None
+    }
+
+    /// What finds points on the device where the state lies, from their places at rest [m], nodes and weights; `None` of a solver
+    /// whose state lies in ordinary memory.
+    fn map(
+        &self,
+        _points: &mut dyn Iterator<Item = MappedPoint>,
+    ) -> Option<Result<DeviceMapping, FailureSummary>> {
+        None
+    }
+
+    /// Brings points on the device to the state's instant.
+    fn apply(&self, _mapping: &DeviceMapping, _value: PointValue) {}
+
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a solver that knows none.
     fn hold(&mut self, grips: &[Grip]) -> bool {
         grips.is_empty()
@@ -120,6 +149,14 @@ pub(crate) trait Solver<R> {
 
     /// Takes that up again.
     fn resume(&mut self, _memory: Memory<R>) {}
+
+    /// How its steps are counted, of a solver whose increments tell velocities.
+    fn clock(&self, _state: &State<R>) -> Option<Clock> {
+        None
+    }
+
+    /// Goes on where another solver, with steps of length `step` [s], has stood at a state.
+    fn go_on(&mut self, _clock: &Clock, _step: f64, _state: &State<R>) {}
 
     /// Of shells and co-rotational solids: their state, with rotations.
     fn corotational(&self) -> Option<&pliant_corotational::State> {
@@ -213,8 +250,41 @@ impl Solver<f32> for GpuStepper<'_> {
         STRIDE
     }
 
+    fn coast(
+        &mut self,
+        state: &mut State<f32>,
+        steps: u64,
+        within: Duration,
+    ) -> Option<Result<u64, FailureSummary>> {
+        let coasted = GpuStepper::coast(self, state, steps, within);
+        Some(coasted.map_err(|failure| FailureSummary::step(&failure, state.time)))
+    }
+
+    fn map(
+        &self,
+        points: &mut dyn Iterator<Item = MappedPoint>,
+    ) -> Option<Result<DeviceMapping, FailureSummary>> {
+        Some(GpuStepper::map(self, points).map_err(|error| FailureSummary::device(&error, None)))
+    }
+
+    fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
+        GpuStepper::apply(self, mapping, value);
+    }
+
+    fn hold(&mut self, grips: &[Grip]) -> bool {
+        GpuStepper::hold(self, grips).is_ok()
+    }
+
     fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), FailureSummary> {
         GpuStepper::bring_back(self, state).map_err(|failure| FailureSummary::step(&failure, state.time))
+    }
+
+    fn clock(&self, state: &State<f32>) -> Option<Clock> {
+        Some(GpuStepper::clock(self, state))
+    }
+
+    fn go_on(&mut self, clock: &Clock, step: f64, state: &State<f32>) {
+        GpuStepper::go_on(self, clock, step, state);
     }
 
     fn balance_floor(&self) -> f64 {
@@ -249,6 +319,14 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
     fn hold(&mut self, grips: &[Grip]) -> bool {
         CentralDifference::hold(self, grips);
         true
+    }
+
+    fn clock(&self, state: &State<R>) -> Option<Clock> {
+        Some(CentralDifference::clock(self, state))
+    }
+
+    fn go_on(&mut self, clock: &Clock, step: f64, state: &State<R>) {
+        CentralDifference::go_on(self, clock, step, state);
     }
 
     fn balance_floor(&self) -> f64 {

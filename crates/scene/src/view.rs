@@ -1,10 +1,12 @@
 //! What of a scene is shown, as its table `[view]` asks.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use pliant_geometry::Mesh;
 
-use crate::format::{At, BodyModel, ColourBy, FieldName, VtuTable};
+use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, VtuTable};
+use crate::registry::OutputTable;
 use crate::scene::Scene;
 
 /// Draws an instant of a run.
@@ -36,6 +38,20 @@ impl Scene {
 
     fn shows_surface(&self) -> bool {
         self.view.on.as_ref().is_some_and(|on| self.surfaces.iter().any(|(name, _)| name == on))
+    }
+
+    /// All that tables of the scene sample, in one: energies, all reactions, and the probes, under the name of their table too where
+    /// another one has a probe of that name.
+    pub(crate) fn sampled(&self) -> CsvTable {
+        let mut probes = BTreeMap::new();
+        for (name, output) in &self.outputs {
+            let OutputTable::Csv(table) = output else { continue };
+            for (probe, place) in &table.probes {
+                let own = if probes.contains_key(probe) { format!("{name}.{probe}") } else { probe.clone() };
+                probes.insert(own, place.clone());
+            }
+        }
+        CsvTable { every: 1.0, reactions: None, energy: true, probes }
     }
 
     /// A series of what is shown, with displacements and the field of the colours.

@@ -1,4 +1,9 @@
-//! The hand and the pins that hold a body, and recordings of what they did.
+//! The hand and the pins that hold a body.
+//!
+//! A hand has no point: it holds the surface around the one that it took, within two edges of the elements there, with the
+//! weights of a Gaussian whose deviation is one edge. So a pull meets tissue as a grasper does, and not a single element.
+
+use std::collections::HashSet;
 
 use pliant_geometry::Vector3;
 use pliant_mechanics::Model;
@@ -20,13 +25,13 @@ pub struct Point {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hand {
-    /// Takes hold of a point, by a spring of a stiffness [N/m].
+    /// Takes hold of the surface around a point, by a spring of a stiffness [N/m].
     Take(Point, f64),
     /// Pulls what it holds towards a place [m].
     Pull([f64; 3]),
     /// Lets go.
     Release,
-    /// Pins a point where it is.
+    /// Pins the surface around a point where it is.
     Pin(Point),
     /// Removes a pin, counted from 0.
     Unpin(usize),
@@ -36,105 +41,184 @@ pub enum Hand {
 #[derive(Clone, Debug, Default)]
 pub struct Hold {
     grips: Vec<Grip>,
+    taken: Vec<Taken>,
     by_hand: bool,
 }
 
-/// A point as a combination of nodes of the model.
-fn nodes_of(point: &Point, subject: &Subject, live: &dyn Live) -> Option<Vec<(u32, f64)>> {
-    let corners = subject.triangles().nth(point.triangle as usize)?;
-    let mut nodes: Vec<(u32, f64)> = Vec::new();
-    for (corner, weight) in corners.into_iter().zip(point.weights) {
-        for (node, own) in live.nodes_of(corner) {
-            match nodes.iter_mut().find(|(known, _)| *known == node) {
-                Some((_, sum)) => *sum += own * weight,
-                None => nodes.push((node, own * weight)),
-            }
+/// How a grip was taken.
+#[derive(Clone, Copy, Debug)]
+struct Taken {
+    /// Stiffness asked for [N/m].
+    stiffness: f64,
+    /// From the middle of what is held to the point that was taken [m].
+    offset: Vector3,
+}
+
+/// A combination of nodes of the model.
+type Nodes = Vec<(u32, f64)>;
+
+fn add(nodes: &mut Nodes, more: Nodes, weight: f64) {
+    for (node, own) in more {
+        match nodes.iter_mut().find(|(known, _)| *known == node) {
+            Some((_, sum)) => *sum += own * weight,
+            None => nodes.push((node, own * weight)),
         }
+    }
+}
+
+/// A point as a combination of nodes; `None` of one that there is not.
+pub(crate) fn nodes_of(point: &Point, subject: &Subject, live: &dyn Live) -> Option<Nodes> {
+    let corners = subject.triangles().nth(point.triangle as usize)?;
+    let mut nodes = Nodes::new();
+    for (corner, weight) in corners.into_iter().zip(point.weights) {
+        add(&mut nodes, live.nodes_of(corner), weight);
     }
     (!nodes.is_empty()).then_some(nodes)
 }
 
-impl Hold {
-    /// Everything that is held.
-    pub fn grips(&self) -> &[Grip] {
-        &self.grips
+/// The mean length [m] of the edges between the nodes that carry a triangle.
+fn edge(corners: [u32; 3], model: &Model, live: &dyn Live) -> f64 {
+    let mut nodes = Nodes::new();
+    corners.into_iter().for_each(|corner| add(&mut nodes, live.nodes_of(corner), 1.0));
+    let places: Vec<Vector3> = nodes.iter().map(|&(node, _)| model.rest[node as usize].into()).collect();
+    let (mut sum, mut count) = (0.0, 0);
+    for (first, a) in places.iter().enumerate() {
+        for b in &places[..first] {
+            (sum, count) = (sum + (a - b).norm(), count + 1);
+        }
     }
+    if count > 0 { sum / f64::from(count) } else { 0.0 }
+}
 
-    /// Whether the first of them is the hand's.
+/// The surface around a point, as a combination of nodes: what lies within two edges of it at rest and hangs together with it.
+fn around(point: &Point, subject: &Subject, model: &Model, live: &dyn Live) -> Option<Nodes> {
+    let corners = subject.triangles().nth(point.triangle as usize)?;
+    let middle: Vector3 =
+        corners.into_iter().zip(point.weights).map(|(corner, w)| subject.points[corner as usize] * w).sum();
+    let edge = edge(corners, model, live);
+    let distance = |corner: u32| (subject.points[corner as usize] - middle).norm();
+    let mut reached: Vec<u32> = corners.into_iter().filter(|&c| distance(c) < 2.0 * edge).collect();
+    let mut known: HashSet<u32> = reached.iter().copied().collect();
+    let mut before = 0;
+    while before < reached.len() {
+        before = reached.len();
+        for triangle in subject.triangles() {
+            if triangle.iter().any(|corner| known.contains(corner)) {
+                let near = triangle.into_iter().filter(|&c| distance(c) < 2.0 * edge);
+                near.for_each(|corner| {
+                    if known.insert(corner) {
+                        reached.push(corner);
+                    }
+                });
+            }
+        }
+    }
+    let mut nodes = Nodes::new();
+    for corner in reached {
+        let part = distance(corner) / edge;
+        add(&mut nodes, live.nodes_of(corner), (-0.5 * part * part).exp());
+    }
+    let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
+    nodes.iter_mut().for_each(|(_, weight)| *weight /= sum);
+    if nodes.is_empty() { nodes_of(point, subject, live) } else { Some(nodes) }
+}
+
+impl Hold {
+    /// Whether the first of what is held is the hand's.
     pub fn by_hand(&self) -> bool {
         self.by_hand
     }
 
-    /// Does what hand and pins do; the stiffness stays below what leaves steps [s] stable.
-    pub fn take(&mut self, hand: &Hand, model: &Model, step: f64, subject: &Subject, live: &mut dyn Live) {
+    /// Of each grip the point [m], and its force on the body [N].
+    pub fn shown<'h>(&'h self, live: &'h dyn Live) -> impl Iterator<Item = [[f64; 3]; 2]> + 'h {
+        self.grips.iter().zip(&self.taken).map(|(grip, taken)| {
+            let [middle, force] = live.pulled(grip);
+            [(Vector3::from(middle) + taken.offset).into(), force]
+        })
+    }
+
+    /// Does what hand and pins do; the stiffness stays below what leaves steps [s] stable. False where the solver knows no hand.
+    pub fn take(
+        &mut self,
+        hand: &Hand,
+        model: &Model,
+        step: f64,
+        subject: &Subject,
+        live: &mut dyn Live,
+    ) -> bool {
         match hand {
             Hand::Take(point, stiffness) => {
                 self.release();
-                let Some(nodes) = nodes_of(point, subject, live) else { return };
-                let grip = grip(nodes, *stiffness, model, step, live);
+                let Some((grip, taken)) = grip(point, *stiffness, model, step, subject, live) else {
+                    return true;
+                };
                 self.grips.insert(0, grip);
+                self.taken.insert(0, taken);
                 self.by_hand = true;
             }
-            Hand::Pull(place) if self.by_hand => self.grips[0].place = *place,
+            Hand::Pull(place) if self.by_hand => {
+                self.grips[0].place = (Vector3::from(*place) - self.taken[0].offset).into();
+            }
             Hand::Pull(_) => {}
             Hand::Release => self.release(),
             Hand::Pin(point) => {
-                let Some(nodes) = nodes_of(point, subject, live) else { return };
-                self.grips.push(grip(nodes, f64::INFINITY, model, step, live));
+                let Some((grip, taken)) = grip(point, f64::INFINITY, model, step, subject, live) else {
+                    return true;
+                };
+                self.grips.push(grip);
+                self.taken.push(taken);
             }
             Hand::Unpin(pin) => {
                 let at = pin + usize::from(self.by_hand);
                 if at < self.grips.len() {
                     self.grips.remove(at);
+                    self.taken.remove(at);
                 }
             }
         }
-        if !live.hold(&self.grips) {
-            self.grips.clear();
-            self.by_hand = false;
+        self.hold(live)
+    }
+
+    /// Holds the same in a run of another model or step [s].
+    pub fn hold_on(&mut self, model: &Model, step: f64, live: &mut dyn Live) -> bool {
+        for (grip, taken) in self.grips.iter_mut().zip(&self.taken) {
+            grip.stiffness = taken.stiffness.min(grip.stiffest(model, step));
         }
+        self.hold(live)
+    }
+
+    fn hold(&mut self, live: &mut dyn Live) -> bool {
+        let held = live.hold(&self.grips);
+        if !held {
+            *self = Self::default();
+        }
+        held
     }
 
     fn release(&mut self) {
         if std::mem::take(&mut self.by_hand) {
             self.grips.remove(0);
+            self.taken.remove(0);
         }
     }
 }
 
 /// A grip where its point is, as stiff as asked for or as steps allow.
-fn grip(nodes: Vec<(u32, f64)>, stiffness: f64, model: &Model, step: f64, live: &dyn Live) -> Grip {
-    let mut grip = Grip { nodes, place: [0.0; 3], stiffness: 0.0 };
+fn grip(
+    point: &Point,
+    stiffness: f64,
+    model: &Model,
+    step: f64,
+    subject: &Subject,
+    live: &dyn Live,
+) -> Option<(Grip, Taken)> {
+    let nodes = around(point, subject, model, live)?;
+    let at = Grip { nodes: nodes_of(point, subject, live)?, ..Grip::default() };
+    let mut grip = Grip { nodes, ..Grip::default() };
     grip.stiffness = stiffness.min(grip.stiffest(model, step));
-    grip.place = live.pulled(&grip)[0];
-    grip
-}
-
-/// What was held from which step on.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Recording {
-    /// Steps done before, and what was held then; whether the hand held the first of it.
-    pub moves: Vec<(u64, Vec<Grip>, bool)>,
-    /// Steps in all.
-    pub steps: u64,
-}
-
-impl Recording {
-    /// As bytes that keep every bit.
-    ///
-    /// # Errors
-    /// Never in practice: memory that ran out.
-    pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
-        postcard::to_stdvec(self).map_err(|error| error.to_string())
-    }
-
-    /// From these bytes.
-    ///
-    /// # Errors
-    /// If they are no recording.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
-        postcard::from_bytes(bytes).map_err(|error| error.to_string())
-    }
+    [grip.place, _] = live.pulled(&grip);
+    let offset = Vector3::from(live.pulled(&at)[0]) - Vector3::from(grip.place);
+    Some((grip, Taken { stiffness, offset }))
 }
 
 /// The first triangle that a ray meets, and where: Möller and Trumbore (1997), one triangle after the other. A tree over

@@ -1,14 +1,20 @@
 //! The window: a scene played in real time on a thread of its own, pulled by hand and pinned, looked at from all sides. All but the
 //! window itself works without one: [`Session`] plays, [`pick`] finds what lies under a pixel, [`replay()`] repeats what a hand did.
 
+mod device;
 mod hand;
+mod parameters;
 mod replay;
+mod samples;
 mod session;
 #[cfg(feature = "window")]
 mod window;
 
-pub use hand::{Hand, Hold, Point, Recording, pick};
-pub use replay::{Replayed, replay};
+pub use device::LOOK;
+pub use hand::{Hand, Hold, Point, pick};
+pub use parameters::{Number, Parameter, parameters, with_numbers};
+pub use replay::{Done, Lags, Move, Recording, Replayed, replay, replay_in_real_time};
+pub use samples::Samples;
 pub use session::{Frame, Order, Session, Stage};
 #[cfg(feature = "window")]
 pub use window::{Errand, Opening, WindowError, open};

@@ -1,11 +1,67 @@
-//! What a hand did, repeated: before the same steps, so that it comes to the same bits.
+//! What was done to a run, recorded and repeated: before the same steps, so that it comes to the same bits; or by a mouse that moves as
+//! fast as it did, so that its lag can be measured.
 
-use pliant_mechanics::grip::Grip;
-use pliant_scene::live;
-use serde::Serialize;
+use std::time::{Duration, Instant};
 
-use crate::hand::Recording;
-use crate::session::Stage;
+use pliant_geometry::Vector3;
+use pliant_picture::Subject;
+use pliant_scene::{Live, Standing};
+use serde::{Deserialize, Serialize};
+
+use crate::hand::{Hand, Hold};
+use crate::parameters::{Number, with_numbers};
+use crate::session::{FRAME, Order, Session, Stage};
+
+/// Something done to a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Done {
+    /// By hand.
+    Hand(Hand),
+    /// Numbers of the scene that are others from then on; all others are as in the file.
+    Numbers(Vec<Number>),
+}
+
+/// When something was done, and what.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Move {
+    /// Steps done before.
+    pub steps: u64,
+    /// Whether that instant was looked at before, so that the step to come knows nothing of it yet.
+    pub looked: bool,
+    /// Wall time since the first one [s].
+    pub seconds: f64,
+    /// Wall time from when it was asked for to the end of the first step in which it acted [s]; `None` while the run stood still.
+    pub lag: Option<f64>,
+    /// What.
+    pub done: Done,
+}
+
+/// What was done to a run, from its start on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Recording {
+    /// In the order of time.
+    pub moves: Vec<Move>,
+    /// Steps in all.
+    pub steps: u64,
+}
+
+impl Recording {
+    /// As bytes that keep every bit.
+    ///
+    /// # Errors
+    /// Never in practice: memory that ran out.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
+        postcard::to_stdvec(self).map_err(|error| error.to_string())
+    }
+
+    /// From these bytes.
+    ///
+    /// # Errors
+    /// If they are no recording.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
+        postcard::from_bytes(bytes).map_err(|error| error.to_string())
+    }
+}
 
 /// What a replay came to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,35 +78,149 @@ pub struct Replayed {
     pub reactions: Vec<[f64; 3]>,
 }
 
-/// Repeats a recording.
+/// How long it took until what a mouse did was felt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Lags {
+    /// Moves that a step has felt.
+    pub moves: usize,
+    /// Wall time from a move to the end of the first step in which it acted, of the middle one [s].
+    pub median: f64,
+    /// The longest [s].
+    pub worst: f64,
+    /// The middle one in frames of 1/60 s.
+    pub median_frames: f64,
+    /// The longest in frames.
+    pub worst_frames: f64,
+}
+
+impl Lags {
+    /// Of what was recorded.
+    pub fn of(recording: &Recording) -> Self {
+        let mut all: Vec<f64> = recording.moves.iter().filter_map(|then| then.lag).collect();
+        all.sort_by(f64::total_cmp);
+        let median = all.get(all.len() / 2).copied().unwrap_or_default();
+        let worst = all.last().copied().unwrap_or_default();
+        let frames = |lag: f64| lag / FRAME.as_secs_f64();
+        Self { moves: all.len(), median, worst, median_frames: frames(median), worst_frames: frames(worst) }
+    }
+}
+
+/// Repeats a recording by a mouse that moves when it did, while the run goes on in real time: what was felt then, and when.
+///
+/// # Errors
+/// If a stage can't be made, or the run fails.
+pub fn replay_in_real_time(stage: &Stage, recording: &Recording) -> Result<Recording, String> {
+    let mut orders = Vec::new();
+    for then in &recording.moves {
+        let order = match &then.done {
+            Done::Hand(hand) => Order::Hand(*hand),
+            Done::Numbers(numbers) => {
+                Order::Change(Box::new(with_numbers(&stage.scene, numbers)?), numbers.clone())
+            }
+        };
+        orders.push((Duration::try_from_secs_f64(then.seconds).unwrap_or_default(), order));
+    }
+    let mut session = Session::start(stage.clone(), || ()).map_err(|error| error.to_string())?;
+    session.order(Order::Record);
+    session.order(Order::Play(true));
+    let started = Instant::now();
+    for (due, order) in orders {
+        std::thread::sleep(due.saturating_sub(started.elapsed()));
+        session.order(order);
+    }
+    // Until the last one is felt.
+    std::thread::sleep(10 * FRAME);
+    if let Some(failure) = &session.look().1.failure {
+        return Err(failure.clone());
+    }
+    session.end().ok_or_else(|| "the solver's thread has ended".into())
+}
+
+/// Repeats a recording before the same steps.
 ///
 /// # Errors
 /// Why the run could not go on.
 pub fn replay(stage: &Stage, recording: &Recording) -> Result<Replayed, String> {
-    let mut live = live(&stage.scene, &stage.built, &stage.plan).map_err(|failure| failure.message)?;
-    let mut hand: Option<Grip> = None;
-    let mut moves = recording.moves.iter().peekable();
-    let mut largest_force = 0.0_f64;
-    let mut steps = 0;
+    let mut replay = Replay { moves: &recording.moves, of: recording.steps, ..Replay::default() };
+    let (mut now, mut before) = (stage.clone(), None);
     loop {
-        while let Some((_, grips, by_hand)) = moves.next_if(|(before, ..)| *before <= steps) {
-            live.hold(grips);
-            hand = grips.first().filter(|_| *by_hand).cloned();
-        }
-        if steps >= recording.steps {
-            break;
-        }
-        let next = moves.peek().map_or(recording.steps, |(before, ..)| (*before).min(recording.steps));
-        steps += live.advance(next - steps).map_err(|failure| failure.message)?;
-        if let Some(grip) = &hand {
-            let [_, [x, y, z]] = live.pulled(grip);
-            largest_force = largest_force.max((x * x + y * y + z * z).sqrt());
+        match replay.play(&now, before.take())? {
+            Ended::Whole(replayed) => return Ok(replayed),
+            Ended::Change(standing, numbers) => {
+                let next = with_numbers(&stage.scene, numbers)?;
+                before = Some((std::mem::replace(&mut now, next), standing));
+            }
         }
     }
-    let (time, fingerprint) = (live.time(), live.fingerprint());
-    // Reactions belong to the instant at which forces are found.
-    live.mesh().map_err(|failure| failure.message)?;
-    let reactions = (0..stage.built.model.constraints.len()).map(|index| live.reaction(index)).collect();
-    let held = hand.map(|grip| live.pulled(&grip));
-    Ok(Replayed { time, fingerprint, largest_force, held, reactions })
+}
+
+/// How far a replay is.
+#[derive(Default)]
+struct Replay<'r> {
+    /// What is left of the moves.
+    moves: &'r [Move],
+    steps: u64,
+    /// Steps in all.
+    of: u64,
+    subject: Option<Subject>,
+    hold: Hold,
+    largest_force: f64,
+}
+
+enum Ended<'r> {
+    /// Numbers are others from here on.
+    Change(Option<Standing>, &'r [Number]),
+    Whole(Replayed),
+}
+
+impl<'r> Replay<'r> {
+    /// Goes on until numbers are others, or to the end.
+    fn play(&mut self, stage: &Stage, from: Option<(Stage, Option<Standing>)>) -> Result<Ended<'r>, String> {
+        let (mut live, _) = stage.enter(from)?;
+        let subject = match self.subject.take() {
+            Some(subject) => subject,
+            None => Subject::new(live.mesh().map_err(|failure| failure.message)?),
+        };
+        let subject = self.subject.insert(subject);
+        let (model, step) = (&stage.built.model, stage.plan.step);
+        self.hold.hold_on(model, step, live.as_mut());
+        loop {
+            while let Some((then, rest)) =
+                self.moves.split_first().filter(|(then, _)| then.steps <= self.steps)
+            {
+                self.moves = rest;
+                match &then.done {
+                    Done::Hand(hand) => {
+                        if then.looked {
+                            live.mesh().map_err(|failure| failure.message)?;
+                        }
+                        self.hold.take(hand, model, step, subject, live.as_mut());
+                    }
+                    Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
+                    Done::Numbers(numbers) => return Ok(Ended::Change(live.stand(), numbers)),
+                }
+            }
+            if self.steps >= self.of {
+                return self.end(stage, live.as_mut()).map(Ended::Whole);
+            }
+            let next = self.moves.first().map_or(self.of, |then| then.steps.min(self.of));
+            self.steps += live.advance(next - self.steps).map_err(|failure| failure.message)?;
+            if let Some([_, force]) = self.hold.shown(live.as_ref()).next().filter(|_| self.hold.by_hand()) {
+                self.largest_force = self.largest_force.max(Vector3::from(force).norm());
+            }
+        }
+    }
+
+    fn end(&self, stage: &Stage, live: &mut dyn Live) -> Result<Replayed, String> {
+        let (time, fingerprint) = (live.time(), live.fingerprint());
+        // Reactions belong to the instant at which forces are found.
+        live.mesh().map_err(|failure| failure.message)?;
+        Ok(Replayed {
+            time,
+            fingerprint,
+            largest_force: self.largest_force,
+            held: self.hold.shown(live).next().filter(|_| self.hold.by_hand()),
+            reactions: (0..stage.built.model.constraints.len()).map(|index| live.reaction(index)).collect(),
+        })
+    }
 }

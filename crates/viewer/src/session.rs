@@ -1,25 +1,31 @@
 //! A scene on a thread of its own: it is played there in real time, and handed over frame by frame. Neither side ever waits for the
 //! other: orders go through a channel, the newest frame lies in one of three places of which each side holds one.
 
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
+use pliant_gpu::{DevicePoints, PointValue};
 use pliant_mechanics::Energies;
-use pliant_picture::{Subject, nodal_values};
+use pliant_mechanics::grip::Grip;
+use pliant_picture::{Subject, drawn_value, nodal_values};
 use pliant_scene::format::{At, FieldName};
-use pliant_scene::{Built, Live, Plan, Scene, live};
+use pliant_scene::{Built, Column, Live, Plan, Scene, Standing, go_on, live};
 
-use crate::hand::{Hand, Hold, Recording};
+use crate::device::{Seen, point_value};
+use crate::hand::{Hand, Hold, Point, nodes_of};
+use crate::parameters::Number;
+use crate::replay::{Done, Move, Recording};
 
 /// Wall time between frames.
-const FRAME: Duration = Duration::from_micros(16_667);
+pub(crate) const FRAME: Duration = Duration::from_micros(16_667);
 /// Wall time that the solver may fall behind before it gives up catching up.
 const BEHIND: f64 = 0.1;
 
 /// What the window asks of the solver.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum Order {
     /// Goes on, or stands still.
     Play(bool),
@@ -31,8 +37,18 @@ pub enum Order {
     Speed(f64),
     /// Changes what a hand or a pin holds.
     Hand(Hand),
+    /// Goes on as another stage from the next step on, from where the run stands: that of numbers which are others than in the file.
+    Change(Box<Stage>, Vec<Number>),
+    /// Follows a point.
+    Probe(Point),
+    /// Follows no point any more but those that the scene names.
+    ForgetProbes,
+    /// Keeps what is done to the run from now on.
+    Record,
     /// Shows another field; `None` for the colour of tissue.
     Show(Option<FieldName>, Option<&'static str>),
+    /// Brings every frame to ordinary memory where the state lies on a device, as a section needs it; or only some.
+    Memory(bool),
     /// Ends.
     Quit,
 }
@@ -48,6 +64,13 @@ pub struct Frame {
     pub steps: u64,
     /// Whether it goes on.
     pub playing: bool,
+    /// Points on the device where the state lies, at this instant, to be drawn from there; `None` of a state in ordinary memory.
+    pub on_device: Option<DevicePoints>,
+    /// How many looks there were. Points, values, energies, what is held and the sample are of the last one: of this instant unless
+    /// the state lies on a device, where looks are rare ([`LOOK`](crate::LOOK)).
+    pub looks: u64,
+    /// What was read back from the device so far.
+    pub read_backs: u64,
     /// Positions [m].
     pub points: Vec<Vector3>,
     /// Values of the field that is shown; empty for none.
@@ -68,8 +91,14 @@ pub struct Frame {
     pub possible_factor: f64,
     /// From a hand's move to the first step in which it acted [s], of the last one.
     pub input_lag: Option<f64>,
-    /// Why it cannot go on.
+    /// Why it cannot go on: what happened, where, and what to try.
     pub failure: Option<String>,
+    /// What else to tell.
+    pub note: Option<String>,
+    /// Names and units of the sample of this instant.
+    pub columns: Arc<[Column]>,
+    /// The sample: force of the hand, energies, reactions and probes.
+    pub sample: Vec<f64>,
 }
 
 /// A scene that is played on another thread.
@@ -91,6 +120,26 @@ pub struct Stage {
     pub plan: Plan,
 }
 
+impl Stage {
+    /// Begins to play it, from where a run of a stage before stands if it can be; whether it goes on from there.
+    ///
+    /// # Errors
+    /// If its solver can't be made.
+    pub(crate) fn enter(
+        &self,
+        from: Option<(Self, Option<Standing>)>,
+    ) -> Result<(Box<dyn Live + '_>, bool), String> {
+        let told = |failure: pliant_scene::FailureSummary| failure.message;
+        if let Some((before, Some(standing))) = from {
+            let going = go_on(&self.scene, &self.built, &self.plan, standing, &before.built).map_err(told)?;
+            if let Some(live) = going {
+                return Ok((live, true));
+            }
+        }
+        Ok((live(&self.scene, &self.built, &self.plan).map_err(told)?, false))
+    }
+}
+
 impl Session {
     /// Starts to play a scene, standing still. `wake` is called after each frame.
     pub fn start(stage: Stage, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
@@ -99,7 +148,7 @@ impl Session {
         let threads = stage.scene.run.threads as usize;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(std::io::Error::other)?;
-        let run = move || pool.install(move || play(&stage, &inbox, input, &wake));
+        let run = move || pool.install(move || play(stage, &inbox, input, &wake));
         let thread = std::thread::Builder::new().name("solver".into()).spawn(run)?;
         Ok(Self { orders, frames, thread: Some(thread) })
     }
@@ -121,7 +170,7 @@ impl Session {
 }
 
 impl Session {
-    /// Ends it; what was held since it started or was last reset. `None` after a panic, which was told there.
+    /// Ends it; what was done since it was told to record or was last reset. `None` after a panic, which was told there.
     pub fn end(&mut self) -> Option<Recording> {
         self.order(Order::Quit);
         self.thread.take()?.join().ok()
@@ -168,173 +217,340 @@ impl Pace {
     }
 }
 
-/// Everything of the solver's thread.
-struct Player<'s> {
-    stage: &'s Stage,
-    subject: Subject,
-    live: Box<dyn Live + 's>,
+/// What of a run lasts when it goes on as another stage.
+struct Course {
     hold: Hold,
     field: Option<String>,
     steps: u64,
     failure: Option<String>,
+    note: Option<String>,
     pace: Pace,
     playing: bool,
-    /// When the hand moved that no step has felt yet.
-    moved: Option<Instant>,
+    /// Steps that were asked for one by one.
+    owed: u64,
+    /// What was asked for that no step has felt yet: when, after how many steps it acts, and its number in the recording.
+    waiting: Vec<(Instant, u64, usize)>,
     input_lag: Option<f64>,
     /// Since the last frame.
     batch: (u64, Duration),
     step_seconds: f64,
     frames: u64,
-    recording: Recording,
-    /// Points and values of the last instant that could be shown.
-    good: (Vec<Vector3>, Vec<f64>),
+    shown: Instant,
+    recording: Option<Recording>,
+    /// When the first move was recorded.
+    started: Option<Instant>,
+    /// The stage to go on as, and its numbers that are others than in the file.
+    change: Option<(Box<Stage>, Vec<Number>)>,
+    numbers: Vec<Number>,
+    followed: Vec<Followed>,
+    columns: Arc<[Column]>,
+    seen: Seen,
+    /// Whether every frame comes to ordinary memory.
+    in_memory: bool,
+}
+
+/// A point that a user follows.
+struct Followed {
+    /// Its nodes; it pulls at none.
+    point: Grip,
+    /// Its place at rest [m].
+    rest: Vector3,
+}
+
+/// Why a stage is left.
+enum Left {
+    Quit,
+    /// To start anew.
+    Reset,
+    /// For another stage.
+    Change,
+}
+
+/// The solver's thread while it plays a stage.
+struct Player<'s> {
+    stage: &'s Stage,
+    subject: Subject,
+    live: Box<dyn Live + 's>,
+    /// Whether the state lies on a device.
+    on_device: bool,
+    course: Course,
 }
 
 fn play(
-    stage: &Stage,
+    mut stage: Stage,
     inbox: &Receiver<(Instant, Order)>,
     mut frames: triple_buffer::Input<Frame>,
     wake: &(impl Fn() + Send),
 ) -> Recording {
-    let mut player = match Player::new(stage) {
-        Ok(player) => player,
-        Err(message) => {
-            frames.input_buffer_mut().failure = Some(message);
-            frames.publish();
-            wake();
-            return Recording::default();
-        }
-    };
-    let shown = Instant::now();
-    player.show(&mut frames);
-    wake();
-    player.until_quit(inbox, &mut frames, wake, shown);
-    Recording { steps: player.steps, ..player.recording }
-}
-
-impl Player<'_> {
-    fn until_quit(
-        &mut self,
-        inbox: &Receiver<(Instant, Order)>,
-        frames: &mut triple_buffer::Input<Frame>,
-        wake: &(impl Fn() + Send),
-        mut shown: Instant,
-    ) {
-        loop {
-            // Orders come first; while it stands still nothing but orders happens.
-            let due = FRAME.saturating_sub(shown.elapsed());
-            let patience = if self.is_going() { self.patience(due) } else { Duration::from_millis(50) };
-            let mut changed = false;
-            let mut next = match patience {
-                Duration::ZERO => inbox.try_recv().ok(),
-                _ => match inbox.recv_timeout(patience) {
-                    Ok(order) => Some(order),
-                    Err(RecvTimeoutError::Timeout) => None,
-                    Err(RecvTimeoutError::Disconnected) => return,
-                },
-            };
-            while let Some((sent, order)) = next {
-                if order == Order::Quit {
-                    return;
-                }
-                self.obey(sent, order);
-                changed = true;
-                next = inbox.try_recv().ok();
-            }
-            if self.is_going() {
-                self.go_on(FRAME.saturating_sub(shown.elapsed()));
-                changed = true;
-            }
-            if changed && (shown.elapsed() >= FRAME || !self.is_going()) {
-                shown = Instant::now();
-                self.show(frames);
+    let mut course = Course::new(&stage);
+    let mut from = None;
+    let mut subject = None;
+    loop {
+        let mut player = match Player::enter(&stage, from, subject, course) {
+            Ok(player) => player,
+            Err(message) => {
+                frames.input_buffer_mut().failure = Some(message);
+                frames.publish();
                 wake();
+                return Recording::default();
             }
+        };
+        player.show(&mut frames);
+        wake();
+        let left = player.go(inbox, &mut frames, wake);
+        let standing = match left {
+            Left::Change if player.course.steps > 0 && player.course.failure.is_none() => player.live.stand(),
+            _ => None,
+        };
+        let anew = matches!(left, Left::Reset) || player.course.failure.is_some();
+        (subject, course) = (Some(player.subject), player.course);
+        if matches!(left, Left::Quit) {
+            let recording = course.recording.unwrap_or_default();
+            return Recording { steps: course.steps, ..recording };
         }
+        if anew {
+            course.start_anew();
+        }
+        from = course.change.take().map(|(mut next, numbers)| {
+            next.share(stage.plan.target.device.as_ref());
+            course.record(false, Instant::now(), Done::Numbers(numbers.clone()));
+            course.numbers = numbers;
+            (std::mem::replace(&mut stage, *next), standing)
+        });
     }
 }
 
-impl<'s> Player<'s> {
-    fn new(stage: &'s Stage) -> Result<Self, String> {
-        let mut live = live(&stage.scene, &stage.built, &stage.plan).map_err(|failure| failure.message)?;
-        let subject = Subject::new(live.mesh().map_err(|failure| failure.message)?);
+impl Course {
+    fn new(stage: &Stage) -> Self {
         let field = stage.scene.shown_field().map(|field| {
             let part = stage.scene.view.component.map(|part| format!(":{}", part.word())).unwrap_or_default();
             format!("{}{part}", field.name())
         });
-        Ok(Self {
-            stage,
-            subject,
-            live,
+        Self {
             hold: Hold::default(),
             field,
             steps: 0,
             failure: None,
+            note: None,
             pace: Pace::new(0.0),
             playing: false,
-            moved: None,
+            owed: 0,
+            waiting: Vec::new(),
             input_lag: None,
             batch: (0, Duration::ZERO),
             step_seconds: 0.0,
             frames: 0,
-            recording: Recording::default(),
-            good: Default::default(),
-        })
+            shown: Instant::now(),
+            recording: None,
+            started: None,
+            change: None,
+            numbers: Vec::new(),
+            followed: Vec::new(),
+            columns: Arc::default(),
+            seen: Seen::default(),
+            in_memory: false,
+        }
+    }
+
+    fn start_anew(&mut self) {
+        self.hold = Hold::default();
+        (self.steps, self.owed, self.started) = (0, 0, None);
+        (self.failure, self.note) = (None, None);
+        self.waiting.clear();
+        if let Some(recording) = &mut self.recording {
+            *recording = Recording::default();
+        }
+        if !self.numbers.is_empty() {
+            self.record(false, Instant::now(), Done::Numbers(self.numbers.clone()));
+        }
+        self.pace.anchor(0.0);
     }
 
     fn is_going(&self) -> bool {
         self.playing && self.failure.is_none()
     }
 
-    /// How long it may wait for orders: until the simulation is due to go on, or the next frame is.
-    fn patience(&self, frame_due: Duration) -> Duration {
-        let ahead = (self.live.time() - self.pace.goal()) / self.pace.speed.max(1e-9);
-        Duration::try_from_secs_f64(ahead.max(0.0)).unwrap_or(frame_due).min(frame_due)
+    /// Keeps what was done at an instant, which was looked at or not.
+    fn record(&mut self, looked: bool, sent: Instant, done: Done) {
+        let Some(recording) = &mut self.recording else { return };
+        let started = *self.started.get_or_insert(sent);
+        let seconds = sent.saturating_duration_since(started).as_secs_f64();
+        recording.moves.push(Move { steps: self.steps, looked, seconds, lag: None, done });
     }
 
-    fn obey(&mut self, sent: Instant, order: Order) {
-        match order {
-            Order::Play(playing) => {
-                self.playing = playing;
-                self.pace.anchor(self.live.time());
+    /// After a step: what was asked for before has been felt.
+    fn feel(&mut self) {
+        for &(sent, from, number) in self.waiting.iter().filter(|(_, from, _)| self.steps > *from) {
+            let lag = sent.elapsed().as_secs_f64();
+            self.input_lag = Some(lag);
+            if let Some(then) = self.recording.as_mut().and_then(|recording| recording.moves.get_mut(number))
+            {
+                then.lag = Some(lag);
             }
-            Order::Step(steps) => {
-                self.playing = false;
-                for _ in 0..steps {
-                    self.step();
+        }
+        let steps = self.steps;
+        self.waiting.retain(|(_, from, _)| steps <= *from);
+    }
+}
+
+impl<'s> Player<'s> {
+    /// Begins to play a stage, or goes on as it from where a run of the stage before stands.
+    fn enter(
+        stage: &'s Stage,
+        from: Option<(Stage, Option<Standing>)>,
+        subject: Option<Subject>,
+        mut course: Course,
+    ) -> Result<Self, String> {
+        let (mut live, goes_on) = stage.enter(from)?;
+        if !goes_on && course.steps > 0 {
+            course.start_anew();
+            course.note = Some("the mesh or the solver is another one: it starts anew".into());
+        }
+        course.hold.hold_on(&stage.built.model, stage.plan.step, live.as_mut());
+        let subject = match subject.filter(|_| goes_on) {
+            Some(subject) => subject,
+            None => Subject::new(live.mesh().map_err(|failure| failure.message)?),
+        };
+        let on_device = stage.plan.target.device.is_some();
+        let mut player = Self { stage, subject, live, on_device, course };
+        player.show_named(player.course.field.clone().as_deref());
+        player.name_columns();
+        Ok(player)
+    }
+
+    /// Follows orders and goes on, until the stage is left.
+    fn go(
+        &mut self,
+        inbox: &Receiver<(Instant, Order)>,
+        frames: &mut triple_buffer::Input<Frame>,
+        wake: &(impl Fn() + Send),
+    ) -> Left {
+        let mut changed = false;
+        loop {
+            if self.is_due_to_change() {
+                return Left::Change;
+            }
+            // Orders come first, before each step; while it stands still nothing but orders happens.
+            if self.course.owed == 0 {
+                let mut next = match self.patience() {
+                    Duration::ZERO => inbox.try_recv().ok(),
+                    patience => match inbox.recv_timeout(patience) {
+                        Ok(order) => Some(order),
+                        Err(RecvTimeoutError::Timeout) => None,
+                        Err(RecvTimeoutError::Disconnected) => return Left::Quit,
+                    },
+                };
+                while let Some((sent, order)) = next {
+                    changed = true;
+                    if let Some(left) = self.obey(sent, order) {
+                        return left;
+                    }
+                    // Steps that were asked for come before later orders.
+                    next = if self.course.owed > 0 { None } else { inbox.try_recv().ok() };
                 }
             }
-            Order::Reset => self.reset(),
-            Order::Speed(speed) => {
-                self.pace.speed = speed.clamp(1e-6, 1e6);
-                self.pace.anchor(self.live.time());
+            if self.is_due_to_change() {
+                return Left::Change;
             }
-            Order::Hand(hand) => {
-                let (model, step) = (&self.stage.built.model, self.stage.plan.step);
-                self.hold.take(&hand, model, step, &self.subject, self.live.as_mut());
-                let from = self.steps + self.live.delay();
-                self.recording.moves.push((from, self.hold.grips().to_vec(), self.hold.by_hand()));
-                self.moved.get_or_insert(sent);
+            if self.course.owed > 0 || (self.course.is_going() && self.live.time() < self.course.pace.goal())
+            {
+                self.step();
+                changed = true;
             }
-            Order::Show(field, component) => self.show_field(field, component),
-            Order::Quit => {}
+            let still = !self.course.is_going() && self.course.owed == 0;
+            if changed && (still || self.course.shown.elapsed() >= FRAME) {
+                self.show(frames);
+                wake();
+                changed = false;
+            }
         }
     }
 
-    fn reset(&mut self) {
-        match live(&self.stage.scene, &self.stage.built, &self.stage.plan) {
-            Ok(live) => {
-                self.live = live;
-                self.hold = Hold::default();
-                self.recording = Recording::default();
-                (self.steps, self.failure, self.moved) = (0, None, None);
-                self.pace.anchor(0.0);
-                let field = self.field.clone();
-                self.show_named(field.as_deref());
-            }
-            Err(failure) => self.failure = Some(failure.message),
+    /// Whether another stage waits, and the run stands between two steps.
+    fn is_due_to_change(&self) -> bool {
+        let course = &self.course;
+        course.change.is_some() && (course.steps == 0 || course.failure.is_some() || self.live.delay() == 0)
+    }
+
+    /// How long it may wait for orders: until the simulation is due to go on, or the next frame is.
+    fn patience(&self) -> Duration {
+        let course = &self.course;
+        if !course.is_going() {
+            return Duration::from_millis(50);
         }
+        let due = FRAME.saturating_sub(course.shown.elapsed());
+        let ahead = (self.live.time() - course.pace.goal()) / course.pace.speed.max(1e-9);
+        Duration::try_from_secs_f64(ahead.max(0.0)).unwrap_or(due).min(due)
+    }
+
+    fn obey(&mut self, sent: Instant, order: Order) -> Option<Left> {
+        let course = &mut self.course;
+        match order {
+            Order::Play(playing) => {
+                course.playing = playing;
+                course.pace.anchor(self.live.time());
+            }
+            Order::Step(steps) => (course.playing, course.owed) = (false, steps),
+            Order::Reset => return Some(Left::Reset),
+            Order::Speed(speed) => {
+                course.pace.speed = speed.clamp(1e-6, 1e6);
+                course.pace.anchor(self.live.time());
+            }
+            Order::Hand(hand) => self.hold(sent, &hand),
+            Order::Change(stage, numbers) => course.change = Some((stage, numbers)),
+            Order::Probe(point) => self.follow(&point),
+            Order::ForgetProbes => {
+                course.followed.clear();
+                self.name_columns();
+            }
+            Order::Record => course.recording = Some(Recording::default()),
+            Order::Show(field, component) => self.show_field(field, component),
+            Order::Memory(every) => course.in_memory = every,
+            Order::Quit => return Some(Left::Quit),
+        }
+        None
+    }
+
+    fn hold(&mut self, sent: Instant, hand: &Hand) {
+        // Where it takes hold has to be known.
+        if self.on_device && matches!(hand, Hand::Take(..) | Hand::Pin(_)) {
+            self.look();
+        }
+        if !matches!(hand, Hand::Pull(_)) {
+            self.course.seen.at = None;
+        }
+        let (model, step) = (&self.stage.built.model, self.stage.plan.step);
+        let looked = self.live.delay() > 0;
+        let held = self.course.hold.take(hand, model, step, &self.subject, self.live.as_mut());
+        let course = &mut self.course;
+        course.note = (!held).then(|| "this solver knows no hand: it does not pull".into());
+        let number = course.recording.as_ref().map_or(0, |recording| recording.moves.len());
+        course.record(looked, sent, Done::Hand(*hand));
+        if held && course.is_going() {
+            course.waiting.push((sent, course.steps + u64::from(looked), number));
+        }
+    }
+
+    fn follow(&mut self, point: &Point) {
+        let Some(nodes) = nodes_of(point, &self.subject, self.live.as_ref()) else { return };
+        let point = Grip { nodes, ..Grip::default() };
+        let rest = &self.stage.built.model.rest;
+        let rest =
+            point.nodes.iter().map(|&(node, weight)| Vector3::from(rest[node as usize]) * weight).sum();
+        self.course.followed.push(Followed { point, rest });
+        self.name_columns();
+    }
+
+    fn name_columns(&mut self) {
+        let axes =
+            |name: String, unit| ["x", "y", "z"].map(|axis| Column { name: format!("{name}.{axis}"), unit });
+        let mut columns = axes("hand".into(), "N").to_vec();
+        columns.extend(self.live.columns());
+        for number in 1..=self.course.followed.len() {
+            columns.extend(axes(format!("point.{number}.displacement"), "m"));
+        }
+        self.course.columns = columns.into();
+        self.course.seen.at = None;
     }
 
     fn show_field(&mut self, field: Option<FieldName>, component: Option<&'static str>) {
@@ -352,87 +568,127 @@ impl<'s> Player<'s> {
             shown.at = At::Points;
         }
         self.live.show(&shown);
-        self.field = name.map(str::to_owned);
+        self.course.seen.at = None;
+        self.course.field = name.map(str::to_owned);
     }
 
-    fn step(&mut self) -> u64 {
-        if self.failure.is_some() {
-            return 0;
+    fn step(&mut self) {
+        let (started, course) = (Instant::now(), &mut self.course);
+        course.owed = course.owed.saturating_sub(1);
+        if course.failure.is_some() {
+            course.owed = 0;
+            return;
         }
-        match self.live.advance(1) {
+        let left = (course.pace.goal() - self.live.time()) / self.stage.plan.step;
+        let coasted = match self.on_device && course.is_going() {
+            true => self.live.coast(left.ceil().max(1.0) as u64, FRAME / 2),
+            false => None,
+        };
+        match coasted.unwrap_or_else(|| self.live.advance(1)) {
             Ok(steps) => {
-                self.steps += steps;
-                if let Some(moved) = self.moved.take() {
-                    self.input_lag = Some(moved.elapsed().as_secs_f64());
-                }
-                steps
+                course.steps += steps;
+                course.batch = (course.batch.0 + steps, course.batch.1 + started.elapsed());
+                course.feel();
             }
-            Err(failure) => {
-                self.failure = Some(failure.message);
-                0
-            }
+            Err(failure) => course.failure = Some(failure.message),
+        }
+        if course.pace.goal() - self.live.time() > BEHIND * course.pace.speed {
+            course.pace.anchor = (Instant::now(), self.live.time());
         }
     }
 
-    /// Steps until the simulation is where it should be, or the next frame is due.
-    fn go_on(&mut self, most: Duration) {
-        let started = Instant::now();
-        let mut done = 0;
-        while self.failure.is_none() && self.live.time() < self.pace.goal() {
-            done += self.step();
-            if started.elapsed() >= most {
-                break;
+    /// Looks at the instant in ordinary memory.
+    fn look(&mut self) {
+        let course = &mut self.course;
+        let seen = &mut course.seen;
+        match self.live.mesh() {
+            Ok(mesh) => {
+                seen.points.clone_from(&mesh.points);
+                if let Some(moved) = mesh.point_data.get("displacement") {
+                    for (point, by) in seen.points.iter_mut().zip(moved.values.chunks_exact(3)) {
+                        *point += Vector3::new(by[0], by[1], by[2]);
+                    }
+                }
+                seen.values = course.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
+                seen.energies = self.live.energies();
+            }
+            // The last good picture stays.
+            Err(failure) => {
+                course.failure.get_or_insert(failure.message);
             }
         }
-        self.batch = (self.batch.0 + done, self.batch.1 + started.elapsed());
-        if self.pace.goal() - self.live.time() > BEHIND * self.pace.speed {
-            self.pace.anchor = (Instant::now(), self.live.time());
+        seen.held.clear();
+        seen.held.extend(course.hold.shown(self.live.as_ref()));
+        let [x, y, z] =
+            seen.held.first().filter(|_| course.hold.by_hand()).map_or([0.0; 3], |[_, force]| *force);
+        seen.sample.clear();
+        seen.sample.extend([x, y, z]);
+        self.live.sample(&mut seen.sample);
+        for followed in &course.followed {
+            let [place, _] = self.live.pulled(&followed.point);
+            seen.sample.extend((Vector3::from(place) - followed.rest).iter());
+        }
+        seen.number += 1;
+        seen.at = Some(Instant::now());
+    }
+
+    /// Brings the points that are drawn from the device to the instant; `looked` where their values are new.
+    fn place(&mut self, looked: bool) -> Option<DevicePoints> {
+        let course = &mut self.course;
+        let value = point_value(course.field.as_deref());
+        let given = (looked && value == PointValue::Given)
+            .then(|| course.seen.values.iter().map(|&value| drawn_value(value)).collect::<Vec<_>>());
+        match self.live.place(value, given.as_deref())? {
+            Ok(points) => Some(points),
+            Err(failure) => {
+                course.failure.get_or_insert(failure.message);
+                None
+            }
         }
     }
 
     /// Hands the instant over.
     fn show(&mut self, frames: &mut triple_buffer::Input<Frame>) {
         let started = Instant::now();
+        self.course.shown = started;
+        let course = &self.course;
+        let looks = !self.on_device || course.in_memory || !course.is_going() || course.seen.is_old();
+        if looks {
+            self.look();
+        }
+        let on_device = if self.on_device { self.place(looks) } else { None };
+        let course = &mut self.course;
         let frame = frames.input_buffer_mut();
-        match self.live.mesh() {
-            Ok(mesh) => {
-                frame.points.clone_from(&mesh.points);
-                if let Some(moved) = mesh.point_data.get("displacement") {
-                    for (point, by) in frame.points.iter_mut().zip(moved.values.chunks_exact(3)) {
-                        *point += Vector3::new(by[0], by[1], by[2]);
-                    }
-                }
-                frame.values = self.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
-                frame.energies = self.live.energies();
-                self.good.0.clone_from(&frame.points);
-                self.good.1.clone_from(&frame.values);
-            }
-            // The last good picture stays.
-            Err(failure) => {
-                self.failure.get_or_insert(failure.message);
-                frame.points.clone_from(&self.good.0);
-                frame.values.clone_from(&self.good.1);
-            }
+        if frame.looks != course.seen.number {
+            frame.looks = course.seen.number;
+            frame.points.clone_from(&course.seen.points);
+            frame.values.clone_from(&course.seen.values);
+            frame.energies = course.seen.energies;
+            frame.held.clone_from(&course.seen.held);
+            frame.sample.clone_from(&course.seen.sample);
         }
-        let (steps, wall) = std::mem::take(&mut self.batch);
+        let device = self.stage.plan.target.device.as_ref();
+        frame.read_backs = device.map_or(0, |device| device.read_backs());
+        frame.on_device = on_device;
+        frame.columns.clone_from(&course.columns);
+        let (steps, wall) = std::mem::take(&mut course.batch);
         if steps > 0 {
-            self.step_seconds = wall.as_secs_f64() / steps as f64;
+            course.step_seconds = wall.as_secs_f64() / steps as f64;
         }
-        frame.number = self.frames;
+        frame.number = course.frames;
         frame.time = self.live.time();
-        frame.steps = self.steps;
-        frame.playing = self.playing && self.failure.is_none();
-        frame.held.clear();
-        frame.held.extend(self.hold.grips().iter().map(|grip| self.live.pulled(grip)));
+        frame.steps = course.steps;
+        frame.playing = course.is_going();
         frame.steps_a_frame = steps;
-        frame.step_seconds = self.step_seconds;
-        frame.real_time_factor = if frame.playing { self.pace.factor(frame.time) } else { 0.0 };
-        let step = if self.steps > 0 { frame.time / self.steps as f64 } else { self.stage.plan.step };
-        frame.possible_factor = if self.step_seconds > 0.0 { step / self.step_seconds } else { 0.0 };
-        frame.input_lag = self.input_lag;
-        frame.failure.clone_from(&self.failure);
+        frame.step_seconds = course.step_seconds;
+        frame.real_time_factor = if frame.playing { course.pace.factor(frame.time) } else { 0.0 };
+        let step = if course.steps > 0 { frame.time / course.steps as f64 } else { self.stage.plan.step };
+        frame.possible_factor = if course.step_seconds > 0.0 { step / course.step_seconds } else { 0.0 };
+        frame.input_lag = course.input_lag;
+        frame.failure.clone_from(&course.failure);
+        frame.note.clone_from(&course.note);
         frame.prepare_seconds = started.elapsed().as_secs_f64();
-        self.frames += 1;
+        course.frames += 1;
         frames.publish();
     }
 }

@@ -24,6 +24,22 @@ pub(super) struct Rows {
     crc: Hasher,
     /// What an interrupted run had written beyond them. It stays until this run writes something else there.
     beyond: Vec<u8>,
+    samples: Samples,
+    row: Vec<f64>,
+}
+
+/// A column of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Its name, such as `reaction.base.x`.
+    pub name: String,
+    /// Its unit; empty for none.
+    pub unit: &'static str,
+}
+
+/// What a table samples at an instant.
+pub(crate) struct Samples {
+    columns: Vec<Column>,
     reactions: Vec<usize>,
     energy: bool,
     probes: Vec<Probe>,
@@ -54,51 +70,93 @@ const SHELL_ENERGIES: [&str; 3] = ["membrane", "bending", "drilling"];
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
-impl Rows {
-    pub(super) fn new(built: &Built, table: &CsvTable, folder: &Path, name: &str) -> Self {
-        let path = folder.join(format!("{name}.csv"));
+impl Samples {
+    pub(crate) fn new(built: &Built, table: &CsvTable) -> Self {
         let wanted = |name: &String| table.reactions.as_ref().is_none_or(|list| list.contains(name));
         let constraints = built.model.constraints.iter();
         let reactions: Vec<usize> =
             constraints.enumerate().filter(|(_, c)| wanted(&c.name)).map(|(i, _)| i).collect();
-        let mut header = vec!["time".to_owned()];
+        let mut columns = Vec::new();
+        let mut add = |name: String, unit| columns.push(Column { name, unit });
         for &constraint in &reactions {
             let name = &built.model.constraints[constraint].name;
-            header.extend(AXES.map(|axis| format!("reaction.{name}.{axis}")));
-        }
-        if table.energy {
-            header.extend(ENERGIES.map(|energy| format!("energy.{energy}")));
+            AXES.iter().for_each(|axis| add(format!("reaction.{name}.{axis}"), "N"));
         }
         let shells = built.corotational.as_ref().is_some_and(|part| !part.model.facets.is_empty());
-        if table.energy && shells {
-            header.extend(SHELL_ENERGIES.map(|energy| format!("energy.{energy}")));
+        if table.energy {
+            for energy in ENERGIES {
+                add(format!("energy.{energy}"), if energy == "balance" { "" } else { "J" });
+            }
+            let parts = SHELL_ENERGIES.iter().filter(|_| shells);
+            parts.for_each(|energy| add(format!("energy.{energy}"), "J"));
         }
         if built.corotational.as_ref().is_some_and(|part| part.control.is_some()) {
-            header.push("load-factor".into());
+            add("load-factor".into(), "");
         }
-        let mut probes = Vec::new();
         for (name, probe) in &table.probes {
             for field in &probe.data {
                 let column = format!("probe.{name}.{}", field.name());
                 match field.components() {
-                    1 => header.push(column),
-                    3 => header.extend(AXES.map(|axis| format!("{column}.{axis}"))),
-                    _ => header.extend(TENSOR.map(|entry| format!("{column}.{entry}"))),
+                    1 => add(column, field.unit()),
+                    3 => AXES.iter().for_each(|axis| add(format!("{column}.{axis}"), field.unit())),
+                    _ => TENSOR.iter().for_each(|entry| add(format!("{column}.{entry}"), field.unit())),
                 }
             }
-            probes.push(Probe::new(built, probe));
         }
+        let probes = table.probes.values().map(|probe| Probe::new(built, probe)).collect();
+        let corotated = fields::Corotated::default();
+        Self { columns, reactions, energy: table.energy, probes, corotated }
+    }
+
+    pub(crate) fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Adds the sample of an instant to a row.
+    pub(crate) fn read<R: Real>(&mut self, frame: &Frame<'_, R>, row: &mut Vec<f64>) {
+        for &constraint in &self.reactions {
+            row.extend(frame.stepper.reaction(constraint));
+        }
+        if self.energy {
+            let e = frame.stepper.energies();
+            row.extend([e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]);
+        }
+        if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
+            if self.energy && !part.model.facets.is_empty() {
+                // An element that has no energy ends the run with a reason.
+                let parts = state.shell_energy(&part.model).unwrap_or_default();
+                row.extend([parts.membrane, parts.bending, parts.drilling]);
+            }
+            if part.control.is_some() {
+                row.push(state.load_factor);
+            }
+        }
+        let cells_wanted = self.probes.iter().any(|probe| probe.fields.iter().any(|field| !field.is_nodal()));
+        let recovery = cells_wanted.then(|| Recovery::new(&frame.built.model, frame.state));
+        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.corotational)
+        {
+            self.corotated.fill(&part.model, state);
+        }
+        for probe in &self.probes {
+            probe.read(frame, recovery.as_ref(), &self.corotated, row);
+        }
+    }
+}
+
+impl Rows {
+    pub(super) fn new(built: &Built, table: &CsvTable, folder: &Path, name: &str) -> Self {
+        let samples = Samples::new(built, table);
+        let names = samples.columns().iter().map(|column| column.name.as_str());
+        let header: Vec<&str> = std::iter::once("time").chain(names).collect();
         Self {
-            path,
+            path: folder.join(format!("{name}.csv")),
             header: header.join(","),
             file: None,
             length: 0,
             crc: Hasher::new(),
             beyond: Vec::new(),
-            reactions,
-            energy: table.energy,
-            probes,
-            corotated: fields::Corotated::default(),
+            samples,
+            row: Vec::new(),
         }
     }
 
@@ -185,34 +243,10 @@ pub(super) fn verify(path: &Path, bytes: u64, crc: u32) -> Result<(), String> {
 
 impl<R: Real> Observer<R> for Rows {
     fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
-        let mut row = vec![frame.time()];
-        for &constraint in &self.reactions {
-            row.extend(frame.stepper.reaction(constraint));
-        }
-        if self.energy {
-            let e = frame.stepper.energies();
-            row.extend([e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]);
-        }
-        if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
-            if self.energy && !part.model.facets.is_empty() {
-                // An element that has no energy ends the run with a reason.
-                let parts = state.shell_energy(&part.model).unwrap_or_default();
-                row.extend([parts.membrane, parts.bending, parts.drilling]);
-            }
-            if part.control.is_some() {
-                row.push(state.load_factor);
-            }
-        }
-        let cells_wanted = self.probes.iter().any(|probe| probe.fields.iter().any(|field| !field.is_nodal()));
-        let recovery = cells_wanted.then(|| Recovery::new(&frame.built.model, frame.state));
-        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.corotational)
-        {
-            self.corotated.fill(&part.model, state);
-        }
-        for probe in &self.probes {
-            probe.read(frame, recovery.as_ref(), &self.corotated, &mut row);
-        }
-        let row: Vec<String> = row.iter().map(|value| format!("{value:e}")).collect();
+        self.row.clear();
+        self.row.push(frame.time());
+        self.samples.read(frame, &mut self.row);
+        let row: Vec<String> = self.row.iter().map(|value| format!("{value:e}")).collect();
         self.write(row.join(","))
     }
 

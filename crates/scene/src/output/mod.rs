@@ -22,7 +22,8 @@ pub use summary::{
     BodySummary, FailureSummary, LoadStepSummary, Summary, failed_input, failed_output, number,
 };
 
-pub(crate) use csv::{AXES, ENERGIES};
+pub use csv::Column;
+pub(crate) use csv::{AXES, ENERGIES, Samples};
 pub(crate) use plot::plot;
 pub(crate) use snapshot::Snapshot;
 pub(crate) use summary::{bodies, markdown, summarise};

@@ -1,10 +1,14 @@
 //! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
 
+mod device;
 mod errand;
 mod paint;
 mod panels;
+mod parameters;
 mod picture;
+mod plots;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,14 +17,17 @@ use std::time::{Duration, Instant, SystemTime};
 use eframe::egui::{self, Key, Rect};
 use eframe::wgpu;
 use pliant_geometry::Vector3;
+use pliant_gpu::Device;
 use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
 use pliant_scene::format::FieldName;
 
 pub use self::errand::Errand;
 use self::errand::Errands;
 use self::paint::{SAMPLES, place};
+use self::parameters::Numbers;
 use self::picture::{Cut, SCALE};
 use crate::hand::{Hand, Point};
+use crate::samples::Samples;
 use crate::session::{Frame, Order, Session, Stage};
 
 /// What a window opens with.
@@ -82,6 +89,7 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
         depth_buffer: 32,
         multisampling: SAMPLES as u16,
         renderer: eframe::Renderer::Wgpu,
+        wgpu_options: device::setup(&opening.stage),
         ..Default::default()
     };
     let outcome = Arc::<Mutex<Option<Result<String, String>>>>::default();
@@ -93,12 +101,6 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
     outcome.transpose().map_err(WindowError::Errand)
 }
-
-/// Points of the curves kept.
-const MOST_SAMPLES: usize = 4000;
-
-/// What is plotted: time [s], kinetic and internal energy [J], force of the hand [N].
-type Sample = [f64; 4];
 
 struct App {
     target: Target,
@@ -117,6 +119,10 @@ struct App {
     field: Option<FieldName>,
     component: Option<&'static str>,
     cut: Cut,
+    /// Whether every frame comes to ordinary memory.
+    in_memory: bool,
+    /// The device of the window, if it is one of a solver.
+    device: Option<Device>,
     /// Points on the surface, increasing.
     surface: Vec<u32>,
     /// Where the picture is in the window, in egui's points.
@@ -131,7 +137,12 @@ struct App {
     strongest: f64,
     orbiting: bool,
     help: bool,
-    samples: Vec<Sample>,
+    numbers: Numbers,
+    samples: Samples,
+    /// Names of the curves that are plotted.
+    plotted: BTreeSet<String>,
+    /// Points that the user follows.
+    probes: usize,
     file: PathBuf,
     changed: Option<SystemTime>,
     looked: Instant,
@@ -173,6 +184,7 @@ impl App {
             points: Arc::new(subject.points.clone()),
             values: Arc::default(),
             fresh: true,
+            numbers: Numbers::of(&stage.scene),
             stage,
             home: camera,
             camera,
@@ -181,6 +193,8 @@ impl App {
             field,
             component,
             cut: Cut::new(style.clip, &subject),
+            in_memory: false,
+            device: device::shared(state, &stage),
             surface: subject.surface_points(),
             subject,
             picture: Rect::ZERO,
@@ -191,7 +205,9 @@ impl App {
             strongest: 0.0,
             orbiting: false,
             help: false,
-            samples: Vec::new(),
+            samples: Samples::default(),
+            plotted: plots::usual(),
+            probes: 0,
             changed: modified(&file),
             file,
             looked: Instant::now(),
@@ -207,13 +223,17 @@ impl App {
             outcome,
         };
         app.fit();
+        if app.record.is_some() {
+            app.order(Order::Record);
+        }
         Ok(app)
     }
 
     /// What a user should know now: why it cannot go on, what was done last, what the scene warns of.
     fn banner(&self) -> Option<String> {
         let warnings = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
-        self.frame.failure.clone().or_else(|| self.message.clone()).or_else(|| warnings.last())
+        let told = self.frame.failure.clone().or_else(|| self.message.clone());
+        told.or_else(|| self.frame.note.clone()).or_else(|| warnings.last())
     }
 
     /// The scene's title, or the name of its file.
@@ -263,7 +283,8 @@ impl App {
             return;
         }
         // After a failure at the first instant there is nothing but the message.
-        if frame.points.len() == self.subject.points.len() {
+        let looked = frame.looks != self.frame.looks;
+        if looked && frame.points.len() == self.subject.points.len() {
             Arc::make_mut(&mut self.points).clone_from(&frame.points);
             Arc::make_mut(&mut self.values).clone_from(&frame.values);
             self.fresh = true;
@@ -276,21 +297,8 @@ impl App {
         }
         let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
         self.strongest = self.strongest.max(force);
-        let last = self.samples.last().map_or(-1.0, |sample| sample[0]);
-        if self.frame.time < last {
-            self.samples.clear();
-        }
-        if self.frame.time > last {
-            let energies = &self.frame.energies;
-            self.samples.push([self.frame.time, energies.kinetic, energies.internal, force]);
-            // Every second one goes, so that memory stays flat and the curve whole.
-            if self.samples.len() > MOST_SAMPLES {
-                let mut index = 0;
-                self.samples.retain(|_| {
-                    index += 1;
-                    index % 2 == 0
-                });
-            }
+        if looked {
+            self.samples.take(&self.frame);
         }
     }
 
@@ -341,7 +349,8 @@ impl App {
         }
     }
 
-    fn replace(&mut self, path: PathBuf, stage: Stage, subject: Arc<Subject>) -> Result<(), String> {
+    fn replace(&mut self, path: PathBuf, mut stage: Stage, subject: Arc<Subject>) -> Result<(), String> {
+        stage.share(self.device.as_ref());
         let before = std::mem::replace(&mut self.session, begin(&stage, &self.context)?);
         // A long step ends in its own time.
         std::thread::spawn(move || drop(before));
@@ -350,6 +359,8 @@ impl App {
         let other = path != self.file;
         self.surface = subject.surface_points();
         self.subject = subject;
+        self.numbers = Numbers::of(&stage.scene);
+        self.forget_probes();
         self.stage = stage;
         self.changed = modified(&path);
         self.file = path;
@@ -359,6 +370,11 @@ impl App {
             self.fit();
         }
         self.fresh = true;
+        if self.record.is_some() {
+            self.session.order(Order::Record);
+        }
+        self.frame.looks = 0;
+        self.session.order(Order::Memory(self.in_memory));
         self.session.order(Order::Show(self.field, self.component));
         self.session.order(Order::Speed(self.speed));
         self.session.order(Order::Play(self.frame.playing));
@@ -429,6 +445,7 @@ impl eframe::App for App {
             place(state, self.target, &self.subject);
         }
         self.look();
+        self.choose_memory();
         self.keys(&context);
         egui::Panel::top("top").show(ui, |ui| self.top(ui));
         egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));

@@ -1,7 +1,6 @@
 //! The panels around the picture: what is played and shown, and plots.
 
 use eframe::egui;
-use egui_plot::{Line, Plot, PlotPoints};
 use pliant_geometry::Vector3;
 use pliant_picture::ColourMap;
 use pliant_scene::format::FieldName;
@@ -111,6 +110,8 @@ impl App {
                 self.act(Hand::Unpin(pin));
             }
         }
+        ui.separator();
+        self.numbers(ui);
     }
 
     /// The fields that bodies of the scene have.
@@ -123,25 +124,5 @@ impl App {
             return vec![FieldName::Displacement];
         }
         all.filter(|field| models.iter().any(|&model| field.is_of(model))).collect()
-    }
-
-    pub(super) fn plots(&self, ui: &mut egui::Ui) {
-        let curve =
-            |column: usize| -> PlotPoints<'_> { self.samples.iter().map(|s| [s[0], s[column]]).collect() };
-        ui.columns(2, |columns| {
-            Plot::new("energies").height(130.0).legend(egui_plot::Legend::default()).show(
-                &mut columns[0],
-                |plot| {
-                    plot.line(Line::new("kinetic energy [J]", curve(1)));
-                    plot.line(Line::new("internal energy [J]", curve(2)));
-                },
-            );
-            Plot::new("hand").height(130.0).legend(egui_plot::Legend::default()).show(
-                &mut columns[1],
-                |plot| {
-                    plot.line(Line::new("force of the hand [N]", curve(3)));
-                },
-            );
-        });
     }
 }

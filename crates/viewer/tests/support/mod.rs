@@ -1,5 +1,7 @@
-//! A scene of a few lines, and waiting for its frames.
+//! Scenes of a few lines, and waiting for their frames.
+#![allow(dead_code)] // Each test takes what it needs.
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use pliant_picture::Subject;
@@ -28,9 +30,40 @@ body = "ball"
 nodes = { half-space = { point = [-0.03, 0, 0], normal = [-1, 0, 0] } }
 "#;
 
+/// A strip of a shell, held at one end, with a solver of shells.
+pub fn shell(solver: &str) -> Stage {
+    let text = r#"
+[scene]
+until = 100
+gravity = [0, 0, -9.81]
+[law.wall]
+type = "neo-hookean"
+young-modulus = 1e6
+poisson-ratio = 0.4
+[body.strip]
+model = "shell"
+mesh = { plate = { size = [0.1, 0.02] }, edge = 0.01 }
+law = "wall"
+density = 1000
+thickness = 0.002
+damping = 20
+[constraint.end]
+type = "fix"
+body = "strip"
+nodes = { set = "x-min" }
+[run]
+threads = 1
+"#;
+    let more = if solver == "static" { "load-steps = 10\n" } else { "" };
+    stage(&format!("{text}solver = '{solver}'\n{more}"))
+}
+
 pub fn stage(text: &str) -> Stage {
-    let source = Source::parse("ball.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
-    let scene = Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
+    staged(Source::parse("ball.toml", text).unwrap_or_else(|error| panic!("{}", error.plain())), ".".into())
+}
+
+pub fn staged(source: Source, folder: PathBuf) -> Stage {
+    let scene = Scene::from_source(source, folder).unwrap_or_else(|error| panic!("{}", error.plain()));
     let built = pliant_scene::build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
     let plan = pliant_scene::plan(&scene, &built).unwrap_or_else(|error| panic!("{}", error.plain()));
     Stage { scene, built, plan }

@@ -1,0 +1,162 @@
+//! The scene that a mesh alone is: soft tissue that is held at one end, to be looked at and pulled.
+
+use std::path::{Path, PathBuf};
+
+use pliant_geometry::io::{self, Format, MeshFileError};
+
+use crate::output::number;
+
+/// A body whose longest side is longer than this [m] is taken to be in millimetres.
+const LARGEST: f64 = 2.0;
+/// Cells along the longest side of what a surface encloses.
+const CELLS: f64 = 12.0;
+/// Young's modulus [Pa], Poisson's ratio and density [kg/m³].
+const TISSUE: [f64; 3] = [5e3, 0.45, 1000.0];
+
+/// A scene made of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneOfMesh {
+    /// Its text, in which the mesh is named without its folder.
+    pub text: String,
+    /// The folder of the mesh.
+    pub folder: PathBuf,
+    /// What was assumed, in a sentence.
+    pub assumed: String,
+}
+
+/// Whether a path has the ending of a mesh file.
+pub fn is_mesh(path: &Path) -> bool {
+    Format::of_path(path).is_some()
+}
+
+/// Makes a scene of a mesh file: soft tissue, held where its lowest tenth along its longest side is. What a surface encloses is filled with
+/// tets. Damping is half of the critical one of the slowest vibration along that side, α = 2 · ½ · (π/2) √(E/ρ)/L.
+///
+/// # Errors
+/// If the file can't be read.
+pub fn scene_of_mesh(path: &Path) -> Result<SceneOfMesh, MeshFileError> {
+    let mesh = io::read(path)?.mesh;
+    let (low, high) = mesh.bounds().unwrap_or_default();
+    let size = high - low;
+    let axis = size.imax();
+    let (scale, unit) = if size[axis] > LARGEST { (1e-3, "millimetres") } else { (1.0, "metres") };
+    let length = scale * size[axis];
+    let filled = mesh.volume_blocks().all(|block| block.is_empty());
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let quoted = serde_json::Value::from(name.as_str());
+    let edge = rounded(length / CELLS);
+    let how = if filled {
+        format!("as = \"tets\", edge = {edge}")
+    } else {
+        "fix = [\"reorder\", \"drop-unused\"]".into()
+    };
+    let [young, poisson, density] = TISSUE;
+    let damping = rounded(0.5 * std::f64::consts::PI * (young / density).sqrt() / length.max(1e-6));
+    let mut point = scale * low;
+    point[axis] += 0.1 * length;
+    let mut normal = [0, 0, 0];
+    normal[axis] = -1;
+    let text = format!(
+        r#"[scene]
+title = {quoted}
+until = 10.0
+
+[law.tissue]
+type = "neo-hookean"
+young-modulus = {young:?}
+poisson-ratio = {poisson:?}
+
+[body.body]
+mesh = {{ file = {quoted}, scale = {scale:?}, {how} }}
+law = "tissue"
+density = {density:?}
+damping = {damping}
+
+[constraint.held]
+type = "fix"
+body = "body"
+nodes = {{ half-space = {{ point = {point:?}, normal = {normal:?} }} }}
+"#,
+        point = <[f64; 3]>::from(point),
+    );
+    let side = ["x", "y", "z"][axis];
+    let mut assumed = format!(
+        "`{name}` is a mesh: lengths are taken as {unit} ({} m along {side}), the tissue as neo-Hookean with E = 5 kPa, ν = 0.45 and \
+         1000 kg/m³, held at its lowest tenth along {side}",
+        number(length)
+    );
+    if filled {
+        assumed.push_str(&format!("; its surface is filled with tets of {} m", number(edge)));
+    }
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    Ok(SceneOfMesh { text, folder, assumed })
+}
+
+/// To two digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::source::Source;
+    use pliant_geometry::{Mesh, Vector3, boundary};
+    use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
+
+    /// A bar along y, in a unit of so many metres.
+    fn bar(unit: f64) -> Mesh {
+        let block = Block::new([0.05, 0.12, 0.04]);
+        let mut mesh = block.mesh(Resolution::Edge(0.02), VolumeCell::Tet, DEFAULT_CELL_LIMIT).unwrap();
+        mesh.points.iter_mut().for_each(|point| *point = (*point + Vector3::new(0.01, 0.02, 0.03)) / unit);
+        mesh
+    }
+
+    fn opened(name: &str, mesh: &Mesh) -> (SceneOfMesh, crate::Built) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        io::write(&path, mesh).unwrap();
+        assert!(is_mesh(&path));
+        let made = scene_of_mesh(&path).unwrap();
+        let source =
+            Source::parse(name, made.text.clone()).unwrap_or_else(|error| panic!("{}", error.plain()));
+        let scene = Scene::from_source(source, made.folder.clone())
+            .unwrap_or_else(|error| panic!("{}", error.plain()));
+        let built = crate::build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
+        (made, built)
+    }
+
+    fn length(built: &crate::Built) -> f64 {
+        let (low, high) = built.bodies[0].mesh.bounds().unwrap();
+        (high - low).max()
+    }
+
+    #[test]
+    fn a_closed_surface_in_millimetres_is_filled_and_held_at_its_end() {
+        let whole = bar(1e-3);
+        let (skin, _) = boundary(&whole).to_mesh(&whole.points);
+        let (made, built) = opened("bar.stl", &skin);
+        for piece in ["`bar.stl`", "millimetres", "0.12 m along y", "E = 5 kPa", "filled with tets of 0.01 m"]
+        {
+            assert!(made.assumed.contains(piece), "no `{piece}` in {}", made.assumed);
+        }
+        assert!((length(&built) - 0.12).abs() < 2e-3);
+        assert!(built.bodies[0].mesh.volume_blocks().any(|block| block.len() > 300));
+        let held = &built.model.constraints[0].nodes;
+        let height = |node: u32| built.model.rest[node as usize][1];
+        assert!(!held.is_empty() && held.iter().all(|&node| height(node) < 0.0321));
+    }
+
+    #[test]
+    fn a_volume_mesh_in_metres_is_taken_as_it_is() {
+        let (made, built) = opened("bar.vtu", &bar(1.0));
+        assert!(
+            made.assumed.contains("taken as metres") && !made.assumed.contains("filled"),
+            "{}",
+            made.assumed
+        );
+        assert!((length(&built) - 0.12).abs() < 1e-12);
+        assert_eq!(built.model.node_count(), bar(1.0).points.len());
+    }
+}

@@ -1,0 +1,133 @@
+//! What is plotted over time: samples of a run, few enough to be kept however long it lasts, and the table that they are written to.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use pliant_scene::Column;
+
+use crate::session::Frame;
+
+/// Samples kept.
+const MOST: usize = 4000;
+
+/// Samples of a run, in the order of time.
+#[derive(Clone, Debug, Default)]
+pub struct Samples {
+    columns: Arc<[Column]>,
+    /// Times [s].
+    times: Vec<f64>,
+    /// One after the other, each as long as there are columns.
+    values: Vec<f64>,
+    /// Of so many frames one is kept …
+    every: u64,
+    /// … and so many were seen since.
+    passed: u64,
+}
+
+impl Samples {
+    /// Names and units.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.times.is_empty()
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Takes the sample of a frame, if its time is a later one. A run that starts anew begins anew here. Where there are too many, every
+    /// second one goes, and from then on comes.
+    pub fn take(&mut self, frame: &Frame) {
+        let last = self.times.last().copied().unwrap_or(-1.0);
+        if frame.time < last {
+            self.clear();
+        } else if frame.time == last {
+            return;
+        }
+        if self.columns != frame.columns {
+            self.rearrange(&frame.columns);
+        }
+        self.passed += 1;
+        if self.passed < self.every || frame.sample.len() != self.columns.len() {
+            return;
+        }
+        self.passed = 0;
+        self.times.push(frame.time);
+        self.values.extend(&frame.sample);
+        if self.times.len() > MOST {
+            let width = self.columns.len();
+            for kept in 0..MOST / 2 {
+                let from = 2 * kept + 1;
+                self.times[kept] = self.times[from];
+                self.values.copy_within(from * width..(from + 1) * width, kept * width);
+            }
+            self.times.truncate(MOST / 2);
+            self.values.truncate(MOST / 2 * width);
+            self.every = 2 * self.every.max(1);
+        }
+    }
+
+    /// Takes on other columns; those that were not there are not a number until now.
+    fn rearrange(&mut self, columns: &Arc<[Column]>) {
+        let places: Vec<_> =
+            columns.iter().map(|new| self.columns.iter().position(|old| old == new)).collect();
+        let width = self.columns.len().max(1);
+        let rows = self.values.chunks_exact(width);
+        let moved = rows.flat_map(|row| places.iter().map(move |place| place.map_or(f64::NAN, |at| row[at])));
+        self.values = moved.collect();
+        self.columns = columns.clone();
+    }
+
+    /// The curve of a column: times [s] and values.
+    pub fn curve(&self, column: usize) -> impl Iterator<Item = [f64; 2]> + '_ {
+        let width = self.columns.len().max(1);
+        let values = self.values.iter().skip(column).step_by(width);
+        self.times.iter().zip(values).map(|(time, value)| [*time, *value])
+    }
+
+    /// Writes a table with a header of names and units, beside the file of a scene: `NAME-probes.csv`, or with a number where there is
+    /// one already. What is not known is empty.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write_beside(&self, scene: &Path) -> std::io::Result<PathBuf> {
+        let stem = scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+        let mut number = 1;
+        let (path, file) = loop {
+            let more = if number > 1 { format!("-{number}") } else { String::new() };
+            let path = scene.with_file_name(format!("{stem}-probes{more}.csv"));
+            match File::create_new(&path) {
+                Ok(file) => break (path, file),
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+                Err(error) => return Err(error),
+            }
+        };
+        let mut out = BufWriter::new(file);
+        write!(out, "time [s]")?;
+        for Column { name, unit } in self.columns.iter() {
+            if unit.is_empty() { write!(out, ",{name}")? } else { write!(out, ",{name} [{unit}]")? }
+        }
+        writeln!(out)?;
+        for (time, row) in self.times.iter().zip(self.values.chunks_exact(self.columns.len().max(1))) {
+            write!(out, "{time:e}")?;
+            for value in row {
+                if value.is_nan() { write!(out, ",")? } else { write!(out, ",{value:e}")? }
+            }
+            writeln!(out)?;
+        }
+        out.flush()?;
+        Ok(path)
+    }
+}

@@ -1,0 +1,138 @@
+//! The numbers of laws, loads and bodies, changed while it is played. The scene with them is made on a thread of its own.
+
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+
+use eframe::egui;
+use pliant_scene::Scene;
+
+use super::App;
+use crate::parameters::{Number, Parameter, parameters, with_numbers};
+use crate::session::{Order, Stage};
+
+/// The numbers that can be changed.
+pub(super) struct Numbers {
+    all: Vec<Parameter>,
+    in_file: Vec<f64>,
+    /// Those of the stage that is played, or waits to be.
+    accepted: Vec<f64>,
+    /// A stage that is being made of some numbers.
+    making: Option<(Vec<f64>, Receiver<Result<Stage, String>>)>,
+}
+
+impl Numbers {
+    pub(super) fn of(scene: &Scene) -> Self {
+        let all = parameters(scene);
+        let in_file: Vec<f64> = all.iter().map(|parameter| parameter.number.value).collect();
+        Self { all, accepted: in_file.clone(), in_file, making: None }
+    }
+
+    fn values(&self) -> Vec<f64> {
+        self.all.iter().map(|parameter| parameter.number.value).collect()
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        self.all.iter_mut().zip(values).for_each(|(parameter, value)| parameter.number.value = *value);
+    }
+
+    /// Those of some values that are others than in the file.
+    fn changed(&self, values: &[f64]) -> Vec<Number> {
+        let all = self.all.iter().zip(values).zip(&self.in_file);
+        all.filter(|((_, value), file)| value != file)
+            .map(|((parameter, value), _)| Number { value: *value, ..parameter.number.clone() })
+            .collect()
+    }
+}
+
+/// A number to be dragged, by a hundredth of itself a point; whether it is let go with another value.
+fn dragged(ui: &mut egui::Ui, parameter: &mut Parameter) -> bool {
+    let value = &mut parameter.number.value;
+    let write = |value: f64, _| match value.abs() {
+        size if size != 0.0 && !(1e-3..1e6).contains(&size) => format!("{value:.4e}"),
+        _ => format!("{}", (value * 1e6).round() / 1e6),
+    };
+    let speed = if *value == 0.0 { 0.01 } else { 0.01 * value.abs() };
+    let drag = egui::DragValue::new(value)
+        .speed(speed)
+        .custom_formatter(write)
+        .suffix(format!(" {}", parameter.unit));
+    let response = ui.add(drag).on_hover_text(&parameter.meaning);
+    response.drag_stopped() || response.lost_focus()
+}
+
+impl App {
+    /// The list of numbers; each acts once it is let go.
+    pub(super) fn numbers(&mut self, ui: &mut egui::Ui) {
+        let mut released = false;
+        let mut table = String::new();
+        egui::CollapsingHeader::new("Laws, loads and bodies").show(ui, |ui| {
+            for parameter in &mut self.numbers.all {
+                let own = parameter.number.path[..2].join(".");
+                if own != table {
+                    ui.label(egui::RichText::new(&own).strong());
+                    table = own;
+                }
+                ui.horizontal(|ui| {
+                    released |= dragged(ui, parameter);
+                    ui.label(parameter.number.path[2..].join("."));
+                });
+            }
+            let other = self.numbers.values() != self.numbers.in_file;
+            if ui.add_enabled(other, egui::Button::new("As in the file")).clicked() {
+                let in_file = self.numbers.in_file.clone();
+                self.numbers.set(&in_file);
+                released = true;
+            }
+        });
+        if released {
+            self.make_stage(ui.ctx());
+        }
+        self.take_stage(ui.ctx());
+    }
+
+    /// Begins to make the stage of the numbers as they are, unless one is being made.
+    fn make_stage(&mut self, context: &egui::Context) {
+        let values = self.numbers.values();
+        if values == self.numbers.accepted || self.numbers.making.is_some() {
+            return;
+        }
+        let (send, receive) = channel();
+        let (scene, numbers, context) =
+            (self.stage.scene.clone(), self.numbers.changed(&values), context.clone());
+        let work = move || {
+            // The window may be closed by now.
+            let _ = send.send(with_numbers(&scene, &numbers));
+            context.request_repaint();
+        };
+        match std::thread::Builder::new().name("numbers".into()).spawn(work) {
+            Ok(_) => self.numbers.making = Some((values, receive)),
+            Err(error) => self.message = Some(error.to_string()),
+        }
+    }
+
+    /// Takes a stage that is made; numbers that cannot be are told and taken back.
+    fn take_stage(&mut self, context: &egui::Context) {
+        let Some((values, made)) = &self.numbers.making else { return };
+        let made = match made.try_recv() {
+            Ok(made) => made,
+            Err(TryRecvError::Empty) => return,
+            Err(TryRecvError::Disconnected) => Err("the scene with these numbers could not be made".into()),
+        };
+        let values = values.clone();
+        self.numbers.making = None;
+        match made {
+            Ok(stage) => {
+                self.message = None;
+                let changed = self.numbers.changed(&values);
+                self.numbers.accepted = values;
+                self.order(Order::Change(Box::new(stage), changed));
+                // They may be others again by now.
+                self.make_stage(context);
+            }
+            Err(message) => {
+                self.message = Some(message);
+                let accepted = self.numbers.accepted.clone();
+                self.numbers.set(&accepted);
+            }
+        }
+    }
+}
