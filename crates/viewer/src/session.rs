@@ -303,7 +303,7 @@ fn play(
             _ => None,
         };
         let anew = matches!(left, Left::Reset) || player.course.failure.is_some();
-        (subject, course) = (Some(player.subject), player.course);
+        (subject, course) = player.end();
         if matches!(left, Left::Quit) {
             let recording = course.recording.unwrap_or_default();
             return Recording { steps: course.steps, ..recording };
@@ -380,7 +380,7 @@ impl Course {
 
     /// After a step: what was asked for before has been felt.
     fn feel(&mut self) {
-        for &(sent, from, number) in self.waiting.iter().filter(|(_, from, _)| self.steps > *from) {
+        for &(sent, _, number) in self.waiting.iter().filter(|(_, from, _)| self.steps > *from) {
             let lag = sent.elapsed().as_secs_f64();
             self.input_lag = Some(lag);
             if let Some(then) = self.recording.as_mut().and_then(|recording| recording.moves.get_mut(number))
@@ -416,6 +416,11 @@ impl<'s> Player<'s> {
         player.show_named(player.course.field.clone().as_deref());
         player.name_columns();
         Ok(player)
+    }
+
+    /// What lasts.
+    fn end(self) -> (Option<Subject>, Course) {
+        (Some(self.subject), self.course)
     }
 
     /// Follows orders and goes on, until the stage is left.

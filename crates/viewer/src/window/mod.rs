@@ -177,6 +177,7 @@ impl App {
         let subject = seen(&stage)?;
         let session = begin(&stage, &context.egui_ctx)?;
         place(state, target, &subject);
+        let device = device::shared(state, &stage);
         let mut app = Self {
             target,
             session,
@@ -194,7 +195,7 @@ impl App {
             component,
             cut: Cut::new(style.clip, &subject),
             in_memory: false,
-            device: device::shared(state, &stage),
+            device,
             surface: subject.surface_points(),
             subject,
             picture: Rect::ZERO,
