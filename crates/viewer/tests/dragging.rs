@@ -84,12 +84,7 @@ fn random_dragging_breaks_nothing_and_takes_no_more_memory() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn an_hour_of_random_dragging_at_a_ball() {
+fn an_hour_of_random_dragging() {
     drag(BALL, 3600);
-}
-
-#[test]
-#[ignore = "takes minutes"]
-fn an_hour_of_random_dragging_at_a_liver() {
     drag(LIVER, 3600);
 }
