@@ -268,6 +268,12 @@ fn numbers_out_of_range_are_refused() {
             "curve = { table = [[1, 0], [0, 1]] }",
             "the times of the table do not increase",
         ),
+        (
+            "curve = \"smooth-step\"",
+            "curve = { wave = -1 }",
+            "the period of the wave must be greater than 0, found -1",
+        ),
+        ("curve = \"smooth-step\"", "curve = { wave = 1 }\nto = 2", "a wave does not end"),
     ] {
         spoilt(good, bad, &[says]);
     }

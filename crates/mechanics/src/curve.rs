@@ -1,5 +1,7 @@
 //! How a motion or a load grows over time: a factor from 0 to 1 between two times, or a table.
 
+use std::f64::consts::TAU;
+
 /// A factor over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
@@ -7,7 +9,7 @@ pub struct Curve {
     pub shape: Shape,
     /// Time [s] at which it leaves 0.
     pub from: f64,
-    /// Time [s] at which it reaches 1 and stays there.
+    /// Time [s] at which it reaches 1 and stays there; of a wave, at which it is back at 0.
     pub to: f64,
 }
 
@@ -20,6 +22,8 @@ pub enum Shape {
     SmoothStep,
     /// 10s³ − 15s⁴ + 6s⁵: continuous acceleration.
     Polynomial,
+    /// (1 − cos 2πs)/2, again and again: from 0 to 1 and back, with continuous velocity.
+    Wave,
     /// 1 from the start.
     Hold,
     /// (time [s], factor), linear between the points, constant outside; times increase.
@@ -32,6 +36,10 @@ impl Curve {
         match &self.shape {
             Shape::Hold => f64::from(u8::from(time >= self.from)),
             Shape::Table(points) => interpolate(points, time),
+            Shape::Wave => {
+                let s = (time - self.from).max(0.0) / (self.to - self.from);
+                0.5 - 0.5 * (TAU * s).cos()
+            }
             Shape::Ramp | Shape::SmoothStep | Shape::Polynomial => {
                 let s = ((time - self.from) / (self.to - self.from)).clamp(0.0, 1.0);
                 match self.shape {
@@ -54,6 +62,10 @@ impl Curve {
         let after = (time - self.to).max(0.0);
         match self.shape {
             Shape::Hold => (time - self.from).max(0.0),
+            Shape::Wave => {
+                let s = (time - self.from).max(0.0) / length;
+                length * (0.5 * s - (TAU * s).sin() / (2.0 * TAU))
+            }
             Shape::Ramp => length * s * s / 2.0 + after,
             Shape::SmoothStep => length * s * s * s * (1.0 - s / 2.0) + after,
             _ => length * s.powi(4) * (2.5 + s * (s - 3.0)) + after,
@@ -95,7 +107,7 @@ mod tests {
 
     fn curves() -> Vec<Curve> {
         let table = Shape::Table(vec![(0.0, 0.0), (0.4, 1.0), (0.9, -0.5), (1.5, 0.2)]);
-        [Shape::Ramp, Shape::SmoothStep, Shape::Polynomial, Shape::Hold, table]
+        [Shape::Ramp, Shape::SmoothStep, Shape::Polynomial, Shape::Wave, Shape::Hold, table]
             .map(|shape| Curve { shape, from: 0.25, to: 1.25 })
             .to_vec()
     }

@@ -22,35 +22,7 @@ pub const CASE: Case = Case {
     compute,
 };
 
-/// The cube; the face goes to and fro in a second.
-const CUBE: &str = r#"
-[scene]
-until = 1.0
-[run]
-precision = "single"
-[law.brain]
-type = "neo-hookean"
-young-modulus = 3000
-poisson-ratio = 0.45
-[body.cube]
-mesh = { block = { size = [0.1, 0.1, 0.1], cells = [21, 21, 21] } }
-law = "brain"
-density = 1000
-damping = 5
-[constraint.wall]
-type = "fix"
-body = "cube"
-nodes = { set = "x-min" }
-[constraint.hand]
-type = "move"
-body = "cube"
-nodes = { set = "x-max" }
-by = [0.04, 0, 0]
-curve = [[0, 0], [0.1, 0.1], [0.4, 0.9], [0.5, 1], [0.6, 0.9], [0.9, 0.1], [1, 0]]
-"#;
-
-/// The step of the thesis [s].
-const STEP: f64 = 0.7e-3;
+const CUBE: &str = include_str!("../../../../scenes/stretched-cube/scene.toml");
 const LIVER: &str = include_str!("../../../../scenes/liver/scene.toml");
 /// Frames a simulated second.
 const FRAMES: f64 = 60.0;
@@ -103,9 +75,7 @@ fn go(scene: &Scene, built: &Built, plan: &Plan, seconds: f64) -> Result<Played,
 
 fn compute() -> Result<Findings, CaseError> {
     let mut findings = Findings::default();
-    let step = |seconds: f64| (&["run", "step"][..], Value::from(seconds));
-    // Where the step of the thesis is above the limit, the automatic one is taken.
-    let cube = play(CUBE, 1.0, &[step(STEP)]).or_else(|_| play(CUBE, 1.0, &[]))?;
+    let cube = play(CUBE, 1.0, &[])?;
     let thread = (&["run", "threads"][..], Value::from(1_i64));
     let until = (&["scene", "until"][..], Value::from(10.0));
     let liver = play(LIVER, 10.0, &[thread, until])?;

@@ -187,12 +187,26 @@ impl<'s> Builder<'s> {
     fn curve(&mut self, timing: &Timing, path: &[&str]) -> Option<Curve> {
         let at = |key| [path, &[key]].concat();
         let until = self.scene.scene.until;
-        let to = timing.to.unwrap_or(until);
+        let mut to = timing.to.unwrap_or(until);
         let shape = match timing.curve.as_ref().unwrap_or(&CurveShape::SmoothStep) {
             CurveShape::Ramp => Shape::Ramp,
             CurveShape::SmoothStep => Shape::SmoothStep,
             CurveShape::Polynomial => Shape::Polynomial,
             CurveShape::Hold => Shape::Hold,
+            CurveShape::Wave(_) if timing.to.is_some() => {
+                let help = "leave out `to`: a wave goes on to the end of the scene";
+                self.error(&at("to"), "a wave does not end", "here", help);
+                return None;
+            }
+            CurveShape::Wave(period) if *period <= 0.0 => {
+                let message = format!("the period of the wave must be greater than 0, found {period}");
+                self.error(&at("curve"), message, "this wave", "give seconds");
+                return None;
+            }
+            &CurveShape::Wave(period) => {
+                to = timing.from + period;
+                Shape::Wave
+            }
             CurveShape::Table(points) => {
                 if points.is_empty() || points.windows(2).any(|w| w[1][0] <= w[0][0]) {
                     let help = "give pairs [time, factor] with increasing times";
@@ -224,7 +238,7 @@ impl<'s> Builder<'s> {
         let (name, until) = (path.join("."), self.scene.scene.until);
         let (begins, ends) = match shape {
             Shape::Table(points) => (points.first().map_or(0.0, |first| first.0), until),
-            Shape::Hold => (from, from),
+            Shape::Hold | Shape::Wave => (from, from),
             _ => (from, to),
         };
         if begins >= until && begins > 0.0 {

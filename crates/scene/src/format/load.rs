@@ -37,6 +37,8 @@ pub enum CurveShape {
     Polynomial,
     /// All of it from the start.
     Hold,
+    /// From 0 to 1 and back without a jolt, again and again, in this period [s]: breath, a beating heart.
+    Wave(f64),
     /// Pairs of time [s] and factor, linear in between, constant outside; times increase.
     Table(Vec<[f64; 2]>),
 }

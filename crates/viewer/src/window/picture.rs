@@ -23,11 +23,12 @@ const WARNING: Color32 = Color32::from_rgb(250, 225, 150);
 const FAILED: Color32 = Color32::from_rgb(245, 180, 170);
 
 /// Keys and what they do, as in `docs/viewer.md`.
-const KEYS: [(&str, &str); 14] = [
+const KEYS: [(&str, &str); 15] = [
     ("drag the body", "pull it"),
     ("Ctrl or P + click", "pin it; on a pin, take it away"),
     ("drag beside it", "turn the view"),
     ("right drag", "turn the view; with Shift move it"),
+    ("middle drag", "move the view"),
     ("wheel", "zoom"),
     ("Space", "play or pause"),
     (".", "one step"),
@@ -335,4 +336,17 @@ pub(super) fn to_screen(camera: &Camera, point: &Vector3, rect: Rect) -> Option<
     let half = 0.5 * rect.size();
     let [x, y] = camera.place(point, f64::from(half.x / half.y.max(1.0)))?;
     Some(rect.center() + vec2(half.x * x as f32, -half.y * y as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_manual_lists_the_keys_that_the_window_lists() {
+        let manual = include_str!("../../../../docs/viewer.md");
+        for (key, does) in KEYS {
+            assert!(manual.contains(&format!("| {key} | {does} |")), "`{key}` is not in docs/viewer.md");
+        }
+    }
 }
