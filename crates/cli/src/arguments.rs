@@ -115,6 +115,9 @@ pub struct View {
     /// Repeat what the hand did, without a window, and print what it came to as JSON: the same bits every time.
     #[arg(long, value_name = "FILE", conflicts_with = "record")]
     pub replay: Option<PathBuf>,
+    /// Repeat it in real time too, by a mouse that moves when it did, and tell how long it takes until a move is felt.
+    #[arg(long, requires = "replay")]
+    pub real_time: bool,
     /// Play, write a picture of the window as PNG, and close.
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     pub screenshot: Option<PathBuf>,
