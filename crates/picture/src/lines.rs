@@ -88,11 +88,11 @@ impl Fibres {
             let count = nodes.len() / kind.node_count();
             let array = mesh.block(*kind).and_then(|block| block.data.get("fibre")).filter(known);
             directions.extend((0..count).map(|cell| match array {
-                Some(array) if cell < array.len() => direction(array, cell),
+                Some(array) if cell < array.len() && direction(array, cell).norm() > 0.5 => direction(array, cell),
                 _ => Vector3::zeros(),
             }));
         }
-        if directions.iter().all(|direction| direction.norm() < 0.5 || !direction.norm().is_finite()) {
+        if directions.iter().all(|direction| direction.norm() == 0.0) {
             return Self::default();
         }
         let mut fibres = Self { directions, ..Self::default() };

@@ -223,6 +223,7 @@ pub struct Drawn {
     section_corners: u32,
     /// Edges of the marked cell, fibres on the surface, fibres in the section.
     lines: wgpu::Buffer,
+    first: [Line; MOST_EDGES],
     marked: Option<u32>,
     mark_lines: u32,
     surface_fibres: Vec<Line>,
@@ -276,7 +277,11 @@ impl Drawn {
         let rest_points: Vec<[f32; 4]> = subject.points.iter().map(|point| staged(point, f64::NAN)).collect();
         let section = storage::<Corner>(device, &[]);
         let surface_fibres = subject.fibres.surface.clone();
-        let lines = storage(device, &[&[Line::default(); MOST_EDGES][..], &surface_fibres].concat());
+        let marked = subject.critical.map(|cell| subject.outline(cell)).unwrap_or_default();
+        let mark_lines = marked.len() as u32;
+        let mut first = [Line::default(); MOST_EDGES];
+        first[..marked.len()].copy_from_slice(&marked);
+        let lines = storage(device, &[&first[..], &surface_fibres].concat());
         let rest = storage(device, &rest_points);
         let pose = |points: wgpu::Buffer| {
             let normals = storage(device, &vec![[0.0_f32; 4]; subject.vertices.len()]);
@@ -326,8 +331,9 @@ impl Drawn {
             section,
             section_corners: 0,
             lines,
-            marked: None,
-            mark_lines: 0,
+            first,
+            marked: subject.critical,
+            mark_lines,
             surface_fibres,
             section_fibres: 0,
             corners: 3 * subject.triangles.len() as u32,
@@ -374,13 +380,14 @@ impl Drawn {
         }
     }
 
-    /// Marks a cell (see [`critical_cell`](crate::critical_cell)), or none.
+    /// Marks a cell instead of the one that was critical in the mesh of the subject (see [`critical_cell`](crate::critical_cell)), or none.
     pub fn mark(&mut self, queue: &wgpu::Queue, subject: &Subject, cell: Option<u32>) {
         if cell == self.marked {
             return;
         }
         let edges = cell.map(|cell| subject.outline(cell)).unwrap_or_default();
-        queue.write_buffer(&self.lines, 0, bytemuck::cast_slice(&edges));
+        self.first[..edges.len()].copy_from_slice(&edges);
+        queue.write_buffer(&self.lines, 0, bytemuck::cast_slice(&self.first));
         (self.marked, self.mark_lines) = (cell, edges.len() as u32);
     }
 
@@ -403,11 +410,8 @@ impl Drawn {
             queue.write_buffer(&self.lines, before as u64, fibres);
             return;
         }
-        let marked = &[Line::default(); MOST_EDGES][..];
         self.section = storage(device, &section.corners);
-        self.lines = storage(device, &[marked, &self.surface_fibres, &section.fibres].concat());
-        // The edges of the marked cell are to be written again.
-        (self.marked, self.mark_lines) = (None, 0);
+        self.lines = storage(device, &[&self.first[..], &self.surface_fibres, &section.fibres].concat());
         self.bind_shape(device, renderer);
     }
 
