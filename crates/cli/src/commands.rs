@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use pliant_geometry::io;
 use pliant_gpu::{Adapter, GpuError};
-use pliant_scene::diagnostic::SceneErrors;
+use pliant_scene::diagnostic::{Diagnostic, SceneErrors};
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
     Built, Checkpoint, Draw, MeshCache, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim,
@@ -61,7 +61,7 @@ pub fn prepare_changed(
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
 ) -> Result<(Scene, Built, Plan), Failure> {
-    let (mut source, folder, _translated) = open(path)?;
+    let Opened { mut source, folder, assumed, _translated } = open(path)?;
     let mut mistakes: Vec<_> =
         overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
     let precision = overrides.precision.map(|precision| match precision {
@@ -92,7 +92,8 @@ pub fn prepare_changed(
     }
     let mut scene = Scene::from_source(source, folder)?;
     change(&mut scene);
-    let built = pliant_scene::build_with(&scene, &mesh_cache(overrides.no_cache))?;
+    let mut built = pliant_scene::build_with(&scene, &mesh_cache(overrides.no_cache))?;
+    built.warnings.extend(assumed.map(Diagnostic::warning));
     if !built.warnings.is_empty() {
         report::show(&scene.source.errors(built.warnings.clone()));
     }
@@ -100,11 +101,27 @@ pub fn prepare_changed(
     Ok((scene, built, plan))
 }
 
-/// Reads the text of a scene. A NiftySim model is translated first, into a folder that lasts as long as the last value.
-fn open(path: &Path) -> Result<(Source, PathBuf, Option<TempDir>), Failure> {
+/// A scene that was read.
+struct Opened {
+    source: Source,
+    folder: PathBuf,
+    /// What was assumed of a mesh.
+    assumed: Option<String>,
+    /// The folder of a translated model, which lasts as long as this.
+    _translated: Option<TempDir>,
+}
+
+/// Reads the text of a scene. A NiftySim model is translated first; of a mesh a scene is made.
+fn open(path: &Path) -> Result<Opened, Failure> {
+    if pliant_scene::is_mesh(path) {
+        let help = "`pliant info` reads a mesh file on its own";
+        let made = pliant_scene::scene_of_mesh(path).map_err(|error| Failure::plain(error, help))?;
+        let source = Source::parse(path.display().to_string(), made.text)?;
+        return Ok(Opened { source, folder: made.folder, assumed: Some(made.assumed), _translated: None });
+    }
     if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) {
         let (source, folder) = pliant_scene::open(path)?;
-        return Ok((source, folder, None));
+        return Ok(Opened { source, folder, assumed: None, _translated: None });
     }
     let folder = tempfile::tempdir().map_err(|error| {
         Failure::plain(
@@ -115,7 +132,7 @@ fn open(path: &Path) -> Result<(Source, PathBuf, Option<TempDir>), Failure> {
     let notes = translate(path, &folder.path().join("scene.toml"))?;
     notes.iter().for_each(|note| eprintln!("note: {note}"));
     let (source, place) = pliant_scene::open(folder.path())?;
-    Ok((source, place, Some(folder)))
+    Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 
 /// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing.
@@ -251,7 +268,7 @@ fn devices(json: bool) -> Result<ExitCode, Failure> {
 }
 
 fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
-    let (source, folder, _translated) = open(&arguments.scene)?;
+    let Opened { source, folder, _translated, .. } = open(&arguments.scene)?;
     let sweep = Sweep::new(source, folder, &arguments.set)?.with_cache(mesh_cache(arguments.no_cache));
     let (runs, threads) = (sweep.runs(), arguments.threads.into());
     refuse_mistakes(&sweep, threads)?;

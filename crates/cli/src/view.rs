@@ -4,7 +4,9 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use pliant_viewer::{Errand, Opening, Recording, Stage, WindowError, open, replay};
+use pliant_viewer::{
+    Errand, Lags, Opening, Recording, Stage, WindowError, open, replay, replay_in_real_time,
+};
 
 use crate::arguments::{Overrides, View};
 use crate::commands::prepare;
@@ -28,7 +30,7 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
         eprintln!("note: {note}");
     }
     if let Some(file) = &arguments.replay {
-        return repeat(&stage_now, file);
+        return repeat(&stage_now, file, arguments.real_time);
     }
     let look = look_of(&stage_now.scene);
     let overrides = arguments.overrides.clone();
@@ -65,8 +67,8 @@ fn errand(arguments: &View) -> Option<Errand> {
     }
 }
 
-/// Repeats a recording without a window, and tells what it came to.
-fn repeat(stage: &Stage, file: &Path) -> Result<ExitCode, Failure> {
+/// Repeats a recording without a window, and tells what it came to; in real time too, to measure how soon a mouse is felt.
+fn repeat(stage: &Stage, file: &Path, real_time: bool) -> Result<ExitCode, Failure> {
     let wrong = |error: &dyn std::fmt::Display| {
         Failure::plain(
             format!("`{}` is no recording: {error}", file.display()),
@@ -77,7 +79,13 @@ fn repeat(stage: &Stage, file: &Path) -> Result<ExitCode, Failure> {
     let recording = Recording::from_bytes(&bytes).map_err(|error| wrong(&error))?;
     match replay(stage, &recording) {
         Ok(replayed) => {
-            say(serde_json::to_string(&replayed).map_err(|error| wrong(&error))?)?;
+            let mut told = serde_json::to_value(&replayed).map_err(|error| wrong(&error))?;
+            if real_time {
+                let played = replay_in_real_time(stage, &recording);
+                let played = played.map_err(|message| Failure::plain(message, ""))?;
+                told["input_lag"] = serde_json::to_value(Lags::of(&played)).map_err(|error| wrong(&error))?;
+            }
+            say(told)?;
             Ok(ExitCode::SUCCESS)
         }
         Err(message) => {

@@ -197,7 +197,10 @@ impl<'r> Replay<'r> {
                         self.hold.take(hand, model, step, subject, live.as_mut());
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
-                    Done::Numbers(numbers) => return Ok(Ended::Change(live.stand(), numbers)),
+                    Done::Numbers(numbers) => {
+                        let standing = live.stand().ok_or("numbers were changed within a step")?;
+                        return Ok(Ended::Change(Some(standing), numbers));
+                    }
                 }
             }
             if self.steps >= self.of {

@@ -286,29 +286,31 @@ fn play(
     let mut from = None;
     let mut subject = None;
     loop {
-        let mut player = match Player::enter(&stage, from, subject, course) {
-            Ok(player) => player,
-            Err(message) => {
-                frames.input_buffer_mut().failure = Some(message);
-                frames.publish();
-                wake();
-                return Recording::default();
-            }
+        let (left, standing);
+        (left, standing, subject, course) = {
+            let mut player = match Player::enter(&stage, from, subject, course) {
+                Ok(player) => player,
+                Err(message) => {
+                    frames.input_buffer_mut().failure = Some(message);
+                    frames.publish();
+                    wake();
+                    return Recording::default();
+                }
+            };
+            player.show(&mut frames);
+            wake();
+            let left = player.go(inbox, &mut frames, wake);
+            let goes_on = matches!(left, Left::Change) && player.course.steps > 0;
+            let standing =
+                if goes_on && player.course.failure.is_none() { player.live.stand() } else { None };
+            let (subject, course) = player.end();
+            (left, standing, subject, course)
         };
-        player.show(&mut frames);
-        wake();
-        let left = player.go(inbox, &mut frames, wake);
-        let standing = match left {
-            Left::Change if player.course.steps > 0 && player.course.failure.is_none() => player.live.stand(),
-            _ => None,
-        };
-        let anew = matches!(left, Left::Reset) || player.course.failure.is_some();
-        (subject, course) = player.end();
         if matches!(left, Left::Quit) {
             let recording = course.recording.unwrap_or_default();
             return Recording { steps: course.steps, ..recording };
         }
-        if anew {
+        if matches!(left, Left::Reset) || course.failure.is_some() {
             course.start_anew();
         }
         from = course.change.take().map(|(mut next, numbers)| {
@@ -437,7 +439,7 @@ impl<'s> Player<'s> {
             }
             // Orders come first, before each step; while it stands still nothing but orders happens.
             if self.course.owed == 0 {
-                let mut next = match self.patience() {
+                let mut next = match self.patience(changed) {
                     Duration::ZERO => inbox.try_recv().ok(),
                     patience => match inbox.recv_timeout(patience) {
                         Ok(order) => Some(order),
@@ -477,13 +479,14 @@ impl<'s> Player<'s> {
         course.change.is_some() && (course.steps == 0 || course.failure.is_some() || self.live.delay() == 0)
     }
 
-    /// How long it may wait for orders: until the simulation is due to go on, or the next frame is.
-    fn patience(&self) -> Duration {
+    /// How long it may wait for orders: until the simulation is due to go on, or the frame of what has changed is.
+    fn patience(&self, changed: bool) -> Duration {
         let course = &self.course;
+        let long = Duration::from_millis(50);
         if !course.is_going() {
-            return Duration::from_millis(50);
+            return long;
         }
-        let due = FRAME.saturating_sub(course.shown.elapsed());
+        let due = if changed { FRAME.saturating_sub(course.shown.elapsed()) } else { long };
         let ahead = (self.live.time() - course.pace.goal()) / course.pace.speed.max(1e-9);
         Duration::try_from_secs_f64(ahead.max(0.0)).unwrap_or(due).min(due)
     }

@@ -23,9 +23,10 @@ const WARNING: Color32 = Color32::from_rgb(250, 225, 150);
 const FAILED: Color32 = Color32::from_rgb(245, 180, 170);
 
 /// Keys and what they do, as in `docs/viewer.md`.
-const KEYS: [(&str, &str); 15] = [
+const KEYS: [(&str, &str); 16] = [
     ("drag the body", "pull it"),
     ("Ctrl or P + click", "pin it; on a pin, take it away"),
+    ("Alt + click", "follow a point: its displacement is plotted"),
     ("drag beside it", "turn the view"),
     ("right drag", "turn the view; with Shift move it"),
     ("middle drag", "move the view"),
@@ -133,6 +134,12 @@ impl App {
                 (None, Some((point, _))) => self.act(Hand::Pin(point)),
                 (None, None) => {}
             }
+        }
+        if response.clicked()
+            && context.input(|input| input.modifiers.alt)
+            && let Some((point, _)) = self.hit(place)
+        {
+            self.add_probe(point);
         }
         if response.drag_started_by(PointerButton::Primary) {
             let origin = context.input(|input| input.pointer.press_origin()).unwrap_or(pointer);

@@ -30,6 +30,31 @@ body = "ball"
 nodes = { half-space = { point = [-0.03, 0, 0], normal = [-1, 0, 0] } }
 "#;
 
+/// The organ and the relaxing tissue of the example, of larger cells.
+pub const LIVER: &str = r#"
+[scene]
+until = 100
+[run]
+threads = 1
+precision = "single"
+[law.parenchyma]
+type = "transversely-isotropic"
+shear-modulus = 3.0e3
+bulk-modulus = 29.0e3
+fibre-modulus = 6.0e3
+fibre = [0, 1, 0]
+prony = [{ part = "isochoric", weight = 0.5, time = 0.58 }]
+[body.liver]
+mesh = { organ = "liver", scale = 1.25, edge = 0.025 }
+law = "parenchyma"
+density = 1060
+damping = 5
+[constraint.diaphragm]
+type = "fix"
+body = "liver"
+nodes = { half-space = { point = [-0.095, 0, 0], normal = [-1, 0, 0] } }
+"#;
+
 /// A strip of a shell, held at one end, with a solver of shells.
 pub fn shell(solver: &str) -> Stage {
     let text = r#"
