@@ -203,9 +203,9 @@ fn noise(place: vec3<f32>) -> vec4<f32> {
 }
 
 // Sum of octaves of noise from a frequency on; those finer than pixels are left out.
-fn octaves(place: vec3<f32>, first: f32, count: i32, pixel: f32) -> vec4<f32> {
+fn octaves(place: vec3<f32>, lowest: f32, count: i32, pixel: f32) -> vec4<f32> {
     var sum = vec4(0.0);
-    var frequency = first;
+    var frequency = lowest;
     var height = 1.0;
     for (var octave = 0; octave < count; octave++) {
         let seen = 1.0 - smoothstep(0.25, 0.6, frequency * pixel);
@@ -319,16 +319,16 @@ fn line(@builtin(vertex_index) index: u32, @builtin(instance_index) mark: u32) -
     let end = select(-1.0, 1.0, (corner & 1u) != 0u);
     let side = select(-1.0, 1.0, (corner & 2u) != 0u);
     let position = lifted(middle + end * half_line);
-    let from = view.projection_view * vec4(lifted(middle - half_line), 1.0);
-    let to = view.projection_view * vec4(lifted(middle + half_line), 1.0);
+    let first = view.projection_view * vec4(lifted(middle - half_line), 1.0);
+    let last = view.projection_view * vec4(lifted(middle + half_line), 1.0);
     let shape = vec2(view.line.x, 1.0);
-    let along = (to.xy / to.w - from.xy / from.w) * shape;
+    let along = (last.xy / last.w - first.xy / first.w) * shape;
     let unit = along / max(length(along), 1.0e-9);
     let width = 2.0 * select(view.line.y, view.line.z, mark != 0u);
     // Ends reach out a little, so that lines that meet close.
     let offset = width * (vec2(-unit.y, unit.x) * side + unit * end * 0.5) / shape;
     var result: Stroke;
-    result.clip = select(from, to, end > 0.0);
+    result.clip = select(first, last, end > 0.0);
     result.clip = vec4(result.clip.xy + offset * result.clip.w, result.clip.zw);
     result.position = position;
     result.across = side;
