@@ -479,6 +479,10 @@ impl<'s> Player<'s> {
             {
                 self.step();
                 changed = true;
+                // Looked at, the run would not stand between two steps any more.
+                if self.is_due_to_change() {
+                    return Left::Change;
+                }
             }
             let still = !self.course.is_going() && self.course.owed == 0;
             if changed && (still || self.course.shown.elapsed() >= FRAME) {
