@@ -440,6 +440,10 @@ impl<'s> Player<'s> {
             {
                 self.step();
                 changed = true;
+                // Before forces at the new instant are found.
+                if self.is_due_to_change() {
+                    return Left::Change;
+                }
             }
             let still = !self.course.is_going() && self.course.owed == 0;
             if changed && (still || self.course.shown.elapsed() >= FRAME) {
