@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand, ValueEnum};
 use pliant_bench::Instructions;
+use pliant_scene::format::{BackgroundName, Choice, MapName, TextureName};
 
 /// Real-time simulation of soft organs.
 #[derive(Debug, Parser)]
@@ -138,6 +139,8 @@ Examples:
   pliant render out/liver --series skin --colour displacement --camera 90,10
   pliant render scenes/liver --colour pressure --edges --clip 0,0,0,0,1,0
   pliant render scenes/cube --colour displacement:z --map cividis --range 0,0.02 --ghost
+  pliant render scenes/liver --fibres --critical --colour element-step
+  pliant render scenes -o gallery                            a page with a picture of each scene in a folder
 
 A scene is run first, without its own outputs; its table [view] tells how it is seen, the options below come before it. A film
 whose name ends in .mp4 takes ffmpeg; without one, or with a name that ends in .png, it is an animated PNG.
@@ -146,7 +149,7 @@ Exit codes: 0 done, 1 the run or a picture failed, 2 the input is wrong or nothi
 
 #[derive(Debug, clap::Args)]
 pub struct Render {
-    /// The folder of a finished run, or a scene file, a folder with a scene.toml, a NiftySim model (.xml).
+    /// The folder of a finished run, or a scene file, a folder with a scene.toml, a NiftySim model (.xml), a folder of scenes.
     pub what: PathBuf,
     /// Frames: `all`, `last`, a number counted from 0, or several as in 0..20 (without the 20) and 10.. (to the end).
     #[arg(long, value_name = "FRAMES")]
@@ -170,8 +173,8 @@ pub struct Render {
     #[arg(long, value_name = "FIELD")]
     pub colour: Option<String>,
     /// Map of colours.
-    #[arg(long, value_name = "MAP", value_parser = ["viridis", "cividis", "magma", "inferno", "plasma", "turbo", "blue-red"])]
-    pub map: Option<String>,
+    #[arg(long, value_name = "MAP", value_parser = word::<MapName>())]
+    pub map: Option<MapName>,
     /// Values of the first and the last colour.
     #[arg(long, value_name = "LOW,HIGH", value_parser = range, allow_hyphen_values = true)]
     pub range: Option<Numbers<2>>,
@@ -190,15 +193,28 @@ pub struct Render {
     /// Draw the edges of the elements.
     #[arg(long)]
     pub edges: bool,
+    /// Draw nothing but the edges of the elements on the surface.
+    #[arg(long)]
+    pub wireframe: bool,
     /// Draw the shape at rest, as a ghost.
     #[arg(long)]
     pub ghost: bool,
+    /// Draw fibres as short lines, on the surface and in a section (of a run: one whose series has the field `fibre` on its cells).
+    #[arg(long)]
+    pub fibres: bool,
+    /// Mark the element with the smallest stable step, through the body (of a run: one whose series has the field `element-step` on
+    /// its cells).
+    #[arg(long)]
+    pub critical: bool,
+    /// What the surface is like.
+    #[arg(long, value_name = "WORD", value_parser = word::<TextureName>())]
+    pub texture: Option<TextureName>,
     /// A point and a normal: what lies on the side of the normal is taken away.
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = plane, allow_hyphen_values = true)]
     pub clip: Option<Numbers<6>>,
     /// What stands behind.
-    #[arg(long, value_name = "WORD", value_parser = ["light", "white", "dark"])]
-    pub background: Option<String>,
+    #[arg(long, value_name = "WORD", value_parser = word::<BackgroundName>())]
+    pub background: Option<BackgroundName>,
     /// The series of a finished run; the first one of the alphabet if not given.
     #[arg(long, value_name = "NAME")]
     pub series: Option<String>,
@@ -269,6 +285,15 @@ fn plane(typed: &str) -> Result<Numbers<6>, String> {
         return Err("a plane needs a normal, as in 0,0,0,1,0,0".into());
     }
     Ok(found)
+}
+
+/// A word of the scene file's.
+fn word<T>() -> impl TypedValueParser<Value = T>
+where
+    T: Choice + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(T::WORDS)
+        .try_map(|typed| T::of_word(&typed).ok_or_else(|| format!("`{typed}` is unknown")))
 }
 
 fn factor(typed: &str) -> Result<f64, String> {

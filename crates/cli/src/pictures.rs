@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use pliant_geometry::{Mesh, Vector3};
 use pliant_picture::{
     AnimatedPng, Axis, Background, Camera, ColourMap, Film, Graphics, Legend, Look, Picture, PictureError,
-    Plane, Projection, Series, SeriesError, Style, ffmpeg,
+    Plane, Projection, Series, SeriesError, Style, Texture, ffmpeg,
 };
-use pliant_scene::format::{FieldName, UpName, VtuTable};
+use pliant_scene::format::{BackgroundName, FieldName, MapName, TextureName, UpName, VtuTable};
 use pliant_scene::registry::OutputTable;
 use pliant_scene::{Draw, Options, OutputFolder, Scene};
 
@@ -35,12 +35,16 @@ pub fn look_of(scene: &Scene) -> Look {
     let camera = &view.camera;
     let mut look = Look {
         style: Style {
-            map: ColourMap::of_name(view.map.word()).unwrap_or_default(),
+            map: map_of(view.map),
             range: view.range,
             edges: view.edges,
+            wireframe: view.wireframe,
             ghost: view.ghost,
+            fibres: view.fibres,
+            critical: view.critical,
+            texture: texture_of(view.texture),
             clip: view.clip.and_then(|clip| Plane::through(&clip.point.into(), &clip.normal.into())),
-            background: Background::of_name(view.background.word()).unwrap_or_default(),
+            background: background_of(view.background),
         },
         camera: Camera {
             azimuth: camera.azimuth,
@@ -59,6 +63,33 @@ pub fn look_of(scene: &Scene) -> Look {
     }
     look.legend.title = scene.scene.title.clone();
     look
+}
+
+fn map_of(name: MapName) -> ColourMap {
+    match name {
+        MapName::Viridis => ColourMap::Viridis,
+        MapName::Cividis => ColourMap::Cividis,
+        MapName::Magma => ColourMap::Magma,
+        MapName::Inferno => ColourMap::Inferno,
+        MapName::Plasma => ColourMap::Plasma,
+        MapName::Turbo => ColourMap::Turbo,
+        MapName::BlueRed => ColourMap::BlueRed,
+    }
+}
+
+fn background_of(name: BackgroundName) -> Background {
+    match name {
+        BackgroundName::Light => Background::Light,
+        BackgroundName::White => Background::White,
+        BackgroundName::Dark => Background::Dark,
+    }
+}
+
+fn texture_of(name: TextureName) -> Texture {
+    match name {
+        TextureName::None => Texture::None,
+        TextureName::Skin => Texture::Skin,
+    }
 }
 
 /// What is up: as the scene says, or against gravity.
@@ -92,15 +123,15 @@ fn colour_by_name(look: &mut Look, name: &str) {
 /// What was typed comes before what the scene says.
 fn typed(look: &mut Look, arguments: &Render) {
     let style = &mut look.style;
-    if let Some(map) = arguments.map.as_deref().and_then(ColourMap::of_name) {
-        style.map = map;
-    }
-    if let Some(background) = arguments.background.as_deref().and_then(Background::of_name) {
-        style.background = background;
-    }
+    style.map = arguments.map.map_or(style.map, map_of);
+    style.background = arguments.background.map_or(style.background, background_of);
+    style.texture = arguments.texture.map_or(style.texture, texture_of);
     style.range = arguments.range.or(style.range);
     style.edges |= arguments.edges;
+    style.wireframe |= arguments.wireframe;
     style.ghost |= arguments.ghost;
+    style.fibres |= arguments.fibres;
+    style.critical |= arguments.critical;
     if let Some([x, y, z, nx, ny, nz]) = arguments.clip {
         style.clip = Plane::through(&Vector3::new(x, y, z), &Vector3::new(nx, ny, nz));
     }
@@ -152,9 +183,12 @@ impl Draw for Photographer {
 
 pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
     let film = arguments.film.as_deref().map(film_kind).transpose()?;
+    let scenes = scenes_in(&arguments.what);
+    if !scenes.is_empty() {
+        return gallery(arguments, &scenes);
+    }
     let graphics = Graphics::open()?;
-    let folder = OutputFolder::claim(arguments.out.clone(), arguments.force, is_picture)
-        .map_err(|error| Failure::plain(&error, error.remedy))?;
+    let folder = claim(arguments, is_picture)?;
     if is_folder_of_run(&arguments.what) {
         refuse_words_of_scenes(arguments)?;
         let series = Series::find(&arguments.what, arguments.series.as_deref())?;
@@ -169,6 +203,31 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
     if arguments.series.is_some() {
         return Err(Failure::plain("`--series` chooses among the series of a finished run", "leave it out"));
     }
+    let Some(shown) = run_scene(&arguments.what, arguments)? else {
+        return Ok(ExitCode::from(INTERRUPTED));
+    };
+    let code = shoot(arguments, &shown.look, &graphics, &shown.series, &folder, film)?;
+    // What a failed run came to is worth a look.
+    Ok(if shown.failed { ExitCode::from(1) } else { code })
+}
+
+fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
+    OutputFolder::claim(arguments.out.clone(), arguments.force, own)
+        .map_err(|error| Failure::plain(&error, error.remedy))
+}
+
+/// A scene that has been run for its pictures.
+struct Shown {
+    look: Look,
+    series: Series,
+    title: String,
+    failed: bool,
+    /// Holds the frames until they are drawn.
+    _space: tempfile::TempDir,
+}
+
+/// Runs a scene with nothing but what is shown of it as its output; `None` if it was interrupted.
+fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> {
     let space = tempfile::tempdir().map_err(|error| {
         Failure::plain(
             format!("no temporary folder can be made: {error}"),
@@ -178,7 +237,7 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
     let overrides = with_colour(&arguments.overrides, arguments.colour.as_deref());
     let mut every = 0.0;
     let (mut scene, built, plan) =
-        prepare_changed(&arguments.what, &overrides, |scene| every = forget_outputs(scene, arguments))?;
+        prepare_changed(path, &overrides, |scene| every = forget_outputs(scene, arguments))?;
     scene.outputs = vec![("shown".into(), OutputTable::Vtu(scene.shown(every)))];
     let mut look = look_of(&scene);
     typed(&mut look, arguments);
@@ -195,17 +254,76 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
     }
     if summary.status == "interrupted" {
         eprintln!("error: the run was interrupted; no pictures were taken");
-        return Ok(ExitCode::from(INTERRUPTED));
+        return Ok(None);
     }
-    let code = shoot(arguments, &look, &graphics, &Series::find(run.path(), None)?, &folder, film)?;
-    match &summary.error {
-        None => Ok(code),
-        // What it came to is worth a look.
-        Some(error) => {
-            eprintln!("error: {}", error.message);
-            Ok(ExitCode::from(1))
+    if let Some(error) = &summary.error {
+        eprintln!("error: {}", error.message);
+    }
+    let series = Series::find(run.path(), None)?;
+    let failed = summary.error.is_some();
+    Ok(Some(Shown { look, series, title: scene.scene.title.clone(), failed, _space: space }))
+}
+
+/// Width of a picture in a gallery [pixels].
+const GALLERY_WIDTH: u32 = 800;
+
+/// The scenes in a folder that is none itself, in the order of the alphabet.
+fn scenes_in(folder: &Path) -> Vec<PathBuf> {
+    if !is_folder_of_run(folder) {
+        return Vec::new();
+    }
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut scenes: Vec<PathBuf> =
+        entries.map(|entry| entry.path()).filter(|path| path.join("scene.toml").is_file()).collect();
+    scenes.sort_unstable();
+    scenes
+}
+
+/// Runs scenes, and makes a page with the last picture of each.
+fn gallery(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> {
+    if arguments.film.is_some() || arguments.frames.is_some() || arguments.series.is_some() {
+        let message = "a gallery has the last picture of each scene";
+        return Err(Failure::plain(
+            message,
+            "leave `--film`, `--frames` and `--series` out, or give one scene",
+        ));
+    }
+    let graphics = Graphics::open()?;
+    let folder = claim(arguments, |name| name == "README.md" || name.ends_with(".png"))?;
+    let until = arguments.overrides.until.map(|until| format!(" --until {until}")).unwrap_or_default();
+    let (what, out) = (arguments.what.display(), arguments.out.display());
+    let mut page = format!(
+        "# Gallery\n\nMade by `pliant render {what} -o {out}{until}`: the last instant of each scene.\n"
+    );
+    let mut failed = false;
+    for scene in scenes {
+        let Some(mut shown) = run_scene(scene, arguments)? else {
+            return Ok(ExitCode::from(INTERRUPTED));
+        };
+        failed |= shown.failed;
+        let name = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let title = if shown.title.is_empty() { name.clone() } else { shown.title };
+        let [width, height] = shown.look.size;
+        if arguments.size.is_none() {
+            shown.look.size = [GALLERY_WIDTH, (GALLERY_WIDTH * height / width).max(1)];
         }
+        // The page says it.
+        shown.look.legend.title.clear();
+        let file = folder.path().join(format!("{name}.png"));
+        let last = shown.series.frames.len() - 1;
+        shown.look.pictures(&graphics, &shown.series, &[last], |_, picture| {
+            std::fs::write(&file, picture.png()?)
+                .map_err(|error| PictureError::Write { path: file.clone(), reason: error.to_string() })
+        })?;
+        say(format_args!("wrote {}", file.display()))?;
+        page.push_str(&format!(
+            "\n## {title}\n\n![{title}]({name}.png)\n\n```sh\npliant render {}{until}\n```\n",
+            scene.display()
+        ));
     }
+    let path = folder.write("README.md", &page).map_err(|error| Failure::plain(&error, error.remedy))?;
+    say(format_args!("wrote {} ({})", path.display(), graphics.adapter()))?;
+    Ok(ExitCode::from(u8::from(failed)))
 }
 
 /// Whether a path is the folder of a run, and not of a scene.
@@ -238,6 +356,8 @@ fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
     if arguments.colour.as_ref().is_some_and(|name| !name.contains(':')) {
         scene.view.component = None;
     }
+    scene.view.fibres |= arguments.fibres;
+    scene.view.critical |= arguments.critical;
     arguments.every.or(own).unwrap_or(0.01 * scene.scene.until)
 }
 
@@ -388,7 +508,23 @@ fn start_film(
 
 #[cfg(test)]
 mod tests {
+    use pliant_scene::format::Choice;
+
     use super::*;
+
+    #[test]
+    fn words_of_scenes_and_of_pictures_are_the_same() {
+        let maps = MapName::WORDS;
+        let seen: Vec<ColourMap> = maps.iter().map(|word| map_of(MapName::of_word(word).unwrap())).collect();
+        assert_eq!(seen, ColourMap::ALL);
+        assert_eq!(seen.iter().map(|map| map.name()).collect::<Vec<_>>(), maps);
+        let backgrounds = BackgroundName::WORDS;
+        let seen: Vec<Background> =
+            backgrounds.iter().map(|word| background_of(BackgroundName::of_word(word).unwrap())).collect();
+        assert_eq!(seen, [Background::Light, Background::White, Background::Dark]);
+        let textures = TextureName::WORDS.iter().map(|word| texture_of(TextureName::of_word(word).unwrap()));
+        assert_eq!(textures.collect::<Vec<_>>(), [Texture::None, Texture::Skin]);
+    }
 
     #[test]
     fn names_of_pictures_are_known_again_and_films_go_by_their_ending() {

@@ -151,6 +151,71 @@ mod with_pictures {
     }
 
     #[test]
+    fn every_colour_and_mark_changes_what_is_seen_of_fibrous_tissue() {
+        if !has_graphics_processor() {
+            return;
+        }
+        let workshop = short("");
+        let take = |more: &[&str]| -> Vec<u8> {
+            let all = [&["render", "case", "--step", "1e-3", "-o", "pictures"], more].concat();
+            done(&workshop.pliant(&all));
+            fs::read(workshop.path("pictures/frame-00005.png")).unwrap()
+        };
+        let mut seen = BTreeSet::new();
+        for colour in [
+            "none",
+            "von-mises",
+            "displacement",
+            "fibre-stretch",
+            "pressure",
+            "energy-density",
+            "element-step",
+        ] {
+            assert!(seen.insert(take(&["--colour", colour])), "{colour}");
+        }
+        let marks: [&[&str]; 4] = [&["--fibres"], &["--critical"], &["--texture", "skin"], &["--wireframe"]];
+        for more in marks {
+            assert!(seen.insert(take(more)), "{more:?}");
+        }
+        // The same words in the scene.
+        let table = short("fibres = true\ncritical = true\ntexture = 'skin'\nwireframe = true\n");
+        done(&table.pliant(&["render", "case", "--step", "1e-3", "-o", "pictures"]));
+        let by_table = fs::read(table.path("pictures/frame-00005.png")).unwrap();
+        assert_eq!(take(&["--fibres", "--critical", "--texture", "skin", "--wireframe"]), by_table);
+    }
+
+    #[test]
+    fn a_folder_of_scenes_becomes_a_gallery() {
+        if !has_graphics_processor() {
+            return;
+        }
+        let workshop = short("");
+        for (name, title) in [("one", "A block"), ("two", "Another one")] {
+            let titled = BLOCK.replace("[scene]\n", &format!("[scene]\ntitle = '{title}'\n"));
+            workshop.write(
+                &format!("scenes/{name}/scene.toml"),
+                format!("{titled}\n[view]\nsize = [320, 200]\n"),
+            );
+        }
+        workshop.write("scenes/README.md", "no scene");
+        let arguments = ["render", "scenes", "-o", "gallery", "--until", "0.004"];
+        done(&workshop.pliant(&arguments));
+        let all = ["README.md", "one.png", "two.png"].map(String::from);
+        assert_eq!(names(&workshop, "gallery"), BTreeSet::from(all));
+        assert_eq!(png(&workshop, "gallery/two.png").0, [800, 500]);
+        let page = workshop.read("gallery/README.md");
+        for piece in
+            ["## A block\n\n![A block](one.png)", "pliant render scenes/two --until 0.004", "## Another one"]
+        {
+            assert!(page.contains(piece), "{piece}: {page}");
+        }
+        done(&workshop.pliant(&arguments));
+        let told = workshop.pliant(&[&arguments[..], &["--film", "film.png"]].concat());
+        assert_eq!(told.code, 2);
+        assert!(told.err.contains("the last picture of each scene"), "{}", told.err);
+    }
+
+    #[test]
     fn what_cannot_be_shown_is_refused_with_a_remedy() {
         if !has_graphics_processor() {
             return;
@@ -159,8 +224,11 @@ mod with_pictures {
         workshop.run(&["--step", "1e-3"]).done();
         workshop.write("full/letter.txt", "mine");
         workshop.write("empty/letter.txt", "mine");
-        let cases: [(&[&str], &str); 10] = [
+        let cases: [(&[&str], &str); 13] = [
             (&["render", "nowhere"], "nowhere"),
+            (&["render", "out/case", "--fibres"], "needs `fibre` in `data`"),
+            (&["render", "out/case", "--critical"], "needs `element-step` in `data`"),
+            (&["render", "case", "--texture", "wood"], "possible values: none, skin"),
             (&["render", "empty"], "holds no series of frames"),
             (&["render", "out/case", "--series", "skin"], "there is `fields`"),
             (&["render", "out/case", "--colour", "pressure"], "`displacement`, `von-mises`"),

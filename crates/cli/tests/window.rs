@@ -98,6 +98,21 @@ fn the_window_draws_picks_pins_and_pulls_and_what_holds_the_body_holds_against_t
 }
 
 #[test]
+fn the_window_is_on_the_device_of_a_scene_that_runs_on_one() {
+    if !has_graphics_processor() {
+        return;
+    }
+    let Some(screen) = Screen::start() else { return };
+    let workshop = Workshop::new(&changed(BALL, "threads = 1", "threads = 1\ndevice = 'gpu'"));
+    let told = view(&workshop, &screen, &["--rehearse", "--record", "drag", "--screenshot", "window.png"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.contains("10 frames drawn, 100 pixels picked"), "{}", told.out);
+    let replay = workshop.pliant(&["view", "case", "--replay", "drag"]);
+    assert_eq!(replay.code, 0, "{}", replay.err);
+    assert!(replay.json()["largest_force"].as_f64().unwrap() > 0.01, "{}", replay.out);
+}
+
+#[test]
 fn the_window_takes_a_picture_of_itself_and_reads_a_scene_that_changed_while_it_is_open() {
     if !has_graphics_processor() {
         return;

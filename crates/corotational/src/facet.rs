@@ -411,6 +411,11 @@ impl Facet {
         SymmetricEigen::new(scaled).eigenvalues.max()
     }
 
+    /// The longest stable step [s] of the element by itself, at rest.
+    pub fn stable_step(&self) -> f64 {
+        2.0 / self.highest_frequency_squared().sqrt()
+    }
+
     /// The largest force of a displacement of one node [N/m]: of slivers far above E t.
     pub(crate) fn stiffest(&self) -> f64 {
         let in_plane = [0, 1, 3, 4, 6, 7].map(|at| self.membrane[(at, at)]);

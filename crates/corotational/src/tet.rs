@@ -128,6 +128,11 @@ impl Tet {
         })
     }
 
+    /// The longest stable step [s] by itself, at rest.
+    pub fn stable_step(&self) -> f64 {
+        2.0 / self.highest_frequency_squared().sqrt()
+    }
+
     /// The largest ω² [1/s²] by itself about rest, with its lumped mass.
     pub(crate) fn highest_frequency_squared(&self) -> f64 {
         let [lambda, mu] = self.lame;

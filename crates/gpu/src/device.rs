@@ -79,7 +79,7 @@ impl Adapter {
 }
 
 /// Those that can compute, the best first.
-fn found() -> Vec<(Adapter, wgpu::Adapter)> {
+fn found() -> (wgpu::Instance, Vec<(Adapter, wgpu::Adapter)>) {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     descriptor.backends &= wgpu::Backends::PRIMARY;
     let backends = descriptor.backends;
@@ -89,12 +89,12 @@ fn found() -> Vec<(Adapter, wgpu::Adapter)> {
         .map(|adapter| (Adapter::new(adapter.get_info(), &adapter.limits(), adapter.features()), adapter))
         .collect();
     found.sort_by_key(|(adapter, _)| adapter.kind);
-    found
+    (instance, found)
 }
 
 /// All adapters, the best first.
 pub fn adapters() -> Vec<Adapter> {
-    found().into_iter().map(|(adapter, _)| adapter).collect()
+    found().1.into_iter().map(|(adapter, _)| adapter).collect()
 }
 
 /// An open adapter.
@@ -103,7 +103,10 @@ pub struct Device {
     adapter: Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
+    instance: wgpu::Instance,
+    handle: wgpu::Adapter,
     faults: Faults,
+    read_backs: Arc<AtomicU64>,
 }
 
 /// What went wrong with a device since it was opened.
@@ -155,7 +158,7 @@ impl Device {
         name: Option<&str>,
         lessen: impl FnOnce(&mut wgpu::Limits, &mut wgpu::Features),
     ) -> Result<Self, GpuError> {
-        let mut found = found();
+        let (instance, mut found) = found();
         let names: Vec<String> = found.iter().map(|(adapter, _)| adapter.name.clone()).collect();
         if let Some(name) = name {
             let name = name.to_lowercase();
@@ -189,7 +192,7 @@ impl Device {
         device.set_device_lost_callback(move |_, reason| {
             on_loss.note(GpuError::Lost { adapter: on_loss.adapter.clone(), reason });
         });
-        Ok(Self { adapter, device, queue, faults })
+        Ok(Self { adapter, device, queue, instance, handle, faults, read_backs: Arc::default() })
     }
 
     /// What it is.
@@ -200,6 +203,20 @@ impl Device {
     /// The handles of wgpu, for work beside the stepper's on the same device.
     pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.device, &self.queue)
+    }
+
+    /// Where it comes from: a window that draws what lies on the device needs both.
+    pub fn origin(&self) -> (&wgpu::Instance, &wgpu::Adapter) {
+        (&self.instance, &self.handle)
+    }
+
+    /// How often something was read back to ordinary memory since it was opened, by whatever works on it.
+    pub fn read_backs(&self) -> u64 {
+        self.read_backs.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn count_read_back(&self) {
+        self.read_backs.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Takes an error for one that the driver reports.

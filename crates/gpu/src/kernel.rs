@@ -267,6 +267,11 @@ impl Kernel {
         Ok(Self { pipeline, bound, dispatch: groups(invocations) })
     }
 
+    /// Runs in so many groups from now on.
+    pub(crate) fn dispatch_groups(&mut self, count: u32) {
+        self.dispatch = [count, 1];
+    }
+
     /// Runs for the instant at an offset, with `side` of arrays that have two.
     pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>, instant: &Bound, offset: u32, side: usize) {
         pass.set_pipeline(&self.pipeline);

@@ -65,10 +65,11 @@ impl DeviceNodes {
         for body in &model.bodies {
             for node in body.nodes.clone() {
                 let owner = owners[node as usize];
-                let mut hold = FREE;
+                // One more than its place among those held, or zero.
+                let mut tag = 0;
                 if owner != [FREE; 3] {
-                    hold = held.len() as u32;
                     held.push(node);
+                    tag = held.len() as u32;
                     let [x, y, z] = amplitudes[node as usize].map(|a| a as f32);
                     holds.push(Hold {
                         owner: [owner[0], owner[1], owner[2], FREE],
@@ -76,7 +77,7 @@ impl DeviceNodes {
                     });
                 }
                 let (inertia, mass) = (model.inertia(node as usize), model.mass[node as usize]);
-                constants.push([inertia as f32, body.damping as f32, mass as f32, f32::from_bits(hold)]);
+                constants.push([inertia as f32, body.damping as f32, mass as f32, f32::from_bits(tag)]);
             }
         }
         let vectors = |alternate| memory.sides("the nodes", count * size_of::<Four>(), alternate);
@@ -140,6 +141,16 @@ impl DeviceNodes {
         })
     }
 
+    /// Marks nodes that grips pull at, or unmarks them.
+    pub(crate) fn mark(&self, device: &Device, nodes: &[u32], gripped: bool) {
+        for &node in nodes {
+            let tag = self.held.binary_search(&node).map_or(0, |hold| hold as u32 + 1);
+            let tag = if gripped { tag | GRIPPED } else { tag };
+            let place = (node as usize * size_of::<Four>() + 3 * size_of::<f32>()) as u64;
+            device.queue.write_buffer(&self.constants, place, bytemuck::bytes_of(&tag));
+        }
+    }
+
     /// What blocks of nodes work on, with `left` the forces that they leave.
     pub(crate) fn of_blocks(&self, device: &Device, left: &wgpu::Buffer) -> Bound {
         let bindings = [
@@ -157,6 +168,9 @@ impl DeviceNodes {
 }
 
 const INSTANT: &str = include_str!("shaders/instant.wgsl");
+
+/// Marks a node that a grip pulls at; twin of the one in move.wgsl.
+const GRIPPED: u32 = 1 << 31;
 
 /// What resists and holds nodes.
 pub(crate) const MOVE: &str = include_str!("shaders/move.wgsl");

@@ -6,6 +6,7 @@ use pliant_mechanics::model::Model;
 use pliant_mechanics::{Lengths, StepError};
 
 use crate::kernel::{Binding, Bound, Memory};
+use crate::solids::Four;
 use crate::{Device, GpuError};
 
 /// Most instants in a submission.
@@ -80,6 +81,7 @@ pub(crate) struct Instants {
     instants: wgpu::Buffer,
     table: wgpu::Buffer,
     pub findings: wgpu::Buffer,
+    grips: wgpu::Buffer,
     /// Bytes from one instant to the next.
     spacing: usize,
     bytes: Vec<u8>,
@@ -95,6 +97,19 @@ pub(crate) fn table_constants(model: &Model) -> [(&'static str, usize); 2] {
     [("LOADS", loads), ("GRAVITY", loads + model.loads.len())]
 }
 
+/// What all kernels read.
+fn bind(
+    device: &Device,
+    instants: &wgpu::Buffer,
+    findings: &wgpu::Buffer,
+    table: &wgpu::Buffer,
+    grips: &wgpu::Buffer,
+) -> Bound {
+    let size = size_of::<Instant>() as u64;
+    let arrays = [Binding::Write(findings), Binding::Read(table), Binding::Write(grips)];
+    Bound::new(device, &[&[Binding::Moving(instants, size)], &arrays[..]].concat())
+}
+
 /// What is found at all instants, before any.
 const NOTHING: [u32; 4] = [u32::MAX, u32::MAX, f32::to_bits(1.0), 0];
 
@@ -108,22 +123,34 @@ impl Instants {
         let instants = memory.uniform("the instants", spacing * MOST);
         let table = memory.zeros("the factors of motions and loads", stride * MOST * size_of::<f32>())?;
         let findings = memory.filled("the findings", &NOTHING)?;
-        let size = size_of::<Instant>() as u64;
-        let bound = Bound::new(
-            device,
-            &[Binding::Moving(&instants, size), Binding::Write(&findings), Binding::Read(&table)],
-        );
+        let grips = memory.zeros("the grips", 0)?;
+        let bound = bind(device, &instants, &findings, &table, &grips);
         Ok(Self {
             bound,
             instants,
             table,
             findings,
+            grips,
             spacing,
             bytes: vec![],
             numbers: vec![],
             stride,
             count: 0,
         })
+    }
+
+    /// Takes grips as instant.wgsl reads them.
+    ///
+    /// # Errors
+    /// If there are too many.
+    pub(crate) fn hold(&mut self, device: &Device, grips: &[Four]) -> Result<(), GpuError> {
+        if self.grips.size() < size_of_val(grips) as u64 {
+            self.grips = Memory::new(device).filled("the grips", grips)?;
+            self.bound = bind(device, &self.instants, &self.findings, &self.table, &self.grips);
+        } else {
+            device.queue.write_buffer(&self.grips, 0, bytemuck::cast_slice(grips));
+        }
+        Ok(())
     }
 
     /// Forgets what was found.

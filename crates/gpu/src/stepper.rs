@@ -1,7 +1,8 @@
 //! The central difference method on a device; the method itself stands in the stepper of `pliant-mechanics`.
 
-use std::time::Instant as Clock;
+use std::time::{Duration, Instant as Clock};
 
+use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::{FREE, Model};
 use pliant_mechanics::stability::{Monitor, Stability};
 use pliant_mechanics::tensor::Vector;
@@ -11,8 +12,10 @@ use pliant_mechanics::{
 };
 
 use crate::blocks::NodeBlocks;
+use crate::grips::DeviceGrips;
 use crate::kernel::{Kernel, Memory};
 use crate::loads::DeviceLoads;
+use crate::mapping::{DeviceMapping, PointValue};
 use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
 use crate::paths::Paths;
 use crate::run::{Instant, Instants, MOST, StepFailure, flags, table_constants};
@@ -82,6 +85,7 @@ pub struct GpuStepper<'m> {
     nodes: DeviceNodes,
     kernels: NodeKernels,
     loads: Option<DeviceLoads>,
+    grips: DeviceGrips,
     instants: Instants,
     transfer: Transfer,
     /// Length of a step [s] that relaxing laws are set to.
@@ -171,6 +175,7 @@ impl<'m> GpuStepper<'m> {
             .collect::<Result<Vec<_>, _>>()?;
         let gather = (paths.node_snippet.as_str(), &paths.nodes);
         let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), &constants)?;
+        let grips = DeviceGrips::new(device, &instants.bound, &nodes.displacement)?;
         let control = StepControl::new(step);
         Ok(Self {
             device: device.clone(),
@@ -183,6 +188,7 @@ impl<'m> GpuStepper<'m> {
             paths,
             kernels,
             loads,
+            grips,
             instants,
             transfer: Transfer::default(),
             relaxing: None,
@@ -340,6 +346,59 @@ impl<'m> GpuStepper<'m> {
         Ok(())
     }
 
+    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without looking: nothing comes back.
+    /// Returns how many. Where something breaks the device stands still, which the next evaluation tells. The first instant is
+    /// evaluated where that is not done yet.
+    ///
+    /// # Errors
+    /// As [`Self::evaluate`] at the first instant, and if the device fails.
+    pub fn coast(
+        &mut self,
+        state: &mut State<f32>,
+        steps: u64,
+        within: Duration,
+    ) -> Result<u64, StepFailure> {
+        // Where work was entered since the last look, sums would enter it again.
+        if !self.evaluated && self.entered {
+            self.evaluate(state, Wanted::Energies)?;
+        }
+        let pace = self.pace.map_or(f64::INFINITY, |pace| pace * f64::from(self.control.substeps()));
+        let steps = steps.min((within.as_secs_f64() / pace) as u64).max(1);
+        let (begun, before) = (Clock::now(), self.since);
+        if let Some(last) = self.go(state, steps)? {
+            self.device.wait_for(last)?;
+        }
+        self.pace = Some(begun.elapsed().as_secs_f64() / f64::from((self.since - before).max(1)));
+        Ok(steps)
+    }
+
+    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is external.
+    ///
+    /// # Errors
+    /// If there are too many for the device.
+    pub fn hold(&mut self, grips: &[Grip]) -> Result<(), GpuError> {
+        self.nodes.mark(&self.device, &self.grips.nodes, false);
+        let numbers = self.grips.take(self.model, grips);
+        self.nodes.mark(&self.device, &self.grips.nodes, true);
+        self.instants.hold(&self.device, &numbers)
+    }
+
+    /// What finds points on the device that are combinations of nodes, from their places at rest [m] and the nodes and weights of each.
+    ///
+    /// # Errors
+    /// If there are too many for the device.
+    pub fn map(
+        &self,
+        points: impl Iterator<Item = (Vector<f64>, Vec<(u32, f64)>)>,
+    ) -> Result<DeviceMapping, GpuError> {
+        DeviceMapping::new(&self.device, &self.nodes.displacement, points)
+    }
+
+    /// Brings points to the instant at which the steps taken so far end. Nothing comes back.
+    pub fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
+        mapping.apply(value, self.side);
+    }
+
     /// Brings displacements, increments and what relaxing laws remember back to the state, and enters its energies.
     ///
     /// # Errors
@@ -372,12 +431,14 @@ impl<'m> GpuStepper<'m> {
         Ok(())
     }
 
-    /// Goes whole steps on from an evaluated instant, without looking.
-    fn go(&mut self, state: &mut State<f32>, steps: u64) -> Result<(), GpuError> {
+    /// Goes whole steps on without looking; the last submission, which may not be done yet.
+    fn go(&mut self, state: &mut State<f32>, steps: u64) -> Result<Option<wgpu::SubmissionIndex>, GpuError> {
         let end = state.steps + steps;
-        state.work.advance();
-        (self.evaluated, self.entered) = (false, false);
-        let mut from_look = true;
+        let mut from_look = std::mem::take(&mut self.evaluated);
+        if from_look {
+            state.work.advance();
+        }
+        self.entered = false;
         let mut side = self.side;
         let mut running: Option<(wgpu::SubmissionIndex, usize)> = None;
         let mut begun = Clock::now();
@@ -407,7 +468,8 @@ impl<'m> GpuStepper<'m> {
                 self.wait_for(submitted, &mut begun, count)?;
             }
         }
-        self.device.check()
+        self.device.check()?;
+        Ok(running.map(|(last, _)| last))
     }
 
     /// Waits for a submission of some instants, and notes how long one takes.
@@ -473,10 +535,11 @@ impl<'m> GpuStepper<'m> {
     fn submit_evaluation(&mut self, time: f64, flags: u32, anew: bool) -> Result<Results, GpuError> {
         let instant = Instant::new(self.since, flags, self.lengths);
         self.instants.push(self.model, time, self.lengths.next, instant);
-        let (loads, solids, nodes, side) = (&self.loads, &self.solids, &self.kernels, self.side);
+        let (nodes, side) = (&self.kernels, self.side);
+        let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
         self.instants.submit(&self.device, |pass, bound, _, offset| {
             if anew {
-                force_kernels(loads, solids).for_each(|kernel| kernel.run(pass, bound, offset, side));
+                forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
             }
             nodes.pass.run(pass, bound, offset, side);
         });
@@ -485,14 +548,15 @@ impl<'m> GpuStepper<'m> {
 
     /// Goes on from the instants that are pushed, at first with a side; the first of them may be one that was looked at.
     fn submit_steps(&mut self, from_look: bool, mut side: usize) -> wgpu::SubmissionIndex {
-        let (loads, solids, nodes) = (&self.loads, &self.solids, &self.kernels);
+        let nodes = &self.kernels;
+        let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
         let moves = self.paths.moves;
         self.instants.submit(&self.device, |pass, bound, place, offset| {
             if from_look && place == 0 {
                 nodes.advance.run(pass, bound, offset, side);
                 return;
             }
-            force_kernels(loads, solids).for_each(|kernel| kernel.run(pass, bound, offset, side));
+            forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
             if !moves {
                 nodes.pass.run(pass, bound, offset, side);
             }
@@ -639,8 +703,9 @@ fn owned(model: &Model, owners: &[[u32; 3]], held: &[u32]) -> Vec<Vec<(u32, [boo
 /// What finds the forces at an instant, in order.
 fn force_kernels<'a>(
     loads: &'a Option<DeviceLoads>,
+    grips: &'a DeviceGrips,
     solids: &'a [DeviceSolid],
 ) -> impl Iterator<Item = &'a Kernel> {
     let pressure = loads.iter().filter_map(|loads| loads.pressure.as_ref());
-    pressure.chain(solids.iter().flat_map(DeviceSolid::kernels))
+    pressure.chain(grips.kernel()).chain(solids.iter().flat_map(DeviceSolid::kernels))
 }

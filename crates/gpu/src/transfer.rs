@@ -55,6 +55,7 @@ impl Transfer {
             ends.push(end + bytes);
         }
         device.queue.submit([encoder.finish()]);
+        device.count_read_back();
         staging.map_async(wgpu::MapMode::Read, ..size, |_| {});
         device.wait()?;
         let view = staging.get_mapped_range(..size).map_err(|error| device.fault(&error))?;

@@ -385,6 +385,16 @@ impl Watch {
     }
 }
 
+/// The limit [s] of a cell alone in a deformed state, Δt_e above: no assembly is unstable at the smallest one. Displacements
+/// [m], one per node.
+pub fn cell_limit<R: Real>(model: &Model, solid: usize, cell: usize, displacement: &[Vector<R>]) -> f64 {
+    let solid = &model.solids[solid];
+    let h = displacement_gradient(solid, cell, displacement);
+    let square = gradient_square_of(solid, cell);
+    let mode = stiffness(&solid.material.law, solid.fibres(cell), &h, &square).mode;
+    limit_alone(model, solid, cell, mode.max(hourglass_modulus(solid, cell)))
+}
+
 /// How many of some cells are looked at closely for each order.
 fn picked(count: usize) -> usize {
     (count / SHARE).max(LEAST).min(count)

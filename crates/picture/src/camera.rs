@@ -98,6 +98,13 @@ impl Default for Camera {
 }
 
 impl Camera {
+    /// From a direction, with an axis up.
+    pub fn looking(towards: &Vector3, up: Axis) -> Self {
+        let [front, left, above] = up.frame().map(|axis| axis.dot(towards));
+        let elevation = above.atan2(front.hypot(left)).to_degrees().clamp(-STEEPEST, STEEPEST);
+        Self { azimuth: left.atan2(front).to_degrees(), elevation, up, ..Self::default() }
+    }
+
     /// Unit vectors right, up and towards the camera.
     pub fn axes(&self) -> [Vector3; 3] {
         let [front, left, up] = self.up.frame();
@@ -250,6 +257,15 @@ mod tests {
         (0..8)
             .map(|i| Vector3::new(f64::from(i & 1), f64::from(i >> 1 & 1) * 2.0, f64::from(i >> 2) * 0.3))
             .collect()
+    }
+
+    #[test]
+    fn a_camera_looks_from_where_it_was_told() {
+        for up in ALL {
+            let from = Vector3::new(0.3, -0.8, 0.5);
+            let [_, _, towards] = Camera::looking(&from, up).axes();
+            assert!((towards - from.normalize()).norm() < 1e-12, "{up:?}");
+        }
     }
 
     #[test]

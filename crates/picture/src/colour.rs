@@ -38,11 +38,6 @@ impl ColourMap {
         }
     }
 
-    /// The one of that word.
-    pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|map| map.name() == name)
-    }
-
     /// The colour (sRGB) of a part of the range from 0 to 1.
     pub fn at(self, part: f64) -> [u8; 3] {
         let (gradient, part) = match self {
@@ -136,12 +131,6 @@ mod tests {
         }
         assert_eq!(ColourMap::Viridis.at(0.0), [0x44, 0x01, 0x54]);
         assert!(ColourMap::BlueRed.at(0.0)[2] > 90 && ColourMap::BlueRed.at(1.0)[0] > 90);
-    }
-
-    #[test]
-    fn names_lead_back() {
-        assert!(ColourMap::ALL.into_iter().all(|map| ColourMap::of_name(map.name()) == Some(map)));
-        assert_eq!(ColourMap::of_name("jet"), None);
     }
 
     fn range(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {

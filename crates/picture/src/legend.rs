@@ -20,7 +20,7 @@ pub struct Legend {
 /// Prefixes of units: powers of ten.
 const PREFIXES: [(&str, i32); 7] = [("G", 9), ("M", 6), ("k", 3), ("", 0), ("m", -3), ("µ", -6), ("n", -9)];
 /// Units that take a prefix.
-const SCALED: [&str; 5] = ["Pa", "m", "N", "J", "m/s"];
+const SCALED: [&str; 6] = ["Pa", "m", "N", "J", "m/s", "s"];
 
 /// About as many round values in a range as asked for, and the step between them.
 pub fn ticks([low, high]: [f64; 2], about: usize) -> (Vec<f64>, f64) {

@@ -6,8 +6,9 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use crate::camera::{Camera, Projection};
 use crate::colour::{ColourMap, linear};
-use crate::section::Section;
-use crate::style::{PLAIN, Style};
+use crate::lines::{Line, MOST_EDGES};
+use crate::section::{Corner, Section};
+use crate::style::{PLAIN, Style, Texture};
 use crate::subject::Subject;
 
 /// What is drawn into.
@@ -31,6 +32,9 @@ pub struct Renderer {
     background: wgpu::RenderPipeline,
     opaque: wgpu::RenderPipeline,
     clipped: wgpu::RenderPipeline,
+    wireframe: wgpu::RenderPipeline,
+    fibres: wgpu::RenderPipeline,
+    mark: wgpu::RenderPipeline,
     section: wgpu::RenderPipeline,
     ghost: wgpu::RenderPipeline,
     compute: wgpu::ComputePipeline,
@@ -51,23 +55,30 @@ struct View {
     top: [f32; 4],
     bottom: [f32; 4],
     edge: [f32; 4],
+    line: [f32; 4],
+    skin: [f32; 4],
 }
 
 /// Cover of the edges of cells.
 const EDGES: f32 = 0.55;
 /// Cover of the shape at rest where it turns away.
 const GHOST: f32 = 0.85;
+/// Half the width of a fibre and of an edge of the marked cell, over the height of the picture.
+const WIDTHS: [f32; 2] = [0.0026, 0.0034];
+/// How far lines are lifted towards the eye, over the size of the body.
+const LIFT: f64 = 0.004;
+/// Strength of the texture on tissue and under colours of values.
+const SKIN: [f32; 2] = [1.0, 0.45];
 /// Invocations of a group of the kernel of normals.
 const GROUP: u32 = 256;
 
 fn layout(
     device: &wgpu::Device,
-    stages: wgpu::ShaderStages,
-    bindings: &[wgpu::BufferBindingType],
+    bindings: &[(wgpu::ShaderStages, wgpu::BufferBindingType)],
 ) -> wgpu::BindGroupLayout {
-    let entry = |(binding, &ty): (usize, &wgpu::BufferBindingType)| wgpu::BindGroupLayoutEntry {
+    let entry = |(binding, &(visibility, ty)): (usize, &_)| wgpu::BindGroupLayoutEntry {
         binding: binding as u32,
-        visibility: stages,
+        visibility,
         ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
         count: None,
     };
@@ -81,9 +92,11 @@ impl Renderer {
         use wgpu::{BufferBindingType, ShaderStages};
         let read = BufferBindingType::Storage { read_only: true };
         let write = BufferBindingType::Storage { read_only: false };
-        let view = layout(device, ShaderStages::VERTEX_FRAGMENT, &[BufferBindingType::Uniform, read]);
-        let shape = layout(device, ShaderStages::VERTEX, &[read; 6]);
-        let normals = layout(device, ShaderStages::COMPUTE, &[read, read, read, write, read, read]);
+        let uniform = (ShaderStages::VERTEX_FRAGMENT, BufferBindingType::Uniform);
+        let view = layout(device, &[uniform, (ShaderStages::FRAGMENT, read)]);
+        let shape = layout(device, &[(ShaderStages::VERTEX, read); 7]);
+        let normals =
+            layout(device, &[read, read, read, write, read, read].map(|kind| (ShaderStages::COMPUTE, kind)));
         let module = device.create_shader_module(wgpu::include_wgsl!("shader.wgsl"));
         let pipelines = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("surface"),
@@ -93,21 +106,23 @@ impl Renderer {
         let pipeline = |vertex: &str, fragment: &str, kind: Kind| {
             let (write, compare) = match kind {
                 Kind::Behind => (false, wgpu::CompareFunction::Always),
-                Kind::Solid => (true, wgpu::CompareFunction::Less),
-                Kind::Veil => (false, wgpu::CompareFunction::Less),
+                Kind::Solid | Kind::Wire => (true, wgpu::CompareFunction::Less),
+                Kind::Veil | Kind::Line => (false, wgpu::CompareFunction::Less),
+                Kind::Mark => (false, wgpu::CompareFunction::Always),
             };
             let over = wgpu::BlendComponent {
                 src_factor: wgpu::BlendFactor::SrcAlpha,
                 dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
                 operation: wgpu::BlendOperation::Add,
             };
-            // A veil does not count as covered.
-            let keep = wgpu::BlendComponent {
-                src_factor: wgpu::BlendFactor::Zero,
-                dst_factor: wgpu::BlendFactor::One,
+            // What covers in part counts so, but for a veil.
+            let veil = matches!(kind, Kind::Veil);
+            let cover = wgpu::BlendComponent {
+                src_factor: if veil { wgpu::BlendFactor::Zero } else { wgpu::BlendFactor::One },
+                dst_factor: if veil { wgpu::BlendFactor::One } else { wgpu::BlendFactor::OneMinusSrcAlpha },
                 operation: wgpu::BlendOperation::Add,
             };
-            let veil = matches!(kind, Kind::Veil);
+            let mixed = !matches!(kind, Kind::Behind | Kind::Solid);
             // Where the shape at rest lies on the deformed one, it stays behind.
             let bias = if veil {
                 wgpu::DepthBiasState { constant: 64, slope_scale: 4.0, clamp: 0.0 }
@@ -141,7 +156,7 @@ impl Renderer {
                     compilation_options: Default::default(),
                     targets: &[Some(wgpu::ColorTargetState {
                         format: target.format,
-                        blend: veil.then_some(wgpu::BlendState { color: over, alpha: keep }),
+                        blend: mixed.then_some(wgpu::BlendState { color: over, alpha: cover }),
                         write_mask: wgpu::ColorWrites::ALL,
                     })],
                 }),
@@ -167,6 +182,9 @@ impl Renderer {
             background: pipeline("background", "sky", Kind::Behind),
             opaque: pipeline("surface", "opaque", Kind::Solid),
             clipped: pipeline("surface", "clipped", Kind::Solid),
+            wireframe: pipeline("surface", "wireframe", Kind::Wire),
+            fibres: pipeline("line", "stroke", Kind::Line),
+            mark: pipeline("line", "stroke", Kind::Mark),
             section: pipeline("section", "opaque", Kind::Solid),
             ghost: pipeline("surface", "ghost", Kind::Veil),
             compute,
@@ -181,7 +199,11 @@ impl Renderer {
 enum Kind {
     Behind,
     Solid,
+    Wire,
     Veil,
+    Line,
+    /// Seen through everything.
+    Mark,
 }
 
 /// A subject on the device.
@@ -197,12 +219,21 @@ pub struct Drawn {
     colours: wgpu::Buffer,
     view_group: wgpu::BindGroup,
     map: ColourMap,
-    section: [wgpu::Buffer; 2],
-    section_triangles: u32,
+    section: wgpu::Buffer,
+    section_corners: u32,
+    /// Edges of the marked cell, fibres on the surface, fibres in the section.
+    lines: wgpu::Buffer,
+    first: [Line; MOST_EDGES],
+    marked: Option<u32>,
+    mark_lines: u32,
+    surface_fibres: Vec<Line>,
+    section_fibres: u32,
     corners: u32,
     vertex_count: u32,
-    /// From the middle of the body to its farthest point [m], at rest.
+    /// From the middle of the body at rest to its farthest point so far [m].
     size: f64,
+    /// The same, at rest.
+    rest_size: f64,
     middle: Vector3,
     /// Position and value of each point, as last written.
     staged: Vec<[f32; 4]>,
@@ -243,14 +274,21 @@ impl Drawn {
         let vertices = storage(device, &subject.vertices);
         let offsets = storage(device, &subject.offsets);
         let around = storage(device, &subject.around);
-        let rest: Vec<[f32; 4]> = subject.points.iter().map(|point| staged(point, f64::NAN)).collect();
-        let section = [storage::<[f32; 4]>(device, &[]), storage::<u32>(device, &[])];
+        let rest_points: Vec<[f32; 4]> = subject.points.iter().map(|point| staged(point, f64::NAN)).collect();
+        let section = storage::<Corner>(device, &[]);
+        let surface_fibres = subject.fibres.surface.clone();
+        let marked = subject.critical.map(|cell| subject.outline(cell)).unwrap_or_default();
+        let mark_lines = marked.len() as u32;
+        let mut first = [Line::default(); MOST_EDGES];
+        first[..marked.len()].copy_from_slice(&marked);
+        let lines = storage(device, &[&first[..], &surface_fibres].concat());
+        let rest = storage(device, &rest_points);
         let pose = |points: wgpu::Buffer| {
             let normals = storage(device, &vec![[0.0_f32; 4]; subject.vertices.len()]);
             let draw = group(
                 device,
                 &renderer.shape,
-                &[&points, &triangles, &vertices, &normals, &section[0], &section[1]],
+                &[&points, &triangles, &vertices, &normals, &section, &lines, &rest],
             );
             let compute = group(
                 device,
@@ -259,7 +297,7 @@ impl Drawn {
             );
             Pose { points, normals, draw, compute }
         };
-        let poses = [pose(storage(device, &rest)), pose(storage(device, &rest))];
+        let poses = [pose(storage(device, &rest_points)), pose(rest.clone())];
         let view = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("view"),
             size: size_of::<View>() as u64,
@@ -291,12 +329,19 @@ impl Drawn {
             view_group,
             map,
             section,
-            section_triangles: 0,
+            section_corners: 0,
+            lines,
+            first,
+            marked: subject.critical,
+            mark_lines,
+            surface_fibres,
+            section_fibres: 0,
             corners: 3 * subject.triangles.len() as u32,
             vertex_count: subject.vertices.len() as u32,
             size,
+            rest_size: size,
             middle,
-            staged: rest,
+            staged: rest_points,
         }
     }
 
@@ -311,20 +356,48 @@ impl Drawn {
         queue.write_buffer(&self.poses[0].points, 0, bytemuck::cast_slice(&self.staged));
     }
 
-    /// Draws from a buffer of someone else's, four numbers a point (position [m], value), such as a solver's on the same device.
-    pub fn bind_positions(&mut self, device: &wgpu::Device, renderer: &Renderer, points: &wgpu::Buffer) {
-        let Self { triangles, vertices, offsets, around, section, .. } = self;
-        let pose = &mut self.poses[0];
-        pose.draw = group(
-            device,
-            &renderer.shape,
-            &[points, triangles, vertices, &pose.normals, &section[0], &section[1]],
-        );
-        pose.compute =
-            group(device, &renderer.normals, &[points, triangles, vertices, &pose.normals, offsets, around]);
+    /// Takes note of how far points [m] reach that are drawn from a buffer of someone else's.
+    pub fn reach(&mut self, points: &[Vector3]) {
+        let reach = points.iter().map(|point| (point - self.middle).norm_squared()).fold(0.0, f64::max);
+        self.size = self.size.max(reach.sqrt());
     }
 
-    /// Takes the triangles of a section; none for no section.
+    /// Draws from a buffer of someone else's, four numbers a point (position [m], value), such as a solver's on the same device.
+    pub fn bind_positions(&mut self, device: &wgpu::Device, renderer: &Renderer, points: &wgpu::Buffer) {
+        let Self { triangles, vertices, offsets, around, .. } = &*self;
+        let normals = &self.poses[0].normals;
+        let compute =
+            group(device, &renderer.normals, &[points, triangles, vertices, normals, offsets, around]);
+        self.poses[0].points = points.clone();
+        self.poses[0].compute = compute;
+        self.bind_shape(device, renderer);
+    }
+
+    /// Binds what is drawn anew, after one of its buffers is another.
+    fn bind_shape(&mut self, device: &wgpu::Device, renderer: &Renderer) {
+        let rest = self.poses[1].points.clone();
+        let Self { triangles, vertices, section, lines, .. } = &*self;
+        let bound = [&self.poses[0], &self.poses[1]].map(|pose| {
+            let buffers = [&pose.points, triangles, vertices, &pose.normals, section, lines, &rest];
+            group(device, &renderer.shape, &buffers)
+        });
+        for (pose, draw) in self.poses.iter_mut().zip(bound) {
+            pose.draw = draw;
+        }
+    }
+
+    /// Marks a cell instead of the one that was critical in the mesh of the subject (see [`critical_cell`](crate::critical_cell)), or none.
+    pub fn mark(&mut self, queue: &wgpu::Queue, subject: &Subject, cell: Option<u32>) {
+        if cell == self.marked {
+            return;
+        }
+        let edges = cell.map(|cell| subject.outline(cell)).unwrap_or_default();
+        self.first[..edges.len()].copy_from_slice(&edges);
+        queue.write_buffer(&self.lines, 0, bytemuck::cast_slice(&self.first));
+        (self.marked, self.mark_lines) = (cell, edges.len() as u32);
+    }
+
+    /// Takes the triangles and fibres of a section; none for no section.
     pub fn set_section(
         &mut self,
         device: &wgpu::Device,
@@ -332,28 +405,20 @@ impl Drawn {
         renderer: &Renderer,
         section: &Section,
     ) {
-        self.section_triangles = section.edges.len() as u32;
+        self.section_corners = section.corners.len() as u32;
+        self.section_fibres = section.fibres.len() as u32;
+        let fits = |buffer: &wgpu::Buffer, bytes: usize| buffer.size() >= bytes as u64;
+        let before = (MOST_EDGES + self.surface_fibres.len()) * size_of::<Line>();
+        let fibres: &[u8] = bytemuck::cast_slice(&section.fibres);
         let corners: &[u8] = bytemuck::cast_slice(&section.corners);
-        if self.section[0].size() < corners.len() as u64 {
-            self.section = [storage(device, &section.corners), storage(device, &section.edges)];
-            for pose in &mut self.poses {
-                pose.draw = group(
-                    device,
-                    &renderer.shape,
-                    &[
-                        &pose.points,
-                        &self.triangles,
-                        &self.vertices,
-                        &pose.normals,
-                        &self.section[0],
-                        &self.section[1],
-                    ],
-                );
-            }
-        } else {
-            queue.write_buffer(&self.section[0], 0, corners);
-            queue.write_buffer(&self.section[1], 0, bytemuck::cast_slice(&section.edges));
+        if fits(&self.section, corners.len()) && fits(&self.lines, before + fibres.len()) {
+            queue.write_buffer(&self.section, 0, corners);
+            queue.write_buffer(&self.lines, before as u64, fibres);
+            return;
         }
+        self.section = storage(device, &section.corners);
+        self.lines = storage(device, &[&self.first[..], &self.surface_fibres, &section.fibres].concat());
+        self.bind_shape(device, renderer);
     }
 
     /// Finds normals and writes how the subject is looked at, in a picture of so many widths a height.
@@ -371,7 +436,9 @@ impl Drawn {
             queue.write_buffer(&self.colours, 0, bytemuck::cast_slice(&self.map.table()));
         }
         let reach = (camera.target - self.middle).norm() + 1.5 * self.size.max(1e-12);
-        let view = view(camera, style, aspect, reach, !renderer.target.format.is_srgb());
+        let mut view = view(camera, style, aspect, reach, !renderer.target.format.is_srgb());
+        view.line[3] = (LIFT * self.rest_size) as f32;
+        view.skin[0] = (1.0 / self.rest_size.max(1e-12)) as f32;
         queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(&renderer.compute);
@@ -388,19 +455,34 @@ impl Drawn {
         pass.set_bind_group(1, &self.poses[0].draw, &[]);
         pass.set_pipeline(&renderer.background);
         pass.draw(0..3, 0..1);
-        if style.clip.is_some() {
+        if style.wireframe {
+            pass.set_pipeline(&renderer.wireframe);
+            pass.draw(0..self.corners, 0..1);
+        } else if style.clip.is_some() {
             pass.set_pipeline(&renderer.clipped);
             pass.draw(0..self.corners, 0..1);
             pass.set_pipeline(&renderer.section);
-            pass.draw(0..3 * self.section_triangles, 0..1);
+            pass.draw(0..self.section_corners, 0..1);
         } else {
             pass.set_pipeline(&renderer.opaque);
             pass.draw(0..self.corners, 0..1);
+        }
+        if style.fibres {
+            let first = MOST_EDGES as u32;
+            let surface = first + self.surface_fibres.len() as u32;
+            let last = surface + if style.clip.is_some() { self.section_fibres } else { 0 };
+            pass.set_pipeline(&renderer.fibres);
+            pass.draw(6 * first..6 * last, 0..1);
         }
         if style.ghost {
             pass.set_bind_group(1, &self.poses[1].draw, &[]);
             pass.set_pipeline(&renderer.ghost);
             pass.draw(0..self.corners, 0..1);
+            pass.set_bind_group(1, &self.poses[0].draw, &[]);
+        }
+        if style.critical {
+            pass.set_pipeline(&renderer.mark);
+            pass.draw(0..6 * self.mark_lines, 1..2);
         }
     }
 }
@@ -409,10 +491,14 @@ impl Drawn {
 /// any number.
 const NO_VALUE: f32 = 1e38;
 
+/// A value as the shader takes it; where it is not finite, the colour is that of tissue.
+pub fn drawn_value(value: f64) -> f32 {
+    if value.is_finite() { value.clamp(-1e29, 1e29) as f32 } else { NO_VALUE }
+}
+
 /// A position and a value as the shader takes them.
 pub(crate) fn staged(point: &Vector3, value: f64) -> [f32; 4] {
-    let value = if value.is_finite() { value.clamp(-1e29, 1e29) as f32 } else { NO_VALUE };
-    [point.x as f32, point.y as f32, point.z as f32, value]
+    [point.x as f32, point.y as f32, point.z as f32, drawn_value(value)]
 }
 
 fn four(v: &Vector3, w: f64) -> [f32; 4] {
@@ -448,5 +534,10 @@ fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> 
         top: colour(top, 1.0),
         bottom: colour(bottom, 1.0),
         edge: colour([18, 20, 26], if style.edges { EDGES } else { 0.0 }),
+        line: [aspect as f32, WIDTHS[0], WIDTHS[1], 0.0],
+        skin: match style.texture {
+            Texture::None => [0.0; 4],
+            Texture::Skin => [0.0, SKIN[usize::from(style.range.is_some())], 0.0, 0.0],
+        },
     }
 }

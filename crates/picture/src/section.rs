@@ -1,8 +1,12 @@
 //! Sections: what a plane cuts of volume cells. A cell's edges are cut where linear interpolation meets the plane; the
 //! points, turned around their middle, make a convex polygon. Leaves out: cells that are so bent that their section is not convex.
 
-use pliant_geometry::{CellKind, Vector3};
+use std::collections::BTreeSet;
 
+use bytemuck::{Pod, Zeroable};
+use pliant_geometry::Vector3;
+
+use crate::lines::{Line, edges};
 use crate::renderer::staged;
 use crate::subject::Subject;
 
@@ -28,71 +32,100 @@ impl Plane {
     }
 }
 
-/// The triangles of a section.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Section {
-    /// Three corners a triangle: position [m] and value.
-    pub corners: Vec<[f32; 4]>,
-    /// For each triangle a bit for each edge, that opposite to the corner, which is one of the polygon.
-    pub edges: Vec<u32>,
+/// A corner of a triangle of a section.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(crate) struct Corner {
+    /// Position [m] and value.
+    pub point: [f32; 4],
+    /// Position at rest [m].
+    pub rest: [f32; 3],
+    /// A bit for each edge of its triangle, that opposite to the corner, which is one of the polygon.
+    pub edges: u32,
 }
 
-/// Local nodes of the edges of a cell.
-const fn edges(kind: CellKind) -> &'static [[usize; 2]] {
-    match kind {
-        CellKind::Tet => &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]],
-        CellKind::Hex => {
-            &[[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
-        }
-        _ => &[],
-    }
+/// The triangles of a section, and the fibres in it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Section {
+    /// Three a triangle.
+    pub(crate) corners: Vec<Corner>,
+    pub(crate) fibres: Vec<Line>,
+}
+
+/// Where a plane cuts an edge of a cell.
+struct Cut {
+    angle: f64,
+    point: Vector3,
+    rest: Vector3,
+    value: f64,
 }
 
 impl Section {
     /// Cuts the cells of a subject, with its points now [m] and a value at each.
     pub fn cut(&mut self, subject: &Subject, points: &[Vector3], values: &[f64], plane: &Plane) {
         self.corners.clear();
-        self.edges.clear();
+        self.fibres.clear();
         let distances: Vec<f64> = points.iter().map(|point| plane.distance(point)).collect();
         let across = plane.normal.cross(&any_other(&plane.normal)).normalize();
         let axes = [across, plane.normal.cross(&across)];
-        let mut polygon: Vec<(f64, Vector3, f64)> = Vec::with_capacity(12);
-        for (kind, nodes) in subject.volume_cells() {
+        let rest = &subject.points;
+        let mut polygon: Vec<Cut> = Vec::with_capacity(12);
+        let mut taken = BTreeSet::new();
+        for (number, (kind, nodes)) in subject.volume_cells().enumerate() {
             let beyond = nodes.iter().filter(|&&node| distances[node as usize] > 0.0).count();
             if beyond == 0 || beyond == nodes.len() {
                 continue;
             }
             polygon.clear();
-            for &[a, b] in edges(kind) {
-                let (a, b) = (nodes[a] as usize, nodes[b] as usize);
+            let mut parts = [0.0; 8];
+            for &[local_a, local_b] in edges(kind) {
+                let (a, b) = (nodes[local_a] as usize, nodes[local_b] as usize);
                 let (da, db) = (distances[a], distances[b]);
                 if (da > 0.0) != (db > 0.0) {
                     let part = da / (da - db);
+                    parts[local_a] += 1.0 - part;
+                    parts[local_b] += part;
                     let value = |node: usize| values.get(node).copied().unwrap_or(f64::NAN);
-                    let mixed = value(a) + (value(b) - value(a)) * part;
-                    polygon.push((0.0, points[a] + (points[b] - points[a]) * part, mixed));
+                    polygon.push(Cut {
+                        angle: 0.0,
+                        point: points[a] + (points[b] - points[a]) * part,
+                        rest: rest[a] + (rest[b] - rest[a]) * part,
+                        value: value(a) + (value(b) - value(a)) * part,
+                    });
                 }
             }
             self.add(&mut polygon, &axes);
+            if subject.has_fibres() {
+                parts.iter_mut().for_each(|part| *part /= polygon.len() as f64);
+                let middle: Vector3 =
+                    nodes.iter().zip(parts).map(|(&node, part)| rest[node as usize] * part).sum();
+                if taken.insert(subject.fibres.cube_of(&middle)) {
+                    self.fibres.extend(subject.fibres.line(number, kind, nodes, rest, &parts));
+                }
+            }
         }
     }
 
-    fn add(&mut self, polygon: &mut [(f64, Vector3, f64)], axes: &[Vector3; 2]) {
-        let middle = polygon.iter().map(|(_, point, _)| point).sum::<Vector3>() / polygon.len() as f64;
-        for (angle, point, _) in polygon.iter_mut() {
-            let from = *point - middle;
-            *angle = axes[1].dot(&from).atan2(axes[0].dot(&from));
+    fn add(&mut self, polygon: &mut [Cut], axes: &[Vector3; 2]) {
+        let middle = polygon.iter().map(|cut| cut.point).sum::<Vector3>() / polygon.len() as f64;
+        for cut in polygon.iter_mut() {
+            let from = cut.point - middle;
+            cut.angle = axes[1].dot(&from).atan2(axes[0].dot(&from));
         }
-        polygon.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let corner = |at: usize| {
-            let (_, point, value) = &polygon[at];
-            staged(point, *value)
-        };
+        polygon.sort_by(|a, b| a.angle.total_cmp(&b.angle));
         let last = polygon.len().saturating_sub(1);
         for at in 1..last {
-            self.corners.extend([corner(0), corner(at), corner(at + 1)]);
             // Bit 0: from the second to the third corner, an edge always; the others are ends of the fan.
-            self.edges.push(1 | (u32::from(at + 1 == last) << 1) | (u32::from(at == 1) << 2));
+            let edges = 1 | (u32::from(at + 1 == last) << 1) | (u32::from(at == 1) << 2);
+            let corner = |at: usize| {
+                let Cut { point, rest, value, .. } = &polygon[at];
+                Corner {
+                    point: staged(point, *value),
+                    rest: [rest.x, rest.y, rest.z].map(|x| x as f32),
+                    edges,
+                }
+            };
+            self.corners.extend([corner(0), corner(at), corner(at + 1)]);
         }
     }
 }
@@ -108,8 +141,8 @@ mod tests {
     use crate::subject::tests::{block, tets};
 
     fn area(section: &Section) -> f64 {
-        let at = |&[x, y, z, _]: &[f32; 4]| Vector3::new(x.into(), y.into(), z.into());
-        let triangle = |c: &[[f32; 4]]| (at(&c[1]) - at(&c[0])).cross(&(at(&c[2]) - at(&c[0]))).norm() / 2.0;
+        let at = |c: &Corner| Vector3::from([0, 1, 2].map(|axis| f64::from(c.point[axis])));
+        let triangle = |c: &[Corner]| (at(&c[1]) - at(&c[0])).cross(&(at(&c[2]) - at(&c[0]))).norm() / 2.0;
         section.corners.chunks(3).map(triangle).sum()
     }
 
@@ -124,10 +157,10 @@ mod tests {
             section.cut(&subject, &mesh.points, &values, &plane);
             // Of the unit cube, a plane that meets only the four edges along x: 1 / n_x.
             assert!((area(&section) - 1.0 / plane.normal.x).abs() < 1e-6, "{}", area(&section));
-            for [x, y, _, value] in &section.corners {
+            for Corner { point: [x, y, _, value], rest, .. } in &section.corners {
+                assert_eq!([*x, *y], rest[..2], "at rest");
                 assert!((x + 2.0 * y - value).abs() < 1e-5);
             }
-            assert_eq!(section.edges.len() * 3, section.corners.len());
         }
     }
 

@@ -10,11 +10,11 @@ use crate::camera::Camera;
 use crate::colour::Extremes;
 use crate::error::PictureError;
 use crate::graphics::Graphics;
-use crate::legend::Legend;
+use crate::legend::{Legend, readable};
 use crate::picture::Picture;
 use crate::studio::{Frame, Studio};
 use crate::style::Style;
-use crate::subject::{Subject, nodal_values};
+use crate::subject::{Subject, critical_cell, nodal_values};
 
 /// A series of frames that can't be shown.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +46,12 @@ pub enum SeriesError {
         /// The fields there are.
         known: String,
     },
+    /// Fibres are to be drawn where there are none.
+    #[error("the cells of the frames have no fibres (the field `fibre`)")]
+    NoFibres,
+    /// The critical cell is to be marked where no steps are known.
+    #[error("the cells of the frames have no stable steps (the field `element-step`)")]
+    NoSteps,
     /// A frame of another mesh than the first.
     #[error("frame {0} has another mesh than the first one")]
     OtherMesh(usize),
@@ -66,6 +72,12 @@ impl SeriesError {
             Self::File(_) => "",
             Self::NoField { .. } => {
                 "take one of these, a component as in `displacement:z` or `cauchy-stress:xx`, or `none`"
+            }
+            Self::NoFibres => {
+                "show a body whose law has fibres; a finished run needs `fibre` in `data` of its output, `at = \"cells\"`"
+            }
+            Self::NoSteps => {
+                "show bodies and no carried surface; a finished run needs `element-step` in `data` of its output, `at = \"cells\"`"
             }
             Self::OtherMesh(_) => "run the scene again into an empty folder",
             Self::Picture(error) => error.remedy(),
@@ -193,19 +205,33 @@ fn spread_directions() -> Vec<Vector3> {
 }
 
 impl Look {
-    fn frame(&self, mesh: &Mesh) -> Result<Frame, SeriesError> {
+    /// An instant, and the smallest stable step of a cell [s] where that cell is to be marked.
+    fn frame(&self, mesh: &Mesh) -> Result<(Frame, Option<f64>), SeriesError> {
+        let missing =
+            |field: &str| SeriesError::NoField { field: field.to_owned(), known: quoted(&fields(mesh)) };
         let values = match &self.field {
             None => Vec::new(),
-            Some(field) => nodal_values(mesh, field)
-                .ok_or_else(|| SeriesError::NoField { field: field.clone(), known: quoted(&fields(mesh)) })?,
+            Some(field) => nodal_values(mesh, field).ok_or_else(|| missing(field))?,
         };
+        let critical =
+            self.style.critical.then(|| critical_cell(mesh).ok_or(SeriesError::NoSteps)).transpose()?;
         let mut points = mesh.points.clone();
         if let Some(moved) = mesh.point_data.get("displacement").filter(|array| array.components == 3) {
             for (point, by) in points.iter_mut().zip(moved.values.chunks_exact(3)) {
                 *point += Vector3::new(by[0], by[1], by[2]);
             }
         }
-        Ok(Frame { points, values })
+        let (critical, step) = critical.unzip();
+        Ok((Frame { points, values, critical }, step))
+    }
+
+    /// What is drawn of a mesh.
+    fn subject(&self, mesh: &Mesh) -> Result<Subject, SeriesError> {
+        let subject = Subject::new(mesh);
+        if self.style.fibres && !subject.has_fibres() {
+            return Err(SeriesError::NoFibres);
+        }
+        Ok(subject)
     }
 
     /// Camera and style for all frames.
@@ -227,9 +253,13 @@ impl Look {
         (camera, style)
     }
 
-    fn finished(&self, mut picture: Picture, style: &Style, time: f64) -> Picture {
-        let note =
+    fn finished(&self, mut picture: Picture, style: &Style, time: f64, step: Option<f64>) -> Picture {
+        let mut note =
             if self.legend.note.is_empty() { format!("t = {time:.3} s") } else { self.legend.note.clone() };
+        if let Some(step) = step {
+            let (unit, factor) = readable("s", step);
+            note.push_str(&format!(", smallest element step {:.3} {unit} (marked)", step * factor));
+        }
         Legend { note, ..self.legend.clone() }.write(&mut picture, style);
         picture
     }
@@ -239,13 +269,13 @@ impl Look {
     /// # Errors
     /// If it has no such field, or can't be drawn.
     pub fn picture(&self, graphics: &Graphics, mesh: &Mesh, time: f64) -> Result<Picture, SeriesError> {
-        let subject = Subject::new(mesh);
-        let frame = self.frame(mesh)?;
+        let subject = self.subject(mesh)?;
+        let (frame, step) = self.frame(mesh)?;
         let mut common = Common::default();
         common.add(&subject, &frame, self.style.ghost);
         let (camera, style) = self.settle(common);
         let picture = Studio::new(graphics, &subject, self.size)?.draw(&frame, &camera, &style)?;
-        Ok(self.finished(picture, &style, time))
+        Ok(self.finished(picture, &style, time, step))
     }
 
     /// Pictures of chosen frames of a series: each goes to `take`, with how many were taken before it.
@@ -261,7 +291,7 @@ impl Look {
     ) -> Result<(), SeriesError> {
         let Some(&first) = frames.first() else { return Ok(()) };
         let mesh = series.mesh(first)?;
-        let subject = Subject::new(&mesh);
+        let subject = self.subject(&mesh)?;
         let blocks =
             |mesh: &Mesh| mesh.blocks.iter().map(|block| (block.kind, block.len())).collect::<Vec<_>>();
         let shape = (mesh.points.len(), blocks(&mesh));
@@ -274,13 +304,14 @@ impl Look {
         };
         let mut common = Common::default();
         for &index in frames {
-            common.add(&subject, &read(index)?, self.style.ghost);
+            common.add(&subject, &read(index)?.0, self.style.ghost);
         }
         let (camera, style) = self.settle(common);
         let mut studio = Studio::new(graphics, &subject, self.size)?;
         for (count, &index) in frames.iter().enumerate() {
-            let picture = studio.draw(&read(index)?, &camera, &style)?;
-            take(count, self.finished(picture, &style, series.frames[index].0))?;
+            let (frame, step) = read(index)?;
+            let picture = studio.draw(&frame, &camera, &style)?;
+            take(count, self.finished(picture, &style, series.frames[index].0, step))?;
         }
         Ok(())
     }

@@ -17,6 +17,10 @@ struct View {
     bottom: vec4<f32>,
     // Strength of the edges.
     edge: vec4<f32>,
+    // Widths of the picture a height; half the width of fibres and of marks over the height; how far lines are lifted [m].
+    line: vec4<f32>,
+    // Of the texture: 1 / size of the body [1/m], strength.
+    skin: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -31,6 +35,9 @@ struct View {
 // Normal of each vertex.
 @group(1) @binding(3) var<storage, read> normals: array<vec4<f32>>;
 
+// Position at rest [m] of each point.
+@group(1) @binding(6) var<storage, read> rest: array<vec4<f32>>;
+
 struct Corner {
     @builtin(position) clip: vec4<f32>,
     @location(0) position: vec3<f32>,
@@ -38,26 +45,34 @@ struct Corner {
     @location(2) value: f32,
     @location(3) corner: vec3<f32>,
     @location(4) @interpolate(flat) edges: u32,
+    // At rest, over the size of the body.
+    @location(5) rest: vec3<f32>,
 }
 
 @vertex
 fn surface(@builtin(vertex_index) index: u32) -> Corner {
     let triangle = triangles[index / 3u];
     let vertex = triangle[index % 3u];
-    let point = points[vertices[vertex]];
-    return corner_at(point, normals[vertex].xyz, index, triangle.w);
+    let node = vertices[vertex];
+    return corner_at(points[node], normals[vertex].xyz, index, triangle.w, rest[node].xyz);
+}
+
+struct Cut {
+    point: vec4<f32>,
+    rest: vec3<f32>,
+    edges: u32,
 }
 
 // Corners of a section, one after the other.
-@group(1) @binding(4) var<storage, read> corners: array<vec4<f32>>;
-@group(1) @binding(5) var<storage, read> corner_edges: array<u32>;
+@group(1) @binding(4) var<storage, read> corners: array<Cut>;
 
 @vertex
 fn section(@builtin(vertex_index) index: u32) -> Corner {
-    return corner_at(corners[index], view.plane.xyz, index, corner_edges[index / 3u]);
+    let cut = corners[index];
+    return corner_at(cut.point, view.plane.xyz, index, cut.edges, cut.rest);
 }
 
-fn corner_at(point: vec4<f32>, normal: vec3<f32>, index: u32, edges: u32) -> Corner {
+fn corner_at(point: vec4<f32>, normal: vec3<f32>, index: u32, edges: u32, rest: vec3<f32>) -> Corner {
     var result: Corner;
     result.clip = view.projection_view * vec4(point.xyz, 1.0);
     result.position = point.xyz;
@@ -66,6 +81,7 @@ fn corner_at(point: vec4<f32>, normal: vec3<f32>, index: u32, edges: u32) -> Cor
     let own = index % 3u;
     result.corner = vec3(select(0.0, 1.0, own == 0u), select(0.0, 1.0, own == 1u), select(0.0, 1.0, own == 2u));
     result.edges = edges;
+    result.rest = rest * view.skin.x;
     return result;
 }
 
@@ -98,7 +114,8 @@ fn lit(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>) -> vec3<f32> {
     return (albedo * (ambient + direct) + vec3(shine)) * outline;
 }
 
-fn with_edges(colour: vec3<f32>, corner: vec3<f32>, edges: u32) -> vec3<f32> {
+// Cover of the edges of cells.
+fn edge_cover(corner: vec3<f32>, edges: u32) -> f32 {
     // Distance to each edge in pixels; edges that are not drawn are far away.
     let width = fwidth(corner);
     var distance = corner / max(width, vec3(1.0e-6));
@@ -110,8 +127,7 @@ fn with_edges(colour: vec3<f32>, corner: vec3<f32>, edges: u32) -> vec3<f32> {
     let nearest = min(distance.x, min(distance.y, distance.z));
     // Where edges are closer than pixels they would cover everything.
     let dense = clamp(1.6 - 2.0 * max(width.x, max(width.y, width.z)), 0.0, 1.0);
-    let cover = (1.0 - smoothstep(0.35, 1.15, nearest)) * view.edge.a * dense;
-    return mix(colour, view.edge.rgb, cover);
+    return (1.0 - smoothstep(0.35, 1.15, nearest)) * dense;
 }
 
 fn coded(colour: vec3<f32>) -> vec3<f32> {
@@ -126,9 +142,101 @@ fn shade(at: Corner) -> vec4<f32> {
     let eye = towards_eye(at.position);
     var normal = normalize(at.normal);
     normal = select(-normal, normal, dot(normal, eye) >= 0.0);
-    let colour = lit(colour_of(at.value), normal, eye);
-    return vec4(coded(with_edges(colour, at.corner, at.edges)), 1.0);
+    let albedo = colour_of(at.value);
+    var colour = lit(albedo, normal, eye);
+    // Derivatives over pixels are taken where all pixels pass.
+    let bumpy = uneven(at, normal);
+    if view.skin.y > 0.0 {
+        colour = moist(albedo * mottled(at.rest), bumpy, eye);
+    }
+    let edges = edge_cover(at.corner, at.edges) * view.edge.a;
+    return vec4(coded(mix(colour, view.edge.rgb, edges)), 1.0);
 }
+
+// Random unit-ish vector of a lattice point (PCG hash: Jarzynski and Olano 2020).
+fn random(cell: vec3<i32>) -> vec3<f32> {
+    var v = bitcast<vec3<u32>>(cell) * 1664525u + 1013904223u;
+    v.x += v.y * v.z;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v ^= v >> vec3(16u);
+    v.x += v.y * v.z;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    return vec3<f32>(v >> vec3(8u)) * (2.0 / 16777215.0) - 1.0;
+}
+
+// Gradient noise of about −1 to 1 (Perlin 2002): its gradient and its value.
+fn noise(place: vec3<f32>) -> vec4<f32> {
+    let cell = floor(place);
+    let w = place - cell;
+    let u = w * w * w * (w * (w * 6.0 - 15.0) + 10.0);
+    let du = 30.0 * w * w * (w * (w - 2.0) + 1.0);
+    let i = vec3<i32>(cell);
+    let ga = random(i);
+    let gb = random(i + vec3(1, 0, 0));
+    let gc = random(i + vec3(0, 1, 0));
+    let gd = random(i + vec3(1, 1, 0));
+    let ge = random(i + vec3(0, 0, 1));
+    let gf = random(i + vec3(1, 0, 1));
+    let gg = random(i + vec3(0, 1, 1));
+    let gh = random(i + vec3(1, 1, 1));
+    let va = dot(ga, w);
+    let vb = dot(gb, w - vec3(1.0, 0.0, 0.0));
+    let vc = dot(gc, w - vec3(0.0, 1.0, 0.0));
+    let vd = dot(gd, w - vec3(1.0, 1.0, 0.0));
+    let ve = dot(ge, w - vec3(0.0, 0.0, 1.0));
+    let vf = dot(gf, w - vec3(1.0, 0.0, 1.0));
+    let vg = dot(gg, w - vec3(0.0, 1.0, 1.0));
+    let vh = dot(gh, w - vec3(1.0, 1.0, 1.0));
+    let k = vec3(vb - va, vc - va, ve - va);
+    let kxy = va - vb - vc + vd;
+    let kyz = va - vc - ve + vg;
+    let kzx = va - vb - ve + vf;
+    let kxyz = -va + vb + vc - vd + ve - vf - vg + vh;
+    let value = va + dot(u, k) + u.x * u.y * kxy + u.y * u.z * kyz + u.z * u.x * kzx + u.x * u.y * u.z * kxyz;
+    let slope = ga + u.x * (gb - ga) + u.y * (gc - ga) + u.z * (ge - ga)
+        + u.x * u.y * (ga - gb - gc + gd) + u.y * u.z * (ga - gc - ge + gg) + u.z * u.x * (ga - gb - ge + gf)
+        + u.x * u.y * u.z * (-ga + gb + gc - gd + ge - gf - gg + gh)
+        + du * (k + u.yzx * vec3(kxy, kyz, kzx) + u.zxy * vec3(kzx, kxy, kyz) + u.yzx * u.zxy * kxyz);
+    return vec4(slope, value);
+}
+
+// Sum of octaves of noise from a frequency on; those finer than pixels are left out.
+fn octaves(place: vec3<f32>, lowest: f32, count: i32, pixel: f32) -> vec4<f32> {
+    var sum = vec4(0.0);
+    var frequency = lowest;
+    var height = 1.0;
+    for (var octave = 0; octave < count; octave++) {
+        let seen = 1.0 - smoothstep(0.25, 0.6, frequency * pixel);
+        let own = noise(place * frequency + f32(octave) * 17.3);
+        sum += height * seen * vec4(own.xyz * frequency, own.w);
+        frequency *= 2.03;
+        height *= 0.5;
+    }
+    return sum;
+}
+
+// The normal of the uneven surface: heights over the body at rest, their slope carried to the deformed surface (Mikkelsen 2010).
+fn uneven(at: Corner, normal: vec3<f32>) -> vec3<f32> {
+    let px = dpdx(at.position);
+    let py = dpdy(at.position);
+    let rx = dpdx(at.rest);
+    let ry = dpdy(at.rest);
+    if view.skin.y == 0.0 {
+        return normal;
+    }
+    let pixel = max(length(rx), length(ry));
+    let swells = octaves(at.rest, 5.0, 2, pixel);
+    let grain = octaves(at.rest, 34.0, 3, pixel);
+    let slope = (swells.xyz * 0.020 + grain.xyz * 0.0035) * view.skin.y / view.skin.x;
+    let r1 = cross(py, normal);
+    let r2 = cross(normal, px);
+    let area = dot(px, r1);
+    let gradient = sign(area) * (dot(slope, rx) * r1 + dot(slope, ry) * r2);
+    return normalize(abs(area) * normal - gradient);
+}
+
 
 @fragment
 fn opaque(at: Corner) -> @location(0) vec4<f32> {
@@ -173,4 +281,104 @@ fn background(@builtin(vertex_index) index: u32) -> Sky {
 fn sky(at: Sky) -> @location(0) vec4<f32> {
     // Alpha tells what is covered by a body.
     return vec4(coded(mix(view.bottom.rgb, view.top.rgb, at.height)), 0.0);
+}
+
+// Lines between combinations of points, turned to the camera.
+struct Line {
+    nodes: array<u32, 8>,
+    middle: array<f32, 8>,
+    reach: array<f32, 8>,
+}
+
+@group(1) @binding(5) var<storage, read> lines: array<Line>;
+
+struct Stroke {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) position: vec3<f32>,
+    // −1 to 1 across.
+    @location(1) across: f32,
+    @location(2) @interpolate(flat) mark: u32,
+}
+
+fn lifted(position: vec3<f32>) -> vec3<f32> {
+    return position + towards_eye(position) * view.line.w;
+}
+
+@vertex
+fn line(@builtin(vertex_index) index: u32, @builtin(instance_index) mark: u32) -> Stroke {
+    var middle = vec3(0.0);
+    var half_line = vec3(0.0);
+    for (var slot = 0u; slot < 8u; slot++) {
+        let point = points[lines[index / 6u].nodes[slot]].xyz;
+        middle += lines[index / 6u].middle[slot] * point;
+        half_line += lines[index / 6u].reach[slot] * point;
+    }
+    // Two triangles: corners 0 1 2, 2 1 3.
+    var order = array(0u, 1u, 2u, 2u, 1u, 3u);
+    let corner = order[index % 6u];
+    let end = select(-1.0, 1.0, (corner & 1u) != 0u);
+    let side = select(-1.0, 1.0, (corner & 2u) != 0u);
+    let position = lifted(middle + end * half_line);
+    let first = view.projection_view * vec4(lifted(middle - half_line), 1.0);
+    let last = view.projection_view * vec4(lifted(middle + half_line), 1.0);
+    let shape = vec2(view.line.x, 1.0);
+    let along = (last.xy / last.w - first.xy / first.w) * shape;
+    let unit = along / max(length(along), 1.0e-9);
+    let width = 2.0 * select(view.line.y, view.line.z, mark != 0u);
+    // Ends reach out a little, so that lines that meet close.
+    let offset = width * (vec2(-unit.y, unit.x) * side + unit * end * 0.5) / shape;
+    var result: Stroke;
+    result.clip = select(first, last, end > 0.0);
+    result.clip = vec4(result.clip.xy + offset * result.clip.w, result.clip.zw);
+    result.position = position;
+    result.across = side;
+    result.mark = mark;
+    return result;
+}
+
+@fragment
+fn stroke(at: Stroke) -> @location(0) vec4<f32> {
+    let marked = at.mark != 0u;
+    if dot(view.plane.xyz, at.position) > view.plane.w + view.line.w * 1.5 && !marked {
+        discard;
+    }
+    // A core with a pale rim is seen on any colour.
+    let core = select(vec3(0.012, 0.014, 0.022), vec3(0.80, 0.0, 0.24), marked);
+    let rim = smoothstep(0.45, 0.75, abs(at.across));
+    return vec4(coded(mix(core, vec3(0.92), rim)), mix(0.95, 0.75, rim));
+}
+
+@fragment
+fn wireframe(at: Corner) -> @location(0) vec4<f32> {
+    let cover = edge_cover(at.corner, at.edges);
+    let plain = view.range.z < 0.5 || at.value > 1.0e30;
+    let colour = select(colour_of(at.value), view.ghost.rgb, plain);
+    if dot(view.plane.xyz, at.position) > view.plane.w || cover < 0.05 {
+        discard;
+    }
+    return vec4(coded(colour), cover);
+}
+
+// Colours of tissue vary: paler and darker patches, and thin vessels below the surface.
+fn mottled(rest: vec3<f32>) -> vec3<f32> {
+    let patches = octaves(rest, 2.3, 3, 0.0).w;
+    let fine = octaves(rest, 19.0, 2, 0.0).w;
+    let warped = rest + 0.07 * vec3(noise(rest * 5.0 + 3.1).w, noise(rest * 5.0 + 11.7).w, noise(rest * 5.0 + 23.9).w);
+    let vessel = smoothstep(0.93, 1.0, 1.0 - abs(octaves(warped, 3.1, 2, 0.0).w)) * smoothstep(-0.2, 0.4, patches);
+    let tone = clamp(0.5 + 0.55 * patches + 0.16 * fine, 0.0, 1.0);
+    let tint = mix(vec3(0.52, 0.27, 0.25), vec3(0.88, 0.60, 0.54), tone);
+    let full = mix(tint, vec3(0.50, 0.12, 0.13), 0.35 * vessel);
+    // Under colours of values only its lightness, so that they can be read.
+    let light = vec3(0.86 + 0.2 * tone);
+    return select(full, light, view.range.z > 0.5);
+}
+
+// Sharp reflections on what is uneven, and a film that shines where it is seen from the side.
+fn moist(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>) -> vec3<f32> {
+    let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
+    let facing = max(dot(normal, normalize(key + eye)), 0.0);
+    let glint = pow(facing, 180.0) * 0.50 + pow(facing, 28.0) * 0.09;
+    let grazing = 1.0 - max(dot(normal, eye), 0.0);
+    let film = 0.16 * grazing * grazing * grazing * grazing;
+    return lit(albedo, normal, eye) + vec3((glint + film) * view.skin.y);
 }

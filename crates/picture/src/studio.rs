@@ -18,6 +18,8 @@ pub struct Frame {
     pub points: Vec<Vector3>,
     /// Value at each point; empty for none.
     pub values: Vec<f64>,
+    /// The cell that is marked, as [`critical_cell`](crate::critical_cell) counts.
+    pub critical: Option<u32>,
 }
 
 /// Off screen, in four samples a pixel.
@@ -112,6 +114,7 @@ impl<'s> Studio<'s> {
             self.section.cut(self.subject, &frame.points, &frame.values, plane);
             self.drawn.set_section(device, queue, &self.renderer, &self.section);
         }
+        self.drawn.mark(queue, self.subject, frame.critical);
         let mut encoder = device.create_command_encoder(&Default::default());
         let aspect = f64::from(width) / f64::from(height);
         self.drawn.prepare(&self.renderer, queue, &mut encoder, camera, style, aspect);

@@ -16,23 +16,6 @@ pub enum Background {
 }
 
 impl Background {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Light, Self::White, Self::Dark];
-
-    /// Its word.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Light => "light",
-            Self::White => "white",
-            Self::Dark => "dark",
-        }
-    }
-
-    /// The one of that word.
-    pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|background| background.name() == name)
-    }
-
     /// Colours (sRGB) at top and bottom.
     pub(crate) const fn colours(self) -> [[u8; 3]; 2] {
         match self {
@@ -59,6 +42,16 @@ impl Background {
     }
 }
 
+/// What a surface is like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Texture {
+    /// Smooth and dull.
+    #[default]
+    None,
+    /// Moist tissue, finely uneven: fixed to the body at rest, at any resolution. Under colours of values it is weaker.
+    Skin,
+}
+
 /// Colour (sRGB) of what has no value: soft tissue.
 pub(crate) const PLAIN: [u8; 3] = [214, 148, 132];
 
@@ -71,8 +64,16 @@ pub struct Style {
     pub range: Option<[f64; 2]>,
     /// Whether the edges of the cells are drawn.
     pub edges: bool,
+    /// Whether nothing of the surface but the edges of its cells is drawn.
+    pub wireframe: bool,
     /// Whether the shape at rest is drawn, as a ghost.
     pub ghost: bool,
+    /// Whether fibres are drawn, on the surface and in a section.
+    pub fibres: bool,
+    /// Whether the cell with the smallest stable step is marked.
+    pub critical: bool,
+    /// What the surface is like.
+    pub texture: Texture,
     /// Shows only what lies behind a plane, and what it cuts.
     pub clip: Option<Plane>,
     /// What stands behind.

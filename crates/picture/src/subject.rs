@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::lines::{Fibres, Line, outline};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, vector_area, volume};
 
 /// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
@@ -21,8 +22,11 @@ pub struct Subject {
     pub(crate) offsets: Vec<u32>,
     /// Triangles around vertices.
     pub(crate) around: Vec<u32>,
-    /// Volume cells: kind and nodes.
+    /// Cells with a face: kind and nodes.
     cells: Vec<(CellKind, Vec<u32>)>,
+    pub(crate) fibres: Fibres,
+    /// The cell with the smallest stable step in the mesh that it was made of.
+    pub(crate) critical: Option<u32>,
 }
 
 impl Subject {
@@ -59,10 +63,24 @@ impl Subject {
                 next[vertex as usize] += 1;
             }
         }
-        let known = |block: &&CellBlock| block.nodes.iter().all(|&node| (node as usize) < mesh.points.len());
-        let cells =
-            mesh.volume_blocks().filter(known).map(|block| (block.kind, block.nodes.clone())).collect();
-        Self { points: mesh.points.clone(), triangles, vertices, offsets, around, cells }
+        let cells: Vec<_> = shown_blocks(mesh).map(|block| (block.kind, block.nodes.clone())).collect();
+        let fibres = Fibres::new(mesh, &cells);
+        let critical = critical_cell(mesh).map(|(cell, _)| cell);
+        Self { points: mesh.points.clone(), triangles, vertices, offsets, around, cells, fibres, critical }
+    }
+
+    /// Whether its cells have fibres (the field `fibre` of its mesh).
+    pub fn has_fibres(&self) -> bool {
+        !self.fibres.is_empty()
+    }
+
+    /// The edges of a cell, in the order of the mesh.
+    pub(crate) fn outline(&self, cell: u32) -> Vec<Line> {
+        let cells = self
+            .cells
+            .iter()
+            .flat_map(|(kind, nodes)| nodes.chunks_exact(kind.node_count()).map(move |nodes| (*kind, nodes)));
+        cells.skip(cell as usize).take(1).flat_map(|(kind, nodes)| outline(kind, nodes)).collect()
     }
 
     /// Triangles drawn.
@@ -85,10 +103,35 @@ impl Subject {
 
     /// Volume cells with their nodes.
     pub(crate) fn volume_cells(&self) -> impl Iterator<Item = (CellKind, &[u32])> {
-        self.cells
-            .iter()
-            .flat_map(|(kind, nodes)| nodes.chunks_exact(kind.node_count()).map(move |n| (*kind, n)))
+        let volumes = self.cells.iter().filter(|(kind, _)| kind.dimension() == 3);
+        volumes.flat_map(|(kind, nodes)| nodes.chunks_exact(kind.node_count()).map(move |n| (*kind, n)))
     }
+}
+
+/// Blocks of cells that have a face, and whose nodes are known.
+fn shown_blocks(mesh: &Mesh) -> impl Iterator<Item = &CellBlock> {
+    let known = |block: &&CellBlock| {
+        block.kind.dimension() >= 2 && block.nodes.iter().all(|&node| (node as usize) < mesh.points.len())
+    };
+    mesh.blocks.iter().filter(known)
+}
+
+/// The cell with the smallest stable step (the field `element-step` of cells), counted over the cells that have a face; and its
+/// step [s]. `None` without such a field.
+pub fn critical_cell(mesh: &Mesh) -> Option<(u32, f64)> {
+    let mut first = 0;
+    let mut least: Option<(u32, f64)> = None;
+    for block in shown_blocks(mesh) {
+        if let Some(steps) = block.data.get("element-step") {
+            for (&step, cell) in steps.values.iter().zip(first..) {
+                if step.is_finite() && least.is_none_or(|(_, smallest)| step < smallest) {
+                    least = Some((cell, step));
+                }
+            }
+        }
+        first += block.len() as u32;
+    }
+    least
 }
 
 /// Nodes of the faces that are drawn, three or four each.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::{CellKind, DataArray, Mesh, Vector3};
 use pliant_picture::{
     Background, Camera, ColourMap, Difference, Graphics, Legend, Look, Picture, Plane, Projection, Style,
+    Texture,
 };
 
 /// Hexes of a grid whose corners from [0, 1]³ are put anywhere.
@@ -88,6 +89,46 @@ fn ghost() -> Look {
     Look { field: None, style, camera, ..look() }
 }
 
+/// The organs with fibres that run around the x axis, and stable steps of their cells: that of one inside is the smallest.
+fn fibrous() -> Mesh {
+    let mut mesh = organs(true);
+    let block = &mut mesh.blocks[0];
+    let (mut fibres, mut steps) = (Vec::new(), Vec::new());
+    for (number, nodes) in block.cells().enumerate() {
+        let middle = nodes.iter().map(|&node| mesh.points[node as usize]).sum::<Vector3>() / 8.0;
+        let around = Vector3::new(0.5, 0.0, 0.0)
+            + Vector3::x().cross(&(middle - Vector3::new(0.0, 0.08, 0.03))) * 30.0;
+        fibres.extend(around.normalize().iter().copied());
+        steps.push(if number == 24 * 6 + 24 * 3 + 6 { 1e-4 } else { 2e-4 });
+    }
+    block.data.insert("fibre".into(), DataArray { components: 3, values: fibres });
+    block.data.insert("element-step".into(), DataArray::scalar(steps));
+    mesh
+}
+
+/// Fibres on the surface and in the section, and the marked cell seen through the body.
+fn fibres() -> Look {
+    let style = Style { fibres: true, critical: true, range: None, edges: false, ..section().style };
+    Look {
+        field: None,
+        style,
+        camera: Camera { azimuth: 70.0, elevation: 30.0, ..Camera::default() },
+        ..look()
+    }
+}
+
+fn skin() -> Look {
+    Look { field: None, style: Style { texture: Texture::Skin, range: None, ..look().style }, ..look() }
+}
+
+fn skin_under_colours() -> Look {
+    Look { style: Style { texture: Texture::Skin, ..look().style }, ..look() }
+}
+
+fn wireframe() -> Look {
+    Look { style: Style { wireframe: true, ..look().style }, ..look() }
+}
+
 /// `None` where nothing draws, which is a failure where the gate asks for it.
 fn graphics() -> Option<Graphics> {
     match Graphics::open() {
@@ -119,8 +160,17 @@ fn difference(graphics: &Graphics, look: &Look, mesh: &Mesh, name: &str) -> Diff
 #[test]
 fn pictures_are_as_stored() {
     let Some(graphics) = graphics() else { return };
-    for (name, look) in [("bodies", look()), ("section", section()), ("ghost", ghost())] {
-        let difference = difference(&graphics, &look, &organs(true), name);
+    let all = [
+        ("bodies", look()),
+        ("section", section()),
+        ("ghost", ghost()),
+        ("fibres", fibres()),
+        ("skin", skin()),
+        ("skin-under-colours", skin_under_colours()),
+        ("wireframe", wireframe()),
+    ];
+    for (name, look) in all {
+        let difference = difference(&graphics, &look, &fibrous(), name);
         assert!(difference.is_same(), "{name}: {difference:?}");
     }
 }
@@ -143,6 +193,50 @@ fn a_missing_organ_and_wrong_colours_are_seen() {
     assert!(seen(&Look { field: None, ..look() }, &organs(true)).on_bodies > 6.0, "no colours");
     let turned = Camera { azimuth: -45.0, ..Camera::default() };
     seen(&Look { camera: turned, ..look() }, &organs(true));
+}
+
+#[test]
+fn what_is_not_drawn_is_seen() {
+    let Some(graphics) = graphics() else { return };
+    for (name, look, without) in [
+        ("fibres", fibres(), Style { fibres: false, ..fibres().style }),
+        ("skin", skin(), Style { texture: Texture::None, ..skin().style }),
+        ("wireframe", wireframe(), Style { wireframe: false, ..wireframe().style }),
+    ] {
+        let drawn = Look { style: without, ..look }.picture(&graphics, &fibrous(), 0.25).unwrap();
+        let difference = drawn.difference(&stored(name)).unwrap();
+        assert!(!difference.is_same(), "{name}: {difference:?}");
+    }
+}
+
+#[test]
+fn the_marked_cell_is_seen_through_the_body_where_it_is_and_nowhere_else() {
+    let Some(graphics) = graphics() else { return };
+    let look =
+        Look { style: Style { critical: true, range: None, ..Style::default() }, field: None, ..look() };
+    let plain = Look { style: Style { critical: false, ..look.style }, ..look.clone() };
+    let [with, without] = [&look, &plain].map(|look| look.picture(&graphics, &fibrous(), 0.25).unwrap());
+    // The note at the bottom tells its step.
+    let above = (4 * with.width * (with.height - 40)) as usize;
+    let changed: Vec<usize> = (0..above / 4)
+        .filter(|&pixel| with.rgba[4 * pixel..][..3] != without.rgba[4 * pixel..][..3])
+        .collect();
+    let marked = changed.iter().filter(|&&p| with.rgba[4 * p] > 180 && with.rgba[4 * p + 1] < 100).count();
+    assert!(marked > 20 && changed.len() < 1000, "{marked} of {}", changed.len());
+    assert!(with.rgba[above..] != without.rgba[above..], "its step is told");
+    let none = look.picture(&graphics, &organs(true), 0.25).unwrap_err().to_string();
+    assert!(none.contains("element-step"), "{none}");
+}
+
+#[test]
+fn texture_stays_on_the_body_when_it_moves() {
+    let Some(graphics) = graphics() else { return };
+    let mut far = fibrous();
+    let away = Vector3::new(0.3, -0.2, 0.1);
+    let moved = far.point_data.get_mut("displacement").unwrap();
+    moved.values.chunks_mut(3).for_each(|u| (0..3).for_each(|c| u[c] += away[c]));
+    let difference = skin().picture(&graphics, &far, 0.25).unwrap().difference(&stored("skin")).unwrap();
+    assert!(difference.is_same(), "{difference:?}");
 }
 
 #[test]

@@ -50,8 +50,8 @@ pub struct Findings {
 /// A plot or a picture.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// An SVG element.
-    pub svg: String,
+    /// An SVG element; `None` for a picture where none is drawn.
+    pub svg: Option<String>,
     /// What one sees.
     pub caption: String,
 }

@@ -1,6 +1,7 @@
 //! The page of a reproduction: one HTML file that needs nothing else.
 
 use crate::case::{Case, Correction, Figure, Findings, Row};
+use crate::picture::NO_PICTURE;
 use crate::report::{Report, commit, reference, tolerance};
 
 const STYLE: &str = include_str!("page.css");
@@ -86,7 +87,10 @@ fn section(case: &Case, findings: &Findings, wall: f64) -> String {
 }
 
 fn figure(figure: &Figure) -> String {
-    let svg = figure.svg.replacen("<svg ", "<svg role=\"img\" ", 1);
+    let Some(svg) = &figure.svg else {
+        return format!("<p class=\"meta\">{}</p>\n", prose(NO_PICTURE));
+    };
+    let svg = svg.replacen("<svg ", "<svg role=\"img\" ", 1);
     format!("<figure>{svg}<figcaption>{}</figcaption></figure>\n", escape(&figure.caption))
 }
 

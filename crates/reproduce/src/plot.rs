@@ -80,7 +80,7 @@ impl Plot<'_> {
                 self.draw(&mut chart, x, low..y.end + margin)
             }
         })?;
-        Ok(Figure { svg, caption: caption.into() })
+        Ok(Figure { svg: Some(svg), caption: caption.into() })
     }
 
     fn draw<X, Y>(
@@ -197,7 +197,7 @@ pub(crate) fn bars(
         )])?;
         Ok(())
     })?;
-    Ok(Figure { svg, caption: caption.into() })
+    Ok(Figure { svg: Some(svg), caption: caption.into() })
 }
 
 /// A number on an axis, without digits that say nothing.

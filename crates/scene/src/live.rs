@@ -1,7 +1,9 @@
 //! A scene that is played: it goes on as long as someone looks, is pulled at, and shows what its `[view]` asks.
 
+use std::time::Duration;
+
 use pliant_geometry::Mesh;
-use pliant_gpu::Wanted;
+use pliant_gpu::{DeviceMapping, DevicePoints, PointValue, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::{Clock, Energies, Real, State};
 
@@ -24,6 +26,18 @@ pub trait Live {
     /// # Errors
     /// If the run can't go on; the state before it can still be looked at.
     fn advance(&mut self, most: u64) -> Result<u64, FailureSummary>;
+
+    /// Goes up to `steps` steps on where the state lies on a graphics processor, as many as take about `within`: nothing comes back to
+    /// ordinary memory, and what breaks is told by [`mesh`](Self::mesh). How many; `None` of a solver whose state lies there.
+    fn coast(&mut self, steps: u64, within: Duration) -> Option<Result<u64, FailureSummary>>;
+
+    /// The points shown at the instant, found on the graphics processor where the state lies, with a value each; `given` takes the
+    /// place of those given before. `None` of a solver whose state lies in ordinary memory.
+    fn place(
+        &mut self,
+        value: PointValue,
+        given: Option<&[f32]>,
+    ) -> Option<Result<DevicePoints, FailureSummary>>;
 
     /// Where it stands, for [`go_on`]. `None` where the instant was looked at, whose forces belong to the step to come; and of a
     /// device that was lost.
@@ -177,6 +191,8 @@ struct Played<'b, R> {
     state: State<R>,
     solver: Box<dyn Solver<R> + 'b>,
     snapshot: Snapshot<R>,
+    /// What finds the points of the snapshot where the state lies on a device.
+    mapping: Option<DeviceMapping>,
     samples: Samples,
     /// Length of a step [s].
     step: f64,
@@ -231,7 +247,7 @@ impl<'b, R: Numeric> Played<'b, R> {
     ) -> Self {
         let snapshot = snapshot(built, &scene.shown(1.0));
         let samples = Samples::new(built, &scene.sampled());
-        Self { built, state, solver, snapshot, samples, step, evaluated: None }
+        Self { built, state, solver, snapshot, mapping: None, samples, step, evaluated: None }
     }
 
     fn evaluate(&mut self, wanted: Wanted) -> Result<(), FailureSummary> {
@@ -258,6 +274,35 @@ impl<R: Numeric> Live for Played<'_, R> {
         self.solver.advance(&mut self.state, steps, &mut |_| {})?;
         self.evaluated = None;
         Ok(steps)
+    }
+
+    fn coast(&mut self, steps: u64, within: Duration) -> Option<Result<u64, FailureSummary>> {
+        let coasted = self.solver.coast(&mut self.state, steps, within)?;
+        self.evaluated = None;
+        Some(coasted)
+    }
+
+    fn place(
+        &mut self,
+        value: PointValue,
+        given: Option<&[f32]>,
+    ) -> Option<Result<DevicePoints, FailureSummary>> {
+        if self.mapping.is_none() {
+            let (built, snapshot) = (self.built, &self.snapshot);
+            let mut points = (0..)
+                .zip(&snapshot.mesh().points)
+                .map(|(point, place)| ([place.x, place.y, place.z], snapshot.nodes_of(built, point)));
+            match self.solver.map(&mut points)? {
+                Ok(mapping) => self.mapping = Some(mapping),
+                Err(failure) => return Some(Err(failure)),
+            }
+        }
+        let mapping = self.mapping.as_ref()?;
+        if let Some(values) = given {
+            mapping.give(values);
+        }
+        self.solver.apply(mapping, value);
+        Some(Ok(mapping.points().clone()))
     }
 
     fn stand(&mut self) -> Option<Standing> {
@@ -287,6 +332,7 @@ impl<R: Numeric> Live for Played<'_, R> {
 
     fn show(&mut self, shown: &VtuTable) {
         self.snapshot = snapshot(self.built, shown);
+        self.mapping = None;
     }
 
     fn mesh(&mut self) -> Result<&Mesh, FailureSummary> {

@@ -1,6 +1,8 @@
 //! The solvers of a scene behind one face, so that one run loop serves them all.
 
-use pliant_gpu::{Device, GpuStepper, Wanted};
+use std::time::Duration;
+
+use pliant_gpu::{Device, DeviceMapping, GpuStepper, PointValue, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::stability::Monitor;
@@ -16,6 +18,9 @@ use crate::corotational::Remembered;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
+
+/// The place of a point at rest [m], and its nodes with their weights.
+pub(crate) type MappedPoint = ([f64; 3], Vec<(u32, f64)>);
 
 /// How far a load step is.
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +101,29 @@ pub(crate) trait Solver<R> {
     fn stride(&self) -> u64 {
         1
     }
+
+    /// Goes up to `steps` steps on without looking, as many as take about `within`: nothing comes back to ordinary memory. How many;
+    /// `None` of a solver whose state lies there.
+    fn coast(
+        &mut self,
+        _state: &mut State<R>,
+        _steps: u64,
+        _within: Duration,
+    ) -> Option<Result<u64, FailureSummary>> {
+        None
+    }
+
+    /// What finds points on the device where the state lies, from their places at rest [m], nodes and weights; `None` of a solver
+    /// whose state lies in ordinary memory.
+    fn map(
+        &self,
+        _points: &mut dyn Iterator<Item = MappedPoint>,
+    ) -> Option<Result<DeviceMapping, FailureSummary>> {
+        None
+    }
+
+    /// Brings points on the device to the state's instant.
+    fn apply(&self, _mapping: &DeviceMapping, _value: PointValue) {}
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a solver that knows none.
     fn hold(&mut self, grips: &[Grip]) -> bool {
@@ -220,6 +248,31 @@ impl Solver<f32> for GpuStepper<'_> {
 
     fn stride(&self) -> u64 {
         STRIDE
+    }
+
+    fn coast(
+        &mut self,
+        state: &mut State<f32>,
+        steps: u64,
+        within: Duration,
+    ) -> Option<Result<u64, FailureSummary>> {
+        let coasted = GpuStepper::coast(self, state, steps, within);
+        Some(coasted.map_err(|failure| FailureSummary::step(&failure, state.time)))
+    }
+
+    fn map(
+        &self,
+        points: &mut dyn Iterator<Item = MappedPoint>,
+    ) -> Option<Result<DeviceMapping, FailureSummary>> {
+        Some(GpuStepper::map(self, points).map_err(|error| FailureSummary::device(&error, None)))
+    }
+
+    fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
+        GpuStepper::apply(self, mapping, value);
+    }
+
+    fn hold(&mut self, grips: &[Grip]) -> bool {
+        GpuStepper::hold(self, grips).is_ok()
     }
 
     fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), FailureSummary> {

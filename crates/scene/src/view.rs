@@ -58,11 +58,19 @@ impl Scene {
     pub fn shown(&self, every: f64) -> VtuTable {
         let mut data = vec![FieldName::Displacement];
         data.extend(self.shown_field().filter(|field| *field != FieldName::Displacement));
+        if self.view.critical && !data.contains(&FieldName::ElementStep) {
+            data.push(FieldName::ElementStep);
+        }
+        if self.view.fibres && !data.contains(&FieldName::Fibre) {
+            data.push(FieldName::Fibre);
+        }
         let on = self.view.on.as_ref();
         let mut models = self.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
         let shells = !self.shows_surface() && models.all(|(_, body)| body.model == BodyModel::Shell);
-        let curved = (shells && self.view.curved > 1).then_some(self.view.curved);
-        let at = if curved.is_some() { At::Cells } else { At::Points };
+        let curved = (shells && self.view.curved > 1 && !self.view.critical).then_some(self.view.curved);
+        // Which cell is critical, and which way its fibres go, only the cells tell.
+        let cells = curved.is_some() || self.view.critical || self.view.fibres;
+        let at = if cells && !self.shows_surface() { At::Cells } else { At::Points };
         VtuTable { on: on.cloned(), every, data, at, curved }
     }
 }
@@ -82,6 +90,11 @@ mod tests {
         assert_eq!(table("[view]\ncolour = 'none'\n").data, [FieldName::Displacement]);
         assert_eq!(table("[view]\ncolour = 'pressure'\non = 'cube'\n").data[1], FieldName::Pressure);
         assert_eq!((table("").curved, table("").at), (None, At::Points), "a solid");
+        let marked = table("[view]\ncritical = true\nfibres = true\n");
+        assert_eq!(
+            (&marked.data[2..], marked.at),
+            (&[FieldName::ElementStep, FieldName::Fibre][..], At::Cells)
+        );
         built(
             "[view]\ncolour = 'displacement'\ncomponent = 'z'\nclip = { point = [0, 0, 0], normal = [1, 0, 0] }\n",
         );

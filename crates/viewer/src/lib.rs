@@ -1,6 +1,7 @@
 //! The window: a scene played in real time on a thread of its own, pulled by hand and pinned, looked at from all sides. All but the
 //! window itself works without one: [`Session`] plays, [`pick`] finds what lies under a pixel, [`replay()`] repeats what a hand did.
 
+mod device;
 mod hand;
 mod parameters;
 mod replay;
@@ -9,6 +10,7 @@ mod session;
 #[cfg(feature = "window")]
 mod window;
 
+pub use device::LOOK;
 pub use hand::{Hand, Hold, Point, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
 pub use replay::{Done, Lags, Move, Recording, Replayed, replay, replay_in_real_time};

@@ -7,12 +7,14 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
+use pliant_gpu::{DevicePoints, PointValue};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
-use pliant_picture::{Subject, nodal_values};
+use pliant_picture::{Subject, drawn_value, nodal_values};
 use pliant_scene::format::{At, FieldName};
 use pliant_scene::{Built, Column, Live, Plan, Scene, Standing, go_on, live};
 
+use crate::device::{Seen, point_value};
 use crate::hand::{Hand, Hold, Point, nodes_of};
 use crate::parameters::Number;
 use crate::replay::{Done, Move, Recording};
@@ -45,6 +47,8 @@ pub enum Order {
     Record,
     /// Shows another field; `None` for the colour of tissue.
     Show(Option<FieldName>, Option<&'static str>),
+    /// Brings every frame to ordinary memory where the state lies on a device, as a section needs it; or only some.
+    Memory(bool),
     /// Ends.
     Quit,
 }
@@ -60,6 +64,13 @@ pub struct Frame {
     pub steps: u64,
     /// Whether it goes on.
     pub playing: bool,
+    /// Points on the device where the state lies, at this instant, to be drawn from there; `None` of a state in ordinary memory.
+    pub on_device: Option<DevicePoints>,
+    /// How many looks there were. Points, values, energies, what is held and the sample are of the last one: of this instant unless
+    /// the state lies on a device, where looks are rare ([`LOOK`](crate::LOOK)).
+    pub looks: u64,
+    /// What was read back from the device so far.
+    pub read_backs: u64,
     /// Positions [m].
     pub points: Vec<Vector3>,
     /// Values of the field that is shown; empty for none.
@@ -233,8 +244,9 @@ struct Course {
     numbers: Vec<Number>,
     followed: Vec<Followed>,
     columns: Arc<[Column]>,
-    /// Points and values of the last instant that could be shown.
-    good: (Vec<Vector3>, Vec<f64>),
+    seen: Seen,
+    /// Whether every frame comes to ordinary memory.
+    in_memory: bool,
 }
 
 /// A point that a user follows.
@@ -259,6 +271,8 @@ struct Player<'s> {
     stage: &'s Stage,
     subject: Subject,
     live: Box<dyn Live + 's>,
+    /// Whether the state lies on a device.
+    on_device: bool,
     course: Course,
 }
 
@@ -289,7 +303,8 @@ fn play(
             let goes_on = matches!(left, Left::Change) && player.course.steps > 0;
             let standing =
                 if goes_on && player.course.failure.is_none() { player.live.stand() } else { None };
-            (left, standing, Some(player.subject), player.course)
+            let (subject, course) = player.end();
+            (left, standing, subject, course)
         };
         if matches!(left, Left::Quit) {
             let recording = course.recording.unwrap_or_default();
@@ -298,7 +313,8 @@ fn play(
         if matches!(left, Left::Reset) || course.failure.is_some() {
             course.start_anew();
         }
-        from = course.change.take().map(|(next, numbers)| {
+        from = course.change.take().map(|(mut next, numbers)| {
+            next.share(stage.plan.target.device.as_ref());
             course.record(false, Instant::now(), Done::Numbers(numbers.clone()));
             course.numbers = numbers;
             (std::mem::replace(&mut stage, *next), standing)
@@ -333,7 +349,8 @@ impl Course {
             numbers: Vec::new(),
             followed: Vec::new(),
             columns: Arc::default(),
-            good: Default::default(),
+            seen: Seen::default(),
+            in_memory: false,
         }
     }
 
@@ -396,10 +413,16 @@ impl<'s> Player<'s> {
             Some(subject) => subject,
             None => Subject::new(live.mesh().map_err(|failure| failure.message)?),
         };
-        let mut player = Self { stage, subject, live, course };
+        let on_device = stage.plan.target.device.is_some();
+        let mut player = Self { stage, subject, live, on_device, course };
         player.show_named(player.course.field.clone().as_deref());
         player.name_columns();
         Ok(player)
+    }
+
+    /// What lasts.
+    fn end(self) -> (Option<Subject>, Course) {
+        (Some(self.subject), self.course)
     }
 
     /// Follows orders and goes on, until the stage is left.
@@ -494,12 +517,20 @@ impl<'s> Player<'s> {
             }
             Order::Record => course.recording = Some(Recording::default()),
             Order::Show(field, component) => self.show_field(field, component),
+            Order::Memory(every) => course.in_memory = every,
             Order::Quit => return Some(Left::Quit),
         }
         None
     }
 
     fn hold(&mut self, sent: Instant, hand: &Hand) {
+        // Where it takes hold has to be known.
+        if self.on_device && matches!(hand, Hand::Take(..) | Hand::Pin(_)) {
+            self.look();
+        }
+        if !matches!(hand, Hand::Pull(_)) {
+            self.course.seen.at = None;
+        }
         let (model, step) = (&self.stage.built.model, self.stage.plan.step);
         let looked = self.live.delay() > 0;
         let held = self.course.hold.take(hand, model, step, &self.subject, self.live.as_mut());
@@ -531,6 +562,7 @@ impl<'s> Player<'s> {
             columns.extend(axes(format!("point.{number}.displacement"), "m"));
         }
         self.course.columns = columns.into();
+        self.course.seen.at = None;
     }
 
     fn show_field(&mut self, field: Option<FieldName>, component: Option<&'static str>) {
@@ -548,6 +580,7 @@ impl<'s> Player<'s> {
             shown.at = At::Points;
         }
         self.live.show(&shown);
+        self.course.seen.at = None;
         self.course.field = name.map(str::to_owned);
     }
 
@@ -558,7 +591,12 @@ impl<'s> Player<'s> {
             course.owed = 0;
             return;
         }
-        match self.live.advance(1) {
+        let left = (course.pace.goal() - self.live.time()) / self.stage.plan.step;
+        let coasted = match self.on_device && course.is_going() {
+            true => self.live.coast(left.ceil().max(1.0) as u64, FRAME / 2),
+            false => None,
+        };
+        match coasted.unwrap_or_else(|| self.live.advance(1)) {
             Ok(steps) => {
                 course.steps += steps;
                 course.batch = (course.batch.0 + steps, course.batch.1 + started.elapsed());
@@ -571,44 +609,79 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// Hands the instant over.
-    fn show(&mut self, frames: &mut triple_buffer::Input<Frame>) {
-        let started = Instant::now();
+    /// Looks at the instant in ordinary memory.
+    fn look(&mut self) {
         let course = &mut self.course;
-        course.shown = started;
-        let frame = frames.input_buffer_mut();
+        let seen = &mut course.seen;
         match self.live.mesh() {
             Ok(mesh) => {
-                frame.points.clone_from(&mesh.points);
+                seen.points.clone_from(&mesh.points);
                 if let Some(moved) = mesh.point_data.get("displacement") {
-                    for (point, by) in frame.points.iter_mut().zip(moved.values.chunks_exact(3)) {
+                    for (point, by) in seen.points.iter_mut().zip(moved.values.chunks_exact(3)) {
                         *point += Vector3::new(by[0], by[1], by[2]);
                     }
                 }
-                frame.values =
-                    course.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
-                frame.energies = self.live.energies();
-                course.good.0.clone_from(&frame.points);
-                course.good.1.clone_from(&frame.values);
+                seen.values = course.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
+                seen.energies = self.live.energies();
             }
             // The last good picture stays.
             Err(failure) => {
                 course.failure.get_or_insert(failure.message);
-                frame.points.clone_from(&course.good.0);
-                frame.values.clone_from(&course.good.1);
             }
         }
-        frame.held.clear();
-        frame.held.extend(course.hold.shown(self.live.as_ref()));
+        seen.held.clear();
+        seen.held.extend(course.hold.shown(self.live.as_ref()));
         let [x, y, z] =
-            frame.held.first().filter(|_| course.hold.by_hand()).map_or([0.0; 3], |[_, force]| *force);
-        frame.sample.clear();
-        frame.sample.extend([x, y, z]);
-        self.live.sample(&mut frame.sample);
+            seen.held.first().filter(|_| course.hold.by_hand()).map_or([0.0; 3], |[_, force]| *force);
+        seen.sample.clear();
+        seen.sample.extend([x, y, z]);
+        self.live.sample(&mut seen.sample);
         for followed in &course.followed {
             let [place, _] = self.live.pulled(&followed.point);
-            frame.sample.extend((Vector3::from(place) - followed.rest).iter());
+            seen.sample.extend((Vector3::from(place) - followed.rest).iter());
         }
+        seen.number += 1;
+        seen.at = Some(Instant::now());
+    }
+
+    /// Brings the points that are drawn from the device to the instant; `looked` where their values are new.
+    fn place(&mut self, looked: bool) -> Option<DevicePoints> {
+        let course = &mut self.course;
+        let value = point_value(course.field.as_deref());
+        let given = (looked && value == PointValue::Given)
+            .then(|| course.seen.values.iter().map(|&value| drawn_value(value)).collect::<Vec<_>>());
+        match self.live.place(value, given.as_deref())? {
+            Ok(points) => Some(points),
+            Err(failure) => {
+                course.failure.get_or_insert(failure.message);
+                None
+            }
+        }
+    }
+
+    /// Hands the instant over.
+    fn show(&mut self, frames: &mut triple_buffer::Input<Frame>) {
+        let started = Instant::now();
+        self.course.shown = started;
+        let course = &self.course;
+        let looks = !self.on_device || course.in_memory || !course.is_going() || course.seen.is_old();
+        if looks {
+            self.look();
+        }
+        let on_device = if self.on_device { self.place(looks) } else { None };
+        let course = &mut self.course;
+        let frame = frames.input_buffer_mut();
+        if frame.looks != course.seen.number {
+            frame.looks = course.seen.number;
+            frame.points.clone_from(&course.seen.points);
+            frame.values.clone_from(&course.seen.values);
+            frame.energies = course.seen.energies;
+            frame.held.clone_from(&course.seen.held);
+            frame.sample.clone_from(&course.seen.sample);
+        }
+        let device = self.stage.plan.target.device.as_ref();
+        frame.read_backs = device.map_or(0, |device| device.read_backs());
+        frame.on_device = on_device;
         frame.columns.clone_from(&course.columns);
         let (steps, wall) = std::mem::take(&mut course.batch);
         if steps > 0 {

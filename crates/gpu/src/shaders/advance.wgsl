@@ -8,6 +8,6 @@ fn main(
 ) {
     let node = number(group, groups, local);
     if node < NODES && end() > instant.index {
-        go(node, next_increment[node].xyz, bitcast<u32>(nodes[node].w));
+        go(node, next_increment[node].xyz, hold_of(nodes[node].w));
     }
 }

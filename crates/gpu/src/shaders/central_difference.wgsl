@@ -43,12 +43,37 @@ struct Motion {
     shock: vec3f,
 }
 
+// What grips pull with at a node [N].
+fn grip_force(node: u32) -> vec3f {
+    let forces = 1u + grip_count();
+    let first = forces + grip_count();
+    let end = first + grip_entries();
+    // The first entry of the node: they are in the order of nodes.
+    var k = first;
+    for (var most = end; k < most;) {
+        let middle = (k + most) / 2u;
+        if bitcast<u32>(grips[middle].x) < node {
+            k = middle + 1u;
+        } else {
+            most = middle;
+        }
+    }
+    var force = vec3f(0.0);
+    for (; k < end && bitcast<u32>(grips[k].x) == node; k++) {
+        force += grips[k].y * grips[forces + bitcast<u32>(grips[k].z)].xyz;
+    }
+    return force;
+}
+
 fn motion(node: u32, internal: vec3f) -> Motion {
     let of_node = nodes[node];
     let inertia = of_node.x;
     let damping = of_node.y;
-    let held = bitcast<u32>(of_node.w);
+    let held = hold_of(of_node.w);
     var applied = external_force(node, of_node.z);
+    if (bitcast<u32>(of_node.w) & GRIPPED) != 0u {
+        applied += grip_force(node);
+    }
     var before = increment[node].xyz;
     var shock = vec3f(0.0);
     if does(STARTS) {

@@ -40,6 +40,18 @@ const LARGEST_STRAIN = 3u;
 // For each instant of a submission the factors of constraints, those of loads, and the gravity of bodies.
 @group(0) @binding(2) var<storage, read> table: array<f32>;
 
+// How many grips and entries there are; of each grip p − Σ wᵢ Xᵢ [m] and its stiffness [N/m]; the force of each [N]; entries in
+// the order of nodes: a node, its weight wᵢ and its grip.
+@group(0) @binding(3) var<storage, read_write> grips: array<vec4f>;
+
+fn grip_count() -> u32 {
+    return bitcast<u32>(grips[0].x);
+}
+
+fn grip_entries() -> u32 {
+    return bitcast<u32>(grips[0].y);
+}
+
 // The first instant that is not sound; all stands still there.
 fn end() -> u32 {
     return min(atomicLoad(&findings[BROKEN]), atomicLoad(&findings[OVERFLOWN]));

@@ -9,9 +9,17 @@ struct Hold {
 
 const FREE = 0xffffffffu;
 
-// Inertia [kg], α [1/s], mass [kg], and which of `holds`.
+// Inertia [kg], α [1/s], mass [kg], and one more than which of `holds` or zero, with GRIPPED.
 @group(2) @binding(3) var<storage, read> nodes: array<vec4f>;
 @group(2) @binding(4) var<storage, read> holds: array<Hold>;
+
+// Marks a node that a grip pulls at.
+const GRIPPED = 0x80000000u;
+
+// Which of `holds` a node has, or FREE.
+fn hold_of(tag: f32) -> u32 {
+    return (bitcast<u32>(tag) & ~GRIPPED) - 1u;
+}
 
 // Where a node is to go, and where it is held its place.
 fn placed(place: vec3f, held: u32) -> vec3f {

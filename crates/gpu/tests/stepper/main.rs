@@ -4,6 +4,7 @@ mod against;
 mod cube;
 mod failures;
 mod jumble;
+mod playing;
 #[path = "../support/mod.rs"]
 mod support;
 

@@ -297,6 +297,6 @@ fn compute() -> Result<Findings, CaseError> {
         factor: 1e3,
         columns: 2,
     };
-    findings.figures.push(figure(&bodies, &view, "tet4-anp. Red: the outline at rest.")?);
+    findings.figures.push(figure(&bodies, &view, "tet4-anp. Grey: the shape at rest.")?);
     Ok(findings)
 }

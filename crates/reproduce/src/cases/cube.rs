@@ -126,7 +126,7 @@ fn compute() -> Result<Findings, CaseError> {
         columns: 2,
     };
     let caption = format!(
-        "{CELLS}³ hexahedra; x to the right, y upwards; the platen at the right moved to the left. Red: the outline at rest."
+        "{CELLS}³ hexahedra; x to the right, y upwards; the platen at the right moved to the left. Grey: the shape at rest."
     );
     findings.figures.push(figure(&bodies, &view, caption)?);
     Ok(findings)

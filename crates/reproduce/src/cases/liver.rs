@@ -140,7 +140,7 @@ fn compute() -> Result<Findings, CaseError> {
         columns: 2,
     };
     let caption = format!(
-        "Pliant's own liver, {} tetrahedra, pulled by its left lobe. Red: the outline at rest. Stresses of the elements, \
+        "Pliant's own liver, {} tetrahedra, pulled by its left lobe. Grey: the shape at rest. Stresses of the elements, \
          averaged at the nodes.",
         cells.len()
     );

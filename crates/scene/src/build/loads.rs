@@ -283,11 +283,11 @@ impl Builder<'_> {
                 BodyModel::Shell => {
                     "fields of a shell: `displacement`, `velocity`, `rotation`, `von-mises`, `stress-top`, `stress-middle`, \
                      `stress-bottom`, `membrane-force`, `bending-moment`, `membrane-energy`, `bending-energy`, \
-                     `drilling-energy`, `thickness`"
+                     `drilling-energy`, `thickness`, `element-step`"
                 }
                 BodyModel::Corotational => {
                     "fields of a co-rotational solid: `displacement`, `velocity`, `cauchy-stress`, `von-mises`, `pressure`, \
-                     `J`, `energy-density`"
+                     `J`, `energy-density`, `element-step`"
                 }
                 BodyModel::Solid => "leave it out: it is a field of shells",
             };

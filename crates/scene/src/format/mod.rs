@@ -20,7 +20,8 @@ pub use load::{
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use view::{
-    BackgroundName, CameraTable, ClipTable, ColourBy, Component, MapName, Nothing, UpName, ViewTable,
+    BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, MapName, Nothing, TextureName,
+    UpName, ViewTable,
 };
 
 use pliant_gpu::Design;

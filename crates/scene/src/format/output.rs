@@ -36,6 +36,9 @@ pub enum FieldName {
     VolumeRatio,
     /// Strain energy of the instantaneous elastic law per volume at rest [J/m³].
     EnergyDensity,
+    /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells and co-rotational solids that
+    /// at rest, which turns with them. The smallest one bounds the step of the whole.
+    ElementStep,
     /// Force per length in the wall of a shell [N/m], as a tensor in space.
     MembraneForce,
     /// Moment per length in the wall of a shell [N], as a tensor in space; positive where the top is in tension.
@@ -59,7 +62,7 @@ pub enum FieldName {
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
@@ -72,6 +75,7 @@ impl FieldName {
         Self::Pressure,
         Self::VolumeRatio,
         Self::EnergyDensity,
+        Self::ElementStep,
         Self::MembraneForce,
         Self::BendingMoment,
         Self::StressTop,
@@ -97,6 +101,7 @@ impl FieldName {
             Self::Pressure => "pressure",
             Self::VolumeRatio => "J",
             Self::EnergyDensity => "energy-density",
+            Self::ElementStep => "element-step",
             Self::Rotation => "rotation",
             Self::MembraneForce => "membrane-force",
             Self::BendingMoment => "bending-moment",
@@ -130,6 +135,7 @@ impl FieldName {
             | Self::StressBottom => "Pa",
             Self::GreenStrain | Self::Fibre | Self::FibreStretch | Self::VolumeRatio => "",
             Self::EnergyDensity => "J/m³",
+            Self::ElementStep => "s",
             Self::MembraneForce => "N/m",
             Self::BendingMoment => "N",
             Self::MembraneEnergy | Self::BendingEnergy | Self::DrillingEnergy => "J/m²",
@@ -151,6 +157,7 @@ impl FieldName {
             Self::Pressure => "pressure",
             Self::VolumeRatio => "volume ratio",
             Self::EnergyDensity => "energy density",
+            Self::ElementStep => "element step",
             Self::MembraneForce => "membrane force",
             Self::BendingMoment => "bending moment",
             Self::StressTop => "stress at the top",
@@ -180,6 +187,7 @@ impl FieldName {
             | Self::Pressure
             | Self::VolumeRatio
             | Self::EnergyDensity
+            | Self::ElementStep
             | Self::MembraneEnergy
             | Self::BendingEnergy
             | Self::DrillingEnergy
@@ -195,7 +203,7 @@ impl FieldName {
     /// True for fields that bodies of a model have.
     pub fn is_of(self, model: BodyModel) -> bool {
         match self {
-            Self::Displacement | Self::Velocity | Self::VonMises => true,
+            Self::Displacement | Self::Velocity | Self::VonMises | Self::ElementStep => true,
             Self::CauchyStress | Self::Pressure | Self::VolumeRatio | Self::EnergyDensity => {
                 model != BodyModel::Shell
             }

@@ -1,9 +1,33 @@
 //! How a scene is looked at, in pictures and in the window.
 
 use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::FieldName;
+
+/// A choice among words, such as [`MapName`].
+pub trait Choice: DeserializeOwned {
+    /// Its words in the scene file.
+    const WORDS: &[&str];
+
+    /// What one of its words stands for; `None` for another one.
+    fn of_word(word: &str) -> Option<Self> {
+        serde_json::from_value(word.into()).ok()
+    }
+}
+
+impl Choice for MapName {
+    const WORDS: &[&str] = &["viridis", "cividis", "magma", "inferno", "plasma", "turbo", "blue-red"];
+}
+
+impl Choice for BackgroundName {
+    const WORDS: &[&str] = &["light", "white", "dark"];
+}
+
+impl Choice for TextureName {
+    const WORDS: &[&str] = &["none", "skin"];
+}
 
 /// How pictures and films of the scene are taken (`pliant render`, `pliant run --picture`) and how the window opens (`pliant view`). It
 /// changes nothing of the run.
@@ -28,9 +52,21 @@ pub struct ViewTable {
     /// Whether the edges of the elements are drawn.
     #[serde(default)]
     pub edges: bool,
+    /// Whether nothing but the edges of the elements on the surface is drawn.
+    #[serde(default)]
+    pub wireframe: bool,
     /// Whether the shape at rest is drawn, as a ghost.
     #[serde(default)]
     pub ghost: bool,
+    /// Whether fibres are drawn on the surface and in a section, as short lines that follow the deformation.
+    #[serde(default)]
+    pub fibres: bool,
+    /// Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat.
+    #[serde(default)]
+    pub critical: bool,
+    /// What the surface is like; a texture stays where it is in the body at rest, and moves with it.
+    #[serde(default)]
+    pub texture: TextureName,
     /// A plane: what lies on the side of its normal is taken away, and shows what is inside.
     #[serde(default)]
     pub clip: Option<ClipTable>,
@@ -135,19 +171,15 @@ pub enum MapName {
     BlueRed,
 }
 
-impl MapName {
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Viridis => "viridis",
-            Self::Cividis => "cividis",
-            Self::Magma => "magma",
-            Self::Inferno => "inferno",
-            Self::Plasma => "plasma",
-            Self::Turbo => "turbo",
-            Self::BlueRed => "blue-red",
-        }
-    }
+/// What a surface is like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TextureName {
+    /// Smooth and dull.
+    #[default]
+    None,
+    /// Moist tissue, finely uneven.
+    Skin,
 }
 
 /// What stands behind a body.
@@ -161,17 +193,6 @@ pub enum BackgroundName {
     White,
     /// Dark grey.
     Dark,
-}
-
-impl BackgroundName {
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Light => "light",
-            Self::White => "white",
-            Self::Dark => "dark",
-        }
-    }
 }
 
 /// A plane.
@@ -264,5 +285,26 @@ impl UpName {
             Self::MinusY => [0.0, -1.0, 0.0],
             Self::MinusZ => [0.0, 0.0, -1.0],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All words, as the schema has them.
+    fn same<T: Choice + JsonSchema>() {
+        let schema = schemars::schema_for!(T);
+        let known = schema.get("oneOf").and_then(|choices| choices.as_array()).unwrap();
+        let words: Vec<&str> = known.iter().map(|choice| choice["const"].as_str().unwrap()).collect();
+        assert_eq!(words, T::WORDS);
+        assert!(T::WORDS.iter().all(|word| T::of_word(word).is_some()) && T::of_word("jet").is_none());
+    }
+
+    #[test]
+    fn choices_have_the_words_of_the_schema() {
+        same::<MapName>();
+        same::<BackgroundName>();
+        same::<TextureName>();
     }
 }

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use pliant_corotational::Carried;
 use pliant_geometry::{Locator, Vector3};
 use pliant_mechanics::Real;
-use pliant_mechanics::recover::Recovery;
 
 use crc32fast::Hasher;
 
@@ -131,14 +130,16 @@ impl Samples {
                 row.push(state.load_factor);
             }
         }
-        let cells_wanted = self.probes.iter().any(|probe| probe.fields.iter().any(|field| !field.is_nodal()));
-        let recovery = cells_wanted.then(|| Recovery::new(&frame.built.model, frame.state));
+        let of_cells: Vec<FieldName> =
+            self.probes.iter().flat_map(|probe| &probe.fields).filter(|f| !f.is_nodal()).copied().collect();
+        let cells_wanted = !of_cells.is_empty();
+        let cells = cells_wanted.then(|| fields::Cells::new(frame, &of_cells));
         if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.corotational)
         {
-            self.corotated.fill(&part.model, state);
+            self.corotated.fill(&part.model, state, &of_cells);
         }
         for probe in &self.probes {
-            probe.read(frame, recovery.as_ref(), &self.corotated, row);
+            probe.read(frame, cells.as_ref(), &self.corotated, row);
         }
     }
 }
@@ -319,12 +320,12 @@ impl Probe {
     fn read<R: Real>(
         &self,
         frame: &Frame<'_, R>,
-        recovery: Option<&Recovery<'_, R>>,
+        cells: Option<&fields::Cells<'_, R>>,
         corotated: &fields::Corotated,
         row: &mut Vec<f64>,
     ) {
-        let recovered = recovery.zip(self.cell.as_ref()).and_then(|(recovery, place)| match *place {
-            Place::Solid(solid, cell) => Some(recovery.cell(solid, cell)),
+        let recovered = cells.zip(self.cell.as_ref()).and_then(|(cells, place)| match *place {
+            Place::Solid(solid, cell) => Some(cells.at(solid, cell)),
             Place::Corotated(_) | Place::Carried(..) => None,
         });
         for &field in &self.fields {

@@ -70,7 +70,7 @@ impl Curved {
         let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) else { return };
         let model = &part.model;
         self.found.fill(&self.picture, &self.surface, model, state);
-        self.cells.fill(model, state);
+        self.cells.fill(model, state, wanted);
         let points = &self.points;
         let vectors = |values: &dyn Fn(usize) -> [f64; 3]| DataArray {
             components: 3,

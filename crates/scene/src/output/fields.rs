@@ -3,8 +3,10 @@
 use nalgebra::Matrix3;
 use pliant_corotational::{Model, ShellFields, SolidFields, State};
 use pliant_mechanics::Real;
-use pliant_mechanics::recover::CellFields;
+use pliant_mechanics::recover::{CellFields, Recovery};
+use pliant_mechanics::stability::cell_limit;
 use pliant_mechanics::tensor::Symmetric;
+use rayon::prelude::*;
 
 use super::Frame;
 use crate::format::FieldName;
@@ -24,9 +26,35 @@ pub(super) fn nodal<R: Real>(frame: &Frame<'_, R>, field: FieldName, node: usize
     padded(&vector)
 }
 
+/// Finds the fields of cells of solids at an instant.
+pub(super) struct Cells<'a, R> {
+    recovery: Recovery<'a, R>,
+    model: &'a pliant_mechanics::Model,
+    displacement: &'a [[R; 3]],
+    /// Whether their stable steps are wanted, which cost far more than the rest.
+    steps: bool,
+}
+
+/// Fields of a cell, and its stable step [s] if it was wanted.
+pub(super) struct Found(CellFields, Option<f64>);
+
+impl<'a, R: Real> Cells<'a, R> {
+    pub fn new(frame: &Frame<'a, R>, wanted: &[FieldName]) -> Self {
+        let (model, displacement) = (&frame.built.model, &frame.state.displacement);
+        let recovery = Recovery::new(model, frame.state);
+        Self { recovery, model, displacement, steps: wanted.contains(&FieldName::ElementStep) }
+    }
+
+    pub fn at(&self, solid: usize, cell: usize) -> Found {
+        let step = self.steps.then(|| cell_limit(self.model, solid, cell, self.displacement));
+        Found(self.recovery.cell(solid, cell), step)
+    }
+}
+
 /// The value of a cell field; the first `components` numbers count.
-pub(super) fn of_cell(fields: &CellFields, field: FieldName) -> Value {
+pub(super) fn of_cell(Found(fields, step): &Found, field: FieldName) -> Value {
     match field {
+        FieldName::ElementStep => padded(&[step.unwrap_or(f64::NAN)]),
         FieldName::CauchyStress => tensor(&fields.cauchy_stress),
         FieldName::Pk2Stress => tensor(&fields.pk2_stress),
         FieldName::GreenStrain => tensor(&fields.green_strain),
@@ -63,14 +91,25 @@ pub(super) enum Cell {
 pub(super) struct Corotated {
     shells: ShellFields,
     solids: SolidFields,
+    /// Stable steps of facets and tets [s], once they are wanted: they don't change.
+    steps: [Vec<f64>; 2],
 }
 
 impl Corotated {
     /// Finds them for the instant of a frame.
-    pub fn fill(&mut self, model: &Model, state: &State) {
+    pub fn fill(&mut self, model: &Model, state: &State, wanted: &[FieldName]) {
+        if wanted.contains(&FieldName::ElementStep) && self.steps.iter().all(Vec::is_empty) {
+            let facets = model.facets.par_iter().map(|facet| facet.stable_step());
+            let tets = model.tets.par_iter().map(|tet| tet.stable_step());
+            self.steps = [facets.collect(), tets.collect()];
+        }
         // An element that is folded over or inverted has ended the run before anyone looks at it.
         let _ = self.shells.fill(model, state);
         let _ = self.solids.fill(model, state);
+    }
+
+    fn step(&self, kind: usize, at: usize) -> f64 {
+        self.steps[kind].get(at).copied().unwrap_or(f64::NAN)
     }
 
     /// The value of a field in a cell; the first `components` numbers count.
@@ -94,6 +133,7 @@ impl Corotated {
                     FieldName::BendingEnergy => padded(&[fields.energy[at].bending]),
                     FieldName::DrillingEnergy => padded(&[fields.energy[at].drilling]),
                     FieldName::Thickness => padded(&[model.facets[at].thickness]),
+                    FieldName::ElementStep => padded(&[self.step(0, at)]),
                     _ => [f64::NAN; 9],
                 }
             }
@@ -105,6 +145,7 @@ impl Corotated {
                     FieldName::Pressure => padded(&[fields.pressure[at]]),
                     FieldName::EnergyDensity => padded(&[fields.energy[at]]),
                     FieldName::VolumeRatio => padded(&[fields.volume_ratio[at]]),
+                    FieldName::ElementStep => padded(&[self.step(1, at)]),
                     _ => [f64::NAN; 9],
                 }
             }

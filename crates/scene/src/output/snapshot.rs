@@ -4,7 +4,6 @@ use std::marker::PhantomData;
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::Real;
-use pliant_mechanics::recover::Recovery;
 use rayon::prelude::*;
 
 use super::fields::Cell;
@@ -89,7 +88,7 @@ impl<R: Real> Snapshot<R> {
             Content::Corotational { nodes, cells, fields } => {
                 fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
                 if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
-                    fields.fill(&part.model, state);
+                    fields.fill(&part.model, state, &self.fields);
                     fill_corotational(&mut self.mesh, &part.model, fields, &self.fields, self.at, cells);
                 }
             }
@@ -116,11 +115,11 @@ fn fill_surface<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldN
     if of_cells.is_empty() {
         return;
     }
-    let recovery = Recovery::new(model, frame.state);
+    let fields_of = fields::Cells::new(frame, &of_cells);
     let mut averages = Averages::new(model.node_count(), &of_cells);
     for (index, solid) in model.solids.iter().enumerate() {
         let cells: Vec<_> =
-            (0..solid.cells.len()).into_par_iter().map(|cell| recovery.cell(index, cell)).collect();
+            (0..solid.cells.len()).into_par_iter().map(|cell| fields_of.at(index, cell)).collect();
         for (cell, found) in cells.iter().enumerate() {
             let volume = solid.cells.volume(cell);
             for (slot, &field) in of_cells.iter().enumerate() {
@@ -298,11 +297,11 @@ fn fill_cells<R: Real>(
         return;
     }
     let model = &frame.built.model;
-    let recovery = Recovery::new(model, frame.state);
+    let fields_of = fields::Cells::new(frame, &wanted);
     let mut averages = Averages::new(mesh.points.len(), &wanted);
     for (block, places) in mesh.blocks.iter_mut().zip(cells) {
         let recovered: Vec<_> =
-            (places.par_iter()).map(|&(solid, cell)| recovery.cell(solid as usize, cell as usize)).collect();
+            (places.par_iter()).map(|&(solid, cell)| fields_of.at(solid as usize, cell as usize)).collect();
         for (slot, &field) in wanted.iter().enumerate() {
             let components = field.components();
             if at == At::Cells {

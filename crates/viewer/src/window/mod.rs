@@ -1,5 +1,6 @@
 //! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
 
+mod device;
 mod errand;
 mod paint;
 mod panels;
@@ -16,6 +17,7 @@ use std::time::{Duration, Instant, SystemTime};
 use eframe::egui::{self, Key, Rect};
 use eframe::wgpu;
 use pliant_geometry::Vector3;
+use pliant_gpu::Device;
 use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
 use pliant_scene::format::FieldName;
 
@@ -87,6 +89,7 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
         depth_buffer: 32,
         multisampling: SAMPLES as u16,
         renderer: eframe::Renderer::Wgpu,
+        wgpu_options: device::setup(&opening.stage),
         ..Default::default()
     };
     let outcome = Arc::<Mutex<Option<Result<String, String>>>>::default();
@@ -116,6 +119,10 @@ struct App {
     field: Option<FieldName>,
     component: Option<&'static str>,
     cut: Cut,
+    /// Whether every frame comes to ordinary memory.
+    in_memory: bool,
+    /// The device of the window, if it is one of a solver.
+    device: Option<Device>,
     /// Points on the surface, increasing.
     surface: Vec<u32>,
     /// Where the picture is in the window, in egui's points.
@@ -170,6 +177,7 @@ impl App {
         let subject = seen(&stage)?;
         let session = begin(&stage, &context.egui_ctx)?;
         place(state, target, &subject);
+        let device = device::shared(state, &stage);
         let mut app = Self {
             target,
             session,
@@ -186,6 +194,8 @@ impl App {
             field,
             component,
             cut: Cut::new(style.clip, &subject),
+            in_memory: false,
+            device,
             surface: subject.surface_points(),
             subject,
             picture: Rect::ZERO,
@@ -274,7 +284,8 @@ impl App {
             return;
         }
         // After a failure at the first instant there is nothing but the message.
-        if frame.points.len() == self.subject.points.len() {
+        let looked = frame.looks != self.frame.looks;
+        if looked && frame.points.len() == self.subject.points.len() {
             Arc::make_mut(&mut self.points).clone_from(&frame.points);
             Arc::make_mut(&mut self.values).clone_from(&frame.values);
             self.fresh = true;
@@ -287,7 +298,9 @@ impl App {
         }
         let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
         self.strongest = self.strongest.max(force);
-        self.samples.take(&self.frame);
+        if looked {
+            self.samples.take(&self.frame);
+        }
     }
 
     fn order(&self, order: Order) {
@@ -337,7 +350,8 @@ impl App {
         }
     }
 
-    fn replace(&mut self, path: PathBuf, stage: Stage, subject: Arc<Subject>) -> Result<(), String> {
+    fn replace(&mut self, path: PathBuf, mut stage: Stage, subject: Arc<Subject>) -> Result<(), String> {
+        stage.share(self.device.as_ref());
         let before = std::mem::replace(&mut self.session, begin(&stage, &self.context)?);
         // A long step ends in its own time.
         std::thread::spawn(move || drop(before));
@@ -360,6 +374,8 @@ impl App {
         if self.record.is_some() {
             self.session.order(Order::Record);
         }
+        self.frame.looks = 0;
+        self.session.order(Order::Memory(self.in_memory));
         self.session.order(Order::Show(self.field, self.component));
         self.session.order(Order::Speed(self.speed));
         self.session.order(Order::Play(self.frame.playing));
@@ -430,6 +446,7 @@ impl eframe::App for App {
             place(state, self.target, &self.subject);
         }
         self.look();
+        self.choose_memory();
         self.keys(&context);
         egui::Panel::top("top").show(ui, |ui| self.top(ui));
         egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));

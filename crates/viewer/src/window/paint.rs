@@ -16,10 +16,14 @@ struct Stageset {
     drawn: Drawn,
     section: Section,
     subject: Arc<Subject>,
+    /// What is drawn from where a solver put it.
+    bound: Option<wgpu::Buffer>,
 }
 
 /// One frame for the device.
 pub struct Paint {
+    /// Points on the window's device, drawn from there.
+    pub on_device: Option<wgpu::Buffer>,
     pub points: Arc<Vec<Vector3>>,
     pub values: Arc<Vec<f64>>,
     pub camera: Camera,
@@ -38,11 +42,25 @@ impl CallbackTrait for Paint {
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut CallbackResources,
     ) -> Vec<wgpu::CommandBuffer> {
-        let Some(Stageset { renderer, drawn, section, subject }) = resources.get_mut() else {
+        let Some(Stageset { renderer, drawn, section, subject, bound }) = resources.get_mut() else {
             return Vec::new();
         };
-        if self.fresh {
+        if bound.is_some() && self.on_device.is_none() {
+            (*drawn, *bound) = (Drawn::new(device, renderer, subject), None);
             drawn.set(queue, &self.points, &self.values);
+        }
+        match &self.on_device {
+            Some(points) => {
+                if bound.as_ref() != Some(points) {
+                    drawn.bind_positions(device, renderer, points);
+                    *bound = Some(points.clone());
+                }
+                if self.fresh {
+                    drawn.reach(&self.points);
+                }
+            }
+            None if self.fresh => drawn.set(queue, &self.points, &self.values),
+            None => {}
         }
         if let Some(plane) = &self.style.clip {
             section.cut(subject, &self.points, &self.values, plane);
@@ -68,6 +86,7 @@ impl CallbackTrait for Paint {
 pub fn place(state: &egui_wgpu::RenderState, target: Target, subject: &Arc<Subject>) {
     let renderer = Renderer::new(&state.device, target);
     let drawn = Drawn::new(&state.device, &renderer, subject);
-    let stageset = Stageset { renderer, drawn, section: Section::default(), subject: subject.clone() };
+    let stageset =
+        Stageset { renderer, drawn, section: Section::default(), subject: subject.clone(), bound: None };
     state.renderer.write().callback_resources.insert(stageset);
 }

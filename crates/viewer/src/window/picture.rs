@@ -87,6 +87,7 @@ impl App {
             style.range = None;
         }
         let paint = Paint {
+            on_device: self.on_device().map(|points| points.buffer().clone()),
             points: self.points.clone(),
             values: self.values.clone(),
             camera: self.camera,
@@ -124,6 +125,9 @@ impl App {
             context.set_cursor_icon(CursorIcon::Grab);
         }
         let pinning = context.input(|input| input.modifiers.command || input.key_down(Key::P));
+        if response.clicked() && pinning || response.drag_started_by(PointerButton::Primary) {
+            self.bring_points();
+        }
         if response.clicked() && pinning {
             match (self.pin_at(pointer, rect), self.hit(place)) {
                 (Some(pin), _) => self.act(Hand::Unpin(pin)),
@@ -305,6 +309,7 @@ impl App {
         ));
         let energies = &frame.energies;
         lines.push(format!("kinetic {:.3e} J, internal {:.3e} J", energies.kinetic, energies.internal));
+        lines.extend(self.told_of_device());
         let ink = self.ink();
         let galley = painter.layout_no_wrap(lines.join("\n"), FontId::proportional(14.0), ink);
         let place = Rect::from_min_size(rect.min + vec2(12.0, 10.0), galley.size());

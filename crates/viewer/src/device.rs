@@ -1,0 +1,62 @@
+//! Scenes whose state lies on a graphics processor: their points are found and drawn there. What needs ordinary memory (energies,
+//! forces, the range of colours, whether all is sound, fields other than displacements) is looked at now and then.
+
+use std::time::{Duration, Instant};
+
+use pliant_geometry::Vector3;
+use pliant_gpu::{Device, PointValue};
+use pliant_mechanics::Energies;
+
+use crate::session::Stage;
+
+/// Wall time between two looks at a state that lies on a device.
+pub const LOOK: Duration = Duration::from_millis(250);
+
+/// What was seen at the last look.
+#[derive(Debug, Default)]
+pub(crate) struct Seen {
+    /// How many looks there were.
+    pub number: u64,
+    /// Positions [m].
+    pub points: Vec<Vector3>,
+    /// Values of the field that is shown; empty for none.
+    pub values: Vec<f64>,
+    /// Energies [J].
+    pub energies: Energies,
+    /// What is held: point [m] and force [N].
+    pub held: Vec<[[f64; 3]; 2]>,
+    /// The sample of that instant.
+    pub sample: Vec<f64>,
+    /// When it was; `None` where the next one is due at once.
+    pub at: Option<Instant>,
+}
+
+impl Seen {
+    /// Whether a look is due while a run goes on.
+    pub fn is_old(&self) -> bool {
+        self.at.is_none_or(|at| at.elapsed() >= LOOK)
+    }
+}
+
+/// A field, with its component, as the device finds it.
+pub(crate) fn point_value(field: Option<&str>) -> PointValue {
+    match field {
+        None | Some("displacement") => PointValue::Size,
+        Some("displacement:x") => PointValue::Component(0),
+        Some("displacement:y") => PointValue::Component(1),
+        Some("displacement:z") => PointValue::Component(2),
+        Some(_) => PointValue::Given,
+    }
+}
+
+impl Stage {
+    /// Goes on on a device that is open, where that is the one it asks for.
+    pub(crate) fn share(&mut self, open: Option<&Device>) {
+        if let (Some(open), Some(asked)) = (open, &mut self.plan.target.device)
+            && open.adapter() == asked.adapter()
+            && open.check().is_ok()
+        {
+            *asked = open.clone();
+        }
+    }
+}
