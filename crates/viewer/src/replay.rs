@@ -178,7 +178,7 @@ pub fn replay(stage: &Stage, recording: &Recording) -> Result<Replayed, String> 
             Ended::Whole(replayed) => return Ok(replayed),
             Ended::Change(standing, numbers) => {
                 let next = with_numbers(&stage.scene, numbers)?;
-                before = Some((std::mem::replace(&mut now, next), standing));
+                before = Some((std::mem::replace(&mut now, next), standing.map(|standing| *standing)));
             }
         }
     }
@@ -201,7 +201,7 @@ struct Replay<'r> {
 
 enum Ended<'r> {
     /// Numbers are others from here on.
-    Change(Option<Standing>, &'r [Number]),
+    Change(Option<Box<Standing>>, &'r [Number]),
     Whole(Replayed),
 }
 
@@ -239,7 +239,7 @@ impl<'r> Replay<'r> {
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {
                         let standing = live.stand().ok_or("numbers were changed within a step")?;
-                        return Ok(Ended::Change(Some(standing), numbers));
+                        return Ok(Ended::Change(Some(Box::new(standing)), numbers));
                     }
                 }
             }
