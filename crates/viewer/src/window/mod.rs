@@ -19,7 +19,7 @@ use eframe::wgpu;
 use pliant_geometry::Vector3;
 use pliant_gpu::Device;
 use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
-use pliant_scene::format::FieldName;
+use pliant_scene::format::{At, FieldName};
 
 pub use self::errand::Errand;
 use self::errand::Errands;
@@ -478,6 +478,13 @@ impl eframe::App for App {
 fn seen(stage: &Stage) -> Result<Arc<Subject>, String> {
     let live = pliant_scene::live(&stage.scene, &stage.built, &stage.plan);
     let mut live = live.map_err(|failure| failure.message)?;
+    // Of bodies, the way of their fibres and which element sets the step, to be shown at a click.
+    let (scene, mut shown) = (&stage.scene, stage.scene.shown(1.0));
+    if shown.curved.is_none() && shown.on.iter().all(|on| scene.bodies.iter().any(|(name, _)| name == on)) {
+        shown.data.extend([FieldName::Fibre, FieldName::ElementStep]);
+        shown.at = At::Cells;
+        live.show(&shown);
+    }
     Ok(Arc::new(Subject::new(live.mesh().map_err(|failure| failure.message)?)))
 }
 

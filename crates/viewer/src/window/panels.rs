@@ -2,7 +2,7 @@
 
 use eframe::egui;
 use pliant_geometry::Vector3;
-use pliant_picture::ColourMap;
+use pliant_picture::{ColourMap, Texture};
 use pliant_scene::format::FieldName;
 
 use super::App;
@@ -86,6 +86,16 @@ impl App {
         ui.heading("Shape");
         ui.checkbox(&mut self.style.edges, "Edges of the elements").on_hover_text("E");
         ui.checkbox(&mut self.style.ghost, "Shape at rest").on_hover_text("G");
+        ui.checkbox(&mut self.style.wireframe, "Wireframe");
+        if self.subject.has_fibres() {
+            ui.checkbox(&mut self.style.fibres, "Fibres");
+        }
+        if self.subject.has_critical_cell() {
+            ui.checkbox(&mut self.style.critical, "Element with the smallest step at rest");
+        }
+        let mut skin = self.style.texture == Texture::Skin;
+        ui.checkbox(&mut skin, "Skin");
+        self.style.texture = if skin { Texture::Skin } else { Texture::None };
         ui.checkbox(&mut self.cut.on, "Section").on_hover_text("C");
         if self.cut.on {
             ui.horizontal(|ui| {
