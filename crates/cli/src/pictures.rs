@@ -265,7 +265,7 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
 }
 
 /// Width of a picture in a gallery [pixels].
-const GALLERY_WIDTH: u32 = 800;
+const GALLERY_WIDTH: u32 = 640;
 
 /// The scenes in a folder that is none itself, in the order of the alphabet.
 fn scenes_in(folder: &Path) -> Vec<PathBuf> {

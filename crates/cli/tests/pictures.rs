@@ -202,7 +202,7 @@ mod with_pictures {
         done(&workshop.pliant(&arguments));
         let all = ["README.md", "one.png", "two.png"].map(String::from);
         assert_eq!(names(&workshop, "gallery"), BTreeSet::from(all));
-        assert_eq!(png(&workshop, "gallery/two.png").0, [800, 500]);
+        assert_eq!(png(&workshop, "gallery/two.png").0, [640, 400]);
         let page = workshop.read("gallery/README.md");
         for piece in
             ["## A block\n\n![A block](one.png)", "pliant render scenes/two --until 0.004", "## Another one"]
