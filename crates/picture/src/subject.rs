@@ -74,11 +74,6 @@ impl Subject {
         !self.fibres.is_empty()
     }
 
-    /// Whether it is known which of its cells has the smallest stable step (the field `element-step` of its mesh).
-    pub fn has_critical_cell(&self) -> bool {
-        self.critical.is_some()
-    }
-
     /// The edges of a cell, in the order of the mesh.
     pub(crate) fn outline(&self, cell: u32) -> Vec<Line> {
         let cells = self

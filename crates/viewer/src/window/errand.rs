@@ -37,9 +37,9 @@ const FRAMES: u64 = 10;
 /// Pixels at which is picked.
 const PICKS: u64 = 100;
 /// Wall time in which what has to happen does.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(180);
 /// Simulated time [s] in which what is pulled comes to rest.
-const SETTLING: f64 = 2.0;
+const SETTLING: f64 = 1.0;
 
 /// Events of one frame.
 type Give = Box<dyn FnOnce(&App) -> Vec<Event>>;
