@@ -43,8 +43,6 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
     let told = open(Opening {
         style: look.style,
         camera: look.camera,
-        field: stage_now.scene.shown_field(),
-        component: stage_now.scene.view.component.map(|component| component.word()),
         file: pliant_scene::scene_file(&arguments.scene),
         stage: stage_now,
         read: Arc::new(read),

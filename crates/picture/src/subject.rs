@@ -10,7 +10,7 @@ use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, vector_area,
 const SHARP: f64 = 0.26;
 
 /// The surface and the cells of a mesh, ready to be drawn in any deformed state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Subject {
     /// Points at rest [m].
     pub points: Vec<Vector3>,

@@ -5,7 +5,7 @@ use std::fmt;
 
 use pliant_geometry::Mesh;
 
-use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, VtuTable};
+use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, ViewTable, VtuTable};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
 
@@ -21,23 +21,28 @@ pub trait Draw: fmt::Debug + Sync {
 impl Scene {
     /// The field that colours tell; `None` for the colour of tissue.
     pub fn shown_field(&self) -> Option<FieldName> {
-        match self.view.colour {
+        self.field_of(&self.view)
+    }
+
+    /// The same of another view than its own.
+    pub fn field_of(&self, view: &ViewTable) -> Option<FieldName> {
+        match view.colour {
             Some(ColourBy::Field(field)) => Some(field),
             Some(ColourBy::Nothing(_)) => None,
-            None if self.shows_surface_of_shell() => Some(FieldName::Displacement),
+            None if self.shows_surface_of_shell(view) => Some(FieldName::Displacement),
             None => Some(FieldName::VonMises),
         }
     }
 
-    fn shows_surface_of_shell(&self) -> bool {
-        let shown = self.surfaces.iter().filter(|(name, _)| self.view.on.as_ref() == Some(name));
+    fn shows_surface_of_shell(&self, view: &ViewTable) -> bool {
+        let shown = self.surfaces.iter().filter(|(name, _)| view.on.as_ref() == Some(name));
         let solid =
             |on: &str| self.bodies.iter().any(|(name, body)| name == on && body.model == BodyModel::Solid);
         shown.into_iter().any(|(_, surface)| !solid(&surface.on))
     }
 
-    fn shows_surface(&self) -> bool {
-        self.view.on.as_ref().is_some_and(|on| self.surfaces.iter().any(|(name, _)| name == on))
+    fn shows_surface(&self, view: &ViewTable) -> bool {
+        view.on.as_ref().is_some_and(|on| self.surfaces.iter().any(|(name, _)| name == on))
     }
 
     /// All that tables of the scene sample, in one: energies, all reactions, and the probes, under the name of their table too where
@@ -56,21 +61,26 @@ impl Scene {
 
     /// A series of what is shown, with displacements and the field of the colours.
     pub fn shown(&self, every: f64) -> VtuTable {
+        self.shown_as(&self.view, every)
+    }
+
+    /// The same of another view than its own.
+    pub fn shown_as(&self, view: &ViewTable, every: f64) -> VtuTable {
         let mut data = vec![FieldName::Displacement];
-        data.extend(self.shown_field().filter(|field| *field != FieldName::Displacement));
-        if self.view.critical && !data.contains(&FieldName::ElementStep) {
+        data.extend(self.field_of(view).filter(|field| *field != FieldName::Displacement));
+        if view.critical && !data.contains(&FieldName::ElementStep) {
             data.push(FieldName::ElementStep);
         }
-        if self.view.fibres && !data.contains(&FieldName::Fibre) {
+        if view.fibres && !data.contains(&FieldName::Fibre) {
             data.push(FieldName::Fibre);
         }
-        let on = self.view.on.as_ref();
+        let on = view.on.as_ref();
         let mut models = self.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
-        let shells = !self.shows_surface() && models.all(|(_, body)| body.model == BodyModel::Shell);
-        let curved = (shells && self.view.curved > 1 && !self.view.critical).then_some(self.view.curved);
+        let shells = !self.shows_surface(view) && models.all(|(_, body)| body.model == BodyModel::Shell);
+        let curved = (shells && view.curved > 1 && !view.critical).then_some(view.curved);
         // Which cell is critical, and which way its fibres go, only the cells tell.
-        let cells = curved.is_some() || self.view.critical || self.view.fibres;
-        let at = if cells && !self.shows_surface() { At::Cells } else { At::Points };
+        let cells = curved.is_some() || view.critical || view.fibres;
+        let at = if cells && !self.shows_surface(view) { At::Cells } else { At::Points };
         VtuTable { on: on.cloned(), every, data, at, curved }
     }
 }

@@ -21,6 +21,8 @@ pub(crate) struct Seen {
     pub points: Vec<Vector3>,
     /// Values of the field that is shown; empty for none.
     pub values: Vec<f64>,
+    /// The cell with the smallest step, where that is asked for.
+    pub critical: Option<u32>,
     /// Energies [J].
     pub energies: Energies,
     /// What is held: point [m] and force [N].

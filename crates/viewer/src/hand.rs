@@ -146,28 +146,32 @@ impl Hold {
         subject: &Subject,
         live: &mut dyn Live,
     ) -> bool {
+        let grip = |point: &Point, stiffness| grip(point, stiffness, model, step, subject, &*live);
+        let mut found = true;
         match hand {
             Hand::Take(point, stiffness) => {
                 self.release();
-                let Some((grip, taken)) = grip(point, *stiffness, model, step, subject, live) else {
-                    return true;
-                };
-                self.grips.insert(0, grip);
-                self.taken.insert(0, taken);
-                self.by_hand = true;
+                match grip(point, *stiffness) {
+                    Some((grip, taken)) => {
+                        self.grips.insert(0, grip);
+                        self.taken.insert(0, taken);
+                        self.by_hand = true;
+                    }
+                    None => found = false,
+                }
             }
             Hand::Pull(place) if self.by_hand => {
                 self.grips[0].place = (Vector3::from(*place) - self.taken[0].offset).into();
             }
             Hand::Pull(_) => {}
             Hand::Release => self.release(),
-            Hand::Pin(point) => {
-                let Some((grip, taken)) = grip(point, f64::INFINITY, model, step, subject, live) else {
-                    return true;
-                };
-                self.grips.push(grip);
-                self.taken.push(taken);
-            }
+            Hand::Pin(point) => match grip(point, f64::INFINITY) {
+                Some((grip, taken)) => {
+                    self.grips.push(grip);
+                    self.taken.push(taken);
+                }
+                None => found = false,
+            },
             Hand::Unpin(pin) => {
                 let at = pin + usize::from(self.by_hand);
                 if at < self.grips.len() {
@@ -176,7 +180,7 @@ impl Hold {
                 }
             }
         }
-        self.hold(live)
+        self.hold(live) && found
     }
 
     /// Holds the same in a run of another model or step [s].

@@ -13,7 +13,7 @@ mod window;
 pub use device::LOOK;
 pub use hand::{Hand, Hold, Point, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
-pub use replay::{Done, Lags, Move, Recording, Replayed, replay, replay_in_real_time};
+pub use replay::{Done, Lags, Move, Recording, Replayed, Surface, replay, replay_in_real_time};
 pub use samples::Samples;
 pub use session::{Frame, Order, Session, Stage};
 #[cfg(feature = "window")]

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
 use pliant_picture::Subject;
+use pliant_scene::format::ViewTable;
 use pliant_scene::{Live, Standing};
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,34 @@ pub enum Done {
     Hand(Hand),
     /// Numbers of the scene that are others from then on; all others are as in the file.
     Numbers(Vec<Number>),
+    /// Another surface is shown, whose triangles are held from then on.
+    Surface(Surface),
+}
+
+/// What of a view decides which triangles are drawn.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Surface {
+    /// The body or the carried surface; `None` for all bodies.
+    pub on: Option<String>,
+    /// Parts of each edge of a shell.
+    pub curved: u32,
+    /// Whether fibres are drawn.
+    pub fibres: bool,
+    /// Whether the critical cell is marked; shells are then flat.
+    pub critical: bool,
+}
+
+impl Surface {
+    /// That of a view.
+    pub fn of(view: &ViewTable) -> Self {
+        Self { on: view.on.clone(), curved: view.curved, fibres: view.fibres, critical: view.critical }
+    }
+
+    /// A view with this surface.
+    fn put_into(&self, view: &ViewTable) -> ViewTable {
+        let Self { on, curved, fibres, critical } = self.clone();
+        ViewTable { on, curved, fibres, critical, ..view.clone() }
+    }
 }
 
 /// When something was done, and what.
@@ -117,6 +146,7 @@ pub fn replay_in_real_time(stage: &Stage, recording: &Recording) -> Result<Recor
             Done::Numbers(numbers) => {
                 Order::Change(Box::new(with_numbers(&stage.scene, numbers)?), numbers.clone())
             }
+            Done::Surface(surface) => Order::Show(Box::new(surface.put_into(&stage.scene.view))),
         };
         orders.push((Duration::try_from_secs_f64(then.seconds).unwrap_or_default(), order));
     }
@@ -148,7 +178,7 @@ pub fn replay(stage: &Stage, recording: &Recording) -> Result<Replayed, String> 
             Ended::Whole(replayed) => return Ok(replayed),
             Ended::Change(standing, numbers) => {
                 let next = with_numbers(&stage.scene, numbers)?;
-                before = Some((std::mem::replace(&mut now, next), standing));
+                before = Some((std::mem::replace(&mut now, next), standing.map(|standing| *standing)));
             }
         }
     }
@@ -163,13 +193,15 @@ struct Replay<'r> {
     /// Steps in all.
     of: u64,
     subject: Option<Subject>,
+    /// The surface that is shown, if it is another one than the scene's.
+    surface: Option<&'r Surface>,
     hold: Hold,
     largest_force: f64,
 }
 
 enum Ended<'r> {
     /// Numbers are others from here on.
-    Change(Option<Standing>, &'r [Number]),
+    Change(Option<Box<Standing>>, &'r [Number]),
     Whole(Replayed),
 }
 
@@ -177,6 +209,9 @@ impl<'r> Replay<'r> {
     /// Goes on until numbers are others, or to the end.
     fn play(&mut self, stage: &Stage, from: Option<(Stage, Option<Standing>)>) -> Result<Ended<'r>, String> {
         let (mut live, _) = stage.enter(from)?;
+        if let Some(surface) = self.surface {
+            live.show(&stage.scene.shown_as(&surface.put_into(&stage.scene.view), 1.0));
+        }
         let subject = match self.subject.take() {
             Some(subject) => subject,
             None => Subject::new(live.mesh().map_err(|failure| failure.message)?),
@@ -196,10 +231,15 @@ impl<'r> Replay<'r> {
                         }
                         self.hold.take(hand, model, step, subject, live.as_mut());
                     }
+                    Done::Surface(surface) => {
+                        self.surface = Some(surface);
+                        live.show(&stage.scene.shown_as(&surface.put_into(&stage.scene.view), 1.0));
+                        *subject = Subject::new(live.mesh().map_err(|failure| failure.message)?);
+                    }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {
                         let standing = live.stand().ok_or("numbers were changed within a step")?;
-                        return Ok(Ended::Change(Some(standing), numbers));
+                        return Ok(Ended::Change(Some(Box::new(standing)), numbers));
                     }
                 }
             }

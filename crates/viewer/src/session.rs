@@ -10,14 +10,14 @@ use pliant_geometry::Vector3;
 use pliant_gpu::{DevicePoints, PointValue};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
-use pliant_picture::{Subject, drawn_value, nodal_values};
-use pliant_scene::format::{At, FieldName};
+use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values};
+use pliant_scene::format::ViewTable;
 use pliant_scene::{Built, Column, Live, Plan, Scene, Standing, go_on, live};
 
 use crate::device::{Seen, point_value};
 use crate::hand::{Hand, Hold, Point, nodes_of};
 use crate::parameters::Number;
-use crate::replay::{Done, Move, Recording};
+use crate::replay::{Done, Move, Recording, Surface};
 
 /// Wall time between frames.
 pub(crate) const FRAME: Duration = Duration::from_micros(16_667);
@@ -45,8 +45,8 @@ pub enum Order {
     ForgetProbes,
     /// Keeps what is done to the run from now on.
     Record,
-    /// Shows another field; `None` for the colour of tissue.
-    Show(Option<FieldName>, Option<&'static str>),
+    /// Shows another field, or another surface.
+    Show(Box<ViewTable>),
     /// Brings every frame to ordinary memory where the state lies on a device, as a section needs it; or only some.
     Memory(bool),
     /// Ends.
@@ -58,6 +58,8 @@ pub enum Order {
 pub struct Frame {
     /// How many frames came before.
     pub number: u64,
+    /// What is drawn: points and triangles at rest. Another one where another surface is shown.
+    pub subject: Arc<Subject>,
     /// Simulated time [s].
     pub time: f64,
     /// Steps done.
@@ -75,6 +77,8 @@ pub struct Frame {
     pub points: Vec<Vector3>,
     /// Values of the field that is shown; empty for none.
     pub values: Vec<f64>,
+    /// The cell with the smallest step, where that is asked for.
+    pub critical: Option<u32>,
     /// Energies [J].
     pub energies: Energies,
     /// What is held: the point [m] and the force on the body [N] of each grip, hand first.
@@ -220,6 +224,10 @@ impl Pace {
 /// What of a run lasts when it goes on as another stage.
 struct Course {
     hold: Hold,
+    /// What is shown, and the view that the scene opened with.
+    view: ViewTable,
+    usual: Surface,
+    /// The field that is shown, with its component.
     field: Option<String>,
     steps: u64,
     failure: Option<String>,
@@ -269,7 +277,7 @@ enum Left {
 /// The solver's thread while it plays a stage.
 struct Player<'s> {
     stage: &'s Stage,
-    subject: Subject,
+    subject: Arc<Subject>,
     live: Box<dyn Live + 's>,
     /// Whether the state lies on a device.
     on_device: bool,
@@ -324,13 +332,11 @@ fn play(
 
 impl Course {
     fn new(stage: &Stage) -> Self {
-        let field = stage.scene.shown_field().map(|field| {
-            let part = stage.scene.view.component.map(|part| format!(":{}", part.word())).unwrap_or_default();
-            format!("{}{part}", field.name())
-        });
         Self {
             hold: Hold::default(),
-            field,
+            view: stage.scene.view.clone(),
+            usual: Surface::of(&stage.scene.view),
+            field: None,
             steps: 0,
             failure: None,
             note: None,
@@ -359,13 +365,22 @@ impl Course {
         (self.steps, self.owed, self.started) = (0, 0, None);
         (self.failure, self.note) = (None, None);
         self.waiting.clear();
-        if let Some(recording) = &mut self.recording {
-            *recording = Recording::default();
+        if self.recording.is_some() {
+            self.begin_recording();
         }
         if !self.numbers.is_empty() {
             self.record(false, Instant::now(), Done::Numbers(self.numbers.clone()));
         }
         self.pace.anchor(0.0);
+    }
+
+    /// Records from now on, a surface that is another one than the scene's first.
+    fn begin_recording(&mut self) {
+        self.recording = Some(Recording::default());
+        let surface = Surface::of(&self.view);
+        if surface != self.usual {
+            self.record(false, Instant::now(), Done::Surface(surface));
+        }
     }
 
     fn is_going(&self) -> bool {
@@ -400,7 +415,7 @@ impl<'s> Player<'s> {
     fn enter(
         stage: &'s Stage,
         from: Option<(Stage, Option<Standing>)>,
-        subject: Option<Subject>,
+        subject: Option<Arc<Subject>>,
         mut course: Course,
     ) -> Result<Self, String> {
         let (mut live, goes_on) = stage.enter(from)?;
@@ -409,19 +424,20 @@ impl<'s> Player<'s> {
             course.note = Some("the mesh or the solver is another one: it starts anew".into());
         }
         course.hold.hold_on(&stage.built.model, stage.plan.step, live.as_mut());
-        let subject = match subject.filter(|_| goes_on) {
-            Some(subject) => subject,
-            None => Subject::new(live.mesh().map_err(|failure| failure.message)?),
-        };
         let on_device = stage.plan.target.device.is_some();
-        let mut player = Self { stage, subject, live, on_device, course };
-        player.show_named(player.course.field.clone().as_deref());
+        let known = subject.filter(|_| goes_on);
+        let is_known = known.is_some();
+        let mut player = Self { stage, subject: known.unwrap_or_default(), live, on_device, course };
+        player.show_as_viewed();
+        if !is_known {
+            player.renew_subject()?;
+        }
         player.name_columns();
         Ok(player)
     }
 
     /// What lasts.
-    fn end(self) -> (Option<Subject>, Course) {
+    fn end(self) -> (Option<Arc<Subject>>, Course) {
         (Some(self.subject), self.course)
     }
 
@@ -463,6 +479,10 @@ impl<'s> Player<'s> {
             {
                 self.step();
                 changed = true;
+                // Looked at, the run would not stand between two steps any more.
+                if self.is_due_to_change() {
+                    return Left::Change;
+                }
             }
             let still = !self.course.is_going() && self.course.owed == 0;
             if changed && (still || self.course.shown.elapsed() >= FRAME) {
@@ -511,8 +531,8 @@ impl<'s> Player<'s> {
                 course.followed.clear();
                 self.name_columns();
             }
-            Order::Record => course.recording = Some(Recording::default()),
-            Order::Show(field, component) => self.show_field(field, component),
+            Order::Record => course.begin_recording(),
+            Order::Show(view) => self.show_another(*view, sent),
             Order::Memory(every) => course.in_memory = every,
             Order::Quit => return Some(Left::Quit),
         }
@@ -561,23 +581,29 @@ impl<'s> Player<'s> {
         self.course.seen.at = None;
     }
 
-    fn show_field(&mut self, field: Option<FieldName>, component: Option<&'static str>) {
-        let part = component.map(|part| format!(":{part}")).unwrap_or_default();
-        let name = field.map(|field| format!("{}{part}", field.name()));
-        self.show_named(name.as_deref());
+    fn show_another(&mut self, view: ViewTable, sent: Instant) {
+        let (before, now) = (Surface::of(&self.course.view), Surface::of(&view));
+        self.course.view = view;
+        self.show_as_viewed();
+        if before != now {
+            self.course.record(self.live.delay() > 0, sent, Done::Surface(now));
+            if let Err(message) = self.renew_subject() {
+                self.course.failure.get_or_insert(message);
+            }
+        }
     }
 
-    fn show_named(&mut self, name: Option<&str>) {
-        let field = name.and_then(|name| FieldName::of_name(name.split(':').next().unwrap_or(name)));
-        let mut shown = self.stage.scene.shown(1.0);
-        shown.data = vec![FieldName::Displacement];
-        shown.data.extend(field.filter(|field| *field != FieldName::Displacement));
-        if shown.curved.is_none() {
-            shown.at = At::Points;
-        }
-        self.live.show(&shown);
-        self.course.seen.at = None;
-        self.course.field = name.map(str::to_owned);
+    fn show_as_viewed(&mut self) {
+        let (scene, course) = (&self.stage.scene, &mut self.course);
+        self.live.show(&scene.shown_as(&course.view, 1.0));
+        let part = course.view.component.map(|part| format!(":{}", part.word())).unwrap_or_default();
+        course.field = scene.field_of(&course.view).map(|field| format!("{}{part}", field.name()));
+        course.seen.at = None;
+    }
+
+    fn renew_subject(&mut self) -> Result<(), String> {
+        self.subject = Arc::new(Subject::new(self.live.mesh().map_err(|failure| failure.message)?));
+        Ok(())
     }
 
     fn step(&mut self) {
@@ -618,6 +644,8 @@ impl<'s> Player<'s> {
                     }
                 }
                 seen.values = course.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
+                seen.critical =
+                    course.view.critical.then(|| critical_cell(mesh)).flatten().map(|(cell, _)| cell);
                 seen.energies = self.live.energies();
             }
             // The last good picture stays.
@@ -684,6 +712,8 @@ impl<'s> Player<'s> {
             course.step_seconds = wall.as_secs_f64() / steps as f64;
         }
         frame.number = course.frames;
+        frame.subject = self.subject.clone();
+        frame.critical = course.seen.critical;
         frame.time = self.live.time();
         frame.steps = course.steps;
         frame.playing = course.is_going();

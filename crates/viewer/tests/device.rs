@@ -160,8 +160,9 @@ fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
     assert!(before > 0, "the first look counts");
     let mut bound = false;
     let mut steps = 0;
+    // A quarter of a second, as between two looks.
     for _ in 0..30 {
-        steps += live.coast(20, Duration::from_secs(1)).unwrap().unwrap();
+        steps += live.coast(8, Duration::from_secs(1)).unwrap().unwrap();
         let points = live.place(PointValue::Size, None).unwrap().unwrap();
         if !std::mem::replace(&mut bound, true) {
             screen.bind(&points);

@@ -376,7 +376,7 @@ fn the_examples_start_and_play() {
         let name = name.as_str();
         let (mut source, folder) = pliant_scene::open(&scenes.join(name)).unwrap();
         let settings: &[(&[&str], f64)] = match name {
-            "colon" => &[(&["body", "colon", "mesh", "edge"], 0.012)],
+            "colon" => &[(&["body", "colon", "mesh", "edge"], 0.008)],
             "liver" => {
                 &[(&["body", "liver", "mesh", "edge"], 0.04), (&["surface", "skin", "mesh", "edge"], 0.03)]
             }

@@ -75,7 +75,7 @@ impl App {
 
     /// The field that is shown, with its component.
     fn shown_name(&self) -> Option<String> {
-        let part = self.component.map(|part| format!(":{part}")).unwrap_or_default();
-        self.field.map(|field| format!("{}{part}", field.name()))
+        let part = self.view.component.map(|part| format!(":{}", part.word())).unwrap_or_default();
+        self.field().map(|field| format!("{}{part}", field.name()))
     }
 }

@@ -19,7 +19,7 @@ use eframe::wgpu;
 use pliant_geometry::Vector3;
 use pliant_gpu::Device;
 use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
-use pliant_scene::format::{At, FieldName};
+use pliant_scene::format::{FieldName, ViewTable};
 
 pub use self::errand::Errand;
 use self::errand::Errands;
@@ -38,10 +38,6 @@ pub struct Opening {
     pub style: Style,
     /// From where; target and height are those that fit.
     pub camera: Camera,
-    /// The field that is shown, and a component of it.
-    pub field: Option<FieldName>,
-    /// Component of that field.
-    pub component: Option<&'static str>,
     /// The file of the scene, watched for changes.
     pub file: PathBuf,
     /// Reads a scene, at the start of another one or after a change; the message of what is wrong with it.
@@ -116,8 +112,8 @@ struct App {
     style: Style,
     /// Whether the range stays as it is.
     locked: bool,
-    field: Option<FieldName>,
-    component: Option<&'static str>,
+    /// What is shown of the scene.
+    view: ViewTable,
     cut: Cut,
     /// Whether every frame comes to ordinary memory.
     in_memory: bool,
@@ -148,7 +144,7 @@ struct App {
     looked: Instant,
     read: Arc<dyn Fn(&std::path::Path) -> Result<Stage, String> + Send + Sync>,
     /// A scene that is being read.
-    reading: Option<Receiver<(PathBuf, Result<(Stage, Arc<Subject>), String>)>>,
+    reading: Option<Receiver<(PathBuf, Result<Stage, String>)>>,
     message: Option<String>,
     frame_seconds: f64,
     painted: Instant,
@@ -173,31 +169,28 @@ impl App {
             samples: SAMPLES,
         };
         context.egui_ctx.set_visuals(egui::Visuals::light());
-        let Opening { stage, style, camera, field, component, file, read, record, errand } = opening;
-        let subject = seen(&stage)?;
+        let Opening { stage, style, camera, file, read, record, errand } = opening;
         let session = begin(&stage, &context.egui_ctx)?;
-        place(state, target, &subject);
         let device = device::shared(state, &stage);
-        let mut app = Self {
+        let app = Self {
             target,
             session,
-            frame: Frame { points: subject.points.clone(), ..Frame::default() },
-            points: Arc::new(subject.points.clone()),
+            frame: Frame::default(),
+            points: Arc::default(),
             values: Arc::default(),
             fresh: true,
             numbers: Numbers::of(&stage.scene),
+            view: stage.scene.view.clone(),
             stage,
             home: camera,
             camera,
             locked: style.range.is_some(),
             style,
-            field,
-            component,
-            cut: Cut::new(style.clip, &subject),
+            cut: Cut::new(style.clip),
             in_memory: false,
             device,
-            surface: subject.surface_points(),
-            subject,
+            surface: Vec::new(),
+            subject: Arc::default(),
             picture: Rect::ZERO,
             hover: None,
             stiffness: 200.0,
@@ -223,11 +216,15 @@ impl App {
             record,
             outcome,
         };
-        app.fit();
         if app.record.is_some() {
             app.order(Order::Record);
         }
         Ok(app)
+    }
+
+    /// The field that colours tell.
+    fn field(&self) -> Option<FieldName> {
+        self.stage.scene.field_of(&self.view)
     }
 
     /// What a user should know now: why it cannot go on, what was done last, what the scene warns of.
@@ -283,8 +280,16 @@ impl App {
         if !new {
             return;
         }
+        let first = self.subject.points.is_empty();
+        let renewed = !Arc::ptr_eq(&self.subject, &frame.subject);
+        if renewed {
+            self.subject = frame.subject.clone();
+            self.surface = self.subject.surface_points();
+            self.points = Arc::new(self.subject.points.clone());
+            self.values = Arc::default();
+        }
         // After a failure at the first instant there is nothing but the message.
-        let looked = frame.looks != self.frame.looks;
+        let looked = renewed || frame.looks != self.frame.looks;
         if looked && frame.points.len() == self.subject.points.len() {
             Arc::make_mut(&mut self.points).clone_from(&frame.points);
             Arc::make_mut(&mut self.values).clone_from(&frame.values);
@@ -300,6 +305,9 @@ impl App {
         self.strongest = self.strongest.max(force);
         if looked {
             self.samples.take(&self.frame);
+        }
+        if first {
+            self.fit();
         }
     }
 
@@ -327,7 +335,7 @@ impl App {
         }
         let Some(Ok((path, read))) = self.reading.as_ref().map(|reading| reading.try_recv()) else { return };
         self.reading = None;
-        let replaced = read.and_then(|(stage, subject)| self.replace(path, stage, subject));
+        let replaced = read.and_then(|stage| self.replace(path, stage));
         self.message = Some(replaced.err().unwrap_or_else(|| REPLACED.into()));
     }
 
@@ -335,10 +343,7 @@ impl App {
         let (send, receive) = channel();
         let (read, context) = (self.read.clone(), context.clone());
         let work = move || {
-            let result = read(&path).and_then(|stage| {
-                let subject = seen(&stage)?;
-                Ok((stage, subject))
-            });
+            let result = read(&path);
             // The window may be closed by now.
             let _ = send.send((path, result));
             context.request_repaint();
@@ -350,16 +355,15 @@ impl App {
         }
     }
 
-    fn replace(&mut self, path: PathBuf, mut stage: Stage, subject: Arc<Subject>) -> Result<(), String> {
+    fn replace(&mut self, path: PathBuf, mut stage: Stage) -> Result<(), String> {
         stage.share(self.device.as_ref());
         let before = std::mem::replace(&mut self.session, begin(&stage, &self.context)?);
         // A long step ends in its own time.
         std::thread::spawn(move || drop(before));
-        self.points = Arc::new(subject.points.clone());
-        self.values = Arc::default();
-        let other = path != self.file;
-        self.surface = subject.surface_points();
-        self.subject = subject;
+        if path != self.file {
+            self.view = stage.scene.view.clone();
+            self.subject = Arc::default();
+        }
         self.numbers = Numbers::of(&stage.scene);
         self.forget_probes();
         self.stage = stage;
@@ -367,16 +371,12 @@ impl App {
         self.file = path;
         self.samples.clear();
         self.holding = None;
-        if other {
-            self.fit();
-        }
-        self.fresh = true;
         if self.record.is_some() {
             self.session.order(Order::Record);
         }
         self.frame.looks = 0;
         self.session.order(Order::Memory(self.in_memory));
-        self.session.order(Order::Show(self.field, self.component));
+        self.session.order(Order::Show(Box::new(self.view.clone())));
         self.session.order(Order::Speed(self.speed));
         self.session.order(Order::Play(self.frame.playing));
         Ok(())
@@ -438,14 +438,14 @@ impl eframe::App for App {
         let context = ui.ctx().clone();
         let painted = std::mem::replace(&mut self.painted, Instant::now());
         self.frame_seconds = 0.8 * self.frame_seconds + 0.2 * painted.elapsed().as_secs_f64();
-        let before = Arc::as_ptr(&self.subject);
         self.watch(&context);
-        if before != Arc::as_ptr(&self.subject)
+        let before = self.subject.clone();
+        self.look();
+        if !Arc::ptr_eq(&before, &self.subject)
             && let Some(state) = frame.wgpu_render_state()
         {
             place(state, self.target, &self.subject);
         }
-        self.look();
         self.choose_memory();
         self.keys(&context);
         egui::Panel::top("top").show(ui, |ui| self.top(ui));
@@ -472,20 +472,6 @@ impl eframe::App for App {
             eprintln!("error: `{}` cannot be written: {reason}", path.display());
         }
     }
-}
-
-/// What is drawn of a scene.
-fn seen(stage: &Stage) -> Result<Arc<Subject>, String> {
-    let live = pliant_scene::live(&stage.scene, &stage.built, &stage.plan);
-    let mut live = live.map_err(|failure| failure.message)?;
-    // Of bodies, the way of their fibres and which element sets the step, to be shown at a click.
-    let (scene, mut shown) = (&stage.scene, stage.scene.shown(1.0));
-    if shown.curved.is_none() && shown.on.iter().all(|on| scene.bodies.iter().any(|(name, _)| name == on)) {
-        shown.data.extend([FieldName::Fibre, FieldName::ElementStep]);
-        shown.at = At::Cells;
-        live.show(&shown);
-    }
-    Ok(Arc::new(Subject::new(live.mesh().map_err(|failure| failure.message)?)))
 }
 
 /// Starts to play a scene.

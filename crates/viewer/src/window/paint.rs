@@ -24,6 +24,8 @@ struct Stageset {
 pub struct Paint {
     /// Points on the window's device, drawn from there.
     pub on_device: Option<wgpu::Buffer>,
+    /// The cell that is marked.
+    pub critical: Option<u32>,
     pub points: Arc<Vec<Vector3>>,
     pub values: Arc<Vec<f64>>,
     pub camera: Camera,
@@ -61,6 +63,9 @@ impl CallbackTrait for Paint {
             }
             None if self.fresh => drawn.set(queue, &self.points, &self.values),
             None => {}
+        }
+        if self.style.critical {
+            drawn.mark(queue, subject, self.critical);
         }
         if let Some(plane) = &self.style.clip {
             section.cut(subject, &self.points, &self.values, plane);

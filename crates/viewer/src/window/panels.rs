@@ -3,11 +3,18 @@
 use eframe::egui;
 use pliant_geometry::Vector3;
 use pliant_picture::{ColourMap, Texture};
-use pliant_scene::format::FieldName;
+use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Nothing};
 
 use super::App;
 use crate::hand::Hand;
+use crate::replay::Surface;
 use crate::session::Order;
+
+/// Components of a tensor.
+const TENSOR: [Option<Component>; 6] = {
+    use Component::{Xx, Xy, Xz, Yy, Yz, Zz};
+    [Some(Xx), Some(Yy), Some(Zz), Some(Xy), Some(Yz), Some(Xz)]
+};
 
 impl App {
     pub(super) fn top(&mut self, ui: &mut egui::Ui) {
@@ -41,37 +48,51 @@ impl App {
     }
 
     pub(super) fn side(&mut self, ui: &mut egui::Ui) {
-        ui.heading("Colours");
-        let before = (self.field, self.component);
+        egui::ScrollArea::vertical().show(ui, |ui| {
+            ui.heading("Colours");
+            let mut changed = self.colours(ui);
+            ui.separator();
+            ui.heading("Shape");
+            changed |= self.shape(ui);
+            if changed {
+                self.order(Order::Show(Box::new(self.view.clone())));
+            }
+            ui.separator();
+            ui.heading("Hand");
+            self.hand(ui);
+            ui.separator();
+            self.numbers(ui);
+        });
+    }
+
+    /// What colours tell; whether another field is asked for.
+    fn colours(&mut self, ui: &mut egui::Ui) -> bool {
+        let before = (self.field(), self.view.component);
+        let mut field = before.0;
         let name = |field: Option<FieldName>| field.map_or("tissue", FieldName::title);
-        egui::ComboBox::from_id_salt("field").selected_text(name(self.field)).width(180.0).show_ui(
-            ui,
-            |ui| {
-                ui.selectable_value(&mut self.field, None, name(None));
-                for field in self.fields() {
-                    ui.selectable_value(&mut self.field, Some(field), name(Some(field)));
-                }
-            },
-        );
-        let components: &[&str] = match self.field.map_or(1, FieldName::components) {
-            3 => &["size", "x", "y", "z"],
-            9 => &["xx", "yy", "zz", "xy", "yz", "xz"],
-            _ => &[],
+        egui::ComboBox::from_id_salt("field").selected_text(name(field)).width(180.0).show_ui(ui, |ui| {
+            ui.selectable_value(&mut field, None, name(None));
+            for other in self.fields() {
+                ui.selectable_value(&mut field, Some(other), name(Some(other)));
+            }
+        });
+        let components: &[Option<Component>] = match field.map_or(1, FieldName::components) {
+            3 => &[None, Some(Component::X), Some(Component::Y), Some(Component::Z)],
+            9 => &TENSOR,
+            _ => &[None],
         };
-        if before.0 != self.field {
-            self.component = (components.first() == Some(&"xx")).then_some("xx");
+        if before.0 != field {
+            self.view.colour = Some(field.map_or(ColourBy::Nothing(Nothing::None), ColourBy::Field));
+            self.view.component = components[0];
             self.locked = false;
         }
-        if !components.is_empty() {
+        if components.len() > 1 {
             ui.horizontal_wrapped(|ui| {
                 for &component in components {
-                    let value = (component != "size").then_some(component);
-                    ui.selectable_value(&mut self.component, value, component);
+                    let word = component.map_or("size", Component::word);
+                    ui.selectable_value(&mut self.view.component, component, word);
                 }
             });
-        }
-        if before != (self.field, self.component) {
-            self.order(Order::Show(self.field, self.component));
         }
         egui::ComboBox::from_id_salt("map").selected_text(self.style.map.name()).width(180.0).show_ui(
             ui,
@@ -82,20 +103,31 @@ impl App {
             },
         );
         ui.checkbox(&mut self.locked, "Lock the range").on_hover_text("L");
-        ui.separator();
-        ui.heading("Shape");
+        before != (self.field(), self.view.component)
+    }
+
+    /// What is drawn beside colours; whether another surface is asked for.
+    fn shape(&mut self, ui: &mut egui::Ui) -> bool {
+        let before = Surface::of(&self.view);
+        let scene = &self.stage.scene;
+        let bodies = scene.bodies.iter().map(|(name, _)| name);
+        let names: Vec<&String> = bodies.chain(scene.surfaces.iter().map(|(name, _)| name)).collect();
+        if names.len() > 1 {
+            let shown = self.view.on.clone().unwrap_or_else(|| "all bodies".into());
+            egui::ComboBox::from_id_salt("surface").selected_text(shown).width(180.0).show_ui(ui, |ui| {
+                ui.selectable_value(&mut self.view.on, None, "all bodies");
+                for name in names {
+                    ui.selectable_value(&mut self.view.on, Some(name.clone()), name);
+                }
+            });
+        }
+        if scene.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell) {
+            let parts = egui::Slider::new(&mut self.view.curved, 1..=12).text("parts of an edge");
+            ui.add(parts)
+                .on_hover_text("how finely the curved surface of shells is drawn; 1: flat triangles");
+        }
         ui.checkbox(&mut self.style.edges, "Edges of the elements").on_hover_text("E");
         ui.checkbox(&mut self.style.ghost, "Shape at rest").on_hover_text("G");
-        ui.checkbox(&mut self.style.wireframe, "Wireframe");
-        if self.subject.has_fibres() {
-            ui.checkbox(&mut self.style.fibres, "Fibres");
-        }
-        if self.subject.has_critical_cell() {
-            ui.checkbox(&mut self.style.critical, "Element with the smallest step at rest");
-        }
-        let mut skin = self.style.texture == Texture::Skin;
-        ui.checkbox(&mut skin, "Skin");
-        self.style.texture = if skin { Texture::Skin } else { Texture::None };
         ui.checkbox(&mut self.cut.on, "Section").on_hover_text("C");
         if self.cut.on {
             ui.horizontal(|ui| {
@@ -106,8 +138,18 @@ impl App {
             });
             ui.add(egui::Slider::new(&mut self.cut.part, 0.0..=1.0).show_value(false));
         }
-        ui.separator();
-        ui.heading("Hand");
+        ui.checkbox(&mut self.view.fibres, "Fibres");
+        ui.checkbox(&mut self.view.critical, "Element that sets the step");
+        ui.checkbox(&mut self.style.wireframe, "Wireframe");
+        let mut skin = self.style.texture == Texture::Skin;
+        if ui.checkbox(&mut skin, "Skin").changed() {
+            self.style.texture = if skin { Texture::Skin } else { Texture::None };
+        }
+        (self.style.fibres, self.style.critical) = (self.view.fibres, self.view.critical);
+        before != Surface::of(&self.view)
+    }
+
+    fn hand(&mut self, ui: &mut egui::Ui) {
         ui.add(egui::Slider::new(&mut self.stiffness, 1.0..=5000.0).logarithmic(true).text("N/m"));
         let force = self.frame.held.first().filter(|_| self.holding.is_some());
         ui.label(match force {
@@ -120,13 +162,11 @@ impl App {
                 self.act(Hand::Unpin(pin));
             }
         }
-        ui.separator();
-        self.numbers(ui);
     }
 
     /// The fields that bodies of the scene have.
     pub(super) fn fields(&self) -> Vec<FieldName> {
-        let on = self.stage.scene.view.on.as_ref();
+        let on = self.view.on.as_ref();
         let bodies = self.stage.scene.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
         let models: Vec<_> = bodies.map(|(_, body)| body.model).collect();
         let all = FieldName::ALL.into_iter();

@@ -48,19 +48,23 @@ pub(super) struct Cut {
     pub on: bool,
     pub normal: Vector3,
     pub part: f64,
+    /// Where the scene has it [m], until it is moved.
+    pub offset: Option<f64>,
 }
 
 impl Cut {
     /// The section at a plane; across the middle of x for none.
-    pub fn new(plane: Option<Plane>, subject: &Subject) -> Self {
-        let Some(plane) = plane else { return Self { on: false, normal: Vector3::x(), part: 0.5 } };
-        let [low, high] = extent(subject, &plane.normal);
-        Self { on: true, normal: plane.normal, part: (plane.offset - low) / (high - low).max(1e-12) }
+    pub fn new(plane: Option<Plane>) -> Self {
+        let normal = plane.map_or(Vector3::x(), |plane| plane.normal);
+        Self { on: plane.is_some(), normal, part: 0.5, offset: plane.map(|plane| plane.offset) }
     }
 
     /// Its plane, if it is on.
-    fn plane(&self, subject: &Subject) -> Option<Plane> {
+    fn plane(&mut self, subject: &Subject) -> Option<Plane> {
         let [low, high] = extent(subject, &self.normal);
+        if let Some(offset) = self.offset.take_if(|_| high > low) {
+            self.part = (offset - low) / (high - low);
+        }
         self.on.then_some(Plane { normal: self.normal, offset: low + self.part * (high - low) })
     }
 }
@@ -88,6 +92,7 @@ impl App {
         }
         let paint = Paint {
             on_device: self.on_device().map(|points| points.buffer().clone()),
+            critical: self.frame.critical,
             points: self.points.clone(),
             values: self.values.clone(),
             camera: self.camera,
@@ -248,7 +253,7 @@ impl App {
     }
 
     fn draw_scale(&self, painter: &egui::Painter, rect: Rect) {
-        let (Some([low, high]), Some(field)) = (self.style.range, self.field) else { return };
+        let (Some([low, high]), Some(field)) = (self.style.range, self.field()) else { return };
         let (unit, factor) = pliant_picture::readable(field.unit(), low.abs().max(high.abs()));
         let bar = Rect::from_min_max(
             rect.right_top() + vec2(-78.0, 70.0),
@@ -256,7 +261,7 @@ impl App {
         );
         let ink = self.ink();
         self.card(painter, Rect::from_min_max(bar.min - vec2(36.0, 46.0), bar.max + vec2(52.0, 8.0)));
-        let component = self.component.map(|part| format!(" {part}")).unwrap_or_default();
+        let component = self.view.component.map(|part| format!(" {}", part.word())).unwrap_or_default();
         let head = format!("{}{component}", field.title());
         let right = Pos2::new(rect.right() - 12.0, bar.top() - 34.0);
         painter.text(right, Align2::RIGHT_CENTER, head, FontId::proportional(14.0), ink);
