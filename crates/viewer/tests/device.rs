@@ -9,7 +9,7 @@ use pliant_geometry::Vector3;
 use pliant_gpu::{Device, DevicePoints, PointValue};
 use pliant_picture::{Camera, Drawn, Plane, Renderer, Section, Style, Subject, Target};
 use pliant_scene::Live;
-use pliant_scene::format::FieldName;
+use pliant_scene::format::{ColourBy, FieldName, ViewTable};
 use pliant_viewer::{Frame, Hand, Order, Point, Session, Stage};
 use support::{BALL, stage, subject, wait};
 
@@ -242,6 +242,7 @@ fn frames(session: &mut Session, looks: u64) -> Vec<Frame> {
 fn a_session_reads_back_at_its_looks_and_at_no_frame_between() {
     let Some(stage) = on_device() else { return };
     let device = stage.plan.target.device.clone().unwrap();
+    let view = stage.scene.view.clone();
     let subject = subject(&stage);
     let mut screen = Screen::new(&device, &subject);
     let mut session = Session::start(stage, || ()).unwrap();
@@ -266,7 +267,8 @@ fn a_session_reads_back_at_its_looks_and_at_no_frame_between() {
     assert!(frames.last().unwrap().steps > frames[0].steps);
     // A section needs points in memory at every frame, a field other than displacements at the looks.
     session.order(Order::Memory(true));
-    session.order(Order::Show(Some(FieldName::VonMises), None));
+    let colour = Some(ColourBy::Field(FieldName::VonMises));
+    session.order(Order::Show(Box::new(ViewTable { colour, ..view })));
     let shown = wait(&mut session, |frame| frame.values.iter().any(|value| *value > 0.0));
     let next = wait(&mut session, |frame| frame.number > shown.number + 3);
     assert!(next.looks >= shown.looks + 3, "{} looks in 4 frames", next.looks - shown.looks);
