@@ -277,10 +277,7 @@ impl Drawn {
         let rest_points: Vec<[f32; 4]> = subject.points.iter().map(|point| staged(point, f64::NAN)).collect();
         let section = storage::<Corner>(device, &[]);
         let surface_fibres = subject.fibres.surface.clone();
-        let marked = subject.critical.map(|cell| subject.outline(cell)).unwrap_or_default();
-        let mark_lines = marked.len() as u32;
-        let mut first = [Line::default(); MOST_EDGES];
-        first[..marked.len()].copy_from_slice(&marked);
+        let first = [Line::default(); MOST_EDGES];
         let lines = storage(device, &[&first[..], &surface_fibres].concat());
         let rest = storage(device, &rest_points);
         let pose = |points: wgpu::Buffer| {
@@ -332,8 +329,8 @@ impl Drawn {
             section_corners: 0,
             lines,
             first,
-            marked: subject.critical,
-            mark_lines,
+            marked: None,
+            mark_lines: 0,
             surface_fibres,
             section_fibres: 0,
             corners: 3 * subject.triangles.len() as u32,
@@ -386,7 +383,7 @@ impl Drawn {
         }
     }
 
-    /// Marks a cell instead of the one that was critical in the mesh of the subject (see [`critical_cell`](crate::critical_cell)), or none.
+    /// Marks a cell (see [`critical_cell`](crate::critical_cell)), or none.
     pub fn mark(&mut self, queue: &wgpu::Queue, subject: &Subject, cell: Option<u32>) {
         if cell == self.marked {
             return;

@@ -25,8 +25,6 @@ pub struct Subject {
     /// Cells with a face: kind and nodes.
     cells: Vec<(CellKind, Vec<u32>)>,
     pub(crate) fibres: Fibres,
-    /// The cell with the smallest stable step in the mesh that it was made of.
-    pub(crate) critical: Option<u32>,
 }
 
 impl Subject {
@@ -65,8 +63,7 @@ impl Subject {
         }
         let cells: Vec<_> = shown_blocks(mesh).map(|block| (block.kind, block.nodes.clone())).collect();
         let fibres = Fibres::new(mesh, &cells);
-        let critical = critical_cell(mesh).map(|(cell, _)| cell);
-        Self { points: mesh.points.clone(), triangles, vertices, offsets, around, cells, fibres, critical }
+        Self { points: mesh.points.clone(), triangles, vertices, offsets, around, cells, fibres }
     }
 
     /// Whether its cells have fibres (the field `fibre` of its mesh).

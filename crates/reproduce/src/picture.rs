@@ -111,7 +111,10 @@ mod drawn {
         let subjects: Vec<Subject> = bodies.iter().map(|body| Subject::new(body.mesh)).collect();
         let frames: Vec<Frame> = bodies.iter().map(frame).collect();
         let seen = || subjects.iter().zip(&frames).map(|(subject, frame)| (subject.surface_points(), frame));
-        let (camera, height) = camera(view, seen());
+        let still = |body: &Body<'_>| Frame { points: body.mesh.points.clone(), ..Frame::default() };
+        let resting: Vec<Frame> = bodies.iter().map(still).collect();
+        let rest = subjects.iter().zip(&resting).map(|(subject, frame)| (subject.surface_points(), frame));
+        let (camera, height) = camera(view, seen().chain(rest));
         let shown = || {
             let values = seen()
                 .flat_map(|(points, frame)| points.into_iter().filter_map(|p| frame.values.get(p as usize)));
