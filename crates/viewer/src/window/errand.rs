@@ -186,11 +186,8 @@ fn covering(app: &App, [x, y]: [f64; 2], aspect: f64) -> Option<u32> {
         let areas = [cross(b, c), cross(c, a), cross(a, b)];
         let weights = areas.map(|area| area / areas.iter().sum::<f64>());
         let least = weights.into_iter().fold(f64::INFINITY, f64::min);
-        if !(least >= 0.0) {
-            continue;
-        }
         let depth = depth(camera, &corners, &weights);
-        if nearest.is_none_or(|(known, ..)| depth < known) {
+        if least >= 0.0 && nearest.is_none_or(|(known, ..)| depth < known) {
             nearest = Some((depth, number, least));
         }
     }

@@ -9,7 +9,7 @@ mod picture;
 mod plots;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
@@ -30,6 +30,9 @@ use crate::hand::{Hand, Point};
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session, Stage};
 
+/// Reads a scene; the message of what is wrong with it.
+pub type Read = Arc<dyn Fn(&Path) -> Result<Stage, String> + Send + Sync>;
+
 /// What a window opens with.
 pub struct Opening {
     /// The scene.
@@ -40,8 +43,8 @@ pub struct Opening {
     pub camera: Camera,
     /// The file of the scene, watched for changes.
     pub file: PathBuf,
-    /// Reads a scene, at the start of another one or after a change; the message of what is wrong with it.
-    pub read: Arc<dyn Fn(&std::path::Path) -> Result<Stage, String> + Send + Sync>,
+    /// Reads a scene, at the start of another one or after a change.
+    pub read: Read,
     /// Where what the hand did is written when the window closes or the scene starts anew.
     pub record: Option<PathBuf>,
     /// What it does by itself before it closes; without, it stays open.
@@ -142,7 +145,7 @@ struct App {
     file: PathBuf,
     changed: Option<SystemTime>,
     looked: Instant,
-    read: Arc<dyn Fn(&std::path::Path) -> Result<Stage, String> + Send + Sync>,
+    read: Read,
     /// A scene that is being read.
     reading: Option<Receiver<(PathBuf, Result<Stage, String>)>>,
     message: Option<String>,
@@ -229,9 +232,9 @@ impl App {
 
     /// What a user should know now: why it cannot go on, what was done last, what the scene warns of.
     fn banner(&self) -> Option<String> {
-        let warnings = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
+        let mut warnings = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
         let told = self.frame.failure.clone().or_else(|| self.message.clone());
-        told.or_else(|| self.frame.note.clone()).or_else(|| warnings.last())
+        told.or_else(|| self.frame.note.clone()).or_else(|| warnings.next_back())
     }
 
     /// The scene's title, or the name of its file.
@@ -480,6 +483,6 @@ fn begin(stage: &Stage, context: &egui::Context) -> Result<Session, String> {
     Session::start(stage.clone(), move || context.request_repaint()).map_err(|error| error.to_string())
 }
 
-fn modified(path: &std::path::Path) -> Option<SystemTime> {
+fn modified(path: &Path) -> Option<SystemTime> {
     std::fs::metadata(path).ok()?.modified().ok()
 }

@@ -9,6 +9,9 @@ use super::App;
 use crate::parameters::{Number, Parameter, parameters, with_numbers};
 use crate::session::{Order, Stage};
 
+/// Some numbers, and where the stage that is made of them comes from.
+type Making = (Vec<f64>, Receiver<Result<Stage, String>>);
+
 /// The numbers that can be changed.
 pub(super) struct Numbers {
     all: Vec<Parameter>,
@@ -16,7 +19,7 @@ pub(super) struct Numbers {
     /// Those of the stage that is played, or waits to be.
     accepted: Vec<f64>,
     /// A stage that is being made of some numbers.
-    making: Option<(Vec<f64>, Receiver<Result<Stage, String>>)>,
+    making: Option<Making>,
 }
 
 impl Numbers {
