@@ -90,6 +90,13 @@ impl Work {
         (self.external, self.at_start) = (kinetic, shock);
     }
 
+    /// Goes on with another model: a law that is stiffer at once strikes the body as a load would. The balance is judged again from when it
+    /// has held once. `gained` is the kinetic energy [J] of mass that came.
+    pub fn shake(&mut self, gained: f64) {
+        self.external += gained;
+        (self.shaken, self.steps_off_balance) = (true, 0);
+    }
+
     /// Enters the sums of an instant, `before` seconds after the one before; `None` at the start. Judged above `floor`.
     pub fn settle(&mut self, sums: &Sums, hourglass: f64, before: Option<f64>, floor: f64) -> Energies {
         if let Some(before) = before {
@@ -110,7 +117,8 @@ impl Work {
         };
         let balance = missing / self.largest.max(floor);
         let off = self.largest > floor && balance > BALANCE_LIMIT;
-        self.steps_off_balance = if off { self.steps_off_balance + 1 } else { 0 };
+        self.shaken &= off;
+        self.steps_off_balance = if off && !self.shaken { self.steps_off_balance + 1 } else { 0 };
         Energies {
             kinetic: sums.kinetic,
             internal,

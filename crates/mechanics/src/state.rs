@@ -85,6 +85,8 @@ pub struct Work {
     pub(crate) at_start: f64,
     /// Steps in a row that were off balance.
     pub(crate) steps_off_balance: u32,
+    /// Whether the model was changed, and the energies have not been balanced since.
+    pub(crate) shaken: bool,
     /// First half of the internal work of the step under way.
     pub(crate) pending_internal: f64,
     /// First half of the external work of the step under way.
@@ -127,7 +129,7 @@ impl<R: Real> State<R> {
             .iter()
             .enumerate()
             .map(|(node, u)| 0.5 * (to.inertia(node) - from.inertia(node)) * speed_squared(u));
-        self.work.external += gained.sum::<f64>();
+        self.work.shake(gained.sum::<f64>());
         self.stability.forget();
         self.reference.fill([R::ZERO; 3]);
     }

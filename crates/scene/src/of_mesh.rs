@@ -137,7 +137,8 @@ mod tests {
         let whole = bar(1e-3);
         let (skin, _) = boundary(&whole).to_mesh(&whole.points);
         let (made, built) = opened("bar.stl", &skin);
-        for piece in ["`bar.stl`", "millimetres", "0.12 m along y", "E = 5 kPa", "filled with tets of 0.01 m"]
+        for piece in
+            ["`bar.stl`", "millimetres", "0.1200 m along y", "E = 5 kPa", "filled with tets of 0.01000 m"]
         {
             assert!(made.assumed.contains(piece), "no `{piece}` in {}", made.assumed);
         }
