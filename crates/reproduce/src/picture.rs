@@ -9,6 +9,7 @@ use crate::case::Figure;
 
 /// A body in a certain state.
 #[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "only pictures read it"))]
+#[derive(Clone)]
 pub(crate) struct Body<'a> {
     pub label: String,
     pub mesh: &'a Mesh,
@@ -17,6 +18,8 @@ pub(crate) struct Body<'a> {
     pub value: Option<Vec<f64>>,
     /// Whether the edges of the faces are drawn.
     pub edges: bool,
+    /// Whether it has the texture of moist tissue.
+    pub skin: bool,
 }
 
 impl<'a> Body<'a> {
@@ -28,6 +31,7 @@ impl<'a> Body<'a> {
             displacement: vec![[0.0; 3]; mesh.points.len()],
             value: None,
             edges: true,
+            skin: false,
         }
     }
 }
@@ -81,7 +85,7 @@ mod drawn {
     use pliant_geometry::io::encode_base64;
     use pliant_picture::{
         Axis, Background, Camera, ColourMap, Frame, Graphics, PictureError, Projection, Studio, Style,
-        Subject,
+        Subject, Texture,
     };
 
     use super::{Body, CaseError, View};
@@ -137,6 +141,7 @@ mod drawn {
             let style = Style {
                 range: (coloured && body.value.is_some()).then_some(scale),
                 edges: body.edges,
+                texture: if body.skin { Texture::Skin } else { Texture::None },
                 ghost: body.displacement.iter().flatten().any(|u| *u != 0.0),
                 background: Background::White,
                 ..Style::default()

@@ -244,6 +244,8 @@ struct Course {
     step_seconds: f64,
     frames: u64,
     shown: Instant,
+    /// Wall time that the last frame took to prepare.
+    prepared: Duration,
     recording: Option<Recording>,
     /// When the first move was recorded.
     started: Option<Instant>,
@@ -349,6 +351,7 @@ impl Course {
             step_seconds: 0.0,
             frames: 0,
             shown: Instant::now(),
+            prepared: Duration::ZERO,
             recording: None,
             started: None,
             change: None,
@@ -381,6 +384,11 @@ impl Course {
         if surface != self.usual {
             self.record(false, Instant::now(), Done::Surface(surface));
         }
+    }
+
+    /// Wall time between frames: long enough that three quarters of it are left for steps.
+    fn interval(&self) -> Duration {
+        FRAME.max(4 * self.prepared)
     }
 
     fn is_going(&self) -> bool {
@@ -485,7 +493,7 @@ impl<'s> Player<'s> {
                 }
             }
             let still = !self.course.is_going() && self.course.owed == 0;
-            if changed && (still || self.course.shown.elapsed() >= FRAME) {
+            if changed && (still || self.course.shown.elapsed() >= self.course.interval()) {
                 self.show(frames);
                 wake();
                 changed = false;
@@ -506,7 +514,7 @@ impl<'s> Player<'s> {
         if !course.is_going() {
             return long;
         }
-        let due = if changed { FRAME.saturating_sub(course.shown.elapsed()) } else { long };
+        let due = if changed { course.interval().saturating_sub(course.shown.elapsed()) } else { long };
         let ahead = (self.live.time() - course.pace.goal()) / course.pace.speed.max(1e-9);
         Duration::try_from_secs_f64(ahead.max(0.0)).unwrap_or(due).min(due)
     }
@@ -725,7 +733,8 @@ impl<'s> Player<'s> {
         frame.input_lag = course.input_lag;
         frame.failure.clone_from(&course.failure);
         frame.note.clone_from(&course.note);
-        frame.prepare_seconds = started.elapsed().as_secs_f64();
+        course.prepared = started.elapsed();
+        frame.prepare_seconds = course.prepared.as_secs_f64();
         course.frames += 1;
         frames.publish();
     }
