@@ -47,25 +47,7 @@ fn view(workshop: &Workshop, screen: &Screen, more: &[&str]) -> Told {
 }
 
 /// A ball that is held at one end and damped, so that it comes to rest where it is pulled.
-const BALL: &str = r#"[scene]
-title = "A ball"
-until = 100
-[run]
-threads = 1
-[law.tissue]
-type = "neo-hookean"
-young-modulus = 5e3
-poisson-ratio = 0.4
-[body.ball]
-mesh = { ellipsoid = { radii = [0.05, 0.04, 0.03] }, edge = 0.012 }
-law = "tissue"
-density = 1000
-damping = 60
-[constraint.base]
-type = "fix"
-body = "ball"
-nodes = { half-space = { point = [-0.03, 0, 0], normal = [-1, 0, 0] } }
-"#;
+const BALL: &str = include_str!("../../viewer/tests/support/ball.toml");
 
 #[test]
 fn the_window_draws_picks_pins_and_pulls_and_what_holds_the_body_holds_against_the_hand() {

@@ -3,7 +3,7 @@
 //! meets all alike; the median counts.
 
 use pliant_bench::{Clocked, ClockedOnDevice, Spread, Timed};
-use pliant_gpu::{Design, Device, GpuError, Kind};
+use pliant_gpu::{Design, Device, GpuError};
 use pliant_mechanics::State;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::model::Material;
@@ -12,6 +12,7 @@ use pliant_meshing::VolumeCell;
 use serde_json::json;
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};
+use crate::cases::told;
 use crate::plot::{Curve, Key, Pen, Plot};
 use crate::{Specimen, elastic, law, liver, liver_matrix, liver_relaxation};
 
@@ -187,8 +188,7 @@ fn compute() -> Result<Findings, CaseError> {
     match Device::open(None) {
         Ok(device) => {
             let adapter = device.adapter();
-            let software = if adapter.kind == Kind::Software { ", the processor in disguise" } else { "" };
-            let detail = format!(" ({}{software})", adapter.name);
+            let detail = format!(" ({})", told(adapter));
             let on_device = Series::measure("graphics processor", detail, Some(&device))?;
             on_device.add_figures(&mut findings)?;
             on_device.add_rows(&mut findings);

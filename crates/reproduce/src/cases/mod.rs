@@ -15,6 +15,8 @@ pub mod relaxation;
 pub mod shear;
 pub mod shell_times;
 
+use pliant_gpu::{Adapter, Kind};
+
 use crate::case::{Case, Correction};
 
 /// All cases.
@@ -39,6 +41,12 @@ pub const CASES: &[Case] = &[
     reconstruction::ANEURYSM,
     shell_times::CASE,
 ];
+
+/// The name of an adapter, and whether it is one at all.
+fn told(adapter: &Adapter) -> String {
+    let software = if adapter.kind == Kind::Software { ", the processor in disguise" } else { "" };
+    format!("{}{software}", adapter.name)
+}
 
 /// The thesis's factor 2, which every case with fibres meets.
 const FIBRE_FACTOR: Correction = Correction {

@@ -4,12 +4,13 @@
 use std::time::{Duration, Instant};
 
 use pliant_geometry::Mesh;
-use pliant_gpu::{Device, GpuError, Kind, PointValue};
+use pliant_gpu::{Device, GpuError, PointValue};
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{Built, Plan, Scene, live};
 
 use crate::CaseError;
 use crate::case::{Case, Findings, Row};
+use crate::cases::told;
 use crate::picture::{Body, View, figure};
 
 /// Figure 6.8.
@@ -118,9 +119,7 @@ fn compute() -> Result<Findings, CaseError> {
     cube.add_rows(&mut findings, "cube, all cores", 1.0);
     match Device::open(None) {
         Ok(device) => {
-            let adapter = device.adapter();
-            let software = if adapter.kind == Kind::Software { ", the processor in disguise" } else { "" };
-            let name = format!("cube, graphics processor ({}{software})", adapter.name);
+            let name = format!("cube, graphics processor ({})", told(device.adapter()));
             play(CUBE, 1.0, &[(&["run", "device"], "gpu".into())])?.add_rows(&mut findings, &name, 1.0);
         }
         Err(GpuError::NoAdapter) => {}

@@ -87,11 +87,13 @@ impl CallbackTrait for Paint {
     }
 }
 
-/// Brings what is drawn to the device.
+/// Brings what is drawn to the device; pipelines are compiled for the first subject.
 pub fn place(state: &egui_wgpu::RenderState, target: Target, subject: &Arc<Subject>) {
-    let renderer = Renderer::new(&state.device, target);
+    let resources = &mut state.renderer.write().callback_resources;
+    let known = resources.remove::<Stageset>();
+    let renderer = known.map_or_else(|| Renderer::new(&state.device, target), |stageset| stageset.renderer);
     let drawn = Drawn::new(&state.device, &renderer, subject);
     let stageset =
         Stageset { renderer, drawn, section: Section::default(), subject: subject.clone(), bound: None };
-    state.renderer.write().callback_resources.insert(stageset);
+    resources.insert(stageset);
 }

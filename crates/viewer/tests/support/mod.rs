@@ -10,25 +10,7 @@ use pliant_scene::source::Source;
 use pliant_viewer::{Frame, Session, Stage};
 
 /// A ball held at one end.
-pub const BALL: &str = r#"
-[scene]
-until = 100
-[run]
-threads = 1
-[law.tissue]
-type = "neo-hookean"
-young-modulus = 5e3
-poisson-ratio = 0.4
-[body.ball]
-mesh = { ellipsoid = { radii = [0.05, 0.04, 0.03] }, edge = 0.012 }
-law = "tissue"
-density = 1000
-damping = 60
-[constraint.base]
-type = "fix"
-body = "ball"
-nodes = { half-space = { point = [-0.03, 0, 0], normal = [-1, 0, 0] } }
-"#;
+pub const BALL: &str = include_str!("ball.toml");
 
 /// The organ and the relaxing tissue of the example, of larger cells.
 pub const LIVER: &str = r#"
