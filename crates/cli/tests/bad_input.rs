@@ -918,3 +918,31 @@ fn a_rule_for_fibres_that_fails_is_shown_where_it_is_written() {
         spoilt("fibre = [0, 1, 0]", &format!("fibre = {rule}"), &[says]);
     }
 }
+
+/// 5,000 terms, each wrong: 152 MB were printed.
+#[test]
+fn a_flood_of_mistakes_is_shown_in_a_few_kilobytes() {
+    let terms = format!("prony = [{}]", "1, ".repeat(5000));
+    let scene = changed(BLOCK, r#"prony = [{ part = "isochoric", weight = 0.3, time = 0.5 }]"#, &terms);
+    let told = Workshop::new(&scene).run(&[]);
+    assert_invalid(&told, &["prony"]);
+    assert!(told.err.len() + told.out.len() < 100_000, "{} bytes", told.err.len() + told.out.len());
+}
+
+/// Names and titles of a scene from somewhere else neither reach the terminal as codes nor a page as HTML.
+#[test]
+fn codes_for_terminals_and_html_are_shown_not_obeyed() {
+    const TITLE: &str = r#"[scene]
+title = "\u001b]0;mine\u0007<script>alert(1)</script>""#;
+    let codes = |text: &str| text.contains(['\u{1b}', '\u{7}', '\u{9b}']);
+    let workshop = Workshop::new(&changed(BLOCK, "[scene]", TITLE));
+    let told = workshop.run(&[]);
+    assert!(told.code == 0 && !codes(&told.err) && !codes(&told.out), "{}", told.err);
+    let page = workshop.read("out/case/summary.md");
+    assert!(!codes(&page) && !page.contains("<script") && page.contains("&lt;script>"), "{page}");
+    for bad in ["\"\\u001b[2J\" = 1", "# \u{9b}2J\nuntill = 1", "\u{202e} = 1"] {
+        let told = Workshop::new(&changed(BLOCK, "[scene]", &format!("[scene]\n{bad}"))).run(&[]);
+        assert!(told.code == 2 && !codes(&told.err) && !codes(&told.out), "{}", told.err);
+        assert!(!told.err.contains('\u{202e}'), "{}", told.err);
+    }
+}

@@ -6,6 +6,11 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{Format, MeshFileError, read_bytes};
 
+#[path = "support/noise.rs"]
+mod noise;
+
+use noise::{Noise, peak};
+
 /// Memory that reading may add [KiB]; the files are below 64 KiB.
 const MOST: u64 = 64 << 10;
 
@@ -25,51 +30,6 @@ fn files(name: &str) -> Vec<(String, Format, Vec<u8>)> {
         .collect();
     found.sort_by(|a, b| a.0.cmp(&b.0));
     found
-}
-
-/// Largest memory that this process has held [KiB], where Linux tells.
-fn peak() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?.parse().ok()
-}
-
-/// Knuth's multiplier, for repeatable noise.
-struct Noise(u64);
-
-impl Noise {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 33) as usize % limit.max(1)
-    }
-
-    fn change(&mut self, seed: &[u8]) -> Vec<u8> {
-        let mut bytes = seed.to_vec();
-        for _ in 0..1 + self.below(4) {
-            let at = self.below(bytes.len());
-            match self.below(6) {
-                0 => bytes.truncate(at),
-                1 => {
-                    let to = (at + self.below(24)).min(bytes.len());
-                    bytes.drain(at..to);
-                }
-                2 => {
-                    let value = [0, 0x7F, 0x80, 0xFF, b' ', b'9', b'-', b'"'][self.below(8)];
-                    let to = (at + 1 + self.below(8)).min(bytes.len());
-                    bytes[at.min(to)..to].fill(value);
-                }
-                3 => {
-                    let again = bytes[at..(at + self.below(16)).min(bytes.len())].to_vec();
-                    bytes.splice(at..at, again);
-                }
-                _ => {
-                    if let Some(byte) = bytes.get_mut(at) {
-                        *byte ^= 1 << self.below(8);
-                    }
-                }
-            }
-        }
-        bytes
-    }
 }
 
 #[test]

@@ -309,10 +309,14 @@ impl Checkpoint {
             file = all.into_iter().last().ok_or_else(|| ResumeError::NoneIn { path: path.to_owned() })?.1;
         }
         let bytes = fs::read(&file).map_err(|error| unreadable(&file, error))?;
-        Self::decode(&file, &bytes)
+        Self::from_bytes(&file, &bytes)
     }
 
-    fn decode(path: &Path, bytes: &[u8]) -> Result<Self, ResumeError> {
+    /// The checkpoint that the bytes of a file are; errors name `path`.
+    ///
+    /// # Errors
+    /// If they are none, are of another format, or are not as they were written.
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ResumeError> {
         let path = path.to_owned();
         let found = bytes.len() as u64;
         let start = bytes.len().min(MAGIC.len());
@@ -343,6 +347,17 @@ impl Checkpoint {
             }
             Err(_) => Err(ResumeError::Damaged { path }),
         }
+    }
+
+    /// The bytes of a file with this body: magic, format and length before it, the CRC-32 after it.
+    pub fn framed(body: &[u8]) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(HEAD + body.len() + CRC);
+        bytes.extend(MAGIC);
+        bytes.extend(FORMAT.to_le_bytes());
+        bytes.extend((body.len() as u64).to_le_bytes());
+        bytes.extend(body);
+        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+        bytes
     }
 
     /// The file.
@@ -460,16 +475,8 @@ fn encode<R: Real>(
     state: &State<R>,
     memory: &Memory<R>,
 ) -> postcard::Result<Vec<u8>> {
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend(FORMAT.to_le_bytes());
-    bytes.extend([0; 8]);
     // As the fields of a [`Moment`], one after the other.
-    let mut bytes = postcard::to_extend(&(origin, progressed, state, memory), bytes)?;
-    let length = (bytes.len() - HEAD) as u64;
-    bytes[12..HEAD].copy_from_slice(&length.to_le_bytes());
-    let crc = crc32fast::hash(&bytes);
-    bytes.extend(crc.to_le_bytes());
-    Ok(bytes)
+    Ok(Checkpoint::framed(&postcard::to_stdvec(&(origin, progressed, state, memory))?))
 }
 
 const PREFIX: &str = "checkpoint-";
@@ -527,10 +534,10 @@ mod tests {
     fn every_truncation_and_every_flipped_bit_is_refused() {
         let whole = small();
         let path = Path::new("x.pliant");
-        let read = Checkpoint::decode(path, &whole).unwrap();
+        let read = Checkpoint::from_bytes(path, &whole).unwrap();
         assert_eq!(read.time(), 0.05);
         for length in 0..whole.len() {
-            let error = Checkpoint::decode(path, &whole[..length]).unwrap_err();
+            let error = Checkpoint::from_bytes(path, &whole[..length]).unwrap_err();
             let truncated = matches!(error, ResumeError::Truncated { .. });
             assert!(truncated || (length == 0 && matches!(error, ResumeError::NotACheckpoint { .. })));
         }
@@ -538,7 +545,7 @@ mod tests {
             for bit in 0..8 {
                 let mut flipped = whole.clone();
                 flipped[place] ^= 1 << bit;
-                let error = Checkpoint::decode(path, &flipped).unwrap_err();
+                let error = Checkpoint::from_bytes(path, &flipped).unwrap_err();
                 let fits = match place {
                     0..8 => matches!(error, ResumeError::NotACheckpoint { .. }),
                     8..12 => matches!(error, ResumeError::OtherFormat { .. }),
@@ -549,7 +556,7 @@ mod tests {
             }
         }
         let longer = [whole.as_slice(), b"x"].concat();
-        assert!(matches!(Checkpoint::decode(path, &longer), Err(ResumeError::Damaged { .. })));
+        assert!(matches!(Checkpoint::from_bytes(path, &longer), Err(ResumeError::Damaged { .. })));
     }
 
     /// A body whose checksum was made to fit must not bring the program down either.
@@ -558,12 +565,10 @@ mod tests {
         let whole = small();
         let built = built(CHECKPOINTED);
         for place in HEAD..whole.len() - CRC {
-            let mut forged = whole.clone();
-            forged[place] = forged[place].wrapping_add(0x7f);
-            let end = forged.len() - CRC;
-            let crc = crc32fast::hash(&forged[..end]).to_le_bytes();
-            forged[end..].copy_from_slice(&crc);
-            if let Ok(read) = Checkpoint::decode(Path::new("x.pliant"), &forged) {
+            let mut body = whole[HEAD..whole.len() - CRC].to_vec();
+            body[place - HEAD] = body[place - HEAD].wrapping_add(0x7f);
+            let forged = Checkpoint::framed(&body);
+            if let Ok(read) = Checkpoint::from_bytes(Path::new("x.pliant"), &forged) {
                 let _ = read.moment::<f32>(&built);
                 let _ = read.moment::<f64>(&built);
             }

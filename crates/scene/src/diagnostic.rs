@@ -1,13 +1,28 @@
 //! What a user is told about a mistake in a scene: a message, the place in the user's own file, what to try.
 //!
-//! All mistakes of a file are collected and shown together. [`SceneErrors`] is what a command line prints: through
-//! miette's graphical handler with the lines underlined, or one mistake a line with [`SceneErrors::plain`].
+//! All mistakes of a file are collected; the first [`MOST_SHOWN`] are shown together. [`SceneErrors`] is what a command
+//! line prints: through miette's graphical handler with the lines underlined, or one mistake a line with
+//! [`SceneErrors::plain`]. Nothing in it makes a terminal do anything, and no line or value is shown at any length.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-use miette::{LabeledSpan, NamedSource, SourceCode};
+use miette::{
+    LabeledSpan, MietteError, MietteSpanContents, NamedSource, SourceCode, SourceSpan, SpanContents,
+};
+
+use crate::printable::{printable, shortened};
+
+/// Mistakes that are shown of one scene; the others are counted.
+pub const MOST_SHOWN: usize = 20;
+
+/// Bytes of one place that are underlined.
+const LONGEST_PLACE: usize = 200;
+
+/// Bytes of the user's text that are shown before and after a place.
+const REACH: usize = 200;
 
 /// "1 element", "2 elements".
 pub(crate) fn counted(n: usize, noun: &str) -> String {
@@ -191,26 +206,78 @@ impl miette::Diagnostic for Diagnostic {
 /// finding, their number where there are several. Logs want [`plain`](Self::plain).
 #[derive(Debug, Clone)]
 pub struct SceneErrors {
-    source: NamedSource<Arc<str>>,
+    source: NamedSource<Excerpts>,
     diagnostics: Vec<Diagnostic>,
+}
+
+/// The scene's text, of which handlers see at most [`REACH`] bytes of the lines around a place.
+#[derive(Debug, Clone)]
+struct Excerpts(Arc<str>);
+
+impl SourceCode for Excerpts {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        before: usize,
+        after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let text: &str = &self.0;
+        let lines = text.read_span(span, before, after)?;
+        let (first, place_end) = (lines.span().offset(), span.offset() + span.len());
+        let last = first + lines.span().len();
+        // Handlers ask for two places at once; those with much text between them are shown apart.
+        if place_end - span.offset() > 2 * LONGEST_PLACE {
+            return Err(MietteError::OutOfBounds);
+        }
+        let line_start = text[..span.offset()].rfind('\n').map_or(0, |at| at + 1).max(first);
+        let line_end = text[place_end..last].find('\n').map_or(last, |at| place_end + at);
+        let from = match () {
+            () if span.offset() - line_start > REACH => text.ceil_char_boundary(span.offset() - REACH),
+            () if line_start - first > REACH => line_start,
+            () => first,
+        };
+        let to = match () {
+            () if line_end - place_end > REACH => text.floor_char_boundary(place_end + REACH),
+            () if last - line_end > REACH => line_end,
+            () => last,
+        };
+        if (from, to) == (first, last) {
+            return Ok(lines);
+        }
+        let line = lines.line() + text[first..from].matches('\n').count();
+        let column = if from == first { lines.column() } else { from - line_start };
+        let data = &text.as_bytes()[from..to];
+        let count = lines.line_count();
+        Ok(Box::new(MietteSpanContents::new(data, (from, to - from).into(), line, column, count)))
+    }
 }
 
 impl SceneErrors {
     /// Puts diagnostics together with the text they are about, in the order of the text.
     pub fn new(name: impl Into<String>, text: Arc<str>, mut diagnostics: Vec<Diagnostic>) -> Self {
+        let visible = |text: Arc<str>| match printable(&text) {
+            Cow::Borrowed(_) => text,
+            Cow::Owned(visible) => visible.into(),
+        };
+        let text = visible(text);
         for diagnostic in &mut diagnostics {
+            diagnostic.option = diagnostic.option.take().map(visible);
             // A place outside the text would make miette show nothing of it.
             let own = diagnostic.option.clone().unwrap_or_else(|| text.clone());
             diagnostic.span = diagnostic.span.take().map(|span| clamp(&own, span));
-            for (span, _) in &mut diagnostic.also {
+            diagnostic.message = shortened(std::mem::take(&mut diagnostic.message));
+            diagnostic.label = shortened(std::mem::take(&mut diagnostic.label));
+            diagnostic.help = diagnostic.help.take().map(shortened);
+            for (span, label) in &mut diagnostic.also {
                 *span = clamp(&text, span.clone());
+                *label = shortened(std::mem::take(label));
             }
         }
         diagnostics.sort_by_key(|diagnostic| match (&diagnostic.option, &diagnostic.span) {
             (None, Some(span)) => span.start,
             _ => usize::MAX,
         });
-        Self { source: NamedSource::new(name.into(), text), diagnostics }
+        Self { source: NamedSource::new(shortened(name.into()), Excerpts(text)), diagnostics }
     }
 
     /// The name of the scene, mostly the path of its file.
@@ -220,7 +287,7 @@ impl SceneErrors {
 
     /// The text of the scene.
     pub fn text(&self) -> &str {
-        self.source.inner()
+        &self.source.inner().0
     }
 
     /// What was found, in the order of the text; what has no place in it comes last.
@@ -243,6 +310,16 @@ impl SceneErrors {
         Plain(self)
     }
 
+    /// Those that are shown.
+    fn shown(&self) -> &[Diagnostic] {
+        &self.diagnostics[..self.diagnostics.len().min(MOST_SHOWN)]
+    }
+
+    /// How many are not shown.
+    fn hidden(&self) -> usize {
+        self.diagnostics.len() - self.shown().len()
+    }
+
     /// The diagnostic that stands for the whole where there is just one.
     fn single(&self) -> Option<&Diagnostic> {
         match self.diagnostics.as_slice() {
@@ -252,12 +329,15 @@ impl SceneErrors {
     }
 }
 
-/// The nearest span that lies in the text, on the borders of characters.
+/// The nearest span that lies in the text, on the borders of characters, not longer than what is underlined at most.
 fn clamp(text: &str, span: Range<usize>) -> Range<usize> {
-    let floor = |at: usize| (0..=at.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
-    let ceil = |at: usize| (at..=text.len()).find(|&at| text.is_char_boundary(at)).unwrap_or(text.len());
-    let start = floor(span.start);
-    start..ceil(span.end).max(start)
+    let start = text.floor_char_boundary(span.start);
+    let end = text.ceil_char_boundary(span.end).max(start);
+    if end - start <= LONGEST_PLACE {
+        start..end
+    } else {
+        start..text.floor_char_boundary(start + LONGEST_PLACE)
+    }
 }
 
 impl fmt::Display for SceneErrors {
@@ -272,7 +352,8 @@ impl fmt::Display for SceneErrors {
             (_, 0) => write!(f, "{mistakes} in {}", self.name()),
             (0, _) => write!(f, "{doubts} about {}", self.name()),
             _ => write!(f, "{mistakes} and {doubts} in {}", self.name()),
-        }
+        }?;
+        if self.hidden() > 0 { write!(f, "; the first {MOST_SHOWN}:") } else { Ok(()) }
     }
 }
 
@@ -298,7 +379,7 @@ impl miette::Diagnostic for SceneErrors {
     }
 
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn miette::Diagnostic> + 'a>> {
-        let related = self.diagnostics.iter().map(|diagnostic| diagnostic as &dyn miette::Diagnostic);
+        let related = self.shown().iter().map(|diagnostic| diagnostic as &dyn miette::Diagnostic);
         self.single().is_none().then(|| Box::new(related) as _)
     }
 }
@@ -308,7 +389,7 @@ struct Plain<'a>(&'a SceneErrors);
 
 impl fmt::Display for Plain<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, diagnostic) in self.0.diagnostics.iter().enumerate() {
+        for (i, diagnostic) in self.0.shown().iter().enumerate() {
             if i > 0 {
                 f.write_str("\n")?;
             }
@@ -322,7 +403,10 @@ impl fmt::Display for Plain<'_> {
                 write!(f, " (help: {})", help.replace('\n', "; "))?;
             }
         }
-        Ok(())
+        match self.0.hidden() {
+            0 => Ok(()),
+            more => write!(f, "\n{}: {more} more are not shown", self.0.name()),
+        }
     }
 }
 
@@ -375,6 +459,57 @@ mod tests {
              liver.toml:4:1: error: unknown key `µ`\n\
              liver.toml: warning: `until` is long (given on the command line)"
         );
+    }
+
+    /// 5,000 mistakes in one line of 30 kB.
+    fn flood() -> SceneErrors {
+        let text: Arc<str> = format!("a = 1\nprony = [{}]\nb = 2\n", "1000, ".repeat(5000)).into();
+        let mistake = |i: usize| {
+            let at = 15 + 6 * i;
+            Diagnostic::error(format!("found {}", &text[15..]))
+                .at(at..at + 4, "here")
+                .also(7..13, "in this one")
+        };
+        SceneErrors::new("liver.toml", text.clone(), (0..5000).map(mistake).collect())
+    }
+
+    #[test]
+    fn a_flood_of_mistakes_is_cut() {
+        let errors = flood();
+        let page = rendered(&errors);
+        assert!(page.contains("5000 mistakes in liver.toml; the first 20:"), "{}", &page[..500]);
+        assert_eq!(page.matches("here").count(), MOST_SHOWN);
+        // 20 messages of 2 kB, broken into lines with their margins, and 20 excerpts.
+        assert!(page.len() < 100_000, "{} bytes", page.len());
+        let plain = errors.plain().to_string();
+        assert_eq!(plain.lines().count(), MOST_SHOWN + 1);
+        assert!(plain.ends_with("liver.toml: 4980 more are not shown"), "{plain}");
+        assert!(plain.len() < 50_000, "{} bytes", plain.len());
+    }
+
+    #[test]
+    fn of_a_long_line_the_text_around_the_place_is_shown() {
+        let text = format!("a = 1\nb = [{} oops, {}]\n", "1, ".repeat(1000), "2, ".repeat(1000));
+        let at = text.find("oops").unwrap();
+        let errors = SceneErrors::new("x", text.into(), vec![Diagnostic::error("m").at(at..at + 4, "this")]);
+        let page = rendered(&errors);
+        assert!(page.contains(&format!("[x:2:{}]", at - 6 + 1)), "{page}");
+        assert!(page.contains("1, 1,  oops, 2, 2,") && page.contains("this"), "{page}");
+        assert!(page.len() < 2500, "{page}");
+        let line = page.lines().position(|line| line.contains("oops")).unwrap();
+        let [above, below] = [line, line + 1].map(|i| page.lines().nth(i).unwrap().chars());
+        let column = above.collect::<Vec<_>>().windows(4).position(|four| four == ['o', 'o', 'p', 's']);
+        assert_eq!(column, below.collect::<Vec<_>>().iter().position(|&c| c == '─'), "{page}");
+    }
+
+    #[test]
+    fn nothing_in_a_scene_makes_a_terminal_do_anything() {
+        let text = "a = '\u{1b}]0;x\u{7}'\n";
+        let mistake = Diagnostic::error("found \u{1b}[2J").at(4..10, "\u{9b}2J").help("\u{202e}");
+        let errors = SceneErrors::new("\u{1b}.toml", text.into(), vec![mistake]);
+        for shown in [rendered(&errors), errors.plain().to_string()] {
+            assert!(!shown.contains(['\u{1b}', '\u{7}', '\u{9b}', '\u{202e}']), "{shown:?}");
+        }
     }
 
     #[test]

@@ -46,6 +46,7 @@ mod of_mesh;
 mod output;
 mod overview;
 mod plan;
+mod printable;
 pub mod reference;
 pub mod registry;
 mod run;
@@ -71,6 +72,7 @@ pub use output::{
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};
+pub use printable::printable;
 pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, scene_file};
 pub use solver::{Effort, LoadStepProgress};

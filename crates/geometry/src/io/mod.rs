@@ -20,6 +20,7 @@ mod vtk;
 mod vtk_cells;
 mod vtu;
 mod vtu_write;
+mod xml;
 
 use std::ffi::OsStr;
 use std::fs;
@@ -32,6 +33,7 @@ pub use error::{MeshFileError, MeshFileProblem, Place};
 pub use pvd::read_pvd;
 use surface_out::SurfaceOut;
 pub use vtu_write::{VtuOptions, save_vtu, write_pvd, write_vtu};
+pub use xml::{XmlError, parse_xml};
 
 /// A format of mesh files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use roxmltree::{Document, Node};
+use roxmltree::Node;
 
-use super::{MeshFileError, MeshFileProblem, Place};
+use super::{MeshFileError, MeshFileProblem, Place, parse_xml};
 
 /// Reads the list of the files of a series: time [s] and file of each frame. Files are relative to where the list is.
 pub fn read_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
@@ -20,8 +20,8 @@ fn parse(path: &Path, text: &str) -> Result<Vec<(f64, PathBuf)>, MeshFileError> 
         place,
         problem: MeshFileProblem::Malformed { what: what.into() },
     };
-    let document = Document::parse(text)
-        .map_err(|error| malformed(Place::Line(error.pos().row as usize), &format!("not XML ({error})")))?;
+    let document =
+        parse_xml(text).map_err(|error| malformed(Place::Line(error.line), &format!("not XML ({error})")))?;
     let frames = document.descendants().filter(|node| node.has_tag_name("DataSet"));
     let folder = path.parent().unwrap_or(Path::new(""));
     let frame = |frame: Node<'_, '_>| {

@@ -5,13 +5,14 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Read;
 
-use roxmltree::{Document, Node};
+use roxmltree::Node;
 
 use super::base64::Base64;
 use super::cells::{Cells, array_limit, finite_points, index_limit};
 use super::cursor::{Cursor, Order, Scalar};
 use super::error::{Fault, Place};
 use super::vtk_cells::{Connectivity, PolyList, add_grid, add_poly};
+use super::xml::parse_xml;
 use super::{Format, MeshFile};
 use crate::{DataArray, Vector3};
 
@@ -45,9 +46,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         Ok(text) => Cow::Borrowed(text),
         Err(_) => String::from_utf8_lossy(&xml),
     };
-    let document = Document::parse(&text).map_err(|error| {
-        let place = Place::Line(error.pos().row as usize);
-        Fault::malformed(place, format!("the XML is broken or cut off: {error}"))
+    let document = parse_xml(&text).map_err(|error| {
+        Fault::malformed(Place::Line(error.line), format!("the XML is broken or cut off: {error}"))
     })?;
     let root = document.root_element();
     if root.tag_name().name() != "VTKFile" {

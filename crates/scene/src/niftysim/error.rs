@@ -25,7 +25,7 @@ pub enum ImportError {
         /// The file.
         path: PathBuf,
         /// The line, from 1.
-        line: u32,
+        line: usize,
         /// What the XML reader says.
         reason: String,
     },

@@ -16,6 +16,7 @@ mod xml;
 use std::path::Path;
 
 use pliant_geometry::Mesh;
+use pliant_geometry::io::parse_xml;
 
 pub use error::{ImportError, ImportProblem};
 
@@ -37,12 +38,20 @@ pub struct Imported {
 pub fn import(path: &Path) -> Result<Imported, ImportError> {
     let bytes = std::fs::read(path)
         .map_err(|error| ImportError::File { path: path.to_owned(), reason: error.to_string() })?;
-    let text = String::from_utf8_lossy(&bytes);
+    import_bytes(path, &bytes)
+}
+
+/// Reads a NiftySim model that was read from `path`, beside which its mesh files are looked for.
+///
+/// # Errors
+/// If a mesh file can't be read, or the model says something that it cannot mean.
+pub fn import_bytes(path: &Path, bytes: &[u8]) -> Result<Imported, ImportError> {
+    let text = String::from_utf8_lossy(bytes);
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    let document = roxmltree::Document::parse(text).map_err(|error| ImportError::Xml {
+    let document = parse_xml(text).map_err(|error| ImportError::Xml {
         path: path.to_owned(),
-        line: error.pos().row,
-        reason: error.to_string(),
+        line: error.line,
+        reason: error.reason,
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());

@@ -12,6 +12,7 @@ use super::OutputError;
 use super::stability::{AddedMass, StabilitySummary, doubts};
 use crate::build::Built;
 use crate::plan::{LimitingElement, Limits, Plan};
+use crate::printable::printable;
 use crate::run::{History, Outcome};
 use crate::scene::Scene;
 use crate::solver::Effort;
@@ -314,7 +315,8 @@ pub(crate) fn markdown(
     let mut page = String::new();
     // Writing to a String cannot fail.
     let _ = write_page(&mut page, scene, built, plan, outcome, summary);
-    page
+    // Names and titles come from files that others wrote: no codes for terminals, no HTML.
+    printable(&page).replace('<', "&lt;")
 }
 
 fn write_page(

@@ -1,0 +1,70 @@
+//! Text from files and names as it may go to a terminal or a page: without codes that a terminal obeys, and cut where
+//! it would flood.
+
+use std::borrow::Cow;
+
+/// Bytes of a value that a message shows.
+const LONGEST: usize = 2000;
+
+/// What a terminal would obey or an editor would reorder by: control codes but line ends and tabs, and the marks that
+/// turn the direction of writing.
+fn commands(c: char) -> bool {
+    (c.is_control() && !matches!(c, '\n' | '\r' | '\t'))
+        || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// The same text with every code that a terminal obeys replaced by a visible character of the same length in UTF-8, so
+/// that places in the text stay where they are.
+///
+/// ```
+/// use pliant_scene::printable;
+/// assert_eq!(printable("\u{1b}[31mliver\n"), "?[31mliver\n");
+/// ```
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(commands) {
+        return Cow::Borrowed(text);
+    }
+    let visible = |c: char| match c.len_utf8() {
+        _ if !commands(c) => c,
+        1 => '?',
+        2 => '¿',
+        _ => '\u{fffd}',
+    };
+    Cow::Owned(text.chars().map(visible).collect())
+}
+
+/// The text without codes that a terminal obeys, and where it is longer than a message should be, its beginning and how
+/// much follows.
+pub(crate) fn shortened(mut text: String) -> String {
+    if let Cow::Owned(visible) = printable(&text) {
+        text = visible;
+    }
+    if text.len() > LONGEST {
+        let end = text.floor_char_boundary(LONGEST);
+        let left = text[end..].chars().count();
+        text.truncate(end);
+        text.push_str(&format!(" … ({left} more characters)"));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_code_for_a_terminal_is_left_and_every_byte_keeps_its_place() {
+        let text = "a\u{1b}]0;title\u{7}\tb\r\nµ\u{9b}31m\u{202e}gnp.exe\u{7f}\u{0}";
+        let shown = printable(text);
+        assert_eq!(shown, "a?]0;title?\tb\r\nµ¿31m\u{fffd}gnp.exe??");
+        assert_eq!(shown.len(), text.len());
+        assert!(matches!(printable("liver µ 1 · ↵\n"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn long_texts_are_cut_and_say_so() {
+        assert_eq!(shortened("µ".repeat(1000)), "µ".repeat(1000));
+        let cut = shortened("µ".repeat(5000));
+        assert_eq!(cut, format!("{} … (4000 more characters)", "µ".repeat(1000)));
+    }
+}
