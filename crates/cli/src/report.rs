@@ -1,5 +1,6 @@
 //! What goes to the user: mistakes with the line they are in, progress, results.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
@@ -144,7 +145,7 @@ impl Bar {
     }
 
     /// A part of the work from 0 to 1, and what is being done.
-    pub fn update_mesh(&self, part: f64, now: &'static str) {
+    pub fn update_mesh(&self, part: f64, now: impl Into<Cow<'static, str>>) {
         self.0.set_position((1000.0 * part) as u64);
         self.0.set_message(now);
     }

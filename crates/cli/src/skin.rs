@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3, diagnose};
 use pliant_meshing::{
-    Fewer, FittedShells, Hausdorff, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh,
+    Fewer, FitProgress, FittedShells, Hausdorff, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs,
+    TriangleMesh,
 };
 use serde_json::{Value as Json, json};
 
@@ -140,7 +141,16 @@ fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> R
     bar.update_mesh(0.5, "making triangles");
     match goal {
         Goal::Shells(goal) => {
-            let progress = |done: f64| bar.update_mesh(0.3 + 0.7 * done, "fitting shells");
+            bar.update_mesh(0.3, "making few triangles to start from");
+            let progress = |now: FitProgress| {
+                let words = format!(
+                    "fitting: round {}, {} shells, {:.2} % off",
+                    now.round,
+                    now.shells,
+                    100.0 * now.off
+                );
+                bar.update_mesh(0.3 + 0.7 * now.part, words);
+            };
             return FittedShells::new(found, goal, &progress).map(shells).map_err(refused);
         }
         Goal::Edge(edge) => {
@@ -158,12 +168,7 @@ fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> R
 
 fn shells(fitted: FittedShells) -> Made {
     let FittedShells { mesh, error_map, report } = fitted;
-    let mut lines = vec![report.to_string()];
-    if !report.reached {
-        lines.push(
-            "the error asked for was not reached: the surface may pass through itself or have creases".into(),
-        );
-    }
+    let lines = vec![report.to_string()];
     let object = json!({ "status": "done", "as": "shells", "report": report });
     Made { mesh, error_map: Some(error_map), lines, object }
 }

@@ -137,9 +137,14 @@ impl CurvedTriangle {
     /// The nearest place of the patch and its distance [m]: Gauss–Newton, in which each step goes to the nearest point of the tangent
     /// triangle, and is halved until it comes closer.
     pub fn closest(&self, point: &Vector3, start: [f64; 3]) -> ([f64; 3], f64) {
+        self.closest_in(40, point, start)
+    }
+
+    /// The same in a number of steps at most. Stopped early, the distance is that of a place nearby, never too small.
+    pub fn closest_in(&self, steps: usize, point: &Vector3, start: [f64; 3]) -> ([f64; 3], f64) {
         let mut at = start;
         let mut distance = (self.point(at) - point).norm();
-        for _ in 0..40 {
+        for _ in 0..steps {
             let (x, [along, across]) = (self.point(at), self.tangents(at));
             let corner = |second: f64, third: f64| x + along * (second - at[1]) + across * (third - at[2]);
             let aim = barycentric_of_closest(&[corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)], point);

@@ -73,7 +73,7 @@ pub use missed::Missed;
 pub use percentiles::Percentiles;
 pub use phantom::{Organ, Phantom, brain_label};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
-pub use shells::{FittedShells, ShellGoal, ShellReport};
+pub use shells::{FitProgress, FittedShells, Flaw, ShellGoal, ShellReport};
 pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
 pub use taubin::{SURFACE_PAIRS, SURFACE_SMOOTHING};

@@ -30,6 +30,8 @@ pub struct TriangleMesh {
     pub(crate) star: Vec<Vec<u32>>,
     /// Edges that stay edges, smaller point first.
     creases: BTreeSet<[u32; 2]>,
+    /// Whether it has borders. Collapses, splits and flips open and close nothing.
+    open: bool,
 }
 
 /// What was mended in a surface from a file.
@@ -89,7 +91,9 @@ impl TriangleMesh {
         for (triangle, nodes) in (0..).zip(&triangles) {
             nodes.iter().for_each(|&node| star[node as usize].push(triangle));
         }
-        Self { points, triangles, star, creases: BTreeSet::new() }
+        let mut mesh = Self { points, triangles, star, creases: BTreeSet::new(), open: false };
+        mesh.open = 2 * mesh.edges().len() != 3 * mesh.triangles.len();
+        mesh
     }
 
     /// The triangles and quads of a mesh (quads halved), or the boundary of its volume cells, mended where needed.
@@ -237,7 +241,7 @@ impl TriangleMesh {
     }
 
     pub(crate) fn is_border(&self, a: u32, b: u32) -> bool {
-        matches!(self.sides(a, b), [Some(_), None])
+        self.open && matches!(self.sides(a, b), [Some(_), None])
     }
 
     /// Whether an edge is a border or a crease.
@@ -247,6 +251,9 @@ impl TriangleMesh {
 
     /// The other ends of the marked edges at a point.
     pub(crate) fn marked(&self, point: u32) -> Vec<u32> {
+        if !self.open && self.creases.is_empty() {
+            return Vec::new();
+        }
         let mut found = self.neighbours(point);
         found.retain(|&n| self.is_marked(point, n));
         found
@@ -260,7 +267,7 @@ impl TriangleMesh {
             return false;
         }
         let sides = self.sides(keep, gone);
-        let on_border = |p: u32| self.neighbours(p).iter().any(|&n| self.is_border(p, n));
+        let on_border = |p: u32| self.open && self.neighbours(p).iter().any(|&n| self.is_border(p, n));
         let border = sides[1].is_none();
         if !border && on_border(keep) && on_border(gone) {
             return false;

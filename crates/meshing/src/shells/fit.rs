@@ -1,11 +1,12 @@
 //! Fit of shells to a surface: Gauss–Newton for the places and normals of the vertices, with respect to the distances at places of the
 //! shells and at points of the target. Distances count with a high power, so that the largest falls; each vertex goes only as far as
-//! the sum of the powers round it falls and its triangles keep their shape. Vertices of a border stay in place, only their normals turn.
+//! the sum of the powers round it falls, its triangles keep their shape and the normals stand on them. Vertices of a border stay in place, only their normals turn.
 
 use nalgebra::Matrix3;
 use pliant_geometry::{CurvedTriangle, Vector3};
 use rayon::prelude::*;
 
+use super::effort::{Effort, ROW};
 use super::measure::Landing;
 use super::{LEAST_SHAPE, Shells, Target};
 use crate::hausdorff::lattice;
@@ -26,6 +27,21 @@ const UNKNOWNS: usize = 5;
 const LARGEST_TURN: f64 = 0.3;
 const LARGEST_WAY: f64 = 0.2;
 
+/// What steps of vertices that make things worse are reduced by, try by try, and whether the whole may then be taken if it is better.
+const TRIES: [(f64, bool); 8] = [
+    (0.4, false),
+    (0.4, false),
+    (0.4, false),
+    (0.0, false),
+    (0.0, true),
+    (0.0, true),
+    (0.0, true),
+    (0.0, true),
+];
+
+/// Normals that need not stand on their triangles are not turned below this cosine, either.
+const LEAST_ALONG: f64 = 0.2;
+
 /// Where a distance is taken: at a place of a shell, from the target or from one point of it along a direction.
 struct Probe {
     shell: u32,
@@ -42,34 +58,48 @@ struct Row {
 
 impl Shells {
     /// One step for the active vertices; distances are compared with `scale` [m].
-    pub(super) fn fit(&mut self, target: &Target, landings: &[Landing], scale: f64) {
+    pub(super) fn fit(&mut self, target: &Target, landings: &[Landing], scale: f64, effort: &mut Effort) {
         let sizes = self.sizes();
         let probes = self.probes(landings, scale);
         let rows: Vec<Row> = probes.par_iter().map(|probe| self.row(probe, target, &sizes)).collect();
         let offs = rows.iter().map(|row| row.off).collect::<Vec<_>>();
         let before = self.powers_round(&probes, &offs, scale);
+        effort.search(rows.len(), ROW);
         let step = self.solve(&rows, scale);
-        let worth = self.worth_of_all();
+        let (worth, upright) = (self.worth_of_all(), self.upright_of_all());
         let mut parts: Vec<f64> = self.active.iter().map(|&active| f64::from(u8::from(active))).collect();
-        for (reduction, is_last) in [(0.4, false), (0.4, false), (0.4, false), (0.0, false), (0.0, true)] {
+        for (reduction, is_last) in TRIES {
             let tried = self.stepped(&step, &sizes, &parts);
             let offs: Vec<f64> = probes.par_iter().map(|probe| tried.off(probe, target).1).collect();
             let after = tried.powers_round(&probes, &offs, scale);
-            let now = tried.worth_of_all();
+            effort.search(probes.len(), 1);
+            let (now, stands) = (tried.worth_of_all(), tried.upright_of_all());
             let is_worse = |v: &usize| {
                 parts[*v] > 0.0 && (after[*v] > before[*v] || now[*v] < worth[*v].min(LEAST_SHAPE))
             };
-            let worse: Vec<usize> = (0..parts.len()).filter(is_worse).collect();
-            if worse.is_empty() || is_last && after.iter().sum::<f64>() < before.iter().sum::<f64>() {
+            let mut worse: Vec<usize> = (0..parts.len()).filter(is_worse).collect();
+            let tilts =
+                |v: &usize| self.tilts(upright[*v], stands[*v]) || tried.creased[*v] && !self.creased[*v];
+            let tilted: Vec<usize> = (0..parts.len()).filter(tilts).collect();
+            let falls = || after.iter().sum::<f64>() < before.iter().sum::<f64>();
+            if tilted.is_empty() && (worse.is_empty() || is_last && falls()) {
                 *self = tried;
                 return;
             }
+            worse.extend(&tilted);
+            worse.extend(tilted.iter().flat_map(|&v| self.mesh.neighbours(v as u32)).map(|v| v as usize));
+            worse.sort_unstable();
+            worse.dedup();
             worse.into_iter().for_each(|v| parts[v] *= reduction);
         }
     }
 
     pub(super) fn worth_of_all(&self) -> Vec<f64> {
         (0..).zip(&self.mesh.points).map(|(v, x)| self.worth_round(v, x)).collect()
+    }
+
+    fn upright_of_all(&self) -> Vec<f64> {
+        (0..).zip(&self.mesh.points).map(|(v, x)| self.upright_round(v, x)).collect()
     }
 
     /// Sums of the powers of the distances of the shells round each vertex.
@@ -125,6 +155,9 @@ impl Shells {
             let [u, v, n] = frame(&self.normals[node]);
             let ways = if self.on_border[node] { [0.0; 3] } else { [u, v, n].map(|way| by_place.dot(&way)) };
             slope[corner][..3].copy_from_slice(&ways);
+            if self.creased[node] {
+                continue;
+            }
             slope[corner][3] = by_normal.dot(&u) / sizes[node];
             slope[corner][4] = by_normal.dot(&v) / sizes[node];
         }
@@ -143,17 +176,19 @@ impl Shells {
 
     fn stepped(&self, step: &[[f64; UNKNOWNS]], sizes: &[f64], parts: &[f64]) -> Self {
         let mut next = self.clone();
-        for (point, (x, size)) in step.iter().zip(sizes).enumerate().filter(|(point, _)| parts[*point] > 0.0)
-        {
+        let moved = |point: &usize| parts[*point] > 0.0;
+        for (point, (x, size)) in step.iter().zip(sizes).enumerate().filter(|(point, _)| moved(point)) {
             let [u, v, n] = frame(&self.normals[point]);
             let way = (x[0] * u + x[1] * v + x[2] * n) * parts[point];
             let turn = (x[3] * u + x[4] * v) * (parts[point] / size);
             next.mesh.points[point] += way * (LARGEST_WAY * size / way.norm()).min(1.0);
             let turned = (n + turn * (LARGEST_TURN / turn.norm()).min(1.0)).normalize();
-            if self.mesh.star[point].iter().all(|&t| self.mesh.normal(t).dot(&turned) > 0.2) {
+            let along = self.mesh.star[point].iter().all(|&t| self.mesh.normal(t).dot(&turned) > LEAST_ALONG);
+            if !self.creased[point] && (self.strict || along) {
                 next.normals[point] = turned;
             }
         }
+        next.stand_all();
         next
     }
 

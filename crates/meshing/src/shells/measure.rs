@@ -5,12 +5,21 @@ use pliant_geometry::{
 };
 use rayon::prelude::*;
 
-use super::{Detail, FittedShells, ShellGoal, ShellReport, Shells, Target};
+use super::effort::{Effort, LANDING};
+use super::report::{Flaw, ShellReport};
+use super::{Detail, FittedShells, ShellGoal, Shells, Target};
 use crate::hausdorff::{Hausdorff, Sample, distance, lattice, locator, samples, spread};
 use crate::triangles::shape;
 
 /// Parts of an edge of the flat triangles among which the nearest place of the shells is looked for.
 const FACETS: usize = 8;
+
+/// The same with more than so many shells.
+const FEWER_FACETS: usize = 4;
+const MANY: usize = 2000;
+
+/// Steps to the nearest place of a shell from there on.
+const STEPS: usize = 10;
 
 /// Where a point of the target is nearest to the shells.
 #[derive(Clone, Copy)]
@@ -59,7 +68,12 @@ impl Shells {
 
     /// Distances after some shells have moved. Points of the target that were nearest to these are looked for on them and their
     /// neighbours; others are at most as far off as before.
-    pub(super) fn distances_after(&self, before: &Distances, target: &Target) -> Distances {
+    pub(super) fn distances_after(
+        &self,
+        before: &Distances,
+        target: &Target,
+        effort: &mut Effort,
+    ) -> Distances {
         let (moving, resting): (Vec<u32>, Vec<u32>) = self.mesh.alive().partition(|&t| self.moves(t));
         let mut there = before.there.clone();
         there.resize(self.mesh.triangles.len(), 0.0);
@@ -70,6 +84,12 @@ impl Shells {
             .into_iter()
             .filter(|&t| self.mesh.triangles[t as usize].iter().any(|&n| near[n as usize]));
         let nearest = Nearest::new(self, moving.iter().copied().chain(beside).collect());
+        let searched = before.landings.iter().filter(|landing| self.moves(landing.shell)).count();
+        effort.search(searched, LANDING);
+        effort.search(
+            moving.len() * lattice(before.parts).len() + FEWER_FACETS * FEWER_FACETS * moving.len(),
+            1,
+        );
         let again = |landing: &Landing| {
             if self.moves(landing.shell) {
                 nearest.landing(&landing.point).unwrap_or(*landing)
@@ -96,18 +116,39 @@ impl Shells {
     }
 
     /// Measures all and tells what was found.
-    pub(super) fn finished(self, target: &Target, rounds: usize, goal: ShellGoal) -> FittedShells {
+    pub(super) fn finished(
+        self,
+        target: &Target,
+        rounds: usize,
+        goal: ShellGoal,
+        stopped: bool,
+    ) -> FittedShells {
         let samples = &target.fine.samples;
         let measured = self.distances(&target.fine, target);
-        let (error_map, forward) = self.picture(target);
+        let (error_map, forward, farthest) = self.picture(target);
         let back: Vec<f64> = measured.landings.iter().map(|landing| landing.off).collect();
         let distances = Hausdorff::of(forward, spread(samples, &back));
+        let missed = measured.landings.iter().max_by(|a, b| a.off.total_cmp(&b.off));
+        let farthest =
+            missed.filter(|landing| landing.off > forward.0).map_or(farthest, |landing| landing.point);
         let shapes: Vec<f64> = self.mesh.alive().map(|t| shape(self.mesh.corners(t))).collect();
+        let creased = |n: &usize| self.creased[*n];
+        let creases = (0..self.creased.len()).filter(creased).collect::<Vec<_>>();
+        let crossing = self.crossing();
         let mut mesh = self.mesh.to_mesh();
-        let normals = self.normals.iter().flat_map(|n| [n.x, n.y, n.z]).collect();
+        let normal = |(n, normal): (usize, &Vector3)| if creased(&n) { [0.0; 3] } else { (*normal).into() };
+        let normals = self.normals.iter().enumerate().flat_map(normal).collect();
         mesh.point_data.insert("normal".into(), DataArray { components: 3, values: normals });
-        let far = DataArray::scalar(measured.far());
+        let far = DataArray::scalar(self.mesh.alive().map(|t| measured.far()[t as usize]).collect());
         mesh.block_mut(CellKind::Triangle).data.insert("distance".into(), far);
+        let asked = match goal {
+            ShellGoal::Error(error) => Some(error),
+            ShellGoal::Shells(_) => None,
+        };
+        let reached = match goal {
+            ShellGoal::Error(error) => distances.largest() <= error * target.diagonal,
+            ShellGoal::Shells(number) => shapes.len() + 1 >= number,
+        };
         let report = ShellReport {
             shells: shapes.len(),
             nodes: self.mesh.points.len(),
@@ -116,13 +157,15 @@ impl Shells {
                 shapes.iter().sum::<f64>() / shapes.len().max(1) as f64,
             ],
             distances,
+            farthest: farthest.into(),
             flat: self.flat(target),
             diagonal: target.diagonal,
             rounds,
-            reached: match goal {
-                ShellGoal::Error(error) => distances.largest() <= error * target.diagonal,
-                ShellGoal::Shells(number) => shapes.len() + 1 >= number,
-            },
+            asked,
+            reached,
+            stopped: stopped && !reached,
+            creases: Flaw::of(creases.len(), creases.first().map(|&n| self.mesh.points[n])),
+            crossings: Flaw::of(crossing.shells.len(), crossing.place),
         };
         FittedShells { mesh, error_map, report }
     }
@@ -137,8 +180,8 @@ impl Shells {
         Hausdorff::of(spread(&own, &there), spread(&target.fine.samples, &back))
     }
 
-    /// The curved surface in small triangles with its distances, and the spread of these.
-    fn picture(&self, target: &Target) -> (Mesh, (f64, f64)) {
+    /// The curved surface in small triangles with its distances, the spread of these, and where it is farthest off [m].
+    fn picture(&self, target: &Target) -> (Mesh, (f64, f64), Vector3) {
         let (places, pieces) = (lattice(target.fine.parts), pieces(target.fine.parts));
         let triangles: Vec<u32> = self.mesh.alive().collect();
         let of = |&t: &u32| {
@@ -159,13 +202,15 @@ impl Shells {
         });
         mesh.block_mut(CellKind::Triangle).nodes = corners.collect();
         let found = spread(&samples, &far);
+        let farthest = samples.iter().zip(&far).max_by(|a, b| a.1.total_cmp(b.1));
+        let farthest = farthest.map(|(sample, _)| sample.point).unwrap_or_default();
         mesh.point_data.insert("distance".into(), DataArray::scalar(far));
-        (mesh, found)
+        (mesh, found, farthest)
     }
 }
 
 /// The small triangles between the places of a lattice.
-fn pieces(n: usize) -> Vec<[u32; 3]> {
+pub(super) fn pieces(n: usize) -> Vec<[u32; 3]> {
     // Row i of the lattice has n − i + 1 places.
     let at = |i: usize, j: usize| ((i * (2 * n + 3 - i)) / 2 + j) as u32;
     let mut found = Vec::with_capacity(n * n);
@@ -190,7 +235,8 @@ struct Nearest {
 
 impl Nearest {
     fn new(shells: &Shells, triangles: Vec<u32>) -> Self {
-        let (places, pieces) = (lattice(FACETS), pieces(FACETS));
+        let facets = if triangles.len() > MANY { FEWER_FACETS } else { FACETS };
+        let (places, pieces) = (lattice(facets), pieces(facets));
         let patches: Vec<CurvedTriangle> = triangles.iter().map(|&t| shells.patch(t)).collect();
         let mut mesh = Mesh {
             points: patches.iter().flat_map(|patch| places.iter().map(|&w| patch.point(w))).collect(),
@@ -212,7 +258,7 @@ impl Nearest {
         let shell = at.nodes[0] as usize / count;
         let corners = at.nodes.map(|node| self.places[node as usize % count]);
         let start = [0, 1, 2].map(|k| (0..3).map(|c| at.weights[c] * corners[c][k]).sum());
-        let (place, off) = self.patches[shell].closest(point, start);
+        let (place, off) = self.patches[shell].closest_in(STEPS, point, start);
         let along = (self.patches[shell].point(place) - point).try_normalize(0.0).unwrap_or_default();
         Some(Landing { point: *point, shell: self.triangles[shell], place, off, along })
     }

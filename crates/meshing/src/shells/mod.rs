@@ -1,23 +1,30 @@
 //! A fine surface by few curved shells: cubic Bézier triangles ([`CurvedTriangle`]) whose vertices and normals are fitted to it.
 //! A decimated surface starts; then, round by round, the shells that are too far off, either way, are halved at their longest edges, and
 //! round them triangles are evened out and fitted again, while the others rest. What is reached is looked at more closely before it counts.
-//! Leaves out: creases, as a vertex has one normal; edges that bend more than their end normals tell.
+//! Normals stand within 60° of their triangles and shells do not pass through each other: where they would, they are halved, too. The
+//! work is bounded, by a count that is the same on every machine; what was closest by then is the result.
+//! Leaves out: creases of the target, but where it folds too sharply for one normal; edges that bend more than their end normals tell.
 
+mod crossing;
+mod effort;
 mod fit;
 mod measure;
 mod refine;
+mod report;
+mod upright;
 
-use std::fmt;
+use std::collections::BTreeSet;
 
 use pliant_geometry::{CurvedTriangle, EdgeRule, Mesh, Vector3};
-use serde::Serialize;
 
 use crate::decimate::Fewer;
 use crate::error::{MeshingError, require_positive};
-use crate::hausdorff::{Hausdorff, Sample, samples};
+use crate::hausdorff::{Sample, samples};
 use crate::remesh::Reference;
 use crate::triangles::TriangleMesh;
+use effort::Effort;
 use measure::Distances;
+pub use report::{Flaw, ShellReport};
 
 /// Shells to start from where an error is asked for.
 const START: usize = 100;
@@ -36,6 +43,24 @@ const POOR: f64 = 0.6;
 
 /// Part of the way to the goal after which distances are looked at closely.
 const CLOSELY: f64 = 0.9;
+
+/// Part of the way to the goal after which normals stand on their triangles.
+const UPRIGHT_FROM: f64 = 0.7;
+
+/// Rounds more in which shells are mended that cross or have a crease.
+const MENDING_ROUNDS: usize = 4;
+
+/// Shells with creases or crossings are halved down to edges of this part of the diagonal, or of the error asked for.
+const LEAST_EDGE: f64 = 1e-3;
+
+/// A target of more triangles is not started from [`START`] shells but from half as many flat triangles as it takes to come as close.
+const LARGE: usize = 50_000;
+
+/// So many shells are fitted once a round, fewer up to four times.
+const MANY: usize = 3000;
+
+/// Points of the target at most that are looked at in each round.
+const MOST_COARSE: usize = 20_000;
 
 /// When the shells are good enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,46 +81,6 @@ pub struct FittedShells {
     pub error_map: Mesh,
     /// What was measured.
     pub report: ShellReport,
-}
-
-/// How close shells are to their target, and of what shape.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ShellReport {
-    /// Shells.
-    pub shells: usize,
-    /// Their vertices.
-    pub nodes: usize,
-    /// Least and mean shape of their flat triangles, 4 √3 A / Σ l²: 1 is equilateral.
-    pub shape: [f64; 2],
-    /// Distances from the curved shells to the target, and back [m].
-    pub distances: Hausdorff,
-    /// The same of the flat triangles of the vertices.
-    pub flat: Hausdorff,
-    /// Diagonal of the target's box [m].
-    pub diagonal: f64,
-    /// Rounds of refinement.
-    pub rounds: usize,
-    /// Whether the goal was reached.
-    pub reached: bool,
-}
-
-impl fmt::Display for ShellReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "shells           {} with {} nodes, after {} rounds",
-            self.shells, self.nodes, self.rounds
-        )?;
-        writeln!(
-            f,
-            "shape            {:.2} at least, {:.2} on average (1: equilateral)",
-            self.shape[0], self.shape[1]
-        )?;
-        let [there, back] = self.distances.lines(self.diagonal, ["shells to target", "target to shells"]);
-        writeln!(f, "{there}\n{back}")?;
-        let [there, back] = self.flat.lines(self.diagonal, ["were they flat  ", "and back        "]);
-        write!(f, "{there}\n{back}")
-    }
 }
 
 /// The surface to be fitted.
@@ -125,24 +110,61 @@ struct Shells {
     on_border: Vec<bool>,
     /// Points that may move: those near what has changed. The others keep what was fitted.
     active: Vec<bool>,
+    /// Whether normals must stand on their triangles. On the way to the goal, while triangles are large, they need not: points that
+    /// are held back then do not find their places.
+    strict: bool,
+    /// Points where no normal stands on all triangles.
+    creased: Vec<bool>,
+}
+
+/// How far a fit has come.
+#[derive(Clone, Copy, Debug)]
+pub struct FitProgress {
+    /// From 0 to 1: of the way to the goal or of the work allowed, whichever is more.
+    pub part: f64,
+    /// Round of refinement.
+    pub round: usize,
+    /// Shells so far.
+    pub shells: usize,
+    /// Their largest distance as a part of the diagonal.
+    pub off: f64,
 }
 
 impl FittedShells {
-    /// Fits shells to a surface. `progress` hears fractions from 0 to 1.
-    pub fn new(target: &TriangleMesh, goal: ShellGoal, progress: &dyn Fn(f64)) -> Result<Self, MeshingError> {
+    /// Fits shells to a surface. `progress` hears how far it has come.
+    pub fn new(
+        target: &TriangleMesh,
+        goal: ShellGoal,
+        progress: &dyn Fn(FitProgress),
+    ) -> Result<Self, MeshingError> {
+        Self::within(target, goal, Effort::MOST, progress)
+    }
+
+    /// The same with some work at most, counted in searches for nearest points.
+    fn within(
+        target: &TriangleMesh,
+        goal: ShellGoal,
+        most: usize,
+        progress: &dyn Fn(FitProgress),
+    ) -> Result<Self, MeshingError> {
+        let mut mesh = target.clone();
         let start = match goal {
             ShellGoal::Error(error) => {
                 require_positive("the error", error)?;
-                START
+                if mesh.len() > LARGE {
+                    mesh.decimate(Fewer::Distance(error * target.diagonal()))? / 2
+                } else {
+                    0
+                }
             }
             ShellGoal::Shells(number) => {
                 require_positive("the number of shells", number as f64)?;
                 number.div_ceil(2)
             }
         };
-        let mut mesh = target.clone();
+        let start = if matches!(goal, ShellGoal::Error(_)) { start.max(START) } else { start };
         mesh.decimate(Fewer::Triangles(start))?;
-        Ok(Self::refined(&Target::new(target), &mesh, goal, progress))
+        Ok(Fit::new(&Target::new(target), &mesh, goal, most).run(progress))
     }
 
     /// Fits the shells of given triangles to a surface, without changing which points they join.
@@ -152,55 +174,146 @@ impl FittedShells {
         for point in 0..shells.mesh.points.len() as u32 {
             shells.place(point, &target);
         }
+        shells.require_upright();
         let start = shells.distances(&target.fine, &target);
-        shells.settle(start, 0.0, 12, &target);
-        shells.finished(&target, 0, ShellGoal::Shells(triangles.len()))
+        shells.settle(start, 0.0, 12, &target, &mut Effort::new(usize::MAX));
+        shells.finished(&target, 0, ShellGoal::Shells(triangles.len()), false)
     }
+}
 
-    fn refined(target: &Target, mesh: &TriangleMesh, goal: ShellGoal, progress: &dyn Fn(f64)) -> Self {
+/// A fit on its way.
+struct Fit<'t> {
+    target: &'t Target,
+    goal: ShellGoal,
+    /// The distance asked for [m]; 0 where a number of shells is.
+    aim: f64,
+    shells: Shells,
+    rounds: usize,
+    effort: Effort,
+    /// Whether distances are looked at closely.
+    closely: bool,
+    best: Option<(Standing, Shells)>,
+}
+
+/// How good shells are; the least is best. Whether the goal is missed, how many shells cross or have creases, whether triangles are poor,
+/// and what is to be small.
+type Standing = (bool, usize, bool, f64);
+
+impl<'t> Fit<'t> {
+    fn new(target: &'t Target, mesh: &TriangleMesh, goal: ShellGoal, most: usize) -> Self {
         let aim = match goal {
             ShellGoal::Error(error) => error * target.diagonal,
             ShellGoal::Shells(_) => 0.0,
         };
-        let mut shells = Shells::new(mesh, target);
-        shells.even_out(target, 10);
-        let mut now = shells.distances(&target.coarse, target);
-        let (mut rounds, mut closely, mut left) = (0, false, LAST_ROUNDS);
-        let mut best: Option<(bool, f64, Shells)> = None;
-        while rounds < MOST_ROUNDS {
-            rounds += 1;
-            now = shells.settle(now, aim, 4, target);
-            let (far, count) = (now.far(), shells.mesh.len());
-            let worst = far.iter().copied().fold(0.0, f64::max);
-            let (part, bound, room) = match goal {
-                ShellGoal::Error(_) => (aim / worst, aim, usize::MAX),
-                ShellGoal::Shells(number) => {
-                    ((count + 1) as f64 / number as f64, share(&far), number.saturating_sub(count) / 2)
-                }
-            };
-            progress(part.min(1.0));
-            if !closely && part >= CLOSELY {
-                closely = true;
-                now = shells.distances(&target.fine, target);
-                shells.activate(shells.corners_of(&now.far(), bound));
+        let shells = Shells::new(mesh, target);
+        Self { target, goal, aim, shells, rounds: 0, effort: Effort::new(most), closely: false, best: None }
+    }
+
+    fn run(mut self, progress: &dyn Fn(FitProgress)) -> FittedShells {
+        let target = self.target;
+        self.shells.even_out(target, 10, &mut self.effort);
+        let mut now = self.shells.distances(&target.coarse, target);
+        let (mut left, mut mending) = (LAST_ROUNDS, MENDING_ROUNDS);
+        let mut ended = false;
+        while self.rounds < MOST_ROUNDS && !self.effort.is_spent() {
+            self.rounds += 1;
+            let times = if self.shells.moving() > MANY { 1 } else { 4 };
+            now = self.shells.settle(now, self.aim, times, target, &mut self.effort);
+            let far = now.far();
+            let (part, bound, room) = self.bounds(&far);
+            progress(self.progress(&far, part));
+            if !self.shells.strict && part >= UPRIGHT_FROM {
+                self.shells.require_upright();
+                now = self.shells.distances(&target.coarse, target);
+                self.effort.search(target.coarse.samples.len(), effort::LANDING);
+                self.shells.activate(self.shells.corners_of(&now.far(), bound));
                 continue;
             }
+            if !self.closely && part >= CLOSELY {
+                self.closely = true;
+                now = self.shells.distances(&target.fine, target);
+                self.effort.search(target.fine.samples.len(), effort::LANDING);
+                self.shells.activate(self.shells.corners_of(&now.far(), bound));
+                continue;
+            }
+            let [creased, crossing] = if part >= 1.0 { self.flaws() } else { Default::default() };
+            let standing = self.standing(&far, part, creased.len() + crossing.len());
+            // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is sharp.
+            let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || standing.1 < best.1);
+            let mut flawed = crossing;
+            flawed.extend(creased.into_iter().filter(|_| fewer));
+            if self.best.as_ref().is_none_or(|(best, _)| standing < *best) {
+                self.best = Some((standing, self.shells.clone()));
+            }
             if part >= 1.0 {
-                let poor = shells.worth_of_all().into_iter().any(|worth| worth < POOR);
-                if best.as_ref().is_none_or(|(was_poor, least, _)| (poor, worst) < (*was_poor, *least)) {
-                    best = Some((poor, worst, shells.clone()));
-                }
-                if left == 0 || worst <= aim && !poor {
+                let mends = !flawed.is_empty() && mending > 0;
+                if !mends && (left == 0 || !standing.2 && standing.3 <= self.aim) {
+                    ended = true;
                     break;
                 }
-                left -= 1;
+                flawed.retain(|_| mends);
+                *(if mends { &mut mending } else { &mut left }) -= 1;
             }
-            shells.refine(&far, bound, room, target);
-            shells.even_out(target, 3);
-            now = shells.distances_after(&now, target);
+            let mut wanted = far;
+            for shell in flawed.into_iter().filter(|&shell| self.is_long(shell)) {
+                wanted[shell as usize] = 2.0 * wanted[shell as usize].max(bound);
+            }
+            self.shells.refine(&wanted, bound, room, target);
+            self.shells.even_out(target, 3, &mut self.effort);
+            now = self.shells.distances_after(&now, target, &mut self.effort);
         }
-        best.map_or(shells, |(.., best)| best).finished(target, rounds, goal)
+        let mut shells = self.best.map_or(self.shells, |(_, best)| best);
+        shells.require_upright();
+        shells.uncross(target);
+        shells.finished(target, self.rounds, self.goal, !ended)
     }
+
+    /// How much of the goal is reached, the distance above which shells are halved [m], and how many may be.
+    fn bounds(&self, far: &[f64]) -> (f64, f64, usize) {
+        let count = self.shells.mesh.len();
+        match self.goal {
+            ShellGoal::Error(_) => (self.aim / worst(far), self.aim, usize::MAX),
+            ShellGoal::Shells(number) => {
+                ((count + 1) as f64 / number as f64, share(far), number.saturating_sub(count) / 2)
+            }
+        }
+    }
+
+    fn progress(&self, far: &[f64], part: f64) -> FitProgress {
+        FitProgress {
+            part: part.max(self.effort.part()).min(1.0),
+            round: self.rounds,
+            shells: self.shells.mesh.len(),
+            off: worst(far) / self.target.diagonal,
+        }
+    }
+
+    fn standing(&self, far: &[f64], part: f64, flaws: usize) -> Standing {
+        let reached = part >= 1.0;
+        let poor = reached && self.shells.worth_of_all().into_iter().any(|worth| worth < POOR);
+        match self.goal {
+            ShellGoal::Shells(_) if !reached => (true, 0, false, -part),
+            _ => (!reached, if reached { flaws } else { 0 }, poor, worst(far)),
+        }
+    }
+
+    /// Shells with a crease, and shells that cross.
+    fn flaws(&self) -> [Vec<u32>; 2] {
+        let mesh = &self.shells.mesh;
+        let creased = |t: &u32| mesh.triangles[*t as usize].iter().any(|&n| self.shells.creased[n as usize]);
+        [mesh.alive().filter(creased).collect(), self.shells.crossing().shells]
+    }
+
+    /// Whether halving a shell may mend it.
+    fn is_long(&self, shell: u32) -> bool {
+        let x = self.shells.mesh.corners(shell);
+        let longest = (0..3).map(|k| (x[(k + 1) % 3] - x[k]).norm()).fold(0.0, f64::max);
+        longest > self.aim.max(LEAST_EDGE * self.target.diagonal)
+    }
+}
+
+fn worst(far: &[f64]) -> f64 {
+    far.iter().copied().fold(0.0, f64::max)
 }
 
 /// The distance above which shells are halved on the way to a number of them: six tenths of the worst, or so many that there are a
@@ -216,7 +329,7 @@ impl Target {
         let diagonal = mesh.diagonal();
         Self {
             reference: Reference::new(mesh),
-            coarse: Detail { samples: distinct(samples(mesh, diagonal / 60.0)), parts: 8 },
+            coarse: Detail { samples: thinned(distinct(samples(mesh, diagonal / 60.0)), diagonal), parts: 8 },
             fine: Detail { samples: distinct(samples(mesh, diagonal / 300.0)), parts: 16 },
             diagonal,
         }
@@ -235,6 +348,18 @@ fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
     samples
 }
 
+/// So few samples that no cube of a grid holds two, of cubes that are doubled until there are no more than [`MOST_COARSE`].
+fn thinned(mut samples: Vec<Sample>, diagonal: f64) -> Vec<Sample> {
+    let mut size = diagonal / 400.0;
+    while samples.len() > MOST_COARSE {
+        let mut taken = BTreeSet::new();
+        samples
+            .retain(|sample| taken.insert(<[f64; 3]>::from(sample.point).map(|x| (x / size).floor() as i64)));
+        size *= 2.0;
+    }
+    samples
+}
+
 impl Shells {
     fn new(mesh: &TriangleMesh, target: &Target) -> Self {
         let (points, triangles) = mesh.compact();
@@ -243,6 +368,8 @@ impl Shells {
             normals: mesh.points.iter().map(|x| target.reference.closest(x).1).collect(),
             on_border: (0..mesh.points.len() as u32).map(|n| !mesh.marked(n).is_empty()).collect(),
             active: vec![true; mesh.points.len()],
+            strict: false,
+            creased: vec![false; mesh.points.len()],
             mesh,
         }
     }
@@ -263,9 +390,9 @@ impl Shells {
     }
 
     fn patch(&self, triangle: u32) -> CurvedTriangle {
-        let nodes = self.mesh.triangles[triangle as usize];
-        let [p, n] = [&self.mesh.points, &self.normals].map(|of| nodes.map(|node| of[node as usize]));
-        CurvedTriangle::new(p, n, [false; 6], EdgeRule::Arc)
+        let [(a, [ab, ac]), (b, [bc, ba]), (c, [ca, cb])] =
+            [0, 1, 2].map(|corner| self.corner(triangle, corner));
+        CurvedTriangle::new(self.mesh.corners(triangle), [a, b, c], [ab, ba, bc, cb, ca, ac], EdgeRule::Arc)
     }
 
     /// Whether a corner of a shell may move.
@@ -273,19 +400,31 @@ impl Shells {
         self.mesh.triangles[shell as usize].iter().any(|&n| self.active[n as usize])
     }
 
+    /// Shells that may move.
+    fn moving(&self) -> usize {
+        self.mesh.alive().filter(|&t| self.moves(t)).count()
+    }
+
     /// Fits until all distances are within `aim` [m], or they fall no more.
-    fn settle(&mut self, mut now: Distances, aim: f64, times: usize, target: &Target) -> Distances {
+    fn settle(
+        &mut self,
+        mut now: Distances,
+        aim: f64,
+        times: usize,
+        target: &Target,
+        effort: &mut Effort,
+    ) -> Distances {
         for _ in 0..times {
             let far = now.far();
-            if far.iter().all(|&off| off <= aim) {
+            if far.iter().all(|&off| off <= aim) || effort.is_spent() {
                 break;
             }
             let scale = if aim > 0.0 { aim } else { share(&far) };
             let mut next = self.clone();
             for _ in 0..2 {
-                next.fit(target, &now.landings, scale);
+                next.fit(target, &now.landings, scale, effort);
             }
-            let then = next.distances_after(&now, target);
+            let then = next.distances_after(&now, target, effort);
             let sum = |far: &[f64]| far.iter().map(|off| (off / scale).powi(8)).sum::<f64>();
             if sum(&then.far()) > 0.98 * sum(&far) {
                 break;

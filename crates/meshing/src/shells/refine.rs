@@ -2,6 +2,7 @@
 
 use pliant_geometry::Vector3;
 
+use super::effort::Effort;
 use super::fit::frame;
 use super::{LEAST_SHAPE, Shells, Target};
 use crate::triangles::{cross, shape};
@@ -9,8 +10,11 @@ use crate::triangles::{cross, shape};
 /// Triangles of a better shape than this are left alone by moves that would make them worse.
 const GOOD_SHAPE: f64 = 0.75;
 
-/// A triangle looks along the normals of its corners where the cosines are above this.
-const UPRIGHT: f64 = 0.3;
+/// Triangles are worth less where the cosine to the normal of a corner is below this.
+const ALONG: f64 = 0.3;
+
+/// Searches to move a point along the target.
+const SEARCHES: usize = 5;
 
 /// Points of a border stay where they are if their edges there meet at less than this angle [rad].
 const BEND: f64 = 2.0;
@@ -29,19 +33,25 @@ impl Shells {
         if normal != Vector3::zeros() {
             self.normals[point as usize] = normal;
         }
+        self.stand(point);
     }
 
     /// Flips edges and moves points along the target to better triangles.
-    pub(super) fn even_out(&mut self, target: &Target, times: usize) {
+    pub(super) fn even_out(&mut self, target: &Target, times: usize, effort: &mut Effort) {
         for _ in 0..times {
+            effort.search(self.active.iter().filter(|active| **active).count(), SEARCHES);
             for [a, b] in self.mesh.edges() {
                 let Some(new) = self.mesh.flipped(a, b) else { continue };
                 let [Some(s), Some(t)] = self.mesh.sides(a, b) else { continue };
                 let worst = |of: [[u32; 3]; 2]| {
                     of.iter().map(|&nodes| self.worth(nodes, self.at(nodes))).fold(1.0, f64::min)
                 };
+                let stands = |of: [[u32; 3]; 2]| {
+                    of.iter().map(|&nodes| self.stands(nodes, self.at(nodes))).fold(1.0, f64::min)
+                };
                 let active = new.as_flattened().iter().all(|&n| self.active[n as usize]);
-                if active && worst(new) > 1.1 * worst([s, t].map(|t| self.mesh.triangles[t as usize])) {
+                let old = [s, t].map(|t| self.mesh.triangles[t as usize]);
+                if active && worst(new) > 1.1 * worst(old) && !self.tilts(stands(old), stands(new)) {
                     self.mesh.flip(a, b, new);
                 }
             }
@@ -51,27 +61,42 @@ impl Shells {
                 }
             }
         }
+        self.stand_all();
     }
 
     fn at(&self, nodes: [u32; 3]) -> [Vector3; 3] {
         nodes.map(|n| self.mesh.points[n as usize])
     }
 
+    /// The least cosine between the normal of a triangle and those of its corners.
+    fn stands(&self, nodes: [u32; 3], x: [Vector3; 3]) -> f64 {
+        self.along(nodes, &cross(x).try_normalize(0.0).unwrap_or_default())
+    }
+
     /// The shape of a triangle, less where it does not look along the normals of its corners, down to 0 where it stands across them.
     fn worth(&self, nodes: [u32; 3], x: [Vector3; 3]) -> f64 {
-        let normal = cross(x).try_normalize(0.0).unwrap_or_default();
-        let along = nodes.iter().map(|&n| self.normals[n as usize].dot(&normal)).fold(1.0, f64::min);
-        shape(x) * (along / UPRIGHT).clamp(0.0, 1.0)
+        shape(x) * (self.stands(nodes, x) / ALONG).clamp(0.0, 1.0)
     }
 
     /// Least worth of the triangles round a point, were it at a position.
     pub(super) fn worth_round(&self, point: u32, position: &Vector3) -> f64 {
+        self.least_round(point, position, |nodes, x| self.worth(nodes, x))
+    }
+
+    /// Least cosine between them and the normals of their corners.
+    pub(super) fn upright_round(&self, point: u32, position: &Vector3) -> f64 {
+        self.least_round(point, position, |nodes, x| self.stands(nodes, x))
+    }
+
+    fn least_round(
+        &self,
+        point: u32,
+        position: &Vector3,
+        value: impl Fn([u32; 3], [Vector3; 3]) -> f64,
+    ) -> f64 {
         let of = |&t: &u32| {
             let nodes = self.mesh.triangles[t as usize];
-            self.worth(
-                nodes,
-                nodes.map(|n| if n == point { *position } else { self.mesh.points[n as usize] }),
-            )
+            value(nodes, nodes.map(|n| if n == point { *position } else { self.mesh.points[n as usize] }))
         };
         self.mesh.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
     }
@@ -87,6 +112,7 @@ impl Shells {
         }
         let Some(aim) = self.mesh.evener(point, &target.reference) else { return };
         let own = self.worth_round(point, &here);
+        let upright = self.upright_round(point, &here);
         let project = |x: Vector3| {
             if self.on_border[point as usize] {
                 target.reference.closest_on_lines(&x)
@@ -105,6 +131,7 @@ impl Shells {
         }
         let best = aims
             .into_iter()
+            .filter(|aim| !self.tilts(upright, self.upright_round(point, aim)))
             .map(|aim| (self.worth_round(point, &aim).min(GOOD_SHAPE), aim))
             .max_by(|a, b| a.0.total_cmp(&b.0).then(std::cmp::Ordering::Greater));
         if let Some((worth, aim)) = best
@@ -142,8 +169,9 @@ impl Shells {
             let fresh = self.mesh.split(a, b, patch.point(place));
             self.normals.push(patch.normal(place));
             self.on_border.push(sides[1].is_none());
+            self.creased.push(false);
             touched.resize(self.mesh.triangles.len(), true);
-            self.place(fresh, target);
+            self.place_upright(fresh, target);
             changed.push(fresh);
             halved += 1;
         }
@@ -153,5 +181,22 @@ impl Shells {
         };
         changed.extend(self.mesh.alive().filter(poor).flat_map(|t| self.mesh.triangles[t as usize]));
         self.activate(changed);
+        self.stand_all();
+    }
+
+    /// Puts a new point on the target where the normals round it stand on its triangles, else leaves it between the ends of its edge.
+    /// On a border it is put there in any case.
+    fn place_upright(&mut self, point: u32, target: &Target) {
+        let (position, normal) = (self.mesh.points[point as usize], self.normals[point as usize]);
+        let before = self.upright_round(point, &position);
+        self.place(point, target);
+        if self.on_border[point as usize] {
+            return;
+        }
+        let placed = self.mesh.points[point as usize];
+        if self.creased[point as usize] || self.tilts(before, self.upright_round(point, &placed)) {
+            (self.mesh.points[point as usize], self.normals[point as usize]) = (position, normal);
+            self.stand(point);
+        }
     }
 }

@@ -422,9 +422,7 @@ fn cover(mut surface: TriangleMesh, goal: Goal) -> Result<(Mesh, Vec<String>), M
     match goal {
         Goal::Shells(goal) => {
             let FittedShells { mesh, report, .. } = FittedShells::new(&surface, goal, &|_| {})?;
-            let missed =
-                "the error asked for was not reached: the surface may pass through itself or have creases";
-            return Ok((mesh, if report.reached { Vec::new() } else { vec![missed.into()] }));
+            return Ok((mesh, report.warnings()));
         }
         Goal::Even(edge) => {
             surface.mark_creases(CREASE);

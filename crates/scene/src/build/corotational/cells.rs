@@ -274,12 +274,24 @@ impl Builder<'_> {
                 None
             }
             (_, Some(data)) => {
-                self.notes.push(format!("`{name}` is curved by the normals of its mesh"));
                 let of = |node: u32| {
                     let given = data.item(node as usize);
                     (first + node, Vector3::new(given[0], given[1], given[2]))
                 };
-                Some((0..mesh.points.len() as u32).map(of).collect())
+                // Where a fit finds no normal that stands on all triangles it gives none: there they are estimated, with creases.
+                let given: BTreeMap<u32, Vector3> = (0..mesh.points.len() as u32)
+                    .map(of)
+                    .filter(|(_, normal)| *normal != Vector3::zeros())
+                    .collect();
+                let creased = mesh.points.len() - given.len();
+                self.notes.push(match creased {
+                    0 => format!("`{name}` is curved by the normals of its mesh"),
+                    _ => format!(
+                        "`{name}` is curved by the normals of its mesh, but for {} without one, which may be creases",
+                        counted(creased, "node")
+                    ),
+                });
+                Some(given)
             }
         }
     }

@@ -1,0 +1,38 @@
+//! How much work a fit may take, counted in searches for the nearest point of the target: the same count, and the same shells, on every
+//! machine with any number of threads.
+
+/// A search for the nearest place of the shells weighs as much as this many for the nearest point of the target.
+pub(super) const LANDING: usize = 4;
+
+/// So does a row of the least-squares step.
+pub(super) const ROW: usize = 4;
+
+/// Work done so far.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    done: usize,
+    most: usize,
+}
+
+impl Effort {
+    /// Searches of a fit: 25 to 50 s of one core.
+    pub(super) const MOST: usize = 25_000_000;
+
+    pub(super) fn new(most: usize) -> Self {
+        Self { done: 0, most }
+    }
+
+    /// Adds a number of searches of a weight.
+    pub(super) fn search(&mut self, number: usize, weight: usize) {
+        self.done = self.done.saturating_add(number * weight);
+    }
+
+    pub(super) fn is_spent(&self) -> bool {
+        self.done >= self.most
+    }
+
+    /// The part of the work that is done.
+    pub(super) fn part(&self) -> f64 {
+        self.done as f64 / self.most as f64
+    }
+}

@@ -1,0 +1,132 @@
+//! What there is to know about fitted shells, in words and numbers.
+
+use std::fmt;
+
+use pliant_geometry::Vector3;
+use serde::Serialize;
+
+use crate::hausdorff::Hausdorff;
+use crate::triangles::counted;
+
+/// How close shells are to their target, and of what shape.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ShellReport {
+    /// Shells.
+    pub shells: usize,
+    /// Their vertices.
+    pub nodes: usize,
+    /// Least and mean shape of their flat triangles, 4 √3 A / Σ l²: 1 is equilateral.
+    pub shape: [f64; 2],
+    /// Distances from the curved shells to the target, and back [m].
+    pub distances: Hausdorff,
+    /// Where they are farthest apart [m].
+    pub farthest: [f64; 3],
+    /// The distances of the flat triangles of the vertices.
+    pub flat: Hausdorff,
+    /// Diagonal of the target's box [m].
+    pub diagonal: f64,
+    /// Rounds of refinement.
+    pub rounds: usize,
+    /// The largest distance asked for as a part of the diagonal, where not a number of shells was.
+    pub asked: Option<f64>,
+    /// Whether the goal was reached.
+    pub reached: bool,
+    /// Whether the bound on work or on rounds ended the fit short of its goal.
+    pub stopped: bool,
+    /// Vertices where the surface folds too sharply for a normal within 60° of all triangles: they have none, `normal` is zero there.
+    pub creases: Flaw,
+    /// Shells that pass through themselves or each other.
+    pub crossings: Flaw,
+}
+
+/// How often something is not as it should be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Flaw {
+    /// How many.
+    pub count: usize,
+    /// Where the first is [m].
+    pub place: Option<[f64; 3]>,
+}
+
+impl Flaw {
+    pub(super) fn of(count: usize, place: Option<Vector3>) -> Self {
+        Self { count, place: place.map(Into::into) }
+    }
+
+    fn place(&self) -> String {
+        millimetres(&self.place.unwrap_or_default())
+    }
+}
+
+fn millimetres([x, y, z]: &[f64; 3]) -> String {
+    format!("({:.1}, {:.1}, {:.1}) mm", 1e3 * x, 1e3 * y, 1e3 * z)
+}
+
+impl ShellReport {
+    /// What a user should know before using the shells, in sentences: a goal that was missed, crossings, creases.
+    pub fn warnings(&self) -> Vec<String> {
+        let missed = (!self.reached).then(|| self.missed());
+        let crossings = (self.crossings.count > 0).then(|| {
+            format!(
+                "{} through other shells or {}, at {} and elsewhere: the surface is folded more tightly there than the shells can \
+                 follow; a smaller error or more shells help",
+                counted(self.crossings.count, "shell passes", "shells pass"),
+                if self.crossings.count == 1 { "itself" } else { "themselves" },
+                self.crossings.place(),
+            )
+        });
+        let creases = (self.creases.count > 0).then(|| {
+            format!(
+                "{} without a normal, at {} and elsewhere: the surface folds too sharply there for one within 60° of all triangles; \
+                 in a scene they are creases",
+                counted(self.creases.count, "node is", "nodes are"),
+                self.creases.place(),
+            )
+        });
+        missed.into_iter().chain(crossings).chain(creases).collect()
+    }
+
+    fn missed(&self) -> String {
+        let Some(asked) = self.asked else {
+            let remedy = "the surface allows no more, or ask for fewer";
+            return format!(
+                "not reached: {} shells are the most that the work allowed makes; {remedy}",
+                self.shells
+            );
+        };
+        let off = self.distances.largest();
+        format!(
+            "not reached: {} % was asked for; the best so far is {:.3} % ({:.2} mm off) at {}. {}",
+            100.0 * asked,
+            100.0 * off / self.diagonal,
+            1e3 * off,
+            millimetres(&self.farthest),
+            if self.stopped {
+                "The work of a fit is bounded: ask for a larger error, or smooth or crop the surface"
+            } else {
+                "There the surface may pass through itself or have creases"
+            }
+        )
+    }
+}
+
+impl fmt::Display for ShellReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "shells           {} with {} nodes, after {} rounds",
+            self.shells, self.nodes, self.rounds
+        )?;
+        writeln!(
+            f,
+            "shape            {:.2} at least, {:.2} on average (1: equilateral)",
+            self.shape[0], self.shape[1]
+        )?;
+        let [there, back] = self.distances.lines(self.diagonal, ["shells to target", "target to shells"]);
+        writeln!(f, "{there}\n{back}")?;
+        writeln!(f, "farthest apart   at {}", millimetres(&self.farthest))?;
+        let [there, back] = self.flat.lines(self.diagonal, ["were they flat  ", "and back        "]);
+        write!(f, "{there}\n{back}")?;
+        self.warnings().iter().try_for_each(|warning| write!(f, "\nwarning: {warning}"))
+    }
+}

@@ -1,0 +1,82 @@
+//! Curved shells of closed surfaces that fold: a flap, a thin gap, a sharp rim. Normals stand within 60° of their triangles, or there are
+//! none; what the report tells is what the mesh holds.
+
+use pliant_geometry::{CellKind, Mesh, Vector3};
+use pliant_meshing::{DEFAULT_CELL_LIMIT, FittedShells, ImplicitField, ShellGoal, TriangleMesh};
+
+/// A body of a signed distance, positive inside, within ± 25 mm.
+struct Body(fn(&Vector3) -> f64);
+
+impl ImplicitField for Body {
+    fn value(&self, point: &Vector3) -> f64 {
+        (self.0)(point)
+    }
+
+    fn bounds(&self) -> (Vector3, Vector3) {
+        (Vector3::repeat(-0.025), Vector3::repeat(0.025))
+    }
+}
+
+fn ball(x: &Vector3, centre: [f64; 3], radius: f64) -> f64 {
+    radius - (x - Vector3::from(centre)).norm()
+}
+
+fn slab(x: &Vector3, centre: [f64; 3], half: [f64; 3]) -> f64 {
+    let off = (x - Vector3::from(centre)).abs() - Vector3::from(half);
+    -(off.sup(&Vector3::zeros()).norm() + off.max().min(0.0))
+}
+
+/// A ball of 10 mm with a flap 2 mm thick.
+fn flap(x: &Vector3) -> f64 {
+    ball(x, [-0.008, 0.0, 0.0], 0.010).max(slab(x, [0.008, 0.0, 0.0], [0.012, 0.007, 0.001]))
+}
+
+/// Two leaves 3 mm thick, folded upon each other with 1.5 mm between them.
+fn fold(x: &Vector3) -> f64 {
+    slab(x, [0.0; 3], [0.015, 0.008, 0.00375]).min(-slab(x, [0.005, 0.0, 0.0], [0.015, 0.02, 0.00075]))
+}
+
+/// What two balls have in common: a lens whose faces meet at 52°.
+fn lens(x: &Vector3) -> f64 {
+    ball(x, [0.0, 0.0, 0.027], 0.03).min(ball(x, [0.0, 0.0, -0.027], 0.03))
+}
+
+/// Largest angle between a normal of a node and one of its triangles [degrees], and nodes without a normal.
+fn normals(mesh: &Mesh) -> (f64, usize) {
+    let normal = |node: u32| {
+        let item = mesh.point_data["normal"].item(node as usize);
+        Vector3::new(item[0], item[1], item[2])
+    };
+    let mut largest = 0.0_f64;
+    for nodes in mesh.block(CellKind::Triangle).unwrap().cells() {
+        let [a, b, c] = [0, 1, 2].map(|k| mesh.points[nodes[k] as usize]);
+        let own = (b - a).cross(&(c - a));
+        let given = nodes.iter().map(|&n| normal(n)).filter(|n| *n != Vector3::zeros());
+        largest = given.map(|n| n.angle(&own).to_degrees()).fold(largest, f64::max);
+    }
+    let nodes = 0..mesh.points.len() as u32;
+    (largest, nodes.filter(|&n| normal(n) == Vector3::zeros()).count())
+}
+
+fn fitted(name: &str, body: fn(&Vector3) -> f64, goal: ShellGoal) -> FittedShells {
+    let surface = TriangleMesh::of_field(&Body(body), 0.001, DEFAULT_CELL_LIMIT).unwrap();
+    let fitted = FittedShells::new(&surface, goal, &|_| {}).unwrap();
+    let (angle, without) = normals(&fitted.mesh);
+    println!(
+        "{name} ({} triangles): {angle:.1}° at most, {without} without a normal\n{}",
+        surface.len(),
+        fitted.report
+    );
+    assert!(angle <= 60.0, "{name}: {angle}");
+    assert_eq!(fitted.report.creases.count, without);
+    assert_eq!(fitted.report.creases.place.is_some(), without > 0);
+    fitted
+}
+
+#[test]
+fn normals_stand_on_their_triangles_at_folds_flaps_and_thin_gaps() {
+    for (name, body) in [("flap", flap as fn(&Vector3) -> f64), ("fold", fold), ("lens", lens)] {
+        fitted(name, body, ShellGoal::Error(0.01));
+        fitted(name, body, ShellGoal::Shells(120));
+    }
+}
