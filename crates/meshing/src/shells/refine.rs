@@ -171,7 +171,7 @@ impl Shells {
             self.on_border.push(sides[1].is_none());
             self.creased.push(false);
             touched.resize(self.mesh.triangles.len(), true);
-            self.place_upright(fresh, target);
+            self.place(fresh, target);
             changed.push(fresh);
             halved += 1;
         }
@@ -182,21 +182,5 @@ impl Shells {
         changed.extend(self.mesh.alive().filter(poor).flat_map(|t| self.mesh.triangles[t as usize]));
         self.activate(changed);
         self.stand_all();
-    }
-
-    /// Puts a new point on the target where the normals round it stand on its triangles, else leaves it between the ends of its edge.
-    /// On a border it is put there in any case.
-    fn place_upright(&mut self, point: u32, target: &Target) {
-        let (position, normal) = (self.mesh.points[point as usize], self.normals[point as usize]);
-        let before = self.upright_round(point, &position);
-        self.place(point, target);
-        if self.on_border[point as usize] {
-            return;
-        }
-        let placed = self.mesh.points[point as usize];
-        if self.creased[point as usize] || self.tilts(before, self.upright_round(point, &placed)) {
-            (self.mesh.points[point as usize], self.normals[point as usize]) = (position, normal);
-            self.stand(point);
-        }
     }
 }
