@@ -205,7 +205,8 @@ impl<'t> Fit<'t> {
             ShellGoal::Error(error) => error * target.diagonal,
             ShellGoal::Shells(_) => 0.0,
         };
-        let shells = Shells::new(mesh, target);
+        let mut shells = Shells::new(mesh, target);
+        shells.place_border(target);
         Self { target, goal, aim, shells, rounds: 0, effort: Effort::new(most), closely: false, best: None }
     }
 

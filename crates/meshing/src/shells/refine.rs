@@ -36,6 +36,16 @@ impl Shells {
         self.stand(point);
     }
 
+    /// Puts the points of borders on those of the target. Decimation leaves them beside it, and neither evening out nor the fit need move
+    /// them.
+    pub(super) fn place_border(&mut self, target: &Target) {
+        for point in 0..self.mesh.points.len() as u32 {
+            if self.on_border[point as usize] {
+                self.place(point, target);
+            }
+        }
+    }
+
     /// Flips edges and moves points along the target to better triangles.
     pub(super) fn even_out(&mut self, target: &Target, times: usize, effort: &mut Effort) {
         for _ in 0..times {
