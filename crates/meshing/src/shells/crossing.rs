@@ -83,7 +83,8 @@ impl Shells {
                 let mean = self.mesh.point_normal(node);
                 tried.normals[node as usize] = own.lerp(&mean, part).try_normalize(0.0).unwrap_or(own);
             }
-            nodes.iter().for_each(|&node| tried.stand(node));
+            // Triangles have turned under the neighbours of what has moved, too.
+            tried.require_upright();
             let then = tried.crossing();
             if then.shells.len() < now.shells.len() {
                 (*self, now) = (tried, then);
