@@ -60,9 +60,7 @@ fn normals(mesh: &Mesh) -> (f64, usize) {
 
 fn fitted(name: &str, body: fn(&Vector3) -> f64, goal: ShellGoal) -> FittedShells {
     let surface = TriangleMesh::of_field(&Body(body), 0.001, DEFAULT_CELL_LIMIT).unwrap();
-    let start = std::time::Instant::now();
     let fitted = FittedShells::new(&surface, goal, &|_| {}).unwrap();
-    println!("T {:.1}", start.elapsed().as_secs_f64());
     let (angle, without) = normals(&fitted.mesh);
     println!(
         "{name} ({} triangles): {angle:.1}° at most, {without} without a normal\n{}",
