@@ -12,7 +12,7 @@ use pliant_scene::format::{BackgroundName, Choice, MapName, TextureName};
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong, 130 interrupted (Ctrl-C)."
+    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong, 130 interrupted (Ctrl-C; 128 + its number for another signal)."
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -145,7 +145,7 @@ Examples:
 A scene is run first, without its own outputs; its table [view] tells how it is seen, the options below come before it. A film
 whose name ends in .mp4 takes ffmpeg; without one, or with a name that ends in .png, it is an animated PNG.
 
-Exit codes: 0 done, 1 the run or a picture failed, 2 the input is wrong or nothing draws here, 130 interrupted (Ctrl-C).";
+Exit codes: 0 done, 1 the run or a picture failed, 2 the input is wrong or nothing draws here, 130 interrupted (Ctrl-C; 128 + its number for another signal).";
 
 #[derive(Debug, clap::Args)]
 pub struct Render {
@@ -474,7 +474,7 @@ Writes sweep.csv, a row for each run: its values, how it ended, energies, reacti
 leaves its summary, plot and tables in a folder run-NNNN. All combinations are checked before the first is run; a run
 that fails does not stop the others.
 
-Exit codes: 0 done, 1 some runs failed, 2 the input is wrong, 130 interrupted (Ctrl-C).";
+Exit codes: 0 done, 1 some runs failed, 2 the input is wrong, 130 interrupted (Ctrl-C; 128 + its number for another signal).";
 
 #[derive(Debug, clap::Args)]
 pub struct Sweep {

@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use pliant_geometry::io;
 use pliant_gpu::{Adapter, GpuError};
@@ -23,6 +22,7 @@ use crate::mesh;
 use crate::pictures;
 use crate::report::{self, Bar, Failure, say};
 use crate::reproduce::reproduce;
+use crate::signals;
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
@@ -174,22 +174,6 @@ fn in_pool<T: Send>(
     Ok(pool.install(work)?)
 }
 
-/// The exit code of a process that Ctrl-C ended.
-pub const INTERRUPTED: u8 = 130;
-
-/// Set by Ctrl-C; pressed again, it ends the process at once.
-pub fn stopped_by_ctrl_c() -> &'static AtomicBool {
-    static STOP: AtomicBool = AtomicBool::new(false);
-    let handler = || {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(INTERRUPTED.into());
-        }
-    };
-    // Where no handler can be set, Ctrl-C ends the process as ever, and what was written stays readable.
-    let _ = ctrlc::set_handler(handler);
-    &STOP
-}
-
 /// The folder of a run that starts at rest.
 fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure> {
     let file = pliant_scene::scene_file(&arguments.scene);
@@ -216,35 +200,34 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     let bar = Bar::new();
     let options = Options {
         resume: checkpoint.as_ref(),
-        stop: Some(stopped_by_ctrl_c()),
+        stop: Some(signals::stop()),
         picture: photographer.as_ref().map(|photographer| photographer as &dyn Draw),
     };
     let mut report = |progress| bar.update(progress);
     let result = pliant_scene::run_with(&scene, &built, &plan, &folder, options, &mut report);
     bar.finish();
     let interrupted = matches!(&result, Ok(summary) if summary.status == "interrupted");
-    let (failure, json) = match result {
+    let (words, failure, json) = match result {
         Ok(summary) => {
-            if !arguments.json {
-                say(report::result(&summary))?;
-            }
-            for warning in &summary.warnings {
-                eprintln!("warning: {warning}");
-            }
-            (summary.error.as_ref().map(|error| error.message.clone()), json!(summary))
+            summary.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+            let message = summary.error.as_ref().map(|error| error.message.clone());
+            (report::result(&summary), message, json!(summary))
         }
-        Err(error) => (Some(format!("{error}; {}", error.remedy)), pliant_scene::failed_output(&error)),
+        Err(error) => {
+            (String::new(), Some(format!("{error}; {}", error.remedy)), pliant_scene::failed_output(&error))
+        }
     };
-    if arguments.json {
-        say(json)?;
+    let told = match arguments.json {
+        true => say(json),
+        false if words.is_empty() => Ok(()),
+        false => say(words),
+    };
+    if let Some(message) = failure {
+        eprintln!("error: {message}");
+        // It tells more than that standard output could not be written.
+        return Ok(ExitCode::from(if interrupted { signals::exit_code() } else { 1 }));
     }
-    match failure {
-        None => Ok(ExitCode::SUCCESS),
-        Some(message) => {
-            eprintln!("error: {message}");
-            Ok(ExitCode::from(if interrupted { INTERRUPTED } else { 1 }))
-        }
-    }
+    told.map(|()| ExitCode::SUCCESS)
 }
 
 /// Lists the graphics processors.
@@ -285,8 +268,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     let folder =
         sweep.open_folder(path, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))?;
     let bar = Bar::new();
-    let options =
-        SweepOptions { threads, keep_fields: arguments.keep_fields, stop: Some(stopped_by_ctrl_c()) };
+    let options = SweepOptions { threads, keep_fields: arguments.keep_fields, stop: Some(signals::stop()) };
     let result = sweep.run(&folder, options, &|progress| bar.update_sweep(progress, runs));
     bar.finish();
     let summary = match result {
@@ -302,7 +284,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     }
     if summary.interrupted {
         eprintln!("error: the sweep was interrupted; the runs that had ended are in the table");
-        return Ok(ExitCode::from(INTERRUPTED));
+        return Ok(ExitCode::from(signals::exit_code()));
     }
     if summary.failures.is_empty() {
         return Ok(ExitCode::SUCCESS);

@@ -732,23 +732,31 @@ fn halves(folder: &Path) -> Vec<String> {
     names.filter(|name| name.ends_with(".tmp")).collect()
 }
 
-#[test]
-#[cfg(target_os = "linux")]
-fn a_full_disk_at_the_history_ends_the_run_clearly() {
-    let workshop = Workshop::new(BLOCK);
-    fs::create_dir_all(workshop.path("out/case")).unwrap();
-    std::os::unix::fs::symlink("/dev/full", workshop.path("out/case/history.csv")).unwrap();
-    assert_disk_full(&workshop.run(&["--force"]), "out/case/history.csv", "No space left on device");
-    assert_eq!(halves(&workshop.path("out")), Vec::<String>::new());
+/// Runs the scene where a file may have so many blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
+#[cfg(unix)]
+fn run_limited(workshop: &Workshop, blocks: u32) -> Told {
+    let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run case --json");
+    let output = std::process::Command::new("sh")
+        .args(["-c", &limited, env!("CARGO_BIN_EXE_pliant")])
+        .current_dir(workshop.path(""))
+        .output()
+        .unwrap();
+    output.into()
 }
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_full_disk_at_a_frame_leaves_the_frames_before() {
+fn a_full_disk_at_the_history_ends_the_run_clearly() {
     let workshop = Workshop::new(BLOCK);
-    fs::create_dir_all(workshop.path("out/case/fields")).unwrap();
-    std::os::unix::fs::symlink("/dev/full", workshop.path("out/case/fields/000002.vtu.tmp")).unwrap();
-    assert_disk_full(&workshop.run(&["--force"]), "out/case/fields/000002.vtu", "No space left on device");
+    assert_disk_full(&run_limited(&workshop, 0), "out/case/history.csv", "File too large");
+    assert_eq!(halves(&workshop.path("out")), Vec::<String>::new());
+}
+
+#[test]
+fn a_frame_that_cannot_be_written_leaves_the_frames_before() {
+    let workshop = Workshop::new(BLOCK);
+    fs::create_dir_all(workshop.path("out/case/fields/000002.vtu")).unwrap();
+    assert_disk_full(&workshop.run(&["--force"]), "out/case/fields/000002.vtu", "not a regular file");
     assert_eq!(workshop.series("out/case/fields.pvd").len(), 2);
     assert_eq!(halves(&workshop.path("out")), Vec::<String>::new());
     assert!(workshop.read("out/case/summary.md").contains("**Failed** (output)"));
@@ -760,14 +768,7 @@ fn a_full_disk_in_the_middle_of_the_history_leaves_whole_rows() {
     let scene = changed(BLOCK, "type = \"csv\"\nevery = 0.004", "type = \"csv\"\nevery = 1e-5");
     let scene = scene.replace("until = 0.02", "until = 0.2").replace("every = 0.004", "every = 0.02");
     let workshop = Workshop::new(&scene);
-    // A file may have 8 blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
-    let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" run case --json";
-    let output = std::process::Command::new("sh")
-        .args(["-c", limited, env!("CARGO_BIN_EXE_pliant")])
-        .current_dir(workshop.path(""))
-        .output()
-        .unwrap();
-    assert_disk_full(&output.into(), "out/case/history.csv", "File too large");
+    assert_disk_full(&run_limited(&workshop, 8), "out/case/history.csv", "File too large");
     let (_, rows) = workshop.table("out/case/history.csv");
     assert!(rows.len() > 5, "{}", rows.len());
     assert!(!series(&workshop.path("out/case/fields.pvd")).is_empty());

@@ -4,7 +4,7 @@
 //! CRC-32 of all before it (u32); little-endian. The body: [`Origin`] (what the run was), [`Progressed`] (how far it
 //! and its outputs were), then [`Moment`] in the run's number type. A file appears under its name only once it is whole.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::build::{Built, Corotational};
 use crate::diagnostic::counted;
 use crate::format::{Precision, SolverName};
-use crate::output::{OutputError, OutputFolder, Schedule, Written, number};
+use crate::output::{OutputError, OutputFolder, Schedule, Written, number, replace};
 use crate::plan::Plan;
 use crate::run::History;
 use crate::scene::Scene;
@@ -151,7 +151,7 @@ pub enum ResumeError {
     },
     /// There is nothing left to do.
     #[error(
-        "the checkpoint is at t = {} s, and the scene ends at {} s: nothing is left to run",
+        "the run has finished: the checkpoint is at t = {} s, and the scene ends at {} s; nothing is left to run",
         number(*time),
         number(*until)
     )]
@@ -161,6 +161,17 @@ pub enum ResumeError {
         /// End of the scene [s].
         until: f64,
     },
+    /// The scene ends before the checkpoint.
+    #[error("the checkpoint is at t = {} s, after the end of the scene at {} s", number(*time), number(*until))]
+    BeyondTheEnd {
+        /// Time of the checkpoint [s].
+        time: f64,
+        /// End of the scene [s].
+        until: f64,
+    },
+    /// The folder can't be written to, or another run holds it.
+    #[error("{0}")]
+    Folder(#[from] OutputError),
     /// The folder does not hold the outputs that the checkpoint continues.
     #[error("`{}` does not hold what the checkpoint continues: {reason}", path.display())]
     OtherOutputs {
@@ -208,10 +219,12 @@ impl ResumeError {
                 )
             }
             Self::AtTheEnd { .. } => {
-                "to go on, let the scene last longer with `--until`; where its last instant is \
-                                      missing, resume from the checkpoint before this one"
-                    .into()
+                "nothing was changed; to go on, let the scene last longer with `--until`".into()
             }
+            Self::BeyondTheEnd { .. } => {
+                "let the scene last longer with `--until`, or resume from an earlier checkpoint".into()
+            }
+            Self::Folder(error) => error.remedy.into(),
             Self::OtherOutputs { .. } => {
                 "name the folder of the interrupted run with `--out DIR`, or run the scene from the start"
                     .into()
@@ -370,16 +383,22 @@ impl Checkpoint {
         self.progressed.time
     }
 
+    /// Whether a run that ends at a time [s] has no step left: only its last instant may still have to be written.
+    pub(crate) fn is_at_the_end(&self, until: f64) -> bool {
+        self.time() + 0.5 * self.origin.step >= until
+    }
+
     /// How the scene goes on from here: its plan with the step of the checkpoint. Only `until` may differ from the
     /// scene of the interrupted run.
     ///
     /// # Errors
-    /// If this is not the scene of the checkpoint, or nothing of it is left.
+    /// If this is not the scene of the checkpoint, or it ends before.
     pub fn continues(&self, scene: &Scene, built: &Built, plan: &Plan) -> Result<Plan, ResumeError> {
         self.origin.check(scene, built, plan)?;
         let (time, until, step) = (self.time(), scene.scene.until, self.origin.step);
-        if time + 0.5 * step >= until {
-            return Err(ResumeError::AtTheEnd { time, until });
+        // The last instant is the one nearest to the end; round-off is no reason to refuse it.
+        if time > until + 0.51 * step {
+            return Err(ResumeError::BeyondTheEnd { time, until });
         }
         let whole = match self.origin.precision {
             Precision::Single => self.moment::<f32>(built).is_some(),
@@ -450,16 +469,8 @@ impl<'a> Checkpoints<'a> {
         let path = self.folder.path().join(name(progressed.steps));
         let failed = |reason: &dyn std::fmt::Display| OutputError::new(&path, reason);
         let bytes = encode(&self.origin, progressed, state, memory).map_err(|e| failed(&e))?;
-        let temporary = path.with_extension("pliant.tmp");
-        let written = File::create(&temporary).and_then(|mut file| {
-            file.write_all(&bytes)?;
-            file.sync_all()
-        });
-        if let Err(error) = written.and_then(|()| fs::rename(&temporary, &path)) {
-            // What is half written is not left behind.
-            let _ = fs::remove_file(&temporary);
-            return Err(failed(&error));
-        }
+        replace(&path, |file| file.write_all(&bytes).and_then(|()| file.sync_all()))
+            .map_err(|error| failed(&error))?;
         let mut earlier = checkpoints_in(self.folder.path()).map_err(|error| failed(&error))?;
         earlier.retain(|(steps, _)| *steps <= progressed.steps);
         for (_, old) in &earlier[..earlier.len().saturating_sub(KEPT)] {

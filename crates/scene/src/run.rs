@@ -334,6 +334,9 @@ impl<'a, R: Real> Course<'a, R> {
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
         let samples = if plan.target.device.is_some() { SAMPLES_ON_DEVICE } else { SAMPLES };
         let written = before.map(|before| before.outputs.as_slice());
+        if before.is_some() {
+            folder.go_on(scene)?;
+        }
         let watching = observers::<R>(scene, built, folder.path(), &mut files, written)?;
         solver.resume(memory);
         Ok(Self {

@@ -213,11 +213,12 @@ fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Re
     let Some(name) = path.file_name() else {
         return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name")));
     };
+    remove_left_over(path, name);
     let mut beside = OsStr::new(".").to_owned();
     beside.push(name);
-    beside.push(format!(".{}.tmp", std::process::id()));
+    beside.push(format!(".{}{UNFINISHED}", std::process::id()));
     let beside = path.with_file_name(beside);
-    let written = fs::File::create(&beside).and_then(|file| {
+    let written = unfinished(&beside).and_then(|file| {
         let mut out = BufWriter::with_capacity(1 << 16, file);
         write(&mut out)?;
         out.flush()?;
@@ -228,6 +229,48 @@ fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Re
         let _ = fs::remove_file(&beside);
         failed(error)
     })
+}
+
+/// The ending of a file that is not whole yet.
+const UNFINISHED: &str = ".tmp";
+
+/// Makes a file that is locked as long as it is written, so that nobody takes it for left over. It is new: a link of its
+/// name is not followed.
+fn unfinished(path: &Path) -> io::Result<fs::File> {
+    loop {
+        let file = match fs::File::create_new(path) {
+            // Of a killed process that had the same number.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                fs::remove_file(path)?;
+                continue;
+            }
+            made => made?,
+        };
+        // A file system without locks has nothing removed from it, either.
+        let _ = file.lock();
+        if path.exists() {
+            return Ok(file);
+        }
+    }
+}
+
+/// Removes what killed processes left of a file of this name: unfinished files that nobody holds.
+fn remove_left_over(path: &Path, name: &OsStr) {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let start = format!(".{}.", name.to_string_lossy());
+    // Whatever can't be listed or removed stays; the file itself is written all the same.
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let found = entry.file_name().to_string_lossy().into_owned();
+        let number = found.strip_prefix(&start).and_then(|rest| rest.strip_suffix(UNFINISHED));
+        let ours = number.is_some_and(|number| number.parse::<u32>().is_ok());
+        if ours
+            && entry.file_type().is_ok_and(|kind| kind.is_file())
+            && let Ok(file) = fs::File::open(entry.path())
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Whether a mesh is whole: finite points, nodes and sets in range, data of the right length.

@@ -1,7 +1,7 @@
 //! A table over time: reactions, energies, probes. Each row is on disk before the next step.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{Seek, SeekFrom, Write};
+use std::fs::{self, File};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use pliant_corotational::Carried;
@@ -10,6 +10,7 @@ use pliant_mechanics::Real;
 
 use crc32fast::Hasher;
 
+use super::file::{create, reopen};
 use super::{Frame, Observer, OutputError, Written, fields};
 use crate::build::{BodyCells, Built};
 use crate::format::{CsvTable, FieldName, ProbeTable};
@@ -163,19 +164,20 @@ impl Rows {
 
     /// Begins the file with its header.
     pub(super) fn start(&mut self) -> Result<(), OutputError> {
-        self.file = Some(File::create(&self.path).map_err(|error| self.failed(error))?);
+        self.file = Some(create(&self.path).map_err(|error| self.failed(error))?);
         let header = self.header.clone();
         self.write(header)
     }
 
     /// Goes on after the rows that an interrupted run had written at its checkpoint.
     pub(super) fn take_up(&mut self, bytes: u64, crc: u32) -> Result<(), OutputError> {
-        let mut content = fs::read(&self.path).map_err(|error| self.failed(error))?;
-        let file = OpenOptions::new().write(true).open(&self.path).and_then(|mut file| {
+        let mut content = Vec::new();
+        let opened = reopen(&self.path).and_then(|mut file| {
+            file.read_to_end(&mut content)?;
             file.seek(SeekFrom::Start(bytes))?;
             Ok(file)
         });
-        self.file = Some(file.map_err(|error| self.failed(error))?);
+        self.file = Some(opened.map_err(|error| self.failed(error))?);
         self.beyond = content.split_off((bytes as usize).min(content.len()));
         (self.length, self.crc) = (bytes, Hasher::new_with_initial_len(crc, bytes));
         Ok(())
@@ -240,6 +242,12 @@ pub(super) fn verify(path: &Path, bytes: u64, crc: u32) -> Result<(), String> {
         }
         Some(_) => Ok(()),
     }
+}
+
+/// The time [s] of the last row of a table, if it is whole.
+pub(super) fn last_time(path: &Path) -> Option<f64> {
+    let text = fs::read_to_string(path).ok()?;
+    text.strip_suffix('\n')?.lines().next_back()?.split(',').next()?.parse().ok()
 }
 
 impl<R: Real> Observer<R> for Rows {

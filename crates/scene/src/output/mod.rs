@@ -3,6 +3,7 @@
 mod csv;
 mod curved;
 mod fields;
+mod file;
 mod folder;
 mod plot;
 mod snapshot;
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 use pliant_mechanics::{Observable, Real, State};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use file::{check_own_folder, replace};
 pub use folder::OutputFolder;
 pub(crate) use folder::{PICTURE, PLOT, SUMMARY};
 pub use stability::{AddedMass, StabilitySummary};
@@ -33,7 +35,7 @@ use crate::registry::OutputTable;
 use crate::scene::Scene;
 
 /// An output that could not be written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{path}` cannot be written: {reason}")]
 pub struct OutputError {
     /// The file or folder.
