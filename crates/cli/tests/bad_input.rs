@@ -954,17 +954,15 @@ fn values_beyond_all_sense_are_refused_and_unusual_ones_doubted() {
         ("young-modulus = 10e3", "young-modulus = 1e-300", "is 1e-300 Pa; values from 1e-20 to 1e20 Pa"),
         ("density = 1000", "density = 1e300", "is 1e300 kg/m³; values from 1e-15 to 1e15 kg/m³"),
         ("until = 0.02", "until = 1e30", "`scene.until` is 1e30 s; values from"),
-        ("total = [0.1, 0, 0]", "total = [1e40, 0, 0]", "is 1e40 N; values up to 1e20 N"),
-        ("pressure = 20", "pressure = -1e40", "is -1e40 Pa; values up to 1e20 Pa"),
     ] {
-        let line = if good.starts_with("total") { "total = [1e40, 0, 0]" } else { bad };
-        assert_refused(&Workshop::block(good, bad), &[line], &[says, "values are in SI units"]);
+        assert_refused(&Workshop::block(good, bad), &[bad], &[says, "values are in SI units"]);
     }
     for (good, odd, says) in [
         ("young-modulus = 10e3", "young-modulus = 1e-3", "1e-2 to 1e13 Pa: is that so?"),
         ("density = 1000", "density = 1e-6", "and usual are 1e-1 to 1e5 kg/m³: is that so?"),
         ("density = 1000", "density = 1e-6", "1 g/cm³ is 1000 kg/m³"),
         ("pressure = 20", "pressure = -1e15", "and usual is less than 1e13 Pa"),
+        ("total = [0.1, 0, 0]", "total = [1e40, 0, 0]", "is 1e40 N, and usual is less than 1e9 N"),
     ] {
         let told = Workshop::block(good, odd).pliant(&["check", "case"]);
         assert_eq!(told.code, 0, "{}", told.err);
@@ -1023,7 +1021,7 @@ fn failure_of(changes: &[&str]) -> String {
 #[test]
 fn advice_fits_what_the_run_does_already() {
     let damped = failure_of(&["body.block.damping=1e4", "body.block.velocity=[0,0,1]"]);
-    for piece in ["the damping of `block`, 1.000e4 1/s, is too strong", "take `damping` below 200"] {
+    for piece in ["the damping of `block`, 10000 1/s, is too strong", "take `damping` below 200"] {
         assert!(damped.contains(piece), "{damped}");
     }
     assert!(!damped.contains("more damping"), "{damped}");

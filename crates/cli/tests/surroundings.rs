@@ -152,16 +152,12 @@ fn a_resumed_run_and_a_sweep_follow_no_links_either() {
     symlink(workshop.path(ELSEWHERE), &history).unwrap();
     let told = workshop.run(&["--resume", "out/case"]);
     assert_eq!(told.code, 2, "{}", told.err);
-    assert!(
-        told.words().contains("out/case/history.csv` is a link to"),
-        "{}",
-        told.err
-    );
+    assert!(told.words().contains("out/case/history.csv` is a link to"), "{}", told.err);
 
     workshop.write("elsewhere/summary.md", "precious");
     fs::create_dir_all(workshop.path("out/sweep")).unwrap();
     symlink(workshop.path("elsewhere"), workshop.path("out/sweep/run-0000")).unwrap();
-    let sweep = ["sweep", "case", "--set", "body.block.damping=[5, 6]", "--out", "out/sweep", "--force"];
+    let sweep = ["sweep", "case", "--set", "body.block.damping=5,6", "--out", "out/sweep", "--force"];
     let told = workshop.pliant(&sweep);
     assert_eq!(told.code, 2, "{}", told.err);
     assert!(told.words().contains("out/sweep/run-0000` is a link to"), "{}", told.err);
@@ -354,7 +350,8 @@ fn a_sandbox_keeps_images_and_models_in_their_folder() {
         assert_eq!(told.code, if allowed { 0 } else { 2 }, "{data}: {}", told.err);
         assert_eq!(told.words().contains("it is outside the folder"), !allowed, "{data}: {}", told.err);
     }
-    let model = "<Model><VTKMesh Type=\"T4\">../elsewhere/organ.vtk</VTKMesh></Model>";
+    let model = "<Model><SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>5</DampingCoeff>\
+                 <Density>1000</Density></SystemParams><VTKMesh Type=\"T4\">../elsewhere/organ.vtk</VTKMesh></Model>";
     workshop.write("model/model.xml", model);
     workshop.write("elsewhere/organ.vtk", support::vtk(&support::CUBE, &support::TETS, ""));
     let words = |more: &[&str]| workshop.pliant(&[&["check", "model/model.xml"], more].concat()).words();

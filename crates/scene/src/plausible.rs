@@ -1,4 +1,5 @@
-//! Which values a quantity can have and is likely to have, by its unit. Values beyond all sense are mistakes, unlikely ones doubts.
+//! Which values a quantity can have and is likely to have, by its unit. Unlikely values are doubts; properties beyond all sense, which
+//! have to be positive, are mistakes.
 
 use std::ops::RangeInclusive;
 
@@ -39,28 +40,27 @@ pub(crate) struct Remark {
     pub help: String,
 }
 
-/// What is to say about a value in a unit; nothing where it is likely. Small values are looked at only where they have to be
-/// `positive`: a load may be as small as it likes.
+/// What is to say about a value in a unit; nothing where it is likely. A value that need not be `positive`, such as a load, may be as
+/// small as it likes, and a size beyond all sense is no mistake.
 pub(crate) fn remark(value: f64, unit: &str, positive: bool, shown: &str) -> Option<Remark> {
     let quantity = QUANTITIES.iter().find(|quantity| quantity.unit == unit)?;
     let outside = |range: &RangeInclusive<f64>| {
         let size = value.abs();
         size > *range.end() || (positive && size < *range.start())
     };
-    let range = |range: &RangeInclusive<f64>| match positive {
-        true => format!("{:e} to {:e} {unit}", range.start(), range.end()),
-        false => format!("{:e} {unit}", range.end()),
-    };
+    let range = |range: &RangeInclusive<f64>| format!("{:e} to {:e} {unit}", range.start(), range.end());
     let help = format!("values are in SI units: {}", quantity.units);
-    if outside(&quantity.possible) {
-        let up_to = if positive { "values from" } else { "values up to" };
+    if positive && outside(&quantity.possible) {
         let message =
-            format!("is {shown} {unit}; {up_to} {} can be computed with", range(&quantity.possible));
+            format!("is {shown} {unit}; values from {} can be computed with", range(&quantity.possible));
         return Some(Remark { is_mistake: true, message, label: "beyond all sense", help });
     }
     outside(&quantity.likely).then(|| {
-        let usual = if positive { "usual are" } else { "usual is less than" };
-        let message = format!("is {shown} {unit}, and {usual} {}: is that so?", range(&quantity.likely));
+        let usual = match positive {
+            true => format!("usual are {}", range(&quantity.likely)),
+            false => format!("usual is less than {:e} {unit}", quantity.likely.end()),
+        };
+        let message = format!("is {shown} {unit}, and {usual}: is that so?");
         Remark { is_mistake: false, message, label: "unusual", help }
     })
 }

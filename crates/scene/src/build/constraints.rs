@@ -97,7 +97,7 @@ impl Builder<'_> {
                 let (mesh, name) = (&built.mesh, &built.name);
                 let size = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
                 for (point, distance) in nearest_points(selection, mesh) {
-                    if distance > 0.5 * size {
+                    if distance > FAR * size {
                         let message = format!(
                             "the node nearest to {point:?} is {} m away, and `{name}` measures {} m across",
                             number(distance),
@@ -151,6 +151,9 @@ impl Builder<'_> {
         }
     }
 }
+
+/// A nearest node farther from its point than so many times the size of its body is doubted.
+const FAR: f64 = 10.0;
 
 /// The points by which a selection takes nearest nodes, each with its distance [m] from the first of these.
 fn nearest_points(selection: &Selection, mesh: &Mesh) -> Vec<([f64; 3], f64)> {
