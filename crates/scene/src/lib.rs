@@ -75,7 +75,7 @@ pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};
 pub use printable::printable;
 pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, scene_file};
-pub use solver::{Effort, LoadStepProgress};
+pub use solver::{Effort, Equilibria, LoadStepProgress};
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;
