@@ -197,6 +197,8 @@ fn a_resumed_quasi_static_run_ends_in_the_same_bits() {
         let run = format!("solver = \"quasi-static\"\nload-steps = 10\nprecision = \"{precision}\"");
         assert_resumes(&bent(element, &run, true), ["2", "1", "3"], &format!("quasi-static {element}"));
     }
+    let times = "solver = \"quasi-static\"\nload-steps = { times = [0.01, 0.02, 0.03, 0.045, 0.05, 0.07] }";
+    assert_resumes(&bent("tet4-anp", times, true), ["2", "1", "3"], "unequal load steps");
 }
 
 /// A pressed shell beside a swinging co-rotational block, with a checkpoint every 0.02 s.

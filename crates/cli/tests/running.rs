@@ -28,7 +28,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 23] = [
     "status",
     "error",
     "bodies",
@@ -40,6 +40,7 @@ const KEYS: [&str; 22] = [
     "true_limit",
     "limiting_element",
     "solver",
+    "equilibria",
     "device",
     "precision",
     "steps",
@@ -888,12 +889,46 @@ fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
     assert_eq!(keys(&error["load_step"]), ["number", "of", "iterations", "residual"]);
     assert_eq!(
         (error["load_step"]["number"].as_u64(), error["load_step"]["of"].as_u64()),
-        (Some(1), Some(10))
+        (Some(0), Some(10))
     );
     assert!(error["load_step"]["residual"].as_f64().unwrap() > 1e-9 && error["node"].is_number(), "{error}");
-    for piece in ["load step 1 of 10: no equilibrium", "largest at node", "iterations", "try more load steps"]
-    {
+    // Gravity acts from the start: its equilibrium comes before the first load step.
+    for piece in ["what acts at t = 0: no equilibrium", "largest at node", "iterations", "nothing holds"] {
         assert!(told.err.contains(piece), "{}", told.err);
+    }
+}
+
+#[test]
+fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
+    let run = |lines: &str| {
+        let workshop = Workshop::new(&bent("hex8", &format!("solver = \"quasi-static\"\n{lines}")));
+        let told = workshop.run(&[]);
+        (told.err.clone(), workshop.read("out/case/summary.md"), told.done())
+    };
+    let (said, page, json) = run("step = 0.3");
+    let note = "a step of 0.3000 s does not divide the 1.000 s of the scene: it takes 4 steps of 0.2500 s";
+    assert!(said.contains(note) && page.contains(note), "{said}\n{page}");
+    assert_eq!((&json["step"], &json["steps"]), (&0.25.into(), &4.into()));
+    let (said, page, unequal) = run("load-steps = { times = [0.1, 0.4] }");
+    let note = "the load steps end at t = 0.1000, 0.4000, 1.000 s";
+    assert!(said.contains(note) && page.contains(note), "{said}\n{page}");
+    assert_eq!(unequal["steps"], 3);
+    assert_close(
+        unequal["reactions"]["hand"][2].as_f64().unwrap(),
+        json["reactions"]["hand"][2].as_f64().unwrap(),
+        1e-6,
+        "the same equilibrium at the end",
+    );
+    let equilibria = &unequal["equilibria"];
+    assert_eq!(keys(equilibria), ["found", "external_error", "displacement_error"]);
+    assert!(equilibria["displacement_error"].as_f64().unwrap() < 1e-3, "{equilibria}");
+    for (lines, pieces) in [
+        ("load-steps = { times = [0.4, 0.1] }", ["increase", "out of order"]),
+        ("step = 0.5\nload-steps = { times = [0.4] }", ["in two ways", "leave one of them out"]),
+    ] {
+        let scene = bent("hex8", &format!("solver = \"quasi-static\"\n{lines}"));
+        let told = Workshop::new(&scene).run(&[]);
+        assert!(told.code != 0 && pieces.iter().all(|piece| told.err.contains(piece)), "{}", told.err);
     }
 }
 

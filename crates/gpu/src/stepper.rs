@@ -287,7 +287,7 @@ impl<'m> GpuStepper<'m> {
     fn evaluate_anew(&mut self, state: &mut State<f32>) -> Result<(), StepFailure> {
         self.control.keep(state);
         self.lengths = self.control.lengths(state);
-        self.relax(self.lengths.before);
+        self.relax(self.control.relaxing(state));
         self.instants.forget_deformation(&self.device);
         let starts = if state.is_at_start() { flags::STARTS } else { 0 };
         let mut results = self.submit_evaluation(state.time, flags::MEASURES | starts, true)?;

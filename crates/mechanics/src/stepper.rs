@@ -402,8 +402,9 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
         self.control.keep(state);
         self.lengths = self.control.lengths(state);
-        if self.relaxing != self.lengths.before {
-            self.relaxing = self.lengths.before;
+        let relaxing = self.control.relaxing(state);
+        if self.relaxing != relaxing {
+            self.relaxing = relaxing;
             self.forces.set_step(self.model, self.relaxing);
         }
         let found = self.forces.evaluate(&state.displacement, &mut state.history);

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::build::{Built, Corotational};
 use crate::diagnostic::counted;
-use crate::format::{Precision, SolverName};
+use crate::format::{LoadSteps, Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, Written, number, replace};
 use crate::plan::Plan;
 use crate::reads::read_regular;
@@ -24,7 +24,7 @@ use crate::solver::Memory;
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -256,6 +256,9 @@ impl Origin {
         parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));
         parts.push(("`run.on-unstable`".into(), fingerprint(&scene.run.on_unstable.unwrap_or_default())));
         parts.push(("`run.mass-scaling`".into(), fingerprint(&scene.run.mass_scaling)));
+        if let LoadSteps::Times(times) = &scene.run.load_steps {
+            parts.push(("`run.load-steps`".into(), fingerprint(times)));
+        }
         parts.push(("`run.iterations`".into(), fingerprint(&scene.run.iterations)));
         parts.push(("`run.linear`".into(), fingerprint(&scene.run.linear)));
         Self {
@@ -290,7 +293,7 @@ impl Origin {
             return Err(ResumeError::OtherScene { parts, until });
         }
         let step = plan.steps_of(scene, built, self.until).1;
-        if step != self.step {
+        if step != self.step && plan.ends.is_none() {
             return Err(ResumeError::OtherStep { checkpoint: self.step, scene: step });
         }
         Ok(())
@@ -408,6 +411,9 @@ impl Checkpoint {
         if !whole || self.progressed.outputs.len() != scene.outputs.len() {
             return Err(ResumeError::Damaged { path: self.path.clone() });
         }
+        if plan.ends.is_some() {
+            return Ok(plan.clone());
+        }
         Ok(Plan { step, steps: (until / step - 1e-9).ceil().max(1.0) as u64, ..plan.clone() })
     }
 
@@ -446,7 +452,7 @@ impl<'a> Checkpoints<'a> {
         time: f64,
     ) -> Option<Self> {
         let every = scene.run.checkpoint?.every;
-        let schedule = Schedule::after(every, time, plan.step);
+        let schedule = Schedule::after(every, time, plan.step_from(time));
         Some(Self { folder, origin: Origin::of(scene, built, plan), schedule })
     }
 
@@ -519,6 +525,8 @@ fn checkpoints_in(folder: &Path) -> std::io::Result<Vec<(u64, PathBuf)>> {
 
 #[cfg(test)]
 mod tests {
+    use pliant_mechanics::Equilibrium;
+
     use super::*;
     use crate::plan::plan;
     use crate::testing::{built, scene};
@@ -590,9 +598,11 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_5_is_as_it_was() {
+    fn the_layout_of_format_6_is_as_it_was() {
         let state = State::<f32>::at_rest(&built("").model);
         let bytes = postcard::to_stdvec(&state).unwrap();
-        assert_eq!((FORMAT, bytes.len()), (5, 1083));
+        let memory = Memory::Equilibrium(Equilibrium::<f32>::default());
+        let memory = postcard::to_stdvec(&memory).unwrap();
+        assert_eq!((FORMAT, bytes.len(), memory.len()), (6, 1083, 61));
     }
 }

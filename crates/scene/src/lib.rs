@@ -79,7 +79,7 @@ pub use printable::printable;
 pub use reads::Reads;
 pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, open_within, scene_file};
-pub use solver::{Effort, LoadStepProgress};
+pub use solver::{Effort, Equilibria, LoadStepProgress};
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;

@@ -20,7 +20,7 @@ use crate::output::{
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::{Effort, LoadStepProgress, Memory, Solver, on_device, on_processor};
+use crate::solver::{Effort, Equilibria, LoadStepProgress, Memory, Solver, on_device, on_processor};
 use crate::view::Draw;
 
 /// How far a run is.
@@ -71,6 +71,8 @@ pub(crate) struct Outcome {
     pub worst_hourglass: (f64, f64),
     /// What was seen of the largest stable step; `None` of a run without inertia.
     pub stability: Option<Stability>,
+    /// How good its equilibria are, if it found some by dynamic relaxation.
+    pub equilibria: Option<Equilibria>,
     /// What its equations took, if it solved some.
     pub effort: Option<Effort>,
     pub reactions: Vec<[f64; 3]>,
@@ -96,6 +98,7 @@ impl Outcome {
             balance_floor: 0.0,
             worst_hourglass: (0.0, 0.0),
             stability: None,
+            equilibria: None,
             effort: None,
             reactions: vec![[0.0; 3]; built.model.constraints.len()],
             history: History::default(),
@@ -267,6 +270,7 @@ fn go<'a, R: Real>(
             .as_ref()
             .filter(|_| scene.run.solver == SolverName::Explicit)
             .map(|_| course.state.stability),
+        equilibria: course.solver.equilibria(),
         effort: course.solver.effort(),
         reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
         history: course.history,
@@ -364,7 +368,8 @@ impl<'a, R: Real> Course<'a, R> {
 
     /// Evaluates the current instant and shows it to all who look; whether it is the last.
     fn see(&mut self) -> Result<bool, FailureSummary> {
-        let (time, step, last) = (self.state.time, self.plan.step, self.is_last());
+        let (time, last) = (self.state.time, self.is_last());
+        let step = self.plan.step_from(time);
         let looked_at = self.watching.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
         let wanted = if looked_at || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies };
         self.solver.evaluate(&mut self.state, wanted)?;
@@ -386,12 +391,13 @@ impl<'a, R: Real> Course<'a, R> {
     }
 
     fn is_last(&self) -> bool {
-        self.state.time + 0.5 * self.plan.step >= self.scene.scene.until
+        self.state.time + 0.5 * self.plan.step_from(self.state.time) >= self.scene.scene.until
     }
 
     /// The steps to the next instant at which there is something to do.
     fn stride(&self) -> u64 {
-        let (time, step) = (self.state.time, self.plan.step);
+        let time = self.state.time;
+        let step = self.plan.step_from(time);
         (self.watching.iter().map(|(schedule, _)| schedule))
             .chain([&self.sampling])
             .map(|schedule| schedule.stride(time, step))
@@ -410,8 +416,9 @@ impl<'a, R: Real> Course<'a, R> {
         let steps = self.stride();
         self.solver.advance(&mut self.state, steps, watch)?;
         let last = self.is_last();
-        let due = (self.checkpoints.as_mut())
-            .is_some_and(|all| all.is_due(self.state.time, self.plan.step, last || stop));
+        let due = (self.checkpoints.as_mut()).is_some_and(|all| {
+            all.is_due(self.state.time, self.plan.step_from(self.state.time), last || stop)
+        });
         if due && let Some(checkpoints) = &self.checkpoints {
             self.solver.bring_back(&mut self.state)?;
             let progressed = Progressed {

@@ -15,7 +15,7 @@ mod plain;
 mod tests;
 
 use averaged::AveragedTets;
-pub(crate) use batch::pressure;
+pub(crate) use batch::{pressure, volumetric_energy};
 pub(crate) use blocks::BLOCK;
 use blocks::{Blocks, Quad, Shares};
 use full_hex::FullHexes;

@@ -9,6 +9,7 @@ use crate::law::samples::every_law;
 use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
 use crate::model::{Averaging, Body, Cells, LocalNodes, Material};
 use crate::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use crate::recover::{CellFields, Recovery};
 use crate::tensor::{cross, dot, scale};
 
 /// Every element whose force is the gradient of an energy.
@@ -239,6 +240,45 @@ fn force_is_the_derivative_of_energy() {
                 let slope = (shifted(1e-6) - shifted(-1e-6)) / 2e-6;
                 assert!((slope - forces[node][component]).abs() < 1e-7 * scale);
             }
+        }
+    }
+}
+
+/// Of the written energy density; with the J of the cell instead of the averaged one it was up to 1.88 times too large.
+#[test]
+fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
+    let mut random = Random(29);
+    for model in every_kernel().chain(every_element_full_or_not()) {
+        let mut state = State::<f64>::at_rest(&model);
+        state.displacement.iter_mut().for_each(|u| *u = random.vector(0.01));
+        let hourglass = forces(&model, &state.displacement).1;
+        let recovery = Recovery::new(&model, &state);
+        let (summed, expected) = (recovery.stored_energy() + hourglass, energy(&model, &state.displacement));
+        let solid = &model.solids[0];
+        let name = format!("{} {}", solid.material.law.name(), solid.cells.element());
+        assert!((summed / expected - 1.0).abs() < 1e-12, "{name}: {summed:e} for {expected:e}");
+        let own: Vec<_> = (0..solid.cells.len()).map(|cell| recovery.cell(0, cell)).collect();
+        // Averages and cells change the same volume in all, and pressure is that of J where it is averaged once.
+        let volume = |of: fn(&CellFields) -> f64| -> f64 {
+            own.iter().enumerate().map(|(cell, fields)| solid.cells.volume(cell) * of(fields)).sum()
+        };
+        let [averaged, cells] = [volume(|f| f.volume_ratio), volume(|f| f.cell_volume_ratio)];
+        assert!((averaged / cells - 1.0).abs() < 1e-12, "{name}: {averaged:e} m³ for {cells:e} m³");
+    }
+}
+
+#[test]
+fn the_pressure_written_is_the_one_of_the_volume_ratio_written() {
+    let mut random = Random(31);
+    for element in ["tet4", "tet4-anp", "hex8", "hex8-full"] {
+        let model = distorted_cube(element, laws()[0]);
+        let mut state = State::<f64>::at_rest(&model);
+        state.displacement.iter_mut().for_each(|u| *u = random.vector(0.01));
+        let recovery = Recovery::new(&model, &state);
+        for cell in 0..model.solids[0].cells.len() {
+            let fields = recovery.cell(0, cell);
+            let expected = -5000.0 * (fields.volume_ratio - 1.0);
+            assert!((fields.pressure() - expected).abs() < 1e-9 * 5000.0, "{element} {cell}");
         }
     }
 }

@@ -31,10 +31,15 @@ pub enum FieldName {
     FibreStretch,
     /// Pressure [Pa], minus a third of the trace of the Cauchy stress.
     Pressure,
-    /// Volume ratio J.
+    /// Volume ratio J that the law's volumetric part sees, to which `pressure` belongs: det F of the element, of `tet4-anp` and the
+    /// other averaged tets the mean over its nodes, of `hex8-full` the mean over the element.
     #[serde(rename = "J")]
     VolumeRatio,
-    /// Strain energy of the instantaneous elastic law per volume at rest [J/m³].
+    /// The element's own det F, whatever its `J` is.
+    #[serde(rename = "cell-J")]
+    CellVolumeRatio,
+    /// Strain energy of the instantaneous elastic law per volume at rest [J/m³], with the element's averages of volume: times the
+    /// volumes it sums to the stored energy.
     EnergyDensity,
     /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells and co-rotational solids that
     /// at rest, which turns with them. The smallest one bounds the step of the whole.
@@ -62,7 +67,7 @@ pub enum FieldName {
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
@@ -74,6 +79,7 @@ impl FieldName {
         Self::FibreStretch,
         Self::Pressure,
         Self::VolumeRatio,
+        Self::CellVolumeRatio,
         Self::EnergyDensity,
         Self::ElementStep,
         Self::MembraneForce,
@@ -100,6 +106,7 @@ impl FieldName {
             Self::FibreStretch => "fibre-stretch",
             Self::Pressure => "pressure",
             Self::VolumeRatio => "J",
+            Self::CellVolumeRatio => "cell-J",
             Self::EnergyDensity => "energy-density",
             Self::ElementStep => "element-step",
             Self::Rotation => "rotation",
@@ -133,7 +140,11 @@ impl FieldName {
             | Self::StressTop
             | Self::StressMiddle
             | Self::StressBottom => "Pa",
-            Self::GreenStrain | Self::Fibre | Self::FibreStretch | Self::VolumeRatio => "",
+            Self::GreenStrain
+            | Self::Fibre
+            | Self::FibreStretch
+            | Self::VolumeRatio
+            | Self::CellVolumeRatio => "",
             Self::EnergyDensity => "J/m³",
             Self::ElementStep => "s",
             Self::MembraneForce => "N/m",
@@ -156,6 +167,7 @@ impl FieldName {
             Self::FibreStretch => "fibre stretch",
             Self::Pressure => "pressure",
             Self::VolumeRatio => "volume ratio",
+            Self::CellVolumeRatio => "volume ratio of the cell",
             Self::EnergyDensity => "energy density",
             Self::ElementStep => "element step",
             Self::MembraneForce => "membrane force",
@@ -186,6 +198,7 @@ impl FieldName {
             | Self::FibreStretch
             | Self::Pressure
             | Self::VolumeRatio
+            | Self::CellVolumeRatio
             | Self::EnergyDensity
             | Self::ElementStep
             | Self::MembraneEnergy
@@ -204,9 +217,11 @@ impl FieldName {
     pub fn is_of(self, model: BodyModel) -> bool {
         match self {
             Self::Displacement | Self::Velocity | Self::VonMises | Self::ElementStep => true,
-            Self::CauchyStress | Self::Pressure | Self::VolumeRatio | Self::EnergyDensity => {
-                model != BodyModel::Shell
-            }
+            Self::CauchyStress
+            | Self::Pressure
+            | Self::VolumeRatio
+            | Self::CellVolumeRatio
+            | Self::EnergyDensity => model != BodyModel::Shell,
             Self::Pk2Stress | Self::GreenStrain | Self::Fibre | Self::FibreStretch => {
                 model == BodyModel::Solid
             }

@@ -63,6 +63,7 @@ pub(super) fn of_cell(Found(fields, step): &Found, field: FieldName) -> Value {
         FieldName::FibreStretch => padded(&[fields.fibre_stretch.unwrap_or(f64::NAN)]),
         FieldName::Pressure => padded(&[fields.pressure()]),
         FieldName::VolumeRatio => padded(&[fields.volume_ratio]),
+        FieldName::CellVolumeRatio => padded(&[fields.cell_volume_ratio]),
         FieldName::EnergyDensity => padded(&[fields.energy_density]),
         _ => [f64::NAN; 9],
     }
@@ -144,7 +145,7 @@ impl Corotated {
                     FieldName::VonMises => padded(&[fields.von_mises[at]]),
                     FieldName::Pressure => padded(&[fields.pressure[at]]),
                     FieldName::EnergyDensity => padded(&[fields.energy[at]]),
-                    FieldName::VolumeRatio => padded(&[fields.volume_ratio[at]]),
+                    FieldName::VolumeRatio | FieldName::CellVolumeRatio => padded(&[fields.volume_ratio[at]]),
                     FieldName::ElementStep => padded(&[self.step(1, at)]),
                     _ => [f64::NAN; 9],
                 }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use pliant_mechanics::stability::{Look, OnUnstable};
+use pliant_mechanics::{BALANCE_LIMIT, Energies};
 use serde::Serialize;
 
 use super::number;
@@ -139,7 +140,37 @@ pub(crate) fn doubts(built: &Built, outcome: &Outcome, stability: Option<&Stabil
             bodies.join(", ")
         )
     });
-    hourglass.into_iter().chain(stability.and_then(StabilitySummary::doubt)).collect()
+    (hourglass.into_iter())
+        .chain(stability.and_then(StabilitySummary::doubt))
+        .chain(equilibria_doubts(outcome))
+        .collect()
+}
+
+/// Estimated error of displacements, over the largest one, from which on equilibria are doubted.
+const MUCH_ERROR: f64 = 1e-3;
+
+/// What is doubtful about equilibria.
+fn equilibria_doubts(outcome: &Outcome) -> impl Iterator<Item = String> {
+    let Energies { internal, hourglass, external, .. } = outcome.energies;
+    let largest = internal.abs().max(external.abs());
+    let displacement = outcome.equilibria.filter(|found| found.displacement_error > MUCH_ERROR).map(|found| {
+        format!(
+            "the equilibria are found to about {:.1} % of the displacements: take a smaller `tolerance`, in single precision with \
+             `precision = \"double\"`",
+            found.displacement_error * 100.0
+        )
+    });
+    let lost = outcome.equilibria.and_then(|found| found.external_error).and_then(|error| {
+        let missing = (internal + hourglass - external).abs() - error.abs();
+        (missing > BALANCE_LIMIT * largest).then(|| {
+            format!(
+                "{:.1} % of the energy is missing between equilibria: the body has snapped from one shape to another, or the load steps \
+                 are too few",
+                100.0 * missing / largest
+            )
+        })
+    });
+    displacement.into_iter().chain(lost)
 }
 
 const HOURGLASS_REMEDY: &str =

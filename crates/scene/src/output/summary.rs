@@ -15,7 +15,7 @@ use crate::plan::{LimitingElement, Limits, Plan};
 use crate::printable::printable;
 use crate::run::{History, Outcome};
 use crate::scene::Scene;
-use crate::solver::Effort;
+use crate::solver::{Effort, Equilibria};
 
 /// The status of a run that was told to stop.
 const INTERRUPTED: &str = "interrupted";
@@ -45,6 +45,8 @@ pub struct Summary {
     pub limiting_element: Option<LimitingElement>,
     /// What its equations took; `null` where none were solved.
     pub solver: Option<Effort>,
+    /// How good the equilibria of a quasi-static run are; `null` of others.
+    pub equilibria: Option<Equilibria>,
     /// Where it was computed: `cpu`, or the name of the graphics processor.
     pub device: String,
     /// `single` or `double`.
@@ -156,7 +158,7 @@ fn empty(status: &str, error: FailureSummary) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "true_limit": null, "limiting_element": null, "solver": null, "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "true_limit": null, "limiting_element": null, "solver": null, "equilibria": null, "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
@@ -216,9 +218,13 @@ impl FailureSummary {
 }
 
 impl FailureSummary {
-    /// A load step, counted from 1, of so many that came to no equilibrium.
+    /// A load step, counted from 1 (0: what acts at the start), of so many that came to no equilibrium.
     pub(crate) fn load_step(error: &RelaxationError, number: u64, of: u64) -> Self {
-        let message = format!("load step {number} of {of}: {error}; {}", error.remedy());
+        let which = match number {
+            0 => "what acts at t = 0".to_owned(),
+            _ => format!("load step {number} of {of}"),
+        };
+        let message = format!("{which}: {error}; {}", error.remedy());
         let (kind, body, element, node, time, iterations, residual) = match error {
             RelaxationError::NotFinite { body, node, iterations, time } => {
                 ("not-finite", body, None, *node, *time, *iterations, None)
@@ -309,6 +315,7 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
         true_limit: plan.limits.as_ref().map(|limits| limits.limit.step),
         limiting_element: plan.limits.as_ref().map(|limits| limits.limiting.clone()),
         solver: outcome.effort.clone(),
+        equilibria: outcome.equilibria,
         device: plan.target.name().to_owned(),
         precision: plan.target.precision.word(),
         steps: outcome.steps,
@@ -472,12 +479,33 @@ fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
             "\nThe balance is not judged: an implicit step takes energy like a damper, and external work is a sum of trapezia."
         );
     }
+    let Some(equilibria) = &outcome.equilibria else {
+        return writeln!(
+            page,
+            "\nBalance: {:.3} % of the largest energy at the end, {:.3} % at worst (judged above {} J).",
+            balance * 100.0,
+            outcome.worst_balance * 100.0,
+            number(outcome.balance_floor)
+        );
+    };
+    let of_largest = |energy: f64| 100.0 * energy / internal.abs().max(external.abs()).max(f64::MIN_POSITIVE);
+    let error = match equilibria.external_error {
+        Some(error) => {
+            let found = equilibria.found;
+            format!(
+                "with {found} equilibria off by about {} J, {:.3} %",
+                number(error),
+                of_largest(error.abs())
+            )
+        }
+        None => "whose error isn't known: a large part of the way was made in one".to_owned(),
+    };
     writeln!(
         page,
-        "\nBalance: {:.3} % of the largest energy at the end, {:.3} % at worst (judged above {} J).",
-        balance * 100.0,
-        outcome.worst_balance * 100.0,
-        number(outcome.balance_floor)
+        "\nInternal and external energy differ by {:.3} % of the largest energy. Internal is what the laws store, and what relaxing ones \
+         have dissipated. External is the work of loads, reactions and prescribed motions by the trapezoidal rule over each load step, \
+         {error}; more load steps make it better, and change neither forces nor displacements of elastic bodies.",
+        balance * 100.0
     )
 }
 

@@ -48,7 +48,7 @@ impl Builder<'_> {
                 let until = self.scene.scene.until;
                 let step = match run.step {
                     StepChoice::Seconds(step) => step.min(until),
-                    StepChoice::Auto(_) => until / f64::from(run.load_steps),
+                    StepChoice::Auto(_) => run.load_steps.first(until),
                 };
                 Curve { shape: Shape::Ramp, from: 0.0, to: step }
             }
