@@ -8,12 +8,18 @@ use nalgebra::{
     Matrix3, Matrix3x2, Rotation3, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector2, Vector3,
 };
 
-use crate::element::{Corners, Elasticity, Formulation, Matrix9, andes_basic, area, gradients};
+use crate::element::{
+    Corners, Elasticity, Formulation, Matrix9, andes_basic, area, gradients, mean_curvature,
+};
 use crate::model::Material;
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
+use crate::strain::ShellStrain;
 
 /// Numbers of (u, v, w, θx, θy, θz) of three nodes, node by node.
 pub type Vector18 = SVector<f64, 18>;
+
+/// Nodal forces over (u, v, θz).
+pub(crate) type Vector9 = SVector<f64, 9>;
 
 /// Stiffness over them.
 pub type Matrix18 = SMatrix<f64, 18, 18>;
@@ -53,6 +59,8 @@ pub struct Facet {
     axes: UnitQuaternion<f64>,
     membrane: Matrix9,
     bending: Matrix9,
+    /// Nodal forces of its tension at rest over (u, v, θz).
+    tension: Vector9,
 }
 
 /// Energy of a shell in its parts [J].
@@ -153,7 +161,15 @@ impl Facet {
             axes: quaternion(axes),
             membrane: formulation.membrane_stiffness(&corners, &elastic, thickness),
             bending: formulation.bending_stiffness(&corners, &elastic, thickness),
+            tension: Vector9::zeros(),
         })
+    }
+
+    /// The same with a tension [N/m] in its rest shape, equal in all directions.
+    #[must_use]
+    pub fn under_tension(self, formulation: Formulation, tension: f64) -> Self {
+        let tension = formulation.membrane_forces(&self.corners, &Vector3::new(tension, tension, 0.0));
+        Self { tension, ..self }
     }
 
     /// Where the facet is with its nodes at positions [m] and turned from rest by rotations.
@@ -210,7 +226,15 @@ impl Facet {
                 force[place] = *value;
             }
         }
+        for (&place, value) in MEMBRANE.iter().zip(&self.tension) {
+            force[place] += value;
+        }
         force
+    }
+
+    /// What the tension at rest does along a deformation [J], beside the elastic energy.
+    fn tension_energy(&self, d: &Vector18) -> f64 {
+        MEMBRANE.iter().zip(&self.tension).map(|(&place, force)| d[place] * force).sum()
     }
 
     /// K in the facet's axes.
@@ -230,7 +254,7 @@ impl Facet {
         let raw = self.linear_force(&placed.deformation);
         let spun = placed.to_spins(&raw);
         (
-            0.5 * placed.deformation.dot(&raw),
+            0.5 * (placed.deformation.dot(&raw) + self.tension_energy(&placed.deformation)),
             placed.to_space(&project(placed, &self.frame_spins(placed), &spun)),
         )
     }
@@ -382,7 +406,8 @@ impl Facet {
         let plane = of(MEMBRANE, &self.membrane);
         // What an element without resistance in its plane has not, it cannot split.
         let membrane = of(MEMBRANE, &andes_basic(&self.corners, &self.elastic, self.thickness)).min(plane);
-        ShellEnergy { membrane, bending: of(BENDING, &self.bending), drilling: plane - membrane }
+        let (drilling, membrane) = (plane - membrane, membrane + self.tension_energy(&placed.deformation));
+        ShellEnergy { membrane, bending: of(BENDING, &self.bending), drilling }
     }
 
     /// Mean forces and moments per length: those whose work with a uniform strain or curvature is that of the element's nodal forces,
@@ -421,6 +446,29 @@ impl Facet {
         let in_plane = [0, 1, 3, 4, 6, 7].map(|at| self.membrane[(at, at)]);
         let across = [0, 3, 6].map(|at| self.bending[(at, at)]);
         in_plane.into_iter().chain(across).fold(0.0, f64::max)
+    }
+
+    /// How far it is strained.
+    pub(crate) fn strain(&self, placed: &Placed) -> ShellStrain {
+        let entry = |row: usize, column: usize| -> f64 {
+            (0..3).map(|i| placed.local[i][row] * self.gradient[i][column]).sum()
+        };
+        let strain = Vector3::new(entry(0, 0) - 1.0, entry(1, 1) - 1.0, entry(0, 1) + entry(1, 0));
+        let own = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[BENDING[i]]);
+        ShellStrain::new(&strain, &(mean_curvature(&self.corners) * own), self.thickness)
+    }
+
+    /// Thickness [m] with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1 − ν)): −ν/(1 − ν) (ε₁ + ε₂) where strains are
+    /// small, and the same volume for ν = ½ however large they are. Forces do not feel it.
+    pub(crate) fn thickness_now(&self, placed: &Placed) -> f64 {
+        let nu = self.elastic.poisson;
+        let ratio = area(&placed.local) / self.area;
+        self.thickness * ratio.powf(-nu / (1.0 - nu))
+    }
+
+    /// Whether it resists bending.
+    pub fn bends(&self) -> bool {
+        self.bending != Matrix9::zeros()
     }
 
     /// The smallest altitude at rest [m].

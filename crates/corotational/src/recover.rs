@@ -11,9 +11,10 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::error::SolveError;
-use crate::facet::{Broken, Facet, Resultants, ShellEnergy};
+use crate::facet::{Resultants, ShellEnergy};
 use crate::model::Model;
 use crate::state::State;
+use crate::strain::ShellStrain;
 use crate::tet::TetStress;
 
 /// Fields of all facets, one entry a facet. Its arrays are made at the first use and kept.
@@ -31,6 +32,10 @@ pub struct ShellFields {
     pub largest: Vec<f64>,
     /// Strain energy over the area at rest [J/m²] in its parts.
     pub energy: Vec<ShellEnergy>,
+    /// Thickness [m] with the strain across that plane stress asks for; forces do not feel it.
+    pub thickness: Vec<f64>,
+    /// How far it is strained.
+    pub strain: Vec<ShellStrain>,
 }
 
 impl ShellFields {
@@ -43,27 +48,30 @@ impl ShellFields {
         for tensors in [&mut self.membrane, &mut self.moment].into_iter().chain(&mut self.stress) {
             tensors.resize(count, Matrix3::zeros());
         }
-        for numbers in self.von_mises.iter_mut().chain([&mut self.largest]) {
+        for numbers in self.von_mises.iter_mut().chain([&mut self.largest, &mut self.thickness]) {
             numbers.resize(count, 0.0);
         }
         self.energy.resize(count, ShellEnergy::default());
+        self.strain.resize(count, ShellStrain::default());
         let [top, middle, bottom] = &mut self.stress;
         let [top_mises, middle_mises, bottom_mises] = &mut self.von_mises;
         let broken = (
             &model.facets,
             (&mut self.membrane, &mut self.moment, &mut self.largest, &mut self.energy),
+            (&mut self.thickness, &mut self.strain),
             (top, middle, bottom),
             (top_mises, middle_mises, bottom_mises),
         )
             .into_par_iter()
             .with_min_len(64)
             .enumerate()
-            .find_map_first(|(cell, (facet, own, stress, mises))| {
-                let found = resultants_and_energy(facet, state);
-                let (resultants, energy) = match found {
-                    Ok(found) => found,
+            .find_map_first(|(cell, (facet, own, wall, stress, mises))| {
+                let (x, rotation) = state.corners(facet.nodes);
+                let placed = match facet.place(&x, &rotation) {
+                    Ok(placed) => placed,
                     Err(why) => return Some(SolveError::Broken { cell, why }),
                 };
+                let (resultants, energy) = (facet.resultants(&placed), facet.energy(&placed));
                 let in_space = |tensor: &Vector3<f64>| resultants.in_space(tensor);
                 let heights = [0.5, 0.0, -0.5].map(|part| part * facet.thickness);
                 let stresses = heights.map(|height| in_space(&resultants.stress(facet.thickness, height)));
@@ -76,18 +84,13 @@ impl ShellFields {
                     bending: energy.bending / facet.area,
                     drilling: energy.drilling / facet.area,
                 };
+                (*wall.0, *wall.1) = (facet.thickness_now(&placed), facet.strain(&placed));
                 [*stress.0, *stress.1, *stress.2] = stresses;
                 [*mises.0, *mises.1, *mises.2] = each;
                 None
             });
         broken.map_or(Ok(()), Err)
     }
-}
-
-fn resultants_and_energy(facet: &Facet, state: &State) -> Result<(Resultants, ShellEnergy), Broken> {
-    let (x, rotation) = state.corners(facet.nodes);
-    let placed = facet.place(&x, &rotation)?;
-    Ok((facet.resultants(&placed), facet.energy(&placed)))
 }
 
 impl Resultants {

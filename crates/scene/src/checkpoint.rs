@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::build::{Built, Corotational};
 use crate::diagnostic::counted;
 use crate::format::{Precision, SolverName};
-use crate::output::{OutputError, OutputFolder, Schedule, Written, number};
+use crate::output::{OutputError, OutputFolder, Schedule, ShellStrains, Written, number};
 use crate::plan::Plan;
 use crate::run::History;
 use crate::scene::Scene;
@@ -23,7 +23,7 @@ use crate::solver::Memory;
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -53,6 +53,8 @@ pub(crate) struct Progressed {
     pub worst_balance: f64,
     /// The largest hourglass energy over the internal one, and its time [s].
     pub worst_hourglass: (f64, f64),
+    /// How far shells were strained.
+    pub strains: ShellStrains,
     /// Samples for plot and summary.
     pub history: History,
     pub sampling: Schedule,
@@ -523,6 +525,7 @@ mod tests {
             wall_seconds: 1.0,
             worst_balance: 0.0,
             worst_hourglass: (0.0, 0.0),
+            strains: ShellStrains::default(),
             history: History::default(),
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
@@ -578,9 +581,9 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_5_is_as_it_was() {
+    fn the_layout_of_format_6_is_as_it_was() {
         let state = State::<f32>::at_rest(&built("").model);
         let bytes = postcard::to_stdvec(&state).unwrap();
-        assert_eq!((FORMAT, bytes.len()), (5, 1083));
+        assert_eq!((FORMAT, bytes.len()), (6, 1083));
     }
 }

@@ -75,6 +75,11 @@ pub(crate) fn curvature(corners: &Corners, [xi, eta]: [f64; 2]) -> SMatrix<f64, 
     })
 }
 
+/// Mean curvatures [1/m] over (w, θx, θy).
+pub(crate) fn mean_curvature(corners: &Corners) -> SMatrix<f64, 3, 9> {
+    MIDSIDES.iter().fold(SMatrix::zeros(), |sum, &point| sum + curvature(corners, point) / 3.0)
+}
+
 /// Stiffness of the discrete Kirchhoff triangle; three points are exact.
 pub fn discrete_kirchhoff(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
     let stiffness = elastic.matrix() * (thickness.powi(3) / 12.0);

@@ -29,6 +29,11 @@ fn lumping(d: &Differences, thickness: f64) -> SMatrix<f64, 9, 3> {
     SMatrix::<f64, 9, 3>::from_row_slice(&rows) * (0.5 * thickness)
 }
 
+/// Nodal forces over uniform membrane forces [m], L/t of the ANDES triangle.
+pub(crate) fn lumped(corners: &Corners) -> SMatrix<f64, 9, 3> {
+    lumping(&Differences::new(corners), 1.0)
+}
+
 /// Hierarchical rotations over (u, v, θz): nodal drilling less the mean rotation of the triangle.
 fn hierarchical(d: &Differences) -> SMatrix<f64, 3, 9> {
     let inverse = 0.5 / d.double_area();

@@ -7,7 +7,7 @@ mod membrane;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{Matrix3, SMatrix, Vector2};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 /// Nine degrees of freedom squared.
 pub type Matrix9 = SMatrix<f64, 9, 9>;
@@ -16,6 +16,7 @@ pub type Matrix9 = SMatrix<f64, 9, 9>;
 pub type Corners = [Vector2<f64>; 3];
 
 pub use bending::discrete_kirchhoff;
+pub(crate) use bending::mean_curvature;
 pub use comas::comas_2010;
 pub(crate) use membrane::andes_basic;
 pub use membrane::{andes_opt, constant_strain};
@@ -78,6 +79,15 @@ impl Formulation {
             Membrane::Opt { adaptation } => andes_opt(corners, elastic, thickness, adaptation),
             Membrane::Cst { drilling } => constant_strain(corners, elastic, thickness, drilling),
             Membrane::None => Matrix9::zeros(),
+        }
+    }
+
+    /// Nodal forces over (u, v, θz) of uniform membrane forces (nxx, nyy, nxy) [N/m].
+    pub(crate) fn membrane_forces(&self, corners: &Corners, forces: &Vector3<f64>) -> SVector<f64, 9> {
+        match self.membrane {
+            Membrane::Opt { .. } => membrane::lumped(corners) * forces,
+            Membrane::Cst { .. } => membrane::strain(corners).transpose() * forces * area(corners),
+            Membrane::None => SVector::zeros(),
         }
     }
 

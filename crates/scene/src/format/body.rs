@@ -32,6 +32,11 @@ pub struct BodyTable {
     /// Thickness of a shell [m]: one, or one for each triangle.
     #[serde(default)]
     pub thickness: Option<Thickness>,
+    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: what holds a flat `membrane` across. Not for the
+    /// element `plate`.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub pre_tension: f64,
     /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the mesh where it has
     /// some and there is no `crease`, else from the triangles.
     #[serde(default)]

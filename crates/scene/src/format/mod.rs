@@ -13,7 +13,10 @@ pub use body::{
     Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule,
     TubeShape, TwistedStripShape,
 };
-pub use linear::{ControlTable, ControlledNode, LinearName, LinearTable, LinearWay, PreconditionerName};
+pub use linear::{
+    ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,
+    StopTable,
+};
 pub use load::{
     Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MomentTable, MoveTable,
     NodeVectorSource, NodeVectors, PressureTable, SpreadName, SpringTable, Timing, TractionTable, Vectors,
@@ -91,6 +94,9 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
+    /// How `implicit` goes on in time; `backward-euler` if not given.
+    #[serde(default)]
+    pub integrator: Option<IntegratorName>,
     /// How `implicit` and `static` solve their linear equations.
     #[serde(default)]
     pub linear: LinearWay,

@@ -58,11 +58,15 @@ pub enum FieldName {
     DrillingEnergy,
     /// Thickness of a shell at rest [m].
     Thickness,
+    /// Thickness [m] that a shell has with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1−ν)); forces do not feel it.
+    CurrentThickness,
+    /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity holds to about 0.1.
+    SurfaceStrain,
 }
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 24] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
@@ -85,6 +89,8 @@ impl FieldName {
         Self::BendingEnergy,
         Self::DrillingEnergy,
         Self::Thickness,
+        Self::CurrentThickness,
+        Self::SurfaceStrain,
     ];
 
     /// The name in files.
@@ -112,6 +118,8 @@ impl FieldName {
             Self::BendingEnergy => "bending-energy",
             Self::DrillingEnergy => "drilling-energy",
             Self::Thickness => "thickness",
+            Self::CurrentThickness => "current-thickness",
+            Self::SurfaceStrain => "surface-strain",
         }
     }
 
@@ -123,7 +131,7 @@ impl FieldName {
     /// Its unit; empty for none.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Displacement | Self::Thickness => "m",
+            Self::Displacement | Self::Thickness | Self::CurrentThickness => "m",
             Self::Velocity => "m/s",
             Self::Rotation => "rad",
             Self::CauchyStress
@@ -133,7 +141,11 @@ impl FieldName {
             | Self::StressTop
             | Self::StressMiddle
             | Self::StressBottom => "Pa",
-            Self::GreenStrain | Self::Fibre | Self::FibreStretch | Self::VolumeRatio => "",
+            Self::GreenStrain
+            | Self::Fibre
+            | Self::FibreStretch
+            | Self::VolumeRatio
+            | Self::SurfaceStrain => "",
             Self::EnergyDensity => "J/m³",
             Self::ElementStep => "s",
             Self::MembraneForce => "N/m",
@@ -167,6 +179,8 @@ impl FieldName {
             Self::BendingEnergy => "bending energy",
             Self::DrillingEnergy => "drilling energy",
             Self::Thickness => "thickness",
+            Self::CurrentThickness => "current thickness",
+            Self::SurfaceStrain => "strain at the surface",
         }
     }
 
@@ -191,7 +205,9 @@ impl FieldName {
             | Self::MembraneEnergy
             | Self::BendingEnergy
             | Self::DrillingEnergy
-            | Self::Thickness => 1,
+            | Self::Thickness
+            | Self::CurrentThickness
+            | Self::SurfaceStrain => 1,
         }
     }
 

@@ -12,6 +12,8 @@ use crate::scene::Scene;
 pub(crate) const SUMMARY: &str = "summary.md";
 /// The plot in it.
 pub(crate) const PLOT: &str = "plot.svg";
+/// Residuals of the iterations of a run that solves equations.
+pub(crate) const CONVERGENCE: &str = "convergence.csv";
 /// The picture of the last instant, if one was asked for.
 pub(crate) const PICTURE: &str = "picture.png";
 
@@ -139,7 +141,7 @@ fn probe(folder: &Path) -> std::io::Result<()> {
 /// Removes what an earlier run of the same outputs left, so that no file tells of another run than its neighbours.
 /// A CSV file stays until it is written anew.
 fn remove_earlier(folder: &Path, scene: &Scene) -> std::io::Result<()> {
-    for page in [SUMMARY, PLOT, PICTURE] {
+    for page in [SUMMARY, PLOT, PICTURE, CONVERGENCE] {
         remove(&folder.join(page))?;
     }
     for entry in fs::read_dir(folder)? {

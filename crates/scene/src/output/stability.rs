@@ -139,7 +139,8 @@ pub(crate) fn doubts(built: &Built, outcome: &Outcome, stability: Option<&Stabil
             bodies.join(", ")
         )
     });
-    hourglass.into_iter().chain(stability.and_then(StabilitySummary::doubt)).collect()
+    let unstable = stability.and_then(StabilitySummary::doubt);
+    hourglass.into_iter().chain(unstable).chain(outcome.strains.doubts()).collect()
 }
 
 const HOURGLASS_REMEDY: &str =

@@ -12,13 +12,19 @@ use crate::build::bodies::{Draft, nodes};
 use crate::build::meshes::surface_of;
 use crate::build::{Builder, SCENE, bodies, suggestion};
 use crate::diagnostic::{Diagnostic, counted};
-use crate::format::{BodyModel, BodyTable, Element, Normals, Thickness, ThicknessRule};
+use crate::format::{BodyModel, BodyTable, Element, Normals, SolverName, Thickness, ThicknessRule};
 
 /// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
 const DRILLING: f64 = 0.01;
 
 /// Point data with the normals of a surface.
 const NORMAL: &str = "normal";
+
+/// Normals whose cosine is as close to 1 are parallel: to 0.1°.
+const FLAT: f64 = 1e-6;
+
+/// Thickness over width from which on a wall is told to be stout: a strip is then 3 % too stiff against twist.
+const STOUT: f64 = 0.05;
 
 impl Builder<'_> {
     /// The mesh of a shell as triangles only: quads cut in two, volume cells left for their boundary.
@@ -98,6 +104,7 @@ impl Builder<'_> {
             thickness,
             material,
             formulation,
+            tension: table.pre_tension,
             crease: table.crease.unwrap_or(45.0).to_radians(),
             normals,
             branches: table.branches,
@@ -107,6 +114,7 @@ impl Builder<'_> {
         match part.model.add_shell(&shell) {
             Ok(notes) => {
                 self.tell_notes(name, notes, count);
+                self.tell_slack(name, table, formulation, start as usize);
                 if formulation.bending == Bending::None && formulation.membrane != Membrane::None {
                     let held = corotational::Constraint {
                         name: format!("membrane {name}"),
@@ -284,6 +292,36 @@ impl Builder<'_> {
         }
     }
 
+    /// Tells of nodes of a membrane that nothing holds across at the start of a static run.
+    fn tell_slack(&mut self, name: &str, table: &BodyTable, formulation: Formulation, first: usize) {
+        let slack = formulation.bending == Bending::None && formulation.membrane != Membrane::None;
+        let Some(part) = self.corotational.as_ref().filter(|_| slack && table.pre_tension == 0.0) else {
+            return;
+        };
+        if self.scene.run.solver != SolverName::Static {
+            return;
+        }
+        // Of each node the normal of a triangle, and whether all are parallel to it.
+        let mut flat: BTreeMap<u32, (Vector3, bool)> = BTreeMap::new();
+        for facet in &part.model.facets[first..] {
+            let [a, b, c] = facet.nodes.map(|node| part.model.rest[node as usize]);
+            let normal = (b - a).cross(&(c - a)).normalize();
+            for node in facet.nodes {
+                let known = flat.entry(node).or_insert((normal, true));
+                known.1 &= known.0.dot(&normal).abs() > 1.0 - FLAT;
+            }
+        }
+        let count = flat.values().filter(|(_, flat)| *flat).count();
+        if count > 0 {
+            self.notes.push(format!(
+                "`{name}`: {} of the membrane lie in one plane with all triangles round them, and without tension nothing holds \
+                 them across: the static solver starts with an artificial stiffness there, proportional to the residual, of \
+                 which nothing is left at equilibrium; `pre-tension` [N/m] would hold them",
+                counted(count, "node")
+            ));
+        }
+    }
+
     fn tell_notes(&mut self, name: &str, notes: corotational::Notes, count: usize) {
         if notes.turned > 0 {
             self.notes.push(format!(
@@ -299,6 +337,13 @@ impl Builder<'_> {
             let place = self.source().span(&["body", name, "thickness"]);
             let help = "take larger triangles, a smaller thickness, or model the wall with tets";
             self.out.push(Diagnostic::warning(message).at(place, "thick").help(help));
+        }
+        if let Some(stoutness) = notes.stoutness.filter(|&stoutness| stoutness > STOUT) {
+            self.notes.push(format!(
+                "`{name}` is {stoutness:.2} times as thick as wide (twice its area over its border): shear across the thickness is \
+                 left out, which makes such a strip about {:.0} % too stiff against twist (0.63 times that)",
+                63.0 * stoutness
+            ));
         }
         if let Some((inverted, first)) = notes.inverted {
             let message = format!(
