@@ -5,11 +5,14 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use pliant_mechanics::curve::Curve;
 
-use crate::element::{Elasticity, Formulation};
+use crate::element::{Elasticity, Formulation, Layer};
 use crate::error::ModelError;
 use crate::facet::Facet;
 use crate::surface::Carried;
 use crate::tet::Tet;
+
+/// The least part of a direction that lies in a triangle.
+const ALONG: f64 = 1e-3;
 
 /// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
 #[derive(Clone, Debug, Default)]
@@ -71,6 +74,10 @@ pub struct Shell {
     pub material: Vec<Material>,
     /// Its elements.
     pub formulation: Formulation,
+    /// Layers from the bottom (against the normals) to the top; with some, `thickness` and `material` say nothing.
+    pub layers: Vec<Layer>,
+    /// The direction that the angles of layers count from, projected on each triangle: one, or one a triangle.
+    pub direction: Vec<Vector3<f64>>,
     /// Tension [N/m] at rest, equal in all directions.
     pub tension: f64,
     /// Triangles that meet at a larger angle [rad] have normals of their own: a crease.
@@ -91,6 +98,8 @@ impl Shell {
             thickness: vec![thickness],
             material: vec![material],
             formulation: Formulation::default(),
+            layers: Vec::new(),
+            direction: Vec::new(),
             tension: 0.0,
             crease: std::f64::consts::FRAC_PI_4,
             normals: BTreeMap::new(),
@@ -253,18 +262,23 @@ impl Model {
         let mut notes = Notes { turned, ..Notes::default() };
         let mut facets = Vec::with_capacity(cells.len());
         for (number, &nodes) in cells.iter().enumerate() {
-            let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
-            let material = shell.material[if shell.material.len() == 1 { 0 } else { number }];
             let corners = nodes.map(|node| self.rest[node as usize]);
-            let facet = Facet::new(nodes, corners, thickness, material, shell.formulation)
-                .map(|facet| facet.under_tension(shell.formulation, shell.tension));
+            let facet = if shell.layers.is_empty() {
+                let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
+                let material = shell.material[if shell.material.len() == 1 { 0 } else { number }];
+                Facet::new(nodes, corners, thickness, material, shell.formulation)
+            } else {
+                let direction = direction_of(shell, number, &corners)?;
+                Facet::layered(nodes, corners, &shell.layers, &direction, shell.formulation)
+            };
+            let facet = facet.map(|facet| facet.under_tension(shell.formulation, shell.tension));
             let facet = facet.ok_or_else(|| ModelError::Degenerate {
                 shell: shell.name.clone(),
                 cell: number,
                 what: "area",
                 value: 0.5 * (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm(),
             })?;
-            notes.thick += usize::from(thickness > facet.altitude());
+            notes.thick += usize::from(facet.thickness > facet.altitude());
             notes.comas += usize::from(shell.formulation.bending == crate::element::Bending::Comas2010);
             facets.push(facet);
         }
@@ -348,6 +362,15 @@ impl Model {
             Err(ModelError::OutOfRange { shell: shell.name.clone(), what, value, range })
         };
         let positive = |value: f64| value > 0.0 && value.is_finite();
+        for (cell, nodes) in shell.cells.iter().enumerate() {
+            check_nodes(&shell.name, cell, nodes, self.rest.len())?;
+        }
+        if !(shell.tension >= 0.0 && shell.tension.is_finite()) {
+            return out_of_range("tension".into(), shell.tension, "finite and not negative");
+        }
+        if !shell.layers.is_empty() {
+            return check_layers(shell);
+        }
         for &material in &shell.material {
             check_material(&shell.name, material, 1.0, "between -1 and 1")?;
         }
@@ -357,16 +380,10 @@ impl Model {
                 return Err(ModelError::Count { shell: shell.name.clone(), what, cells, given });
             }
         }
-        if !(shell.tension >= 0.0 && shell.tension.is_finite()) {
-            return out_of_range("tension".into(), shell.tension, "finite and not negative");
-        }
         let given = shell.thickness.len();
         if let Some((cell, &value)) = shell.thickness.iter().enumerate().find(|(_, t)| !positive(**t)) {
             let what = if given == 1 { "thickness".into() } else { format!("thickness of element {cell}") };
             return out_of_range(what, value, "positive and finite");
-        }
-        for (cell, nodes) in shell.cells.iter().enumerate() {
-            check_nodes(&shell.name, cell, nodes, self.rest.len())?;
         }
         Ok(())
     }
@@ -483,6 +500,41 @@ impl Model {
         }
         if count > 0 { sum / f64::from(count) } else { 1.0 }
     }
+}
+
+fn check_layers(shell: &Shell) -> Result<(), ModelError> {
+    let out_of_range =
+        |what, value, range| Err(ModelError::OutOfRange { shell: shell.name.clone(), what, value, range });
+    for (number, layer) in shell.layers.iter().enumerate() {
+        let what = |what: &str| format!("{what} of layer {number}");
+        if !layer.elastic.is_stable() {
+            let range = "so that every deformation costs energy: moduli above 0, and its square below E₁/E₂";
+            return out_of_range(what("Poisson's ratio"), layer.elastic.poisson, range);
+        }
+        for (name, value) in [("thickness", layer.thickness), ("density", layer.density)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return out_of_range(what(name), value, "positive and finite");
+            }
+        }
+    }
+    let (cells, given) = (shell.cells.len(), shell.direction.len());
+    if given != 1 && given != cells {
+        return Err(ModelError::Count { shell: shell.name.clone(), what: "directions", cells, given });
+    }
+    Ok(())
+}
+
+/// The direction of the layers of a triangle.
+fn direction_of(shell: &Shell, cell: usize, corners: &[Vector3<f64>; 3]) -> Result<Vector3<f64>, ModelError> {
+    let direction = shell.direction[if shell.direction.len() == 1 { 0 } else { cell }];
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(&(c - a));
+    let along = direction - normal * (normal.dot(&direction) / normal.norm_squared());
+    // Written so that NaN and a triangle without area are found too; the latter has its own error.
+    if along.norm() > ALONG * direction.norm() || normal == Vector3::zeros() {
+        return Ok(along);
+    }
+    Err(ModelError::Direction { shell: shell.name.clone(), cell })
 }
 
 fn check_material(

@@ -3,7 +3,7 @@
 //! Shells: membrane forces and bending moments are the means over the facet that do the same work with uniform strains and curvatures
 //! as its nodal forces: n = t Dm Lᵀd/(t A) of the ANDES membrane (Felippa 2003, CMAME 192:2125), whose strain has a part from drilling,
 //! and m = t³/12 Dm κ with the mean curvature of the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980). Stress at a height z along the
-//! facet's normal is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959).
+//! facet's normal is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959), in layers Q (ε + z κ) with ε and κ of n and m.
 //! Tetrahedra: Cauchy stress σ = P Fᵀ/J of their energy.
 //! Leaves out: shear across the thickness, variation within a facet, averages at nodes.
 
@@ -28,7 +28,7 @@ pub struct ShellFields {
     pub stress: [Vec<Matrix3<f64>>; 3],
     /// Von Mises stress [Pa] there.
     pub von_mises: [Vec<f64>; 3],
-    /// The largest of the three [Pa].
+    /// The largest of the three [Pa]; in a wall of layers of both faces of each.
     pub largest: Vec<f64>,
     /// Strain energy over the area at rest [J/m²] in its parts.
     pub energy: Vec<ShellEnergy>,
@@ -73,12 +73,12 @@ impl ShellFields {
                 };
                 let (resultants, energy) = (facet.resultants(&placed), facet.energy(&placed));
                 let in_space = |tensor: &Vector3<f64>| resultants.in_space(tensor);
-                let heights = [0.5, 0.0, -0.5].map(|part| part * facet.thickness);
-                let stresses = heights.map(|height| in_space(&resultants.stress(facet.thickness, height)));
+                let (stresses, largest) = facet.stresses(&resultants);
+                let stresses = stresses.map(|stress| in_space(&stress));
                 let each = stresses.map(|stress| von_mises(&stress));
                 *own.0 = in_space(&resultants.membrane);
                 *own.1 = in_space(&resultants.moment);
-                *own.2 = each.into_iter().fold(0.0, f64::max);
+                *own.2 = largest;
                 *own.3 = ShellEnergy {
                     membrane: energy.membrane / facet.area,
                     bending: energy.bending / facet.area,

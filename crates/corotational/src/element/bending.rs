@@ -4,7 +4,7 @@
 
 use nalgebra::SMatrix;
 
-use super::{Corners, Differences, Elasticity, Matrix9};
+use super::{Corners, Differences, Matrix9, PlaneStress};
 
 /// (L2, L3) in the middle of the edges: three points that integrate quadratics exactly.
 pub(crate) const MIDSIDES: [[f64; 2]; 3] = [[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]];
@@ -81,8 +81,8 @@ pub(crate) fn mean_curvature(corners: &Corners) -> SMatrix<f64, 3, 9> {
 }
 
 /// Stiffness of the discrete Kirchhoff triangle; three points are exact.
-pub fn discrete_kirchhoff(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
-    let stiffness = elastic.matrix() * (thickness.powi(3) / 12.0);
+pub fn discrete_kirchhoff(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+    let stiffness = elastic.matrix * (thickness.powi(3) / 12.0);
     let weight = super::area(corners) / 3.0;
     MIDSIDES.iter().fold(Matrix9::zeros(), |sum, &point| {
         let b = curvature(corners, point);

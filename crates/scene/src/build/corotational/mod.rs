@@ -206,7 +206,13 @@ impl Builder<'_> {
                 ("stiffness-damping", body.model != BodyModel::Solid, "shells and co-rotational solids"),
                 ("initial-displacement", body.model != BodyModel::Solid, "shells and co-rotational solids"),
                 ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
-                ("fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
+                ("layers", shell, "a shell"),
+                ("thickness", body.layers.is_empty(), "a shell without `layers`"),
+                (
+                    "fibre",
+                    body.model == BodyModel::Solid || (shell && !body.layers.is_empty()),
+                    "`model = \"solid\"` and shells with `layers`",
+                ),
                 ("second-fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
             ];
             for (key, wanted, of) in others {
