@@ -259,6 +259,7 @@ fn a_resumed_run_of_shells_ends_in_the_same_bits() {
         &format!("solver = \"implicit\"\nstep = 2e-3\n{jacobi}"),
         "solver = \"static\"\nload-steps = 50",
         "solver = \"explicit\"",
+        "solver = \"implicit\"\nintegrator = \"bdf2\"\nstep = 2e-3",
     ]
     .into_iter()
     .enumerate()

@@ -8,12 +8,19 @@ use nalgebra::{
     Matrix3, Matrix3x2, Rotation3, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector2, Vector3,
 };
 
-use crate::element::{Corners, Elasticity, Formulation, Matrix9, andes_basic, area, gradients};
+use crate::element::{
+    Corners, Formulation, Layer, Matrix9, PlaneStress, Section, andes_basic, area, density, gradients, mean,
+    mean_curvature, thickness,
+};
 use crate::model::Material;
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
+use crate::strain::ShellStrain;
 
 /// Numbers of (u, v, w, θx, θy, θz) of three nodes, node by node.
 pub type Vector18 = SVector<f64, 18>;
+
+/// Nodal forces over (u, v, θz).
+pub(crate) type Vector9 = SVector<f64, 9>;
 
 /// Stiffness over them.
 pub type Matrix18 = SMatrix<f64, 18, 18>;
@@ -44,7 +51,9 @@ pub struct Facet {
     /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that rotations do not shorten the
     /// steps of an explicit solver.
     pub inertia: f64,
-    elastic: Elasticity,
+    elastic: PlaneStress,
+    /// Of a wall of layers.
+    section: Option<Box<Section>>,
     /// Corners at rest in the facet's axes, relative to the centroid [m].
     corners: Corners,
     /// Gradients of the shape functions there [1/m].
@@ -53,6 +62,10 @@ pub struct Facet {
     axes: UnitQuaternion<f64>,
     membrane: Matrix9,
     bending: Matrix9,
+    /// What nodal forces on (u, v, θz) come from (w, θx, θy), of layers that are not symmetric.
+    coupling: Option<Box<Matrix9>>,
+    /// Nodal forces of its tension at rest over (u, v, θz), and that tension [N/m].
+    tension: (Vector9, f64),
 }
 
 /// Energy of a shell in its parts [J].
@@ -124,7 +137,31 @@ impl Facet {
         nodes: [u32; 3],
         rest: [Vector3<f64>; 3],
         thickness: f64,
+        material: Material,
+        formulation: Formulation,
+    ) -> Option<Self> {
+        Self::of_wall(nodes, rest, thickness, material, None, formulation)
+    }
+
+    /// A facet of layers from the bottom (against its normal) to the top; their angles count from a direction, which is projected on the
+    /// facet.
+    pub fn layered(
+        nodes: [u32; 3],
+        rest: [Vector3<f64>; 3],
+        layers: &[Layer],
+        direction: &Vector3<f64>,
+        formulation: Formulation,
+    ) -> Option<Self> {
+        let material = Material { elastic: mean(layers), density: density(layers) };
+        Self::of_wall(nodes, rest, thickness(layers), material, Some((layers, direction)), formulation)
+    }
+
+    fn of_wall(
+        nodes: [u32; 3],
+        rest: [Vector3<f64>; 3],
+        thickness: f64,
         Material { elastic, density }: Material,
+        layers: Option<(&[Layer], &Vector3<f64>)>,
         formulation: Formulation,
     ) -> Option<Self> {
         let [a, b, c] = rest;
@@ -141,6 +178,18 @@ impl Facet {
         let corners = rest.map(|x| (axes.transpose() * (x - centroid)).xy());
         let area = area(&corners);
         let mass = density * thickness * area / 3.0;
+        let section = layers.map(|(layers, direction)| {
+            let own = axes.tr_mul(direction);
+            Box::new(Section::new(layers, own.y.atan2(own.x)))
+        });
+        let [elastic, bent] = match &section {
+            None => [PlaneStress::from(elastic); 2],
+            Some(section) => [section.in_plane(), section.in_bending()],
+        };
+        let coupling = section.as_ref().map(|section| {
+            let strain = formulation.mean_strain(&corners).transpose() * section.coupling;
+            Box::new(strain * formulation.mean_curvature(&corners) * area)
+        });
         Some(Self {
             nodes,
             thickness,
@@ -148,12 +197,23 @@ impl Facet {
             mass,
             inertia: mass * (thickness * thickness).max(area) / 12.0,
             elastic,
+            section,
+            coupling,
             corners,
             gradient: gradients(&corners),
             axes: quaternion(axes),
             membrane: formulation.membrane_stiffness(&corners, &elastic, thickness),
-            bending: formulation.bending_stiffness(&corners, &elastic, thickness),
+            bending: formulation.bending_stiffness(&corners, &bent, thickness),
+            tension: (Vector9::zeros(), 0.0),
         })
+    }
+
+    /// The same with a tension [N/m] in its rest shape, equal in all directions.
+    #[must_use]
+    pub fn under_tension(self, formulation: Formulation, tension: f64) -> Self {
+        let strain = formulation.mean_strain(&self.corners);
+        let forces = strain.transpose() * Vector3::new(tension, tension, 0.0) * self.area;
+        Self { tension: (forces, tension), ..self }
     }
 
     /// Where the facet is with its nodes at positions [m] and turned from rest by rotations.
@@ -210,7 +270,23 @@ impl Facet {
                 force[place] = *value;
             }
         }
+        for (&place, value) in MEMBRANE.iter().zip(&self.tension.0) {
+            force[place] += value;
+        }
+        if let Some(coupling) = &self.coupling {
+            let [stretch, turn] = [MEMBRANE, BENDING].map(|places| Vector9::from_fn(|i, _| d[places[i]]));
+            let (in_plane, across) = (**coupling * turn, coupling.tr_mul(&stretch));
+            for i in 0..9 {
+                force[MEMBRANE[i]] += in_plane[i];
+                force[BENDING[i]] += across[i];
+            }
+        }
         force
+    }
+
+    /// What the tension at rest does along a deformation [J], beside the elastic energy.
+    fn tension_energy(&self, d: &Vector18) -> f64 {
+        MEMBRANE.iter().zip(&self.tension.0).map(|(&place, force)| d[place] * force).sum()
     }
 
     /// K in the facet's axes.
@@ -223,6 +299,14 @@ impl Facet {
                 }
             }
         }
+        if let Some(coupling) = &self.coupling {
+            for (j, &bending) in BENDING.iter().enumerate() {
+                for (i, &membrane) in MEMBRANE.iter().enumerate() {
+                    k[(membrane, bending)] = coupling[(i, j)];
+                    k[(bending, membrane)] = coupling[(i, j)];
+                }
+            }
+        }
     }
 
     /// Energy [J] and internal nodal forces and moments, its gradient with respect to positions and spins.
@@ -230,7 +314,7 @@ impl Facet {
         let raw = self.linear_force(&placed.deformation);
         let spun = placed.to_spins(&raw);
         (
-            0.5 * placed.deformation.dot(&raw),
+            0.5 * (placed.deformation.dot(&raw) + self.tension_energy(&placed.deformation)),
             placed.to_space(&project(placed, &self.frame_spins(placed), &spun)),
         )
     }
@@ -382,7 +466,14 @@ impl Facet {
         let plane = of(MEMBRANE, &self.membrane);
         // What an element without resistance in its plane has not, it cannot split.
         let membrane = of(MEMBRANE, &andes_basic(&self.corners, &self.elastic, self.thickness)).min(plane);
-        ShellEnergy { membrane, bending: of(BENDING, &self.bending), drilling: plane - membrane }
+        let (drilling, membrane) = (plane - membrane, membrane + self.tension_energy(&placed.deformation));
+        let mut bending = of(BENDING, &self.bending);
+        if let Some(coupling) = &self.coupling {
+            let [stretch, turn] =
+                [MEMBRANE, BENDING].map(|places| Vector9::from_fn(|i, _| placed.deformation[places[i]]));
+            bending += stretch.dot(&(**coupling * turn));
+        }
+        ShellEnergy { membrane, bending, drilling }
     }
 
     /// Mean forces and moments per length: those whose work with a uniform strain or curvature is that of the element's nodal forces,
@@ -421,6 +512,45 @@ impl Facet {
         let in_plane = [0, 1, 3, 4, 6, 7].map(|at| self.membrane[(at, at)]);
         let across = [0, 3, 6].map(|at| self.bending[(at, at)]);
         in_plane.into_iter().chain(across).fold(0.0, f64::max)
+    }
+
+    /// Stress (σxx, σyy, σxy) [Pa] at the top, in the middle and at the bottom, and the largest von Mises stress there and, of a wall of
+    /// layers, at the faces of each.
+    pub(crate) fn stresses(&self, resultants: &Resultants) -> ([Vector3<f64>; 3], f64) {
+        let mises = |s: &Vector3<f64>| (s.x * s.x - s.x * s.y + s.y * s.y + 3.0 * s.z * s.z).sqrt();
+        let Some(section) = &self.section else {
+            let all = [0.5, 0.0, -0.5].map(|part| resultants.stress(self.thickness, part * self.thickness));
+            return (all, all.iter().map(mises).fold(0.0, f64::max));
+        };
+        // The tension at rest is the same in all layers.
+        let tension = Vector3::new(self.tension.1, self.tension.1, 0.0);
+        let elastic = resultants.membrane - tension;
+        let (all, faces) = section.stresses(&elastic, &resultants.moment);
+        let whole = |stress: Vector3<f64>| stress + tension / self.thickness;
+        (all.map(whole), faces.map(|stress| mises(&whole(stress))).fold(0.0, f64::max))
+    }
+
+    /// How far it is strained.
+    pub(crate) fn strain(&self, placed: &Placed) -> ShellStrain {
+        let entry = |row: usize, column: usize| -> f64 {
+            (0..3).map(|i| placed.local[i][row] * self.gradient[i][column]).sum()
+        };
+        let strain = Vector3::new(entry(0, 0) - 1.0, entry(1, 1) - 1.0, entry(0, 1) + entry(1, 0));
+        let own = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[BENDING[i]]);
+        ShellStrain::new(&strain, &(mean_curvature(&self.corners) * own), self.thickness)
+    }
+
+    /// Thickness [m] with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1 − ν)): −ν/(1 − ν) (ε₁ + ε₂) where strains are
+    /// small, and the same volume for ν = ½ however large they are. Forces do not feel it.
+    pub(crate) fn thickness_now(&self, placed: &Placed) -> f64 {
+        let nu = self.elastic.poisson;
+        let ratio = area(&placed.local) / self.area;
+        self.thickness * ratio.powf(-nu / (1.0 - nu))
+    }
+
+    /// Whether it resists bending.
+    pub fn bends(&self) -> bool {
+        self.bending != Matrix9::zeros()
     }
 
     /// The smallest altitude at rest [m].
@@ -537,7 +667,7 @@ fn quaternion(axes: Matrix3<f64>) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::Membrane;
+    use crate::element::{Elasticity, Membrane};
     use crate::rotation::exponential;
     use crate::testing::Random;
 

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::build::{Built, Corotational};
 use crate::diagnostic::counted;
 use crate::format::{LoadSteps, Precision, SolverName};
-use crate::output::{OutputError, OutputFolder, Schedule, Written, number, replace};
+use crate::output::{OutputError, OutputFolder, Schedule, ShellStrains, Written, number, replace};
 use crate::plan::Plan;
 use crate::reads::read_regular;
 use crate::run::History;
@@ -54,6 +54,8 @@ pub(crate) struct Progressed {
     pub worst_balance: f64,
     /// The largest hourglass energy over the internal one, and its time [s].
     pub worst_hourglass: (f64, f64),
+    /// How far shells were strained.
+    pub strains: ShellStrains,
     /// Samples for plot and summary.
     pub history: History,
     pub sampling: Schedule,
@@ -543,6 +545,7 @@ mod tests {
             wall_seconds: 1.0,
             worst_balance: 0.0,
             worst_hourglass: (0.0, 0.0),
+            strains: ShellStrains::default(),
             history: History::default(),
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),

@@ -181,6 +181,21 @@ pub(crate) trait Solver<R> {
         None
     }
 
+    /// Why it is at its end before the time of the scene is over.
+    fn ended(&self) -> Option<&str> {
+        None
+    }
+
+    /// After a step that failed: whether what it found on the way is to be shown; the state's time then is that of it.
+    fn keeps_what_it_found(&mut self, _state: &mut State<R>) -> bool {
+        false
+    }
+
+    /// Residuals of its last iterations, as a table; `None` of one that solves no equations.
+    fn convergence(&self) -> Option<String> {
+        None
+    }
+
     /// What its equations took; `None` of one that solves none.
     fn effort(&self) -> Option<Effort> {
         None

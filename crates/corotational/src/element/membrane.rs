@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::{Corners, Differences, Elasticity, Matrix9, area, gradients};
+use super::{Corners, Differences, Matrix9, PlaneStress, area, gradients};
 
 /// α_b: how much of the edges' normal displacement comes from drilling.
 const DRILLING_TO_EDGE: f64 = 1.5;
@@ -29,6 +29,11 @@ fn lumping(d: &Differences, thickness: f64) -> SMatrix<f64, 9, 3> {
     SMatrix::<f64, 9, 3>::from_row_slice(&rows) * (0.5 * thickness)
 }
 
+/// Mean strain of the ANDES triangle over (u, v, θz), Lᵀ/(t A).
+pub(crate) fn andes_strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
+    lumping(&Differences::new(corners), 1.0).transpose() / area(corners)
+}
+
 /// Hierarchical rotations over (u, v, θz): nodal drilling less the mean rotation of the triangle.
 fn hierarchical(d: &Differences) -> SMatrix<f64, 3, 9> {
     let inverse = 0.5 / d.double_area();
@@ -37,14 +42,14 @@ fn hierarchical(d: &Differences) -> SMatrix<f64, 3, 9> {
 }
 
 /// The basic part of the ANDES triangle: constant strain with the drilling of the edges, K = L D Lᵀ/(t A).
-pub(crate) fn andes_basic(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
+pub(crate) fn andes_basic(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
     let d = Differences::new(corners);
     let l = lumping(&d, thickness);
-    l * elastic.matrix() * l.transpose() / (thickness * 0.5 * d.double_area())
+    l * elastic.matrix * l.transpose() / (thickness * 0.5 * d.double_area())
 }
 
 /// The ANDES triangle with β₀ = max((1 − 4ν²)/2, 0.01) min(1, κ t²/A).
-pub fn andes_opt(corners: &Corners, elastic: &Elasticity, thickness: f64, adaptation: f64) -> Matrix9 {
+pub fn andes_opt(corners: &Corners, elastic: &PlaneStress, thickness: f64, adaptation: f64) -> Matrix9 {
     let d = Differences::new(corners);
     let area = 0.5 * d.double_area();
     let optimal = (0.5 * (1.0 - 4.0 * elastic.poisson * elastic.poisson)).max(0.01);
@@ -61,7 +66,7 @@ pub fn andes_opt(corners: &Corners, elastic: &Elasticity, thickness: f64, adapta
         x23 * x13 * l21, x31 * x21 * l32, x12 * x32 * l13,
         (y23 * x31 + x32 * y13) * l21, (y31 * x12 + x13 * y21) * l32, (y12 * x23 + x21 * y32) * l13,
     ) / (4.0 * area * area);
-    let elastic_natural = natural.transpose() * elastic.matrix() * natural;
+    let elastic_natural = natural.transpose() * elastic.matrix * natural;
     // Strains along the edges at the corners, from the hierarchical rotations; βs 1, 2, 1, 0, 1, −1, −1, −1, −2.
     let lengths = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / l21, 1.0 / l32, 1.0 / l13));
     let scale = lengths * (2.0 * area / 3.0);
@@ -89,10 +94,10 @@ pub(crate) fn strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
 }
 
 /// The constant-strain triangle; `drilling` G t A/3 holds each node's rotation to that of the triangle.
-pub fn constant_strain(corners: &Corners, elastic: &Elasticity, thickness: f64, drilling: f64) -> Matrix9 {
+pub fn constant_strain(corners: &Corners, elastic: &PlaneStress, thickness: f64, drilling: f64) -> Matrix9 {
     let volume = thickness * area(corners);
     let b = strain(corners);
     let t = hierarchical(&Differences::new(corners));
-    b.transpose() * elastic.matrix() * b * volume
-        + t.transpose() * t * (drilling * elastic.shear() * volume / 3.0)
+    b.transpose() * elastic.matrix * b * volume
+        + t.transpose() * t * (drilling * elastic.shear * volume / 3.0)
 }

@@ -283,7 +283,7 @@ impl Builder<'_> {
                 BodyModel::Shell => {
                     "fields of a shell: `displacement`, `velocity`, `rotation`, `von-mises`, `stress-top`, `stress-middle`, \
                      `stress-bottom`, `membrane-force`, `bending-moment`, `membrane-energy`, `bending-energy`, \
-                     `drilling-energy`, `thickness`, `element-step`"
+                     `drilling-energy`, `thickness`, `current-thickness`, `surface-strain`, `element-step`"
                 }
                 BodyModel::Corotational => {
                     "fields of a co-rotational solid: `displacement`, `velocity`, `cauchy-stress`, `von-mises`, `pressure`, \

@@ -25,7 +25,7 @@ use crate::format::{CurveShape, Timing};
 use crate::scene::Scene;
 use crate::source::Source;
 
-pub use corotational::{BodyCells, Control, Corotational};
+pub use corotational::{BodyCells, Control, Corotational, Stop};
 pub(crate) use meshes::MeshOrigin;
 pub use meshes::PLAUSIBLE_SIZE;
 

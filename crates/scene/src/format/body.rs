@@ -24,7 +24,9 @@ pub struct BodyTable {
     #[serde(default)]
     pub element: Option<Element>,
     /// The name of its law, or a law for each cell label: `{ 1 = "parenchyma", 2 = "tumour" }`. Shells and co-rotational solids
-    /// take Young's modulus and Poisson's ratio of an isotropic law at small strain.
+    /// take Young's modulus and Poisson's ratio of an isotropic law at small strain; a shell whose `layers` all have their own elasticity
+    /// needs none.
+    #[serde(default = "no_law")]
     pub law: ByLabel<String>,
     /// Mass per volume [kg/m³], or one for each cell label. Elements with averaged pressure average it apart on parts of
     /// different density.
@@ -32,6 +34,15 @@ pub struct BodyTable {
     /// Thickness of a shell [m]: one, or one for each triangle.
     #[serde(default)]
     pub thickness: Option<Thickness>,
+    /// Layers of a shell from the side that its triangles face away from to the side that they face, instead of a `thickness`. Their
+    /// angles count from `fibre`, projected on each triangle.
+    #[serde(default)]
+    pub layers: Vec<LayerTable>,
+    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: what holds a flat `membrane` across. Not for the
+    /// element `plate`.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub pre_tension: f64,
     /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the mesh where it has
     /// some and there is no `crease`, else from the triangles.
     #[serde(default)]
@@ -67,12 +78,47 @@ pub struct BodyTable {
     /// triangles round them. The mesh is the shape at rest.
     #[serde(default)]
     pub initial_displacement: Option<NodeVectors>,
-    /// Fibre direction at rest; overrides that of the law.
+    /// Fibre direction at rest; overrides that of the law. Of a shell, the direction that the angles of its `layers` count from.
     #[serde(default)]
     pub fibre: Option<Fibre>,
     /// Direction of the second family of fibres at rest; overrides that of the law.
     #[serde(default)]
     pub second_fibre: Option<Fibre>,
+}
+
+fn no_law() -> ByLabel<String> {
+    ByLabel::Each(BTreeMap::new())
+}
+
+/// A layer of a shell: linearly elastic in plane stress, by a `law` (that of the body if not given) or by moduli of its own along and
+/// across its direction.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LayerTable {
+    /// Thickness [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub thickness: f64,
+    /// Angle [degrees] of its direction from the `fibre` of the body, counter-clockwise seen from the side that the triangles face.
+    #[serde(default)]
+    #[schemars(range(min = -180.0, max = 180.0))]
+    pub angle: f64,
+    /// The name of an isotropic law, whose Young's modulus and Poisson's ratio at small strain are taken.
+    #[serde(default)]
+    pub law: Option<String>,
+    /// Young's moduli along and across its direction [Pa]; with `poisson-ratio` and `shear-modulus`, instead of a law.
+    #[serde(default)]
+    pub young_modulus: Option<[f64; 2]>,
+    /// Poisson's ratio: how much it narrows across its direction when it is pulled along it.
+    #[serde(default)]
+    pub poisson_ratio: Option<f64>,
+    /// Shear modulus in its plane [Pa].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub shear_modulus: Option<f64>,
+    /// Mass per volume [kg/m³]; that of the body if not given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub density: Option<f64>,
 }
 
 fn default_hourglass() -> ByLabel<Hourglass> {

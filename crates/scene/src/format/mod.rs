@@ -9,11 +9,14 @@ mod view;
 
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
-    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Normals,
-    Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule,
+    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, LayerTable, MeshTable,
+    Normals, Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule,
     TubeShape, TwistedStripShape,
 };
-pub use linear::{ControlTable, ControlledNode, LinearName, LinearTable, LinearWay, PreconditionerName};
+pub use linear::{
+    ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,
+    StopTable,
+};
 pub use load::{
     Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MomentTable, MoveTable,
     NodeVectorSource, NodeVectors, PressureTable, SpreadName, SpringTable, Timing, TractionTable, Vectors,
@@ -90,6 +93,9 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
+    /// How `implicit` goes on in time; `backward-euler` if not given.
+    #[serde(default)]
+    pub integrator: Option<IntegratorName>,
     /// How `implicit` and `static` solve their linear equations.
     #[serde(default)]
     pub linear: LinearWay,

@@ -63,11 +63,15 @@ pub enum FieldName {
     DrillingEnergy,
     /// Thickness of a shell at rest [m].
     Thickness,
+    /// Thickness [m] that a shell has with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1−ν)); forces do not feel it.
+    CurrentThickness,
+    /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity holds to about 0.1.
+    SurfaceStrain,
 }
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 25] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
@@ -91,6 +95,8 @@ impl FieldName {
         Self::BendingEnergy,
         Self::DrillingEnergy,
         Self::Thickness,
+        Self::CurrentThickness,
+        Self::SurfaceStrain,
     ];
 
     /// The name in files.
@@ -119,6 +125,8 @@ impl FieldName {
             Self::BendingEnergy => "bending-energy",
             Self::DrillingEnergy => "drilling-energy",
             Self::Thickness => "thickness",
+            Self::CurrentThickness => "current-thickness",
+            Self::SurfaceStrain => "surface-strain",
         }
     }
 
@@ -130,7 +138,7 @@ impl FieldName {
     /// Its unit; empty for none.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Displacement | Self::Thickness => "m",
+            Self::Displacement | Self::Thickness | Self::CurrentThickness => "m",
             Self::Velocity => "m/s",
             Self::Rotation => "rad",
             Self::CauchyStress
@@ -144,7 +152,8 @@ impl FieldName {
             | Self::Fibre
             | Self::FibreStretch
             | Self::VolumeRatio
-            | Self::CellVolumeRatio => "",
+            | Self::CellVolumeRatio
+            | Self::SurfaceStrain => "",
             Self::EnergyDensity => "J/m³",
             Self::ElementStep => "s",
             Self::MembraneForce => "N/m",
@@ -179,6 +188,8 @@ impl FieldName {
             Self::BendingEnergy => "bending energy",
             Self::DrillingEnergy => "drilling energy",
             Self::Thickness => "thickness",
+            Self::CurrentThickness => "current thickness",
+            Self::SurfaceStrain => "strain at the surface",
         }
     }
 
@@ -204,7 +215,9 @@ impl FieldName {
             | Self::MembraneEnergy
             | Self::BendingEnergy
             | Self::DrillingEnergy
-            | Self::Thickness => 1,
+            | Self::Thickness
+            | Self::CurrentThickness
+            | Self::SurfaceStrain => 1,
         }
     }
 

@@ -134,6 +134,8 @@ impl Corotated {
                     FieldName::BendingEnergy => padded(&[fields.energy[at].bending]),
                     FieldName::DrillingEnergy => padded(&[fields.energy[at].drilling]),
                     FieldName::Thickness => padded(&[model.facets[at].thickness]),
+                    FieldName::CurrentThickness => padded(&[fields.thickness[at]]),
+                    FieldName::SurfaceStrain => padded(&[fields.strain[at].surface]),
                     FieldName::ElementStep => padded(&[self.step(0, at)]),
                     _ => [f64::NAN; 9],
                 }

@@ -15,6 +15,8 @@ use crate::scene::Scene;
 pub(crate) const SUMMARY: &str = "summary.md";
 /// The plot in it.
 pub(crate) const PLOT: &str = "plot.svg";
+/// Residuals of the iterations of a run that solves equations.
+pub(crate) const CONVERGENCE: &str = "convergence.csv";
 /// The picture of the last instant, if one was asked for.
 pub(crate) const PICTURE: &str = "picture.png";
 /// Locked by the run that writes to the folder; holds the number of its process.
@@ -224,7 +226,7 @@ fn series_file(folder: &Path, name: &str) -> PathBuf {
 /// Refuses links where a run of a scene writes.
 fn check_links(folder: &Path, scene: &Scene) -> Result<(), OutputError> {
     let check = |path: PathBuf| check_own(&path).map_err(|error| OutputError::new(&path, error));
-    for page in [SUMMARY, PLOT, PICTURE] {
+    for page in [SUMMARY, PLOT, PICTURE, CONVERGENCE] {
         check(folder.join(page))?;
     }
     for (name, table) in &scene.outputs {
@@ -279,7 +281,7 @@ fn remove_earlier(folder: &Path, scene: &Scene) -> Result<(), OutputError> {
 
 /// Removes the pages of a run, and pages and checkpoints that a killed run left unfinished.
 fn remove_pages(folder: &Path) -> io::Result<()> {
-    for page in [SUMMARY, PLOT, PICTURE] {
+    for page in [SUMMARY, PLOT, PICTURE, CONVERGENCE] {
         let page = folder.join(page);
         remove(&page)?;
         remove(&temporary(&page))?;

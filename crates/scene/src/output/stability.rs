@@ -143,6 +143,7 @@ pub(crate) fn doubts(built: &Built, outcome: &Outcome, stability: Option<&Stabil
     (hourglass.into_iter())
         .chain(stability.and_then(StabilitySummary::doubt))
         .chain(equilibria_doubts(outcome))
+        .chain(outcome.strains.doubts())
         .collect()
 }
 

@@ -8,8 +8,8 @@ use pliant_mechanics::{Energies, RelaxationError, StepError};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
-use super::OutputError;
 use super::stability::{AddedMass, StabilitySummary, doubts};
+use super::{OutputError, StrainSummary};
 use crate::build::Built;
 use crate::plan::{LimitingElement, Limits, Plan};
 use crate::printable::printable;
@@ -18,7 +18,7 @@ use crate::scene::Scene;
 use crate::solver::{Effort, Equilibria};
 
 /// The status of a run that was told to stop.
-const INTERRUPTED: &str = "interrupted";
+pub(crate) const INTERRUPTED: &str = "interrupted";
 
 /// The result of a run.
 #[derive(Clone, Debug, Serialize)]
@@ -47,6 +47,10 @@ pub struct Summary {
     pub solver: Option<Effort>,
     /// How good the equilibria of a quasi-static run are; `null` of others.
     pub equilibria: Option<Equilibria>,
+    /// Why a path by arc length ended before its last load step; `null` of all others.
+    pub ended: Option<String>,
+    /// How far each shell was strained at most, of the instants that were looked at (up to 1000).
+    pub shell_strains: Vec<StrainSummary>,
     /// Where it was computed: `cpu`, or the name of the graphics processor.
     pub device: String,
     /// `single` or `double`.
@@ -158,7 +162,7 @@ fn empty(status: &str, error: FailureSummary) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "true_limit": null, "limiting_element": null, "solver": null, "equilibria": null, "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "true_limit": null, "limiting_element": null, "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
@@ -316,6 +320,8 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
         limiting_element: plan.limits.as_ref().map(|limits| limits.limiting.clone()),
         solver: outcome.effort.clone(),
         equilibria: outcome.equilibria,
+        ended: outcome.ended.clone(),
+        shell_strains: outcome.strains.0.clone(),
         device: plan.target.name().to_owned(),
         precision: plan.target.precision.word(),
         steps: outcome.steps,
@@ -358,7 +364,12 @@ fn write_page(
     let title = if scene.scene.title.is_empty() { "Untitled scene" } else { &scene.scene.title };
     writeln!(page, "# {title}\n")?;
     match &outcome.failure {
-        None => writeln!(page, "Done: {} s simulated in {} steps.\n", number(outcome.time), outcome.steps)?,
+        None => {
+            writeln!(page, "Done: {} s simulated in {} steps.\n", number(outcome.time), outcome.steps)?;
+            if let Some(why) = &outcome.ended {
+                writeln!(page, "It ended before its last step: {why}.\n")?;
+            }
+        }
         Some(failure) if failure.kind == INTERRUPTED => {
             writeln!(page, "**Interrupted**: {}\n", failure.message)?;
         }
@@ -411,6 +422,7 @@ fn write_page(
     if let Some(effort) = &summary.solver {
         write_effort(page, effort, outcome.steps)?;
     }
+    write_strains(page, &summary.shell_strains)?;
     write_energies(page, outcome)?;
     write_reactions(page, built, outcome)?;
     writeln!(page, "\n## Cost\n\n| | |\n|---|---|")?;
@@ -457,6 +469,21 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
     writeln!(page, "| solution | {} ms a step |", milliseconds(effort.seconds_solution))?;
     if let Some(time) = effort.unstable_from {
         writeln!(page, "| unstable equilibria | from t = {} s on |", number(time))?;
+    }
+    Ok(())
+}
+
+fn write_strains(page: &mut String, strains: &[StrainSummary]) -> std::fmt::Result {
+    if strains.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        page,
+        "\n## Largest strains of shells\n\n| body | at a surface | there in the middle | triangle | at t [s] |\n|---|---|---|---|---|"
+    )?;
+    for StrainSummary { body, largest, membrane, element, time, .. } in strains {
+        let [largest, membrane] = [largest, membrane].map(|strain| format!("{:.2} %", 100.0 * strain));
+        writeln!(page, "| {body} | {largest} | {membrane} | {element} | {} |", number(*time))?;
     }
     Ok(())
 }
