@@ -417,6 +417,9 @@ pub struct Overrides {
     /// Make meshes of images anew, and keep none.
     #[arg(long)]
     pub no_cache: bool,
+    /// Read only files in the folder of the scene, links resolved: for scenes of others (see SECURITY.md).
+    #[arg(long)]
+    pub sandbox: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -448,6 +451,9 @@ pub struct Run {
     /// bits as one that was never interrupted; its outputs go on where the checkpoint was. Only `until` may differ.
     #[arg(long, value_name = "CHECKPOINT", conflicts_with = "force")]
     pub resume: Option<PathBuf>,
+    /// Run even if it will take more than a day.
+    #[arg(long)]
+    pub long: bool,
     #[command(flatten)]
     pub overrides: Overrides,
     /// Also draw the last instant, as the scene's [view] shows it: picture.png, in the summary, too.
@@ -495,6 +501,9 @@ pub struct Sweep {
     /// Make meshes of images anew, and keep none.
     #[arg(long)]
     pub no_cache: bool,
+    /// Read only files in the folder of the scene, links resolved: for scenes of others (see SECURITY.md).
+    #[arg(long)]
+    pub sandbox: bool,
     /// Write the series of fields (VTU) of each run, too.
     #[arg(long)]
     pub keep_fields: bool,

@@ -3,14 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 use pliant_geometry::io;
 use pliant_gpu::{Adapter, GpuError};
 use pliant_scene::diagnostic::{Diagnostic, SceneErrors};
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, Draw, MeshCache, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim,
-    reference, registry,
+    Built, Checkpoint, Draw, MeshCache, Options, OutputFolder, Plan, Reads, Scene, Sweep, SweepOptions,
+    niftysim, number, reference, registry,
 };
 use serde_json::{Value as Json, json};
 use tempfile::TempDir;
@@ -61,7 +62,7 @@ pub fn prepare_changed(
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
 ) -> Result<(Scene, Built, Plan), Failure> {
-    let Opened { mut source, folder, assumed, _translated } = open(path)?;
+    let Opened { mut source, folder, assumed, _translated } = open(path, overrides.sandbox)?;
     let mut mistakes: Vec<_> =
         overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
     let precision = overrides.precision.map(|precision| match precision {
@@ -111,16 +112,24 @@ struct Opened {
     _translated: Option<TempDir>,
 }
 
-/// Reads the text of a scene. A NiftySim model is translated first; of a mesh a scene is made.
-fn open(path: &Path) -> Result<Opened, Failure> {
+/// Reads the text of a scene. A NiftySim model is translated first; of a mesh a scene is made. In a sandbox it reads what lies
+/// in its own folder, and nothing else.
+fn open(path: &Path, sandbox: bool) -> Result<Opened, Failure> {
+    let reads = |folder: &Path| {
+        let reads = if sandbox { Reads::within(folder) } else { Ok(Reads::anywhere()) };
+        let failed = |error| format!("the folder `{}` cannot be read: {error}", folder.display());
+        reads.map_err(|error| Failure::plain(failed(error), "check the path and the permissions"))
+    };
+    let file = pliant_scene::scene_file(path);
+    let own = reads(file.parent().unwrap_or(Path::new("")))?;
     if pliant_scene::is_mesh(path) {
         let help = "`pliant info` reads a mesh file on its own";
         let made = pliant_scene::scene_of_mesh(path).map_err(|error| Failure::plain(error, help))?;
-        let source = Source::parse(path.display().to_string(), made.text)?;
+        let source = Source::parse(path.display().to_string(), made.text)?.reading(own);
         return Ok(Opened { source, folder: made.folder, assumed: Some(made.assumed), _translated: None });
     }
     if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) {
-        let (source, folder) = pliant_scene::open(path)?;
+        let (source, folder) = pliant_scene::open_within(path, own)?;
         return Ok(Opened { source, folder, assumed: None, _translated: None });
     }
     let folder = tempfile::tempdir().map_err(|error| {
@@ -129,15 +138,15 @@ fn open(path: &Path) -> Result<Opened, Failure> {
             "check the free space, or set TMPDIR",
         )
     })?;
-    let notes = translate(path, &folder.path().join("scene.toml"))?;
+    let notes = translate(path, &own, &folder.path().join("scene.toml"))?;
     notes.iter().for_each(|note| eprintln!("note: {note}"));
-    let (source, place) = pliant_scene::open(folder.path())?;
+    let (source, place) = pliant_scene::open_within(folder.path(), reads(folder.path())?)?;
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 
 /// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing.
-fn translate(model: &Path, file: &Path) -> Result<Vec<String>, Failure> {
-    let imported = niftysim::import(model).map_err(|error| Failure::plain(error, ""))?;
+fn translate(model: &Path, reads: &Reads, file: &Path) -> Result<Vec<String>, Failure> {
+    let imported = niftysim::import_within(model, reads).map_err(|error| Failure::plain(error, ""))?;
     let folder = file.parent().unwrap_or(Path::new(""));
     let meshes = imported.meshes.iter().map(|(name, mesh)| (folder.join(name), mesh));
     if let Some(taken) =
@@ -184,9 +193,15 @@ fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure>
 fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     let checkpoint = arguments.resume.as_deref().map(Checkpoint::read).transpose()?;
     let (scene, built, mut plan) = prepare(&arguments.scene, &arguments.overrides)?;
+    if let Some(checkpoint) = &checkpoint {
+        plan = checkpoint.continues(&scene, &built, &plan)?;
+    }
+    if !arguments.long {
+        let before = checkpoint.as_ref().map_or(0.0, Checkpoint::time);
+        refuse_very_long(&scene, &built, &plan, before)?;
+    }
     let folder = match &checkpoint {
         Some(checkpoint) => {
-            plan = checkpoint.continues(&scene, &built, &plan)?;
             let own = checkpoint.path().parent().unwrap_or(Path::new(""));
             let path = arguments.out.clone().unwrap_or_else(|| own.to_owned());
             OutputFolder::reopen(path, &scene, checkpoint)?
@@ -230,6 +245,51 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     told.map(|()| ExitCode::SUCCESS)
 }
 
+/// Steps that take no day on anything: fewer are not looked at.
+const FEW_STEPS: f64 = 1e6;
+/// Longest run [s] that needs no consent.
+const A_DAY: f64 = 86_400.0;
+
+/// Refuses a run that would take more than a day, by the time of its first steps.
+fn refuse_very_long(scene: &Scene, built: &Built, plan: &Plan, before: f64) -> Result<(), Failure> {
+    let steps = (scene.scene.until - before) / plan.step;
+    if steps < FEW_STEPS {
+        return Ok(());
+    }
+    let Some(each) = in_pool(scene, || Ok(seconds_of_a_step(scene, built, plan)))? else { return Ok(()) };
+    let wall = steps * each;
+    if wall < A_DAY {
+        return Ok(());
+    }
+    let [simulated, step] = [scene.scene.until - before, plan.step].map(number);
+    let message = format!(
+        "the run takes {} steps of {step} s for {simulated} s, about {} on this machine",
+        number(steps),
+        days(wall)
+    );
+    let diagnostic = Diagnostic::error(message)
+        .at(scene.source.span(&["scene", "until"]), "this long")
+        .help("let it end earlier (`until`), take a coarser mesh, or add `--long` to run it all the same");
+    Err(scene.source.errors(vec![diagnostic]).into())
+}
+
+/// "12 days", "3 years".
+fn days(seconds: f64) -> String {
+    let days = seconds / A_DAY;
+    if days < 1000.0 { format!("{days:.0} days") } else { format!("{} years", number(days / 365.25)) }
+}
+
+/// Wall time [s] of a step, from the first ones; none of a scene whose first steps fail.
+fn seconds_of_a_step(scene: &Scene, built: &Built, plan: &Plan) -> Option<f64> {
+    const ENOUGH: Duration = Duration::from_millis(100);
+    let mut live = pliant_scene::live(scene, built, plan).ok()?;
+    let (started, mut steps) = (Instant::now(), 0);
+    while started.elapsed() < ENOUGH {
+        steps += live.advance(u64::MAX).ok()?.max(1);
+    }
+    Some(started.elapsed().as_secs_f64() / steps as f64)
+}
+
 /// Lists the graphics processors.
 fn devices(json: bool) -> Result<ExitCode, Failure> {
     let found = pliant_gpu::adapters();
@@ -251,7 +311,7 @@ fn devices(json: bool) -> Result<ExitCode, Failure> {
 }
 
 fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
-    let Opened { source, folder, _translated, .. } = open(&arguments.scene)?;
+    let Opened { source, folder, _translated, .. } = open(&arguments.scene, arguments.sandbox)?;
     let sweep = Sweep::new(source, folder, &arguments.set)?.with_cache(mesh_cache(arguments.no_cache));
     let (runs, threads) = (sweep.runs(), arguments.threads.into());
     refuse_mistakes(&sweep, threads)?;
@@ -337,7 +397,7 @@ fn new(name: &Path) -> Result<ExitCode, Failure> {
 fn import(model: &Path, out: &Path) -> Result<ExitCode, Failure> {
     let is_file = out.extension().is_some_and(|ending| ending == "toml");
     let file = if is_file { out.to_owned() } else { out.join("scene.toml") };
-    for note in translate(model, &file)? {
+    for note in translate(model, &Reads::anywhere(), &file)? {
         eprintln!("note: {note}");
     }
     say(format_args!("wrote {}; try: pliant run {}", file.display(), out.display()))?;

@@ -947,3 +947,90 @@ title = "\u001b]0;mine\u0007<script>alert(1)</script>""#;
         assert!(!told.err.contains('\u{202e}'), "{}", told.err);
     }
 }
+
+#[test]
+fn values_beyond_all_sense_are_refused_and_unusual_ones_doubted() {
+    for (good, bad, says) in [
+        ("young-modulus = 10e3", "young-modulus = 1e-300", "is 1e-300 Pa; values from 1e-20 to 1e20 Pa"),
+        ("density = 1000", "density = 1e300", "is 1e300 kg/m³; values from 1e-15 to 1e15 kg/m³"),
+        ("until = 0.02", "until = 1e30", "`scene.until` is 1e30 s; values from"),
+    ] {
+        assert_refused(&Workshop::block(good, bad), &[bad], &[says, "values are in SI units"]);
+    }
+    for (good, odd, says) in [
+        ("young-modulus = 10e3", "young-modulus = 1e-3", "1e-2 to 1e13 Pa: is that so?"),
+        ("density = 1000", "density = 1e-6", "and usual are 1e-1 to 1e5 kg/m³: is that so?"),
+        ("density = 1000", "density = 1e-6", "1 g/cm³ is 1000 kg/m³"),
+        ("pressure = 20", "pressure = -1e15", "and usual is less than 1e13 Pa"),
+        ("total = [0.1, 0, 0]", "total = [1e40, 0, 0]", "is 1e40 N, and usual is less than 1e9 N"),
+    ] {
+        let told = Workshop::block(good, odd).pliant(&["check", "case"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        assert!(told.words().contains(says) && told.underlines(odd), "{}", told.err);
+    }
+    // Loads may be as small, and boxes as large, as they like.
+    let boxed = "nodes = { box = [[-1e9, -1e9, 0.09], [1e9, 1e9, 1e9]] }";
+    for (good, usual) in [("pressure = 20", "pressure = 1e-15"), ("nodes = { set = \"z-max\" }", boxed)] {
+        let told = Workshop::block(good, usual).pliant(&["check", "case"]);
+        assert_eq!((told.code, told.err.as_str()), (0, ""));
+    }
+}
+
+#[test]
+fn a_nearest_node_far_from_its_point_is_doubted() {
+    let line = "nodes = { nearest = { point = [1000, 0.05, 0.05] } }";
+    let told = Workshop::block("nodes = { nearest = { point = [0.1, 0.05, 0.05] } }", line)
+        .pliant(&["check", "case"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let says = "nearest to [1000.0, 0.05, 0.05] is 999.9 m away, and `block` measures 0.1732 m across";
+    assert!(told.words().contains(says) && told.underlines(line), "{}", told.err);
+}
+
+#[test]
+fn a_run_of_more_than_a_day_asks_for_consent() {
+    let workshop = Workshop::block("until = 0.02", "until = 1e9");
+    let told = workshop.run(&[]);
+    assert_invalid(&told, &["the run takes ", " steps of ", "days on this machine", "add `--long`"]);
+    assert!(told.underlines("until = 1e9"), "{}", told.err);
+    assert!(!workshop.path("out").exists());
+    // Whoever wants it gets it.
+    let mut child = workshop
+        .command(&["run", "case", "--long"])
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let patience = std::time::Instant::now();
+    while !workshop.path("out/case/fields.pvd").exists() {
+        assert!(patience.elapsed().as_secs() < 60, "no frame came");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// What a failed run says.
+fn failure_of(changes: &[&str]) -> String {
+    let workshop = Workshop::new(BLOCK);
+    let set: Vec<&str> = changes.iter().flat_map(|change| ["--set", change]).collect();
+    let told = workshop.run(&set);
+    assert_eq!(told.code, 1, "{}", told.err);
+    told.json()["error"]["message"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn advice_fits_what_the_run_does_already() {
+    let damped = failure_of(&["body.block.damping=1e4", "body.block.velocity=[0,0,1]"]);
+    for piece in ["the damping of `block`, 10000 1/s, is too strong", "take `damping` below 200"] {
+        assert!(damped.contains(piece), "{damped}");
+    }
+    assert!(!damped.contains("more damping"), "{damped}");
+    let squeezed = "constraint.hand.by=[0,0,-0.0999]";
+    let cut = failure_of(&[squeezed]);
+    assert!(cut.contains("inverted") && cut.contains("the run cuts its steps already"), "{cut}");
+    assert!(!cut.contains("substep") && !cut.contains("smaller `step`"), "{cut}");
+    let report = failure_of(&[squeezed, "run.on-unstable=report"]);
+    assert!(report.contains("`on-unstable = \"substep\"`"), "{report}");
+    let stopped = failure_of(&["constraint.hand.by=[0,0,-0.09]", "run.on-unstable=stop"]);
+    assert!(stopped.contains("let the run cut its steps (`on-unstable = \"substep\"`)"), "{stopped}");
+}

@@ -152,16 +152,12 @@ fn a_resumed_run_and_a_sweep_follow_no_links_either() {
     symlink(workshop.path(ELSEWHERE), &history).unwrap();
     let told = workshop.run(&["--resume", "out/case"]);
     assert_eq!(told.code, 2, "{}", told.err);
-    assert!(
-        told.words().contains("out/case/history.csv` is a link to"),
-        "{}",
-        told.err
-    );
+    assert!(told.words().contains("out/case/history.csv` is a link to"), "{}", told.err);
 
     workshop.write("elsewhere/summary.md", "precious");
     fs::create_dir_all(workshop.path("out/sweep")).unwrap();
     symlink(workshop.path("elsewhere"), workshop.path("out/sweep/run-0000")).unwrap();
-    let sweep = ["sweep", "case", "--set", "body.block.damping=[5, 6]", "--out", "out/sweep", "--force"];
+    let sweep = ["sweep", "case", "--set", "body.block.damping=5,6", "--out", "out/sweep", "--force"];
     let told = workshop.pliant(&sweep);
     assert_eq!(told.code, 2, "{}", told.err);
     assert!(told.words().contains("out/sweep/run-0000` is a link to"), "{}", told.err);
@@ -243,4 +239,122 @@ fn what_killed_runs_left_unfinished_is_removed() {
         }
         assert_eq!(workshop.read("out/case/notes.tmp"), "mine");
     }
+}
+
+/// Runs the binary, which must not wait for ever.
+fn within_seconds(workshop: &Workshop, arguments: &[&str]) -> Told {
+    let mut command = workshop.command(arguments);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let patience = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if patience.elapsed() > Duration::from_secs(30) {
+            child.kill().unwrap();
+            panic!("{arguments:?} still waits");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.wait_with_output().unwrap().into()
+}
+
+#[test]
+fn pipes_and_devices_are_no_files() {
+    let moved = support::FROM_FILE.replace("type = \"fix\"", "type = \"move\"\nby = { csv = \"pipe.csv\" }");
+    let workshop = Workshop::new(&moved);
+    workshop.write("case/organ.vtk", support::vtk(&support::CUBE, &support::TETS, ""));
+    for pipe in ["pipe.toml", "model.xml", "case/pipe.csv", "checkpoint-0000000001.pliant"] {
+        assert!(Command::new("mkfifo").arg(workshop.path(pipe)).status().unwrap().success());
+    }
+    for arguments in [
+        &["check", "pipe.toml"][..],
+        &["check", "model.xml"],
+        &["import", "model.xml", "-o", "x"],
+        &["check", "case"],
+        &["check", "/dev/zero"],
+        &["run", "case", "--resume", "checkpoint-0000000001.pliant"],
+    ] {
+        let told = within_seconds(&workshop, arguments);
+        assert_eq!(told.code, 2, "{arguments:?}: {}", told.err);
+        assert!(told.words().contains("it is not a regular file but a pipe"), "{arguments:?}: {}", told.err);
+    }
+}
+
+/// A scene whose mesh, and whose table of motions, may lie elsewhere.
+fn naming(mesh: &str, table: &str) -> String {
+    let scene = support::FROM_FILE.replace("organ.vtk", mesh);
+    let move_by = format!("type = \"move\"\nby = {{ csv = \"{table}\" }}");
+    scene.replace("type = \"fix\"", &move_by)
+}
+
+#[test]
+fn a_sandbox_keeps_a_scene_in_its_folder() {
+    let workshop = Workshop::new("");
+    let mesh = support::vtk(&support::CUBE, &support::TETS, "");
+    let table: String = (0..8).map(|node| format!("{node},0,0,0\n")).collect();
+    for folder in ["case", "case/deep", "elsewhere"] {
+        workshop.write(&format!("{folder}/organ.vtk"), &mesh);
+        workshop.write(&format!("{folder}/table.csv"), &table);
+    }
+    symlink(workshop.path("elsewhere/organ.vtk"), workshop.path("case/link.vtk")).unwrap();
+    symlink(workshop.path("elsewhere"), workshop.path("case/linked")).unwrap();
+    symlink("organ.vtk", workshop.path("case/own.vtk")).unwrap();
+    let absolute = workshop.path("elsewhere/organ.vtk").display().to_string();
+    for (mesh, table, allowed) in [
+        ("organ.vtk", "table.csv", true),
+        ("deep/organ.vtk", "deep/../table.csv", true),
+        ("own.vtk", "table.csv", true),
+        ("../elsewhere/organ.vtk", "table.csv", false),
+        (&absolute, "table.csv", false),
+        ("link.vtk", "table.csv", false),
+        ("linked/organ.vtk", "table.csv", false),
+        ("organ.vtk", "../elsewhere/table.csv", false),
+        ("organ.vtk", "linked/table.csv", false),
+    ] {
+        workshop.write("case/scene.toml", naming(mesh, table));
+        assert_eq!(workshop.pliant(&["check", "case"]).code, 0, "{mesh}, {table}");
+        let told = workshop.pliant(&["check", "case", "--sandbox"]);
+        assert_eq!(told.code, if allowed { 0 } else { 2 }, "{mesh}, {table}: {}", told.err);
+        let says = told.words().contains("it is outside the scene's folder");
+        assert_eq!(says, !allowed, "{mesh}, {table}: {}", told.err);
+    }
+    // The scene file itself.
+    workshop.write("elsewhere/other.toml", naming("organ.vtk", "table.csv"));
+    symlink(workshop.path("elsewhere/other.toml"), workshop.path("case/other.toml")).unwrap();
+    let told = workshop.pliant(&["check", "case/other.toml", "--sandbox"]);
+    assert!(told.code == 2 && told.words().contains("outside the scene's folder"), "{}", told.err);
+}
+
+#[test]
+fn a_sandbox_keeps_images_and_models_in_their_folder() {
+    let scene = changed(
+        support::FROM_FILE,
+        "mesh = { file = \"organ.vtk\" }",
+        "mesh = { image = \"scan.nhdr\", label = 1, edge = 0.05 }",
+    );
+    let workshop = Workshop::new(&scene);
+    let header = |data: &str| {
+        format!(
+            "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 12 12 12\nspace: left-posterior-superior\n\
+             space directions: (10,0,0) (0,10,0) (0,0,10)\nspace origin: (0,0,0)\nencoding: raw\ndata file: {data}\n"
+        )
+    };
+    let inside = |i: usize| (2..10).contains(&i);
+    let voxels: Vec<u8> =
+        (0..1728).map(|i| u8::from([i % 12, i / 12 % 12, i / 144].into_iter().all(inside))).collect();
+    workshop.write("case/scan.raw", &voxels);
+    workshop.write("elsewhere/scan.raw", &voxels);
+    for (data, allowed) in [("scan.raw", true), ("../elsewhere/scan.raw", false)] {
+        workshop.write("case/scan.nhdr", header(data));
+        let told = workshop.pliant(&["check", "case"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        let told = workshop.pliant(&["check", "case", "--sandbox", "--no-cache"]);
+        assert_eq!(told.code, if allowed { 0 } else { 2 }, "{data}: {}", told.err);
+        assert_eq!(told.words().contains("it is outside the folder"), !allowed, "{data}: {}", told.err);
+    }
+    let model = "<Model><SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>5</DampingCoeff>\
+                 <Density>1000</Density></SystemParams><VTKMesh Type=\"T4\">../elsewhere/organ.vtk</VTKMesh></Model>";
+    workshop.write("model/model.xml", model);
+    workshop.write("elsewhere/organ.vtk", support::vtk(&support::CUBE, &support::TETS, ""));
+    let words = |more: &[&str]| workshop.pliant(&[&["check", "model/model.xml"], more].concat()).words();
+    assert!(!words(&[]).contains("outside the scene's folder"), "{}", words(&[]));
+    assert!(words(&["--sandbox"]).contains("outside the scene's folder"), "{}", words(&["--sandbox"]));
 }

@@ -16,6 +16,7 @@ use crate::diagnostic::counted;
 use crate::format::{Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, Written, number, replace};
 use crate::plan::Plan;
+use crate::reads::read_regular;
 use crate::run::History;
 use crate::scene::Scene;
 use crate::solver::Memory;
@@ -321,7 +322,7 @@ impl Checkpoint {
             let all = checkpoints_in(path).map_err(|error| unreadable(path, error))?;
             file = all.into_iter().last().ok_or_else(|| ResumeError::NoneIn { path: path.to_owned() })?.1;
         }
-        let bytes = fs::read(&file).map_err(|error| unreadable(&file, error))?;
+        let bytes = read_regular(&file, u64::MAX).map_err(|error| unreadable(&file, error))?;
         Self::from_bytes(&file, &bytes)
     }
 

@@ -9,6 +9,7 @@ use pliant_mechanics::stability::Stability;
 use pliant_mechanics::{Energies, Observable, Real, State};
 use serde::{Deserialize, Serialize};
 
+use crate::advice::remedy;
 use crate::build::Built;
 use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
 use crate::corotational::Corotated;
@@ -242,6 +243,10 @@ fn go<'a, R: Real>(
             break Some(failure);
         }
     };
+    let failure = failure.map(|failure| match remedy(&failure, scene, built, plan, &course.state) {
+        Some(remedy) => failure.advised(&remedy),
+        None => failure,
+    });
     let picture = options.picture.filter(|_| failure.is_none());
     let (drawn, failure) = match picture.map(|picture| course.draw(picture, folder)).transpose() {
         Ok(drawn) => (drawn, failure),

@@ -12,7 +12,7 @@ use std::path::Path;
 use pliant_geometry::Vector3;
 
 use super::text::ToWorld;
-use super::{ReadOptions, checked_size};
+use super::{ReadOptions, check_within, checked_size};
 use crate::error::{Fault, ImageError, ImageProblem};
 use crate::grid::Grid;
 use crate::image::{Image, Numbers, Order, Scalar};
@@ -47,6 +47,7 @@ pub(super) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Image,
     let mut voxels = 0;
     for path in &paths {
         let mut bytes = Vec::new();
+        check_within(path, options.within.as_deref()).map_err(open(path))?;
         let file = fs::File::open(path).map_err(open(path))?;
         file.take(SLICE_LIMIT).read_to_end(&mut bytes).map_err(open(path))?;
         let in_file = |fault: Fault| fault.in_file(path);

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
 
+use super::check_within;
 use crate::error::{Fault, ImageProblem};
 use crate::image::{Numbers, Order, Scalar};
 
@@ -17,6 +18,8 @@ pub(super) struct Input<'a> {
     bytes: Box<dyn BufRead + 'a>,
     /// The file, where its neighbours may be read.
     path: Option<PathBuf>,
+    /// The folder that neighbours have to be in, if there is one.
+    within: Option<PathBuf>,
     /// Bytes read (after unpacking).
     at: usize,
     packed: bool,
@@ -41,14 +44,20 @@ impl<'a> Input<'a> {
         } else {
             Box::new(bytes)
         };
-        Self { bytes, path, at: 0, packed, header_left: HEADER_LIMIT }
+        Self { bytes, path, within: None, at: 0, packed, header_left: HEADER_LIMIT }
+    }
+
+    /// From now on neighbours are read in this folder only.
+    pub fn stay_within(&mut self, folder: Option<PathBuf>) {
+        self.within = folder;
     }
 
     /// What follows, as an input of its own.
     pub fn rest(&mut self) -> Input<'_> {
-        let Self { path, at, packed, header_left, .. } = self;
-        let (path, at, packed, header_left) = (path.clone(), *at, *packed, *header_left);
-        Input { bytes: Box::new(&mut self.bytes), path, at, packed, header_left }
+        let Self { path, within, at, packed, header_left, .. } = self;
+        let (path, within, at, packed, header_left) =
+            (path.clone(), within.clone(), *at, *packed, *header_left);
+        Input { bytes: Box::new(&mut self.bytes), path, within, at, packed, header_left }
     }
 
     /// What follows, packed with gzip.
@@ -72,7 +81,7 @@ impl<'a> Input<'a> {
             .into());
         };
         let path = path.with_file_name("").join(name);
-        match File::open(&path) {
+        match check_within(&path, self.within.as_deref()).and_then(|()| File::open(&path)) {
             Ok(file) => Ok(Input::new(BufReader::with_capacity(1 << 16, file), false, Some(path))),
             Err(error) => {
                 let expected = "that file must lie beside the header and be readable";

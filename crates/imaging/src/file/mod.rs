@@ -12,7 +12,8 @@ mod nrrd;
 mod text;
 
 use std::ffi::OsStr;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Fault, ImageError, ImageProblem};
 use crate::image::Image;
@@ -25,12 +26,14 @@ pub struct ReadOptions {
     pub voxel_limit: u64,
     /// UID of the DICOM series to read, where a folder holds several.
     pub series: Option<String>,
+    /// Folder, links resolved, that files named in headers and slices have to be in; anywhere if not given.
+    pub within: Option<PathBuf>,
 }
 
 impl Default for ReadOptions {
     /// 2²⁹ voxels (1 GiB of 16-bit numbers), the only series of a folder.
     fn default() -> Self {
-        Self { voxel_limit: 1 << 29, series: None }
+        Self { voxel_limit: 1 << 29, series: None, within: None }
     }
 }
 
@@ -95,6 +98,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Image, ImageError> {
     }
     // Whether it can be opened is said first: a missing file is not of an unknown format.
     let mut input = Input::open(path).map_err(|source| ImageError::Open { path: path.to_owned(), source })?;
+    input.stay_within(options.within.clone());
     let content = |fault: Fault| fault.in_file(path);
     let head = input.peek(352).map_err(content)?;
     match ImageFormat::of_bytes(&head).or(ImageFormat::of_path(path)) {
@@ -130,6 +134,18 @@ fn read_input(input: &mut Input<'_>, format: ImageFormat, options: &ReadOptions)
 impl Fault {
     fn in_file(self, path: &Path) -> ImageError {
         ImageError::Content { path: path.to_owned(), place: self.place, problem: Box::new(self.problem) }
+    }
+}
+
+/// Refuses a file that really lies outside a folder.
+fn check_within(path: &Path, folder: Option<&Path>) -> io::Result<()> {
+    match folder {
+        Some(folder) if !path.canonicalize()?.starts_with(folder) => {
+            let reason =
+                format!("it is outside the folder `{}`, and nothing else may be read", folder.display());
+            Err(io::Error::new(io::ErrorKind::PermissionDenied, reason))
+        }
+        _ => Ok(()),
     }
 }
 

@@ -1,11 +1,12 @@
 //! Constraints: which nodes are held or moved, and that no two contradict each other.
 
-use pliant_geometry::Selection;
+use pliant_geometry::{Mesh, Selection, Vector3};
 use pliant_mechanics::model::{Constraint, Motion};
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
 use crate::format::{MoveTable, SolverName, Vectors};
+use crate::output::number;
 use crate::registry::{ConstraintTable, LoadTable};
 
 impl Builder<'_> {
@@ -92,7 +93,24 @@ impl Builder<'_> {
         let built = &self.bodies[body];
         let first = self.model.bodies[body].nodes.start;
         match selection.nodes(&built.mesh, &built.boundary) {
-            Ok(nodes) => Some(nodes.into_iter().map(|node| first + node).collect()),
+            Ok(nodes) => {
+                let (mesh, name) = (&built.mesh, &built.name);
+                let size = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
+                for (point, distance) in nearest_points(selection, mesh) {
+                    if distance > FAR * size {
+                        let message = format!(
+                            "the node nearest to {point:?} is {} m away, and `{name}` measures {} m across",
+                            number(distance),
+                            number(size)
+                        );
+                        let help =
+                            "points are in metres, where the body is after its mesh's `scale` and `at`";
+                        let place = self.source().span(path);
+                        self.out.push(Diagnostic::warning(message).at(place, "far outside").help(help));
+                    }
+                }
+                Some(nodes.into_iter().map(|node| first + node).collect())
+            }
             Err(error) => {
                 self.error(path, error.to_string(), "this selection", "");
                 None
@@ -131,6 +149,24 @@ impl Builder<'_> {
             };
             self.notes.push(format!("`{name}` is held by no constraint: {fate}"));
         }
+    }
+}
+
+/// A nearest node farther from its point than so many times the size of its body is doubted.
+const FAR: f64 = 10.0;
+
+/// The points by which a selection takes nearest nodes, each with its distance [m] from the first of these.
+fn nearest_points(selection: &Selection, mesh: &Mesh) -> Vec<([f64; 3], f64)> {
+    match selection {
+        Selection::Nearest { point, .. } => {
+            let place = Vector3::from(*point);
+            let distance = mesh.points.iter().map(|p| (p - place).norm()).fold(f64::INFINITY, f64::min);
+            vec![(*point, distance)]
+        }
+        Selection::Union(parts) | Selection::Intersection(parts) | Selection::Difference(parts) => {
+            parts.iter().flat_map(|part| nearest_points(part, mesh)).collect()
+        }
+        _ => Vec::new(),
     }
 }
 

@@ -110,7 +110,9 @@ impl Builder<'_> {
             let cut = cut(table)?;
             return self.read_images(file, table).map(|image| Scan::Image(image, cut));
         }
-        let mut read = io::read(&self.scene.folder.join(file)).map_err(|error| {
+        let opened = |source| MeshFileError::Open { path: file.to_owned(), source };
+        let read = self.scene.file(file).map_err(opened).and_then(|path| io::read(&path));
+        let mut read = read.map_err(|error| {
             let help = match error {
                 MeshFileError::Open { .. } => "file names are relative to the scene file",
                 _ => "`pliant info` reads a mesh file on its own",
@@ -124,7 +126,11 @@ impl Builder<'_> {
     /// The image, with the one that is added to it.
     fn read_images(&self, image: &Path, table: &MeshTable) -> Result<Image, Fault> {
         let read = |key, file: &Path| {
-            pliant_imaging::read(&self.scene.folder.join(file), &ReadOptions::default()).map_err(|error| {
+            let within = self.scene.source.reads().folder().map(Path::to_owned);
+            let options = ReadOptions { within, ..ReadOptions::default() };
+            let opened = |source| ImageError::Open { path: file.to_owned(), source };
+            let path = self.scene.file(file).map_err(opened);
+            path.and_then(|path| pliant_imaging::read(&path, &options)).map_err(|error| {
                 let help = match error {
                     ImageError::Open { .. } => "file names are relative to the scene file",
                     _ => "`pliant labels` reads an image on its own",

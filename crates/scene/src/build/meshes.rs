@@ -92,7 +92,8 @@ impl Builder<'_> {
             self.error(&at("edge"), message, "here", help);
             return None;
         }
-        match io::read(&self.scene.folder.join(&file)) {
+        let opened = |source| MeshFileError::Open { path: file.clone(), source };
+        match self.scene.file(&file).map_err(opened).and_then(|path| io::read(&path)) {
             Ok(mut read) => {
                 read.mesh.points.iter_mut().for_each(|point| *point *= table.scale);
                 let name = file.display();

@@ -96,7 +96,7 @@ pub fn build_with(scene: &Scene, cache: &MeshCache) -> Result<Built, SceneErrors
         corotational: None,
         bodies: Vec::new(),
         surfaces: Vec::new(),
-        out: Vec::new(),
+        out: scene.doubts.clone(),
         notes: Vec::new(),
     };
     builder.check_models();

@@ -121,6 +121,20 @@ pub struct FailureSummary {
     pub load_step: Option<Box<LoadStepSummary>>,
     /// What happened and what to try.
     pub message: String,
+    /// What to try, as the message says it at its end; empty where it says it otherwise.
+    #[serde(skip)]
+    pub remedy: &'static str,
+}
+
+impl FailureSummary {
+    /// The same with another remedy.
+    pub(crate) fn advised(mut self, remedy: &str) -> Self {
+        if let Some(told) = self.message.strip_suffix(self.remedy).filter(|_| !self.remedy.is_empty()) {
+            self.message = format!("{told}{remedy}");
+            self.remedy = "";
+        }
+        self
+    }
 }
 
 fn as_map<S: Serializer>(pairs: &[(String, [f64; 3])], serializer: S) -> Result<S::Ok, S::Error> {
@@ -197,7 +211,7 @@ impl FailureSummary {
     }
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
-        Self { kind, body: None, element: None, node: None, time, load_step: None, message }
+        Self { kind, body: None, element: None, node: None, time, load_step: None, message, remedy: "" }
     }
 }
 
@@ -239,7 +253,14 @@ impl From<&StepError> for FailureSummary {
             }
             StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
         };
-        Self { body: Some(body.clone()), element, node: Some(node), ..Self::about(kind, message, Some(time)) }
+        let remedy = error.remedy();
+        Self {
+            body: Some(body.clone()),
+            element,
+            node: Some(node),
+            remedy,
+            ..Self::about(kind, message, Some(time))
+        }
     }
 }
 
