@@ -62,6 +62,9 @@ pub enum Command {
         /// Folder for the scene and its meshes, or name of the scene file (.toml) with the meshes beside it.
         #[arg(short, long, value_name = "DIR|FILE")]
         out: PathBuf,
+        /// Also translate a model of which parts are unknown (shells, membranes, contact), without them.
+        #[arg(long)]
+        allow_partial: bool,
     },
     /// Say what a mesh file holds, how good it is, and what is wrong with it.
     #[command(
@@ -417,6 +420,9 @@ pub struct Overrides {
     /// Make meshes of images anew, and keep none.
     #[arg(long)]
     pub no_cache: bool,
+    /// Take a NiftySim model without the parts that Pliant does not know (shells, membranes, contact): another model.
+    #[arg(long)]
+    pub allow_partial: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -41,7 +41,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Info(arguments) => info(&arguments),
         Command::Labels(arguments) => mesh::labels(&arguments),
         Command::Mesh(arguments) => mesh::mesh(&arguments),
-        Command::Import { model, out } => import(&model, &out),
+        Command::Import { model, out, allow_partial } => import(&model, &out, allow_partial),
         Command::Reproduce(arguments) => reproduce(&arguments),
         Command::Bench(arguments) => bench(&arguments),
         Command::View(arguments) => pictures::view(&arguments),
@@ -61,7 +61,7 @@ pub fn prepare_changed(
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
 ) -> Result<(Scene, Built, Plan), Failure> {
-    let Opened { mut source, folder, assumed, _translated } = open(path)?;
+    let Opened { mut source, folder, assumed, _translated } = open(path, overrides.allow_partial)?;
     let mut mistakes: Vec<_> =
         overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
     let precision = overrides.precision.map(|precision| match precision {
@@ -112,7 +112,7 @@ struct Opened {
 }
 
 /// Reads the text of a scene. A NiftySim model is translated first; of a mesh a scene is made.
-fn open(path: &Path) -> Result<Opened, Failure> {
+fn open(path: &Path, allow_partial: bool) -> Result<Opened, Failure> {
     if pliant_scene::is_mesh(path) {
         let help = "`pliant info` reads a mesh file on its own";
         let made = pliant_scene::scene_of_mesh(path).map_err(|error| Failure::plain(error, help))?;
@@ -129,15 +129,23 @@ fn open(path: &Path) -> Result<Opened, Failure> {
             "check the free space, or set TMPDIR",
         )
     })?;
-    let notes = translate(path, &folder.path().join("scene.toml"))?;
+    let notes = translate(path, &folder.path().join("scene.toml"), allow_partial)?;
     notes.iter().for_each(|note| eprintln!("note: {note}"));
     let (source, place) = pliant_scene::open(folder.path())?;
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 
-/// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing.
-fn translate(model: &Path, file: &Path) -> Result<Vec<String>, Failure> {
+/// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing. A model of which parts
+/// are unknown is refused unless that is allowed.
+fn translate(model: &Path, file: &Path, allow_partial: bool) -> Result<Vec<String>, Failure> {
     let imported = niftysim::import(model).map_err(|error| Failure::plain(error, ""))?;
+    if !imported.missing.is_empty() && !allow_partial {
+        let missing = imported.missing.join("; ");
+        let message = format!("`{}` has parts that Pliant does not support: {missing}", model.display());
+        let help = "`pliant run` and `pliant import` take `--allow-partial` and leave them out: the results are then those \
+                    of another model";
+        return Err(Failure::plain(message, help));
+    }
     let folder = file.parent().unwrap_or(Path::new(""));
     let meshes = imported.meshes.iter().map(|(name, mesh)| (folder.join(name), mesh));
     if let Some(taken) =
@@ -268,7 +276,7 @@ fn devices(json: bool) -> Result<ExitCode, Failure> {
 }
 
 fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
-    let Opened { source, folder, _translated, .. } = open(&arguments.scene)?;
+    let Opened { source, folder, _translated, .. } = open(&arguments.scene, false)?;
     let sweep = Sweep::new(source, folder, &arguments.set)?.with_cache(mesh_cache(arguments.no_cache));
     let (runs, threads) = (sweep.runs(), arguments.threads.into());
     refuse_mistakes(&sweep, threads)?;
@@ -352,10 +360,10 @@ fn new(name: &Path) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn import(model: &Path, out: &Path) -> Result<ExitCode, Failure> {
+fn import(model: &Path, out: &Path, allow_partial: bool) -> Result<ExitCode, Failure> {
     let is_file = out.extension().is_some_and(|ending| ending == "toml");
     let file = if is_file { out.to_owned() } else { out.join("scene.toml") };
-    for note in translate(model, &file)? {
+    for note in translate(model, &file, allow_partial)? {
         eprintln!("note: {note}");
     }
     say(format_args!("wrote {}; try: pliant run {}", file.display(), out.display()))?;

@@ -17,8 +17,9 @@ use crate::energies::Energies;
 use crate::forces::InternalForces;
 use crate::model::{Contradiction, FREE, Model};
 use crate::state::{History, State};
-use crate::stepper::{Observable, sum_owned};
-use crate::tensor::{Vector, sub};
+use crate::step_error::at_corner;
+use crate::stepper::{Observable, owned_only, sum_owned};
+use crate::tensor::{Vector, cast, sub};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -76,25 +77,32 @@ pub enum RelaxationError {
         iterations: usize,
         /// Time [s].
         time: f64,
+        /// Whether the loads and motions do not change on the way there.
+        sudden: bool,
     },
     /// A cell turns inside out however small the load step.
     #[error(
-        "element {element} of `{body}` is inverted (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
-         {iterations} iterations"
+        "element {element} of `{body}` is inverted{} (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
+         {iterations} iterations",
+        at_corner(*corner, *node)
     )]
     Inverted {
         /// The body.
         body: String,
         /// The element, numbered as in the user's mesh.
         element: u32,
-        /// Its first node, numbered in its body.
+        /// Its first node, or that of the corner, numbered in its body.
         node: u32,
-        /// det F.
+        /// Whether it is a corner of a hexahedron, not its middle.
+        corner: bool,
+        /// det F there.
         determinant: f64,
         /// Iterations spent on the last try.
         iterations: usize,
         /// Time [s].
         time: f64,
+        /// Whether the loads and motions do not change on the way there.
+        sudden: bool,
     },
     /// A displacement is not a number or infinite.
     #[error(
@@ -110,6 +118,8 @@ pub enum RelaxationError {
         iterations: usize,
         /// Time [s].
         time: f64,
+        /// Whether the loads and motions do not change on the way there.
+        sudden: bool,
     },
 }
 
@@ -117,12 +127,28 @@ impl RelaxationError {
     /// What to try.
     pub fn remedy(&self) -> &'static str {
         match self {
+            Self::NotConverged { sudden: true, .. }
+            | Self::Inverted { sudden: true, .. }
+            | Self::NotFinite { sudden: true, .. } => {
+                "the whole load acts from the start (`curve = \"hold\"`), so that no load step makes it smaller: bring it on along \
+                 a curve such as `smooth-step`, or choose a smaller load or motion"
+            }
             Self::NotConverged { .. } => {
                 "try more load steps or a looser tolerance; a body that nothing holds has no equilibrium"
             }
             Self::Inverted { .. } => "try more load steps, a smaller motion, or a finer mesh there",
             Self::NotFinite { .. } => "try more load steps; a body that nothing holds has no equilibrium",
         }
+    }
+}
+
+impl RelaxationError {
+    fn on_a_way(mut self, is_sudden: bool) -> Self {
+        let (Self::NotConverged { sudden, .. }
+        | Self::Inverted { sudden, .. }
+        | Self::NotFinite { sudden, .. }) = &mut self;
+        *sudden = is_sudden;
+        self
     }
 }
 
@@ -206,6 +232,8 @@ pub struct DynamicRelaxation<'m, R> {
     residual: Vec<Vector<R>>,
     residual_before: Vec<Vector<R>>,
     sums: Vec<Sums>,
+    /// The first hexahedron of the last trial of which a corner is turned inside out, as (solid, cell).
+    folded: Option<(usize, usize)>,
     energies: Energies,
 }
 
@@ -217,6 +245,10 @@ impl<R: Real> Observable<R> for DynamicRelaxation<'_, R> {
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
         sum_owned(self.model, &self.owners, constraint, &self.residual)
+    }
+
+    fn nodal_reaction(&self, node: usize) -> Vector<f64> {
+        owned_only(&self.owners[node], self.residual[node])
     }
 
     fn velocity(&self, _state: &State<R>, _node: usize) -> Vector<f64> {
@@ -243,6 +275,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             residual: vec![[R::ZERO; 3]; nodes],
             residual_before: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
+            folded: None,
             energies: Energies::default(),
         })
     }
@@ -291,12 +324,19 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                     self.slowness *= 2.0;
                     size = 0.5 * (end - state.time);
                     if size < least * (1.0 - 1e-9) {
-                        return Err(error);
+                        return Err(error.on_a_way(self.is_sudden([state.time, time])));
                     }
                 }
             }
         }
         Ok(convergence)
+    }
+
+    /// Whether nothing that acts from outside changes between two times [s].
+    fn is_sudden(&self, times: [f64; 2]) -> bool {
+        let still = |[before, after]: [[f64; 2]; 2]| before == after;
+        self.model.constraints.iter().all(|c| still(times.map(|time| c.motion.factors(time))))
+            && self.model.loads.iter().all(|load| still(times.map(|time| [load.curve.value(time), 0.0])))
     }
 
     fn load_step(
@@ -320,6 +360,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             convergence.iterations += 1;
             convergence.residual = sums.relative_residual();
             if ramped && convergence.residual <= self.settings.tolerance {
+                self.check_corners(state, iteration, end)?;
                 self.commit(&mut forces, state, &start, end);
                 return Ok(());
             }
@@ -354,17 +395,35 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             tolerance: self.settings.tolerance,
             iterations: self.settings.iterations,
             time: end,
+            sudden: false,
+        })
+    }
+
+    /// Corners of hexahedra are judged in equilibria only: on the way there they may be out of place for a while.
+    fn check_corners(&self, state: &State<R>, iterations: usize, time: f64) -> Result<(), RelaxationError> {
+        let Some((solid, cell)) = self.folded else { return Ok(()) };
+        let solid = &self.model.solids[solid];
+        let worst = solid.cells.worst_corner(cell, |node| cast(state.displacement[node as usize]));
+        let (node, determinant) = worst.unwrap_or((solid.cells.nodes(cell)[0], 0.0));
+        Err(RelaxationError::Inverted {
+            body: self.model.bodies[solid.body].name.clone(),
+            element: solid.original[cell],
+            node: self.model.locate_node(node).1,
+            corner: true,
+            determinant,
+            iterations,
+            time,
+            sudden: false,
         })
     }
 
     /// Moves the prescribed components to their places at a time.
     fn prescribe(&self, state: &mut State<R>, time: f64) {
         for (index, constraint) in self.model.constraints.iter().enumerate() {
-            let factor = constraint.motion.factor(time);
             for (at, &node) in constraint.nodes.iter().enumerate() {
-                let amplitude = constraint.motion.amplitude(at);
+                let place = constraint.motion.displacement(at, time);
                 for c in (0..3).filter(|&c| self.owners[node as usize][c] == index as u32) {
-                    state.displacement[node as usize][c] = R::of(amplitude[c] * factor);
+                    state.displacement[node as usize][c] = R::of(place[c]);
                 }
             }
         }
@@ -379,8 +438,8 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         iterations: usize,
     ) -> Result<Sums, RelaxationError> {
         self.take_committed_history(state);
-        let inverted = forces.evaluate(&state.displacement, &mut self.trial_history).inverted;
-        if let Some((solid, cell, determinant)) = inverted
+        let found = forces.evaluate(&state.displacement, &mut self.trial_history);
+        if let Some((solid, cell, determinant)) = found.inverted
             && determinant.is_finite()
         {
             let solid = &self.model.solids[solid];
@@ -388,11 +447,14 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                 body: self.model.bodies[solid.body].name.clone(),
                 element: solid.original[cell],
                 node: self.model.locate_node(solid.cells.nodes(cell)[0]).1,
+                corner: false,
                 determinant,
                 iterations,
                 time,
+                sudden: false,
             });
         }
+        self.folded = found.folded;
         self.applied.update(time, &state.displacement);
         std::mem::swap(&mut self.residual, &mut self.residual_before);
         let (residual, before) = (&mut self.residual, &self.residual_before);
@@ -432,6 +494,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                 node,
                 iterations,
                 time,
+                sudden: false,
             });
         }
         Ok(total)

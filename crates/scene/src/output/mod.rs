@@ -26,7 +26,7 @@ pub use csv::Column;
 pub(crate) use csv::{AXES, ENERGIES, Samples};
 pub(crate) use plot::plot;
 pub(crate) use snapshot::Snapshot;
-pub(crate) use summary::{bodies, markdown, summarise};
+pub(crate) use summary::{bodies, markdown, summarise, told_limit};
 
 use crate::build::Built;
 use crate::registry::OutputTable;
