@@ -62,6 +62,9 @@ pub enum Command {
         /// Folder for the scene and its meshes, or name of the scene file (.toml) with the meshes beside it.
         #[arg(short, long, value_name = "DIR|FILE")]
         out: PathBuf,
+        /// Also translate a model of which parts are unknown (shells, membranes, contact), without them.
+        #[arg(long)]
+        allow_partial: bool,
     },
     /// Say what a mesh file holds, how good it is, and what is wrong with it.
     #[command(
@@ -420,6 +423,9 @@ pub struct Overrides {
     /// Read only files in the folder of the scene, links resolved: for scenes of others (see SECURITY.md).
     #[arg(long)]
     pub sandbox: bool,
+    /// Take a NiftySim model without the parts that Pliant does not know (shells, membranes, contact): another model.
+    #[arg(long)]
+    pub allow_partial: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

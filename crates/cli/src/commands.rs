@@ -42,7 +42,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Info(arguments) => info(&arguments),
         Command::Labels(arguments) => mesh::labels(&arguments),
         Command::Mesh(arguments) => mesh::mesh(&arguments),
-        Command::Import { model, out } => import(&model, &out),
+        Command::Import { model, out, allow_partial } => import(&model, &out, allow_partial),
         Command::Reproduce(arguments) => reproduce(&arguments),
         Command::Bench(arguments) => bench(&arguments),
         Command::View(arguments) => pictures::view(&arguments),
@@ -62,7 +62,7 @@ pub fn prepare_changed(
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
 ) -> Result<(Scene, Built, Plan), Failure> {
-    let Opened { mut source, folder, assumed, _translated } = open(path, overrides.sandbox)?;
+    let Opened { mut source, folder, assumed, _translated } = open(path, overrides.sandbox, overrides.allow_partial)?;
     let mut mistakes: Vec<_> =
         overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
     let precision = overrides.precision.map(|precision| match precision {
@@ -114,7 +114,7 @@ struct Opened {
 
 /// Reads the text of a scene. A NiftySim model is translated first; of a mesh a scene is made. In a sandbox it reads what lies
 /// in its own folder, and nothing else.
-fn open(path: &Path, sandbox: bool) -> Result<Opened, Failure> {
+fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, Failure> {
     let reads = |folder: &Path| {
         let reads = if sandbox { Reads::within(folder) } else { Ok(Reads::anywhere()) };
         let failed = |error| format!("the folder `{}` cannot be read: {error}", folder.display());
@@ -138,15 +138,23 @@ fn open(path: &Path, sandbox: bool) -> Result<Opened, Failure> {
             "check the free space, or set TMPDIR",
         )
     })?;
-    let notes = translate(path, &own, &folder.path().join("scene.toml"))?;
+    let notes = translate(path, &own, &folder.path().join("scene.toml"), allow_partial)?;
     notes.iter().for_each(|note| eprintln!("note: {note}"));
     let (source, place) = pliant_scene::open_within(folder.path(), reads(folder.path())?)?;
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 
-/// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing.
-fn translate(model: &Path, reads: &Reads, file: &Path) -> Result<Vec<String>, Failure> {
+/// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing. A model of which parts
+/// are unknown is refused unless that is allowed.
+fn translate(model: &Path, reads: &Reads, file: &Path, allow_partial: bool) -> Result<Vec<String>, Failure> {
     let imported = niftysim::import_within(model, reads).map_err(|error| Failure::plain(error, ""))?;
+    if !imported.missing.is_empty() && !allow_partial {
+        let missing = imported.missing.join("; ");
+        let message = format!("`{}` has parts that Pliant does not support: {missing}", model.display());
+        let help = "`pliant run` and `pliant import` take `--allow-partial` and leave them out: the results are then those \
+                    of another model";
+        return Err(Failure::plain(message, help));
+    }
     let folder = file.parent().unwrap_or(Path::new(""));
     let meshes = imported.meshes.iter().map(|(name, mesh)| (folder.join(name), mesh));
     if let Some(taken) =
@@ -311,7 +319,7 @@ fn devices(json: bool) -> Result<ExitCode, Failure> {
 }
 
 fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
-    let Opened { source, folder, _translated, .. } = open(&arguments.scene, arguments.sandbox)?;
+    let Opened { source, folder, _translated, .. } = open(&arguments.scene, arguments.sandbox, false)?;
     let sweep = Sweep::new(source, folder, &arguments.set)?.with_cache(mesh_cache(arguments.no_cache));
     let (runs, threads) = (sweep.runs(), arguments.threads.into());
     refuse_mistakes(&sweep, threads)?;
@@ -394,10 +402,10 @@ fn new(name: &Path) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn import(model: &Path, out: &Path) -> Result<ExitCode, Failure> {
+fn import(model: &Path, out: &Path, allow_partial: bool) -> Result<ExitCode, Failure> {
     let is_file = out.extension().is_some_and(|ending| ending == "toml");
     let file = if is_file { out.to_owned() } else { out.join("scene.toml") };
-    for note in translate(model, &Reads::anywhere(), &file)? {
+    for note in translate(model, &Reads::anywhere(), &file, allow_partial)? {
         eprintln!("note: {note}");
     }
     say(format_args!("wrote {}; try: pliant run {}", file.display(), out.display()))?;

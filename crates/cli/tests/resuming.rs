@@ -149,6 +149,13 @@ fn a_resumed_run_ends_in_the_same_bits_for_every_element_and_history() {
 }
 
 #[test]
+fn a_resumed_rotation_ends_in_the_same_bits() {
+    let rotate = "rotate = { axis = [1, 0, 0], centre = [0, 0.025, 0.025], angle = 0.2 }";
+    let scene = bent("hex8", "precision = \"double\"", false).replace("by = [0, 0, 0.005]", rotate);
+    assert_resumes(&scene, ["1", "2", "1"], "rotation");
+}
+
+#[test]
 fn a_resumed_run_ends_in_the_same_bits_for_every_law_with_history() {
     let isotropic = "young-modulus = 10e3\npoisson-ratio = 0.45\n";
     let fibre = format!("{isotropic}fibre = [1, 0, 0]\n");

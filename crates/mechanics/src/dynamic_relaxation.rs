@@ -26,8 +26,9 @@ use crate::load::Load;
 use crate::model::{Contradiction, FREE, Model};
 use crate::recover::Recovery;
 use crate::state::{History, State};
-use crate::stepper::{Observable, sum_owned};
-use crate::tensor::{Vector, scale, sub};
+use crate::step_error::at_corner;
+use crate::stepper::{Observable, owned_only, sum_owned};
+use crate::tensor::{Vector, cast, scale, sub};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -116,17 +117,20 @@ pub enum RelaxationError {
     },
     /// A cell turns inside out however small the load step.
     #[error(
-        "element {element} of `{body}` is inverted (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
-         {iterations} iterations"
+        "element {element} of `{body}` is inverted{} (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
+         {iterations} iterations",
+        at_corner(*corner, *node)
     )]
     Inverted {
         /// The body.
         body: String,
         /// The element, numbered as in the user's mesh.
         element: u32,
-        /// Its first node, numbered in its body.
+        /// Its first node, or that of the corner, numbered in its body.
         node: u32,
-        /// det F.
+        /// Whether it is a corner of a hexahedron, not its middle.
+        corner: bool,
+        /// det F there.
         determinant: f64,
         /// Iterations spent on the last try.
         iterations: usize,
@@ -299,6 +303,8 @@ pub struct DynamicRelaxation<'m, R> {
     residual: Vec<Vector<R>>,
     residual_before: Vec<Vector<R>>,
     sums: Vec<Sums>,
+    /// The first hexahedron of the last trial of which a corner is turned inside out, as (solid, cell).
+    folded: Option<(usize, usize)>,
     energies: Energies,
     way: Way<R>,
 }
@@ -343,6 +349,10 @@ impl<R: Real> Observable<R> for DynamicRelaxation<'_, R> {
         sum_owned(self.model, &self.owners, constraint, &self.residual)
     }
 
+    fn nodal_reaction(&self, node: usize) -> Vector<f64> {
+        owned_only(&self.owners[node], self.residual[node])
+    }
+
     fn velocity(&self, _state: &State<R>, _node: usize) -> Vector<f64> {
         [0.0; 3]
     }
@@ -367,6 +377,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             residual: vec![[R::ZERO; 3]; nodes],
             residual_before: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
+            folded: None,
             energies: Energies::default(),
             way: Way::default(),
         })
@@ -496,6 +507,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                 && convergence.residual <= self.settings.tolerance
                 && accuracy.suffices(self.settings.displacement)
             {
+                self.check_corners(state, iteration, end.time)?;
                 let error = match is_single::<R>() {
                     true => accuracy.mean(),
                     false => self.error_of_slowest(state, slowest),
@@ -541,6 +553,23 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         })
     }
 
+    /// Corners of hexahedra are judged in equilibria only: on the way there they may be out of place for a while.
+    fn check_corners(&self, state: &State<R>, iterations: usize, time: f64) -> Result<(), RelaxationError> {
+        let Some((solid, cell)) = self.folded else { return Ok(()) };
+        let solid = &self.model.solids[solid];
+        let worst = solid.cells.worst_corner(cell, |node| cast(state.displacement[node as usize]));
+        let (node, determinant) = worst.unwrap_or((solid.cells.nodes(cell)[0], 0.0));
+        Err(RelaxationError::Inverted {
+            body: self.model.bodies[solid.body].name.clone(),
+            element: solid.original[cell],
+            node: self.model.locate_node(node).1,
+            corner: true,
+            determinant,
+            iterations,
+            time,
+        })
+    }
+
     /// The error of the displacements over themselves by the slowest mode, that of a squared frequency: |M⁻¹ r|/(ω² |u|) in the norm
     /// of the masses.
     fn error_of_slowest(&self, state: &State<R>, slowest: f64) -> f64 {
@@ -577,11 +606,10 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
     /// Moves the prescribed components to their places at an instant.
     fn prescribe(&self, state: &mut State<R>, Instant { time, part }: Instant) {
         for (index, constraint) in self.model.constraints.iter().enumerate() {
-            let factor = constraint.motion.factor(time) * part;
             for (at, &node) in constraint.nodes.iter().enumerate() {
-                let amplitude = constraint.motion.amplitude(at);
+                let place = constraint.motion.displacement(at, time, part);
                 for c in (0..3).filter(|&c| self.owners[node as usize][c] == index as u32) {
-                    state.displacement[node as usize][c] = R::of(amplitude[c] * factor);
+                    state.displacement[node as usize][c] = R::of(place[c]);
                 }
             }
         }
@@ -596,8 +624,8 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         iterations: usize,
     ) -> Result<Sums, RelaxationError> {
         self.take_committed_history(state);
-        let inverted = forces.evaluate(&state.displacement, &mut self.trial_history).inverted;
-        if let Some((solid, cell, determinant)) = inverted
+        let found = forces.evaluate(&state.displacement, &mut self.trial_history);
+        if let Some((solid, cell, determinant)) = found.inverted
             && determinant.is_finite()
         {
             let solid = &self.model.solids[solid];
@@ -605,11 +633,13 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                 body: self.model.bodies[solid.body].name.clone(),
                 element: solid.original[cell],
                 node: self.model.locate_node(solid.cells.nodes(cell)[0]).1,
+                corner: false,
                 determinant,
                 iterations,
                 time,
             });
         }
+        self.folded = found.folded;
         self.applied.update(time, &state.displacement);
         std::mem::swap(&mut self.residual, &mut self.residual_before);
         let (residual, before) = (&mut self.residual, &self.residual_before);

@@ -307,6 +307,13 @@ impl<'m> Corotated<'m> {
         }
     }
 
+    /// What holds the three components from one on.
+    fn held(&self, first: usize) -> [f64; 3] {
+        let [internal, loads] = [self.forces.internal(), self.forces.loads()];
+        [first, first + 1, first + 2]
+            .map(|at| if self.prescribed[at] { internal[at] - loads[at] } else { 0.0 })
+    }
+
     /// Puts the displacements where all observers look for them.
     fn show(&self, state: &mut State<f64>) {
         let places = self.state.position.iter().zip(&self.part.model.rest);
@@ -584,6 +591,14 @@ impl Observable<f64> for Corotated<'_> {
 
     fn reaction(&self, constraint: usize) -> [f64; 3] {
         self.reactions[constraint]
+    }
+
+    fn nodal_reaction(&self, node: usize) -> [f64; 3] {
+        self.held(6 * node)
+    }
+
+    fn nodal_reaction_moment(&self, node: usize) -> [f64; 3] {
+        self.held(6 * node + 3)
     }
 
     fn velocity(&self, _state: &State<f64>, node: usize) -> [f64; 3] {

@@ -1,11 +1,12 @@
 //! Constraints: which nodes are held or moved, and that no two contradict each other.
 
 use pliant_geometry::{Mesh, Selection, Vector3};
+use pliant_mechanics::curve::Curve;
 use pliant_mechanics::model::{Constraint, Motion};
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
-use crate::format::{MoveTable, SolverName, Vectors};
+use crate::format::{MoveTable, RotateTable, SolverName, Vectors};
 use crate::output::number;
 use crate::registry::{ConstraintTable, LoadTable};
 
@@ -56,6 +57,9 @@ impl Builder<'_> {
     /// The motion of some nodes of a body (`None`: they are not known, which has been told).
     fn motion(&mut self, table: &MoveTable, nodes: Option<(usize, &[u32])>, path: &[&str]) -> Option<Motion> {
         let curve = self.curve(&table.timing, path);
+        if let Some(rotate) = &table.rotate {
+            return self.rotation(table, rotate, curve?, nodes?.1, path);
+        }
         match (&table.by, table.velocity) {
             (Some(Vectors::Uniform(by)), None) => Some(Motion::Displacement(*by, curve?)),
             (Some(Vectors::PerNode(by)), None) => {
@@ -76,11 +80,42 @@ impl Builder<'_> {
             }
             (by, _) => {
                 let found = if by.is_some() { "both" } else { "neither" };
-                let message = format!("a motion has exactly one of `by` and `velocity`, found {found}");
-                self.error(path, message, "this motion", "`by` in metres, `velocity` in metres per second");
+                let message =
+                    format!("a motion has exactly one of `by`, `velocity` and `rotate`, found {found}");
+                let help = "`by` in metres, `velocity` in metres per second, `rotate` with an axis";
+                self.error(path, message, "this motion", help);
                 None
             }
         }
+    }
+
+    /// The rotation of some nodes of a solid.
+    fn rotation(
+        &mut self,
+        table: &MoveTable,
+        rotate: &RotateTable,
+        curve: Curve,
+        nodes: &[u32],
+        path: &[&str],
+    ) -> Option<Motion> {
+        let others = [
+            ("by", table.by.is_some()),
+            ("velocity", table.velocity.is_some()),
+            ("turn", table.turn.is_some()),
+            ("components", table.components.is_some()),
+        ];
+        if let Some((key, _)) = others.iter().find(|(_, given)| *given) {
+            let message = format!("`rotate` prescribes all of a motion, `{key}` does not go with it");
+            self.error(&[path, &[*key]].concat(), message, "not with `rotate`", "leave one of them out");
+            return None;
+        }
+        if rotate.axis.iter().all(|&x| x == 0.0) {
+            let at = [path, &["rotate", "axis"]].concat();
+            self.error(&at, "the axis of the rotation is zero", "no direction", "such as `[0, 0, 1]`");
+            return None;
+        }
+        let rest = nodes.iter().map(|&node| self.model.rest[node as usize]);
+        Some(Motion::rotation(rotate.axis, rotate.centre, rotate.angle, curve, rest))
     }
 
     /// The nodes of a body that a selection holds, numbered in the model.
@@ -192,7 +227,19 @@ mod tests {
     #[test]
     fn a_motion_has_one_of_two_forms_and_some_components() {
         for (what, says) in [
-            ("type = 'move'", "exactly one of `by` and `velocity`, found neither"),
+            ("type = 'move'", "exactly one of `by`, `velocity` and `rotate`, found neither"),
+            (
+                "type = 'move'\nby = [0, 0, 1]\nrotate = { axis = [0, 0, 1], centre = [0, 0, 0], angle = 1 }",
+                "`by` does not go with it",
+            ),
+            (
+                "type = 'move'\nrotate = { axis = [0, 0, 0], centre = [0, 0, 0], angle = 1 }",
+                "the axis of the rotation is zero",
+            ),
+            (
+                "type = 'move'\ncomponents = ['x']\nrotate = { axis = [0, 0, 1], centre = [0, 0, 0], angle = 1 }",
+                "`components` does not go with it",
+            ),
             ("type = 'move'\nby = [0, 0, 1]\nvelocity = [0, 0, 1]", "found both"),
             ("type = 'fix'\ncomponents = []", "`components` is empty"),
         ] {

@@ -220,7 +220,8 @@ pub struct Density(pub f64);
 #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
 pub struct Hourglass(pub f64);
 
-/// Fibre direction.
+/// Fibre direction at rest: `fibre = [x, y, z]` for one direction everywhere, whose length does not matter, or a table with exactly
+/// one of the keys below for a direction in each element, such as `fibre = { cell-data = "fibre" }`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Fibre {

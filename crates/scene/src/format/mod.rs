@@ -19,7 +19,8 @@ pub use linear::{
 };
 pub use load::{
     Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MomentTable, MoveTable,
-    NodeVectorSource, NodeVectors, PressureTable, SpreadName, SpringTable, Timing, TractionTable, Vectors,
+    NodeVectorSource, NodeVectors, PressureTable, RotateTable, SpreadName, SpringTable, Timing,
+    TractionTable, Vectors,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use view::{

@@ -17,6 +17,13 @@ pub enum FieldName {
     Velocity,
     /// Rotation vector [rad] of the nodes of shells, of length at most π.
     Rotation,
+    /// Force [N] by which constraints hold or move a node; zero where it is free.
+    Reaction,
+    /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero where it is free.
+    ReactionMoment,
+    /// Deformation gradient F of a solid, the mean over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x
+    /// along y at rest.
+    DeformationGradient,
     /// Cauchy stress [Pa].
     CauchyStress,
     /// Second Piola–Kirchhoff stress [Pa].
@@ -71,14 +78,17 @@ pub enum FieldName {
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 28] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
+        Self::Reaction,
+        Self::ReactionMoment,
         Self::CauchyStress,
         Self::Pk2Stress,
         Self::VonMises,
         Self::GreenStrain,
+        Self::DeformationGradient,
         Self::Fibre,
         Self::FibreStretch,
         Self::Pressure,
@@ -116,6 +126,9 @@ impl FieldName {
             Self::EnergyDensity => "energy-density",
             Self::ElementStep => "element-step",
             Self::Rotation => "rotation",
+            Self::Reaction => "reaction",
+            Self::ReactionMoment => "reaction-moment",
+            Self::DeformationGradient => "deformation-gradient",
             Self::MembraneForce => "membrane-force",
             Self::BendingMoment => "bending-moment",
             Self::StressTop => "stress-top",
@@ -141,6 +154,8 @@ impl FieldName {
             Self::Displacement | Self::Thickness | Self::CurrentThickness => "m",
             Self::Velocity => "m/s",
             Self::Rotation => "rad",
+            Self::Reaction => "N",
+            Self::ReactionMoment => "N m",
             Self::CauchyStress
             | Self::Pk2Stress
             | Self::VonMises
@@ -149,6 +164,7 @@ impl FieldName {
             | Self::StressMiddle
             | Self::StressBottom => "Pa",
             Self::GreenStrain
+            | Self::DeformationGradient
             | Self::Fibre
             | Self::FibreStretch
             | Self::VolumeRatio
@@ -168,6 +184,9 @@ impl FieldName {
             Self::Displacement => "displacement",
             Self::Velocity => "velocity",
             Self::Rotation => "rotation",
+            Self::Reaction => "reaction",
+            Self::ReactionMoment => "reaction moment",
+            Self::DeformationGradient => "deformation gradient",
             Self::CauchyStress => "Cauchy stress",
             Self::Pk2Stress => "2nd Piola–Kirchhoff stress",
             Self::VonMises => "von Mises stress",
@@ -196,10 +215,16 @@ impl FieldName {
     /// Numbers per point or cell.
     pub fn components(self) -> usize {
         match self {
-            Self::Displacement | Self::Velocity | Self::Rotation | Self::Fibre => 3,
+            Self::Displacement
+            | Self::Velocity
+            | Self::Rotation
+            | Self::Reaction
+            | Self::ReactionMoment
+            | Self::Fibre => 3,
             Self::CauchyStress
             | Self::Pk2Stress
             | Self::GreenStrain
+            | Self::DeformationGradient
             | Self::MembraneForce
             | Self::BendingMoment
             | Self::StressTop
@@ -223,21 +248,26 @@ impl FieldName {
 
     /// True for fields that live on nodes.
     pub fn is_nodal(self) -> bool {
-        matches!(self, Self::Displacement | Self::Velocity | Self::Rotation)
+        matches!(
+            self,
+            Self::Displacement | Self::Velocity | Self::Rotation | Self::Reaction | Self::ReactionMoment
+        )
     }
 
     /// True for fields that bodies of a model have.
     pub fn is_of(self, model: BodyModel) -> bool {
         match self {
-            Self::Displacement | Self::Velocity | Self::VonMises | Self::ElementStep => true,
+            Self::Displacement | Self::Velocity | Self::Reaction | Self::VonMises | Self::ElementStep => true,
             Self::CauchyStress
             | Self::Pressure
             | Self::VolumeRatio
             | Self::CellVolumeRatio
             | Self::EnergyDensity => model != BodyModel::Shell,
-            Self::Pk2Stress | Self::GreenStrain | Self::Fibre | Self::FibreStretch => {
-                model == BodyModel::Solid
-            }
+            Self::Pk2Stress
+            | Self::GreenStrain
+            | Self::DeformationGradient
+            | Self::Fibre
+            | Self::FibreStretch => model == BodyModel::Solid,
             _ => model == BodyModel::Shell,
         }
     }
@@ -264,7 +294,8 @@ pub struct VtuTable {
     /// Time between frames [s]; the first and the last instant are always written.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
-    /// The fields.
+    /// The fields. Tensors have nine components xx, xy, xz, yx, yy, yz, zx, zy, zz in this order; `[view]` colours by one of them
+    /// with `component`, and probes of a `csv` output write each into a column.
     #[serde(default = "default_fields")]
     pub data: Vec<FieldName>,
     /// Where fields of cells are written.
@@ -287,9 +318,14 @@ pub struct CsvTable {
     /// Time between rows [s]; the first and the last instant are always written.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
-    /// Constraints whose reaction [N] is written; if not given, all.
+    /// Constraints whose reaction [N] is written; if not given, all. Columns `reaction.NAME.x`, `.y`, `.z`: the sum of the forces by
+    /// which the constraint holds or moves its nodes.
     #[serde(default)]
     pub reactions: Option<Vec<String>>,
+    /// A point [m], fixed in space, about which the moments of these reactions are written [N m], in columns `moment.NAME.x`, `.y`, `.z`:
+    /// the sum of (place − point) × force over the nodes where they are, and of shells also of the moments on the nodes.
+    #[serde(default)]
+    pub moments_about: Option<[f64; 3]>,
     /// Whether energies [J] are written.
     #[serde(default = "yes")]
     pub energy: bool,
@@ -310,7 +346,8 @@ pub struct ProbeTable {
     pub on: String,
     /// Its place at rest [m]; outside the body, the nearest cell carries it.
     pub at: [f64; 3],
-    /// The fields; tensors as nine columns xx, xy, …, zz.
+    /// The fields, in columns `probe.NAME.FIELD`; vectors with `.x`, `.y`, `.z`, tensors with `.xx`, `.xy`, `.xz`, `.yx`, `.yy`, `.yz`, `.zx`,
+    /// `.zy`, `.zz`, such as `probe.tip.cauchy-stress.xy`.
     #[serde(default = "default_probe_fields")]
     pub data: Vec<FieldName>,
 }

@@ -2,8 +2,8 @@
 //!
 //! What NiftySim computes is kept, also where it is not what its guide says: the published fibre modulus, hourglass
 //! stiffness by λ + 2μ, backward Euler for relaxation, tractions that pull against the vector they are given by. The
-//! notes name each.
-//! Leaves out: shells, membranes, contact, reduced bases, values read from files; named in one note.
+//! notes name each. Load shapes act at the same steps as NiftySim's, which sets a load after a step for the next one.
+//! Leaves out: shells, membranes, contact, reduced bases, values read from files; [`Imported::missing`] names them.
 
 mod conditions;
 mod error;
@@ -53,6 +53,8 @@ pub struct Imported {
     pub meshes: Vec<(String, Mesh)>,
     /// What is worth knowing of the translation, a sentence each; what was left out is one of them.
     pub notes: Vec<String>,
+    /// Parts of the model that the scene does not have. Unless this is empty, the scene is another model.
+    pub missing: Vec<String>,
 }
 
 /// Reads a NiftySim model. Mesh files are looked for beside the model, then in the working directory.

@@ -178,7 +178,7 @@ impl Model {
         let missing = &mut self.remarks.missing;
         let shells = within("ShellElementSet").max(within("ShellElements"));
         if shells > 0 {
-            missing.push("shells and membranes (they come later)".into());
+            missing.push("shells and membranes".into());
         }
         let contact =
             ["ContactPlate", "ContactCylinder", "ContactUSProbe", "KinematicContact", "ContactSurface"];
@@ -190,10 +190,11 @@ impl Model {
         let mut found: Vec<&str> = contact.into_iter().filter(|name| within(name) > 0).collect();
         found.extend(["DoDeformableCollision", "DoSelfCollision"].into_iter().filter(|name| is_on(name)));
         if !found.is_empty() {
-            missing.push(format!("contact ({}; it comes later)", found.join(", ")));
+            missing.push(format!("contact ({})", found.join(", ")));
         }
         if is_on("ROM") {
-            missing.push("the reduced basis (ROM): the full model is computed".into());
+            let note = "ROM: the full model is computed, not its reduction to a basis";
+            self.remarks.notes.push(note.into());
         }
         let known = [
             "Nodes",

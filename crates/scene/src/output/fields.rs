@@ -18,6 +18,8 @@ pub(super) type Value = [f64; 9];
 pub(super) fn nodal<R: Real>(frame: &Frame<'_, R>, field: FieldName, node: usize) -> Value {
     let vector = match field {
         FieldName::Velocity => frame.stepper.velocity(frame.state, node),
+        FieldName::Reaction => frame.stepper.nodal_reaction(node),
+        FieldName::ReactionMoment => frame.stepper.nodal_reaction_moment(node),
         FieldName::Rotation => {
             frame.corotational.map_or([0.0; 3], |state| state.rotation[node].scaled_axis().into())
         }
@@ -58,6 +60,7 @@ pub(super) fn of_cell(Found(fields, step): &Found, field: FieldName) -> Value {
         FieldName::CauchyStress => tensor(&fields.cauchy_stress),
         FieldName::Pk2Stress => tensor(&fields.pk2_stress),
         FieldName::GreenStrain => tensor(&fields.green_strain),
+        FieldName::DeformationGradient => padded(fields.gradient.0.as_flattened()),
         FieldName::VonMises => padded(&[fields.von_mises()]),
         FieldName::Fibre => padded(&fields.fibre.unwrap_or_default()),
         FieldName::FibreStretch => padded(&[fields.fibre_stretch.unwrap_or(f64::NAN)]),

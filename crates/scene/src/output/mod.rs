@@ -31,7 +31,7 @@ pub use csv::Column;
 pub(crate) use csv::{AXES, ENERGIES, Samples};
 pub(crate) use plot::plot;
 pub(crate) use snapshot::Snapshot;
-pub(crate) use summary::{INTERRUPTED, bodies, markdown, summarise};
+pub(crate) use summary::{INTERRUPTED, bodies, markdown, summarise, told_limit};
 
 use crate::build::Built;
 use crate::registry::OutputTable;

@@ -41,6 +41,9 @@ pub struct StabilitySummary {
     pub most_substeps: u32,
     /// Steps taken beyond the whole ones.
     pub extra_steps: u64,
+    /// Whether a node is free to move, so that there is a limit.
+    #[serde(skip)]
+    limited: bool,
 }
 
 impl StabilitySummary {
@@ -59,6 +62,7 @@ impl StabilitySummary {
             last_cut: seen.last_cut,
             most_substeps: seen.most_substeps,
             extra_steps: seen.extra_steps,
+            limited: plan.limits.as_ref().is_some_and(|limits| limits.limit.step.is_finite()),
         })
     }
 
@@ -79,7 +83,8 @@ impl fmt::Display for StabilitySummary {
                 number(limit),
                 number(time)
             )?,
-            _ => write!(f, "the stable step was not looked at")?,
+            _ if self.limited => write!(f, "the run ended before the stable step was checked")?,
+            _ => write!(f, "any step is stable, as no node is free to move")?,
         }
         if let (Some(first), Some(last)) = (self.first_cut, self.last_cut) {
             let [first, last] = [first, last].map(number);

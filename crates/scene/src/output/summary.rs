@@ -230,7 +230,7 @@ impl FailureSummary {
         };
         let message = format!("{which}: {error}; {}", error.remedy());
         let (kind, body, element, node, time, iterations, residual) = match error {
-            RelaxationError::NotFinite { body, node, iterations, time } => {
+            RelaxationError::NotFinite { body, node, iterations, time, .. } => {
                 ("not-finite", body, None, *node, *time, *iterations, None)
             }
             RelaxationError::Inverted { body, element, node, iterations, time, .. } => {
@@ -407,7 +407,7 @@ fn write_page(
     writeln!(page, "| step | {} s |", number(plan.step))?;
     if let Some(Limits { bound, limit, limiting }) = &plan.limits {
         writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
-        writeln!(page, "| true limit (assembled operator) | {} s |", number(limit.step))?;
+        writeln!(page, "| true limit (assembled operator) | {} |", told_limit(limit.step))?;
     }
     if let Some(AddedMass { mass, percent, elements, .. }) = &summary.added_mass {
         let mass = number(*mass);
@@ -559,12 +559,24 @@ fn short(file: &Path) -> String {
 
 /// A number for people: four significant digits.
 pub fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return if value.is_nan() { "unknown" } else { "unlimited" }.into();
+    }
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
         return format!("{value:.3e}");
     }
     let digits = if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 6) };
     format!("{value:.*}", digits as usize)
+}
+
+/// The true limit of a step [s] in words.
+pub(crate) fn told_limit(limit: f64) -> String {
+    if limit.is_finite() {
+        format!("{} s", number(limit))
+    } else {
+        "none: every node is held or moved as prescribed".into()
+    }
 }
 
 impl History {
