@@ -9,8 +9,8 @@ mod view;
 
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
-    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Normals,
-    Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule,
+    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, MeshTable,
+    Normals, Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule,
     TubeShape, TwistedStripShape,
 };
 pub use linear::{ControlTable, ControlledNode, LinearName, LinearTable, LinearWay, PreconditionerName};
