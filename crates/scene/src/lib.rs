@@ -65,7 +65,7 @@ mod view;
 
 pub use bound::element_bound;
 pub use build::{
-    BodyCells, Built, BuiltBody, Control, Corotational, PLAUSIBLE_SIZE, Stop, build, build_with,
+    BodyCells, Built, BuiltBody, Control, Corotational, SizeDoubt, Stop, build, build_with,
 };
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};

@@ -1,7 +1,7 @@
 //! Mesh files in and out.
 //!
-//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL
-//! and PLY, text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The reader goes by the first bytes
+//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL,
+//! PLY, GIfTI (`.gii`) and FreeSurfer surfaces (`lh.pial`), text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The reader goes by the first bytes
 //! where they tell the format, otherwise by the ending. Cells are linear: vertex, line, triangle, quad, tet,
 //! hex; others are left out and noted, and an error only if nothing is left.
 
@@ -9,11 +9,14 @@ mod base64;
 mod cells;
 mod cursor;
 mod error;
+mod freesurfer;
+mod gifti;
 mod gmsh;
 mod obj;
 mod off;
 mod ply;
 mod pvd;
+mod regular;
 mod stl;
 mod surface_out;
 mod vtk;
@@ -24,13 +27,14 @@ mod xml;
 
 use std::ffi::OsStr;
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::Path;
 
 use crate::Mesh;
 pub use base64::encode as encode_base64;
 pub use error::{MeshFileError, MeshFileProblem, Place};
 pub use pvd::read_pvd;
+pub use regular::{open_regular, read_limited};
 use surface_out::SurfaceOut;
 pub use vtu_write::{VtuOptions, save_vtu, write_pvd, write_vtu};
 pub use xml::{XmlError, parse_xml};
@@ -54,12 +58,26 @@ pub enum Format {
     Stl,
     /// Polygon file format, `.ply`.
     Ply,
+    /// GIfTI, `.gii`.
+    Gifti,
+    /// FreeSurfer, `.pial`, `.white` and others.
+    FreeSurfer,
 }
 
 impl Format {
     /// All formats that can be read.
-    pub const ALL: &[Self] =
-        &[Self::Gmsh, Self::Vtk, Self::Vtu, Self::Vtp, Self::Obj, Self::Off, Self::Stl, Self::Ply];
+    pub const ALL: &[Self] = &[
+        Self::Gmsh,
+        Self::Vtk,
+        Self::Vtu,
+        Self::Vtp,
+        Self::Obj,
+        Self::Off,
+        Self::Stl,
+        Self::Ply,
+        Self::Gifti,
+        Self::FreeSurfer,
+    ];
 
     /// The formats that can be written.
     pub const WRITTEN: &[Self] = &[Self::Vtu, Self::Gmsh, Self::Obj, Self::Stl, Self::Ply];
@@ -75,6 +93,8 @@ impl Format {
             Self::Off => "OFF",
             Self::Stl => "STL",
             Self::Ply => "PLY",
+            Self::Gifti => "GIfTI",
+            Self::FreeSurfer => "FreeSurfer",
         }
     }
 
@@ -89,19 +109,37 @@ impl Format {
             Self::Off => "off",
             Self::Stl => "stl",
             Self::Ply => "ply",
+            Self::Gifti => "gii",
+            Self::FreeSurfer => "pial",
         }
     }
 
     /// The format that the ending of a path names, in capitals or not.
     pub fn of_path(path: &Path) -> Option<Self> {
         let extension = path.extension().and_then(OsStr::to_str)?;
-        Self::ALL.iter().copied().find(|format| extension.eq_ignore_ascii_case(format.extension()))
+        let own = |format: &Self| extension.eq_ignore_ascii_case(format.extension());
+        let surface = || freesurfer::NAMES.contains(&extension).then_some(Self::FreeSurfer);
+        Self::ALL.iter().copied().find(own).or_else(surface)
+    }
+
+    /// The format that the ending of a path names, or the first bytes of the file tell.
+    pub fn of_file(path: &Path) -> Option<Self> {
+        Self::of_path(path).or_else(|| {
+            let mut head = Vec::new();
+            open_regular(path).ok()?.take(512).read_to_end(&mut head).ok()?;
+            Self::of_bytes(&head)
+        })
     }
 
     /// The format that the first bytes of a file tell, for formats that begin with a word of their own.
     fn of_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-        let begins: [(&[u8], Self); 8] = [
+        if bytes.starts_with(b"<?xml")
+            && bytes[..bytes.len().min(4096)].windows(6).any(|word| word == b"<GIFTI")
+        {
+            return Some(Self::Gifti);
+        }
+        let begins: [(&[u8], Self); 11] = [
             (b"$MeshFormat", Self::Gmsh),
             (b"$NOD", Self::Gmsh),
             (b"$Comments", Self::Gmsh),
@@ -110,6 +148,9 @@ impl Format {
             (b"<VTKFile", Self::Vtu),
             (b"ply\n", Self::Ply),
             (b"ply\r", Self::Ply),
+            (b"<GIFTI", Self::Gifti),
+            (&freesurfer::MAGIC, Self::FreeSurfer),
+            (freesurfer::TEXT, Self::FreeSurfer),
         ];
         begins.into_iter().find(|(begin, _)| bytes.starts_with(begin)).map(|(_, format)| format)
     }
@@ -120,6 +161,9 @@ impl Format {
         named.join(", ")
     }
 }
+
+/// Largest mesh file read [bytes].
+const LIMIT: u64 = 1 << 32;
 
 /// What a mesh file held.
 #[derive(Clone, Debug, PartialEq)]
@@ -138,7 +182,8 @@ pub struct MeshFile {
 pub fn read(path: &Path) -> Result<MeshFile, MeshFileError> {
     let by_ending = Format::of_path(path);
     // Whether it can be opened is said first: a missing file is not of an unsupported format.
-    let bytes = fs::read(path).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
+    let bytes =
+        read_limited(path, LIMIT).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
     let by_content = Format::of_bytes(&bytes);
     let Some(format) = by_content.or(by_ending) else {
         return Err(MeshFileError::UnsupportedFormat { path: path.to_owned() });
@@ -167,6 +212,8 @@ fn read_of(path: &Path, bytes: &[u8], format: Format) -> Result<MeshFile, MeshFi
         Format::Off => off::read(bytes),
         Format::Stl => stl::read(bytes),
         Format::Ply => ply::read(bytes),
+        Format::Gifti => gifti::read(bytes),
+        Format::FreeSurfer => freesurfer::read(bytes),
     };
     result.map_err(|fault| MeshFileError::Content {
         path: path.to_owned(),

@@ -1,10 +1,10 @@
 //! Bytes of a file, unpacked on the way. Memory grows with the bytes that arrive, never with what a header announces.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+use pliant_geometry::io::open_regular;
 
 use super::check_within;
 use crate::error::{Fault, ImageProblem};
@@ -12,6 +12,9 @@ use crate::image::{Numbers, Order, Scalar};
 
 /// Longest header of a text format; NRRD's of 3D Slicer list every segment.
 const HEADER_LIMIT: u64 = 1 << 22;
+
+/// Voxels are read in pieces of so many bytes, after each of which progress is told.
+const PIECE: u64 = 1 << 24;
 
 /// A place that moves through the bytes of a file.
 pub(super) struct Input<'a> {
@@ -25,17 +28,21 @@ pub(super) struct Input<'a> {
     packed: bool,
     /// Bytes that header lines may still take.
     header_left: u64,
+    /// Bytes that voxels may take.
+    limit: u64,
+    /// Hears which part of the voxels is read.
+    progress: &'a dyn Fn(f64),
 }
 
 impl<'a> Input<'a> {
-    pub fn open(path: &Path) -> io::Result<Self> {
-        let mut file = BufReader::with_capacity(1 << 16, File::open(path)?);
+    pub fn open(path: &Path, limit: u64, progress: &'a dyn Fn(f64)) -> io::Result<Self> {
+        let mut file = BufReader::with_capacity(1 << 16, open_regular(path)?);
         let packed = file.fill_buf()?.starts_with(&[0x1f, 0x8b]);
-        Ok(Self::new(file, packed, Some(path.to_owned())))
+        Ok(Self { limit, progress, ..Self::new(file, packed, Some(path.to_owned())) })
     }
 
-    pub fn of_bytes(bytes: &'a [u8]) -> Self {
-        Self::new(bytes, bytes.starts_with(&[0x1f, 0x8b]), None)
+    pub fn of_bytes(bytes: &'a [u8], limit: u64) -> Self {
+        Self { limit, ..Self::new(bytes, bytes.starts_with(&[0x1f, 0x8b]), None) }
     }
 
     fn new(bytes: impl BufRead + 'a, packed: bool, path: Option<PathBuf>) -> Self {
@@ -44,7 +51,7 @@ impl<'a> Input<'a> {
         } else {
             Box::new(bytes)
         };
-        Self { bytes, path, within: None, at: 0, packed, header_left: HEADER_LIMIT }
+        Self { bytes, path, within: None, at: 0, packed, header_left: HEADER_LIMIT, limit: u64::MAX, progress: &|_| {} }
     }
 
     /// From now on neighbours are read in this folder only.
@@ -54,10 +61,8 @@ impl<'a> Input<'a> {
 
     /// What follows, as an input of its own.
     pub fn rest(&mut self) -> Input<'_> {
-        let Self { path, within, at, packed, header_left, .. } = self;
-        let (path, within, at, packed, header_left) =
-            (path.clone(), within.clone(), *at, *packed, *header_left);
-        Input { bytes: Box::new(&mut self.bytes), path, within, at, packed, header_left }
+        let (path, within, progress) = (self.path.clone(), self.within.clone(), self.progress);
+        Input { bytes: Box::new(&mut self.bytes), path, within, progress, ..*self }
     }
 
     /// What follows, packed with gzip.
@@ -72,7 +77,7 @@ impl<'a> Input<'a> {
 
     /// The file of this name beside this one, from its beginning, packed or not: it begins with voxels, which may look like
     /// anything.
-    pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'static>, Fault> {
+    pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'a>, Fault> {
         let Some(path) = &self.path else {
             return Err(ImageProblem::Unsupported {
                 what: format!("data in another file (`{name}`)"),
@@ -81,8 +86,12 @@ impl<'a> Input<'a> {
             .into());
         };
         let path = path.with_file_name("").join(name);
-        match check_within(&path, self.within.as_deref()).and_then(|()| File::open(&path)) {
-            Ok(file) => Ok(Input::new(BufReader::with_capacity(1 << 16, file), false, Some(path))),
+        match check_within(&path, self.within.as_deref()).and_then(|()| open_regular(&path)) {
+            Ok(file) => {
+                let file = BufReader::with_capacity(1 << 16, file);
+                let (within, limit, progress) = (self.within.clone(), self.limit, self.progress);
+                Ok(Input { within, limit, progress, ..Input::new(file, false, Some(path)) })
+            }
             Err(error) => {
                 let expected = "that file must lie beside the header and be readable";
                 Err(ImageProblem::bad(field, name, expected).with_cause(&error).into())
@@ -168,8 +177,24 @@ impl<'a> Input<'a> {
 
     /// The numbers of `count` voxels.
     pub fn numbers(&mut self, count: usize, scalar: Scalar, order: Order) -> Result<Numbers, Fault> {
-        let bytes = self.exact(count as u64 * scalar.size() as u64, "the voxels")?;
+        let (needed, start) = (self.within_limit(count, scalar)?, self.at);
+        let mut bytes = Vec::new();
+        while (bytes.len() as u64) < needed {
+            let piece = self.up_to(PIECE.min(needed - bytes.len() as u64), "the voxels")?;
+            if piece.is_empty() {
+                let (reading, found) = ("the voxels", bytes.len() as u64);
+                return Err(ImageProblem::Truncated { reading, expected: needed, found }.at_byte(start));
+            }
+            bytes.extend_from_slice(&piece);
+            (self.progress)(bytes.len() as f64 / needed as f64);
+        }
         Ok(Numbers { scalar, order, bytes })
+    }
+
+    /// Bytes of so many numbers, if that many may be read.
+    pub fn within_limit(&self, count: usize, scalar: Scalar) -> Result<u64, ImageProblem> {
+        let (bytes, limit) = (count as u64 * scalar.size() as u64, self.limit);
+        if bytes > limit { Err(ImageProblem::TooManyBytes { bytes, limit }) } else { Ok(bytes) }
     }
 
     fn broken(&self, reading: &'static str, error: &io::Error) -> Fault {

@@ -27,7 +27,7 @@ use crate::source::Source;
 
 pub use corotational::{BodyCells, Control, Corotational, Stop};
 pub(crate) use meshes::MeshOrigin;
-pub use meshes::PLAUSIBLE_SIZE;
+pub use meshes::SizeDoubt;
 
 /// A model, and what the outputs need beside it.
 #[derive(Clone, Debug)]

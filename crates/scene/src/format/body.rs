@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use pliant_geometry::Selection;
+use pliant_imaging::LabelChoice;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -329,24 +330,31 @@ impl Element {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
-    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY. Its own cells are taken, unless `as`
+    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY, GIfTI, FreeSurfer. Its own cells are taken, unless `as`
     /// asks for others made of its surface.
     #[serde(default)]
     pub file: Option<PathBuf>,
-    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, or the folder of a
-    /// DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
+    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a DICOM segmentation, or the
+    /// folder of a DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
     #[serde(default)]
     pub image: Option<PathBuf>,
     /// Another image of the same voxels whose values are added before the `threshold`, as grey matter to white matter.
     #[serde(default)]
     pub add: Option<PathBuf>,
-    /// Label of the image to mesh.
+    /// Several masks of the same voxels, each an image with 0 outside, as one image: the first has label 1, the second 2, and so on, each
+    /// with the name of its file. Where they overlap, the last one counts.
     #[serde(default)]
-    pub label: Option<i32>,
-    /// Several labels of the image as one body; each cell has its own as cell data `label`, for `law`, `density` and
+    pub masks: Option<Vec<PathBuf>>,
+    /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    #[serde(default)]
+    pub names: Option<PathBuf>,
+    /// Label of the image to mesh, by number or name.
+    #[serde(default)]
+    pub label: Option<Label>,
+    /// Several labels of the image as one body, by number, name or range as `"5-8"`; of `masks` all if not given. Each cell has its own as cell data `label`, for `law`, `density` and
     /// `hourglass` by label. The first label takes what cleaning adds.
     #[serde(default)]
-    pub labels: Option<Vec<i32>>,
+    pub labels: Option<Vec<Label>>,
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
     #[serde(default)]
     pub threshold: Option<f64>,
@@ -404,10 +412,11 @@ pub struct MeshTable {
     /// Cells of a built-in shape or an image (tets if not given), or of the closed surface of a `file`.
     #[serde(default, rename = "as")]
     pub cells: Option<Cells>,
-    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).
-    #[serde(default = "one")]
+    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres); 1 if not given. A file that would be
+    /// larger than 10 m needs it.
+    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub scale: f64,
+    pub scale: Option<f64>,
     /// Shift after scaling [m].
     #[serde(default)]
     pub at: [f64; 3],
@@ -416,14 +425,38 @@ pub struct MeshTable {
     pub fix: Option<Fixes>,
 }
 
-fn one() -> f64 {
-    1.0
-}
-
 impl MeshTable {
+    /// The factor on all lengths.
+    pub fn factor(&self) -> f64 {
+        self.scale.unwrap_or(1.0)
+    }
+
     /// The cells of a built-in shape or an image.
     pub fn made_of(&self) -> Cells {
         self.cells.unwrap_or_default()
+    }
+}
+
+/// A label of an image: its number, or in quotes its name or a range of numbers.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Label {
+    /// Its number.
+    Number(i32),
+    /// Its name, or a range as `"5-8"`.
+    Text(String),
+}
+
+impl Label {
+    /// What of an image it stands for.
+    pub fn choice(&self) -> LabelChoice {
+        match self {
+            Self::Number(label) => LabelChoice::One(*label),
+            Self::Text(text) => match text.parse() {
+                Ok(choice) => choice,
+                Err(never) => match never {},
+            },
+        }
     }
 }
 

@@ -9,7 +9,8 @@ mod view;
 
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
-    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, LayerTable, MeshTable,
+    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, LayerTable,
+    MeshTable,
     Normals, Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule,
     TubeShape, TwistedStripShape,
 };

@@ -119,7 +119,7 @@ impl Writer {
             mesh.block_mut(solid.cell()).data.insert("label".into(), DataArray::scalar(labels));
         }
         self.line(format!("[body.{body}]"));
-        self.line(format!("mesh = {{ file = \"{file}\" }}"));
+        self.line(format!("mesh = {{ file = \"{file}\", scale = 1 }}"));
         self.line(format!("element = \"{}\"", solid.element()));
         self.line(format!(
             "law = {}",
