@@ -508,7 +508,8 @@ fn corners_follow_the_hourglass_patterns_within_their_reach() {
             // The edges at a corner go where F takes them.
             let at_corner = |corner: usize| {
                 let edges = |x: &[Vector<f64>]| {
-                    let edge = crate::element::HEX_EDGES[corner].map(|node| sub(x[node], x[corner]).into());
+                    let edge = crate::element::HEX_EDGES[corner]
+                        .map(|node| nalgebra::Vector3::from(sub(x[node], x[corner])));
                     nalgebra::Matrix3::from_columns(&edge)
                 };
                 edges(&u) * edges(&x).try_inverse().unwrap()
