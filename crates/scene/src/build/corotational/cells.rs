@@ -264,10 +264,10 @@ impl Builder<'_> {
                 Orthotropic { young, poisson, shear }
             }
             (None, None, None) => {
-                let own = [path.as_slice(), &["law"]].concat();
+                let (own, whole) = ([path.as_slice(), &["law"]].concat(), ["body", name, "law"]);
                 let (law, path) = match (&layer.law, &table.law) {
                     (Some(law), _) => (law, own.as_slice()),
-                    (None, ByLabel::One(law)) => (law, &["body", name, "law"][..]),
+                    (None, ByLabel::One(law)) => (law, whole.as_slice()),
                     (None, ByLabel::Each(_)) => {
                         let message = format!("layer {number} of `{name}` has no elasticity");
                         let help = "give it a `law`, or `young-modulus = [along, across]` with `poisson-ratio` and \
