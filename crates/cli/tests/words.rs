@@ -25,9 +25,9 @@ fn volume(label: impl Fn([usize; 3]) -> i16) -> Volume {
 /// A box of label 1 with a core of label 2, and one of label 3 that the head side of the image cuts off.
 fn organ() -> Volume {
     volume(|[i, j, k]| match [i, j, k] {
-        [6..10, 6..10, 6..10] => 2,
-        [3..13, 3..13, 3..13] => 1,
-        [14..18, 3..13, 8..] => 3,
+        [6..=9, 6..=9, 6..=9] => 2,
+        [3..=12, 3..=12, 3..=12] => 1,
+        [14..=17, 3..=12, 8..=19] => 3,
         _ => 0,
     })
 }
@@ -194,6 +194,7 @@ fn scene(mesh: &str) -> Workshop {
         "case/seg.dcm",
         segmentation(&organ(), Segments::Bits, &["Liver", "tumour", "heart"], Syntax::Explicit),
     );
+    workshop.write("case/seg.nii", nifti1(&organ(), Form::Sform, false));
     for (name, label) in [("liver.nii", 1), ("tumour.nii", 2)] {
         let mask =
             Volume { values: organ().values.iter().map(|&own| i16::from(own == label)).collect(), ..organ() };
@@ -214,7 +215,7 @@ fn a_scene_says_labels_by_name_and_masks_and_is_asked_about_units() {
             "label 2 (tumour), 1 (Liver)",
         ),
         ("{ masks = [\"liver.nii\", \"tumour.nii\"], edge = 0.008 }", 0, "label 1 (liver), 2 (tumour)"),
-        ("{ image = \"seg.dcm\", label = \"heart\", edge = 0.008 }", 0, "40 voxels on the head side"),
+        ("{ image = \"seg.nii\", label = 3, edge = 0.008 }", 0, "40 voxels on the head side"),
         ("{ image = \"seg.dcm\", label = \"lung\", edge = 0.008 }", 2, "no label is named `lung`"),
         ("{ image = \"seg.dcm\", label = 1, names = \"none.txt\", edge = 0.008 }", 2, "cannot open"),
         ("{ file = \"ball.stl\", as = \"tets\", edge = 8.0 }", 2, "probably millimetres"),

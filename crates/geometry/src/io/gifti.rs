@@ -5,21 +5,21 @@
 use std::collections::BTreeMap;
 use std::io::Read;
 
-use roxmltree::{Document, Node};
+use roxmltree::Node;
 
 use super::base64::Base64;
 use super::cells::{Cells, array_limit, finite_points, node};
 use super::cursor::{Cursor, Order, Scalar, shown};
 use super::error::{Fault, Place};
+use super::xml::parse_xml;
 use super::{Format, MeshFile};
 use crate::CellKind;
 
 /// Reads a surface.
 pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     let text = without_doctype(&String::from_utf8_lossy(bytes))?;
-    let document = Document::parse(&text).map_err(|error| {
-        let place = Place::Line(error.pos().row as usize);
-        Fault::malformed(place, format!("the XML is broken or cut off: {error}"))
+    let document = parse_xml(&text).map_err(|error| {
+        Fault::malformed(Place::Line(error.line), format!("the XML is broken or cut off: {error}"))
     })?;
     let root = document.root_element();
     if root.tag_name().name() != "GIFTI" {
@@ -27,21 +27,25 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         return Err(Fault::malformed(Place::Line(1), format!("the first element is `{name}`, not `GIFTI`")));
     }
     let mut budget = array_limit(bytes.len());
-    let (mut points, mut corners, mut notes) = (None, None, Vec::new());
-    for array in root.children().filter(|child| child.has_tag_name("DataArray")) {
-        let place = Place::Line(document.text_pos_at(array.range().start).row as usize);
-        let array = Array { node: array, place };
-        match array.attribute("Intent") {
-            "NIFTI_INTENT_POINTSET" if points.is_none() => {
+    let (mut points, mut corners, mut notes, mut others) = (None, None, Vec::new(), 0);
+    for node in root.children().filter(|child| child.has_tag_name("DataArray")) {
+        let place = || Place::Line(document.text_pos_at(node.range().start).row as usize);
+        match node.attribute("Intent") {
+            Some("NIFTI_INTENT_POINTSET") if points.is_none() => {
+                let array = Array { node, place: place() };
                 let coordinates = array.numbers(&mut budget)?;
                 notes.extend(array.transform());
-                points = Some(finite_points(&coordinates, place)?);
+                points = Some(finite_points(&coordinates, array.place)?);
             }
-            "NIFTI_INTENT_TRIANGLE" if corners.is_none() => {
-                corners = Some((array.numbers(&mut budget)?, place))
+            Some("NIFTI_INTENT_TRIANGLE") if corners.is_none() => {
+                let array = Array { node, place: place() };
+                corners = Some((array.numbers(&mut budget)?, array.place));
             }
-            other => notes.push(format!("an array of {} was left out", shown(other.as_bytes()))),
+            _ => others += 1,
         }
+    }
+    if others > 0 {
+        notes.push(format!("arrays other than the points and the triangles were left out: {others}"));
     }
     let points = points.unwrap_or_default();
     let mut cells = Cells::default();

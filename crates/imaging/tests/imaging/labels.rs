@@ -48,7 +48,11 @@ fn a_segmentation_is_a_label_image_with_names() {
             let image = read_bytes(&bytes, ImageFormat::Dicom, &ReadOptions::default())
                 .unwrap_or_else(|error| panic!("{kind:?} {syntax:?}: {error}"));
             assert_same(&image, &volume);
-            assert_eq!(image.grid.dims, [5, 4, 4], "the slice without any voxel between others is there");
+            assert_eq!(
+                image.grid.dims,
+                [5, 4, 6],
+                "slices without any voxel are there, between the others and at either end"
+            );
             let regions = image.regions(&|_| {}).unwrap();
             assert_eq!(
                 regions.iter().map(|region| region.name.as_deref().unwrap()).collect::<Vec<_>>(),

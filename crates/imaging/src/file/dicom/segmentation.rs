@@ -1,5 +1,5 @@
 //! DICOM segmentations (PS3.3 C.8.20): frames of one segment each, a bit or a fraction a pixel, or frames of labels. They become a label image;
-//! the label is the number of the segment. Frames without any voxel may be missing.
+//! the label is the number of the segment. Frames without any voxel may be missing: what lies beyond the first and the last one is taken as empty.
 //! Leaves out: compressed frames, segmentations of several orientations.
 
 use pliant_geometry::Vector3;
@@ -70,7 +70,10 @@ pub(super) fn read(elements: &Elements<'_>, options: &ReadOptions) -> Result<Ima
             }
         }
     }
-    let mut notes = Vec::new();
+    let mut notes = vec![
+        "the frames end where the segments do: whether the scan cuts them off along its slices is not known"
+            .to_owned(),
+    ];
     if shared > 0 {
         notes.push(format!(
             "segments overlap in {shared} voxels, which count to the segment of the highest number"
@@ -121,7 +124,7 @@ fn segment(frames: &Frames<'_>, frame: usize) -> Result<u16, ImageProblem> {
     }
 }
 
-/// The frames as slices of a volume.
+/// The frames as slices of a volume, with an empty slice at either end.
 struct Stack {
     /// LPS [mm].
     first: Vector3,
@@ -163,8 +166,8 @@ impl Stack {
         let Some(least) = gaps.iter().copied().reduce(f64::min) else {
             let spacing = told.or(places[0].thickness);
             let spacing = spacing.ok_or(ImageProblem::MissingField { field: "SliceThickness" })?;
-            let slices = vec![0; places.len()];
-            return Ok(Self { first: places[first].position, step: normal * spacing, count: 1, slices });
+            let (step, slices) = (normal * spacing, vec![1; places.len()]);
+            return Ok(Self { first: places[first].position - step, step, count: 3, slices });
         };
         let whole = |spacing: f64, gap: f64| (gap / spacing - (gap / spacing).round()).abs() < 0.05;
         let even = |&spacing: &f64| gaps.iter().all(|&gap| gap > 0.9 * spacing && whole(spacing, gap));
@@ -185,7 +188,7 @@ impl Stack {
             return Err(ImageProblem::bad("frames", value, expected));
         }
         let step = (places[last].position - places[first].position) / steps;
-        let slices = heights.iter().map(|height| ((height - low) / spacing).round() as usize).collect();
-        Ok(Self { first: places[first].position, step, count: steps as u64 + 1, slices })
+        let slices = heights.iter().map(|height| ((height - low) / spacing).round() as usize + 1).collect();
+        Ok(Self { first: places[first].position - step, step, count: steps as u64 + 3, slices })
     }
 }
