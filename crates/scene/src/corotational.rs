@@ -309,7 +309,8 @@ impl<'m> Corotated<'m> {
 
     /// What holds the three components from one on.
     fn held(&self, first: usize) -> [f64; 3] {
-        let [internal, loads] = [self.forces.internal(), self.forces.loads()];
+        let forces = self.method.forces();
+        let [internal, loads] = [forces.internal(), forces.loads()];
         [first, first + 1, first + 2]
             .map(|at| if self.prescribed[at] { internal[at] - loads[at] } else { 0.0 })
     }
