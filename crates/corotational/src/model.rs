@@ -8,7 +8,7 @@ use pliant_mechanics::curve::Curve;
 use crate::element::{Elasticity, Formulation};
 use crate::error::ModelError;
 use crate::facet::Facet;
-use crate::surface::Carried;
+use crate::surface::{Carried, straight_edges};
 use crate::tet::Tet;
 
 /// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
@@ -47,6 +47,8 @@ pub struct Normal {
     pub node: u32,
     /// Unit vector at rest.
     pub direction: Vector3<f64>,
+    /// Whether it is the mean of its triangles, not given.
+    pub estimated: bool,
 }
 
 /// Elasticity and density.
@@ -192,10 +194,10 @@ pub enum LoadKind {
 /// How a pressure on a shell comes to its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spread {
-    /// A third of p A n of the flat facet to each corner.
-    #[default]
+    /// A third of p A n of the flat facet to each corner: for flat membranes.
     Lumped,
-    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments. Stiffness comes from the flat facets.
+    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments: for curved membranes.
+    #[default]
     Curved,
 }
 
@@ -272,7 +274,16 @@ impl Model {
             }
         }
         self.facets.extend(facets);
+        self.curve_facets();
         Ok(notes)
+    }
+
+    /// Gives the facets the normals of their corners. A shell that shares edges with others makes creases of them.
+    fn curve_facets(&mut self) {
+        let straight = straight_edges(self);
+        for ((facet, corners), straight) in self.facets.iter_mut().zip(&self.corner_normals).zip(straight) {
+            facet.curve(corners.map(|normal| self.normals[normal as usize].direction), straight);
+        }
     }
 
     /// The triangles with two neighbours or more whose normals are all turned by more than 150°: how many, and the first.
@@ -391,7 +402,7 @@ impl Model {
                 if let Some(&(cell, _)) = fan.iter().find(|corner| given.is_some() && !stands(corner.0)) {
                     return Err(ModelError::Normal { shell: shell.name.clone(), node, cell });
                 }
-                normals.push(Normal { node, direction });
+                normals.push(Normal { node, direction, estimated: given.is_none() });
             }
         }
         Ok((normals, corner_normals))
