@@ -2,7 +2,9 @@
 //! [0, 0.1 m]³ compressed by 30 %.
 
 use pliant_geometry::{Mesh, io};
+use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::AnyLaw;
+use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Averaging, Material};
 use pliant_mechanics::prony::PronyUpdate;
 use pliant_mechanics::tensor::{dot, sub};
@@ -35,7 +37,12 @@ fn a_failed_load_step_leaves_the_state_untouched() {
             "nothing relaxes"
         );
         let before = state.clone();
-        let hasty = RelaxationSettings { iterations: 300, halvings: 2, tolerance: 1e-12 };
+        let hasty = RelaxationSettings {
+            iterations: 300,
+            halvings: 2,
+            tolerance: 1e-12,
+            ..RelaxationSettings::default()
+        };
         let error = solver(hasty).solve(&mut state, 1.0).unwrap_err();
         assert!(matches!(error, RelaxationError::NotConverged { iterations: 300, .. }), "{error}");
         assert_eq!(state, before);

@@ -266,6 +266,28 @@ fn hinged_roof_snaps_through() {
     }
 }
 
+/// By arc length it passes both limit points, and ends there when told to, at the load of the second; left alone it ends where the load is
+/// as written.
+#[test]
+fn hinged_roof_by_arc_length_ends() {
+    let run = |stop: &str| {
+        let control = format!("run.control={{ load = \"push\", arc-length = 0.006{stop} }}");
+        table("hinged-roof", &[&control, "run.load-steps=200", "output.history.every=0.001"])
+    };
+    let found = run(", stop = { limit-points = 2 }");
+    let factors = found.column("load-factor");
+    let highest = factors.iter().copied().fold(0.0, f64::max);
+    let last = factors[factors.len() - 1];
+    println!("hinged roof: {} steps, {highest:.4} at most, {last:.4} at the end", factors.len() - 1);
+    assert!(factors.len() < 200, "{factors:?}");
+    claim("hinged roof by arc length, first limit load", (highest - 0.737).abs(), 0.01);
+    let lowest = factors[factors.len() - 2];
+    claim("hinged roof by arc length, second limit load", (lowest - 0.1737).abs(), 0.01);
+    let whole = run("");
+    let last = whole.last("load-factor");
+    assert!((1.0..1.2).contains(&last) && whole.rows.len() < 200, "{last}");
+}
+
 #[test]
 fn the_plate_of_the_thesis_is_no_linear_case() {
     let large = table("thesis-plate", &[]);

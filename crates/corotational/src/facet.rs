@@ -9,11 +9,12 @@ use nalgebra::{
 };
 
 use crate::element::{
-    Corners, CurvedMembrane, Elasticity, Formulation, Matrix3x18, Matrix9, Membrane, andes_higher, area,
-    gradients,
+    Corners, CurvedMembrane, Formulation, Layer, Matrix3x18, Matrix9, Membrane, PlaneStress, Section,
+    andes_higher, area, density, gradients, mean, mean_curvature, thickness,
 };
 use crate::model::Material;
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
+use crate::strain::ShellStrain;
 use crate::surface::{EdgeRule, Patch};
 
 /// Numbers of (u, v, w, θx, θy, θz) of three nodes, node by node.
@@ -48,7 +49,9 @@ pub struct Facet {
     /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that rotations do not shorten the
     /// steps of an explicit solver.
     pub inertia: f64,
-    elastic: Elasticity,
+    elastic: PlaneStress,
+    /// Of a wall of layers.
+    section: Option<Box<Section>>,
     /// Corners at rest in the facet's axes, relative to the centroid [m].
     corners: Corners,
     /// Gradients of the shape functions there [1/m].
@@ -64,6 +67,8 @@ pub struct Facet {
     bending: Matrix9,
     /// Mean membrane strain (εxx, εyy, γxy), and the area [m²] over which it is the mean.
     strain: (Matrix3x18, f64),
+    /// Nodal forces of its tension at rest, and that tension [N/m].
+    tension: (Vector18, f64),
 }
 
 /// Energy of a shell in its parts [J].
@@ -135,7 +140,31 @@ impl Facet {
         nodes: [u32; 3],
         rest: [Vector3<f64>; 3],
         thickness: f64,
+        material: Material,
+        formulation: Formulation,
+    ) -> Option<Self> {
+        Self::of_wall(nodes, rest, thickness, material, None, formulation)
+    }
+
+    /// A facet of layers from the bottom (against its normal) to the top; their angles count from a direction, which is projected on the
+    /// facet.
+    pub fn layered(
+        nodes: [u32; 3],
+        rest: [Vector3<f64>; 3],
+        layers: &[Layer],
+        direction: &Vector3<f64>,
+        formulation: Formulation,
+    ) -> Option<Self> {
+        let material = Material { elastic: mean(layers), density: density(layers) };
+        Self::of_wall(nodes, rest, thickness(layers), material, Some((layers, direction)), formulation)
+    }
+
+    fn of_wall(
+        nodes: [u32; 3],
+        rest: [Vector3<f64>; 3],
+        thickness: f64,
         Material { elastic, density }: Material,
+        layers: Option<(&[Layer], &Vector3<f64>)>,
         formulation: Formulation,
     ) -> Option<Self> {
         let [a, b, c] = rest;
@@ -152,31 +181,64 @@ impl Facet {
         let corners = rest.map(|x| (axes.transpose() * (x - centroid)).xy());
         let area = area(&corners);
         let mass = density * thickness * area / 3.0;
-        let membrane = formulation.membrane_stiffness(&corners, &elastic, thickness);
-        let bending = formulation.bending_stiffness(&corners, &elastic, thickness);
-        let mut stiffness = Matrix18::zeros();
-        add_block(&mut stiffness, MEMBRANE, &membrane);
-        add_block(&mut stiffness, BENDING, &bending);
-        let (flat, mut strain) = (formulation.mean_strain(&corners), Matrix3x18::zeros());
-        for (column, place) in MEMBRANE.into_iter().enumerate() {
-            strain.set_column(place, &flat.column(column));
-        }
-        Some(Self {
+        let section = layers.map(|(layers, direction)| {
+            let own = axes.tr_mul(direction);
+            Box::new(Section::new(layers, own.y.atan2(own.x)))
+        });
+        let [elastic, bent] = match &section {
+            None => [PlaneStress::from(elastic); 2],
+            Some(section) => [section.in_plane(), section.in_bending()],
+        };
+        let mut membrane = Matrix18::zeros();
+        add_block(&mut membrane, MEMBRANE, &formulation.membrane_stiffness(&corners, &elastic, thickness));
+        let strain = spread(MEMBRANE, &formulation.mean_strain(&corners));
+        let mut facet = Self {
             nodes,
             thickness,
             area,
             mass,
             inertia: mass * (thickness * thickness).max(area) / 12.0,
             elastic,
+            section,
             corners,
             gradient: gradients(&corners),
             axes: quaternion(axes),
             formulation,
             curved: None,
-            stiffness,
-            bending,
+            stiffness: Matrix18::zeros(),
+            bending: formulation.bending_stiffness(&corners, &bent, thickness),
             strain: (strain, area),
-        })
+            tension: (Vector18::zeros(), 0.0),
+        };
+        facet.put_together(membrane, strain, area);
+        Some(facet)
+    }
+
+    /// Takes up a membrane with its mean strain and the area of that [m²]: whole stiffness and forces at rest.
+    fn put_together(&mut self, membrane: Matrix18, strain: Matrix3x18, area: f64) {
+        self.stiffness = membrane;
+        add_block(&mut self.stiffness, BENDING, &self.bending);
+        if let Some(section) = &self.section {
+            // Of layers that are not symmetric.
+            let part = strain.tr_mul(&(section.coupling * self.curvature())) * area;
+            self.stiffness += part + part.transpose();
+        }
+        let tension = self.tension.1;
+        self.strain = (strain, area);
+        self.tension.0 = strain.tr_mul(&Vector3::new(tension, tension, 0.0)) * area;
+    }
+
+    /// Mean curvature [1/m].
+    fn curvature(&self) -> Matrix3x18 {
+        spread(BENDING, &self.formulation.mean_curvature(&self.corners))
+    }
+
+    /// The same with a tension [N/m] in its rest shape, equal in all directions.
+    #[must_use]
+    pub fn under_tension(self, tension: f64) -> Self {
+        let (strain, area) = self.strain;
+        let forces = strain.tr_mul(&Vector3::new(tension, tension, 0.0)) * area;
+        Self { tension: (forces, tension), ..self }
     }
 
     /// Gives a curved membrane the normals of its corners at rest, and says which of its edges are straight; others stay as they are.
@@ -192,10 +254,9 @@ impl Facet {
         let patch = Patch::new(corners, curved.0, straight, EdgeRule::Arc);
         let CurvedMembrane { area, strain, hierarchical } = CurvedMembrane::new(&patch, &self.gradient);
         let higher = andes_higher(&self.corners, &self.elastic, self.thickness, adaptation);
-        self.stiffness = strain.transpose() * (self.elastic.matrix() * (self.thickness * area)) * strain
+        let membrane = strain.transpose() * (self.elastic.matrix * (self.thickness * area)) * strain
             + hierarchical.transpose() * higher * hierarchical;
-        add_block(&mut self.stiffness, BENDING, &self.bending);
-        self.strain = (strain, area);
+        self.put_together(membrane, strain, area);
     }
 
     /// Where the facet is with its nodes at positions [m] and turned from rest by rotations.
@@ -243,12 +304,22 @@ impl Facet {
         Ok(Placed { axes, local, trace: sum.hypot(difference), theta, deformation })
     }
 
+    /// K d and the tension at rest in the facet's axes.
+    fn linear_force(&self, d: &Vector18) -> Vector18 {
+        self.stiffness * d + self.tension.0
+    }
+
+    /// What the tension at rest does along a deformation [J], beside the elastic energy.
+    fn tension_energy(&self, d: &Vector18) -> f64 {
+        d.dot(&self.tension.0)
+    }
+
     /// Energy [J] and internal nodal forces and moments, its gradient with respect to positions and spins.
     pub(crate) fn force(&self, placed: &Placed) -> (f64, Vector18) {
-        let raw = self.stiffness * placed.deformation;
+        let raw = self.linear_force(&placed.deformation);
         let spun = placed.to_spins(&raw);
         (
-            0.5 * placed.deformation.dot(&raw),
+            0.5 * (placed.deformation.dot(&raw) + self.tension_energy(&placed.deformation)),
             placed.to_space(&project(placed, &self.frame_spins(placed), &spun)),
         )
     }
@@ -288,7 +359,7 @@ impl Facet {
 
     /// The change of the force in the facet's axes.
     fn local_tangent(&self, placed: &Placed, kind: Tangent, k: &mut Matrix18) {
-        let raw = self.stiffness * placed.deformation;
+        let raw = self.linear_force(&placed.deformation);
         k.copy_from(&self.stiffness);
         let spun = match kind {
             Tangent::Full => {
@@ -396,17 +467,23 @@ impl Facet {
         let d = &placed.deformation;
         let whole = 0.5 * d.dot(&(self.stiffness * d));
         let turned = SVector::<f64, 9>::from_fn(|i, _| d[BENDING[i]]);
-        let bending = 0.5 * turned.dot(&(self.bending * turned));
+        let mut bending = 0.5 * turned.dot(&(self.bending * turned));
         let strain = self.strain.0 * d;
-        let membrane = 0.5 * self.thickness * self.strain.1 * strain.dot(&(self.elastic.matrix() * strain));
-        ShellEnergy { membrane, bending, drilling: (whole - membrane - bending).max(0.0) }
+        if let Some(section) = &self.section {
+            bending += strain.dot(&(section.coupling * (self.curvature() * d))) * self.strain.1;
+        }
+        let membrane = 0.5 * self.thickness * self.strain.1 * strain.dot(&(self.elastic.matrix * strain));
+        let drilling = (whole - membrane - bending).max(0.0);
+        ShellEnergy { membrane: membrane + self.tension_energy(d), bending, drilling }
     }
 
     /// Mean forces and moments per length: t D times the mean strain, and those moments whose work with a uniform curvature is that of
     /// the element's nodal forces (for the discrete Kirchhoff triangle D times the mean curvature).
     pub(crate) fn resultants(&self, placed: &Placed) -> Resultants {
         let d = &placed.deformation;
-        let membrane = self.elastic.matrix() * (self.strain.0 * d) * self.thickness;
+        let strain = self.strain.0 * d;
+        let tension = Vector3::new(self.tension.1, self.tension.1, 0.0);
+        let mut membrane = self.elastic.matrix * strain * self.thickness + tension;
         let force = self.bending * SVector::<f64, 9>::from_fn(|i, _| d[BENDING[i]]);
         let mut moment = Vector3::zeros();
         for (i, corner) in self.corners.iter().enumerate() {
@@ -416,7 +493,12 @@ impl Facet {
             let deflection = -0.5 * Vector3::new(x * x, y * y, x * y);
             moment += deflection * fz + Vector3::new(x * my, -y * mx, 0.5 * (y * my - x * mx));
         }
-        Resultants { membrane, moment: moment / self.area, axes: placed.axes }
+        moment /= self.area;
+        if let Some(section) = &self.section {
+            membrane += section.coupling * (self.curvature() * d);
+            moment += section.coupling * strain;
+        }
+        Resultants { membrane, moment, axes: placed.axes }
     }
 
     /// The largest ω² [1/s²] of the element by itself about its rest shape, with its lumped masses: none of the model's is higher.
@@ -441,12 +523,60 @@ impl Facet {
         (0..18).filter(|i| i % 6 < 3).map(|i| self.stiffness[(i, i)]).fold(0.0, f64::max)
     }
 
+    /// Stress (σxx, σyy, σxy) [Pa] at the top, in the middle and at the bottom, and the largest von Mises stress there and, of a wall of
+    /// layers, at the faces of each.
+    pub(crate) fn stresses(&self, resultants: &Resultants) -> ([Vector3<f64>; 3], f64) {
+        let mises = |s: &Vector3<f64>| (s.x * s.x - s.x * s.y + s.y * s.y + 3.0 * s.z * s.z).sqrt();
+        let Some(section) = &self.section else {
+            let all = [0.5, 0.0, -0.5].map(|part| resultants.stress(self.thickness, part * self.thickness));
+            return (all, all.iter().map(mises).fold(0.0, f64::max));
+        };
+        // The tension at rest is the same in all layers.
+        let tension = Vector3::new(self.tension.1, self.tension.1, 0.0);
+        let elastic = resultants.membrane - tension;
+        let (all, faces) = section.stresses(&elastic, &resultants.moment);
+        let whole = |stress: Vector3<f64>| stress + tension / self.thickness;
+        (all.map(whole), faces.map(|stress| mises(&whole(stress))).fold(0.0, f64::max))
+    }
+
+    /// How far it is strained.
+    pub(crate) fn strain(&self, placed: &Placed) -> ShellStrain {
+        let entry = |row: usize, column: usize| -> f64 {
+            (0..3).map(|i| placed.local[i][row] * self.gradient[i][column]).sum()
+        };
+        let strain = Vector3::new(entry(0, 0) - 1.0, entry(1, 1) - 1.0, entry(0, 1) + entry(1, 0));
+        let own = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[BENDING[i]]);
+        ShellStrain::new(&strain, &(mean_curvature(&self.corners) * own), self.thickness)
+    }
+
+    /// Thickness [m] with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1 − ν)): −ν/(1 − ν) (ε₁ + ε₂) where strains are
+    /// small, and the same volume for ν = ½ however large they are. Forces do not feel it.
+    pub(crate) fn thickness_now(&self, placed: &Placed) -> f64 {
+        let nu = self.elastic.poisson;
+        let ratio = area(&placed.local) / self.area;
+        self.thickness * ratio.powf(-nu / (1.0 - nu))
+    }
+
+    /// Whether it resists bending.
+    pub fn bends(&self) -> bool {
+        self.bending != Matrix9::zeros()
+    }
+
     /// The smallest altitude at rest [m].
     pub fn altitude(&self) -> f64 {
         let longest =
             (0..3).map(|i| (self.corners[i] - self.corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
         2.0 * self.area / longest
     }
+}
+
+/// Strains over the nine displacements at some places, over all eighteen.
+fn spread(places: [usize; 9], own: &SMatrix<f64, 3, 9>) -> Matrix3x18 {
+    let mut all = Matrix3x18::zeros();
+    for (column, place) in places.into_iter().enumerate() {
+        all.set_column(place, &own.column(column));
+    }
+    all
 }
 
 /// Adds a part of the stiffness at its places among the eighteen.
@@ -566,6 +696,7 @@ mod tests {
     use pliant_geometry::EDGES;
 
     use super::*;
+    use crate::element::Elasticity;
     use crate::rotation::exponential;
     use crate::testing::Random;
 

@@ -52,6 +52,7 @@ mod rotation;
 mod sparse;
 mod state;
 mod statics;
+mod strain;
 mod surface;
 mod system;
 #[cfg(test)]
@@ -60,7 +61,7 @@ mod testing;
 mod tests;
 mod tet;
 
-pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit};
+pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
 pub use forces::Forces;
@@ -70,7 +71,8 @@ pub use picture::{Picture, PictureFields};
 pub use recover::{ShellFields, SolidFields, von_mises};
 pub use resolution::Resolution;
 pub use state::State;
-pub use statics::{Control, StaticSettings, Statics, Step, check_held};
+pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
+pub use strain::ShellStrain;
 pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Place};
 pub use system::Phases;
 pub use tet::Tet;

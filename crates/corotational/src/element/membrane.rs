@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::{Corners, Differences, Elasticity, Matrix9, area, gradients};
+use super::{Corners, Differences, Matrix9, PlaneStress, area, gradients};
 
 /// α_b: how much of the edges' normal displacement comes from drilling.
 pub(super) const DRILLING_TO_EDGE: f64 = 1.5;
@@ -40,7 +40,7 @@ fn hierarchical(d: &Differences) -> SMatrix<f64, 3, 9> {
 /// The higher-order part over the hierarchical rotations, with β₀ = max((1 − 4ν²)/2, 0.01) min(1, κ t²/A).
 pub(crate) fn andes_higher(
     corners: &Corners,
-    elastic: &Elasticity,
+    elastic: &PlaneStress,
     thickness: f64,
     adaptation: f64,
 ) -> Matrix3<f64> {
@@ -60,7 +60,7 @@ pub(crate) fn andes_higher(
         x23 * x13 * l21, x31 * x21 * l32, x12 * x32 * l13,
         (y23 * x31 + x32 * y13) * l21, (y31 * x12 + x13 * y21) * l32, (y12 * x23 + x21 * y32) * l13,
     ) / (4.0 * area * area);
-    let elastic_natural = natural.transpose() * elastic.matrix() * natural;
+    let elastic_natural = natural.transpose() * elastic.matrix * natural;
     // Strains along the edges at the corners, from the hierarchical rotations; βs 1, 2, 1, 0, 1, −1, −1, −1, −2.
     let lengths = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / l21, 1.0 / l32, 1.0 / l13));
     let scale = lengths * (2.0 * area / 3.0);
@@ -74,11 +74,11 @@ pub(crate) fn andes_higher(
 }
 
 /// The ANDES triangle: its basic and its higher-order part.
-pub fn andes_opt(corners: &Corners, elastic: &Elasticity, thickness: f64, adaptation: f64) -> Matrix9 {
+pub fn andes_opt(corners: &Corners, elastic: &PlaneStress, thickness: f64, adaptation: f64) -> Matrix9 {
     let t = hierarchical(&Differences::new(corners));
     let higher = t.transpose() * andes_higher(corners, elastic, thickness, adaptation) * t;
     let basic = andes_strain(corners);
-    basic.transpose() * elastic.matrix() * basic * (thickness * area(corners)) + higher
+    basic.transpose() * elastic.matrix * basic * (thickness * area(corners)) + higher
 }
 
 /// Constant strain (εxx, εyy, γxy) over (u, v, θz).
@@ -94,10 +94,10 @@ pub(super) fn strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
 }
 
 /// The constant-strain triangle; `drilling` G t A/3 holds each node's rotation to that of the triangle.
-pub fn constant_strain(corners: &Corners, elastic: &Elasticity, thickness: f64, drilling: f64) -> Matrix9 {
+pub fn constant_strain(corners: &Corners, elastic: &PlaneStress, thickness: f64, drilling: f64) -> Matrix9 {
     let volume = thickness * area(corners);
     let b = strain(corners);
     let t = hierarchical(&Differences::new(corners));
-    b.transpose() * elastic.matrix() * b * volume
-        + t.transpose() * t * (drilling * elastic.shear() * volume / 3.0)
+    b.transpose() * elastic.matrix * b * volume
+        + t.transpose() * t * (drilling * elastic.shear * volume / 3.0)
 }

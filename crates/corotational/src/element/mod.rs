@@ -4,6 +4,7 @@
 mod bending;
 mod comas;
 mod curved;
+mod layers;
 mod membrane;
 #[cfg(test)]
 mod tests;
@@ -17,8 +18,11 @@ pub type Matrix9 = SMatrix<f64, 9, 9>;
 pub type Corners = [Vector2<f64>; 3];
 
 pub use bending::discrete_kirchhoff;
+pub(crate) use bending::mean_curvature;
 pub use comas::comas_2010;
 pub(crate) use curved::{CurvedMembrane, Matrix3x18};
+pub use layers::{Layer, Orthotropic};
+pub(crate) use layers::{Section, density, mean, thickness};
 pub(crate) use membrane::andes_higher;
 pub use membrane::{andes_opt, constant_strain};
 
@@ -83,7 +87,7 @@ pub struct Formulation {
 
 impl Formulation {
     /// Stiffness of a flat facet against (u, v, θz).
-    pub fn membrane_stiffness(&self, corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
+    pub fn membrane_stiffness(&self, corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
         match self.membrane {
             Membrane::Curved { adaptation } | Membrane::Opt { adaptation } => {
                 andes_opt(corners, elastic, thickness, adaptation)
@@ -102,8 +106,13 @@ impl Formulation {
         }
     }
 
+    /// Mean curvature [1/m] over (w, θx, θy), of elements whose layers bend and stretch together.
+    pub(crate) fn mean_curvature(&self, corners: &Corners) -> SMatrix<f64, 3, 9> {
+        if self.bending == Bending::Dkt { mean_curvature(corners) } else { SMatrix::zeros() }
+    }
+
     /// Stiffness against (w, θx, θy).
-    pub fn bending_stiffness(&self, corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
+    pub fn bending_stiffness(&self, corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
         match self.bending {
             Bending::Dkt => discrete_kirchhoff(corners, elastic, thickness),
             Bending::Comas2010 => comas_2010(corners, elastic, thickness),
@@ -131,6 +140,23 @@ impl Elasticity {
     /// Shear modulus [Pa].
     pub(crate) fn shear(&self) -> f64 {
         0.5 * self.young / (1.0 + self.poisson)
+    }
+}
+
+/// Elasticity of a wall in its plane, and two numbers of it by which elements scale what every value of keeps their convergence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneStress {
+    /// (σxx, σyy, σxy) over (εxx, εyy, γxy) [Pa].
+    pub matrix: Matrix3<f64>,
+    /// Poisson's ratio; of layers that on the mean over all angles.
+    pub poisson: f64,
+    /// Shear modulus [Pa], the same.
+    pub shear: f64,
+}
+
+impl From<Elasticity> for PlaneStress {
+    fn from(elastic: Elasticity) -> Self {
+        Self { matrix: elastic.matrix(), poisson: elastic.poisson, shear: elastic.shear() }
     }
 }
 

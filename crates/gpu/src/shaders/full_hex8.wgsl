@@ -1,6 +1,8 @@
 // Forces of hexahedra with eight Gauss points and one mean dilatation. Rows at rest: the eight B_a of each point, with the
 // point's volume beside the first; 1/V beside the second of the first point.
 
+const FIRST_CORNER = 64u;
+
 @group(1) @binding(4) var<storage, read_write> pressures: array<f32>;
 
 fn compute(cell: u32) {
@@ -31,6 +33,9 @@ fn compute(cell: u32) {
             force[a] += piola * row(point * 8u + a, cell).xyz;
         }
         note(d.volume_ratio, d.strain_twice, abs(force[0]) + abs(force[7]));
+    }
+    if is_folded(cell) {
+        atomicMin(&findings[BROKEN], instant.index);
     }
     for (var a = 0u; a < 8u; a++) {
         give(cell, a, vec4f(force[a], 0.0));

@@ -1,24 +1,30 @@
 //! Meshes of segmented images and of surface files: read, cut out, cleaned and made of the cells asked for, or taken from the cache.
 
 use std::f64::consts::FRAC_PI_3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{self, MeshFile, MeshFileError};
 use pliant_geometry::{CellKind, Mesh};
-use pliant_imaging::{Cleaning, Image, ImageError, LabelError, ReadOptions, Smoothing};
+use pliant_imaging::{
+    Border, Choice, Cleaning, Image, ImageError, LabelChoice, LabelError, LabelNames, ReadOptions, Smoothing,
+};
 use pliant_meshing::{
     Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
     Missed, OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
     require_room_for,
 };
 
+use super::meshes::unscaled;
 use super::{Builder, MeshOrigin};
 use crate::cache::{Kept, Key};
 use crate::diagnostic::Diagnostic;
-use crate::format::{Cells, CleanTable, MeshTable};
+use crate::format::{Cells, CleanTable, Label, MeshTable};
 
 /// Faces that meet at more than this angle meet at a crease, which even triangles keep [rad].
 const CREASE: f64 = FRAC_PI_3;
+
+/// Voxels may be made coarser up to this part of the edge of the cells.
+const COARSEST: f64 = 0.25;
 
 /// All that a mesh is made by, but for the image. Its debug text is its part of the key in the cache.
 #[derive(Clone, Debug)]
@@ -29,17 +35,9 @@ struct Recipe {
 
 /// What a body is made of.
 enum Scan {
-    Image(Image, Cut),
+    Image(Image, Choice),
     /// Triangles or quads in metres, and what is said about their file.
     Surface(MeshFile),
-}
-
-/// What of an image is the body.
-#[derive(Clone, Debug)]
-enum Cut {
-    Labels(Vec<i32>),
-    /// Voxels of at least this value.
-    From(f64),
 }
 
 /// The cells and how fine they are.
@@ -59,14 +57,20 @@ enum Goal {
 struct Fault {
     key: &'static str,
     message: String,
-    help: &'static str,
+    help: String,
 }
 
 impl Builder<'_> {
     /// The mesh of what is segmented in an image, or of what the surface of a file encloses.
-    pub(super) fn scanned(&mut self, file: &Path, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
-        let made = recipe(table).and_then(|recipe| Ok((self.scan(file, table)?, recipe)));
-        let name = file.display().to_string();
+    pub(super) fn scanned(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+        let made = recipe(table).and_then(|recipe| Ok((self.scan(table)?, recipe)));
+        let name = match (&table.file, &table.image, &table.masks) {
+            (Some(file), ..) | (None, Some(file), _) => file.display().to_string(),
+            (None, None, masks) => {
+                let names = masks.iter().flatten().map(|mask| mask.display().to_string());
+                names.collect::<Vec<_>>().join(", ")
+            }
+        };
         let made = made.and_then(|(scan, recipe)| {
             let key = self.cache.is_on().then(|| Key::new(|sink| scan.content(sink), &recipe));
             let kept = match key.as_ref().and_then(|key| self.cache.get(key)) {
@@ -97,57 +101,135 @@ impl Builder<'_> {
         self.notes.extend(how.map(|how| format!("mesh of {name}: {how}")));
         self.notes.extend(notes.iter().chain(&kept.notes).map(|note| format!("{name}: {note}")));
         let place = self.source().span(path);
-        self.out.extend(kept.doubts.into_iter().map(|doubt| {
-            let help = "use finer cells, or `clean = { keep-largest = true }` for small pieces";
-            Diagnostic::warning(doubt).at(place.clone(), "this mesh").help(help)
-        }));
+        let doubt = |message: String, help: &'static str| {
+            Diagnostic::warning(message).at(place.clone(), "this mesh").help(help)
+        };
+        let finer = "use finer cells, or `clean = { keep-largest = true }` for small pieces";
+        self.out.extend(kept.doubts.into_iter().map(|message| doubt(message, finer)));
+        let whole = "if the organ goes on beyond the image, its mesh ends there with a flat face";
+        self.out.extend(scan.cut_off().into_iter().map(|message| doubt(message, whole)));
         let origin = format!("{name} ({format}), {}", recipe.words(&scan));
         Some(MeshOrigin { mesh: kept.mesh, origin })
     }
 
-    fn scan(&self, file: &Path, table: &MeshTable) -> Result<Scan, Fault> {
-        if table.image.is_some() {
-            let cut = cut(table)?;
-            return self.read_images(file, table).map(|image| Scan::Image(image, cut));
-        }
-        let mut read = io::read(&self.scene.folder.join(file)).map_err(|error| {
+    fn scan(&self, table: &MeshTable) -> Result<Scan, Fault> {
+        let Some(file) = &table.file else {
+            require_one_cut(table)?;
+            let image = self.read_images(table)?;
+            let choice = choice(&image, table)?;
+            return Ok(Scan::Image(image, choice));
+        };
+        let opened = |source| MeshFileError::Open { path: file.to_owned(), source };
+        let read = self.scene.file(file).map_err(opened).and_then(|path| io::read(&path));
+        let mut read = read.map_err(|error| {
             let help = match error {
                 MeshFileError::Open { .. } => "file names are relative to the scene file",
                 _ => "`pliant info` reads a mesh file on its own",
             };
-            Fault { key: "file", message: error.to_string(), help }
+            Fault { key: "file", message: error.to_string(), help: help.into() }
         })?;
-        read.mesh.points.iter_mut().for_each(|point| *point *= table.scale);
-        Ok(Scan::Surface(read))
+        match unscaled(&mut read.mesh, table) {
+            Some((message, help)) => Err(Fault { key: "file", message, help }),
+            None => Ok(Scan::Surface(read)),
+        }
     }
 
-    /// The image, with the one that is added to it.
-    fn read_images(&self, image: &Path, table: &MeshTable) -> Result<Image, Fault> {
-        let read = |key, file: &Path| {
-            pliant_imaging::read(&self.scene.folder.join(file), &ReadOptions::default()).map_err(|error| {
-                let help = match error {
-                    ImageError::Open { .. } => "file names are relative to the scene file",
-                    _ => "`pliant labels` reads an image on its own",
-                };
-                Fault { key, message: error.to_string(), help }
-            })
+    /// The image, with the one that is added to it, or several masks as one; with the names of its labels.
+    fn read_images(&self, table: &MeshTable) -> Result<Image, Fault> {
+        let failed = |key, error: ImageError| {
+            let help = match error {
+                ImageError::Open { .. } => "file names are relative to the scene file",
+                _ => "`pliant labels` reads an image on its own",
+            };
+            Fault { key, message: error.to_string(), help: help.into() }
         };
-        let first = read("image", image)?;
-        let Some(second) = &table.add else { return Ok(first) };
-        first.plus(&read("add", second)?).map_err(|error| Fault {
-            key: "add",
-            message: error.to_string(),
-            help: "",
-        })
+        let within = self.scene.source.reads().folder().map(Path::to_owned);
+        let options = ReadOptions { within, ..ReadOptions::default() };
+        let allowed = |file: &Path| {
+            let opened = |source| ImageError::Open { path: file.to_owned(), source };
+            self.scene.file(file).map_err(opened)
+        };
+        let read = |key, file: &Path| {
+            let image = allowed(file).and_then(|path| pliant_imaging::read(&path, &options));
+            image.map_err(|error| failed(key, error))
+        };
+        let mut image = match (&table.image, &table.masks) {
+            (Some(image), _) => read("image", image)?,
+            (None, masks) => {
+                let one = |mask: &PathBuf| Ok((mask.clone(), read("masks", mask)?));
+                let masks = masks.iter().flatten().map(one).collect::<Result<Vec<_>, Fault>>()?;
+                Image::of_masks(&masks, table.threshold)
+                    .map_err(|error| label_fault("masks", table, &error))?
+            }
+        };
+        if let Some(second) = &table.add {
+            image = image.plus(&read("add", second)?).map_err(|error| label_fault("add", table, &error))?;
+        }
+        if let Some(names) = &table.names {
+            let word = Path::new("totalsegmentator");
+            let names = if names == word { Ok(word.to_owned()) } else { allowed(names) };
+            let names = names.and_then(|names| LabelNames::read(&names));
+            image.names.extend(&names.map_err(|error| failed("names", error))?);
+        }
+        Ok(image)
     }
 }
 
+/// The labels that a table asks for, as far as the image has them, or the value from which on voxels are inside.
+fn choice(image: &Image, table: &MeshTable) -> Result<Choice, Fault> {
+    if let (Some(threshold), None) = (table.threshold, &table.masks) {
+        return Ok(Choice::From(threshold));
+    }
+    let (key, labels) = match (&table.label, &table.labels, &table.masks) {
+        (Some(label), ..) => ("label", vec![label.choice()]),
+        (None, Some(labels), _) => ("labels", labels.iter().map(Label::choice).collect()),
+        (None, None, Some(masks)) => ("masks", vec![LabelChoice::Range(1, masks.len() as i32)]),
+        (None, None, None) => ("image", Vec::new()),
+    };
+    image.choose(&labels).map_err(|error| {
+        let whole = matches!(error, LabelError::Grey { .. } | LabelError::NotWhole { .. });
+        label_fault(if whole { "image" } else { key }, table, &error)
+    })
+}
+
+fn label_fault(key: &'static str, table: &MeshTable, error: &LabelError) -> Fault {
+    let help = match error {
+        LabelError::NoneChosen { .. } => "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`",
+        LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
+        LabelError::Grey { .. } => "`threshold` takes all voxels from a value on, as 200 for bone in a CT",
+        LabelError::NoMask { .. } => "`threshold = 0.5` takes the voxels of each mask from this value on",
+        LabelError::NoSuchName { .. } | LabelError::AmbiguousName { .. } => {
+            "`names = \"table.txt\"` gives the labels names; `pliant labels` lists them"
+        }
+        LabelError::Absent { .. } if table.threshold.is_some() => {
+            "no voxel is as large as that; use a lower threshold"
+        }
+        LabelError::OtherVoxels { .. } => "",
+        _ => "`pliant labels` lists the labels of an image",
+    };
+    let key = if matches!(error, LabelError::BadLength { .. }) { "clean" } else { key };
+    Fault { key, message: error.to_string(), help: help.into() }
+}
+
 impl Scan {
+    /// What of the body the image may cut off.
+    fn cut_off(&self) -> Vec<String> {
+        let Self::Image(image, choice) = self else { return Vec::new() };
+        let told = |(label, border): (i32, Border)| {
+            let what = match choice {
+                Choice::Labels(_) => format!("label {}", image.names.shown(label)),
+                Choice::From(_) => "the body".into(),
+            };
+            format!("{what} lies at the border of the image ({border}): it may be cut off there")
+        };
+        image.border(choice).into_iter().map(told).collect()
+    }
+
     /// Gives all bytes that a mesh can depend on, in pieces.
     fn content(&self, sink: &mut dyn FnMut(&[u8])) {
         match self {
-            Self::Image(image, cut) => {
-                sink(format!("{cut:?}").as_bytes());
+            Self::Image(image, choice) => {
+                sink(format!("{choice:?}").as_bytes());
                 image.content(sink);
             }
             Self::Surface(file) => {
@@ -164,7 +246,8 @@ impl Scan {
 
 /// What a table asks for.
 fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
-    let refuse = |key, message: &str, help| Err(Fault { key, message: message.into(), help });
+    let refuse =
+        |key, message: &str, help: &str| Err(Fault { key, message: message.into(), help: help.into() });
     let CleanTable { close_gaps, fill_holes, keep_largest } = table.clean.unwrap_or_default();
     let cleaning = Cleaning { close_gaps, fill_holes, keep_largest };
     let cells = goal(table)?;
@@ -182,29 +265,46 @@ fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
         }
         return Ok(Recipe { cleaning, cells });
     }
-    if table.scale != 1.0 {
+    if table.factor() != 1.0 {
         return refuse("scale", "`scale` does not go with `image`", "an image tells its own unit");
     }
     Ok(Recipe { cleaning, cells })
 }
 
-/// What of an image a table asks for.
-fn cut(table: &MeshTable) -> Result<Cut, Fault> {
-    let refuse = |key, message: &str, help| Err(Fault { key, message: message.into(), help });
-    let cut = match (table.label, &table.labels, table.threshold) {
-        (Some(label), None, None) => Cut::Labels(vec![label]),
-        (None, Some(labels), None) => Cut::Labels(labels.clone()),
-        (None, None, Some(threshold)) => Cut::From(threshold),
-        (None, None, None) => Cut::Labels(Vec::new()),
-        _ => {
-            let message = "an image is cut out by exactly one of `label`, `labels`, `threshold`";
-            return refuse("image", message, "leave the others out");
+/// Whether a table says in one way only what of an image the body is.
+fn require_one_cut(table: &MeshTable) -> Result<(), Fault> {
+    let refuse =
+        |key, message: &str, help: &str| Err(Fault { key, message: message.into(), help: help.into() });
+    let ways =
+        [table.label.is_some(), table.labels.is_some(), table.threshold.is_some() && table.masks.is_none()];
+    match &table.masks {
+        Some(masks) if masks.is_empty() => {
+            return refuse("masks", "`masks` names no image", "name one at least");
         }
-    };
-    if table.add.is_some() && table.threshold.is_none() {
-        return refuse("add", "`add` goes with `threshold` only", "labels are not added up");
+        Some(masks) if masks.len() > 1000 => {
+            return refuse("masks", "`masks` names more than 1000 images", "mesh them in parts");
+        }
+        _ => {}
     }
-    Ok(cut)
+    if ways.iter().filter(|way| **way).count() > 1 {
+        let message = "an image is cut out by exactly one of `label`, `labels`, `threshold`";
+        return refuse(
+            if table.image.is_some() { "image" } else { "masks" },
+            message,
+            "leave the others out",
+        );
+    }
+    if table.add.is_some() && table.masks.is_some() {
+        return refuse("add", "`add` goes with `image`, not with `masks`", "name it among the `masks`");
+    }
+    if table.add.is_some() && table.threshold.is_none() {
+        return refuse(
+            "add",
+            "`add` goes with `threshold` only",
+            "labels are not added up; `masks` takes several masks",
+        );
+    }
+    Ok(())
 }
 
 /// The cells that a table asks for: of the sizes that it gives exactly one that goes with them.
@@ -224,14 +324,18 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
     let given: Vec<&'static str> =
         sizes.into_iter().filter(|(_, given)| *given).map(|(key, _)| key).collect();
     let words = words(cells);
-    let source = if table.file.is_some() { "file" } else { "image" };
+    let source = match (&table.file, &table.masks) {
+        (Some(_), _) => "file",
+        (None, Some(_)) => "masks",
+        (None, None) => "image",
+    };
     if let Some(key) = given.iter().copied().find(|key| !fitting.contains(key)) {
         let help = match cells {
             Cells::Shells => "shells are as many as `shells`, or as close as `error`",
             Cells::Surface => "a surface has even triangles of `edge`, or as few as `triangles`",
             _ => "their size is `edge`, in metres",
         };
-        return Err(Fault { key, message: format!("`{key}` does not go with {words}"), help });
+        return Err(Fault { key, message: format!("`{key}` does not go with {words}"), help: help.into() });
     }
     match (cells, table.edge, table.triangles, table.shells, table.error) {
         (Cells::Surface, Some(edge), None, ..) => Ok(Goal::Even(edge)),
@@ -243,7 +347,7 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
         (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, None, ..) => Err(Fault {
             key: source,
             message: format!("{words} of an image or a surface need `edge`"),
-            help: "add `edge`, the size of a cell in metres, for example `edge = 0.008`",
+            help: "add `edge`, the size of a cell in metres, for example `edge = 0.008`".into(),
         }),
         _ => Err(Fault {
             key: source,
@@ -251,7 +355,7 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
                 "{words} of an image or a surface need exactly one of {}",
                 fitting.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
             ),
-            help: "for example `error = 0.005`, half a percent of the diagonal, or `shells = 800`",
+            help: "for example `error = 0.005`, half a percent of the diagonal, or `shells = 800`".into(),
         }),
     }
 }
@@ -271,9 +375,10 @@ impl Recipe {
     fn words(&self, scan: &Scan) -> String {
         let cut = match scan {
             Scan::Surface(_) => "what it encloses".into(),
-            Scan::Image(_, Cut::From(least)) => format!("from {least} on"),
-            Scan::Image(_, Cut::Labels(labels)) => {
-                format!("label {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))
+            Scan::Image(_, Choice::From(least)) => format!("from {least} on"),
+            Scan::Image(image, Choice::Labels(labels)) => {
+                let shown = labels.iter().map(|&label| image.names.shown(label));
+                format!("label {}", shown.collect::<Vec<_>>().join(", "))
             }
         };
         let cells = match self.cells {
@@ -297,20 +402,17 @@ impl Recipe {
             (Goal::Shells(ShellGoal::Shells(_)), _) => "shells",
             (Goal::Shells(ShellGoal::Error(_)), _) => "error",
         };
-        let fault = |error: MeshingError| Fault { key, message: error.to_string(), help: "" };
+        let fault = |error: MeshingError| Fault { key, message: error.to_string(), help: String::new() };
         let mut notes = Vec::new();
         let (mesh, doubts) = match (scan, self.cells) {
-            (Scan::Image(image, cut), goal) => {
-                let (anatomy, cleaned) = self.anatomy(image, cut)?;
+            (Scan::Image(image, choice), goal) => {
+                let (anatomy, cleaned, voxel) = self.anatomy(image, choice, &mut notes)?;
                 if self.cleaning != Cleaning::default() {
                     notes.push(cleaned.to_string());
                 }
                 match goal {
                     Goal::Volume(cells, edge) => fill(&anatomy, cells, edge, &mut notes),
-                    goal => {
-                        let voxel = image.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
-                        extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal))
-                    }
+                    goal => extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal)),
                 }
             }
             (Scan::Surface(file), Goal::Volume(cells, edge)) => self
@@ -349,37 +451,32 @@ impl Recipe {
         surface.anatomy(1, edge, &|_| {})
     }
 
+    /// The body cut out of an image, what its cleaning changed, and the least step of its voxels [m].
     fn anatomy(
         &self,
         image: &Image,
-        cut: &Cut,
-    ) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned), Fault> {
-        let (key, labels, chosen) = match cut {
-            Cut::From(least) => ("threshold", Ok(image.threshold(*least..=f64::INFINITY)), vec![1]),
-            Cut::Labels(labels) => {
-                let key = ["image", "label", "labels"][labels.len().min(2)];
-                (key, image.labels(), labels.clone())
-            }
+        choice: &Choice,
+        notes: &mut Vec<String>,
+    ) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned, f64), Fault> {
+        let key = match choice {
+            Choice::From(_) => "threshold",
+            Choice::Labels(labels) => ["image", "label", "labels"][labels.len().min(2)],
         };
-        let fault = |key, error: LabelError| {
-            let help = match error {
-                LabelError::NoneChosen { .. } => "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`",
-                LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
-                LabelError::Absent { .. } if matches!(cut, Cut::From(_)) => {
-                    "no voxel is as large as that; use a lower threshold"
-                }
-                _ => "`pliant labels` lists the labels of an image",
-            };
-            let key = if matches!(error, LabelError::BadLength { .. }) { "clean" } else { key };
-            Fault { key, message: error.to_string(), help }
+        let table =
+            MeshTable { threshold: matches!(choice, Choice::From(_)).then_some(0.0), ..MeshTable::default() };
+        let fault = |error: LabelError| label_fault(key, &table, &error);
+        let (smoothing, coarsest) = match self.cells {
+            Goal::Volume(_, edge) => (Smoothing::default(), edge * COARSEST),
+            Goal::Even(edge) => (SURFACE_SMOOTHING, edge * COARSEST),
+            _ => (SURFACE_SMOOTHING, f64::INFINITY),
         };
-        let labels = labels.map_err(|error| fault("image", error))?;
-        let smoothing = match self.cells {
-            Goal::Volume(..) => Smoothing::default(),
-            _ => SURFACE_SMOOTHING,
-        };
-        Anatomy::from_image(&labels, &chosen, &self.cleaning, &smoothing, &|_| {})
-            .map_err(|error| fault(key, error))
+        let cut = image.cut(choice, coarsest, &|_| {}).map_err(fault)?;
+        notes.extend(cut.note());
+        let voxel = cut.labels.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let (anatomy, cleaned) =
+            Anatomy::from_image(&cut.labels, &cut.chosen, &self.cleaning, &smoothing, &|_| {})
+                .map_err(fault)?;
+        Ok((anatomy, cleaned, voxel))
     }
 }
 

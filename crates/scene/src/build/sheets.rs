@@ -58,7 +58,7 @@ impl Builder<'_> {
         let at = |key| [path, &[key]].concat();
         let refused = [
             ("fix", table.fix.is_some(), "`fix` repairs mesh files; shapes need none"),
-            ("scale", table.scale != 1.0, "shapes are given in metres, without `scale`"),
+            ("scale", table.factor() != 1.0, "shapes are given in metres, without `scale`"),
             ("as", table.cells.is_some(), "this shape is made of triangles"),
         ];
         for (key, given, message) in refused {

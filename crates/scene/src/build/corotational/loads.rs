@@ -8,12 +8,12 @@ use pliant_corotational::{Resolution, Spread};
 use pliant_geometry::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
 
-use super::{BodyCells, Control};
+use super::{BodyCells, Control, Stop};
 use crate::build::{Builder, SCENE, Target, suggestion};
 use crate::diagnostic::{Diagnostic, counted};
 use crate::format::{
     Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SolverName, SpreadName,
-    StepChoice,
+    StepChoice, StopTable,
 };
 use crate::output::number;
 use crate::registry::LoadTable;
@@ -51,7 +51,7 @@ impl Builder<'_> {
                 let until = self.scene.scene.until;
                 let step = match run.step {
                     StepChoice::Seconds(step) => step.min(until),
-                    StepChoice::Auto(_) => until / f64::from(run.load_steps),
+                    StepChoice::Auto(_) => run.load_steps.first(until),
                 };
                 Curve { shape: Shape::Ramp, from: 0.0, to: step }
             }
@@ -364,18 +364,43 @@ impl Builder<'_> {
             return;
         }
         let control = match (&table.displacement, table.arc_length, table.volume) {
-            (Some(wanted), _, _) => self.controlled_node(wanted),
-            (_, Some(length), _) => Some(Control::ArcLength(length)),
+            (Some(wanted), _, _) => (self.controlled_node(wanted, &["run", "control", "displacement"]))
+                .map(|(node, component, by)| Control::Displacement { node, component, by }),
+            (_, Some(length), _) => {
+                self.stop(table.stop.as_ref()).map(|stop| Control::ArcLength { length, stop })
+            }
             (_, _, Some(volume)) => self.controlled_volume(&table.load, volume),
             _ => None,
         };
+        if table.stop.is_some() && table.arc_length.is_none() {
+            let message = "`stop` is for `arc-length`: other controls end where they are told to";
+            self.error(&["run", "control", "stop"], message, "means nothing here", "remove it");
+        }
         if let Some(part) = &mut self.corotational {
             part.control = control;
         }
     }
 
-    fn controlled_node(&mut self, wanted: &ControlledNode) -> Option<Control> {
-        let at = |key| ["run", "control", "displacement", key];
+    /// Where a path by arc length ends: where the load is as written, if nothing else is told.
+    fn stop(&mut self, table: Option<&StopTable>) -> Option<Stop> {
+        let Some(table) = table else { return Some(Stop { load_factor: Some(1.0), ..Stop::default() }) };
+        let path = ["run", "control", "stop", "displacement"];
+        let displacement = match &table.displacement {
+            Some(wanted) => Some(self.controlled_node(wanted, &path)?),
+            None => None,
+        };
+        let (load_factor, limit_points) = (table.load_factor, table.limit_points);
+        if load_factor.is_none() && displacement.is_none() && limit_points.is_none() {
+            let message = "`stop` needs one of `load-factor`, `displacement` and `limit-points`";
+            self.error(&path[..3], message, "says nothing", "remove it to end at a load factor of 1");
+            return None;
+        }
+        Some(Stop { load_factor, displacement, limit_points })
+    }
+
+    /// The node nearest to a place, the component and how far it moves [m].
+    fn controlled_node(&mut self, wanted: &ControlledNode, path: &[&str]) -> Option<(u32, usize, f64)> {
+        let at = |key| [path, &[key]].concat();
         let body = self.find_body(&wanted.body, &at("body"))?;
         let nodes = self.model.bodies[body].nodes.clone();
         let place = Vector3::from(wanted.at);
@@ -391,7 +416,7 @@ impl Builder<'_> {
                 return None;
             }
         };
-        Some(Control::Displacement { node, component, by: wanted.by })
+        Some((node, component, wanted.by))
     }
 
     fn controlled_volume(&mut self, load: &str, to: f64) -> Option<Control> {
