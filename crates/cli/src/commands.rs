@@ -62,7 +62,8 @@ pub fn prepare_changed(
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
 ) -> Result<(Scene, Built, Plan), Failure> {
-    let Opened { mut source, folder, assumed, _translated } = open(path, overrides.sandbox, overrides.allow_partial)?;
+    let Opened { mut source, folder, assumed, _translated } =
+        open(path, overrides.sandbox, overrides.allow_partial)?;
     let mut mistakes: Vec<_> =
         overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
     let precision = overrides.precision.map(|precision| match precision {

@@ -196,7 +196,76 @@ fn doubtful_shells_are_warned_about() {
     says(&told, &["of `wall` folded back onto all neighbours, as inverted ones are", "smooth or remesh"]);
     let told = wall(&[(THICK, "thickness = 0.002\nelement = \"comas-2010\"")]).pliant(&["check", "case"]);
     assert_eq!(told.code, 0, "{}", told.err);
-    says(&told, &["`wall` has the element of Comas (2010)", "6 to 26 % too soft", "take `dkt-opt`"]);
+    says(&told, &["`wall` has the element of Comas (2010)", "6 to 26 % too soft", "take `dkt-curved`"]);
+}
+
+/// Curved membranes take the pressure of the curved surface, flat ones a third to each corner; other pairs are warned about.
+#[test]
+fn pressures_and_membranes_go_in_pairs() {
+    let check = |element: &str, spread: &str| {
+        let scene = wall(&[
+            (THICK, &format!("{THICK}\n{element}")),
+            ("pressure = 1", &format!("pressure = 1\n{spread}")),
+        ]);
+        let told = scene.pliant(&["check", "case"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        told
+    };
+    let (flat, lumped, curved) = ("element = \"dkt-opt\"", "spread = \"lumped\"", "spread = \"curved\"");
+    for (element, spread) in
+        [("", ""), ("", curved), (flat, ""), (flat, lumped), ("element = \"plate\"", curved)]
+    {
+        let told = check(element, spread);
+        assert!(!told.words().contains("does not go with"), "{element} {spread}: {}", told.err);
+    }
+    let told = check("", lumped);
+    says(
+        &told,
+        &["a lumped pressure does not go with `dkt-curved`, the element of `wall`", "leave `spread` out"],
+    );
+    let told = check(flat, curved);
+    says(&told, &["does not go with the flat membrane of `wall`", "take `element = \"dkt-curved\"`"]);
+}
+
+/// R t = 5e-5 m²: edges up to 14 mm on irregular meshes. Normals of a file without any are estimated, and that is said where the wall is
+/// curved.
+#[test]
+fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
+    let cylinder = |more: &str| {
+        let mesh = format!("mesh = {{ cylinder = {{ radius = 0.1, length = 0.2, cells = [12, 6]{more} }} }}");
+        let told = wall(&[
+            (PLATE, &mesh),
+            ("{ set = \"x-min\" }", "{ set = \"z-min\" }"),
+            (THICK, "thickness = 5e-4"),
+        ])
+        .pliant(&["check", "case"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        told
+    };
+    let told = cylinder(", distortion = 0.2");
+    says(
+        &told,
+        &[
+            "of `wall` under pressure have edges above 2 √(R t)",
+            "m is the limit",
+            "take shorter edges or a regular mesh",
+        ],
+    );
+    let regular = cylinder("");
+    for told in [&regular, &told] {
+        assert!(!told.words().contains("are estimated"), "{}", told.err);
+    }
+    assert!(!regular.words().contains("2 √(R t)"), "{}", regular.err);
+    let points = [
+        [0.0, 0.0, 0.0],
+        [0.1, 0.0, 0.02],
+        [0.2, 0.0, 0.0],
+        [0.0, 0.1, 0.0],
+        [0.1, 0.1, 0.02],
+        [0.2, 0.1, 0.0],
+    ];
+    let told = from_file(&points, &[&[0, 1, 4], &[0, 4, 3], &[1, 2, 5], &[1, 5, 4]], &[]);
+    says(&told, &["the normals of 4 of 4 curved triangles under pressure are estimated from the triangles"]);
 }
 
 #[test]

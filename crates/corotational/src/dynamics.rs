@@ -257,18 +257,18 @@ impl<'m> BackwardEuler<'m> {
                 let node = self.worst_node();
                 return Err(SolveError::NotConverged { time, node, residuals });
             }
-            self.add_inertia();
-            self.system.prepare()?;
             // The motion goes on, to begin with.
             let going_on = if iteration == 0 { h } else { 0.0 };
-            for (guess, &component) in self.solution.iter_mut().zip(&self.system.equations.component) {
-                let (node, c) = (component as usize / 6, component as usize % 6);
-                let rate = if c < 3 { self.start.velocity[node][c] } else { self.start.spin[node][c - 3] };
-                *guess = going_on * rate;
-            }
-            match self.system.solve_from(&self.residual, &mut self.solution) {
-                Err(SolveError::Stalled { .. }) if self.settings.accept_stalled => {}
-                result => result?,
+            match self.find_direction(going_on) {
+                Err(error) if self.system.gives_way(&error) => {
+                    let tangent = Some((self.settings.tangent, &self.pending[..]));
+                    self.system.evaluate(state, time, tangent)?;
+                    self.find_residual(state);
+                    let found = self.find_direction(going_on);
+                    self.system.exact_pressure = true;
+                    found?;
+                }
+                found => found?,
             }
             self.increment.copy_from_slice(&self.pending);
             self.system.spread(&self.solution, &mut self.increment);
@@ -287,6 +287,21 @@ impl<'m> BackwardEuler<'m> {
         }
         state.time = time;
         Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0 })
+    }
+
+    /// Solves for the residual, from a motion that goes on for a time [s].
+    fn find_direction(&mut self, going_on: f64) -> Result<(), SolveError> {
+        self.add_inertia();
+        self.system.prepare()?;
+        for (guess, &component) in self.solution.iter_mut().zip(&self.system.equations.component) {
+            let (node, c) = (component as usize / 6, component as usize % 6);
+            let rate = if c < 3 { self.start.velocity[node][c] } else { self.start.spin[node][c - 3] };
+            *guess = going_on * rate;
+        }
+        match self.system.solve_from(&self.residual, &mut self.solution) {
+            Err(SolveError::Stalled { .. }) if self.settings.accept_stalled => Ok(()),
+            result => result,
+        }
     }
 
     /// Translations and rotation vectors since the start of the step.

@@ -1,8 +1,8 @@
 //! Thin structures in large rotation: co-rotational triangular shells with membrane, bending and twist, and co-rotational tetrahedra beside
 //! them, with static and implicit solvers. Knows nothing of files or windows. SI units throughout.
 //!
-//! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane (Felippa 2003), six degrees of
-//! freedom a node, in a frame that turns with the facet; its force is the gradient of its energy. [`Model`] is constant, [`State`]
+//! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane (Felippa 2003), which takes the
+//! mean strain of the curved triangle, six degrees of freedom a node, in a frame that turns with the facet; its force is the gradient of its energy. [`Model`] is constant, [`State`]
 //! changes; [`Statics`] finds equilibria, [`BackwardEuler`] and [`Explicit`] move a state in time; [`CurvedSurface`] is the smooth
 //! surface of the shells for pictures and for forces on any of its points.
 //!
@@ -34,6 +34,7 @@
 //! ```
 
 mod carry;
+mod control;
 mod dynamics;
 pub mod element;
 mod error;
@@ -44,7 +45,9 @@ mod initial;
 mod linear;
 mod model;
 mod picture;
+mod pressure;
 mod recover;
+mod resolution;
 mod rotation;
 mod sparse;
 mod state;
@@ -66,6 +69,7 @@ pub use linear::{LinearReport, LinearSolver, Preconditioner};
 pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spread, Spring};
 pub use picture::{Picture, PictureFields};
 pub use recover::{ShellFields, SolidFields, von_mises};
+pub use resolution::Resolution;
 pub use state::State;
 pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
 pub use strain::ShellStrain;

@@ -8,7 +8,7 @@ use pliant_mechanics::curve::Curve;
 use crate::element::{Elasticity, Formulation, Layer};
 use crate::error::ModelError;
 use crate::facet::Facet;
-use crate::surface::Carried;
+use crate::surface::{Carried, straight_edges};
 use crate::tet::Tet;
 
 /// The least part of a direction that lies in a triangle.
@@ -50,6 +50,8 @@ pub struct Normal {
     pub node: u32,
     /// Unit vector at rest.
     pub direction: Vector3<f64>,
+    /// Whether it is the mean of its triangles, not given.
+    pub estimated: bool,
 }
 
 /// Elasticity and density.
@@ -207,10 +209,10 @@ pub enum LoadKind {
 /// How a pressure on a shell comes to its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spread {
-    /// A third of p A n of the flat facet to each corner.
-    #[default]
+    /// A third of p A n of the flat facet to each corner: for flat membranes.
     Lumped,
-    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments. Stiffness comes from the flat facets.
+    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments: for curved membranes.
+    #[default]
     Curved,
 }
 
@@ -271,7 +273,7 @@ impl Model {
                 let direction = direction_of(shell, number, &corners)?;
                 Facet::layered(nodes, corners, &shell.layers, &direction, shell.formulation)
             };
-            let facet = facet.map(|facet| facet.under_tension(shell.formulation, shell.tension));
+            let facet = facet.map(|facet| facet.under_tension(shell.tension));
             let facet = facet.ok_or_else(|| ModelError::Degenerate {
                 shell: shell.name.clone(),
                 cell: number,
@@ -294,7 +296,16 @@ impl Model {
             }
         }
         self.facets.extend(facets);
+        self.curve_facets();
         Ok(notes)
+    }
+
+    /// Gives the facets the normals of their corners. A shell that shares edges with others makes creases of them.
+    fn curve_facets(&mut self) {
+        let straight = straight_edges(self);
+        for ((facet, corners), straight) in self.facets.iter_mut().zip(&self.corner_normals).zip(straight) {
+            facet.curve(corners.map(|normal| self.normals[normal as usize].direction), straight);
+        }
     }
 
     /// Mean thickness over twice the area by the length of the border; `None` of a closed shell.
@@ -430,7 +441,7 @@ impl Model {
                 if let Some(&(cell, _)) = fan.iter().find(|corner| given.is_some() && !stands(corner.0)) {
                     return Err(ModelError::Normal { shell: shell.name.clone(), node, cell });
                 }
-                normals.push(Normal { node, direction });
+                normals.push(Normal { node, direction, estimated: given.is_none() });
             }
         }
         Ok((normals, corner_normals))

@@ -340,9 +340,17 @@ impl<'m> Statics<'m> {
             if !norm.is_finite() || iteration == self.settings.iterations {
                 break;
             }
-            self.hold_slack();
-            negative_pivots = self.system.prepare().map_err(failed)?;
-            self.system.solve(&self.residual, &mut self.solution).map_err(failed)?;
+            negative_pivots = match self.find_direction() {
+                Err(error) if self.system.gives_way(&error) => {
+                    let tangent = Some((self.settings.tangent, &self.pending[..]));
+                    self.system.evaluate(state, time, tangent).map_err(failed)?;
+                    self.find_residual(state);
+                    let pivots = self.find_direction();
+                    self.system.exact_pressure = true;
+                    pivots.map_err(failed)?
+                }
+                found => found.map_err(failed)?,
+            };
             let factor = match control {
                 Some(control) => self.controlled_factor(control, gap, iteration == 0)?,
                 None => 0.0,
@@ -359,6 +367,14 @@ impl<'m> Statics<'m> {
         }
         let node = self.worst_node();
         Err(Attempt { error: SolveError::NotConverged { time, node, residuals }, retry: true })
+    }
+
+    /// Solves for the residual; the negative pivots of the stiffness.
+    fn find_direction(&mut self) -> Result<usize, SolveError> {
+        self.hold_slack();
+        let negative_pivots = self.system.prepare()?;
+        self.system.solve(&self.residual, &mut self.solution)?;
+        Ok(negative_pivots)
     }
 
     /// Loads less internal forces on the free components; its norm and what is allowed [N].

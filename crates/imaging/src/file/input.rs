@@ -51,7 +51,16 @@ impl<'a> Input<'a> {
         } else {
             Box::new(bytes)
         };
-        Self { bytes, path, within: None, at: 0, packed, header_left: HEADER_LIMIT, limit: u64::MAX, progress: &|_| {} }
+        Self {
+            bytes,
+            path,
+            within: None,
+            at: 0,
+            packed,
+            header_left: HEADER_LIMIT,
+            limit: u64::MAX,
+            progress: &|_| {},
+        }
     }
 
     /// From now on neighbours are read in this folder only.

@@ -18,6 +18,11 @@ struct OnGrid<'t> {
 }
 
 impl MeshTable {
+    /// Whether it is a built-in shape of triangles.
+    pub(in crate::build) fn is_sheet(&self) -> bool {
+        self.sphere.is_some() || self.sheet().is_some()
+    }
+
     /// The shape on a grid that it names.
     fn sheet(&self) -> Option<OnGrid<'_>> {
         let made = |sheet, lengths, grid| Some(OnGrid { sheet, lengths, grid });

@@ -20,7 +20,7 @@ pub struct BodyTable {
     /// Its mesh, from a file, a built-in shape, or a segmented image. A shell's mesh is of triangles (quads are cut into
     /// two); a volume mesh gives it its boundary.
     pub mesh: MeshTable,
-    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-opt` for shells. For soft tissue prefer
+    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells. For soft tissue prefer
     /// `tet4-anp` to `tet4`.
     #[serde(default)]
     pub element: Option<Element>,
@@ -45,7 +45,7 @@ pub struct BodyTable {
     #[schemars(range(min = 0.0))]
     pub pre_tension: f64,
     /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the mesh where it has
-    /// some and there is no `crease`, else from the triangles.
+    /// some, as built-in shapes have, and there is no `crease`, else from the triangles.
     #[serde(default)]
     pub normals: Option<Normals>,
     /// Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved surface has a kink; 45
@@ -293,7 +293,10 @@ pub enum Element {
     Hex8,
     /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell.
     Hex8Full,
-    /// Shell: discrete Kirchhoff triangle and optimal ANDES membrane, whose drilling adapts to the thickness: the recommended one.
+    /// Shell: discrete Kirchhoff triangle and the mean membrane strain of the curved triangle: the recommended one.
+    DktCurved,
+    /// Shell: discrete Kirchhoff triangle and optimal flat ANDES membrane, whose drilling adapts to the thickness. `dkt-curved` is this
+    /// on flat walls; on curved walls under pressure this one scatters displacements from node to node.
     DktOpt,
     /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane, and calm under pressures
     /// that stretch thin curved walls much.
@@ -311,7 +314,10 @@ pub enum Element {
 impl Element {
     /// True for elements of shells.
     pub fn is_shell(self) -> bool {
-        matches!(self, Self::DktOpt | Self::DktCst | Self::Membrane | Self::Plate | Self::Comas2010)
+        matches!(
+            self,
+            Self::DktCurved | Self::DktOpt | Self::DktCst | Self::Membrane | Self::Plate | Self::Comas2010
+        )
     }
 
     /// True for tetrahedra.

@@ -246,9 +246,10 @@ pub struct PressureTable {
     /// Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face (a closed one that faces
     /// outwards is blown up).
     pub pressure: f64,
-    /// How it comes to the nodes of a shell.
+    /// How it comes to the nodes of a shell; if not given, `curved` with `dkt-curved` and `lumped` with other elements. Only these
+    /// pairs go together.
     #[serde(default)]
-    pub spread: SpreadName,
+    pub spread: Option<SpreadName>,
     /// Its course.
     #[serde(flatten)]
     pub timing: Timing,
@@ -272,11 +273,10 @@ pub struct GravityTable {
 }
 
 /// How a pressure on a shell comes to its nodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpreadName {
     /// A third of the force on each flat triangle to each of its corners.
-    #[default]
     Lumped,
     /// From the curved surface, as forces and moments.
     Curved,

@@ -141,13 +141,14 @@ impl Builder<'_> {
     fn formulation(&mut self, name: &str, table: &BodyTable) -> Option<Formulation> {
         let cst = Membrane::Cst { drilling: DRILLING };
         let (membrane, bending) = match table.element {
-            None | Some(Element::DktOpt) => (Membrane::default(), Bending::Dkt),
+            None | Some(Element::DktCurved) => (Membrane::default(), Bending::Dkt),
+            Some(Element::DktOpt) => (Membrane::Opt { adaptation: 10.0 }, Bending::Dkt),
             Some(Element::DktCst) => (cst, Bending::Dkt),
             Some(Element::Membrane) => (cst, Bending::None),
             Some(Element::Plate) => (Membrane::None, Bending::Dkt),
             Some(Element::Comas2010) => (cst, Bending::Comas2010),
             Some(_) => {
-                let help = "elements of shells: `dkt-opt`, `dkt-cst`, `membrane`, `plate`, `comas-2010`";
+                let help = "elements of shells: `dkt-curved`, `dkt-opt`, `dkt-cst`, `membrane`, `plate`, `comas-2010`";
                 let message = format!("`{name}` is a shell, and this element is of a solid");
                 self.error(&["body", name, "element"], message, "not of a shell", help);
                 return None;
@@ -370,7 +371,9 @@ impl Builder<'_> {
                 None
             }
             (_, Some(data)) => {
-                self.notes.push(format!("`{name}` is curved by the normals of its mesh"));
+                if !table.mesh.is_sheet() {
+                    self.notes.push(format!("`{name}` is curved by the normals of its mesh"));
+                }
                 let of = |node: u32| {
                     let given = data.item(node as usize);
                     (first + node, Vector3::new(given[0], given[1], given[2]))
@@ -450,7 +453,7 @@ impl Builder<'_> {
                  plates 6 to 26 % too soft"
             );
             let place = self.source().span(&["body", name, "element"]);
-            let help = "it is there for comparison; take `dkt-opt`";
+            let help = "it is there for comparison; take `dkt-curved`";
             self.out.push(Diagnostic::warning(message).at(place, "converges to a wrong plate").help(help));
         }
     }
