@@ -7,10 +7,10 @@
 //! 3/2 (1 + S). So κ² |q|² 3/2 (1 + S) < J² is enough, which costs five operations a cell.
 
 use super::{PackedCells, relative};
-use crate::Real;
 use crate::element::HEX_EDGES;
 use crate::lanes::{Lanes, Local, PACK, Pack, Work, load_vector};
 use crate::tensor::{Vector, add, cross, dot, sub};
+use crate::{Number, Real};
 
 /// Nodes of packs of hexahedra at rest, relative to their first ones [m].
 pub(super) struct PackedCorners<R>([Vector<Pack<R>>; 7]);
@@ -35,16 +35,20 @@ impl<R: Real> PackedCorners<R> {
         for (x, (rest, u)) in x[1..].iter_mut().zip(self.0.iter().zip(u)) {
             *x = add(load_vector(rest, at), *u);
         }
-        let at_corner = |corner: usize| {
-            let [a, b, c] = HEX_EDGES[corner].map(|node| sub(x[node], x[corner]));
-            -dot(cross(a, b), c)
-        };
-        let mut depth = at_corner(0);
+        let mut depth = depth_at(&x, 0);
         for corner in 1..8 {
-            depth = depth.max(at_corner(corner));
+            depth = depth.max(depth_at(&x, corner));
         }
         depth
     }
+}
+
+/// The determinant of the edges at a corner, with its sign turned. Written out: `array::map` is left as a call here.
+#[inline(always)]
+fn depth_at<N: Number>(x: &[Vector<N>; 8], corner: usize) -> N {
+    let [a, b, c] = HEX_EDGES[corner];
+    let origin = x[corner];
+    -dot(cross(sub(x[a], origin), sub(x[b], origin)), sub(x[c], origin))
 }
 
 /// The first of a pack of numbers that is not below zero.
