@@ -10,8 +10,8 @@ mod view;
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
     Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Normals,
-    Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule,
-    TubeShape, TwistedStripShape,
+    Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape, SurfaceTable, Thickness,
+    ThicknessRule, TubeShape, TwistedStripShape,
 };
 pub use linear::{ControlTable, ControlledNode, LinearName, LinearTable, LinearWay, PreconditionerName};
 pub use load::{
