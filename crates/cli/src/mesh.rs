@@ -12,8 +12,8 @@ use pliant_imaging::{
     Smoothing, read,
 };
 use pliant_meshing::{
-    Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, MeshingError, Missed, OrganTets,
-    RegionReport, TetReport, Voxels, require_room_for,
+    Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, LabelReport, MeshingError, Missed,
+    OrganTets, TetReport, Voxels, require_room_for,
 };
 use pliant_scene::{element_bound, number};
 use serde_json::{Value as Json, json};
@@ -512,7 +512,7 @@ fn largest_line(name: &str, found: &Deviation) -> String {
     )
 }
 
-fn label_line(region: &RegionReport) -> String {
+fn label_line(region: &LabelReport) -> String {
     let own = format!("label {:<10} {} cells, {:.2} ml", region.label, region.cells, region.volume * 1e6);
     match region.volume_error() {
         Some(error) => format!("{own} ({:+.2} % of the input)", error * 100.0),
@@ -520,7 +520,7 @@ fn label_line(region: &RegionReport) -> String {
     }
 }
 
-fn label_object(region: &RegionReport) -> Json {
+fn label_object(region: &LabelReport) -> Json {
     json!({
         "label": region.label, "cells": region.cells, "volume": region.volume, "input_volume": region.input_volume,
         "volume_error": region.volume_error(), "distances": region.distances,

@@ -79,7 +79,7 @@ pub use hausdorff::Hausdorff;
 pub use missed::Missed;
 pub use percentiles::Percentiles;
 pub use phantom::{Organ, Phantom, brain_label};
-pub use regions::{InterfaceReport, RegionReport, Regions};
+pub use regions::{InterfaceReport, LabelReport, Regions};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use shells::{FittedShells, ShellGoal, ShellReport};
 pub use structured::{Block, Resolution, Tube, VolumeCell};

@@ -17,7 +17,7 @@ const LARGEST_VOLUME_ERROR: f64 = 0.05;
 
 /// One label of a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RegionReport {
+pub struct LabelReport {
     /// The label.
     pub label: i32,
     /// Its cells.
@@ -30,7 +30,7 @@ pub struct RegionReport {
     pub distances: Option<Deviation>,
 }
 
-impl RegionReport {
+impl LabelReport {
     /// By which part its volume is off, where it is known.
     pub fn volume_error(&self) -> Option<f64> {
         self.input_volume.map(|input| self.volume / input - 1.0)
@@ -52,7 +52,7 @@ pub struct InterfaceReport {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Regions {
     /// Its labels.
-    pub labels: Vec<RegionReport>,
+    pub labels: Vec<LabelReport>,
     /// Its interfaces, where there are several labels and the input knows where they are.
     pub interfaces: Vec<InterfaceReport>,
 }
@@ -113,7 +113,7 @@ fn pairs(all: &[&Patches]) -> Vec<[i32; 2]> {
 }
 
 /// Cells and volume of each label of a mesh, filled by the fractions of its cells, beside the volume of the input.
-fn volumes(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<RegionReport> {
+fn volumes(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<LabelReport> {
     let mut found: BTreeMap<i32, (usize, f64)> = BTreeMap::new();
     for block in mesh.volume_blocks() {
         let labels = block.data.get("label").map_or(&[][..], |labels| &labels.values);
@@ -128,7 +128,7 @@ fn volumes(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<RegionReport> {
     }
     let of_label = |(label, &input_volume): (i32, &Option<f64>)| {
         let (cells, volume) = found.get(&label).copied().unwrap_or_default();
-        RegionReport { label, cells, volume, input_volume, distances: None }
+        LabelReport { label, cells, volume, input_volume, distances: None }
     };
     anatomy.labels().into_iter().zip(anatomy.volumes()).map(of_label).collect()
 }
