@@ -628,6 +628,16 @@ pub struct MeshImage {
     /// Edge of the cells: 0.008 in metres, or 8mm. Tets and hexes need it; a surface gets even triangles of this edge.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     pub edge: Option<f64>,
+    /// Tets: largest distance between the boundary of the mesh and the body, both ways, as 1mm: cells are made smaller where it is not
+    /// held. Measured to the triangles of a surface, or to the smooth surface of an image. Without `--edge` the first edge is chosen.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
+    pub distance: Option<f64>,
+    /// Tets: longer edge inside, away from the surface, rounded down to 2, 4, 8, ... times `--edge`.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
+    pub inner_edge: Option<f64>,
+    /// Tets: a label with smaller cells, as 4 for half of `--edge` or 4=2mm, rounded down to a half, quarter, ... of `--edge`.
+    #[arg(long, value_name = "LABEL[=LENGTH]", value_parser = protected, allow_hyphen_values = true)]
+    pub protect: Vec<(i32, Option<f64>)>,
     /// Triangles of a surface, instead of their edge: as few, placed where the shape needs them.
     #[arg(long = "cells", value_name = "N", conflicts_with = "edge")]
     pub triangles: Option<usize>,
@@ -707,6 +717,16 @@ fn length(typed: &str) -> Result<f64, String> {
         Ok(number) => Ok(number * metres),
         Err(_) => Err("a length is a number of metres, as 0.008, or one with its unit, as 8mm".into()),
     }
+}
+
+/// A label, and the length after it if there is one.
+fn protected(typed: &str) -> Result<(i32, Option<f64>), String> {
+    let (label, edge) = typed.split_once('=').map_or((typed, None), |(label, edge)| (label, Some(edge)));
+    let label = label
+        .trim()
+        .parse()
+        .map_err(|_| "a label to protect is a number, as 4, or one with an edge, as 4=2mm")?;
+    Ok((label, edge.map(str::trim).map(length).transpose()?))
 }
 
 fn positive(typed: &str) -> Result<f64, String> {

@@ -4,12 +4,12 @@ use std::f64::consts::FRAC_PI_3;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{self, MeshFile, MeshFileError};
-use pliant_geometry::{CellKind, Mesh};
+use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_imaging::{
     Border, Choice, Cleaning, Image, ImageError, LabelChoice, LabelError, LabelNames, ReadOptions, Smoothing,
 };
 use pliant_meshing::{
-    Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
+    Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
     Missed, OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
     require_room_for,
 };
@@ -18,7 +18,7 @@ use super::meshes::unscaled;
 use super::{Builder, MeshOrigin};
 use crate::cache::{Kept, Key};
 use crate::diagnostic::Diagnostic;
-use crate::format::{Cells, CleanTable, Label, MeshTable};
+use crate::format::{Cells, CleanTable, Label, MeshTable, Protected};
 
 /// Faces that meet at more than this angle meet at a crease, which even triangles keep [rad].
 const CREASE: f64 = FRAC_PI_3;
@@ -40,11 +40,24 @@ enum Scan {
     Surface(MeshFile),
 }
 
+/// How fine tets or hexes are.
+#[derive(Clone, Debug)]
+struct Fineness {
+    /// Their edge [m], if it is given.
+    edge: Option<f64>,
+    /// Edge of tets inside [m].
+    inner_edge: Option<f64>,
+    /// Labels with smaller tets, and their edges [m].
+    protect: Vec<(i32, Option<f64>)>,
+    /// Largest distance of tets from the body [m].
+    distance: Option<f64>,
+}
+
 /// The cells and how fine they are.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Goal {
-    /// Tets or hexes with their edge [m].
-    Volume(Cells, f64),
+    /// Tets or hexes.
+    Volume(Cells, Fineness),
     /// Even triangles of this edge [m].
     Even(f64),
     Triangles(u32),
@@ -324,6 +337,15 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
     let given: Vec<&'static str> =
         sizes.into_iter().filter(|(_, given)| *given).map(|(key, _)| key).collect();
     let words = words(cells);
+    let of_tets = [
+        ("inner-edge", table.inner_edge.is_some()),
+        ("protect", table.protect.is_some()),
+        ("distance", table.distance.is_some()),
+    ];
+    if let Some((key, _)) = of_tets.into_iter().find(|(_, given)| *given && cells != Cells::Tets) {
+        let message = format!("`{key}` does not go with {words}");
+        return Err(Fault { key, message, help: "it is for tets".into() });
+    }
     let source = match (&table.file, &table.masks) {
         (Some(_), _) => "file",
         (None, Some(_)) => "masks",
@@ -343,7 +365,13 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
         (Cells::Surface, None, None, ..) => Ok(Goal::Finest),
         (Cells::Shells, _, _, Some(number), None) => Ok(Goal::Shells(ShellGoal::Shells(number as usize))),
         (Cells::Shells, _, _, None, Some(error)) => Ok(Goal::Shells(ShellGoal::Error(error))),
-        (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, Some(edge), ..) => Ok(Goal::Volume(cells, edge)),
+        (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, edge, ..)
+            if edge.is_some() || table.distance.is_some() =>
+        {
+            let protect = table.protect.iter().flatten().map(Protected::label_and_edge).collect();
+            let MeshTable { inner_edge, distance, .. } = *table;
+            Ok(Goal::Volume(cells, Fineness { edge, inner_edge, protect, distance }))
+        }
         (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, None, ..) => Err(Fault {
             key: source,
             message: format!("{words} of an image or a surface need `edge`"),
@@ -371,6 +399,37 @@ pub(super) fn words(cells: Cells) -> &'static str {
     }
 }
 
+impl Fineness {
+    /// The edge of the cells [m], or of the first ones where a distance is asked for, given the box of the body [m].
+    fn edge_in(&self, bounds: [Vector3; 2]) -> f64 {
+        let chosen = self.distance.map_or(0.0, |distance| OrganTets::edge_for(distance, bounds));
+        self.edge.unwrap_or(chosen)
+    }
+
+    /// The shortest edge, or the distance that is to be held [m].
+    fn finest(&self) -> f64 {
+        self.tets(self.edge.or(self.distance).unwrap_or(f64::INFINITY)).finest()
+    }
+
+    /// Tets as fine as this.
+    fn tets(&self, edge: f64) -> OrganTets {
+        let Self { inner_edge, distance, .. } = *self;
+        OrganTets { inner_edge, distance, ..OrganTets::new(edge) }.protecting(&self.protect)
+    }
+
+    fn words(&self) -> String {
+        let edge = self.edge.map(|edge| format!("of {edge} m"));
+        let inner = self.inner_edge.map(|edge| format!("of {edge} m inside"));
+        let distance = self.distance.map(|distance| format!("within {distance} m"));
+        let protected = self.protect.iter().map(|(label, edge)| match edge {
+            Some(edge) => format!("of {edge} m in label {label}"),
+            None => format!("finer in label {label}"),
+        });
+        let all: Vec<String> = edge.into_iter().chain(inner).chain(protected).chain(distance).collect();
+        all.join(", ")
+    }
+}
+
 impl Recipe {
     fn words(&self, scan: &Scan) -> String {
         let cut = match scan {
@@ -381,8 +440,8 @@ impl Recipe {
                 format!("label {}", shown.collect::<Vec<_>>().join(", "))
             }
         };
-        let cells = match self.cells {
-            Goal::Volume(cells, edge) => format!("{} of {edge} m", words(cells)),
+        let cells = match &self.cells {
+            Goal::Volume(cells, fineness) => format!("{} {}", words(*cells), fineness.words()),
             Goal::Even(edge) => format!("surface in triangles of {edge} m"),
             Goal::Triangles(number) => format!("surface in {number} triangles"),
             Goal::Finest => "surface as fine as it is given".into(),
@@ -394,7 +453,8 @@ impl Recipe {
 
     /// Cuts the body out, cleans it and makes its cells.
     fn make(&self, scan: &Scan) -> Result<Kept, Fault> {
-        let key = match (self.cells, scan) {
+        let key = match (&self.cells, scan) {
+            (Goal::Volume(_, Fineness { edge: None, .. }), _) => "distance",
             (Goal::Volume(..) | Goal::Even(_), _) => "edge",
             (Goal::Triangles(_), _) => "triangles",
             (Goal::Finest, Scan::Image(..)) => "image",
@@ -402,23 +462,32 @@ impl Recipe {
             (Goal::Shells(ShellGoal::Shells(_)), _) => "shells",
             (Goal::Shells(ShellGoal::Error(_)), _) => "error",
         };
-        let fault = |error: MeshingError| Fault { key, message: error.to_string(), help: String::new() };
+        let fault = |error: MeshingError| {
+            let key = if matches!(error, MeshingError::NoSuchLabel { .. }) { "protect" } else { key };
+            Fault { key, message: error.to_string(), help: String::new() }
+        };
         let mut notes = Vec::new();
-        let (mesh, doubts) = match (scan, self.cells) {
+        let (mesh, doubts) = match (scan, &self.cells) {
             (Scan::Image(image, choice), goal) => {
                 let (anatomy, cleaned, voxel) = self.anatomy(image, choice, &mut notes)?;
                 if self.cleaning != Cleaning::default() {
                     notes.push(cleaned.to_string());
                 }
                 match goal {
-                    Goal::Volume(cells, edge) => fill(&anatomy, cells, edge, &mut notes),
+                    Goal::Volume(cells, fineness) => {
+                        let edge = fineness.edge_in(anatomy.field().bounds().into());
+                        fill(&anatomy, *cells, &fineness.tets(edge), &mut notes)
+                    }
                     goal => extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal)),
                 }
             }
-            (Scan::Surface(file), Goal::Volume(cells, edge)) => self
-                .enclosed(&file.mesh, edge, &mut notes)
-                .map_err(|error| Fault { key: "file", ..fault(error) })
-                .map(|anatomy| fill(&anatomy, cells, edge, &mut notes))?,
+            (Scan::Surface(file), Goal::Volume(cells, fineness)) => {
+                let edge = fineness.edge_in(file.mesh.bounds().unwrap_or_default().into());
+                let request = fineness.tets(edge);
+                self.enclosed(&file.mesh, &request, &mut notes)
+                    .map_err(|error| Fault { key: "file", ..fault(error) })
+                    .map(|anatomy| fill(&anatomy, *cells, &request, &mut notes))?
+            }
             (Scan::Surface(file), goal) => {
                 TriangleMesh::from_mesh(&file.mesh).and_then(|(surface, repairs)| {
                     if repairs != SurfaceRepairs::default() {
@@ -436,9 +505,10 @@ impl Recipe {
     fn enclosed(
         &self,
         mesh: &Mesh,
-        edge: f64,
+        request: &OrganTets,
         notes: &mut Vec<String>,
     ) -> Result<Anatomy<'static>, MeshingError> {
+        let edge = request.edge;
         let Cleaning { close_gaps, fill_holes, keep_largest } = self.cleaning;
         let closing = Closing { holes: close_gaps, fill_cavities: fill_holes, keep_largest };
         let surface = Enclosed::new(mesh, edge, &closing)?;
@@ -448,7 +518,7 @@ impl Recipe {
         let kind =
             if matches!(self.cells, Goal::Volume(Cells::Tets, _)) { CellKind::Tet } else { CellKind::Hex };
         require_room_for(kind, edge, surface.volume(), DEFAULT_CELL_LIMIT)?;
-        surface.anatomy(1, edge, &|_| {})
+        surface.fine_anatomy(1, edge, request.finest(), &|_| {})
     }
 
     /// The body cut out of an image, what its cleaning changed, and the least step of its voxels [m].
@@ -465,8 +535,8 @@ impl Recipe {
         let table =
             MeshTable { threshold: matches!(choice, Choice::From(_)).then_some(0.0), ..MeshTable::default() };
         let fault = |error: LabelError| label_fault(key, &table, &error);
-        let (smoothing, coarsest) = match self.cells {
-            Goal::Volume(_, edge) => (Smoothing::default(), edge * COARSEST),
+        let (smoothing, coarsest) = match &self.cells {
+            Goal::Volume(_, fineness) => (Smoothing::default(), fineness.finest() * COARSEST),
             Goal::Even(edge) => (SURFACE_SMOOTHING, edge * COARSEST),
             _ => (SURFACE_SMOOTHING, f64::INFINITY),
         };
@@ -484,11 +554,14 @@ impl Recipe {
 fn fill(
     anatomy: &Anatomy<'_>,
     cells: Cells,
-    edge: f64,
+    request: &OrganTets,
     notes: &mut Vec<String>,
 ) -> Result<(Mesh, Vec<String>), MeshingError> {
+    let edge = request.edge;
+    let mut doubts = Vec::new();
     let (mesh, dropped, pieces) = if cells == Cells::Tets {
-        let made = OrganTets::new(edge).mesh(anatomy, &|_| {})?;
+        let made = request.mesh(anatomy, &|_| {})?;
+        doubts = made.report.doubts();
         (made.mesh, made.report.repairs.dropped_cells, made.report.repairs.dropped_pieces)
     } else {
         let voxels = Voxels::new(edge);
@@ -501,10 +574,9 @@ fn fill(
     if pieces > 0 {
         notes.push(format!("{dropped} cells in {pieces} loose parts were dropped"));
     }
-    let allowed = Missed::allowed(&mesh, edge);
-    let deviation = Deviation::new(&mesh, anatomy.field(), edge)?;
-    let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed)?;
-    Ok((mesh, missed.iter().map(Missed::to_string).collect()))
+    let assessment = Assessment::of(&mesh, anatomy, edge)?;
+    doubts.splice(0..0, assessment.missed.iter().map(Missed::to_string));
+    Ok((mesh, doubts))
 }
 
 /// The surface of an anatomy as fine as its voxels [m].
@@ -515,20 +587,20 @@ fn extracted(anatomy: &Anatomy<'_>, voxel: f64) -> Result<TriangleMesh, MeshingE
 }
 
 /// A surface in the triangles or shells asked for, and what is doubtful about it.
-fn cover(mut surface: TriangleMesh, goal: Goal) -> Result<(Mesh, Vec<String>), MeshingError> {
+fn cover(mut surface: TriangleMesh, goal: &Goal) -> Result<(Mesh, Vec<String>), MeshingError> {
     match goal {
         Goal::Shells(goal) => {
-            let FittedShells { mesh, report, .. } = FittedShells::new(&surface, goal, &|_| {})?;
+            let FittedShells { mesh, report, .. } = FittedShells::new(&surface, *goal, &|_| {})?;
             let missed =
                 "the error asked for was not reached: the surface may pass through itself or have creases";
             return Ok((mesh, if report.reached { Vec::new() } else { vec![missed.into()] }));
         }
         Goal::Even(edge) => {
             surface.mark_creases(CREASE);
-            surface.remesh(edge, DEFAULT_CELL_LIMIT)?;
+            surface.remesh(*edge, DEFAULT_CELL_LIMIT)?;
         }
         Goal::Triangles(number) => {
-            surface.decimate(Fewer::Triangles(number as usize))?;
+            surface.decimate(Fewer::Triangles(*number as usize))?;
         }
         Goal::Finest | Goal::Volume(..) => {}
     }

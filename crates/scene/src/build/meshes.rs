@@ -126,6 +126,9 @@ impl Builder<'_> {
             ("triangles", table.triangles.is_some(), from_file),
             ("shells", table.shells.is_some(), from_file),
             ("error", table.error.is_some(), from_file),
+            ("inner-edge", table.inner_edge.is_some(), from_file),
+            ("protect", table.protect.is_some(), from_file),
+            ("distance", table.distance.is_some(), from_file),
         ];
         let misplaced =
             |&(_, given, fits): &(&str, bool, bool)| given && !fits && !matches!(source, "image" | "masks");

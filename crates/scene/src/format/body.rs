@@ -403,6 +403,20 @@ pub struct MeshTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
+    /// Tets of an image or of what the surface of a file encloses: longer edge inside, away from the surface [m], rounded down to 2, 4, 8,
+    /// ... times `edge`.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub inner_edge: Option<f64>,
+    /// Labels with smaller tets: numbers, for half of `edge`, or tables with their edge, as `[4, { label = 5, edge = 0.002 }]`. Edges are
+    /// rounded down to a half, a quarter, ... of `edge`.
+    #[serde(default)]
+    pub protect: Option<Vec<Protected>>,
+    /// Largest distance between the boundary of tets and the body [m], both ways: they are made smaller where it is not held. It is
+    /// measured to the triangles of a file, or to the smooth surface of an image. Without `edge` the first edge is chosen.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub distance: Option<f64>,
     /// Number of triangles of a `surface` of an image or a file, instead of `edge`: as few, placed where the shape needs them.
     #[serde(default)]
     #[schemars(range(min = 4))]
@@ -462,6 +476,37 @@ impl Label {
                 Ok(choice) => choice,
                 Err(never) => match never {},
             },
+        }
+    }
+}
+
+/// A label with smaller tets.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Protected {
+    /// A label with tets of half of `edge`.
+    Half(i32),
+    /// A label with tets of an edge of its own.
+    Own(ProtectedTable),
+}
+
+/// A label and the edge of its tets.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ProtectedTable {
+    /// The label.
+    pub label: i32,
+    /// Edge of its tets [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub edge: f64,
+}
+
+impl Protected {
+    /// The label, and the edge of its tets if it is given [m].
+    pub fn label_and_edge(&self) -> (i32, Option<f64>) {
+        match *self {
+            Self::Half(label) => (label, None),
+            Self::Own(ProtectedTable { label, edge }) => (label, Some(edge)),
         }
     }
 }

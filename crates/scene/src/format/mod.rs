@@ -10,7 +10,7 @@ mod view;
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
     Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, LayerTable,
-    MeshTable, Normals, Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness,
+    MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape, SurfaceTable, Thickness,
     ThicknessRule, TubeShape, TwistedStripShape,
 };
 pub use linear::{
