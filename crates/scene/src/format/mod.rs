@@ -10,8 +10,8 @@ mod view;
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
     Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, LayerTable,
-    MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape, SurfaceTable, Thickness,
-    ThicknessRule, TubeShape, TwistedStripShape,
+    MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape, SurfaceTable,
+    Thickness, ThicknessRule, TubeShape, TwistedStripShape,
 };
 pub use linear::{
     ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,
