@@ -2,9 +2,9 @@
 //! [0, 0.1 m]³ compressed by 30 %.
 
 use pliant_geometry::{Mesh, io};
-use pliant_mechanics::curve::{Curve, Shape};
+
 use pliant_mechanics::law::AnyLaw;
-use pliant_mechanics::load::{Load, LoadKind};
+
 use pliant_mechanics::model::{Averaging, Material};
 use pliant_mechanics::prony::PronyUpdate;
 use pliant_mechanics::tensor::{dot, sub};

@@ -28,7 +28,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 23] = [
+const KEYS: [&str; 25] = [
     "status",
     "error",
     "bodies",
@@ -41,6 +41,8 @@ const KEYS: [&str; 23] = [
     "limiting_element",
     "solver",
     "equilibria",
+    "ended",
+    "shell_strains",
     "device",
     "precision",
     "steps",
@@ -995,7 +997,7 @@ fn mesh_files_of_every_volume_format_become_bodies() {
 fn info_asks_whether_a_large_mesh_is_in_millimetres() {
     let workshop = Workshop::new("");
     workshop.write("organ.vtk", vtk(&CUBE.map(|p| p.map(|x| 1000.0 * x)), &TETS, ""));
-    let hint = "give `--scale 0.001`";
+    let hint = "`--scale 0.001` brings millimetres to metres";
     assert!(workshop.pliant(&["info", "organ.vtk"]).out.contains(hint));
     assert!(!workshop.pliant(&["info", "organ.vtk", "--scale", "0.001"]).out.contains(hint));
 }
@@ -1295,7 +1297,7 @@ fn a_table_of_motions_names_nodes_as_the_mesh_file_does() {
     let scene = changed(
         &moved_node_by_node("{ csv = \"motion.csv\" }"),
         "\"organ.vtk\"",
-        "\"organ.vtk\", fix = \"drop-unused\"",
+        "\"organ.vtk\", scale = 1, fix = \"drop-unused\"",
     );
     let workshop = Workshop::new(&scene);
     workshop.write("case/organ.vtk", vtk(&points, &tets, ""));
@@ -1518,7 +1520,7 @@ fn a_flattened_cube_ends_with_the_corner_that_turns_inside_out() {
     let run = "solver = \"quasi-static\"\nload-steps = 2";
     let told = Workshop::new(&squeezed("hex8", run, "by = [0, 0, -0.099]\ncurve = \"hold\"")).run(&[]);
     assert_eq!(told.code, 1, "{}", told.err);
-    assert!(told.err.contains("inverted") && told.err.contains("bring it on along a curve"), "{}", told.err);
+    assert!(told.err.contains("inverted") && told.err.contains("let it grow over time"), "{}", told.err);
     assert!(!told.err.contains("more load steps"), "{}", told.err);
 }
 

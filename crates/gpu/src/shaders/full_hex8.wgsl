@@ -21,7 +21,9 @@ fn compute(cell: u32) {
         gradient[point] = h;
         change += row(point * 8u, cell).w * volume_change(h);
     }
-    let pressure = relaxed_pressure(change * row(1u, cell).w, cell);
+    // v/V − 1.
+    let swelling = change * row(1u, cell).w;
+    let pressure = relaxed_pressure(swelling, cell);
     var force = array<vec3f, 8>();
     for (var point = 0u; point < 8u; point++) {
         let d = deformation(gradient[point]);
@@ -34,7 +36,7 @@ fn compute(cell: u32) {
         }
         note(d.volume_ratio, d.strain_twice, abs(force[0]) + abs(force[7]));
     }
-    if is_folded(cell) {
+    if 1.0 + swelling < FLAT && is_folded(cell) {
         atomicMin(&findings[BROKEN], instant.index);
     }
     for (var a = 0u; a < 8u; a++) {

@@ -34,7 +34,7 @@ fn compute(cell: u32) {
     }
     give(cell, 0u, vec4f(first + q * row(8u, cell), energy));
     var ratio = d.volume_ratio;
-    if row(2u, cell).w * square * (1.0 + strain_square(d.strain_twice)) >= ratio * ratio && is_folded(cell) {
+    if ratio < FLAT && row(2u, cell).w * square * (1.0 + strain_square(d.strain_twice)) >= ratio * ratio && is_folded(cell) {
         ratio = min(ratio, 0.0);
     }
     note(ratio, d.strain_twice, size);

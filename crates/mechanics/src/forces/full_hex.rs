@@ -4,7 +4,7 @@
 use super::averaged::{relaxed_pressures, volume_change};
 use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
-use super::corners::{PackedCorners, first_folded};
+use super::corners::{Look, PackedCorners, is_flat};
 use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
 use crate::Real;
 use crate::element::GaussPoints;
@@ -98,7 +98,6 @@ impl<R: Real> Work<R> for Pass<'_, R> {
         let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
         for pack in packs.clone() {
             let mut pressure = Pack::ZERO;
-            let mut depths = Pack::ZERO;
             for at in (0..PACK).step_by(L::WIDTH) {
                 let (relative, _) = relative::<R, L, 8, 7>(&local, pack - packs.start, at);
                 for (u, relative) in u.iter_mut().zip(relative) {
@@ -111,10 +110,18 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                     change += L::load(weight, at) * volume_change(&h);
                 }
                 (change * L::load(&inverse_volume[pack], at)).store(&mut pressure, at);
-                corners[pack].depth(&relative, at).store(&mut depths, at);
             }
-            if findings.folded.is_none() {
-                findings.folded = first_folded(&depths).map(|lane| pack * PACK + lane);
+            let mut ratio = pressure;
+            ratio.0.iter_mut().for_each(|change| *change = *change + R::ONE);
+            if findings.folded.is_none() && ratio.0.iter().any(|&ratio| is_flat(ratio)) {
+                let pack_of_block = pack - packs.start;
+                let look = Look::<R, 8, 7> {
+                    corners: &corners[pack],
+                    local: &local,
+                    ratio: &ratio,
+                    pack: pack_of_block,
+                };
+                findings.folded = L::call(look).map(|lane| pack * PACK + lane);
             }
             // U'(v/V), relaxed where the law's volumetric part relaxes.
             let slots = constants.volumetric_slots;

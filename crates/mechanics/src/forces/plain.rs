@@ -106,8 +106,12 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                 if hourglass.is_some() && may_fold(&reach[index], ratio, strain) && findings.folded.is_none()
                 {
                     let pack_of_block = pack - packs.start;
-                    let look =
-                        Look::<R, N, M> { corners: &corners[pack], local: &local, pack: pack_of_block };
+                    let look = Look::<R, N, M> {
+                        corners: &corners[pack],
+                        local: &local,
+                        ratio,
+                        pack: pack_of_block,
+                    };
                     findings.folded = L::call(look).map(|lane| pack * PACK + lane);
                 }
                 let own = (pack - packs.start) * per_pack;

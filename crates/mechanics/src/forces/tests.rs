@@ -457,7 +457,7 @@ fn packs_of_tets_are_their_cells_one_by_one() {
     }
 }
 
-/// The corners of hexahedra are judged exactly, however the estimate that spares the look at them comes out, in both precisions and in
+/// The corners of flat hexahedra are judged exactly, however the estimate that spares the look at them comes out, in both precisions and in
 /// all lanes.
 #[test]
 fn a_corner_turned_inside_out_is_found_and_no_other() {
@@ -468,7 +468,12 @@ fn a_corner_turned_inside_out_is_found_and_no_other() {
         let solid = &model.solids[0];
         for round in 0..60 {
             let size = 0.001 * f64::from(round);
-            let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(size)).collect();
+            // Squeezed to a tenth of their height.
+            let squeezed = |rest: &Vector<f64>| {
+                let [x, y, z] = random.vector(size);
+                [x, y, 0.1 * z - 0.9 * rest[2]]
+            };
+            let displacement: Vec<_> = model.rest.iter().map(squeezed).collect();
             let worst = |cell| solid.cells.worst_corner(cell, |node| displacement[node as usize]).unwrap().1;
             let folded: Vec<usize> = (0..solid.cells.len()).filter(|&cell| worst(cell) <= 0.0).collect();
             counts[usize::from(folded.is_empty())] += 1;
