@@ -2,9 +2,7 @@
 //! [0, 0.1 m]³ compressed by 30 %.
 
 use pliant_geometry::{Mesh, io};
-
 use pliant_mechanics::law::AnyLaw;
-
 use pliant_mechanics::model::{Averaging, Material};
 use pliant_mechanics::prony::PronyUpdate;
 use pliant_mechanics::tensor::{dot, sub};

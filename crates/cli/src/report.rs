@@ -12,6 +12,7 @@ use pliant_gpu::Adapter;
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::{
     LoadStepProgress, Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, number,
+    printable,
 };
 use serde_json::json;
 
@@ -102,7 +103,8 @@ pub fn show(errors: &SceneErrors) {
     let mut text = String::new();
     let drawn = handler.render_report(&mut text, errors as &dyn Diagnostic);
     match drawn {
-        Ok(()) => eprintln!("{}", text.trim_end_matches('\n')),
+        // Its colours are codes for the terminal; what comes from the scene was made printable before.
+        Ok(()) => drop(writeln!(io::stderr(), "{}", text.trim_end_matches('\n'))),
         Err(_) => eprintln!("{}", errors.plain().to_string().trim_end_matches('\n')),
     }
 }
@@ -201,14 +203,15 @@ pub fn adapters(found: &[Adapter]) -> String {
 
 /// Prints a line on standard output. A reader that has gone away (`pliant schema | head`) is no mistake.
 pub fn say(text: impl Display) -> Result<(), Failure> {
-    let written = writeln!(io::stdout(), "{text}").and_then(|()| io::stdout().flush());
+    let text = text.to_string();
+    let written = writeln!(io::stdout(), "{}", printable(&text)).and_then(|()| io::stdout().flush());
     match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Output(error)),
         _ => Ok(()),
     }
 }
 
-/// Prints a line on standard error, if it can be written.
+/// Prints a line on standard error, if it can be written. Names in it that come from files reach the terminal without codes.
 pub fn tell(text: impl Display) {
-    let _ = writeln!(io::stderr(), "{text}");
+    let _ = writeln!(io::stderr(), "{}", printable(&text.to_string()));
 }

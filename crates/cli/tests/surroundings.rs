@@ -358,3 +358,17 @@ fn a_sandbox_keeps_images_and_models_in_their_folder() {
     assert!(!words(&[]).contains("outside the scene's folder"), "{}", words(&[]));
     assert!(words(&["--sandbox"]).contains("outside the scene's folder"), "{}", words(&["--sandbox"]));
 }
+
+/// A name in a mesh file cannot clear the screen.
+#[test]
+fn names_from_files_reach_the_terminal_without_codes() {
+    let workshop = Workshop::new(BLOCK);
+    workshop.write(
+        "named.msh",
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 \"\u{1b}[2Jliver\"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n\
+         2 0.1 0 0\n3 0 0.1 0\n4 0 0 0.1\n$EndNodes\n$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n",
+    );
+    let told = workshop.pliant(&["info", "named.msh"]);
+    assert!(told.code == 0 && told.out.contains("?[2Jliver"), "{}{}", told.out, told.err);
+    assert!(!told.out.contains('\u{1b}') && !told.err.contains('\u{1b}'));
+}

@@ -75,8 +75,8 @@ impl Patch {
     /// The velocity of each control point over velocities and spins of the three nodes.
     pub(crate) fn control_maps(&self) -> [Matrix3x18; 9] {
         let mut maps = [Matrix3x18::zeros(); 9];
-        for corner in 0..3 {
-            maps[corner].fixed_columns_mut::<3>(6 * corner).fill_with_identity();
+        for (corner, map) in maps[..3].iter_mut().enumerate() {
+            map.fixed_columns_mut::<3>(6 * corner).fill_with_identity();
         }
         for ((map, [start, end]), [along, turning]) in maps[3..].iter_mut().zip(EDGES).zip(self.edge_maps()) {
             map.fixed_columns_mut::<3>(6 * start).copy_from(&(Matrix3::identity() - along));

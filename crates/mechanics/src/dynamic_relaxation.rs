@@ -576,8 +576,8 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         let (mut left, mut size) = (0.0, 0.0);
         for (node, u) in state.displacement.iter().enumerate() {
             let mass = self.slowness * self.mass[node].to_f64();
-            for c in 0..3 {
-                size += mass * u[c].to_f64().powi(2);
+            for (c, x) in u.iter().enumerate() {
+                size += mass * x.to_f64().powi(2);
                 if self.owners[node][c] == FREE {
                     left += self.residual[node][c].to_f64().powi(2) / mass;
                 }

@@ -112,7 +112,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 (change * L::load(&inverse_volume[pack], at)).store(&mut pressure, at);
             }
             let mut ratio = pressure;
-            ratio.0.iter_mut().for_each(|change| *change = *change + R::ONE);
+            ratio.0.iter_mut().for_each(|change| *change += R::ONE);
             if findings.folded.is_none() && ratio.0.iter().any(|&ratio| is_flat(ratio)) {
                 let pack_of_block = pack - packs.start;
                 let look = Look::<R, 8, 7> {

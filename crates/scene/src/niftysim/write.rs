@@ -18,6 +18,7 @@ const MOST_HOURGLASS: f64 = 10.0;
 /// the most.
 const HILLY_POINTS: f64 = 2000.0;
 /// π as NiftySim has it, in the curve HILLY.
+#[expect(clippy::approx_constant, reason = "NiftySim's")]
 const PI: f64 = 3.14159_f32 as f64;
 /// From this excess over 1 on, in NiftySim's step after the total time, POLY345 is told to go on there.
 const TOLD_EXCESS: f64 = 1e-5;

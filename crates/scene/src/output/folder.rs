@@ -116,8 +116,8 @@ impl OutputFolder {
     pub(crate) fn go_on(&self, scene: &Scene) -> Result<(), OutputError> {
         let removed = || -> io::Result<()> {
             remove_pages(&self.path)?;
-            let frames = scene.outputs.iter().map(|(name, _)| self.path.join(name));
-            frames.map(|frames| remove_frames(&frames, ".vtu.tmp")).collect()
+            let mut frames = scene.outputs.iter().map(|(name, _)| self.path.join(name));
+            frames.try_for_each(|frames| remove_frames(&frames, ".vtu.tmp"))
         };
         removed().map_err(|error| OutputError::new(&self.path, error))
     }
