@@ -217,6 +217,8 @@ fn niftysims_load_shapes_act_at_niftysims_steps() {
     let reference = Loop::new(&model);
     let faces: Vec<String> = reference.top.iter().flatten().map(ToString::to_string).collect();
     let folder = tempfile::tempdir().unwrap();
+    // π as NiftySim has it.
+    #[expect(clippy::approx_constant)]
     let hilly = |s: f64| s * ((4.0 * 3.14159 * s).cos() - 1.0).exp();
     let shapes: [(&str, &dyn Fn(f64) -> f64); 5] = [
         ("POLY345", &polynomial),

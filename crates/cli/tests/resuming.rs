@@ -303,7 +303,7 @@ fn undo_the_end(workshop: &Workshop, folder: &str) {
     }
     let without_last = |name: &str, is_it: fn(&&str) -> bool| {
         let text = workshop.read(name);
-        let last = text.lines().filter(is_it).next_back().unwrap();
+        let last = text.lines().rfind(is_it).unwrap();
         workshop.write(name, text.replace(&format!("{last}\n"), ""));
         last.to_owned()
     };

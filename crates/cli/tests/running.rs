@@ -1471,7 +1471,7 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
     let again = workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]);
     assert!(again.code == 2 && again.err.contains("exists already"), "{}", again.err);
     let contact = "<ContactPlate><a>0 0 0</a></ContactPlate><ShellElements Type=\"SURFACE\"/></Model>";
-    workshop.write("partial.xml", &model.replace("</Model>", contact));
+    workshop.write("partial.xml", model.replace("</Model>", contact));
     for arguments in
         [&["run", "partial.xml"][..], &["import", "partial.xml", "-o", "partial"], &["check", "partial.xml"]]
     {

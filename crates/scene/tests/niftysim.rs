@@ -216,6 +216,8 @@ fn load_shapes_reach_their_values_where_niftysims_do() {
     };
     let total = 0.1;
     // NiftySim's π is 3.14159.
+    // π as NiftySim has it.
+    #[expect(clippy::approx_constant)]
     let hilly = |s: f64| s * ((4.0 * 3.14159 * s).cos() - 1.0).exp();
     let shapes: [(&str, &Shape, f64); 6] = [
         ("POLY345", &|s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s), 1e-12),
