@@ -1522,7 +1522,7 @@ fn a_flattened_cube_ends_with_the_corner_that_turns_inside_out() {
     assert_eq!((told.code, &told.json()["error"]["kind"]), (1, &"unstable".into()), "{}", told.err);
     assert!(told.err.contains("hourglass control holds"), "{}", told.err);
     let run = "solver = \"quasi-static\"\nload-steps = 2";
-    let told = Workshop::new(&squeezed("hex8", run, "by = [0, 0, -0.099]\ncurve = \"hold\"")).run(&[]);
+    let told = Workshop::new(&squeezed("hex8-full", run, "by = [0, 0, -0.099]\ncurve = \"hold\"")).run(&[]);
     assert_eq!(told.code, 1, "{}", told.err);
     assert!(told.err.contains("inverted") && told.err.contains("let it grow over time"), "{}", told.err);
     assert!(!told.err.contains("more load steps"), "{}", told.err);
