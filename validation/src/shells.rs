@@ -1,7 +1,7 @@
 //! Shells of the literature (from `pliant-reproduce`), and the same with other numbers.
 
 use pliant_geometry::Mesh;
-pub use pliant_reproduce::shells::{CLAMPED, Specimen, ramp, sheet, symmetry, triangles};
+pub use pliant_reproduce::shells::{CLAMPED, FLAT, Specimen, ramp, sheet, symmetry, triangles};
 
 use crate::Random;
 

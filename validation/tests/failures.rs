@@ -1,9 +1,10 @@
 //! A run that cannot go on says what happened.
 
-use pliant_mechanics::StepError;
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::model::{Constraint, Motion};
+use pliant_mechanics::{CentralDifference, State, StepError};
 use pliant_meshing::VolumeCell;
-use pliant_validation::{Specimen, elastic, run, soft_tissue};
+use pliant_validation::{Hexes, Specimen, Tets, elastic, run, smooth_step, soft_tissue};
 
 #[test]
 fn block_pushed_through_itself_names_the_inverted_element() {
@@ -17,4 +18,29 @@ fn block_pushed_through_itself_names_the_inverted_element() {
         println!("{cells:?}: {failure:?}");
         assert!(matches!(failure, Some(StepError::Inverted { determinant, .. }) if determinant <= 0.0));
     }
+}
+
+/// A cube that is glued to two plates which come together turns inside out at the rim.
+#[test]
+fn a_cube_squeezed_between_glued_plates_fails() {
+    let mesh = Specimen::block([0.1; 3], [4; 3], VolumeCell::Hex, &elastic(soft_tissue()), [0.0; 3]).mesh;
+    let material = elastic(soft_tissue());
+    let mut cube = Specimen::of_elements(mesh, Tets::Plain, Hexes::Full, &material, [0.0; 3])
+        .fix("z-min", [true; 3])
+        .damped(50.0);
+    let motion = Motion::Displacement([0.0, 0.0, -0.095], smooth_step(1.0));
+    let (name, nodes) = ("top".into(), cube.face("z-max"));
+    cube.model.constraints.push(Constraint { name, nodes, components: [true; 3], motion });
+    let step = 0.3 * cube.element_bound();
+    let mut stepper = CentralDifference::<f64>::new(&cube.model, step).unwrap();
+    let mut state = State::at_rest(&cube.model);
+    let failure = loop {
+        if let Err(failure) = stepper.evaluate(&mut state) {
+            break failure;
+        }
+        assert!(state.time < 1.0, "the cube is flat, and nothing has been said");
+        stepper.advance(&mut state);
+    };
+    println!("{failure}");
+    assert!(matches!(failure, StepError::Inverted { determinant, .. } if determinant <= 0.0));
 }

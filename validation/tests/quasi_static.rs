@@ -35,7 +35,12 @@ fn a_failed_load_step_leaves_the_state_untouched() {
             "nothing relaxes"
         );
         let before = state.clone();
-        let hasty = RelaxationSettings { iterations: 300, halvings: 2, tolerance: 1e-12 };
+        let hasty = RelaxationSettings {
+            iterations: 300,
+            halvings: 2,
+            tolerance: 1e-12,
+            ..RelaxationSettings::default()
+        };
         let error = solver(hasty).solve(&mut state, 1.0).unwrap_err();
         assert!(matches!(error, RelaxationError::NotConverged { iterations: 300, .. }), "{error}");
         assert_eq!(state, before);

@@ -8,7 +8,7 @@ use pliant_corotational::{Control, LinearSolver, LoadKind, State, StaticSettings
 use pliant_geometry::Mesh;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 use pliant_reproduce::cases::plate::{LARGE, deflections};
-use pliant_validation::shells::{CLAMPED, Specimen, symmetry};
+use pliant_validation::shells::{CLAMPED, FLAT, Specimen, symmetry};
 use pliant_validation::{claim, numbers, reference};
 
 fn mesh(sheet: Sheet, counts: [usize; 2], pattern: Pattern) -> Mesh {
@@ -147,16 +147,31 @@ fn hemisphere(cells: usize, membrane: Membrane) -> ([f64; 2], [f64; 2]) {
 /// 8 × 8 cells; the prototype's 4.02 and 8.00 (reference 4.067 and 8.178).
 #[test]
 fn pinched_hemisphere_in_large_rotation() {
-    let (last, _) = hemisphere(8, Membrane::default());
+    let (last, _) = hemisphere(8, FLAT.membrane);
     claim("hemisphere, V_A", (last[0] - 4.018).abs(), 0.03);
     claim("hemisphere, U_B", (last[1] - 7.999).abs(), 0.03);
+}
+
+/// Curved membranes, whose strain is linear about rest: 4.067 and 8.178 to 5 % with 8 × 8 cells, where flat ones come to 2.2 %.
+#[test]
+fn curved_hemisphere_in_large_rotation() {
+    let (_, off) = hemisphere(8, Membrane::default());
+    claim("curved hemisphere, all steps", off[0].max(off[1]), 0.05);
+}
+
+/// The same with 16 × 16 cells.
+#[test]
+#[ignore = "seconds"]
+fn curved_hemisphere_on_a_fine_mesh() {
+    let (_, off) = hemisphere(16, Membrane::default());
+    claim("curved hemisphere, fine, all steps", off[0].max(off[1]), 0.02);
 }
 
 /// 16 × 16 cells; the prototype's 4.058 and 8.107, with Felippa's drilling 3.849 and 7.389.
 #[test]
 #[ignore = "seconds"]
 fn pinched_hemisphere_on_a_fine_mesh() {
-    let (last, off) = hemisphere(16, Membrane::default());
+    let (last, off) = hemisphere(16, FLAT.membrane);
     claim("hemisphere, V_A", (last[0] / 4.058 - 1.0).abs(), 0.005);
     claim("hemisphere, U_B", (last[1] / 8.107 - 1.0).abs(), 0.005);
     claim("hemisphere, all steps", off[0].max(off[1]), 0.01);

@@ -6,10 +6,11 @@ use pliant_corotational::element::{Bending, Formulation, Membrane};
 use pliant_corotational::{LoadKind, Spread};
 use pliant_geometry::Mesh;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Pattern, Sheet};
+use pliant_reproduce::CaseError;
 use pliant_reproduce::cases::obstacle_course::{self as course, CantileverCells};
 use pliant_reproduce::cases::plate::{self, RIGIDITY, SIDE};
 use pliant_validation::claim;
-use pliant_validation::shells::{CLAMPED, renumbered};
+use pliant_validation::shells::{CLAMPED, FLAT, renumbered};
 
 /// Prints a ratio beside the one expected and holds it to that within a tolerance.
 fn expect(what: &str, ratio: f64, expected: f64, tolerance: f64) {
@@ -118,7 +119,7 @@ fn scordelis_lo_roof() {
     for (cells, expected) in [(4, 1.117), (8, 1.021), (16, 0.999), (32, 0.995)] {
         expect(
             &format!("Scordelis-Lo, N = {cells}"),
-            course::scordelis_lo(cells, Formulation::default()).unwrap(),
+            course::scordelis_lo(cells, FLAT).unwrap(),
             expected,
             0.005,
         );
@@ -130,7 +131,7 @@ fn pinched_cylinder_with_diaphragms() {
     for (cells, expected) in [(4, 0.724), (8, 0.973), (16, 1.023), (32, 1.012)] {
         expect(
             &format!("pinched cylinder, N = {cells}"),
-            course::pinched_cylinder(cells, Formulation::default()).unwrap(),
+            course::pinched_cylinder(cells, FLAT).unwrap(),
             expected,
             0.01,
         );
@@ -140,7 +141,7 @@ fn pinched_cylinder_with_diaphragms() {
 #[test]
 fn pinched_hemisphere() {
     for (cells, expected) in [(4, 0.680), (8, 0.961), (16, 0.992), (32, 0.994)] {
-        let ratio = course::hemisphere(cells, Formulation::default()).unwrap();
+        let ratio = course::hemisphere(cells, FLAT).unwrap();
         expect(&format!("hemisphere, N = {cells}"), ratio, expected, 0.005);
     }
     let membrane = Membrane::Opt { adaptation: f64::INFINITY };
@@ -152,7 +153,7 @@ fn pinched_hemisphere() {
 #[test]
 fn cook_membrane() {
     for (cells, expected) in [(4, 0.923), (8, 0.951), (16, 0.979), (32, 0.992)] {
-        let ratio = course::cook(cells, Formulation::default()).unwrap();
+        let ratio = course::cook(cells, FLAT).unwrap();
         expect(&format!("Cook, N = {cells}"), ratio, expected, 0.005);
     }
 }
@@ -166,7 +167,7 @@ fn straight_cantilever() {
         (CantileverCells::Parallelograms, [0.5331, 0.9725]),
     ];
     for (cells, expected) in rows {
-        let ratios = course::cantilever(cells, Formulation::default()).unwrap();
+        let ratios = course::cantilever(cells, FLAT).unwrap();
         for (ratio, expected) in ratios.into_iter().zip(expected) {
             expect(&format!("cantilever of {cells:?}"), ratio, expected, 0.01 * expected);
         }
@@ -182,7 +183,7 @@ fn twisted_beam() {
     ];
     for (thin, expected) in rows {
         for (across, expected) in [2, 4, 8].into_iter().zip(expected) {
-            let ratios = course::twisted_beam(thin, across, Formulation::default()).unwrap();
+            let ratios = course::twisted_beam(thin, across, FLAT).unwrap();
             for (ratio, expected) in ratios.into_iter().zip(expected) {
                 expect(
                     &format!("twisted beam, thin: {thin}, N = {across}"),
@@ -191,6 +192,32 @@ fn twisted_beam() {
                     0.01 * expected,
                 );
             }
+        }
+    }
+}
+
+/// The obstacle course with the curved membrane, which is the flat one on plates. The prototype has Scordelis-Lo 1.016 and 0.998 at N = 8
+/// and 16, and the hemisphere 0.870, 0.961, 0.987 at 4, 8 and 16 on a mesh of its own, where the flat membrane differs by 0.005, too.
+#[test]
+fn the_obstacle_course_with_curved_membranes() {
+    type Problem = fn(usize, Formulation) -> Result<f64, CaseError>;
+    type Rows = &'static [(usize, f64, f64)];
+    let problems: [(&str, Problem, Rows); 4] = [
+        ("Scordelis-Lo", course::scordelis_lo, &[(8, 1.016, 0.005), (16, 0.998, 0.005), (32, 0.995, 0.005)]),
+        ("hemisphere", course::hemisphere, &[(4, 0.870, 0.02), (8, 0.961, 0.01), (16, 0.987, 0.005)]),
+        // The literature: the wall is stiffer on most meshes, softer with these diagonals.
+        ("pinched cylinder", course::pinched_cylinder, &[(8, 1.0, 0.07), (16, 1.0, 0.04), (32, 1.0, 0.02)]),
+        ("Cook", course::cook, &[(8, 0.951, 0.005), (16, 0.979, 0.005)]),
+    ];
+    for (name, problem, rows) in problems {
+        for &(cells, expected, tolerance) in rows {
+            let found = problem(cells, Formulation::default()).unwrap();
+            expect(&format!("{name}, curved, N = {cells}"), found, expected, tolerance);
+        }
+    }
+    for thin in [false, true] {
+        for ratio in course::twisted_beam(thin, 4, Formulation::default()).unwrap() {
+            expect(&format!("twisted beam, curved, thin: {thin}"), ratio, 1.0, 0.015);
         }
     }
 }

@@ -6,13 +6,14 @@ use std::str::FromStr;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand, ValueEnum};
 use pliant_bench::Instructions;
+use pliant_imaging::LabelChoice;
 use pliant_scene::format::{BackgroundName, Choice, MapName, TextureName};
 
 /// Real-time simulation of soft organs.
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong, 130 interrupted (Ctrl-C)."
+    after_help = "Example:\n  pliant new my-organ && pliant run my-organ\n\nExit codes: 0 done, 1 the run failed, 2 the input is wrong, 130 interrupted (Ctrl-C; 128 + its number for another signal)."
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -62,6 +63,9 @@ pub enum Command {
         /// Folder for the scene and its meshes, or name of the scene file (.toml) with the meshes beside it.
         #[arg(short, long, value_name = "DIR|FILE")]
         out: PathBuf,
+        /// Also translate a model of which parts are unknown (shells, membranes, contact), without them.
+        #[arg(long)]
+        allow_partial: bool,
     },
     /// Say what a mesh file holds, how good it is, and what is wrong with it.
     #[command(
@@ -69,8 +73,11 @@ pub enum Command {
                             pliant info liver.vtu --against liver.stl --against-scale 0.001"
     )]
     Info(Info),
-    /// List the labels of a segmented image: volume, place and pieces of each.
-    #[command(after_help = "Examples:\n  pliant labels seg.nii.gz\n  pliant labels seg.nii.gz --json")]
+    /// List the labels of a segmented image: name, volume, place and pieces of each, and where the image cuts it off.
+    #[command(
+        after_help = "Examples:\n  pliant labels seg.nii.gz\n  pliant labels seg.nii.gz --names totalsegmentator\n  \
+                            pliant labels liver.nii.gz tumour.nii.gz --json"
+    )]
     Labels(Labels),
     /// Make a mesh from labels of a segmented image or from a closed surface: tets, hexes, a surface, curved shells.
     #[command(after_help = MESH_HELP)]
@@ -145,7 +152,7 @@ Examples:
 A scene is run first, without its own outputs; its table [view] tells how it is seen, the options below come before it. A film
 whose name ends in .mp4 takes ffmpeg; without one, or with a name that ends in .png, it is an animated PNG.
 
-Exit codes: 0 done, 1 the run or a picture failed, 2 the input is wrong or nothing draws here, 130 interrupted (Ctrl-C).";
+Exit codes: 0 done, 1 the run or a picture failed, 2 the input is wrong or nothing draws here, 130 interrupted (Ctrl-C; 128 + its number for another signal).";
 
 #[derive(Debug, clap::Args)]
 pub struct Render {
@@ -417,6 +424,12 @@ pub struct Overrides {
     /// Make meshes of images anew, and keep none.
     #[arg(long)]
     pub no_cache: bool,
+    /// Read only files in the folder of the scene, links resolved: for scenes of others (see SECURITY.md).
+    #[arg(long)]
+    pub sandbox: bool,
+    /// Take a NiftySim model without the parts that Pliant does not know (shells, membranes, contact): another model.
+    #[arg(long)]
+    pub allow_partial: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -448,6 +461,9 @@ pub struct Run {
     /// bits as one that was never interrupted; its outputs go on where the checkpoint was. Only `until` may differ.
     #[arg(long, value_name = "CHECKPOINT", conflicts_with = "force")]
     pub resume: Option<PathBuf>,
+    /// Run even if it will take more than a day.
+    #[arg(long)]
+    pub long: bool,
     #[command(flatten)]
     pub overrides: Overrides,
     /// Also draw the last instant, as the scene's [view] shows it: picture.png, in the summary, too.
@@ -474,7 +490,7 @@ Writes sweep.csv, a row for each run: its values, how it ended, energies, reacti
 leaves its summary, plot and tables in a folder run-NNNN. All combinations are checked before the first is run; a run
 that fails does not stop the others.
 
-Exit codes: 0 done, 1 some runs failed, 2 the input is wrong, 130 interrupted (Ctrl-C).";
+Exit codes: 0 done, 1 some runs failed, 2 the input is wrong, 130 interrupted (Ctrl-C; 128 + its number for another signal).";
 
 #[derive(Debug, clap::Args)]
 pub struct Sweep {
@@ -495,6 +511,9 @@ pub struct Sweep {
     /// Make meshes of images anew, and keep none.
     #[arg(long)]
     pub no_cache: bool,
+    /// Read only files in the folder of the scene, links resolved: for scenes of others (see SECURITY.md).
+    #[arg(long)]
+    pub sandbox: bool,
     /// Write the series of fields (VTU) of each run, too.
     #[arg(long)]
     pub keep_fields: bool,
@@ -533,15 +552,19 @@ pub struct Info {
 }
 
 const MESH_HELP: &str = "\
-Images: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, or the folder of a DICOM series. The mesh is in metres, in
-the coordinates of the patient: x to the right, y to the front, z to the head.
-Closed surfaces: the triangles and quads of OBJ, OFF, STL, PLY, VTP, VTK, VTU or Gmsh files, in metres or with `--scale`.
+Images: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a DICOM segmentation, or the folder of a DICOM series. The mesh is
+in metres, in the coordinates of the patient: x to the right, y to the front, z to the head.
+Closed surfaces: the triangles and quads of OBJ, OFF, STL, PLY, VTP, VTK, VTU, Gmsh, GIfTI or FreeSurfer files, in metres or with
+`--scale`.
 
 Examples:
   pliant labels seg.nii.gz
   pliant mesh seg.nii.gz --label 5 --edge 8mm -o liver.vtu                             # or --edge 0.008
   pliant mesh liver.stl --scale 0.001 --edge 8mm --young 5000 -o liver.vtu             # a surface in millimetres
   pliant mesh brain.nii.gz --label 1 --label 2 --edge 6mm --keep-largest -o brain.vtu   # two materials
+  pliant mesh seg.nrrd --label liver --label tumour --edge 8mm -o liver.vtu            # labels by their names
+  pliant mesh seg.nii.gz --names totalsegmentator --label heart --edge 8mm -o heart.vtu # names from a table
+  pliant mesh liver.nii.gz tumour.nii.gz --edge 8mm -o liver.vtu                       # masks: labels 1 and 2
   pliant mesh seg.nii.gz --label 5 --edge 0.01 --as hexes --close-gaps 3mm --fill-holes -o liver.msh
   pliant mesh seg.nii.gz --label 5 --edge 1cm --as immersed-hexes -o liver.vtu         # cubes weighted by their fill
   pliant mesh grey.nii --threshold 0.5 --edge 8mm -o grey.vtu
@@ -563,6 +586,15 @@ Exit codes: 0 done, 1 the mesh could not be written, 2 the input is wrong.";
 pub struct Labels {
     /// An image file, or the folder of a DICOM series.
     pub image: PathBuf,
+    /// More masks of the same voxels: the first image is label 1, these are 2, 3, …, named after their files.
+    #[arg(value_name = "MASK")]
+    pub masks: Vec<PathBuf>,
+    /// Names of the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    #[arg(long, value_name = "TABLE")]
+    pub names: Option<PathBuf>,
+    /// Read an image of more than 2 GiB.
+    #[arg(long)]
+    pub force: bool,
     /// UID of the DICOM series, where the folder holds several.
     #[arg(long, value_name = "UID")]
     pub series: Option<String>,
@@ -576,19 +608,36 @@ pub struct MeshImage {
     /// An image file, the folder of a DICOM series, or a mesh file; for tets and hexes a closed surface.
     #[arg(value_name = "INPUT")]
     pub image: PathBuf,
+    /// More masks of the same voxels: the first image is label 1, these are 2, 3, …, named after their files. All are meshed, but where
+    /// `--label` chooses; where they overlap, the last one counts.
+    #[arg(value_name = "MASK")]
+    pub masks: Vec<PathBuf>,
     /// Another image of the same voxels whose values are added before `--threshold`, as grey matter to white matter.
-    #[arg(long, value_name = "IMAGE", requires = "threshold")]
+    #[arg(long, value_name = "IMAGE")]
     pub add: Option<PathBuf>,
-    /// Label to mesh; several make one mesh of several materials. The first one takes what cleaning adds. With a surface, the
-    /// label that its cells get.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub label: Vec<i32>,
-    /// Instead of labels: all voxels of at least this value, as of a map of probabilities.
-    #[arg(long, value_name = "VALUE", allow_negative_numbers = true, conflicts_with = "label")]
+    /// Label to mesh: 5, a range as 5-8, or its name; several make one mesh of several materials. The first one takes what cleaning
+    /// adds. With a surface, the label that its cells get.
+    #[arg(long, value_name = "LABEL", allow_hyphen_values = true)]
+    pub label: Vec<LabelChoice>,
+    /// Names of the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    #[arg(long, value_name = "TABLE")]
+    pub names: Option<PathBuf>,
+    /// Instead of labels: all voxels of at least this value, as of a map of probabilities; with several masks, in each of them.
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     pub threshold: Option<f64>,
     /// Edge of the cells: 0.008 in metres, or 8mm. Tets and hexes need it; a surface gets even triangles of this edge.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     pub edge: Option<f64>,
+    /// Tets: largest distance between the boundary of the mesh and the body, both ways, as 1mm: cells are made smaller where it is not
+    /// held. Measured to the triangles of a surface, or to the smooth surface of an image. Without `--edge` the first edge is chosen.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
+    pub distance: Option<f64>,
+    /// Tets: longer edge inside, away from the surface, rounded down to 2, 4, 8, ... times `--edge`.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
+    pub inner_edge: Option<f64>,
+    /// Tets: a label with smaller cells, as 4 for half of `--edge` or 4=2mm, rounded down to a half, quarter, ... of `--edge`.
+    #[arg(long, value_name = "LABEL[=LENGTH]", value_parser = protected, allow_hyphen_values = true)]
+    pub protect: Vec<(i32, Option<f64>)>,
     /// Triangles of a surface, instead of their edge: as few, placed where the shape needs them.
     #[arg(long = "cells", value_name = "N", conflicts_with = "edge")]
     pub triangles: Option<usize>,
@@ -598,9 +647,9 @@ pub struct MeshImage {
     /// Largest distance of shells from the surface, both ways, as a part of the diagonal of its box: 0.005 or 0.5%.
     #[arg(long, value_name = "PART", value_parser = part, conflicts_with_all = ["edge", "triangles", "shells"])]
     pub error: Option<f64>,
-    /// Factor that makes the lengths of a mesh file metres: 0.001 for millimetres. Images know theirs.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
-    pub scale: f64,
+    /// Factor that makes the lengths of a mesh file metres: 0.001 for millimetres. Images know theirs. A file larger than 10 m needs it.
+    #[arg(long, value_name = "FACTOR")]
+    pub scale: Option<f64>,
     /// Also write the curved surface of the shells in small triangles, with its distance from the target as point data.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["edge", "triangles"])]
     pub error_map: Option<PathBuf>,
@@ -621,7 +670,7 @@ pub struct MeshImage {
     /// Keep only the largest piece.
     #[arg(long)]
     pub keep_largest: bool,
-    /// Make more than five million cells, if it comes to that.
+    /// Make more than five million cells, if it comes to that, and read images of more than 2 GiB.
     #[arg(long)]
     pub force: bool,
     /// UID of the DICOM series, where the folder holds several.
@@ -668,6 +717,16 @@ fn length(typed: &str) -> Result<f64, String> {
         Ok(number) => Ok(number * metres),
         Err(_) => Err("a length is a number of metres, as 0.008, or one with its unit, as 8mm".into()),
     }
+}
+
+/// A label, and the length after it if there is one.
+fn protected(typed: &str) -> Result<(i32, Option<f64>), String> {
+    let (label, edge) = typed.split_once('=').map_or((typed, None), |(label, edge)| (label, Some(edge)));
+    let label = label
+        .trim()
+        .parse()
+        .map_err(|_| "a label to protect is a number, as 4, or one with an edge, as 4=2mm")?;
+    Ok((label, edge.map(str::trim).map(length).transpose()?))
 }
 
 fn positive(typed: &str) -> Result<f64, String> {

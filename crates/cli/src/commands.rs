@@ -3,15 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use pliant_geometry::io;
 use pliant_gpu::{Adapter, GpuError};
 use pliant_scene::diagnostic::{Diagnostic, SceneErrors};
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, Draw, MeshCache, Options, OutputFolder, Plan, Scene, Sweep, SweepOptions, niftysim,
-    reference, registry,
+    Built, Checkpoint, Draw, MeshCache, Options, OutputFolder, Plan, Reads, Scene, Sweep, SweepOptions,
+    niftysim, number, reference, registry,
 };
 use serde_json::{Value as Json, json};
 use tempfile::TempDir;
@@ -23,6 +23,7 @@ use crate::mesh;
 use crate::pictures;
 use crate::report::{self, Bar, Failure, say};
 use crate::reproduce::reproduce;
+use crate::signals;
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
@@ -41,7 +42,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Info(arguments) => info(&arguments),
         Command::Labels(arguments) => mesh::labels(&arguments),
         Command::Mesh(arguments) => mesh::mesh(&arguments),
-        Command::Import { model, out } => import(&model, &out),
+        Command::Import { model, out, allow_partial } => import(&model, &out, allow_partial),
         Command::Reproduce(arguments) => reproduce(&arguments),
         Command::Bench(arguments) => bench(&arguments),
         Command::View(arguments) => pictures::view(&arguments),
@@ -61,7 +62,8 @@ pub fn prepare_changed(
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
 ) -> Result<(Scene, Built, Plan), Failure> {
-    let Opened { mut source, folder, assumed, _translated } = open(path)?;
+    let Opened { mut source, folder, assumed, _translated } =
+        open(path, overrides.sandbox, overrides.allow_partial)?;
     let mut mistakes: Vec<_> =
         overrides.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
     let precision = overrides.precision.map(|precision| match precision {
@@ -111,16 +113,24 @@ struct Opened {
     _translated: Option<TempDir>,
 }
 
-/// Reads the text of a scene. A NiftySim model is translated first; of a mesh a scene is made.
-fn open(path: &Path) -> Result<Opened, Failure> {
+/// Reads the text of a scene. A NiftySim model is translated first; of a mesh a scene is made. In a sandbox it reads what lies
+/// in its own folder, and nothing else.
+fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, Failure> {
+    let reads = |folder: &Path| {
+        let reads = if sandbox { Reads::within(folder) } else { Ok(Reads::anywhere()) };
+        let failed = |error| format!("the folder `{}` cannot be read: {error}", folder.display());
+        reads.map_err(|error| Failure::plain(failed(error), "check the path and the permissions"))
+    };
+    let file = pliant_scene::scene_file(path);
+    let own = reads(file.parent().unwrap_or(Path::new("")))?;
     if pliant_scene::is_mesh(path) {
         let help = "`pliant info` reads a mesh file on its own";
         let made = pliant_scene::scene_of_mesh(path).map_err(|error| Failure::plain(error, help))?;
-        let source = Source::parse(path.display().to_string(), made.text)?;
+        let source = Source::parse(path.display().to_string(), made.text)?.reading(own);
         return Ok(Opened { source, folder: made.folder, assumed: Some(made.assumed), _translated: None });
     }
     if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) {
-        let (source, folder) = pliant_scene::open(path)?;
+        let (source, folder) = pliant_scene::open_within(path, own)?;
         return Ok(Opened { source, folder, assumed: None, _translated: None });
     }
     let folder = tempfile::tempdir().map_err(|error| {
@@ -129,15 +139,23 @@ fn open(path: &Path) -> Result<Opened, Failure> {
             "check the free space, or set TMPDIR",
         )
     })?;
-    let notes = translate(path, &folder.path().join("scene.toml"))?;
+    let notes = translate(path, &own, &folder.path().join("scene.toml"), allow_partial)?;
     notes.iter().for_each(|note| eprintln!("note: {note}"));
-    let (source, place) = pliant_scene::open(folder.path())?;
+    let (source, place) = pliant_scene::open_within(folder.path(), reads(folder.path())?)?;
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 
-/// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing.
-fn translate(model: &Path, file: &Path) -> Result<Vec<String>, Failure> {
-    let imported = niftysim::import(model).map_err(|error| Failure::plain(error, ""))?;
+/// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing. A model of which parts
+/// are unknown is refused unless that is allowed.
+fn translate(model: &Path, reads: &Reads, file: &Path, allow_partial: bool) -> Result<Vec<String>, Failure> {
+    let imported = niftysim::import_within(model, reads).map_err(|error| Failure::plain(error, ""))?;
+    if !imported.missing.is_empty() && !allow_partial {
+        let missing = imported.missing.join("; ");
+        let message = format!("`{}` has parts that Pliant does not support: {missing}", model.display());
+        let help = "`pliant run` and `pliant import` take `--allow-partial` and leave them out: the results are then those \
+                    of another model";
+        return Err(Failure::plain(message, help));
+    }
     let folder = file.parent().unwrap_or(Path::new(""));
     let meshes = imported.meshes.iter().map(|(name, mesh)| (folder.join(name), mesh));
     if let Some(taken) =
@@ -174,22 +192,6 @@ fn in_pool<T: Send>(
     Ok(pool.install(work)?)
 }
 
-/// The exit code of a process that Ctrl-C ended.
-pub const INTERRUPTED: u8 = 130;
-
-/// Set by Ctrl-C; pressed again, it ends the process at once.
-pub fn stopped_by_ctrl_c() -> &'static AtomicBool {
-    static STOP: AtomicBool = AtomicBool::new(false);
-    let handler = || {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(INTERRUPTED.into());
-        }
-    };
-    // Where no handler can be set, Ctrl-C ends the process as ever, and what was written stays readable.
-    let _ = ctrlc::set_handler(handler);
-    &STOP
-}
-
 /// The folder of a run that starts at rest.
 fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure> {
     let file = pliant_scene::scene_file(&arguments.scene);
@@ -200,9 +202,15 @@ fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure>
 fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     let checkpoint = arguments.resume.as_deref().map(Checkpoint::read).transpose()?;
     let (scene, built, mut plan) = prepare(&arguments.scene, &arguments.overrides)?;
+    if let Some(checkpoint) = &checkpoint {
+        plan = checkpoint.continues(&scene, &built, &plan)?;
+    }
+    if !arguments.long {
+        let before = checkpoint.as_ref().map_or(0.0, Checkpoint::time);
+        refuse_very_long(&scene, &built, &plan, before)?;
+    }
     let folder = match &checkpoint {
         Some(checkpoint) => {
-            plan = checkpoint.continues(&scene, &built, &plan)?;
             let own = checkpoint.path().parent().unwrap_or(Path::new(""));
             let path = arguments.out.clone().unwrap_or_else(|| own.to_owned());
             OutputFolder::reopen(path, &scene, checkpoint)?
@@ -216,35 +224,79 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     let bar = Bar::new();
     let options = Options {
         resume: checkpoint.as_ref(),
-        stop: Some(stopped_by_ctrl_c()),
+        stop: Some(signals::stop()),
         picture: photographer.as_ref().map(|photographer| photographer as &dyn Draw),
     };
     let mut report = |progress| bar.update(progress);
     let result = pliant_scene::run_with(&scene, &built, &plan, &folder, options, &mut report);
     bar.finish();
     let interrupted = matches!(&result, Ok(summary) if summary.status == "interrupted");
-    let (failure, json) = match result {
+    let (words, failure, json) = match result {
         Ok(summary) => {
-            if !arguments.json {
-                say(report::result(&summary))?;
-            }
-            for warning in &summary.warnings {
-                eprintln!("warning: {warning}");
-            }
-            (summary.error.as_ref().map(|error| error.message.clone()), json!(summary))
+            summary.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+            let message = summary.error.as_ref().map(|error| error.message.clone());
+            (report::result(&summary), message, json!(summary))
         }
-        Err(error) => (Some(format!("{error}; {}", error.remedy)), pliant_scene::failed_output(&error)),
+        Err(error) => {
+            (String::new(), Some(format!("{error}; {}", error.remedy)), pliant_scene::failed_output(&error))
+        }
     };
-    if arguments.json {
-        say(json)?;
+    let told = match arguments.json {
+        true => say(json),
+        false if words.is_empty() => Ok(()),
+        false => say(words),
+    };
+    if let Some(message) = failure {
+        eprintln!("error: {message}");
+        // It tells more than that standard output could not be written.
+        return Ok(ExitCode::from(if interrupted { signals::exit_code() } else { 1 }));
     }
-    match failure {
-        None => Ok(ExitCode::SUCCESS),
-        Some(message) => {
-            eprintln!("error: {message}");
-            Ok(ExitCode::from(if interrupted { INTERRUPTED } else { 1 }))
-        }
+    told.map(|()| ExitCode::SUCCESS)
+}
+
+/// Steps that take no day on anything: fewer are not looked at.
+const FEW_STEPS: f64 = 1e6;
+/// Longest run [s] that needs no consent.
+const A_DAY: f64 = 86_400.0;
+
+/// Refuses a run that would take more than a day, by the time of its first steps.
+fn refuse_very_long(scene: &Scene, built: &Built, plan: &Plan, before: f64) -> Result<(), Failure> {
+    let steps = (scene.scene.until - before) / plan.step;
+    if steps < FEW_STEPS {
+        return Ok(());
     }
+    let Some(each) = in_pool(scene, || Ok(seconds_of_a_step(scene, built, plan)))? else { return Ok(()) };
+    let wall = steps * each;
+    if wall < A_DAY {
+        return Ok(());
+    }
+    let [simulated, step] = [scene.scene.until - before, plan.step].map(number);
+    let message = format!(
+        "the run takes {} steps of {step} s for {simulated} s, about {} on this machine",
+        number(steps),
+        days(wall)
+    );
+    let diagnostic = Diagnostic::error(message)
+        .at(scene.source.span(&["scene", "until"]), "this long")
+        .help("let it end earlier (`until`), take a coarser mesh, or add `--long` to run it all the same");
+    Err(scene.source.errors(vec![diagnostic]).into())
+}
+
+/// "12 days", "3 years".
+fn days(seconds: f64) -> String {
+    let days = seconds / A_DAY;
+    if days < 1000.0 { format!("{days:.0} days") } else { format!("{} years", number(days / 365.25)) }
+}
+
+/// Wall time [s] of a step, from the first ones; none of a scene whose first steps fail.
+fn seconds_of_a_step(scene: &Scene, built: &Built, plan: &Plan) -> Option<f64> {
+    const ENOUGH: Duration = Duration::from_millis(100);
+    let mut live = pliant_scene::live(scene, built, plan).ok()?;
+    let (started, mut steps) = (Instant::now(), 0);
+    while started.elapsed() < ENOUGH {
+        steps += live.advance(u64::MAX).ok()?.max(1);
+    }
+    Some(started.elapsed().as_secs_f64() / steps as f64)
 }
 
 /// Lists the graphics processors.
@@ -268,7 +320,7 @@ fn devices(json: bool) -> Result<ExitCode, Failure> {
 }
 
 fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
-    let Opened { source, folder, _translated, .. } = open(&arguments.scene)?;
+    let Opened { source, folder, _translated, .. } = open(&arguments.scene, arguments.sandbox, false)?;
     let sweep = Sweep::new(source, folder, &arguments.set)?.with_cache(mesh_cache(arguments.no_cache));
     let (runs, threads) = (sweep.runs(), arguments.threads.into());
     refuse_mistakes(&sweep, threads)?;
@@ -285,8 +337,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     let folder =
         sweep.open_folder(path, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))?;
     let bar = Bar::new();
-    let options =
-        SweepOptions { threads, keep_fields: arguments.keep_fields, stop: Some(stopped_by_ctrl_c()) };
+    let options = SweepOptions { threads, keep_fields: arguments.keep_fields, stop: Some(signals::stop()) };
     let result = sweep.run(&folder, options, &|progress| bar.update_sweep(progress, runs));
     bar.finish();
     let summary = match result {
@@ -302,7 +353,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     }
     if summary.interrupted {
         eprintln!("error: the sweep was interrupted; the runs that had ended are in the table");
-        return Ok(ExitCode::from(INTERRUPTED));
+        return Ok(ExitCode::from(signals::exit_code()));
     }
     if summary.failures.is_empty() {
         return Ok(ExitCode::SUCCESS);
@@ -352,10 +403,10 @@ fn new(name: &Path) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn import(model: &Path, out: &Path) -> Result<ExitCode, Failure> {
+fn import(model: &Path, out: &Path, allow_partial: bool) -> Result<ExitCode, Failure> {
     let is_file = out.extension().is_some_and(|ending| ending == "toml");
     let file = if is_file { out.to_owned() } else { out.join("scene.toml") };
-    for note in translate(model, &file)? {
+    for note in translate(model, &Reads::anywhere(), &file, allow_partial)? {
         eprintln!("note: {note}");
     }
     say(format_args!("wrote {}; try: pliant run {}", file.display(), out.display()))?;

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{CellKind, Mesh, QualityReport, Spread, Vector3, boundary, diagnose};
 use pliant_meshing::{Curvature, Hausdorff, Percentiles, Thickness, TriangleMesh};
-use pliant_scene::{PLAUSIBLE_SIZE, number};
+use pliant_scene::{SizeDoubt, number};
 use serde_json::{Map, Value as Json, json};
 
 use crate::arguments::Info;
@@ -208,14 +208,7 @@ fn info_page(MeshFile { mesh, format, notes, .. }: &MeshFile) -> String {
     if let Some((low, high)) = mesh.bounds() {
         let at = |p: Vector3| format!("({}, {}, {})", number(p.x), number(p.y), number(p.z));
         lines.push(format!("from {} to {} m", at(low), at(high)));
-        if (high - low).norm() > PLAUSIBLE_SIZE[1] {
-            lines.push("note: larger than any organ; for a mesh in millimetres give `--scale 0.001`".into());
-        } else if (high - low).norm() < PLAUSIBLE_SIZE[0] {
-            lines.push(
-                "note: smaller than any organ; `--scale` is the size of one unit of the file in metres"
-                    .into(),
-            );
-        }
+        lines.extend(SizeDoubt::of(mesh).map(|doubt| format!("note: {doubt}; {}", doubt.advice("--scale "))));
     }
     lines.push(QualityReport::new(mesh).to_string().trim_end().to_owned());
     lines.extend(sets(mesh).map(|(name, count)| format!("set `{name}`: {count} nodes")));

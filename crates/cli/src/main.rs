@@ -1,5 +1,11 @@
 //! `pliant`: real-time simulation of soft organs. Words and wiring only; the work is done by the libraries.
 
+/// A line on standard error. One that can't be written, to a full disk or a reader that has gone, is no reason to end a
+/// run: unlike the standard library's, this never panics.
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::report::tell(format_args!($($text)*)) };
+}
+
 mod arguments;
 mod bench;
 mod commands;
@@ -10,6 +16,7 @@ mod page;
 mod pictures;
 mod report;
 mod reproduce;
+mod signals;
 mod skin;
 #[cfg(feature = "viewer")]
 mod view;

@@ -2,20 +2,21 @@
 //! shells are in `skin.rs`.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use pliant_bench::{elastic, law, liver_matrix, soft_tissue};
 use pliant_geometry::io::{self, Format, MeshFile};
-use pliant_geometry::{CellKind, Mesh, QualityReport, Vector3, diagnose, volume};
+use pliant_geometry::{CellKind, Mesh, QualityReport, Vector3, diagnose};
 use pliant_imaging::{
-    Cleaned, Cleaning, Image, ImageError, ImageProblem, LabelError, LabelImage, ReadOptions, RegionReport,
-    Smoothing, read,
+    Border, Choice, Cleaned, Cleaning, Image, ImageError, ImageProblem, LabelChoice, LabelError, LabelImage,
+    LabelNames, ReadOptions, RegionReport, Smoothing, read_with,
 };
 use pliant_meshing::{
-    Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, MeshingError, Missed, OrganTets, TetReport,
-    Voxels, require_room_for,
+    Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, LabelReport, MeshingError, Missed,
+    OrganTets, TetReport, Voxels, require_room_for,
 };
-use pliant_scene::{element_bound, number};
+use pliant_scene::{SizeDoubt, element_bound, number};
 use serde_json::{Value as Json, json};
 
 use crate::arguments::{Labels, MeshCells, MeshImage, Tissue};
@@ -23,10 +24,20 @@ use crate::report::{Bar, Failure, failed_output, say};
 use crate::skin;
 
 pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
-    let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
-    let image = read(&arguments.image, &options).map_err(|error| image_failure(&error))?;
-    let labels = image.labels().map_err(|error| label_failure(&error))?;
-    let regions = labels.regions();
+    let bar = Bar::new();
+    let source = Source {
+        files: std::iter::once(&arguments.image).chain(&arguments.masks).collect(),
+        names: arguments.names.as_deref(),
+        series: arguments.series.clone(),
+        threshold: None,
+        force: arguments.force,
+    };
+    let found = source.read(&bar, 0.7).and_then(|image| {
+        let regions = image.regions(&|done| bar.update_mesh(0.7 + 0.3 * done, "finding the labels"));
+        Ok((regions.map_err(|error| label_failure(&error))?, image))
+    });
+    bar.finish();
+    let (regions, image) = found?;
     if arguments.json {
         let mut object = image_object(&image);
         object["labels"] = json!(regions);
@@ -43,9 +54,51 @@ pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// An image as it was asked for: a file or folder, or several masks.
+struct Source<'a> {
+    files: Vec<&'a PathBuf>,
+    names: Option<&'a Path>,
+    series: Option<String>,
+    threshold: Option<f64>,
+    force: bool,
+}
+
+impl Source<'_> {
+    /// Reads it; the bar moves up to a part of the whole work.
+    fn read(&self, bar: &Bar, share: f64) -> Result<Image, Failure> {
+        let table = self.names.map(LabelNames::read).transpose().map_err(|error| image_failure(&error))?;
+        let each = share / self.files.len() as f64;
+        let read = |(at, path): (usize, &&PathBuf)| {
+            let progress = |done: f64| bar.update_mesh(each * (at as f64 + done), "reading the image");
+            read_with(path, &self.options(), &progress).map_err(|error| image_failure(&error))
+        };
+        let mut images = self.files.iter().enumerate().map(read).collect::<Result<Vec<_>, _>>()?;
+        let mut image = if images.len() == 1 {
+            images.remove(0)
+        } else {
+            let masks: Vec<(PathBuf, Image)> =
+                self.files.iter().map(|&path| path.clone()).zip(images).collect();
+            Image::of_masks(&masks, self.threshold).map_err(|error| label_failure(&error))?
+        };
+        if let Some(table) = table {
+            image.names.extend(&table);
+        }
+        Ok(image)
+    }
+
+    fn options(&self) -> ReadOptions {
+        let usual = ReadOptions { series: self.series.clone(), ..ReadOptions::default() };
+        if self.force {
+            ReadOptions { byte_limit: u64::MAX, voxel_limit: u32::MAX.into(), ..usual }
+        } else {
+            usual
+        }
+    }
+}
+
 pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
-    if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
-        let message = format!("`--scale` is {}; it must be positive and finite", arguments.scale);
+    if let Some(scale) = arguments.scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
+        let message = format!("`--scale` is {scale}; it must be positive and finite");
         return Err(Failure::plain(message, "for example `--scale 0.001` for a file in millimetres"));
     }
     refuse_idle(arguments)?;
@@ -73,28 +126,43 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Whether the input is a mesh file, by the ending of its name.
+/// Whether the input is a mesh file, by the ending of its name or by its first bytes.
 pub fn is_mesh_file(arguments: &MeshImage) -> bool {
-    Format::of_path(&arguments.image).is_some()
+    Format::of_file(&arguments.image).is_some()
 }
 
 /// Refuses options that would do nothing.
 fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
     let skin = matches!(arguments.cells, MeshCells::Surface | MeshCells::Shells);
+    let tets = matches!(arguments.cells, MeshCells::Tets);
     let file = is_mesh_file(arguments);
     let cleans = arguments.close_gaps != 0.0 || arguments.fill_holes || arguments.keep_largest;
     let tissue = arguments.law.is_some() || arguments.young.is_some();
+    let masks = !arguments.masks.is_empty();
+    let (labels, threshold) = (!arguments.label.is_empty(), arguments.threshold.is_some());
     let idle = [
-        (file && arguments.threshold.is_some(), "`--threshold` is for images"),
+        (file && threshold, "`--threshold` is for images"),
         (file && arguments.series.is_some(), "`--series` is for images"),
+        (file && arguments.names.is_some(), "`--names` is for images"),
+        (file && masks, "several inputs are masks, which are images"),
         (file && arguments.label.len() > 1, "`--label` more than once is for images"),
-        (file && skin && !arguments.label.is_empty(), "`--label` is for images, and for tets and hexes"),
+        (file && skin && labels, "`--label` is for images, and for tets and hexes"),
         (
             file && skin && cleans,
             "`--close-gaps`, `--fill-holes` and `--keep-largest` are for images, and for tets and hexes",
         ),
-        (!file && arguments.scale != 1.0, "`--scale` is for mesh files: images know their lengths"),
+        (!file && arguments.scale.is_some(), "`--scale` is for mesh files: images know their lengths"),
+        (!tets && arguments.distance.is_some(), "`--distance` is for tets"),
+        (!tets && arguments.inner_edge.is_some(), "`--inner-edge` is for tets"),
+        (!tets && !arguments.protect.is_empty(), "`--protect` is for tets"),
         (skin && tissue, "`--law` and `--young` are for tets and hexes"),
+        (arguments.add.is_some() && file, "`--add` is for images"),
+        (
+            arguments.add.is_some() && !threshold,
+            "`--add` goes with `--threshold`: values are added up, labels are not (several masks are given one after the other)",
+        ),
+        (arguments.add.is_some() && masks, "`--add` goes with one image, and several masks are given"),
+        (labels && threshold && !masks, "`--label` and `--threshold` are two ways to choose voxels"),
     ];
     match idle.into_iter().find(|(idle, _)| *idle) {
         Some((_, message)) => Err(Failure::plain(message, "leave it out")),
@@ -102,28 +170,102 @@ fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
     }
 }
 
-/// The mesh of a file in metres.
-pub fn mesh_file(arguments: &MeshImage) -> Result<MeshFile, Failure> {
+/// The mesh of a file in metres; what is questionable about its size goes to the warnings.
+pub fn mesh_file(arguments: &MeshImage, warnings: &mut Vec<String>) -> Result<MeshFile, Failure> {
     let mut file = io::read(&arguments.image).map_err(|error| Failure::plain(error, ""))?;
-    file.mesh.points.iter_mut().for_each(|point| *point *= arguments.scale);
+    file.mesh.points.iter_mut().for_each(|point| *point *= arguments.scale.unwrap_or(1.0));
+    if let Some(doubt) = SizeDoubt::of(&file.mesh) {
+        let message = format!("`{}` measures {doubt}", arguments.image.display());
+        if arguments.scale.is_none() && doubt.is_large() {
+            return Err(Failure::plain(
+                message,
+                format!("{}; `--scale 1` if it is in metres", doubt.advice("--scale ")),
+            ));
+        }
+        warnings.push(message);
+    }
     Ok(file)
 }
 
-/// The image, what is segmented in it, and the labels chosen.
-pub fn regions(arguments: &MeshImage) -> Result<(Image, LabelImage, Vec<i32>), Failure> {
-    let options = ReadOptions { series: arguments.series.clone(), ..ReadOptions::default() };
-    let image = read(&arguments.image, &options).map_err(|error| image_failure(&error))?;
-    let (labels, chosen) = match arguments.threshold {
-        Some(least) => {
-            let added = arguments.add.as_ref().map(|path| read(path, &options)).transpose();
-            let added = added.map_err(|error| Failure::plain(error, ""))?;
-            let sum =
-                added.map(|added| image.plus(&added)).transpose().map_err(|error| label_failure(&error))?;
-            (sum.as_ref().unwrap_or(&image).threshold(least..=f64::INFINITY), vec![1])
-        }
-        None => (image.labels().map_err(|error| label_failure(&error))?, arguments.label.clone()),
+/// What is segmented in an image, cut out of it.
+pub struct Segmented {
+    pub labels: LabelImage,
+    pub chosen: Vec<i32>,
+    /// Least step from voxel to voxel [m].
+    pub voxel: f64,
+    /// For people and for programs.
+    pub lines: Vec<String>,
+    pub object: Json,
+    pub warnings: Vec<String>,
+}
+
+/// Part of the work on an image that is reading it and cutting the body out, for the bar.
+const READING: f64 = 0.1;
+
+/// The labels chosen in an image, or all from a value on. Where there are very many voxels, coarser ones that suit the cells.
+pub fn regions(arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
+    let refused = |error: LabelError| label_failure(&error);
+    let masks = !arguments.masks.is_empty();
+    let source = Source {
+        files: std::iter::once(&arguments.image).chain(&arguments.masks).collect(),
+        names: arguments.names.as_deref(),
+        series: arguments.series.clone(),
+        threshold: arguments.threshold,
+        force: arguments.force,
     };
-    Ok((image, labels, chosen))
+    let mut image = source.read(bar, READING)?;
+    let choice = match arguments.threshold {
+        Some(least) if !masks => {
+            if let Some(path) = &arguments.add {
+                let added = read_with(path, &source.options(), &|_| {});
+                image = image.plus(&added.map_err(|error| image_failure(&error))?).map_err(refused)?;
+            }
+            Choice::From(least)
+        }
+        _ if masks && arguments.label.is_empty() => {
+            let all = LabelChoice::Range(1, arguments.masks.len() as i32 + 1);
+            image.choose(&[all]).map_err(refused)?
+        }
+        _ => image.choose(&arguments.label).map_err(refused)?,
+    };
+    let finest = arguments.edge.or(arguments.distance).map(|edge| tets(arguments, edge).finest());
+    let coarsest = finest.map_or(f64::INFINITY, |finest| finest * COARSEST);
+    let progress = |done: f64| bar.update_mesh(READING * (1.0 + done), "cutting the body out");
+    let cut = image.cut(&choice, coarsest, &progress).map_err(|error| match (&error, &choice) {
+        (LabelError::Absent { .. }, Choice::From(least)) => {
+            Failure::plain(format!("no voxel is {least} or more"), "use a lower `--threshold`")
+        }
+        _ => label_failure(&error),
+    })?;
+    let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
+    lines.extend(image.notes.iter().chain(&cut.note()).map(|note| format!("note: {note}")));
+    let named: Vec<String> = cut
+        .chosen
+        .iter()
+        .filter(|&&label| image.names.get(label).is_some())
+        .map(|&label| image.names.shown(label))
+        .collect();
+    if !named.is_empty() {
+        lines.push(format!("labels           {}", named.join(", ")));
+    }
+    let mut object = image_object(&image);
+    object["names"] = json!(
+        cut.chosen
+            .iter()
+            .filter_map(|&label| Some((label.to_string(), image.names.get(label)?)))
+            .collect::<BTreeMap<_, _>>()
+    );
+    let warning = |(label, border): (i32, Border)| {
+        let what = if matches!(choice, Choice::From(_)) {
+            "the body".into()
+        } else {
+            format!("label {}", image.names.shown(label))
+        };
+        format!("{what} lies at the border of the image ({border}): it may be cut off there")
+    };
+    let warnings = image.border(&choice).into_iter().map(warning).collect();
+    let voxel = cut.labels.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    Ok(Segmented { labels: cut.labels, chosen: cut.chosen, voxel, lines, object, warnings })
 }
 
 /// Refuses a name whose ending no volume mesh can be written to, before any work.
@@ -138,15 +280,31 @@ fn require_volume_format(arguments: &MeshImage) -> Result<(), Failure> {
 }
 
 fn image_failure(error: &ImageError) -> Failure {
-    let several = matches!(error, ImageError::Content { problem, .. } if matches!(**problem, ImageProblem::MixedSeries { .. }));
-    Failure::plain(error, if several { "`--series UID` chooses one" } else { "" })
+    let help = match error {
+        ImageError::Content { problem, .. } => match **problem {
+            ImageProblem::MixedSeries { .. } => "`--series UID` chooses one",
+            ImageProblem::TooManyBytes { .. } | ImageProblem::TooManyVoxels { .. } => {
+                "`--force` reads it all the same"
+            }
+            _ => "",
+        },
+        _ => "",
+    };
+    Failure::plain(error, help)
 }
 
 fn label_failure(error: &LabelError) -> Failure {
     let help = match error {
         LabelError::NotWhole { .. } => "`pliant mesh --threshold 0.5` takes a map of probabilities",
+        LabelError::Grey { .. } => {
+            "`pliant mesh --threshold VALUE` takes all voxels from a value on, as 200 for bone in a CT"
+        }
+        LabelError::NoMask { .. } => "`--threshold 0.5` takes the voxels of each mask from this value on",
+        LabelError::NoSuchName { .. } | LabelError::AmbiguousName { .. } => {
+            "`pliant labels IMAGE` lists the labels with their names; `--names TABLE` gives them names"
+        }
         LabelError::NoneChosen { .. } => "choose with `--label N`, several times for several materials",
-        LabelError::Absent { .. } | LabelError::Background { .. } => {
+        LabelError::Absent { .. } | LabelError::Background { .. } | LabelError::EmptyRange { .. } => {
             "`pliant labels IMAGE` lists the labels with their sizes"
         }
         LabelError::BadLength { .. } => {
@@ -169,32 +327,34 @@ pub fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
             "`--close-gaps 20mm` closes holes of up to 20 mm; a file in millimetres needs `--scale 0.001`"
         }
         MeshingError::NothingEnclosed => "`pliant info` tells what the file holds",
+        MeshingError::NoSuchLabel { .. } => "`--label` chooses the labels that are meshed",
+        MeshingError::TooFine { .. } => "use a shorter `--edge` with it",
         MeshingError::NotPositive { .. } => "for example `--edge 8mm`, or 0.008 in metres",
         _ => "",
     };
     Failure::plain(error, help)
 }
 
+/// Voxels may be made coarser up to this part of the edge of the cells.
+const COARSEST: f64 = 0.25;
+
 /// The parts of the whole work, for the bar: the field, the cells, the distances.
 const PARTS: [f64; 3] = [0.3, 0.6, 0.1];
 
 fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
-    let Some(edge) = arguments.edge else {
-        return Err(Failure::plain("no edge for the cells", "for example `--edge 8mm`, or 0.008 in metres"));
-    };
+    if arguments.edge.is_none() && arguments.distance.is_none() {
+        let help = "for example `--edge 8mm`, or 0.008 in metres; of tets `--distance 1mm` chooses it";
+        return Err(Failure::plain("no edge for the cells", help));
+    }
     let force = arguments.force;
-    let found = if is_mesh_file(arguments) {
-        enclosed(arguments, edge, bar)
-    } else {
-        segmented(arguments, edge, bar)
-    }?;
-    let anatomy = &found.anatomy;
+    let found = if is_mesh_file(arguments) { enclosed(arguments, bar) } else { segmented(arguments, bar) }?;
+    let (anatomy, edge) = (&found.anatomy, found.edge);
     let filling = |done: f64| bar.update_mesh(PARTS[0] + PARTS[1] * done, "making cells");
     let cell_limit = cell_limit(arguments);
     let refused = |error: MeshingError| meshing_failure(&error, force);
     let (mesh, cells) = match arguments.cells {
         MeshCells::Tets => {
-            let request = OrganTets { cell_limit, ..OrganTets::new(edge) };
+            let request = OrganTets { cell_limit, ..tets(arguments, edge) };
             let made = request.mesh(anatomy, &filling).map_err(refused)?;
             (made.mesh, Cells::Tets(Box::new(made.report)))
         }
@@ -208,21 +368,46 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
         }
     };
     bar.update_mesh(PARTS[0] + PARTS[1], "measuring distances");
-    let deviation = Deviation::new(&mesh, anatomy.field(), edge).map_err(refused)?;
-    let allowed = Missed::allowed(&mesh, edge);
-    let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed).map_err(refused)?;
+    let assessment = Assessment::of(&mesh, anatomy, edge).map_err(refused)?;
+    let mut warnings = found.warnings;
+    warnings.extend(assessment.missed.iter().map(warning));
+    if let Cells::Tets(report) = &cells {
+        warnings.extend(report.doubts());
+    }
     Ok(Made {
-        materials: materials(&mesh, anatomy),
         quality: QualityReport::new(&mesh),
         components: diagnose(&mesh).components,
         steps: steps(arguments, &mesh),
-        warnings: missed.iter().map(|missed| format!("{missed}; use a shorter edge")).collect(),
+        warnings,
         mesh,
         cells,
         lines: found.lines,
         object: found.object,
-        deviation,
+        assessment,
     })
+}
+
+/// The tets asked for.
+fn tets(arguments: &MeshImage, edge: f64) -> OrganTets {
+    let MeshImage { inner_edge, distance, .. } = *arguments;
+    OrganTets { inner_edge, distance, ..OrganTets::new(edge) }.protecting(&arguments.protect)
+}
+
+/// The edge of the cells [m], or of the first ones where a distance is asked for, given the box of the body [m].
+fn edge_of(arguments: &MeshImage, bounds: [Vector3; 2]) -> f64 {
+    let chosen = arguments.distance.map_or(0.0, |distance| OrganTets::edge_for(distance, bounds));
+    arguments.edge.unwrap_or(chosen)
+}
+
+/// What is missed, and what helps.
+fn warning(missed: &Missed) -> String {
+    let remedy = match missed {
+        Missed::Label { label } | Missed::LabelVolume { label, .. } | Missed::LabelAway { label, .. } => {
+            format!("`--protect {label}` makes smaller cells there")
+        }
+        _ => "use a shorter edge".into(),
+    };
+    format!("{missed}; {remedy}")
 }
 
 pub fn cell_limit(arguments: &MeshImage) -> usize {
@@ -254,24 +439,29 @@ fn steps(arguments: &MeshImage, mesh: &Mesh) -> Vec<(String, f64)> {
 /// A body to fill, and what there is to say of where it comes from.
 struct Found {
     anatomy: Anatomy<'static>,
+    /// Edge of the cells [m].
+    edge: f64,
     lines: Vec<String>,
     object: Json,
+    warnings: Vec<String>,
 }
 
 /// The body of regions of an image.
-fn segmented(arguments: &MeshImage, edge: f64, bar: &Bar) -> Result<Found, Failure> {
-    let (image, labels, chosen) = regions(arguments)?;
-    let voxels = labels.labels.iter().filter(|label| chosen.contains(label)).count();
-    require_few(arguments, edge, voxels as f64 * image.grid.voxel_volume())?;
-    let (anatomy, cleaned) = anatomy(arguments, &labels, &chosen, &Smoothing::default(), bar)?;
-    let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
-    lines.extend(image.notes.iter().map(|note| format!("note: {note}")));
+fn segmented(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
+    let found = regions(arguments, bar)?;
+    if let Some(edge) = arguments.edge {
+        let voxels = found.labels.labels.iter().filter(|&&label| label != 0).count();
+        require_few(arguments, edge, voxels as f64 * found.labels.grid.voxel_volume())?;
+    }
+    let (anatomy, cleaned) = anatomy(arguments, &found, &Smoothing::default(), bar)?;
+    let Segmented { mut lines, object, warnings, .. } = found;
     lines.push(format!("cleaned          {cleaned}"));
-    Ok(Found { anatomy, lines, object: json!({ "image": image_object(&image), "cleaned": cleaned }) })
+    let edge = edge_of(arguments, anatomy.field().bounds().into());
+    Ok(Found { anatomy, edge, lines, object: json!({ "image": object, "cleaned": cleaned }), warnings })
 }
 
 /// The body that a closed surface encloses.
-fn enclosed(arguments: &MeshImage, edge: f64, bar: &Bar) -> Result<Found, Failure> {
+fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     let refused = |error| meshing_failure(&error, arguments.force);
     let closing = Closing {
         holes: arguments.close_gaps,
@@ -281,13 +471,26 @@ fn enclosed(arguments: &MeshImage, edge: f64, bar: &Bar) -> Result<Found, Failur
     if !(closing.holes >= 0.0 && closing.holes.is_finite()) {
         return Err(label_failure(&LabelError::BadLength { what: "gaps to close", value: closing.holes }));
     }
-    let file = mesh_file(arguments)?;
+    let mut warnings = Vec::new();
+    let file = mesh_file(arguments, &mut warnings)?;
     bar.update_mesh(0.0, "mending the surface");
+    let edge = edge_of(arguments, file.mesh.bounds().unwrap_or_default().into());
     let surface = Enclosed::new(&file.mesh, edge, &closing).map_err(refused)?;
     require_few(arguments, edge, surface.volume())?;
     let progress = |done: f64| bar.update_mesh(PARTS[0] * done, "measuring distances from the surface");
-    let label = arguments.label.first().copied().unwrap_or(1);
-    let anatomy = surface.anatomy(label, edge, &progress).map_err(refused)?;
+    let label = match arguments.label.first() {
+        None => 1,
+        Some(LabelChoice::One(label)) => *label,
+        Some(other) => {
+            let message = format!("`--label {other}` is no number");
+            return Err(Failure::plain(
+                message,
+                "the cells of a surface get a label by its number, as `--label 5`",
+            ));
+        }
+    };
+    let finest = tets(arguments, edge).finest();
+    let anatomy = surface.fine_anatomy(label, edge, finest, &progress).map_err(refused)?;
     let report = &surface.report;
     let mut lines =
         vec![format!("{}: {}, {} triangles", arguments.image.display(), file.format, report.triangles)];
@@ -299,7 +502,7 @@ fn enclosed(arguments: &MeshImage, edge: f64, bar: &Bar) -> Result<Found, Failur
         lines.push(format!("surface          {} pieces, of which {cavities} {word}", report.shells));
     }
     let object = json!({ "surface": { "format": file.format, "notes": file.notes }, "mended": report });
-    Ok(Found { anatomy, lines, object })
+    Ok(Found { anatomy, edge, lines, object, warnings })
 }
 
 /// Refuses cells that would be too many for a volume [m³], before they are made.
@@ -312,8 +515,7 @@ fn require_few(arguments: &MeshImage, edge: f64, volume: f64) -> Result<(), Fail
 /// The chosen regions, cleaned and smoothed.
 pub fn anatomy(
     arguments: &MeshImage,
-    labels: &LabelImage,
-    chosen: &[i32],
+    found: &Segmented,
     smoothing: &Smoothing,
     bar: &Bar,
 ) -> Result<(Anatomy<'static>, Cleaned), Failure> {
@@ -322,46 +524,10 @@ pub fn anatomy(
         fill_holes: arguments.fill_holes,
         keep_largest: arguments.keep_largest,
     };
-    let field = |done: f64| bar.update_mesh(PARTS[0] * done, "smoothing the surface");
-    Anatomy::from_image(labels, chosen, &cleaning, smoothing, &field).map_err(|error| {
-        match (&error, arguments.threshold) {
-            (LabelError::Absent { .. }, Some(least)) => {
-                let message = format!("no voxel is {least} or more");
-                Failure::plain(message, "use a lower `--threshold`")
-            }
-            _ => label_failure(&error),
-        }
-    })
-}
-
-/// One material of a mesh.
-struct MaterialReport {
-    label: i32,
-    cells: usize,
-    volume: f64,
-    /// Of its voxels after cleaning, or within the surface.
-    input_volume: Option<f64>,
-}
-
-/// Cells and volume of each label of a mesh, filled by the fractions of its cells, beside the volume of the input.
-fn materials(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<MaterialReport> {
-    let mut found: BTreeMap<i32, (usize, f64)> = BTreeMap::new();
-    for block in &mesh.blocks {
-        let labels = block.data.get("label").map_or(&[][..], |labels| &labels.values);
-        let fractions = block.data.get(Voxels::FRACTION).map_or(&[][..], |fractions| &fractions.values);
-        let fractions = fractions.iter().copied().chain(std::iter::repeat(1.0));
-        for ((cell, label), fraction) in block.cells().zip(labels).zip(fractions) {
-            let corners: Vec<Vector3> = cell.iter().map(|&node| mesh.points[node as usize]).collect();
-            let (cells, sum) = found.entry(*label as i32).or_default();
-            *cells += 1;
-            *sum += fraction * volume(block.kind, &corners);
-        }
-    }
-    let of_label = |(label, &input_volume): (i32, &Option<f64>)| {
-        let (cells, volume) = found.get(&label).copied().unwrap_or_default();
-        MaterialReport { label, cells, volume, input_volume }
-    };
-    anatomy.labels().into_iter().zip(anatomy.volumes()).map(of_label).collect()
+    let rest = PARTS[0] - 2.0 * READING;
+    let field = |done: f64| bar.update_mesh(2.0 * READING + rest * done, "smoothing the surface");
+    Anatomy::from_image(&found.labels, &found.chosen, &cleaning, smoothing, &field)
+        .map_err(|error| label_failure(&error))
 }
 
 /// What is known of the cells of each kind.
@@ -381,9 +547,8 @@ struct Made {
     /// Where the body comes from, for people and for programs.
     lines: Vec<String>,
     object: Json,
-    materials: Vec<MaterialReport>,
     quality: QualityReport,
-    deviation: Deviation,
+    assessment: Assessment,
     components: usize,
     /// The smallest element bound [s] for tissues by name.
     steps: Vec<(String, f64)>,
@@ -398,7 +563,7 @@ impl Made {
             Cells::Hexes { dropped: [parts, cells], .. } => {
                 lines.push(format!("nodes            {}", self.quality.nodes));
                 lines.push(format!("hexes            {}", self.cell_count()));
-                lines.extend(self.materials.iter().map(MaterialReport::line));
+                lines.extend(self.assessment.regions.labels.iter().map(label_line));
                 if let Some([low, high]) = self.quality.dihedral {
                     lines.push(format!("dihedral angle   {low:.1}° to {high:.1}°"));
                 }
@@ -411,13 +576,19 @@ impl Made {
             }
         }
         lines.push(format!("pieces           {}", self.components));
-        let Deviation { largest_from_mesh, rms_from_mesh, largest_from_body, rms_from_body, .. } =
-            self.deviation;
-        for (way, rms, most) in [
-            ("mesh to body    ", rms_from_mesh, largest_from_mesh),
-            ("body to mesh    ", rms_from_body, largest_from_body),
-        ] {
-            lines.push(format!("{way} {:.3} mm rms, {:.3} mm at most", rms * 1e3, most * 1e3));
+        let Assessment { deviation, regions, .. } = &self.assessment;
+        lines.push(format!("distances to     {}", deviation.to));
+        lines.extend(both_ways(deviation));
+        for region in &regions.labels {
+            lines.extend(
+                region.distances.map(|found| largest_line(&format!("label {}", region.label), &found)),
+            );
+        }
+        for interface in regions.interfaces.iter().filter(|interface| interface.labels[0] != 0) {
+            let [a, b] = interface.labels;
+            lines.extend(
+                interface.distances.map(|found| largest_line(&format!("between {a} and {b}"), &found)),
+            );
         }
         let steps: Vec<String> =
             self.steps.iter().map(|(name, step)| format!("{} s {name}", number(*step))).collect();
@@ -426,7 +597,8 @@ impl Made {
     }
 
     fn object(&self) -> Json {
-        let materials: Vec<Json> = self.materials.iter().map(MaterialReport::object).collect();
+        let Assessment { deviation, regions, .. } = &self.assessment;
+        let materials: Vec<Json> = regions.labels.iter().map(label_object).collect();
         let mut object = json!({
             "status": "done",
             "nodes": self.quality.nodes,
@@ -435,7 +607,8 @@ impl Made {
             "components": self.components,
             "dihedral": self.quality.dihedral,
             "acoustic_length": self.quality.acoustic_length.map(|length| length.min),
-            "distances": self.deviation,
+            "distances": deviation,
+            "interfaces": regions.interfaces,
             "element_bound": self.steps.iter().cloned().collect::<BTreeMap<_, _>>(),
             "warnings": self.warnings,
         });
@@ -447,8 +620,11 @@ impl Made {
                 object["as"] = json!("tets");
                 object["acoustic_part"] = json!(report.acoustic_part);
                 object["repairs"] = json!(report.repairs);
+                object["edges"] = json!(report.edges);
                 object["crowded_edges_left"] = json!(report.crowded_edges_left);
+                object["pinched_points"] = json!(report.pinched_points);
                 object["optimiser"] = json!(report.steps);
+                object["distance"] = json!(report.distance);
             }
             Cells::Hexes { immersed, dropped: [parts, cells] } => {
                 object["as"] = json!(if *immersed { "immersed-hexes" } else { "hexes" });
@@ -463,21 +639,54 @@ impl Made {
     }
 }
 
-impl MaterialReport {
-    fn line(&self) -> String {
-        let own = format!("label {:<10} {} cells, {:.2} ml", self.label, self.cells, self.volume * 1e6);
-        match self.input_volume {
-            Some(input) => format!("{own} ({:+.2} % of the input)", (self.volume / input - 1.0) * 100.0),
-            None => own,
-        }
-    }
+/// Distances both ways, the largest with its place.
+fn both_ways(found: &Deviation) -> [String; 2] {
+    let line = |way: &str, [rms, median, p95, most]: [f64; 4], [x, y, z]: [f64; 3]| {
+        let [rms, median, p95, most] = [rms, median, p95, most].map(|length| length * 1e3);
+        let [x, y, z] = [x, y, z].map(|x| x * 1e3);
+        format!(
+            "{way} {rms:.3} mm rms, half within {median:.3}, 95 % within {p95:.3}, {most:.3} mm at most, at ({x:.1}, {y:.1}, {z:.1}) mm"
+        )
+    };
+    let Deviation { rms_from_mesh, median_from_mesh, p95_from_mesh, largest_from_mesh, .. } = *found;
+    let Deviation { rms_from_body, median_from_body, p95_from_body, largest_from_body, .. } = *found;
+    let from_mesh = [rms_from_mesh, median_from_mesh, p95_from_mesh, largest_from_mesh];
+    let from_body = [rms_from_body, median_from_body, p95_from_body, largest_from_body];
+    [
+        line("mesh to body    ", from_mesh, found.farthest_of_mesh),
+        line("body to mesh    ", from_body, found.farthest),
+    ]
+}
 
-    fn object(&self) -> Json {
-        json!({
-            "label": self.label, "cells": self.cells, "volume": self.volume, "input_volume": self.input_volume,
-            "volume_error": self.input_volume.map(|input| self.volume / input - 1.0),
-        })
+/// The larger of both ways for the surface of a label or an interface.
+fn largest_line(name: &str, found: &Deviation) -> String {
+    let (most, [x, y, z]) = found.largest();
+    let median = found.median_from_mesh.max(found.median_from_body);
+    let p95 = found.p95_from_mesh.max(found.p95_from_body);
+    format!(
+        "{name:<16} off by {:.3} mm at half of it, {:.3} mm at 95 %, {:.3} mm at most, at ({:.1}, {:.1}, {:.1}) mm",
+        median * 1e3,
+        p95 * 1e3,
+        most * 1e3,
+        x * 1e3,
+        y * 1e3,
+        z * 1e3
+    )
+}
+
+fn label_line(region: &LabelReport) -> String {
+    let own = format!("label {:<10} {} cells, {:.2} ml", region.label, region.cells, region.volume * 1e6);
+    match region.volume_error() {
+        Some(error) => format!("{own} ({:+.2} % of the input)", error * 100.0),
+        None => own,
     }
+}
+
+fn label_object(region: &LabelReport) -> Json {
+    json!({
+        "label": region.label, "cells": region.cells, "volume": region.volume, "input_volume": region.input_volume,
+        "volume_error": region.volume_error(), "distances": region.distances,
+    })
 }
 
 pub fn image_line(image: &Image) -> String {

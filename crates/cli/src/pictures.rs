@@ -13,8 +13,9 @@ use pliant_scene::registry::OutputTable;
 use pliant_scene::{Draw, Options, OutputFolder, Scene};
 
 use crate::arguments::{Frames, Overrides, Render};
-use crate::commands::{INTERRUPTED, prepare_changed, stopped_by_ctrl_c};
+use crate::commands::prepare_changed;
 use crate::report::{Bar, Failure, say};
+use crate::signals;
 pub use crate::view::view;
 
 impl From<PictureError> for Failure {
@@ -204,7 +205,7 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
         return Err(Failure::plain("`--series` chooses among the series of a finished run", "leave it out"));
     }
     let Some(shown) = run_scene(&arguments.what, arguments)? else {
-        return Ok(ExitCode::from(INTERRUPTED));
+        return Ok(ExitCode::from(signals::exit_code()));
     };
     let code = shoot(arguments, &shown.look, &graphics, &shown.series, &folder, film)?;
     // What a failed run came to is worth a look.
@@ -244,7 +245,7 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
     let run = OutputFolder::prepare(space.path().join("run"), &scene, false)
         .map_err(|error| Failure::plain(&error, error.remedy))?;
     let bar = Bar::new();
-    let options = Options { stop: Some(stopped_by_ctrl_c()), ..Options::default() };
+    let options = Options { stop: Some(signals::stop()), ..Options::default() };
     let result =
         pliant_scene::run_with(&scene, &built, &plan, &run, options, &mut |progress| bar.update(progress));
     bar.finish();
@@ -298,7 +299,7 @@ fn gallery(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> 
     let mut failed = false;
     for scene in scenes {
         let Some(mut shown) = run_scene(scene, arguments)? else {
-            return Ok(ExitCode::from(INTERRUPTED));
+            return Ok(ExitCode::from(signals::exit_code()));
         };
         failed |= shown.failed;
         let name = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -312,8 +313,7 @@ fn gallery(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> 
         let file = folder.path().join(format!("{name}.png"));
         let last = shown.series.frames.len() - 1;
         shown.look.pictures(&graphics, &shown.series, &[last], |_, picture| {
-            std::fs::write(&file, picture.png()?)
-                .map_err(|error| PictureError::Write { path: file.clone(), reason: error.to_string() })
+            save(&folder, &format!("{name}.png"), &picture)
         })?;
         say(format_args!("wrote {}", file.display()))?;
         page.push_str(&format!(
@@ -439,9 +439,7 @@ fn shoot(
     let (mut reel, path) = start_film(arguments, look, series, &frames, film)?;
     let bar = Bar::new();
     let done = look.pictures(graphics, series, &frames, |count, picture| {
-        let path = folder.path().join(picture_name(frames[count]));
-        std::fs::write(&path, picture.png()?)
-            .map_err(|error| PictureError::Write { path, reason: error.to_string() })?;
+        save(folder, &picture_name(frames[count]), &picture)?;
         bar.update_mesh(count as f64 / frames.len() as f64, "taking pictures");
         reel.add(&picture)
     });
@@ -458,6 +456,12 @@ fn shoot(
         say(format_args!("wrote {}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a picture into the folder.
+fn save(folder: &OutputFolder, name: &str, picture: &Picture) -> Result<(), PictureError> {
+    let written = folder.write(name, picture.png()?);
+    written.map(|_| ()).map_err(|error| PictureError::Write { path: error.path, reason: error.reason })
 }
 
 /// The frames that were asked for: the last one, or all for a film.

@@ -13,6 +13,7 @@ use pliant_gpu::Adapter;
 use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::{
     LoadStepProgress, Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, number,
+    printable,
 };
 use serde_json::json;
 
@@ -23,6 +24,8 @@ pub enum Failure {
     Scene(SceneErrors),
     /// Anything else, with a remedy.
     Plain { message: String, help: String },
+    /// Standard output can't be written, which is no mistake of the input (exit code 1).
+    Output(io::Error),
 }
 
 impl Failure {
@@ -55,7 +58,7 @@ impl From<ResumeError> for Failure {
     }
 }
 
-/// Prints what is wrong with the input; exit code 2.
+/// Prints what is wrong; exit code 2 where it is the input.
 pub fn failure(failure: &Failure, json: bool) -> ExitCode {
     let text = match failure {
         Failure::Scene(errors) => {
@@ -68,6 +71,10 @@ pub fn failure(failure: &Failure, json: bool) -> ExitCode {
                 eprintln!("  help: {help}");
             }
             if help.is_empty() { message.clone() } else { format!("{message} (help: {help})") }
+        }
+        Failure::Output(error) => {
+            eprintln!("error: standard output cannot be written: {error}; check the free space");
+            return ExitCode::from(1);
         }
     };
     if json {
@@ -97,8 +104,9 @@ pub fn show(errors: &SceneErrors) {
     let mut text = String::new();
     let drawn = handler.render_report(&mut text, errors as &dyn Diagnostic);
     match drawn {
-        Ok(()) => eprint!("{text}"),
-        Err(_) => eprint!("{}", errors.plain()),
+        // Its colours are codes for the terminal; what comes from the scene was made printable before.
+        Ok(()) => drop(writeln!(io::stderr(), "{}", text.trim_end_matches('\n'))),
+        Err(_) => eprintln!("{}", errors.plain().to_string().trim_end_matches('\n')),
     }
 }
 
@@ -196,11 +204,15 @@ pub fn adapters(found: &[Adapter]) -> String {
 
 /// Prints a line on standard output. A reader that has gone away (`pliant schema | head`) is no mistake.
 pub fn say(text: impl Display) -> Result<(), Failure> {
-    let written = writeln!(io::stdout(), "{text}").and_then(|()| io::stdout().flush());
+    let text = text.to_string();
+    let written = writeln!(io::stdout(), "{}", printable(&text)).and_then(|()| io::stdout().flush());
     match written {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Failure::plain(format!("standard output cannot be written: {error}"), "check the free space"))
-        }
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Output(error)),
         _ => Ok(()),
     }
+}
+
+/// Prints a line on standard error, if it can be written. Names in it that come from files reach the terminal without codes.
+pub fn tell(text: impl Display) {
+    let _ = writeln!(io::stderr(), "{}", printable(&text.to_string()));
 }

@@ -12,9 +12,7 @@ use pliant_meshing::{
 use serde_json::{Value as Json, json};
 
 use crate::arguments::{MeshCells, MeshImage};
-use crate::mesh::{
-    anatomy, cell_limit, image_line, image_object, is_mesh_file, mesh_file, meshing_failure, regions,
-};
+use crate::mesh::{Segmented, anatomy, cell_limit, is_mesh_file, mesh_file, meshing_failure, regions};
 use crate::report::{Bar, Failure, failed_output, say};
 
 /// Faces that meet at more than this angle meet at a crease, which a remeshed surface keeps [rad].
@@ -28,6 +26,7 @@ struct Found {
     surface: TriangleMesh,
     lines: Vec<String>,
     object: Json,
+    warnings: Vec<String>,
 }
 
 pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
@@ -44,6 +43,7 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     if !arguments.json {
         say(found.lines.iter().chain(&made.lines).cloned().collect::<Vec<_>>().join("\n"))?;
     }
+    found.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     let mut files = vec![(&arguments.out, &made.mesh)];
     files.extend(arguments.error_map.as_ref().zip(made.error_map.as_ref()));
     for (path, mesh) in &files {
@@ -55,6 +55,7 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     if arguments.json {
         let mut object = made.object;
         object["input"] = found.object;
+        object["warnings"] = json!(found.warnings);
         object["files"] = json!(files.iter().map(|(path, _)| path).collect::<Vec<_>>());
         say(object)?;
     }
@@ -101,26 +102,24 @@ fn require_surface_format(path: &Path) -> Result<(), Failure> {
 fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     let refused = |error| meshing_failure(&error, arguments.force);
     if is_mesh_file(arguments) {
-        let file = mesh_file(arguments)?;
+        let mut warnings = Vec::new();
+        let file = mesh_file(arguments, &mut warnings)?;
         let (surface, repairs) = TriangleMesh::from_mesh(&file.mesh).map_err(refused)?;
         let mut lines =
             vec![format!("{}: {}, {} triangles", arguments.image.display(), file.format, surface.len())];
         lines.extend(file.notes.iter().map(|note| format!("note: {note}")));
         lines.push(format!("mended           {repairs}"));
-        return Ok(Found { surface, lines, object: file_object(&file.format, &repairs) });
+        return Ok(Found { surface, lines, object: file_object(&file.format, &repairs), warnings });
     }
-    let (image, labels, chosen) = regions(arguments)?;
-    let (anatomy, cleaned) = anatomy(arguments, &labels, &chosen, &SURFACE_SMOOTHING, bar)?;
-    let step = image.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    let found = regions(arguments, bar)?;
+    let (anatomy, cleaned) = anatomy(arguments, &found, &SURFACE_SMOOTHING, bar)?;
     let mut surface =
-        TriangleMesh::of_field(anatomy.field(), step, cell_limit(arguments)).map_err(refused)?;
+        TriangleMesh::of_field(anatomy.field(), found.voxel, cell_limit(arguments)).map_err(refused)?;
     surface.smooth(SURFACE_PAIRS);
-    let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
-    lines.extend(image.notes.iter().map(|note| format!("note: {note}")));
+    let Segmented { mut lines, mut object, warnings, .. } = found;
     lines.push(format!("cleaned          {cleaned}"));
-    let mut object = image_object(&image);
     object["cleaned"] = json!(cleaned);
-    Ok(Found { surface, lines, object })
+    Ok(Found { surface, lines, object, warnings })
 }
 
 fn file_object(format: &str, repairs: &SurfaceRepairs) -> Json {

@@ -37,6 +37,7 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
     let read = move |path: &Path| {
         stage(path, &overrides).map_err(|failure| match failure {
             Failure::Scene(errors) => errors.plain().to_string(),
+            Failure::Output(error) => error.to_string(),
             Failure::Plain { message, .. } => message,
         })
     };

@@ -164,7 +164,11 @@ fn missing_keys_and_tables_are_named() {
         ("law = \"tissue\"\n", "[body.block]", "missing key `law` in `body.block`"),
         ("density = 1000\n", "[body.block]", "missing key `density` in `body.block`"),
         ("until = 0.02\n", "[scene]", "missing key `until` in `scene`"),
-        ("by = [0, 0, 0.001]\n", "[constraint.hand]", "exactly one of `by` and `velocity`, found neither"),
+        (
+            "by = [0, 0, 0.001]\n",
+            "[constraint.hand]",
+            "exactly one of `by`, `velocity` and `rotate`, found neither",
+        ),
         ("total = [0.1, 0, 0]\n", "[load.push]", "exactly one of `each` and `total`, found neither"),
         (
             "young-modulus = 10e3\n",
@@ -224,13 +228,10 @@ fn unreadable_and_truncated_meshes_tell_the_line() {
 }
 
 #[test]
-fn an_organ_a_thousand_times_too_large_or_small_is_doubted() {
+fn an_organ_a_thousand_times_too_large_is_refused_and_one_too_small_doubted() {
     let large = CUBE.map(|point| point.map(|x| 1000.0 * x));
-    let told = with_mesh(vtk(&large, &TETS, ""), FROM_FILE).run(&[]);
-    told.done();
-    let says = ["⚠", "`organ` measures 173.2 m across", "0.001 for one in millimetres"];
-    assert!(says.iter().all(|piece| told.words().contains(piece)), "{}", told.err);
-    assert!(told.underlines(MESH_LINE), "{}", told.err);
+    let says = ["the mesh measures 173.2 m across", "`scale = 0.001` brings millimetres to metres"];
+    assert_refused(&with_mesh(vtk(&large, &TETS, ""), FROM_FILE), &[MESH_LINE], &says);
     let scene = changed(FROM_FILE, "\"organ.vtk\"", "\"organ.vtk\", scale = 0.001");
     let told = with_mesh(vtk(&CUBE, &TETS, ""), &scene).pliant(&["check", "case"]);
     assert_eq!(told.code, 0);
@@ -732,23 +733,31 @@ fn halves(folder: &Path) -> Vec<String> {
     names.filter(|name| name.ends_with(".tmp")).collect()
 }
 
-#[test]
-#[cfg(target_os = "linux")]
-fn a_full_disk_at_the_history_ends_the_run_clearly() {
-    let workshop = Workshop::new(BLOCK);
-    fs::create_dir_all(workshop.path("out/case")).unwrap();
-    std::os::unix::fs::symlink("/dev/full", workshop.path("out/case/history.csv")).unwrap();
-    assert_disk_full(&workshop.run(&["--force"]), "out/case/history.csv", "No space left on device");
-    assert_eq!(halves(&workshop.path("out")), Vec::<String>::new());
+/// Runs the scene where a file may have so many blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
+#[cfg(unix)]
+fn run_limited(workshop: &Workshop, blocks: u32) -> Told {
+    let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run case --json");
+    let output = std::process::Command::new("sh")
+        .args(["-c", &limited, env!("CARGO_BIN_EXE_pliant")])
+        .current_dir(workshop.path(""))
+        .output()
+        .unwrap();
+    output.into()
 }
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_full_disk_at_a_frame_leaves_the_frames_before() {
+fn a_full_disk_at_the_history_ends_the_run_clearly() {
     let workshop = Workshop::new(BLOCK);
-    fs::create_dir_all(workshop.path("out/case/fields")).unwrap();
-    std::os::unix::fs::symlink("/dev/full", workshop.path("out/case/fields/000002.vtu.tmp")).unwrap();
-    assert_disk_full(&workshop.run(&["--force"]), "out/case/fields/000002.vtu", "No space left on device");
+    assert_disk_full(&run_limited(&workshop, 0), "out/case/history.csv", "File too large");
+    assert_eq!(halves(&workshop.path("out")), Vec::<String>::new());
+}
+
+#[test]
+fn a_frame_that_cannot_be_written_leaves_the_frames_before() {
+    let workshop = Workshop::new(BLOCK);
+    fs::create_dir_all(workshop.path("out/case/fields/000002.vtu")).unwrap();
+    assert_disk_full(&workshop.run(&["--force"]), "out/case/fields/000002.vtu", "not a regular file");
     assert_eq!(workshop.series("out/case/fields.pvd").len(), 2);
     assert_eq!(halves(&workshop.path("out")), Vec::<String>::new());
     assert!(workshop.read("out/case/summary.md").contains("**Failed** (output)"));
@@ -760,14 +769,7 @@ fn a_full_disk_in_the_middle_of_the_history_leaves_whole_rows() {
     let scene = changed(BLOCK, "type = \"csv\"\nevery = 0.004", "type = \"csv\"\nevery = 1e-5");
     let scene = scene.replace("until = 0.02", "until = 0.2").replace("every = 0.004", "every = 0.02");
     let workshop = Workshop::new(&scene);
-    // A file may have 8 blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
-    let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" run case --json";
-    let output = std::process::Command::new("sh")
-        .args(["-c", limited, env!("CARGO_BIN_EXE_pliant")])
-        .current_dir(workshop.path(""))
-        .output()
-        .unwrap();
-    assert_disk_full(&output.into(), "out/case/history.csv", "File too large");
+    assert_disk_full(&run_limited(&workshop, 8), "out/case/history.csv", "File too large");
     let (_, rows) = workshop.table("out/case/history.csv");
     assert!(rows.len() > 5, "{}", rows.len());
     assert!(!series(&workshop.path("out/case/fields.pvd")).is_empty());
@@ -945,4 +947,91 @@ title = "\u001b]0;mine\u0007<script>alert(1)</script>""#;
         assert!(told.code == 2 && !codes(&told.err) && !codes(&told.out), "{}", told.err);
         assert!(!told.err.contains('\u{202e}'), "{}", told.err);
     }
+}
+
+#[test]
+fn values_beyond_all_sense_are_refused_and_unusual_ones_doubted() {
+    for (good, bad, says) in [
+        ("young-modulus = 10e3", "young-modulus = 1e-300", "is 1e-300 Pa; values from 1e-20 to 1e20 Pa"),
+        ("density = 1000", "density = 1e300", "is 1e300 kg/m³; values from 1e-15 to 1e15 kg/m³"),
+        ("until = 0.02", "until = 1e30", "`scene.until` is 1e30 s; values from"),
+    ] {
+        assert_refused(&Workshop::block(good, bad), &[bad], &[says, "values are in SI units"]);
+    }
+    for (good, odd, says) in [
+        ("young-modulus = 10e3", "young-modulus = 1e-3", "1e-2 to 1e13 Pa: is that so?"),
+        ("density = 1000", "density = 1e-6", "and usual are 1e-1 to 1e5 kg/m³: is that so?"),
+        ("density = 1000", "density = 1e-6", "1 g/cm³ is 1000 kg/m³"),
+        ("pressure = 20", "pressure = -1e15", "and usual is less than 1e13 Pa"),
+        ("total = [0.1, 0, 0]", "total = [1e40, 0, 0]", "is 1e40 N, and usual is less than 1e9 N"),
+    ] {
+        let told = Workshop::block(good, odd).pliant(&["check", "case"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        assert!(told.words().contains(says) && told.underlines(odd), "{}", told.err);
+    }
+    // Loads may be as small, and boxes as large, as they like.
+    let boxed = "nodes = { box = [[-1e9, -1e9, 0.09], [1e9, 1e9, 1e9]] }";
+    for (good, usual) in [("pressure = 20", "pressure = 1e-15"), ("nodes = { set = \"z-max\" }", boxed)] {
+        let told = Workshop::block(good, usual).pliant(&["check", "case"]);
+        assert_eq!((told.code, told.err.as_str()), (0, ""));
+    }
+}
+
+#[test]
+fn a_nearest_node_far_from_its_point_is_doubted() {
+    let line = "nodes = { nearest = { point = [1000, 0.05, 0.05] } }";
+    let told = Workshop::block("nodes = { nearest = { point = [0.1, 0.05, 0.05] } }", line)
+        .pliant(&["check", "case"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let says = "nearest to [1000.0, 0.05, 0.05] is 999.9 m away, and `block` measures 0.1732 m across";
+    assert!(told.words().contains(says) && told.underlines(line), "{}", told.err);
+}
+
+#[test]
+fn a_run_of_more_than_a_day_asks_for_consent() {
+    let workshop = Workshop::block("until = 0.02", "until = 1e9");
+    let told = workshop.run(&[]);
+    assert_invalid(&told, &["the run takes ", " steps of ", "days on this machine", "add `--long`"]);
+    assert!(told.underlines("until = 1e9"), "{}", told.err);
+    assert!(!workshop.path("out").exists());
+    // Whoever wants it gets it.
+    let mut child = workshop
+        .command(&["run", "case", "--long"])
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let patience = std::time::Instant::now();
+    while !workshop.path("out/case/fields.pvd").exists() {
+        assert!(patience.elapsed().as_secs() < 60, "no frame came");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// What a failed run says.
+fn failure_of(changes: &[&str]) -> String {
+    let workshop = Workshop::new(BLOCK);
+    let set: Vec<&str> = changes.iter().flat_map(|change| ["--set", change]).collect();
+    let told = workshop.run(&set);
+    assert_eq!(told.code, 1, "{}", told.err);
+    told.json()["error"]["message"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn advice_fits_what_the_run_does_already() {
+    let damped = failure_of(&["body.block.damping=1e4", "body.block.velocity=[0,0,1]"]);
+    for piece in ["the damping of `block`, 10000 1/s, is too strong", "take `damping` below 200"] {
+        assert!(damped.contains(piece), "{damped}");
+    }
+    assert!(!damped.contains("more damping"), "{damped}");
+    let squeezed = "constraint.hand.by=[0,0,-0.0999]";
+    let cut = failure_of(&[squeezed]);
+    assert!(cut.contains("inverted") && cut.contains("the run cuts its steps already"), "{cut}");
+    assert!(!cut.contains("substep") && !cut.contains("smaller `step`"), "{cut}");
+    let report = failure_of(&[squeezed, "run.on-unstable=report"]);
+    assert!(report.contains("`on-unstable = \"substep\"`"), "{report}");
+    let stopped = failure_of(&["constraint.hand.by=[0,0,-0.09]", "run.on-unstable=stop"]);
+    assert!(stopped.contains("let the run cut its steps (`on-unstable = \"substep\"`)"), "{stopped}");
 }

@@ -207,6 +207,42 @@ fn two_labels_become_one_mesh_of_two_materials() {
     assert!(page.err.contains("wrote two.vtu"), "{}", page.err);
 }
 
+/// The mesh is measured to the faces of the voxels; a protected label gets smaller cells and a distance is held.
+#[test]
+fn tets_come_in_several_sizes_and_within_a_distance() {
+    let workshop = with_image();
+    let two = ["--label", "5", "--label", "8", "--keep-largest", "--fill-holes", "--json"];
+    let coarse = mesh(&workshop, &[&two[..], &["--edge", "8mm", "-o", "coarse.vtu"]].concat());
+    assert_eq!(coarse.code, 0, "{}", coarse.err);
+    let fine = [&two[..], &["--edge", "8mm", "--protect", "8=2mm", "-o", "fine.vtu"]].concat();
+    let fine = mesh(&workshop, &fine);
+    assert_eq!(fine.code, 0, "{}", fine.err);
+    let [coarse, fine] = [coarse, fine].map(|told| told.json());
+    assert_eq!(fine["distances"]["to"], "voxels");
+    let off = |json: &Value| json["materials"][1]["distances"]["p95_from_mesh"].as_f64().expect("a distance");
+    assert!(off(&fine) < off(&coarse), "{} {}", off(&fine), off(&coarse));
+    assert!(fine["materials"][1]["volume_error"].as_f64().unwrap().abs() < 0.02, "{fine}");
+    assert!(
+        fine["interfaces"].as_array().unwrap().iter().any(|of| of["labels"] == serde_json::json!([5, 8]))
+    );
+    assert!(fine["edges"]["longest_part"].as_f64().unwrap() <= 1.6 + 1e-9, "{fine}");
+    let held = mesh(&workshop, &["--threshold", "5", "--distance", "1mm", "-o", "held.vtu", "--json"]).json();
+    assert!(held["distance"]["reached"].as_f64().unwrap() <= 1e-3, "{held}");
+    for (option, message) in [
+        (["--distance", "1mm"], "`--distance` is for tets"),
+        (["--inner-edge", "8mm"], "`--inner-edge` is for tets"),
+        (["--protect", "5"], "`--protect` is for tets"),
+    ] {
+        let told = mesh(
+            &workshop,
+            &[&["--label", "5", "--edge", "4mm", "--as", "hexes", "-o", "x.vtu"][..], &option].concat(),
+        );
+        assert!(told.code != 0 && told.err.contains(message), "{}", told.err);
+    }
+    let told = mesh(&workshop, &["--label", "5", "--edge", "4mm", "--protect", "8", "-o", "x.vtu"]);
+    assert!(told.code != 0 && told.err.contains("label 8 can't be protected"), "{}", told.err);
+}
+
 #[test]
 fn hexes_and_thresholds_work_and_go_to_gmsh() {
     let workshop = with_image();

@@ -15,6 +15,8 @@ const RADIUS: f64 = 15.0;
 fn ball(radius: f64, x: f64) -> Mesh {
     let mut mesh = sphere(radius, 4, 100_000).expect("a sphere");
     mesh.points.iter_mut().for_each(|point| point.x += x);
+    // What is made of it is another surface.
+    mesh.point_data.clear();
     mesh
 }
 

@@ -28,7 +28,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 25] = [
     "status",
     "error",
     "bodies",
@@ -40,6 +40,9 @@ const KEYS: [&str; 22] = [
     "true_limit",
     "limiting_element",
     "solver",
+    "equilibria",
+    "ended",
+    "shell_strains",
     "device",
     "precision",
     "steps",
@@ -888,12 +891,46 @@ fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
     assert_eq!(keys(&error["load_step"]), ["number", "of", "iterations", "residual"]);
     assert_eq!(
         (error["load_step"]["number"].as_u64(), error["load_step"]["of"].as_u64()),
-        (Some(1), Some(10))
+        (Some(0), Some(10))
     );
     assert!(error["load_step"]["residual"].as_f64().unwrap() > 1e-9 && error["node"].is_number(), "{error}");
-    for piece in ["load step 1 of 10: no equilibrium", "largest at node", "iterations", "try more load steps"]
-    {
+    // Gravity acts from the start: its equilibrium comes before the first load step.
+    for piece in ["what acts at t = 0: no equilibrium", "largest at node", "iterations", "nothing holds"] {
         assert!(told.err.contains(piece), "{}", told.err);
+    }
+}
+
+#[test]
+fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
+    let run = |lines: &str| {
+        let workshop = Workshop::new(&bent("hex8", &format!("solver = \"quasi-static\"\n{lines}")));
+        let told = workshop.run(&[]);
+        (told.err.clone(), workshop.read("out/case/summary.md"), told.done())
+    };
+    let (said, page, json) = run("step = 0.3");
+    let note = "a step of 0.3000 s does not divide the 1.000 s of the scene: it takes 4 steps of 0.2500 s";
+    assert!(said.contains(note) && page.contains(note), "{said}\n{page}");
+    assert_eq!((&json["step"], &json["steps"]), (&0.25.into(), &4.into()));
+    let (said, page, unequal) = run("load-steps = { times = [0.1, 0.4] }");
+    let note = "the load steps end at t = 0.1000, 0.4000, 1.000 s";
+    assert!(said.contains(note) && page.contains(note), "{said}\n{page}");
+    assert_eq!(unequal["steps"], 3);
+    assert_close(
+        unequal["reactions"]["hand"][2].as_f64().unwrap(),
+        json["reactions"]["hand"][2].as_f64().unwrap(),
+        1e-6,
+        "the same equilibrium at the end",
+    );
+    let equilibria = &unequal["equilibria"];
+    assert_eq!(keys(equilibria), ["found", "external_error", "displacement_error"]);
+    assert!(equilibria["displacement_error"].as_f64().unwrap() < 1e-3, "{equilibria}");
+    for (lines, pieces) in [
+        ("load-steps = { times = [0.4, 0.1] }", ["increase", "out of order"]),
+        ("step = 0.5\nload-steps = { times = [0.4] }", ["in two ways", "leave one of them out"]),
+    ] {
+        let scene = bent("hex8", &format!("solver = \"quasi-static\"\n{lines}"));
+        let told = Workshop::new(&scene).run(&[]);
+        assert!(told.code != 0 && pieces.iter().all(|piece| told.err.contains(piece)), "{}", told.err);
     }
 }
 
@@ -960,7 +997,7 @@ fn mesh_files_of_every_volume_format_become_bodies() {
 fn info_asks_whether_a_large_mesh_is_in_millimetres() {
     let workshop = Workshop::new("");
     workshop.write("organ.vtk", vtk(&CUBE.map(|p| p.map(|x| 1000.0 * x)), &TETS, ""));
-    let hint = "give `--scale 0.001`";
+    let hint = "`--scale 0.001` brings millimetres to metres";
     assert!(workshop.pliant(&["info", "organ.vtk"]).out.contains(hint));
     assert!(!workshop.pliant(&["info", "organ.vtk", "--scale", "0.001"]).out.contains(hint));
 }
@@ -1260,7 +1297,7 @@ fn a_table_of_motions_names_nodes_as_the_mesh_file_does() {
     let scene = changed(
         &moved_node_by_node("{ csv = \"motion.csv\" }"),
         "\"organ.vtk\"",
-        "\"organ.vtk\", fix = \"drop-unused\"",
+        "\"organ.vtk\", scale = 1, fix = \"drop-unused\"",
     );
     let workshop = Workshop::new(&scene);
     workshop.write("case/organ.vtk", vtk(&points, &tets, ""));
@@ -1433,7 +1470,136 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
     assert_eq!(direct["reactions"], scene["reactions"]);
     let again = workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]);
     assert!(again.code == 2 && again.err.contains("exists already"), "{}", again.err);
+    let contact = "<ContactPlate><a>0 0 0</a></ContactPlate><ShellElements Type=\"SURFACE\"/></Model>";
+    workshop.write("partial.xml", model.replace("</Model>", contact));
+    for arguments in
+        [&["run", "partial.xml"][..], &["import", "partial.xml", "-o", "partial"], &["check", "partial.xml"]]
+    {
+        let told = workshop.pliant(arguments);
+        assert_eq!(told.code, 2, "{arguments:?}: {}", told.err);
+        for part in ["partial.xml", "shells and membranes; contact (ContactPlate)", "--allow-partial"] {
+            assert!(told.err.contains(part), "{arguments:?}: no `{part}` in {}", told.err);
+        }
+        assert!(!workshop.path("out/partial").exists() && !workshop.path("partial").exists());
+    }
+    let told = workshop.pliant(&["run", "partial.xml", "--allow-partial", "--json"]);
+    assert!(told.err.contains("left out"), "{}", told.err);
+    assert_eq!(told.done()["reactions"], direct["reactions"]);
+    workshop.pliant(&["import", "partial.xml", "-o", "partial", "--allow-partial"]).words();
+    assert!(workshop.path("partial/scene.toml").is_file());
     workshop.write("broken.xml", &model[..200]);
     let told = workshop.pliant(&["run", "broken.xml"]);
     assert!(told.code == 2 && told.err.contains("broken.xml"), "{}", told.err);
+}
+
+/// A cube of hexes between glued plates, the upper one moved as told.
+fn squeezed(element: &str, run: &str, motion: &str) -> String {
+    format!(
+        "[scene]\nuntil = 0.5\n[run]\nprecision = \"double\"\n{run}\n[law.tissue]\ntype = \"neo-hookean\"\n\
+         young-modulus = 3e3\npoisson-ratio = 0.45\n[body.cube]\n\
+         mesh = {{ block = {{ size = [0.1, 0.1, 0.1], cells = [3, 3, 3] }}, as = \"hexes\" }}\n\
+         element = \"{element}\"\nlaw = \"tissue\"\ndensity = 1000\ndamping = 60\n\
+         [constraint.base]\ntype = \"fix\"\nbody = \"cube\"\nnodes = {{ set = \"z-min\" }}\n\
+         [constraint.top]\ntype = \"move\"\nbody = \"cube\"\nnodes = {{ set = \"z-max\" }}\n{motion}\n\
+         [output.table]\ntype = \"csv\"\nevery = 0.05\n"
+    )
+}
+
+#[test]
+fn a_flattened_cube_ends_with_the_corner_that_turns_inside_out() {
+    for by in ["-0.095", "-0.099"] {
+        let told = Workshop::new(&squeezed("hex8-full", "", &format!("by = [0, 0, {by}]"))).run(&[]);
+        assert_eq!(told.code, 1, "{by}: {}", told.err);
+        let error = &told.json()["error"];
+        assert_eq!(error["kind"], "inverted", "{by}: {error}");
+        for piece in ["at its corner at node", "(det F = ", "slower or smaller motion"] {
+            assert!(told.err.contains(piece), "{by}: no `{piece}` in {}", told.err);
+        }
+        assert!(error["element"].is_number() && error["node"].is_number() && error["time"].is_number());
+    }
+    // Held by its hourglass control alone, which is told, until no step is small enough.
+    let told = Workshop::new(&squeezed("hex8", "", "by = [0, 0, -0.099]")).run(&[]);
+    assert_eq!((told.code, &told.json()["error"]["kind"]), (1, &"unstable".into()), "{}", told.err);
+    assert!(told.err.contains("hourglass control holds"), "{}", told.err);
+    let run = "solver = \"quasi-static\"\nload-steps = 2";
+    let told = Workshop::new(&squeezed("hex8-full", run, "by = [0, 0, -0.099]\ncurve = \"hold\"")).run(&[]);
+    assert_eq!(told.code, 1, "{}", told.err);
+    assert!(told.err.contains("inverted") && told.err.contains("let it grow over time"), "{}", told.err);
+    assert!(!told.err.contains("more load steps"), "{}", told.err);
+}
+
+/// Where every node is held there is no limit, which is said in words.
+#[test]
+fn a_body_whose_nodes_are_all_prescribed_has_no_limit_and_a_page_without_inf() {
+    let scene = squeezed("hex8", "", "by = [0, 0, 0.001]")
+        .replace("nodes = { set = \"z-max\" }", "nodes = \"all\"\ncomponents = [\"x\", \"y\", \"z\"]")
+        .replace("[constraint.base]\ntype = \"fix\"\nbody = \"cube\"\nnodes = { set = \"z-min\" }\n", "");
+    let workshop = Workshop::new(&scene);
+    workshop.run(&[]).done();
+    let page = fs::read_to_string(workshop.path("out/case/summary.md")).unwrap();
+    assert!(page.contains("none: every node is held or moved as prescribed"), "{page}");
+    assert!(page.contains("any step is stable, as no node is free to move"), "{page}");
+    let checked = workshop.pliant(&["check", "case"]).words();
+    for text in [page, checked] {
+        let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).collect();
+        assert!(!words.iter().any(|word| ["inf", "NaN", "nan"].contains(word)), "{text}");
+    }
+}
+
+/// A beam held at one end by a couple that its moved end makes: the moments balance, and the nodal reactions sum up to the reaction.
+#[test]
+fn moments_of_reactions_balance_and_a_rotation_twists() {
+    let rotate = "rotate = { axis = [0, 0, 2], centre = [0.05, 0.05, 0], angle = 0.3 }";
+    let run = "solver = \"quasi-static\"\nload-steps = 2\ntolerance = 1e-8";
+    let scene = squeezed("hex8", run, rotate)
+        + "moments-about = [0.05, 0.05, 0.02]\n\
+           probes.corner = { on = \"cube\", at = [0.1, 0.1, 0.1], data = [\"displacement\", \"reaction\", \
+           \"deformation-gradient\", \"green-strain\", \"cauchy-stress\"] }\n\
+           [output.fields]\ntype = \"vtu\"\nevery = 0.5\ndata = [\"reaction\", \"deformation-gradient\"]\n";
+    let workshop = Workshop::new(&scene);
+    workshop.run(&[]).done();
+    let table = fs::read_to_string(workshop.path("out/case/table.csv")).unwrap();
+    let last = table.lines().last().unwrap();
+    let row: std::collections::BTreeMap<&str, f64> = (table.lines().next().unwrap().split(','))
+        .zip(last.split(',').map(|number| number.parse().unwrap()))
+        .collect();
+    let vector = |name: &str| ["x", "y", "z"].map(|axis| row[format!("{name}.{axis}").as_str()]);
+    let (base, top) = (vector("moment.base"), vector("moment.top"));
+    // A twist about the axis of a square: a couple.
+    assert!(top[2] > 1e-3, "{top:?}");
+    for c in 0..3 {
+        assert!((base[c] + top[c]).abs() < 1e-5 * top[2], "{base:?} against {top:?}");
+        let [below, above] = ["reaction.base", "reaction.top"].map(|name| vector(name)[c]);
+        assert!((below + above).abs() < 1e-5 * top[2] / 0.1, "{row:?}");
+        // Along the axis a twist pulls at the plates, across it nothing does.
+        assert!(c == 2 || above.abs() < 1e-5 * top[2] / 0.1, "{row:?}");
+    }
+    // The corner goes round by 0.3 rad.
+    let arm = [0.05, 0.05];
+    let [x, y, z] = vector("probe.corner.displacement");
+    let (sin, cos) = 0.3_f64.sin_cos();
+    let expected = [cos * arm[0] - sin * arm[1] - arm[0], sin * arm[0] + cos * arm[1] - arm[1]];
+    assert!(
+        (x - expected[0]).abs() < 1e-12 && (y - expected[1]).abs() < 1e-12 && z.abs() < 1e-15,
+        "{x} {y} {z}"
+    );
+    assert!(vector("probe.corner.reaction").iter().any(|force| force.abs() > 1e-3));
+    // E = (FᵀF − I)/2 of the same cell.
+    let entry = |field: &str, i: usize, j: usize| {
+        row[format!("probe.corner.{field}.{}{}", ["x", "y", "z"][i], ["x", "y", "z"][j]).as_str()]
+    };
+    for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+        let square: f64 =
+            (0..3).map(|k| entry("deformation-gradient", k, i) * entry("deformation-gradient", k, j)).sum();
+        let strain = 0.5 * (square - f64::from(u8::from(i == j)));
+        assert!((strain - entry("green-strain", i, j)).abs() < 1e-12, "E_{i}{j}");
+        assert_eq!(entry("cauchy-stress", i, j), entry("cauchy-stress", j, i));
+    }
+    let refused = squeezed("hex8", "", rotate).replace("element = \"hex8\"", "model = \"corotational\"");
+    let told = Workshop::new(&refused.replace("as = \"hexes\"", "as = \"tets\"")).run(&[]);
+    assert!(
+        told.code == 2 && told.err.contains("a rotation about an axis is for nodes of solids"),
+        "{}",
+        told.err
+    );
 }

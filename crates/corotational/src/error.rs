@@ -22,7 +22,7 @@ pub enum ModelError {
     Count {
         /// Name of the part.
         shell: String,
-        /// `thicknesses` or `materials`.
+        /// `thicknesses`, `materials` or `directions`.
         what: &'static str,
         /// Elements.
         cells: usize,
@@ -67,6 +67,16 @@ pub enum ModelError {
         edge: [u32; 2],
         /// Triangles at it.
         count: usize,
+    },
+    /// Layers without a direction.
+    #[error(
+        "the direction of the layers of `{shell}` is perpendicular to element {cell}, or zero: their angles count from nothing there"
+    )]
+    Direction {
+        /// Name of the part.
+        shell: String,
+        /// An element.
+        cell: usize,
     },
     /// A given normal that is none.
     #[error(

@@ -8,9 +8,14 @@ use nalgebra::{
     Matrix3, Matrix3x2, Rotation3, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector2, Vector3,
 };
 
-use crate::element::{Corners, Elasticity, Formulation, Matrix9, andes_basic, area, gradients};
+use crate::element::{
+    Corners, CurvedMembrane, Formulation, Layer, Matrix3x18, Matrix9, Membrane, PlaneStress, Section,
+    andes_higher, area, density, gradients, mean, mean_curvature, thickness,
+};
 use crate::model::Material;
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
+use crate::strain::ShellStrain;
+use crate::surface::{EdgeRule, Patch};
 
 /// Numbers of (u, v, w, θx, θy, θz) of three nodes, node by node.
 pub type Vector18 = SVector<f64, 18>;
@@ -44,15 +49,26 @@ pub struct Facet {
     /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that rotations do not shorten the
     /// steps of an explicit solver.
     pub inertia: f64,
-    elastic: Elasticity,
+    elastic: PlaneStress,
+    /// Of a wall of layers.
+    section: Option<Box<Section>>,
     /// Corners at rest in the facet's axes, relative to the centroid [m].
     corners: Corners,
     /// Gradients of the shape functions there [1/m].
     gradient: [Vector2<f64>; 3],
     /// Axes at rest.
     axes: UnitQuaternion<f64>,
-    membrane: Matrix9,
+    formulation: Formulation,
+    /// Which edges of a curved membrane are straight, and its normals, in the facet's axes; `None` while it is flat.
+    curved: Option<([Vector3<f64>; 3], [bool; 6])>,
+    /// Stiffness of all, in the facet's axes.
+    stiffness: Matrix18,
+    /// The part of it that resists bending.
     bending: Matrix9,
+    /// Mean membrane strain (εxx, εyy, γxy), and the area [m²] over which it is the mean.
+    strain: (Matrix3x18, f64),
+    /// Nodal forces of its tension at rest, and that tension [N/m].
+    tension: (Vector18, f64),
 }
 
 /// Energy of a shell in its parts [J].
@@ -119,12 +135,36 @@ pub enum Broken {
 }
 
 impl Facet {
-    /// A facet of corners at rest [m]; `None` if its area is below 1e-12 of its longest edge squared.
+    /// A flat facet of corners at rest [m]; `None` if its area is below 1e-12 of its longest edge squared.
     pub fn new(
         nodes: [u32; 3],
         rest: [Vector3<f64>; 3],
         thickness: f64,
+        material: Material,
+        formulation: Formulation,
+    ) -> Option<Self> {
+        Self::of_wall(nodes, rest, thickness, material, None, formulation)
+    }
+
+    /// A facet of layers from the bottom (against its normal) to the top; their angles count from a direction, which is projected on the
+    /// facet.
+    pub fn layered(
+        nodes: [u32; 3],
+        rest: [Vector3<f64>; 3],
+        layers: &[Layer],
+        direction: &Vector3<f64>,
+        formulation: Formulation,
+    ) -> Option<Self> {
+        let material = Material { elastic: mean(layers), density: density(layers) };
+        Self::of_wall(nodes, rest, thickness(layers), material, Some((layers, direction)), formulation)
+    }
+
+    fn of_wall(
+        nodes: [u32; 3],
+        rest: [Vector3<f64>; 3],
+        thickness: f64,
         Material { elastic, density }: Material,
+        layers: Option<(&[Layer], &Vector3<f64>)>,
         formulation: Formulation,
     ) -> Option<Self> {
         let [a, b, c] = rest;
@@ -141,19 +181,82 @@ impl Facet {
         let corners = rest.map(|x| (axes.transpose() * (x - centroid)).xy());
         let area = area(&corners);
         let mass = density * thickness * area / 3.0;
-        Some(Self {
+        let section = layers.map(|(layers, direction)| {
+            let own = axes.tr_mul(direction);
+            Box::new(Section::new(layers, own.y.atan2(own.x)))
+        });
+        let [elastic, bent] = match &section {
+            None => [PlaneStress::from(elastic); 2],
+            Some(section) => [section.in_plane(), section.in_bending()],
+        };
+        let mut membrane = Matrix18::zeros();
+        add_block(&mut membrane, MEMBRANE, &formulation.membrane_stiffness(&corners, &elastic, thickness));
+        let strain = spread(MEMBRANE, &formulation.mean_strain(&corners));
+        let mut facet = Self {
             nodes,
             thickness,
             area,
             mass,
             inertia: mass * (thickness * thickness).max(area) / 12.0,
             elastic,
+            section,
             corners,
             gradient: gradients(&corners),
             axes: quaternion(axes),
-            membrane: formulation.membrane_stiffness(&corners, &elastic, thickness),
-            bending: formulation.bending_stiffness(&corners, &elastic, thickness),
-        })
+            formulation,
+            curved: None,
+            stiffness: Matrix18::zeros(),
+            bending: formulation.bending_stiffness(&corners, &bent, thickness),
+            strain: (strain, area),
+            tension: (Vector18::zeros(), 0.0),
+        };
+        facet.put_together(membrane, strain, area);
+        Some(facet)
+    }
+
+    /// Takes up a membrane with its mean strain and the area of that [m²]: whole stiffness and forces at rest.
+    fn put_together(&mut self, membrane: Matrix18, strain: Matrix3x18, area: f64) {
+        self.stiffness = membrane;
+        add_block(&mut self.stiffness, BENDING, &self.bending);
+        if let Some(section) = &self.section {
+            // Of layers that are not symmetric.
+            let part = strain.tr_mul(&(section.coupling * self.curvature())) * area;
+            self.stiffness += part + part.transpose();
+        }
+        let tension = self.tension.1;
+        self.strain = (strain, area);
+        self.tension.0 = strain.tr_mul(&Vector3::new(tension, tension, 0.0)) * area;
+    }
+
+    /// Mean curvature [1/m].
+    fn curvature(&self) -> Matrix3x18 {
+        spread(BENDING, &self.formulation.mean_curvature(&self.corners))
+    }
+
+    /// The same with a tension [N/m] in its rest shape, equal in all directions.
+    #[must_use]
+    pub fn under_tension(self, tension: f64) -> Self {
+        let (strain, area) = self.strain;
+        let forces = strain.tr_mul(&Vector3::new(tension, tension, 0.0)) * area;
+        Self { tension: (forces, tension), ..self }
+    }
+
+    /// Gives a curved membrane the normals of its corners at rest, and says which of its edges are straight; others stay as they are.
+    pub(crate) fn curve(&mut self, normals: [Vector3<f64>; 3], straight: [bool; 6]) {
+        let Membrane::Curved { adaptation } = self.formulation.membrane else { return };
+        let back = self.axes.inverse();
+        let curved = (normals.map(|normal| back * normal), straight);
+        if self.curved == Some(curved) {
+            return;
+        }
+        self.curved = Some(curved);
+        let corners = self.corners.map(|corner| corner.push(0.0));
+        let patch = Patch::new(corners, curved.0, straight, EdgeRule::Arc);
+        let CurvedMembrane { area, strain, hierarchical } = CurvedMembrane::new(&patch, &self.gradient);
+        let higher = andes_higher(&self.corners, &self.elastic, self.thickness, adaptation);
+        let membrane = strain.transpose() * (self.elastic.matrix * (self.thickness * area)) * strain
+            + hierarchical.transpose() * higher * hierarchical;
+        self.put_together(membrane, strain, area);
     }
 
     /// Where the facet is with its nodes at positions [m] and turned from rest by rotations.
@@ -201,28 +304,14 @@ impl Facet {
         Ok(Placed { axes, local, trace: sum.hypot(difference), theta, deformation })
     }
 
-    /// K d in the facet's axes.
+    /// K d and the tension at rest in the facet's axes.
     fn linear_force(&self, d: &Vector18) -> Vector18 {
-        let mut force = Vector18::zeros();
-        for (places, stiffness) in [(MEMBRANE, &self.membrane), (BENDING, &self.bending)] {
-            let own = stiffness * SVector::<f64, 9>::from_fn(|i, _| d[places[i]]);
-            for (&place, value) in places.iter().zip(&own) {
-                force[place] = *value;
-            }
-        }
-        force
+        self.stiffness * d + self.tension.0
     }
 
-    /// K in the facet's axes.
-    fn linear_stiffness(&self, k: &mut Matrix18) {
-        k.fill(0.0);
-        for (places, stiffness) in [(MEMBRANE, &self.membrane), (BENDING, &self.bending)] {
-            for j in 0..9 {
-                for i in 0..9 {
-                    k[(places[i], places[j])] = stiffness[(i, j)];
-                }
-            }
-        }
+    /// What the tension at rest does along a deformation [J], beside the elastic energy.
+    fn tension_energy(&self, d: &Vector18) -> f64 {
+        d.dot(&self.tension.0)
     }
 
     /// Energy [J] and internal nodal forces and moments, its gradient with respect to positions and spins.
@@ -230,7 +319,7 @@ impl Facet {
         let raw = self.linear_force(&placed.deformation);
         let spun = placed.to_spins(&raw);
         (
-            0.5 * placed.deformation.dot(&raw),
+            0.5 * (placed.deformation.dot(&raw) + self.tension_energy(&placed.deformation)),
             placed.to_space(&project(placed, &self.frame_spins(placed), &spun)),
         )
     }
@@ -271,7 +360,7 @@ impl Facet {
     /// The change of the force in the facet's axes.
     fn local_tangent(&self, placed: &Placed, kind: Tangent, k: &mut Matrix18) {
         let raw = self.linear_force(&placed.deformation);
-        self.linear_stiffness(k);
+        k.copy_from(&self.stiffness);
         let spun = match kind {
             Tangent::Full => {
                 placed.spin_stiffness(k);
@@ -375,40 +464,53 @@ impl Facet {
 
     /// Energy in its parts.
     pub(crate) fn energy(&self, placed: &Placed) -> ShellEnergy {
-        let of = |places: [usize; 9], stiffness: &Matrix9| {
-            let own = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[places[i]]);
-            0.5 * own.dot(&(stiffness * own))
-        };
-        let plane = of(MEMBRANE, &self.membrane);
-        // What an element without resistance in its plane has not, it cannot split.
-        let membrane = of(MEMBRANE, &andes_basic(&self.corners, &self.elastic, self.thickness)).min(plane);
-        ShellEnergy { membrane, bending: of(BENDING, &self.bending), drilling: plane - membrane }
+        let d = &placed.deformation;
+        let whole = 0.5 * d.dot(&(self.stiffness * d));
+        let turned = SVector::<f64, 9>::from_fn(|i, _| d[BENDING[i]]);
+        let mut bending = 0.5 * turned.dot(&(self.bending * turned));
+        let strain = self.strain.0 * d;
+        if let Some(section) = &self.section {
+            bending += strain.dot(&(section.coupling * (self.curvature() * d))) * self.strain.1;
+        }
+        let membrane = 0.5 * self.thickness * self.strain.1 * strain.dot(&(self.elastic.matrix * strain));
+        let drilling = (whole - membrane - bending).max(0.0);
+        ShellEnergy { membrane: membrane + self.tension_energy(d), bending, drilling }
     }
 
-    /// Mean forces and moments per length: those whose work with a uniform strain or curvature is that of the element's nodal forces,
-    /// whatever its formulation. For ANDES that is D Lᵀ d/A (Felippa 2003), for the discrete Kirchhoff triangle D times the mean
-    /// curvature.
+    /// Mean forces and moments per length: t D times the mean strain, and those moments whose work with a uniform curvature is that of
+    /// the element's nodal forces (for the discrete Kirchhoff triangle D times the mean curvature).
     pub(crate) fn resultants(&self, placed: &Placed) -> Resultants {
-        let force = self.linear_force(&placed.deformation);
-        let (mut membrane, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        let d = &placed.deformation;
+        let strain = self.strain.0 * d;
+        let tension = Vector3::new(self.tension.1, self.tension.1, 0.0);
+        let mut membrane = self.elastic.matrix * strain * self.thickness + tension;
+        let force = self.bending * SVector::<f64, 9>::from_fn(|i, _| d[BENDING[i]]);
+        let mut moment = Vector3::zeros();
         for (i, corner) in self.corners.iter().enumerate() {
             let (x, y) = (corner.x, corner.y);
-            let [fx, fy, fz, mx, my] = [0, 1, 2, 3, 4].map(|c| force[6 * i + c]);
-            membrane += Vector3::new(x * fx, y * fy, 0.5 * (x * fy + y * fx));
+            let [fz, mx, my] = [0, 1, 2].map(|c| force[3 * i + c]);
             // w of curvatures −w,xx = 1, −w,yy = 1 and −2 w,xy = 1, with θx = w,y and θy = −w,x.
             let deflection = -0.5 * Vector3::new(x * x, y * y, x * y);
             moment += deflection * fz + Vector3::new(x * my, -y * mx, 0.5 * (y * my - x * mx));
         }
-        Resultants { membrane: membrane / self.area, moment: moment / self.area, axes: placed.axes }
+        moment /= self.area;
+        if let Some(section) = &self.section {
+            membrane += section.coupling * (self.curvature() * d);
+            moment += section.coupling * strain;
+        }
+        Resultants { membrane, moment, axes: placed.axes }
     }
 
     /// The largest ω² [1/s²] of the element by itself about its rest shape, with its lumped masses: none of the model's is higher.
     pub(crate) fn highest_frequency_squared(&self) -> f64 {
         let scale = |i: usize| if i % 6 < 3 { self.mass } else { self.inertia }.sqrt();
-        let mut k = Matrix18::zeros();
-        self.linear_stiffness(&mut k);
-        let scaled = Matrix18::from_fn(|i, j| k[(i, j)] / (scale(i) * scale(j)));
+        let scaled = Matrix18::from_fn(|i, j| self.stiffness[(i, j)] / (scale(i) * scale(j)));
         SymmetricEigen::new(scaled).eigenvalues.max()
+    }
+
+    /// How it resists in its plane.
+    pub fn membrane(&self) -> Membrane {
+        self.formulation.membrane
     }
 
     /// The longest stable step [s] of the element by itself, at rest.
@@ -418,9 +520,46 @@ impl Facet {
 
     /// The largest force of a displacement of one node [N/m]: of slivers far above E t.
     pub(crate) fn stiffest(&self) -> f64 {
-        let in_plane = [0, 1, 3, 4, 6, 7].map(|at| self.membrane[(at, at)]);
-        let across = [0, 3, 6].map(|at| self.bending[(at, at)]);
-        in_plane.into_iter().chain(across).fold(0.0, f64::max)
+        (0..18).filter(|i| i % 6 < 3).map(|i| self.stiffness[(i, i)]).fold(0.0, f64::max)
+    }
+
+    /// Stress (σxx, σyy, σxy) [Pa] at the top, in the middle and at the bottom, and the largest von Mises stress there and, of a wall of
+    /// layers, at the faces of each.
+    pub(crate) fn stresses(&self, resultants: &Resultants) -> ([Vector3<f64>; 3], f64) {
+        let mises = |s: &Vector3<f64>| (s.x * s.x - s.x * s.y + s.y * s.y + 3.0 * s.z * s.z).sqrt();
+        let Some(section) = &self.section else {
+            let all = [0.5, 0.0, -0.5].map(|part| resultants.stress(self.thickness, part * self.thickness));
+            return (all, all.iter().map(mises).fold(0.0, f64::max));
+        };
+        // The tension at rest is the same in all layers.
+        let tension = Vector3::new(self.tension.1, self.tension.1, 0.0);
+        let elastic = resultants.membrane - tension;
+        let (all, faces) = section.stresses(&elastic, &resultants.moment);
+        let whole = |stress: Vector3<f64>| stress + tension / self.thickness;
+        (all.map(whole), faces.map(|stress| mises(&whole(stress))).fold(0.0, f64::max))
+    }
+
+    /// How far it is strained.
+    pub(crate) fn strain(&self, placed: &Placed) -> ShellStrain {
+        let entry = |row: usize, column: usize| -> f64 {
+            (0..3).map(|i| placed.local[i][row] * self.gradient[i][column]).sum()
+        };
+        let strain = Vector3::new(entry(0, 0) - 1.0, entry(1, 1) - 1.0, entry(0, 1) + entry(1, 0));
+        let own = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[BENDING[i]]);
+        ShellStrain::new(&strain, &(mean_curvature(&self.corners) * own), self.thickness)
+    }
+
+    /// Thickness [m] with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1 − ν)): −ν/(1 − ν) (ε₁ + ε₂) where strains are
+    /// small, and the same volume for ν = ½ however large they are. Forces do not feel it.
+    pub(crate) fn thickness_now(&self, placed: &Placed) -> f64 {
+        let nu = self.elastic.poisson;
+        let ratio = area(&placed.local) / self.area;
+        self.thickness * ratio.powf(-nu / (1.0 - nu))
+    }
+
+    /// Whether it resists bending.
+    pub fn bends(&self) -> bool {
+        self.bending != Matrix9::zeros()
     }
 
     /// The smallest altitude at rest [m].
@@ -428,6 +567,24 @@ impl Facet {
         let longest =
             (0..3).map(|i| (self.corners[i] - self.corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
         2.0 * self.area / longest
+    }
+}
+
+/// Strains over the nine displacements at some places, over all eighteen.
+fn spread(places: [usize; 9], own: &SMatrix<f64, 3, 9>) -> Matrix3x18 {
+    let mut all = Matrix3x18::zeros();
+    for (column, place) in places.into_iter().enumerate() {
+        all.set_column(place, &own.column(column));
+    }
+    all
+}
+
+/// Adds a part of the stiffness at its places among the eighteen.
+fn add_block(k: &mut Matrix18, places: [usize; 9], part: &Matrix9) {
+    for (j, &column) in places.iter().enumerate() {
+        for (i, &row) in places.iter().enumerate() {
+            k[(row, column)] += part[(i, j)];
+        }
     }
 }
 
@@ -536,8 +693,10 @@ fn quaternion(axes: Matrix3<f64>) -> UnitQuaternion<f64> {
 
 #[cfg(test)]
 mod tests {
+    use pliant_geometry::EDGES;
+
     use super::*;
-    use crate::element::Membrane;
+    use crate::element::Elasticity;
     use crate::rotation::exponential;
     use crate::testing::Random;
 
@@ -553,10 +712,70 @@ mod tests {
         [[0.1, -0.2, 0.3], [1.3, 0.1, 0.2], [0.3, 0.8, 0.7]].map(Vector3::from)
     }
 
-    fn facet(order: [usize; 3]) -> Facet {
+    fn flat(order: [usize; 3], membrane: Membrane) -> Facet {
         let x = rest();
         let nodes = order.map(|i| i as u32);
-        Facet::new(nodes, order.map(|i| x[i]), 0.1, MATERIAL, Formulation::default()).unwrap()
+        let formulation = Formulation { membrane, ..Formulation::default() };
+        Facet::new(nodes, order.map(|i| x[i]), 0.1, MATERIAL, formulation).unwrap()
+    }
+
+    /// Normals that lean by 0.2 to 0.4 rad.
+    fn normals() -> [Vector3<f64>; 3] {
+        let [a, b, c] = rest();
+        let normal = (b - a).cross(&(c - a)).normalize();
+        [[0.3, 0.1, 0.0], [-0.1, 0.2, 0.1], [0.2, -0.3, 0.1]].map(|n| (normal + Vector3::from(n)).normalize())
+    }
+
+    /// With a curved membrane, one of its edges straight.
+    fn facet(order: [usize; 3]) -> Facet {
+        let mut facet = flat(order, Membrane::default());
+        let normals = normals();
+        // The edge from the second to the third node of the rest shape.
+        let straight = EDGES.map(|edge| edge.map(|corner| order[corner]).iter().all(|&node| node > 0));
+        facet.curve(order.map(|i| normals[i]), straight);
+        facet
+    }
+
+    /// Mean strain and stiffness are those of ANDES-OPT where the normals are the facet's, and where all edges are straight: 1e-13.
+    #[test]
+    fn a_curved_membrane_without_curvature_is_andes() {
+        let [a, b, c] = rest();
+        let normal = (b - a).cross(&(c - a)).normalize();
+        let andes = flat([0, 1, 2], Membrane::Opt { adaptation: 10.0 });
+        for (normals, straight) in [([normal; 3], [false; 6]), (normals(), [true; 6])] {
+            let mut facet = flat([0, 1, 2], Membrane::default());
+            facet.curve(normals, straight);
+            let off = (facet.stiffness - andes.stiffness).amax() / andes.stiffness.amax();
+            assert!(off < 1e-13, "{off:e}");
+            let off = (facet.strain.0 - andes.strain.0).amax() / andes.strain.0.amax();
+            assert!(off < 1e-13, "{off:e}");
+        }
+        assert!((facet([0, 1, 2]).stiffness - andes.stiffness).amax() > 1e-3 * andes.stiffness.amax());
+    }
+
+    /// Six rigid motions cost nothing, 1e-12 of the stiffness; no other does.
+    #[test]
+    fn a_curved_facet_has_six_rigid_motions() {
+        let facet = facet([0, 1, 2]);
+        let scale = facet.stiffness.amax();
+        for motion in 0..6 {
+            let mut rigid = Vector18::zeros();
+            for (i, corner) in facet.corners.iter().enumerate() {
+                let axis = Vector3::ith(motion % 3, 1.0);
+                if motion < 3 {
+                    rigid.fixed_rows_mut::<3>(6 * i).copy_from(&axis);
+                } else {
+                    rigid.fixed_rows_mut::<3>(6 * i).copy_from(&axis.cross(&corner.push(0.0)));
+                    rigid.fixed_rows_mut::<3>(6 * i + 3).copy_from(&axis);
+                }
+            }
+            let off = (facet.stiffness * rigid).amax() / scale;
+            assert!(off < 1e-12, "{motion}: {off:e}");
+        }
+        let symmetric = 0.5 * (facet.stiffness + facet.stiffness.transpose());
+        let values = SymmetricEigen::new(symmetric).eigenvalues;
+        assert_eq!(values.iter().filter(|value| **value > 1e-9 * scale).count(), 12, "{values}");
+        assert!(values.min() > -1e-12 * scale);
     }
 
     /// A large common rotation, stretch and shear of 5 %, nodes turned by up to 0.3 rad.
@@ -684,8 +903,8 @@ mod tests {
         let mut random = Random::new(6);
         let (x, rotation) = pose(&mut random, 1.0);
         for membrane in [Membrane::default(), Membrane::Opt { adaptation: f64::INFINITY }] {
-            let formulation = Formulation { membrane, ..Formulation::default() };
-            let facet = Facet::new([0, 1, 2], rest(), 0.1, MATERIAL, formulation).unwrap();
+            let mut facet = flat([0, 1, 2], membrane);
+            facet.curve(normals(), [false; 6]);
             let placed = facet.place(&x, &rotation).unwrap();
             let parts = facet.energy(&placed);
             let whole = facet.force(&placed).0;

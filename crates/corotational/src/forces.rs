@@ -7,7 +7,7 @@ use crate::system::System;
 
 /// Forces and moments on the nodes of a model at the state last evaluated.
 pub struct Forces<'m> {
-    system: System<'m>,
+    pub(crate) system: System<'m>,
 }
 
 impl<'m> Forces<'m> {

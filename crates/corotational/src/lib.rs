@@ -1,8 +1,8 @@
 //! Thin structures in large rotation: co-rotational triangular shells with membrane, bending and twist, and co-rotational tetrahedra beside
 //! them, with static and implicit solvers. Knows nothing of files or windows. SI units throughout.
 //!
-//! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane (Felippa 2003), six degrees of
-//! freedom a node, in a frame that turns with the facet; its force is the gradient of its energy. [`Model`] is constant, [`State`]
+//! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane (Felippa 2003), which takes the
+//! mean strain of the curved triangle, six degrees of freedom a node, in a frame that turns with the facet; its force is the gradient of its energy. [`Model`] is constant, [`State`]
 //! changes; [`Statics`] finds equilibria, [`BackwardEuler`] and [`Explicit`] move a state in time; [`CurvedSurface`] is the smooth
 //! surface of the shells for pictures and for forces on any of its points.
 //!
@@ -34,6 +34,7 @@
 //! ```
 
 mod carry;
+mod control;
 mod dynamics;
 pub mod element;
 mod error;
@@ -44,11 +45,14 @@ mod initial;
 mod linear;
 mod model;
 mod picture;
+mod pressure;
 mod recover;
+mod resolution;
 mod rotation;
 mod sparse;
 mod state;
 mod statics;
+mod strain;
 mod surface;
 mod system;
 #[cfg(test)]
@@ -57,7 +61,7 @@ mod testing;
 mod tests;
 mod tet;
 
-pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit};
+pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
 pub use forces::Forces;
@@ -65,8 +69,10 @@ pub use linear::{LinearReport, LinearSolver, Preconditioner};
 pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spread, Spring};
 pub use picture::{Picture, PictureFields};
 pub use recover::{ShellFields, SolidFields, von_mises};
+pub use resolution::Resolution;
 pub use state::State;
-pub use statics::{Control, StaticSettings, Statics, Step, check_held};
+pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
+pub use strain::ShellStrain;
 pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Place};
 pub use system::Phases;
 pub use tet::Tet;

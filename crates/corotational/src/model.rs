@@ -5,11 +5,14 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use pliant_mechanics::curve::Curve;
 
-use crate::element::{Elasticity, Formulation};
+use crate::element::{Elasticity, Formulation, Layer};
 use crate::error::ModelError;
 use crate::facet::Facet;
-use crate::surface::Carried;
+use crate::surface::{Carried, straight_edges};
 use crate::tet::Tet;
+
+/// The least part of a direction that lies in a triangle.
+const ALONG: f64 = 1e-3;
 
 /// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
 #[derive(Clone, Debug, Default)]
@@ -47,6 +50,8 @@ pub struct Normal {
     pub node: u32,
     /// Unit vector at rest.
     pub direction: Vector3<f64>,
+    /// Whether it is the mean of its triangles, not given.
+    pub estimated: bool,
 }
 
 /// Elasticity and density.
@@ -71,6 +76,12 @@ pub struct Shell {
     pub material: Vec<Material>,
     /// Its elements.
     pub formulation: Formulation,
+    /// Layers from the bottom (against the normals) to the top; with some, `thickness` and `material` say nothing.
+    pub layers: Vec<Layer>,
+    /// The direction that the angles of layers count from, projected on each triangle: one, or one a triangle.
+    pub direction: Vec<Vector3<f64>>,
+    /// Tension [N/m] at rest, equal in all directions.
+    pub tension: f64,
     /// Triangles that meet at a larger angle [rad] have normals of their own: a crease.
     pub crease: f64,
     /// Normals of nodes at rest, of any length and to either side: those of a surface that is known better than by its triangles.
@@ -89,6 +100,9 @@ impl Shell {
             thickness: vec![thickness],
             material: vec![material],
             formulation: Formulation::default(),
+            layers: Vec::new(),
+            direction: Vec::new(),
+            tension: 0.0,
             crease: std::f64::consts::FRAC_PI_4,
             normals: BTreeMap::new(),
             branches: false,
@@ -97,7 +111,7 @@ impl Shell {
 }
 
 /// What was noticed when a shell was added.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Notes {
     /// Triangles turned over so that all face the same side.
     pub turned: usize,
@@ -105,6 +119,9 @@ pub struct Notes {
     pub thick: usize,
     /// Triangles folded back onto all their neighbours, as inverted ones are: how many, and the number of the first.
     pub inverted: Option<(usize, usize)>,
+    /// Mean thickness over width, where there is a border: a strip of length L and width b has two areas over its border, b L/(b + L).
+    /// Shear across the thickness, which is left out, makes a strip softer against twist by 0.63 of it.
+    pub stoutness: Option<f64>,
     /// Elements of Comas (2010), which depend on the numbering and converge to a wrong plate.
     pub comas: usize,
 }
@@ -192,10 +209,10 @@ pub enum LoadKind {
 /// How a pressure on a shell comes to its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spread {
-    /// A third of p A n of the flat facet to each corner.
-    #[default]
+    /// A third of p A n of the flat facet to each corner: for flat membranes.
     Lumped,
-    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments. Stiffness comes from the flat facets.
+    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments: for curved membranes.
+    #[default]
     Curved,
 }
 
@@ -247,21 +264,28 @@ impl Model {
         let mut notes = Notes { turned, ..Notes::default() };
         let mut facets = Vec::with_capacity(cells.len());
         for (number, &nodes) in cells.iter().enumerate() {
-            let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
-            let material = shell.material[if shell.material.len() == 1 { 0 } else { number }];
             let corners = nodes.map(|node| self.rest[node as usize]);
-            let facet = Facet::new(nodes, corners, thickness, material, shell.formulation);
+            let facet = if shell.layers.is_empty() {
+                let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
+                let material = shell.material[if shell.material.len() == 1 { 0 } else { number }];
+                Facet::new(nodes, corners, thickness, material, shell.formulation)
+            } else {
+                let direction = direction_of(shell, number, &corners)?;
+                Facet::layered(nodes, corners, &shell.layers, &direction, shell.formulation)
+            };
+            let facet = facet.map(|facet| facet.under_tension(shell.tension));
             let facet = facet.ok_or_else(|| ModelError::Degenerate {
                 shell: shell.name.clone(),
                 cell: number,
                 what: "area",
                 value: 0.5 * (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm(),
             })?;
-            notes.thick += usize::from(thickness > facet.altitude());
+            notes.thick += usize::from(facet.thickness > facet.altitude());
             notes.comas += usize::from(shell.formulation.bending == crate::element::Bending::Comas2010);
             facets.push(facet);
         }
         notes.inverted = self.inverted(&cells);
+        notes.stoutness = self.stoutness(&facets);
         let (normals, corner_normals) = self.normals_of(shell, &facets)?;
         self.normals.extend(normals);
         self.corner_normals.extend(corner_normals);
@@ -272,7 +296,27 @@ impl Model {
             }
         }
         self.facets.extend(facets);
+        self.curve_facets();
         Ok(notes)
+    }
+
+    /// Gives the facets the normals of their corners. A shell that shares edges with others makes creases of them.
+    fn curve_facets(&mut self) {
+        let straight = straight_edges(self);
+        for ((facet, corners), straight) in self.facets.iter_mut().zip(&self.corner_normals).zip(straight) {
+            facet.curve(corners.map(|normal| self.normals[normal as usize].direction), straight);
+        }
+    }
+
+    /// Mean thickness over twice the area by the length of the border; `None` of a closed shell.
+    fn stoutness(&self, facets: &[Facet]) -> Option<f64> {
+        let cells: Vec<[u32; 3]> = facets.iter().map(|facet| facet.nodes).collect();
+        let border = edges(&cells).into_iter().filter(|(_, sides)| sides.len() == 1);
+        let length = |([a, b], _): ([u32; 2], _)| (self.rest[a as usize] - self.rest[b as usize]).norm();
+        let border: f64 = border.map(length).sum();
+        let area: f64 = facets.iter().map(|facet| facet.area).sum();
+        let volume: f64 = facets.iter().map(|facet| facet.area * facet.thickness).sum();
+        (border > 0.0).then(|| volume / area * border / (2.0 * area))
     }
 
     /// The triangles with two neighbours or more whose normals are all turned by more than 150°: how many, and the first.
@@ -329,6 +373,15 @@ impl Model {
             Err(ModelError::OutOfRange { shell: shell.name.clone(), what, value, range })
         };
         let positive = |value: f64| value > 0.0 && value.is_finite();
+        for (cell, nodes) in shell.cells.iter().enumerate() {
+            check_nodes(&shell.name, cell, nodes, self.rest.len())?;
+        }
+        if !(shell.tension >= 0.0 && shell.tension.is_finite()) {
+            return out_of_range("tension".into(), shell.tension, "finite and not negative");
+        }
+        if !shell.layers.is_empty() {
+            return check_layers(shell);
+        }
         for &material in &shell.material {
             check_material(&shell.name, material, 1.0, "between -1 and 1")?;
         }
@@ -342,9 +395,6 @@ impl Model {
         if let Some((cell, &value)) = shell.thickness.iter().enumerate().find(|(_, t)| !positive(**t)) {
             let what = if given == 1 { "thickness".into() } else { format!("thickness of element {cell}") };
             return out_of_range(what, value, "positive and finite");
-        }
-        for (cell, nodes) in shell.cells.iter().enumerate() {
-            check_nodes(&shell.name, cell, nodes, self.rest.len())?;
         }
         Ok(())
     }
@@ -391,7 +441,7 @@ impl Model {
                 if let Some(&(cell, _)) = fan.iter().find(|corner| given.is_some() && !stands(corner.0)) {
                     return Err(ModelError::Normal { shell: shell.name.clone(), node, cell });
                 }
-                normals.push(Normal { node, direction });
+                normals.push(Normal { node, direction, estimated: given.is_none() });
             }
         }
         Ok((normals, corner_normals))
@@ -461,6 +511,41 @@ impl Model {
         }
         if count > 0 { sum / f64::from(count) } else { 1.0 }
     }
+}
+
+fn check_layers(shell: &Shell) -> Result<(), ModelError> {
+    let out_of_range =
+        |what, value, range| Err(ModelError::OutOfRange { shell: shell.name.clone(), what, value, range });
+    for (number, layer) in shell.layers.iter().enumerate() {
+        let what = |what: &str| format!("{what} of layer {number}");
+        if !layer.elastic.is_stable() {
+            let range = "so that every deformation costs energy: moduli above 0, and its square below E₁/E₂";
+            return out_of_range(what("Poisson's ratio"), layer.elastic.poisson, range);
+        }
+        for (name, value) in [("thickness", layer.thickness), ("density", layer.density)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return out_of_range(what(name), value, "positive and finite");
+            }
+        }
+    }
+    let (cells, given) = (shell.cells.len(), shell.direction.len());
+    if given != 1 && given != cells {
+        return Err(ModelError::Count { shell: shell.name.clone(), what: "directions", cells, given });
+    }
+    Ok(())
+}
+
+/// The direction of the layers of a triangle.
+fn direction_of(shell: &Shell, cell: usize, corners: &[Vector3<f64>; 3]) -> Result<Vector3<f64>, ModelError> {
+    let direction = shell.direction[if shell.direction.len() == 1 { 0 } else { cell }];
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(&(c - a));
+    let along = direction - normal * (normal.dot(&direction) / normal.norm_squared());
+    // Written so that NaN and a triangle without area are found too; the latter has its own error.
+    if along.norm() > ALONG * direction.norm() || normal == Vector3::zeros() {
+        return Ok(along);
+    }
+    Err(ModelError::Direction { shell: shell.name.clone(), cell })
 }
 
 fn check_material(

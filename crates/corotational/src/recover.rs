@@ -3,7 +3,7 @@
 //! Shells: membrane forces and bending moments are the means over the facet that do the same work with uniform strains and curvatures
 //! as its nodal forces: n = t Dm Lᵀd/(t A) of the ANDES membrane (Felippa 2003, CMAME 192:2125), whose strain has a part from drilling,
 //! and m = t³/12 Dm κ with the mean curvature of the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980). Stress at a height z along the
-//! facet's normal is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959).
+//! facet's normal is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959), in layers Q (ε + z κ) with ε and κ of n and m.
 //! Tetrahedra: Cauchy stress σ = P Fᵀ/J of their energy.
 //! Leaves out: shear across the thickness, variation within a facet, averages at nodes.
 
@@ -11,9 +11,10 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::error::SolveError;
-use crate::facet::{Broken, Facet, Resultants, ShellEnergy};
+use crate::facet::{Resultants, ShellEnergy};
 use crate::model::Model;
 use crate::state::State;
+use crate::strain::ShellStrain;
 use crate::tet::TetStress;
 
 /// Fields of all facets, one entry a facet. Its arrays are made at the first use and kept.
@@ -27,10 +28,14 @@ pub struct ShellFields {
     pub stress: [Vec<Matrix3<f64>>; 3],
     /// Von Mises stress [Pa] there.
     pub von_mises: [Vec<f64>; 3],
-    /// The largest of the three [Pa].
+    /// The largest of the three [Pa]; in a wall of layers of both faces of each.
     pub largest: Vec<f64>,
     /// Strain energy over the area at rest [J/m²] in its parts.
     pub energy: Vec<ShellEnergy>,
+    /// Thickness [m] with the strain across that plane stress asks for; forces do not feel it.
+    pub thickness: Vec<f64>,
+    /// How far it is strained.
+    pub strain: Vec<ShellStrain>,
 }
 
 impl ShellFields {
@@ -43,51 +48,49 @@ impl ShellFields {
         for tensors in [&mut self.membrane, &mut self.moment].into_iter().chain(&mut self.stress) {
             tensors.resize(count, Matrix3::zeros());
         }
-        for numbers in self.von_mises.iter_mut().chain([&mut self.largest]) {
+        for numbers in self.von_mises.iter_mut().chain([&mut self.largest, &mut self.thickness]) {
             numbers.resize(count, 0.0);
         }
         self.energy.resize(count, ShellEnergy::default());
+        self.strain.resize(count, ShellStrain::default());
         let [top, middle, bottom] = &mut self.stress;
         let [top_mises, middle_mises, bottom_mises] = &mut self.von_mises;
         let broken = (
             &model.facets,
             (&mut self.membrane, &mut self.moment, &mut self.largest, &mut self.energy),
+            (&mut self.thickness, &mut self.strain),
             (top, middle, bottom),
             (top_mises, middle_mises, bottom_mises),
         )
             .into_par_iter()
             .with_min_len(64)
             .enumerate()
-            .find_map_first(|(cell, (facet, own, stress, mises))| {
-                let found = resultants_and_energy(facet, state);
-                let (resultants, energy) = match found {
-                    Ok(found) => found,
+            .find_map_first(|(cell, (facet, own, wall, stress, mises))| {
+                let (x, rotation) = state.corners(facet.nodes);
+                let placed = match facet.place(&x, &rotation) {
+                    Ok(placed) => placed,
                     Err(why) => return Some(SolveError::Broken { cell, why }),
                 };
+                let (resultants, energy) = (facet.resultants(&placed), facet.energy(&placed));
                 let in_space = |tensor: &Vector3<f64>| resultants.in_space(tensor);
-                let heights = [0.5, 0.0, -0.5].map(|part| part * facet.thickness);
-                let stresses = heights.map(|height| in_space(&resultants.stress(facet.thickness, height)));
+                let (stresses, largest) = facet.stresses(&resultants);
+                let stresses = stresses.map(|stress| in_space(&stress));
                 let each = stresses.map(|stress| von_mises(&stress));
                 *own.0 = in_space(&resultants.membrane);
                 *own.1 = in_space(&resultants.moment);
-                *own.2 = each.into_iter().fold(0.0, f64::max);
+                *own.2 = largest;
                 *own.3 = ShellEnergy {
                     membrane: energy.membrane / facet.area,
                     bending: energy.bending / facet.area,
                     drilling: energy.drilling / facet.area,
                 };
+                (*wall.0, *wall.1) = (facet.thickness_now(&placed), facet.strain(&placed));
                 [*stress.0, *stress.1, *stress.2] = stresses;
                 [*mises.0, *mises.1, *mises.2] = each;
                 None
             });
         broken.map_or(Ok(()), Err)
     }
-}
-
-fn resultants_and_energy(facet: &Facet, state: &State) -> Result<(Resultants, ShellEnergy), Broken> {
-    let (x, rotation) = state.corners(facet.nodes);
-    let placed = facet.place(&x, &rotation)?;
-    Ok((facet.resultants(&placed), facet.energy(&placed)))
 }
 
 impl Resultants {
@@ -165,9 +168,10 @@ mod tests {
     use pliant_mechanics::curve::{Curve, Shape};
 
     use super::*;
+    use crate::element::Formulation;
     use crate::rotation::exponential;
-    use crate::tests::{MATERIAL, balloon, bar, model, strip};
-    use crate::{Constraint, Load, LoadKind, Motion, Spread, StaticSettings, Statics};
+    use crate::tests::{FLAT, MATERIAL, balloon, bar, model, strip};
+    use crate::{Constraint, Load, LoadKind, Motion, Shell, Spread, StaticSettings, Statics};
 
     const YOUNG: f64 = MATERIAL.elastic.young;
     const POISSON: f64 = MATERIAL.elastic.poisson;
@@ -265,6 +269,11 @@ mod tests {
     /// A closed cylinder (its ends are pulled with p R/2): hoop p R, along p R/2. With 48 facets round, 0.5 %.
     #[test]
     fn membrane_forces_of_a_cylinder_under_pressure() {
+        cylinder_under_pressure(FLAT, Spread::Lumped, [0.02, 0.002]);
+        cylinder_under_pressure(Formulation::default(), Spread::Curved, [0.01, 0.003]);
+    }
+
+    fn cylinder_under_pressure(formulation: Formulation, spread: Spread, limits: [f64; 2]) {
         let (round, long, pressure) = (48_u32, 6_u32, 10.0);
         let node = |i: u32, j: u32| i % round + round * j;
         let points = (0..round * (long + 1)).map(|n| {
@@ -278,7 +287,9 @@ mod tests {
                 [node(i, j), node(i + 1, j + 1), node(i, j + 1)],
             ]
         });
-        let mut model = model((points.collect(), cells.collect()), 0.02);
+        let mut model = Model::new(points.collect());
+        let shell = Shell { formulation, ..Shell::new("cylinder", cells.collect(), 0.02, MATERIAL) };
+        model.add_shell(&shell).unwrap();
         let mut hold = |nodes: Vec<u32>, components| {
             let motion = Motion::Fixed;
             model.constraints.push(Constraint { name: "held".into(), nodes, components, motion });
@@ -290,7 +301,7 @@ mod tests {
         let edges = (0..round).map(|i| [node(i, long), node(i + 1, long)]).collect();
         let cells = (0..model.facets.len() as u32).collect();
         for kind in [
-            LoadKind::Pressure { cells, pressure, spread: Spread::Lumped },
+            LoadKind::Pressure { cells, pressure, spread },
             LoadKind::Edge { edges, traction: Vector3::new(0.0, 0.0, 0.5 * pressure) },
         ] {
             model.loads.push(Load { name: "load".into(), kind, curve: curve.clone(), controlled: false });
@@ -305,7 +316,7 @@ mod tests {
             [around.dot(&(n * around)) / pressure, n[(2, 2)] / (0.5 * pressure)]
         });
         let ratios: Vec<[f64; 2]> = ratios.collect();
-        for (direction, middle) in [(0, 0.02), (1, 0.002)] {
+        for (direction, middle) in limits.into_iter().enumerate() {
             let mean = ratios.iter().map(|n| n[direction]).sum::<f64>() / ratios.len() as f64;
             let off =
                 |cells: &[[f64; 2]]| cells.iter().map(|n| (n[direction] - 1.0).abs()).fold(0.0, f64::max);

@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::rotation::exponential;
 
 /// Where a model is.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct State {
     /// Time [s], or the course of a quasi-static load.
     pub time: f64,

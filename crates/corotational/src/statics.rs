@@ -1,5 +1,7 @@
 //! Static equilibria: Newton's method with load steps; displacement control and arc length (Crisfield 1981) past limit
 //! points; a prescribed volume for balloons. A control finds the factor of the controlled loads as one more unknown.
+//! Nodes of membranes, which nothing but tension holds across, get an artificial stiffness on the diagonal that is proportional to the
+//! largest residual on them (Levenberg 1944, Marquardt 1963): it bounds what an iteration moves them and vanishes at equilibrium.
 //! Leaves out: branch switching at bifurcations.
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
@@ -8,6 +10,7 @@ use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::linear::{LinearSolver, dot};
 use crate::model::{Load, LoadKind, Model};
+use crate::sparse::NONE;
 use crate::state::State;
 use crate::system::{Phases, System};
 
@@ -51,6 +54,12 @@ impl Default for StaticSettings {
 /// Growth of the residual along an increment above which it is shortened. With 1 the slit annulus takes a fifth more iterations.
 const GROWTH: f64 = 10.0;
 
+/// What a residual on a node of a membrane may move it in an iteration, as a part of the extent of the membranes.
+const REACH: f64 = 0.1;
+
+/// The least artificial stiffness of membranes, as a part of the largest stiffness of a cell.
+const LEAST: f64 = 1e-12;
+
 /// What fixes the factor of the controlled loads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Control {
@@ -88,10 +97,32 @@ pub struct Step {
     pub parts: usize,
 }
 
+/// An attempt to find an equilibrium.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Attempted {
+    /// The time that it was to reach.
+    pub time: f64,
+    /// Factor of the controlled loads at its end.
+    pub load_factor: f64,
+    /// Whether it found one.
+    pub found: bool,
+    /// Norm of the residual [N] before each iteration and at the end.
+    pub residuals: Vec<f64>,
+    /// What was allowed at the end [N].
+    pub allowed: f64,
+}
+
 /// A static solver.
 pub struct Statics<'m> {
     system: System<'m>,
     settings: StaticSettings,
+    /// Equations of the translations of nodes that only membranes hold.
+    slack: Vec<u32>,
+    /// How far a residual may move these in an iteration [m], and their least artificial stiffness [N/m].
+    reach: f64,
+    least: f64,
+    /// Attempts of the last call.
+    attempts: Vec<Attempted>,
     /// Mean edge [m]: makes forces of moments.
     length: f64,
     /// What round-off leaves of a residual, about ε E t |x| a node [N].
@@ -110,7 +141,7 @@ pub struct Statics<'m> {
     direction: Vec<f64>,
 }
 
-/// An attempt that failed, with the residuals so far and the node of the largest.
+/// An attempt that failed.
 struct Attempt {
     error: SolveError,
     /// Whether smaller load steps may help.
@@ -126,8 +157,14 @@ impl<'m> Statics<'m> {
         check_held(model)?;
         let system = System::new(model, settings.linear)?;
         let (all, free) = (6 * model.rest.len(), system.equations.len());
+        let (slack, extent) = slack(model, &system);
+        let stiffest = model.facets.iter().map(|facet| facet.stiffest()).fold(0.0, f64::max);
         Ok(Self {
             settings,
+            slack,
+            reach: REACH * extent,
+            least: LEAST * stiffest,
+            attempts: Vec::new(),
             length: model.mean_edge(),
             round_off: model.round_off(),
             pending: vec![0.0; all],
@@ -145,6 +182,11 @@ impl<'m> Statics<'m> {
     /// Time spent in the parts of the solver so far.
     pub fn phases(&self) -> Phases {
         self.system.phases
+    }
+
+    /// The attempts of the last call of [`solve`](Self::solve) or [`control`](Self::control), one after the other.
+    pub fn attempts(&self) -> &[Attempted] {
+        &self.attempts
     }
 
     /// Forces and moments on each node of the model that its elements resist with, less its loads, at the last evaluation:
@@ -174,6 +216,7 @@ impl<'m> Statics<'m> {
     /// # Errors
     /// If a step fails as often as it may be halved; the state then is at the last equilibrium found on the way.
     pub fn solve(&mut self, state: &mut State, until: f64) -> Result<Step, SolveError> {
+        self.attempts.clear();
         let mut done = Step::default();
         let mut size = until - state.time;
         let mut halvings = 0;
@@ -206,6 +249,7 @@ impl<'m> Statics<'m> {
     /// # Errors
     /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is found (the state then is as it was).
     pub fn control(&mut self, state: &mut State, control: Control) -> Result<Step, SolveError> {
+        self.attempts.clear();
         if !self.system.model.loads.iter().any(|load| load.controlled) {
             return Err(SolveError::Impossible("no load is marked as controlled"));
         }
@@ -260,7 +304,17 @@ impl<'m> Statics<'m> {
         }
     }
 
+    /// Newton's method from a state, kept with the other attempts.
     fn newton(&mut self, state: &mut State, time: f64, control: Option<Control>) -> Result<Step, Attempt> {
+        self.attempts.push(Attempted { time, ..Attempted::default() });
+        let result = self.iterate(state, time, control);
+        if let Some(attempt) = self.attempts.last_mut() {
+            (attempt.found, attempt.load_factor) = (result.is_ok(), state.load_factor);
+        }
+        result
+    }
+
+    fn iterate(&mut self, state: &mut State, time: f64, control: Option<Control>) -> Result<Step, Attempt> {
         let failed = |error| Attempt { error, retry: true };
         let start = state.clone();
         self.system.prescribed(state.time, time, &mut self.pending);
@@ -272,6 +326,10 @@ impl<'m> Statics<'m> {
                 .map_err(failed)?;
             let (norm, allowed) = self.find_residual(state);
             residuals.push(norm);
+            if let Some(attempt) = self.attempts.last_mut() {
+                attempt.residuals.push(norm);
+                attempt.allowed = allowed;
+            }
             let gap = control.map_or(0.0, |control| self.constraint(control, state, &start));
             let complete = self.pending.iter().all(|&p| p == 0.0);
             let controlled = gap.abs() <= self.allowed_gap(control);
@@ -282,8 +340,17 @@ impl<'m> Statics<'m> {
             if !norm.is_finite() || iteration == self.settings.iterations {
                 break;
             }
-            negative_pivots = self.system.prepare().map_err(failed)?;
-            self.system.solve(&self.residual, &mut self.solution).map_err(failed)?;
+            negative_pivots = match self.find_direction() {
+                Err(error) if self.system.gives_way(&error) => {
+                    let tangent = Some((self.settings.tangent, &self.pending[..]));
+                    self.system.evaluate(state, time, tangent).map_err(failed)?;
+                    self.find_residual(state);
+                    let pivots = self.find_direction();
+                    self.system.exact_pressure = true;
+                    pivots.map_err(failed)?
+                }
+                found => found.map_err(failed)?,
+            };
             let factor = match control {
                 Some(control) => self.controlled_factor(control, gap, iteration == 0)?,
                 None => 0.0,
@@ -300,6 +367,14 @@ impl<'m> Statics<'m> {
         }
         let node = self.worst_node();
         Err(Attempt { error: SolveError::NotConverged { time, node, residuals }, retry: true })
+    }
+
+    /// Solves for the residual; the negative pivots of the stiffness.
+    fn find_direction(&mut self) -> Result<usize, SolveError> {
+        self.hold_slack();
+        let negative_pivots = self.system.prepare()?;
+        self.system.solve(&self.residual, &mut self.solution)?;
+        Ok(negative_pivots)
     }
 
     /// Loads less internal forces on the free components; its norm and what is allowed [N].
@@ -326,6 +401,16 @@ impl<'m> Statics<'m> {
         let StaticSettings { tolerance, floor, .. } = self.settings;
         let allowed = tolerance * external.max(internal) + floor * system.largest + self.round_off;
         (free, allowed)
+    }
+
+    /// Adds the artificial stiffness of membranes.
+    fn hold_slack(&mut self) {
+        let force = |&equation: &u32| self.residual[equation as usize].abs();
+        let largest = self.slack.iter().map(force).fold(0.0, f64::max);
+        let stiffness = (largest / self.reach).max(self.least);
+        for &equation in &self.slack {
+            self.system.matrix.add_diagonal(equation as usize, stiffness);
+        }
     }
 
     fn worst_node(&self) -> u32 {
@@ -447,6 +532,22 @@ impl<'m> Statics<'m> {
         }
         Ok(factor)
     }
+}
+
+/// The equations of the translations of nodes that only membranes hold, and the extent of these nodes [m].
+fn slack(model: &Model, system: &System<'_>) -> (Vec<u32>, f64) {
+    let mut slack = vec![false; model.rest.len()];
+    let mut mark = |nodes: &[u32], is: bool| nodes.iter().for_each(|&node| slack[node as usize] = is);
+    model.facets.iter().for_each(|facet| mark(&facet.nodes, true));
+    model.facets.iter().filter(|facet| facet.bends()).for_each(|facet| mark(&facet.nodes, false));
+    model.tets.iter().for_each(|tet| mark(&tet.nodes, false));
+    let nodes: Vec<usize> = (0..slack.len()).filter(|&node| slack[node]).collect();
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for &node in &nodes {
+        (low, high) = (low.inf(&model.rest[node]), high.sup(&model.rest[node]));
+    }
+    let equations = nodes.iter().flat_map(|node| (0..3).map(move |c| system.equations.number[6 * node + c]));
+    (equations.filter(|&equation| equation != NONE).collect(), (high - low).norm())
 }
 
 /// The volume [m³] that the facets of controlled pressures enclose.

@@ -12,10 +12,13 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 pub use pliant_geometry::EdgeRule;
 use pliant_geometry::{ControlWeights, CurvedTriangle, EDGES};
 
-use crate::facet::Vector18;
+use crate::facet::{Facet, Vector18};
 use crate::model::Model;
 use crate::rotation::skew;
 use crate::state::State;
+
+/// Cosine of the angle between a nodal normal and a facet beyond which edges are straight: 60°.
+const LEANING: f64 = 0.5;
 
 /// A place on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +33,7 @@ pub struct Place {
 #[derive(Clone, Debug)]
 pub struct CurvedSurface {
     rule: EdgeRule,
-    /// Edge control points at creases: on the straight edge, since the two sides have normals of their own.
+    /// Edge control points on the straight edge, as at creases.
     straight: Vec<[bool; 6]>,
     /// The facet across each edge 12, 23, 31.
     neighbours: Vec<[Option<u32>; 3]>,
@@ -62,32 +65,14 @@ impl Deref for Patch {
 impl CurvedSurface {
     /// The surface of all facets.
     pub fn new(model: &Model, rule: EdgeRule) -> Self {
-        let mut sides: BTreeMap<[u32; 2], Vec<(usize, usize)>> = BTreeMap::new();
-        for (number, facet) in model.facets.iter().enumerate() {
-            for i in 0..3 {
-                let (a, b) = (facet.nodes[i], facet.nodes[(i + 1) % 3]);
-                sides.entry([a.min(b), a.max(b)]).or_default().push((number, i));
-            }
-        }
-        let mut straight = vec![[false; 6]; model.facets.len()];
         let mut neighbours = vec![[None; 3]; model.facets.len()];
-        for sides in sides.values() {
+        for sides in sides(&model.facets).values() {
             if let [(a, i), (b, j)] = sides[..] {
                 neighbours[a][i] = Some(b as u32);
                 neighbours[b][j] = Some(a as u32);
             }
-            let normal = |facet: usize, node: u32| {
-                let corner = model.facets[facet].nodes.iter().position(|&n| n == node);
-                corner.map(|corner| model.corner_normals[facet][corner])
-            };
-            for &(facet, i) in sides {
-                for (k, [start, _]) in EDGES.into_iter().enumerate().filter(|(k, _)| k / 2 == i) {
-                    let node = model.facets[facet].nodes[start];
-                    straight[facet][k] =
-                        sides.iter().any(|&(other, _)| normal(other, node) != normal(facet, node));
-                }
-            }
         }
+        let straight = straight_edges(model);
         Self { rule, straight, neighbours }
     }
 
@@ -144,6 +129,44 @@ impl CurvedSurface {
     pub fn carried(&self, model: &Model, state: &State, point: &Carried) -> Vector3<f64> {
         self.patch(model, state, point.place.facet).carried(point)
     }
+}
+
+/// The facets at each edge, lower node first, and which of their edges 12, 23, 31 it is.
+fn sides(facets: &[Facet]) -> BTreeMap<[u32; 2], Vec<(usize, usize)>> {
+    let mut sides: BTreeMap<[u32; 2], Vec<(usize, usize)>> = BTreeMap::new();
+    for (number, facet) in facets.iter().enumerate() {
+        for i in 0..3 {
+            let (a, b) = (facet.nodes[i], facet.nodes[(i + 1) % 3]);
+            sides.entry([a.min(b), a.max(b)]).or_default().push((number, i));
+        }
+    }
+    sides
+}
+
+/// Control points on the straight edge: at creases, whose sides have normals of their own, and where a normal leans so far from a
+/// facet at the edge that a curve along it would fold.
+pub(crate) fn straight_edges(model: &Model) -> Vec<[bool; 6]> {
+    let mut straight = vec![[false; 6]; model.facets.len()];
+    for sides in sides(&model.facets).values() {
+        let normal = |facet: usize, node: u32| {
+            let corner = model.facets[facet].nodes.iter().position(|&n| n == node);
+            corner.map(|corner| model.corner_normals[facet][corner])
+        };
+        let leans = |facet: usize, normal: Option<u32>| {
+            let [a, b, c] = model.facets[facet].nodes.map(|node| model.rest[node as usize]);
+            let across = (b - a).cross(&(c - a)).normalize();
+            normal.is_some_and(|normal| model.normals[normal as usize].direction.dot(&across) < LEANING)
+        };
+        for &(facet, i) in sides {
+            for (k, [start, _]) in EDGES.into_iter().enumerate().filter(|(k, _)| k / 2 == i) {
+                let node = model.facets[facet].nodes[start];
+                let own = normal(facet, node);
+                straight[facet][k] =
+                    sides.iter().any(|&(other, _)| normal(other, node) != own || leans(other, own));
+            }
+        }
+    }
+    straight
 }
 
 impl Patch {
@@ -205,23 +228,6 @@ impl Patch {
     /// Nodal forces and moments of a force on a carried point: Jᵀ f.
     pub fn carried_forces(&self, point: &Carried, force: &Vector3<f64>) -> Vector18 {
         self.carried_jacobian(point).tr_mul(force)
-    }
-
-    /// Nodal forces [m²] and moments [m³] of a pressure of 1: ∫ Jᵀ n dA, with the rule of six points of Dunavant (1985), exact to the
-    /// fourth degree.
-    pub fn pressure_forces(&self) -> Vector18 {
-        const POINTS: [(f64, f64); 2] =
-            [(0.445_948_490_915_965, 0.223_381_589_678_011), (0.091_576_213_509_771, 0.109_951_743_655_322)];
-        let mut sum = Vector18::zeros();
-        for (a, weight) in POINTS {
-            for corner in 0..3 {
-                let mut at = [a; 3];
-                at[corner] = 1.0 - 2.0 * a;
-                let [along, across] = self.tangents(at);
-                sum += self.nodal_forces(at, &(0.5 * weight * along.cross(&across)));
-            }
-        }
-        sum
     }
 
     /// Nodal forces and moments of a force on a point: Jᵀ f.

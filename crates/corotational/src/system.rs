@@ -13,7 +13,7 @@ use crate::model::{LoadKind, Model, Motion, Spread};
 use crate::rotation::skew;
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
-use crate::surface::{CurvedSurface, EdgeRule};
+use crate::surface::{CurvedSurface, EdgeRule, Patch};
 use crate::tet::{Matrix12, Vector12};
 
 /// Cells computed side by side before they are added up.
@@ -51,10 +51,13 @@ pub(crate) struct System<'m> {
     pub(crate) controlled: Vec<f64>,
     /// What prescribed increments make of forces on free components: K_fc d_c.
     pub(crate) coupling: Vec<f64>,
-    /// Pressures on facets [Pa]: fixed, controlled.
-    pressure: Vec<[f64; 2]>,
+    /// Pressures on facets.
+    pressure: Vec<Pressure>,
     /// The curved surface, if a load acts on it.
     surface: Option<CurvedSurface>,
+    /// Whether the stiffness has the change of pressures on the curved surface, or that on the flat facets in its place, with which
+    /// conjugate gradients converge more often and Newton's method slowly.
+    pub(crate) exact_pressure: bool,
     /// Strain energy [J].
     pub(crate) energy: f64,
     /// Largest force on a node of a cell [N].
@@ -65,10 +68,19 @@ pub(crate) struct System<'m> {
     pub(crate) last_solution: LinearReport,
 }
 
+/// Pressures on a facet [Pa], each fixed and controlled.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct Pressure {
+    lumped: [f64; 2],
+    curved: [f64; 2],
+}
+
 #[derive(Clone)]
 struct FacetResult {
     energy: f64,
     force: Vector18,
+    /// What the fixed and the controlled pressures make.
+    loads: [Vector18; 2],
     tangent: Matrix18,
     broken: Option<Broken>,
 }
@@ -127,7 +139,8 @@ impl<'m> System<'m> {
             external: vec![0.0; 6 * nodes],
             controlled: vec![0.0; 6 * nodes],
             coupling: Vec::new(),
-            pressure: vec![[0.0; 2]; model.facets.len()],
+            pressure: vec![Pressure::default(); model.facets.len()],
+            exact_pressure: true,
             surface: model
                 .loads
                 .iter()
@@ -202,12 +215,12 @@ impl<'m> System<'m> {
         }
     }
 
-    /// Loads on nodes, and pressures on facets; those on the curved surface by what they differ from these.
+    /// Loads on nodes, and pressures on facets.
     fn nodal_loads(&mut self, state: &State, time: f64) {
         let model = self.model;
         self.external.fill(0.0);
         self.controlled.fill(0.0);
-        self.pressure.fill([0.0; 2]);
+        self.pressure.fill(Pressure::default());
         for load in &model.loads {
             let factor = load.curve.value(time);
             let target = if load.controlled { &mut self.controlled } else { &mut self.external };
@@ -248,15 +261,12 @@ impl<'m> System<'m> {
                 }
                 LoadKind::Pressure { cells, pressure, spread } => {
                     for &cell in cells {
-                        self.pressure[cell as usize][usize::from(load.controlled)] += factor * pressure;
-                        if let (Spread::Curved, Some(surface)) = (spread, &self.surface) {
-                            let force = surface.patch(model, state, cell).pressure_forces()
-                                - flat_forces(state, model.facets[cell as usize].nodes);
-                            for (i, &node) in model.facets[cell as usize].nodes.iter().enumerate() {
-                                add(node, 0, force.fixed_rows::<3>(6 * i) * *pressure);
-                                add(node, 3, force.fixed_rows::<3>(6 * i + 3) * *pressure);
-                            }
-                        }
+                        let own = &mut self.pressure[cell as usize];
+                        let own = match spread {
+                            Spread::Lumped => &mut own.lumped,
+                            Spread::Curved => &mut own.curved,
+                        };
+                        own[usize::from(load.controlled)] += factor * pressure;
                     }
                 }
             }
@@ -268,47 +278,50 @@ impl<'m> System<'m> {
         state: &State,
         tangent: Option<(Tangent, &[f64])>,
     ) -> Result<(), SolveError> {
-        let kind = tangent.map(|(kind, _)| kind);
         let model = self.model;
         let mut results = std::mem::take(&mut self.results);
+        let wanted = Wanted {
+            kind: tangent.map(|(kind, _)| kind),
+            symmetric: self.matrix.mirror.is_empty(),
+            exact_pressure: self.exact_pressure,
+        };
         let mut broken = None;
         for first in (0..model.facets.len()).step_by(CHUNK) {
             let last = (first + CHUNK).min(model.facets.len());
-            let factor = state.load_factor;
-            let pressure = &self.pressure;
-            let symmetric = self.matrix.mirror.is_empty();
+            let (pressure, surface) = (&self.pressure, self.surface.as_ref());
             results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
                 let number = first + at;
-                let [fixed, controlled] = pressure[number];
-                let pressure = fixed + factor * controlled;
-                result.broken = result.fill(&model.facets[number], state, kind, pressure, symmetric).err();
+                let patch = || surface.map(|surface| surface.patch(model, state, number as u32));
+                let facet = &model.facets[number];
+                result.broken = result.fill(facet, state, pressure[number], patch, wanted).err();
             });
             broken = (first..last).zip(&results).find_map(|(cell, result)| Some((cell, result.broken?)));
             if broken.is_some() {
                 break;
             }
             for (number, result) in (first..last).zip(&results) {
-                self.add_facet(state, number, result, tangent.map(|(_, moved)| moved));
+                self.add_facet(number, result, tangent.map(|(_, moved)| moved));
             }
         }
         self.results = results;
         broken.map_or(Ok(()), |(cell, why)| Err(SolveError::Broken { cell, why }))
     }
 
-    fn add_facet(&mut self, state: &State, number: usize, result: &FacetResult, moved: Option<&[f64]>) {
+    fn add_facet(&mut self, number: usize, result: &FacetResult, moved: Option<&[f64]>) {
         let facet = &self.model.facets[number];
         self.energy += result.energy;
-        let pressure = self.pressure[number];
-        let third = if pressure == [0.0; 2] { Vector3::zeros() } else { third_of_area(state, facet.nodes) };
+        let pressed = self.pressure[number] != Pressure::default();
         for (i, &node) in facet.nodes.iter().enumerate() {
             let at = 6 * node as usize;
             for c in 0..6 {
                 self.internal[at + c] += result.force[6 * i + c];
+                if pressed {
+                    self.external[at + c] += result.loads[0][6 * i + c];
+                    self.controlled[at + c] += result.loads[1][6 * i + c];
+                }
             }
             for c in 0..3 {
                 self.largest = self.largest.max(result.force[6 * i + c].abs());
-                self.external[at + c] += pressure[0] * third[c];
-                self.controlled[at + c] += pressure[1] * third[c];
             }
         }
         let Some(moved) = moved else { return };
@@ -396,6 +409,14 @@ impl<'m> System<'m> {
         Ok(pivots.negative)
     }
 
+    /// Whether a matrix that is indefinite may be so for the change of pressures on the curved surface: it is left out from now on.
+    pub(crate) fn gives_way(&mut self, error: &SolveError) -> bool {
+        let pressed = self.pressure.iter().any(|pressure| pressure.curved != [0.0; 2]);
+        let gives_way = matches!(error, SolveError::Indefinite { .. }) && pressed && self.exact_pressure;
+        self.exact_pressure &= !gives_way;
+        gives_way
+    }
+
     /// Solves with the matrix prepared.
     pub(crate) fn solve(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         solution.fill(0.0);
@@ -457,15 +478,9 @@ fn linear_error(error: LinearError) -> SolveError {
 }
 
 /// A third of the area times the normal on each corner, as six numbers a node [m²].
-fn flat_forces(state: &State, nodes: [u32; 3]) -> Vector18 {
-    let third = third_of_area(state, nodes);
+fn flat_forces([a, b, c]: &[Vector3<f64>; 3]) -> Vector18 {
+    let third = (b - a).cross(&(c - a)) / 6.0;
     Vector18::from_fn(|i, _| if i % 6 < 3 { third[i % 6] } else { 0.0 })
-}
-
-/// A third of the area times the normal, now [m²].
-fn third_of_area(state: &State, nodes: [u32; 3]) -> Vector3<f64> {
-    let [a, b, c] = nodes.map(|node| state.position[node as usize]);
-    (b - a).cross(&(c - a)) / 6.0
 }
 
 #[derive(Clone)]
@@ -482,33 +497,76 @@ impl TetResult {
     }
 }
 
+/// What is wanted of a facet's stiffness.
+#[derive(Clone, Copy)]
+struct Wanted {
+    /// `None`: forces alone.
+    kind: Option<Tangent>,
+    /// Whether only the symmetric part of it.
+    symmetric: bool,
+    /// Whether the change of pressures on the curved surface is that of the flat facets.
+    exact_pressure: bool,
+}
+
 impl FacetResult {
     fn none() -> Self {
-        Self { energy: 0.0, force: Vector18::zeros(), tangent: Matrix18::zeros(), broken: None }
+        let loads = [Vector18::zeros(); 2];
+        Self { energy: 0.0, force: Vector18::zeros(), loads, tangent: Matrix18::zeros(), broken: None }
     }
 
-    /// Force, and with a kind of tangent the stiffness under a pressure; its symmetric part if only that is wanted.
+    /// Forces, and with a kind of tangent the stiffness under the pressures.
     fn fill(
         &mut self,
         facet: &Facet,
         state: &State,
-        kind: Option<Tangent>,
-        pressure: f64,
-        symmetric: bool,
+        pressure: Pressure,
+        patch: impl Fn() -> Option<Patch>,
+        wanted: Wanted,
     ) -> Result<(), Broken> {
         let (x, rotation) = state.corners(facet.nodes);
         let placed = facet.place(&x, &rotation)?;
         (self.energy, self.force) = facet.force(&placed);
-        if let Some(kind) = kind {
+        if let Some(kind) = wanted.kind {
             facet.hessian(&placed, kind, &mut self.tangent);
-            if pressure != 0.0 {
-                follow(&mut self.tangent, &x, pressure);
-                if symmetric {
-                    symmetrise(&mut self.tangent);
-                }
-            }
+        }
+        if pressure != Pressure::default() {
+            self.press(&x, pressure, patch, state.load_factor, wanted);
         }
         Ok(())
+    }
+
+    /// Takes up the pressures.
+    fn press(
+        &mut self,
+        x: &[Vector3<f64>; 3],
+        Pressure { lumped, curved }: Pressure,
+        patch: impl Fn() -> Option<Patch>,
+        factor: f64,
+        wanted: Wanted,
+    ) {
+        let whole = |[fixed, controlled]: [f64; 2]| fixed + factor * controlled;
+        let flat = flat_forces(x);
+        self.loads = lumped.map(|pressure| flat * pressure);
+        let mut follows = whole(lumped);
+        if let Some(patch) = (curved != [0.0; 2]).then(patch).flatten() {
+            let forces = patch.pressure_forces();
+            for (load, pressure) in self.loads.iter_mut().zip(curved) {
+                *load += forces * pressure;
+            }
+            if wanted.kind.is_some() && wanted.exact_pressure {
+                self.tangent -= patch.pressure_change() * whole(curved);
+            } else {
+                follows += whole(curved);
+            }
+        }
+        if wanted.kind.is_some() {
+            if follows != 0.0 {
+                follow(&mut self.tangent, x, follows);
+            }
+            if wanted.symmetric {
+                symmetrise(&mut self.tangent);
+            }
+        }
     }
 }
 

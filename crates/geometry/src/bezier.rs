@@ -37,14 +37,18 @@ pub struct CurvedTriangle {
     rule: EdgeRule,
 }
 
-/// g(c) and its derivative.
-fn reach(rule: EdgeRule, c: f64) -> (f64, f64) {
+/// g(c) and its first two derivatives.
+fn reach(rule: EdgeRule, c: f64) -> [f64; 3] {
     match rule {
-        EdgeRule::Third => (1.0 / 3.0, 0.0),
-        EdgeRule::Arc if c < STEEPEST => (2.0 / (3.0 * STEEPEST * (1.0 + STEEPEST)), 0.0),
+        EdgeRule::Third => [1.0 / 3.0, 0.0, 0.0],
+        EdgeRule::Arc if c < STEEPEST => [2.0 / (3.0 * STEEPEST * (1.0 + STEEPEST)), 0.0, 0.0],
         EdgeRule::Arc => {
             let below = c * (1.0 + c);
-            (2.0 / (3.0 * below), -2.0 * (1.0 + 2.0 * c) / (3.0 * below * below))
+            [
+                2.0 / (3.0 * below),
+                -2.0 * (1.0 + 2.0 * c) / (3.0 * below * below),
+                4.0 * (1.0 + 3.0 * c + 3.0 * c * c) / (3.0 * below * below * below),
+            ]
         }
     }
 }
@@ -60,7 +64,7 @@ impl CurvedTriangle {
                 p[i] + e / 3.0
             } else {
                 let t = e - e.dot(&n[i]) * n[i];
-                p[i] + reach(rule, t.norm() / e.norm()).0 * t
+                p[i] + reach(rule, t.norm() / e.norm())[0] * t
             };
         }
         patch
@@ -69,6 +73,16 @@ impl CurvedTriangle {
     /// Its corners [m].
     pub fn corners(&self) -> &[Vector3; 3] {
         &self.corners
+    }
+
+    /// Its control points along edges, in the order of [`EDGES`] [m].
+    pub fn edge_points(&self) -> &[Vector3; 6] {
+        &self.edge
+    }
+
+    /// Which of them lie on straight edges.
+    pub fn straight(&self) -> &[bool; 6] {
+        &self.straight
     }
 
     /// The unit normals given at its corners.
@@ -175,8 +189,8 @@ impl CurvedTriangle {
         self.edge.iter().chain([&middle]).map(off).fold(0.0, f64::max)
     }
 
-    /// ∂b/∂e and ∂b/∂n of an edge's control point.
-    fn edge_derivative(&self, k: usize) -> (Matrix3<f64>, Matrix3<f64>) {
+    /// ∂b/∂e and ∂b/∂n of an edge's control point b with the edge's vector e and the normal n at its start.
+    pub fn edge_derivative(&self, k: usize) -> (Matrix3<f64>, Matrix3<f64>) {
         if self.straight[k] {
             return (Matrix3::from_diagonal_element(1.0 / 3.0), Matrix3::zeros());
         }
@@ -185,7 +199,7 @@ impl CurvedTriangle {
         let t = e - e.dot(&n) * n;
         let (length, size) = (e.norm(), t.norm());
         let c = size / length;
-        let (g, slope) = reach(self.rule, c);
+        let [g, slope, _] = reach(self.rule, c);
         let by_e = Matrix3::identity() - n * n.transpose();
         let by_n = -(n * e.transpose() + Matrix3::from_diagonal_element(e.dot(&n)));
         if slope == 0.0 {
@@ -194,6 +208,50 @@ impl CurvedTriangle {
         let c_e = t.transpose() * by_e / (size * length) - e.transpose() * (c / (length * length));
         let c_n = t.transpose() * by_n / (size * length);
         (g * by_e + slope * t * c_e, g * by_n + slope * t * c_n)
+    }
+
+    /// Second derivatives of w·b of an edge's control point b, for a vector w that stays: ∂²/∂e², ∂²/∂e∂n (rows e) and ∂²/∂n².
+    pub fn edge_second_derivative(&self, k: usize, w: &Vector3) -> [Matrix3<f64>; 3] {
+        if self.straight[k] {
+            return [Matrix3::zeros(); 3];
+        }
+        let identity = Matrix3::<f64>::identity();
+        let [i, j] = EDGES[k];
+        let (e, n) = (self.corners[j] - self.corners[i], self.normals[i]);
+        let s = e.dot(&n);
+        let t = e - s * n;
+        // t and its derivatives; of a·t the second ones.
+        let (t_e, t_n) = (identity - n * n.transpose(), -(n * e.transpose() + identity * s));
+        let mixed = |a: &Vector3| -(n * a.transpose() + identity * a.dot(&n));
+        let turned = |a: &Vector3| -(a * e.transpose() + e * a.transpose());
+        // q = |t|²/|e|² = c².
+        let length = e.norm_squared();
+        let q = t.norm_squared() / length;
+        let c = q.sqrt();
+        let [g, slope, bend] = reach(self.rule, c);
+        if slope == 0.0 {
+            return [Matrix3::zeros(), g * mixed(w), g * turned(w)];
+        }
+        let (by_q, by_qq) = (0.5 * slope / c, 0.25 * (bend - slope / c) / q);
+        let (size_e, size_n) = (2.0 * t_e.tr_mul(&t), 2.0 * t_n.tr_mul(&t));
+        let (q_e, q_n) = ((size_e - 2.0 * q * e) / length, size_n / length);
+        let both = size_e * e.transpose();
+        let q_ee = (2.0 * t_e.tr_mul(&t_e) - 2.0 * q * identity) / length
+            + (8.0 * q * e * e.transpose() - 2.0 * (both + both.transpose())) / (length * length);
+        let q_en =
+            2.0 * (t_e.tr_mul(&t_n) + mixed(&t)) / length - 2.0 * e * size_n.transpose() / (length * length);
+        let q_nn = 2.0 * (t_n.tr_mul(&t_n) + turned(&t)) / length;
+        let along = w.dot(&t);
+        let (w_e, w_n) = (t_e.tr_mul(w), t_n.tr_mul(w));
+        let whole = |a: &Vector3, b: &Vector3, w_a: &Vector3, w_b: &Vector3, second: Matrix3<f64>| {
+            along * (by_qq * a * b.transpose() + by_q * second)
+                + by_q * (a * w_b.transpose() + w_a * b.transpose())
+        };
+        [
+            whole(&q_e, &q_e, &w_e, &w_e, q_ee),
+            whole(&q_e, &q_n, &w_e, &w_n, q_en) + g * mixed(w),
+            whole(&q_n, &q_n, &w_n, &w_n, q_nn) + g * turned(w),
+        ]
     }
 
     /// Derivatives of the sum of the control points with weights, with respect to each corner and to each corner's normal.

@@ -119,6 +119,19 @@ fn write_the_corpus() {
     };
     save("vtp-offset-beyond", poly("0 1 2", "9223372036854775807").as_bytes());
     save("vtp-negative-point", poly("0 1 -2", "3").as_bytes());
+    let gii = |encoding: &str, dim: &str, data: &str| {
+        format!(
+            "<GIFTI Version=\"1.0\"><DataArray Intent=\"NIFTI_INTENT_POINTSET\" DataType=\"NIFTI_TYPE_FLOAT32\" Encoding=\"{encoding}\" \
+             ArrayIndexingOrder=\"ColumnMajorOrder\" Endian=\"LittleEndian\" Dim0=\"{dim}\" Dim1=\"3\"><Data>{data}</Data></DataArray></GIFTI>"
+        )
+    };
+    save("gii-huge", gii("Base64Binary", "6148914691236517205", "AAAA").as_bytes());
+    save("gii-short", gii("GZipBase64Binary", "9", "eJxjYGBgAAAABAAB").as_bytes());
+    save("gii-nan", gii("ASCII", "1", "1 nan 2").as_bytes());
+    save("pial-huge", b"\xFF\xFF\xFEmade\n\n\x7F\xFF\xFF\xFF\x7F\xFF\xFF\xFF\0\0\0\0");
+    save("pial-negative", b"\xFF\xFF\xFEmade\n\n\xFF\xFF\xFF\xFF\0\0\0\x01");
+    save("pial-quads", b"\xFF\xFF\xFF\0\0\x04\0\0\x01");
+    save("pial-text-huge", b"#!ascii\n4000000000 4000000000\n0 0 0 0\n");
     save("obj-no-points", b"f 1 2 3\n");
     save("obj-index-zero", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n");
     save("obj-nan", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");

@@ -241,6 +241,70 @@ fn partitioned_gmsh_keeps_its_group() {
 }
 
 #[test]
+fn freesurfer_tells_its_shift_and_is_found_by_its_first_bytes() {
+    let pial = read_data("nibabel.pial");
+    assert_eq!(pial.format, "FreeSurfer binary");
+    assert!(pial.notes[0].contains("(1.5, -2, 3) mm (c_ras)"), "{:?}", pial.notes);
+    let folder = tempfile::tempdir().unwrap();
+    let of = |name: &str| fs::read(data().join(name)).unwrap();
+    for (name, bytes) in [
+        ("lh.anything", of("nibabel.pial")),
+        ("rh.graymid.asc", of("tetrahedron-text.pial")),
+        ("surface.xml", of("nibabel-gzip.gii")),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        assert!(Format::of_path(&path).is_none() && Format::of_file(&path).is_some(), "{name}");
+        assert_eq!(read(&path).unwrap().mesh.points.len(), 4, "{name}");
+    }
+    assert_eq!(Format::of_path(Path::new("lh.white")), Some(Format::FreeSurfer));
+}
+
+#[test]
+fn gifti_says_what_it_leaves_out() {
+    let text = fs::read_to_string(data().join("nibabel-ascii.gii")).unwrap();
+    let changed = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        read_bytes(text.replacen(from, to, 1).as_bytes(), Format::Gifti)
+    };
+    let moved =
+        changed("0.000000   1.000000   0.000000   0.000000", "0.000000   1.000000   0.000000   7.000000")
+            .unwrap();
+    assert!(moved.notes[0].contains("was not applied"), "{:?}", moved.notes);
+    for (from, to, says) in [
+        ("Encoding=\"ASCII\"", "Encoding=\"ExternalFileBinary\"", "ExternalFileBinary"),
+        ("NIFTI_TYPE_FLOAT32", "NIFTI_TYPE_RGB24", "no type of points"),
+        ("Dim1=\"3\"", "Dim1=\"2\"", "`Dim0` and `Dim1`"),
+        ("Dim0=\"4\"", "Dim0=\"400000000\"", "far larger than the file"),
+        ("SYSTEM \"http", "[<!ENTITY a \"b\">] \"http", "declarations of its own"),
+        ("<GIFTI", "<GOFTI", "XML is broken"),
+        ("NIFTI_INTENT_TRIANGLE", "NIFTI_INTENT_SHAPE", "no cells"),
+    ] {
+        let told = changed(from, to).unwrap_err().to_string();
+        assert!(told.contains(says), "{told}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn pipes_and_devices_are_refused_and_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.stl");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let zero = folder.path().join("zero.vtu");
+    std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
+    for path in [&pipe, &zero] {
+        let told = read(path).unwrap_err().to_string();
+        assert!(told.contains("cannot open") && told.contains("no regular file"), "{told}");
+    }
+    let huge = folder.path().join("huge.stl");
+    // Without any block on the disk.
+    fs::File::create(&huge).unwrap().set_len(1 << 40).unwrap();
+    let told = read(&huge).unwrap_err().to_string();
+    assert!(told.contains("1099511627776 bytes, more than"), "{told}");
+}
+
+#[test]
 fn surfaces_of_other_programs() {
     let expected = points(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.5]]);
     let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
@@ -253,6 +317,11 @@ fn surfaces_of_other_programs() {
         "meshio.obj",
         "vtk.obj",
         "vtk-big.ply",
+        "nibabel-ascii.gii",
+        "nibabel-base64.gii",
+        "nibabel-gzip.gii",
+        "nibabel.pial",
+        "tetrahedron-text.pial",
     ] {
         let mesh = read_data(name).mesh;
         assert_eq!(mesh.points.len(), 4, "{name}");

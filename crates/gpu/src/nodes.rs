@@ -14,7 +14,7 @@ use crate::{Device, GpuError};
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Hold {
     owner: [u32; 4],
-    amplitude: Four,
+    amplitudes: [Four; 2],
 }
 
 /// Numbers that the pass over nodes leaves for each of its groups.
@@ -70,10 +70,10 @@ impl DeviceNodes {
                 if owner != [FREE; 3] {
                     held.push(node);
                     tag = held.len() as u32;
-                    let [x, y, z] = amplitudes[node as usize].map(|a| a as f32);
+                    let four = |[x, y, z]: Vector<f64>| [x as f32, y as f32, z as f32, 0.0];
                     holds.push(Hold {
                         owner: [owner[0], owner[1], owner[2], FREE],
-                        amplitude: [x, y, z, 0.0],
+                        amplitudes: amplitudes[node as usize].map(four),
                     });
                 }
                 let (inertia, mass) = (model.inertia(node as usize), model.mass[node as usize]);

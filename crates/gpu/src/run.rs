@@ -93,7 +93,7 @@ pub(crate) struct Instants {
 
 /// Where numbers stand in a row of the table.
 pub(crate) fn table_constants(model: &Model) -> [(&'static str, usize); 2] {
-    let loads = 2 * model.constraints.len();
+    let loads = 4 * model.constraints.len();
     [("LOADS", loads), ("GRAVITY", loads + model.loads.len())]
 }
 
@@ -119,7 +119,7 @@ impl Instants {
     pub(crate) fn new(memory: &Memory<'_>, device: &Device, model: &Model) -> Result<Self, GpuError> {
         let alignment = device.device.limits().min_uniform_buffer_offset_alignment as usize;
         let spacing = size_of::<Instant>().next_multiple_of(alignment);
-        let stride = 2 * model.constraints.len() + model.loads.len() + 3 * model.bodies.len();
+        let stride = 4 * model.constraints.len() + model.loads.len() + 3 * model.bodies.len();
         let instants = memory.uniform("the instants", spacing * MOST);
         let table = memory.zeros("the factors of motions and loads", stride * MOST * size_of::<f32>())?;
         let findings = memory.filled("the findings", &NOTHING)?;
@@ -167,8 +167,10 @@ impl Instants {
     pub(crate) fn push(&mut self, model: &Model, time: f64, next: f64, mut instant: Instant) {
         instant.row = self.numbers.len() as u32;
         for constraint in &model.constraints {
-            let [now, then] = [time, time + next].map(|t| constraint.motion.factor(t));
-            self.numbers.extend([(then - now) as f32, then as f32]);
+            let [now, then] = [time, time + next].map(|t| constraint.motion.factors(t));
+            for (now, then) in now.into_iter().zip(then) {
+                self.numbers.extend([(then - now) as f32, then as f32]);
+            }
         }
         let mut gravity = vec![[0.0; 3]; model.bodies.len()];
         for load in &model.loads {

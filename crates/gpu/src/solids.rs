@@ -15,6 +15,7 @@ const CELLS: &str = include_str!("shaders/cells.wgsl");
 const PRONY: &str = include_str!("shaders/prony.wgsl");
 const PRESSURE_HISTORY: &str = include_str!("shaders/pressure_history.wgsl");
 const SHAPE: &str = include_str!("shaders/stored_shape.wgsl");
+const HEX_CORNERS: &str = include_str!("shaders/hex_corners.wgsl");
 const TET: &str = include_str!("shaders/tet.wgsl");
 const AVERAGES: &str = include_str!("shaders/averages.wgsl");
 
@@ -161,9 +162,10 @@ impl DeviceSolid {
         };
         let kernels = match cells {
             Cells::Tet4(_) => vec![tets("tet4", &[include_str!("shaders/tet4.wgsl")])],
-            Cells::Hex8(_) => vec![forces("hex8", &[include_str!("shaders/hex8.wgsl")])],
+            Cells::Hex8(_) => vec![forces("hex8", &[HEX_CORNERS, include_str!("shaders/hex8.wgsl")])],
             Cells::FullHex8(..) => {
-                vec![forces("hex8-full", &[PRESSURE_HISTORY, include_str!("shaders/full_hex8.wgsl")])]
+                let own = include_str!("shaders/full_hex8.wgsl");
+                vec![forces("hex8-full", &[PRESSURE_HISTORY, HEX_CORNERS, own])]
             }
             Cells::AveragedTet4(_, averaging) => {
                 let of_cells = |name: &str, snippets: &[&str]| {
@@ -280,6 +282,11 @@ fn rows_of_nodes(cells: &Cells, order: &[u32]) -> Vec<[u32; 4]> {
     (0..cells.nodes_per_cell() / 4).flat_map(row).collect()
 }
 
+/// 3/2 κ² [1/m²], within what single precision holds.
+fn reach(square: f64) -> f64 {
+    (1.5 * square).min(1e30)
+}
+
 /// What the element needs of the shape at rest, row by row of all cells.
 fn rows_at_rest(cells: &Cells, order: &[u32]) -> Vec<Four> {
     let rows = |count: usize, of_cell: &dyn Fn(usize, usize) -> Four| {
@@ -290,14 +297,19 @@ fn rows_at_rest(cells: &Cells, order: &[u32]) -> Vec<Four> {
             let rest = &block.rest[cell];
             four(rest.gradient[row + 1], if row == 0 { rest.volume } else { 0.0 })
         }),
-        Cells::Hex8(block) => rows(16, &|row, cell| match (row, &block.hourglass) {
+        Cells::Hex8(block) => rows(16 + 7, &|row, cell| match (row, &block.hourglass) {
+            (16.., _) => four(block.offsets[cell][row - 15], 0.0),
             (0, _) => four(block.rest[cell].gradient[0], block.rest[cell].volume),
             (1, Some(control)) => four(block.rest[cell].gradient[1], control.stiffness[cell]),
+            (2, Some(control)) => four(block.rest[cell].gradient[2], reach(control.corner_reach[cell])),
             (..8, _) => four(block.rest[cell].gradient[row], 0.0),
             (_, Some(control)) => control.patterns[cell].map(|gamma| gamma[row - 8] as f32),
             (_, None) => Four::default(),
         }),
-        Cells::FullHex8(block, points) => rows(64, &|row, cell| {
+        Cells::FullHex8(block, points) => rows(64 + 7, &|row, cell| {
+            if row >= 64 {
+                return four(block.offsets[cell][row - 63], 0.0);
+            }
             let (point, a) = (row / 8, row % 8);
             let beside = match (point, a) {
                 (_, 0) => points[cell].weight[point],

@@ -107,8 +107,9 @@ pub struct GpuStepper<'m> {
     /// Time an instant takes [s], once known.
     pace: Option<f64>,
     energies: Energies,
-    /// Of each constraint.
+    /// Of each constraint, and of each node that is held.
     reactions: Vec<Vector<f64>>,
+    held_reactions: Vec<Four>,
     /// Which held nodes each constraint moves, and which of their components.
     owned: Vec<Vec<(u32, [bool; 3])>>,
     next: Vec<Vector<f32>>,
@@ -121,6 +122,12 @@ impl Observable<f32> for GpuStepper<'_> {
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
         self.reactions[constraint]
+    }
+
+    fn nodal_reaction(&self, node: usize) -> Vector<f64> {
+        let Ok(hold) = self.nodes.held.binary_search(&(node as u32)) else { return [0.0; 3] };
+        let force = self.held_reactions[hold];
+        [0, 1, 2].map(|c| if self.owners[node][c] == FREE { 0.0 } else { f64::from(force[c]) })
     }
 
     /// The mean of the increments before and after; belongs to the last instant of which everything was wanted.
@@ -203,6 +210,7 @@ impl<'m> GpuStepper<'m> {
             pace: None,
             energies: Energies::default(),
             reactions: vec![[0.0; 3]; model.constraints.len()],
+            held_reactions: vec![Four::default(); nodes.held.len()],
             owned: owned(model, &owners, &nodes.held),
             next: vec![[0.0; 3]; nodes.count],
             nodes,
@@ -287,7 +295,7 @@ impl<'m> GpuStepper<'m> {
     fn evaluate_anew(&mut self, state: &mut State<f32>) -> Result<(), StepFailure> {
         self.control.keep(state);
         self.lengths = self.control.lengths(state);
-        self.relax(self.lengths.before);
+        self.relax(self.control.relaxing(state));
         self.instants.forget_deformation(&self.device);
         let starts = if state.is_at_start() { flags::STARTS } else { 0 };
         let mut results = self.submit_evaluation(state.time, flags::MEASURES | starts, true)?;
@@ -619,6 +627,7 @@ impl<'m> GpuStepper<'m> {
     }
 
     fn enter_reactions(&mut self, forces: &[Four]) {
+        self.held_reactions.copy_from_slice(forces);
         for (sum, owned) in self.reactions.iter_mut().zip(&self.owned) {
             *sum = [0.0; 3];
             for &(hold, owns) in owned {

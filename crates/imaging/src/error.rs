@@ -19,7 +19,7 @@ pub enum ImageError {
     /// Neither the first bytes nor the ending tell a format that can be read.
     #[error(
         "`{}` is not an image known here; formats read: NIfTI (.nii, .nii.gz, .hdr + .img), NRRD (.nrrd, .nhdr), MetaImage \
-         (.mha, .mhd), GIPL (.gipl, .gipl.gz), DICOM (a folder of slices); convert it, e.g. with ITK-SNAP or 3D Slicer",
+         (.mha, .mhd), GIPL (.gipl, .gipl.gz), DICOM (a folder of slices, or a segmentation); convert it, e.g. with ITK-SNAP or 3D Slicer",
         path.display()
     )]
     UnknownFormat {
@@ -107,6 +107,18 @@ pub enum ImageProblem {
         /// Voxels allowed.
         limit: u64,
     },
+    /// More bytes than allowed. Found before they are read.
+    #[error(
+        "the voxels take {:.1} GB unpacked, more than the {:.1} GB allowed; crop the image, resample it, or save it with smaller numbers \
+         (8 or 16 bits)",
+        *bytes as f64 * 1e-9, *limit as f64 * 1e-9
+    )]
+    TooManyBytes {
+        /// Bytes of the voxels.
+        bytes: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
     /// The steps from voxel to voxel span no volume, or are no numbers.
     #[error(
         "the steps from voxel to voxel ({}, {} and {} m) span no volume; correct the orientation in the header",
@@ -185,13 +197,65 @@ fn shown(step: &Vector3) -> String {
 pub enum LabelError {
     /// A value that is not a whole number.
     #[error(
-        "voxel {voxel:?} is {value}, which is no label; give a label image, or choose the region by a threshold"
+        "voxel {voxel:?} is {value}, which is no label (values from {} to {}); give a label image, or choose the region by a threshold",
+        range[0], range[1]
     )]
     NotWhole {
         /// The value.
         value: f64,
         /// The voxel (i, j, k).
         voxel: [usize; 3],
+        /// The least and the largest value of the image.
+        range: [f64; 2],
+    },
+    /// A scan instead of a segmentation: many values that change from voxel to voxel.
+    #[error(
+        "this is no label image: {values}{} values from {} to {} that change from voxel to voxel, as in a CT or an MR scan; segment it \
+         first, or choose the region by a threshold",
+        if *more { " or more" } else { "" }, range[0], range[1]
+    )]
+    Grey {
+        /// Different values.
+        values: usize,
+        /// Whether there are more than were counted.
+        more: bool,
+        /// The least and the largest value.
+        range: [i32; 2],
+    },
+    /// A name that no label has.
+    #[error("no label is named `{name}`; {}", named(names))]
+    NoSuchName {
+        /// The name.
+        name: String,
+        /// The labels of the image that have names, each with its number.
+        names: Vec<String>,
+    },
+    /// A name that several labels have.
+    #[error("`{name}` is the name of the labels {}; choose by number", list(labels))]
+    AmbiguousName {
+        /// The name.
+        name: String,
+        /// The labels.
+        labels: Vec<i32>,
+    },
+    /// A range in which the image has no label.
+    #[error("no voxel has a label of {range}; the image has {}", list(present))]
+    EmptyRange {
+        /// The range.
+        range: String,
+        /// Labels of the image, without 0.
+        present: Vec<i32>,
+    },
+    /// An image that was to be a mask.
+    #[error(
+        "`{name}` is no mask: it has the labels {}; give it as the only image, or say from which value on a voxel is inside",
+        list(labels)
+    )]
+    NoMask {
+        /// The image.
+        name: String,
+        /// Its labels.
+        labels: Vec<i32>,
     },
     /// A label beyond 32 bits.
     #[error("voxel {voxel:?} has the label {label}, beyond ±2147483647; renumber the labels")]
@@ -271,6 +335,17 @@ pub enum LabelError {
         /// Voxels allowed.
         limit: u64,
     },
+}
+
+fn named(names: &[String]) -> String {
+    match names {
+        [] => "the labels of this image have no names: choose by number, or give a table of names".to_owned(),
+        names => {
+            let rest = names.len().saturating_sub(60);
+            let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+            format!("the image has {}{more}", names[..names.len() - rest].join(", "))
+        }
+    }
 }
 
 fn list(labels: &[i32]) -> String {

@@ -88,6 +88,14 @@ impl Grid {
         Self { dims, origin, ..*self }
     }
 
+    /// Other voxels from another origin [m] on, with multiples of these steps.
+    pub(crate) fn coarser(&self, dims: [usize; 3], origin: Vector3, factors: [usize; 3]) -> Self {
+        let factors = Vector3::from(factors.map(|n| n as f64));
+        let axes = self.axes * Matrix3::from_diagonal(&factors);
+        let inverse = Matrix3::from_diagonal(&factors.map(f64::recip)) * self.inverse;
+        Self { dims, origin, axes, inverse }
+    }
+
     /// Box [m] in world coordinates round the voxels `first` to `last`, faces included.
     pub(crate) fn world_box(&self, first: [usize; 3], last: [usize; 3]) -> [Vector3; 2] {
         let low = Vector3::from(first.map(|i| i as f64 - 0.5));

@@ -1,11 +1,15 @@
 //! An image in memory: the numbers as the file holds them, and label images made of them.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 use rayon::prelude::*;
 
 use crate::error::LabelError;
 use crate::grid::Grid;
+use crate::labels::RegionReport;
+use crate::names::LabelNames;
 
 /// Type of the numbers of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,6 +111,53 @@ impl Numbers {
     }
 }
 
+/// Different values that are counted; a scan may have more.
+const MOST_VALUES: usize = 1 << 16;
+
+/// What the values of an image are like: voxels and runs along i of each.
+#[derive(Default)]
+struct Counts {
+    values: BTreeMap<i32, [u64; 2]>,
+    /// Whether there are more values than are counted.
+    more: bool,
+}
+
+impl Counts {
+    fn add(&mut self, label: i32, begins: bool) {
+        if self.values.len() < MOST_VALUES || self.values.contains_key(&label) {
+            let [voxels, runs] = self.values.entry(label).or_default();
+            *voxels += 1;
+            *runs += u64::from(begins);
+        } else {
+            self.more = true;
+        }
+    }
+
+    fn and(mut self, other: Self) -> Self {
+        for (label, [voxels, runs]) in other.values {
+            let own = self.values.entry(label).or_default();
+            *own = [own[0] + voxels, own[1] + runs];
+        }
+        self.more |= other.more || self.values.len() > MOST_VALUES;
+        self
+    }
+
+    /// The labels without 0; an error where the values change from voxel to voxel, as in a scan. Of labels, a run along i is several voxels
+    /// long; of scans hardly more than one, but for what is around the patient.
+    fn labels(self) -> Result<Vec<i32>, LabelError> {
+        let around = self.values.values().max().copied().unwrap_or_default();
+        let [voxels, runs] =
+            self.values.values().fold([0; 2], |[voxels, runs], [v, r]| [voxels + v, runs + r]);
+        let length = (voxels - around[0]) as f64 / (runs - around[1]).max(1) as f64;
+        let (first, last) = (self.values.keys().next().copied(), self.values.keys().next_back().copied());
+        if self.more || self.values.len() > 64 && length < 1.5 || self.values.len() > 1000 && length < 3.0 {
+            let range = [first.unwrap_or(0), last.unwrap_or(0)];
+            return Err(LabelError::Grey { values: self.values.len(), more: self.more, range });
+        }
+        Ok(self.values.into_keys().filter(|&label| label != 0).collect())
+    }
+}
+
 /// A volume read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
@@ -116,6 +167,8 @@ pub struct Image {
     pub format: String,
     /// What was left out or assumed, one sentence each.
     pub notes: Vec<String>,
+    /// Names of the labels that the file gives.
+    pub names: LabelNames,
     pub(crate) numbers: Numbers,
     /// A value is slope × number + intercept; [1, 0] leaves integers integers.
     pub(crate) scale: [f64; 2],
@@ -133,8 +186,36 @@ impl Image {
         slope * self.numbers.value(at) + intercept
     }
 
-    /// The values as labels. Floating-point images count if all their values are whole numbers.
+    /// The values as labels. Floating-point images count if all their values are whole numbers; a scan, whose values change from voxel
+    /// to voxel, does not.
     pub fn labels(&self) -> Result<LabelImage, LabelError> {
+        self.survey()?;
+        let labels = (0..self.grid.len()).into_par_iter().map(|at| self.label(at)).collect();
+        Ok(LabelImage { grid: self.grid, labels })
+    }
+
+    /// Every label but 0, increasing, with its size, place and pieces. `progress` hears fractions from 0 to 1.
+    pub fn regions(&self, progress: &dyn Fn(f64)) -> Result<Vec<RegionReport>, LabelError> {
+        self.survey()?;
+        progress(0.3);
+        let mut regions = RegionReport::all(&self.grid, |at| self.label(at));
+        for region in &mut regions {
+            region.name = self.names.get(region.label).map(str::to_owned);
+        }
+        progress(1.0);
+        Ok(regions)
+    }
+
+    /// The label of a voxel of an image whose values are labels, which a survey tells.
+    pub(crate) fn label(&self, at: usize) -> i32 {
+        match self.numbers.at(at) {
+            Number::Integer(number) if self.scale == [1.0, 0.0] => number as i32,
+            _ => self.value(at).round() as i32,
+        }
+    }
+
+    /// The labels that there are, without 0, increasing; an error if the values are no labels.
+    pub(crate) fn survey(&self) -> Result<Vec<i32>, LabelError> {
         let whole = |at: usize| match self.numbers.at(at) {
             Number::Integer(number) if self.scale == [1.0, 0.0] => i32::try_from(number)
                 .map_err(|_| LabelError::TooLarge { label: number, voxel: self.grid.triple(at) }),
@@ -144,18 +225,93 @@ impl Image {
                 if (value - value.round()).abs() <= 1e-4 && value.abs() <= f64::from(i32::MAX) {
                     Ok(value.round() as i32)
                 } else {
-                    Err(LabelError::NotWhole { value, voxel: self.grid.triple(at) })
+                    let (range, voxel) = ([f64::NAN; 2], self.grid.triple(at));
+                    Err(LabelError::NotWhole { value, voxel, range })
                 }
             }
         };
-        let results = (0..self.grid.len()).into_par_iter().map(whole);
-        // The first error in memory order, whichever thread meets it.
-        match results.clone().find_first(Result::is_err) {
-            Some(Err(error)) => Err(error),
-            _ => {
-                Ok(LabelImage { grid: self.grid, labels: results.map(|label| label.unwrap_or(0)).collect() })
+        let row = self.grid.dims[0];
+        let counted = (0..self.grid.len() / row).into_par_iter().with_min_len(64).fold(
+            || Ok(Counts::default()),
+            |counts: Result<Counts, (usize, LabelError)>, number| {
+                let mut counts = counts?;
+                let mut last = None;
+                for at in number * row..(number + 1) * row {
+                    let label = whole(at).map_err(|error| (at, error))?;
+                    counts.add(label, last != Some(label));
+                    last = Some(label);
+                }
+                Ok(counts)
+            },
+        );
+        let first =
+            |a: Result<Counts, (usize, LabelError)>, b: Result<Counts, (usize, LabelError)>| match (a, b) {
+                (Ok(a), Ok(b)) => Ok(a.and(b)),
+                // The first error in memory order, whichever thread meets it.
+                (Err(a), Err(b)) => Err(if a.0 <= b.0 { a } else { b }),
+                (Err(error), _) | (_, Err(error)) => Err(error),
+            };
+        match counted.reduce(|| Ok(Counts::default()), first) {
+            Ok(counts) => counts.labels(),
+            Err((_, LabelError::NotWhole { value, voxel, .. })) => {
+                Err(LabelError::NotWhole { value, voxel, range: self.range() })
             }
+            Err((_, error)) => Err(error),
         }
+    }
+
+    /// The least and the largest value that is finite.
+    fn range(&self) -> [f64; 2] {
+        let values = (0..self.grid.len()).into_par_iter().map(|at| self.value(at)).filter(|x| x.is_finite());
+        let wider = |[low, high]: [f64; 2], [least, most]: [f64; 2]| [low.min(least), high.max(most)];
+        values.map(|x| [x, x]).reduce(|| [f64::INFINITY, f64::NEG_INFINITY], wider)
+    }
+
+    /// Several masks of the same voxels as one label image: the first has label 1, the second 2, and so on, named after their files. Where they
+    /// overlap, the last one counts. A voxel is in a mask where its value is at least `least`, or where it is not 0.
+    pub fn of_masks(masks: &[(PathBuf, Self)], least: Option<f64>) -> Result<Self, LabelError> {
+        let Some((_, first)) = masks.first() else {
+            return Err(LabelError::NoneChosen { present: Vec::new() });
+        };
+        let mut labels = vec![0_u16; first.grid.len()];
+        let mut names = LabelNames::default();
+        let mut notes = Vec::new();
+        let mut shared = 0;
+        for (number, (path, mask)) in (1_u16..).zip(masks) {
+            let file = path.file_name().unwrap_or_default().to_string_lossy();
+            let name = file.split('.').next().unwrap_or_default();
+            first.require_same_voxels(mask)?;
+            if least.is_none() {
+                let present = mask.survey()?;
+                if present.len() > 1 {
+                    return Err(LabelError::NoMask { name: file.into_owned(), labels: present });
+                }
+            }
+            let inside = |at| least.map_or_else(|| mask.label(at) != 0, |least| mask.value(at) >= least);
+            for (_, label) in labels.iter_mut().enumerate().filter(|(at, _)| inside(*at)) {
+                shared += usize::from(*label != 0);
+                *label = number;
+            }
+            names.insert(number.into(), name);
+            notes.extend(mask.notes.iter().map(|note| format!("{name}: {note}")));
+        }
+        if shared > 0 {
+            notes.push(format!("the masks overlap in {shared} voxels, which count to the last one"));
+        }
+        let bytes = labels.into_iter().flat_map(u16::to_le_bytes).collect();
+        let numbers = Numbers { scalar: Scalar::U16, order: Order::Little, bytes };
+        let format = format!("{} masks ({})", masks.len(), first.format);
+        Ok(Self { grid: first.grid, format, notes, names, numbers, scale: [1.0, 0.0] })
+    }
+
+    fn require_same_voxels(&self, other: &Self) -> Result<(), LabelError> {
+        let off =
+            (self.grid.axes - other.grid.axes).amax().max((self.grid.origin - other.grid.origin).amax());
+        let least = self.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        if self.grid.dims != other.grid.dims || off > 1e-3 * least {
+            return Err(LabelError::OtherVoxels { first: self.grid.dims, second: other.grid.dims });
+        }
+        Ok(())
     }
 
     /// All that makes the image what it is, piece by piece, for a hash of its content.
@@ -167,19 +323,15 @@ impl Image {
 
     /// The sum of the values of two images of the same voxels, such as maps of the probability of grey and white matter.
     pub fn plus(&self, other: &Self) -> Result<Self, LabelError> {
-        let off =
-            (self.grid.axes - other.grid.axes).amax().max((self.grid.origin - other.grid.origin).amax());
-        let least = self.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        if self.grid.dims != other.grid.dims || off > 1e-3 * least {
-            return Err(LabelError::OtherVoxels { first: self.grid.dims, second: other.grid.dims });
-        }
+        self.require_same_voxels(other)?;
         let sums: Vec<[u8; 8]> = (0..self.grid.len())
             .into_par_iter()
             .map(|at| (self.value(at) + other.value(at)).to_le_bytes())
             .collect();
         let numbers = Numbers { scalar: Scalar::F64, order: Order::Little, bytes: sums.concat() };
         let notes = self.notes.iter().chain(&other.notes).cloned().collect();
-        Ok(Self { grid: self.grid, format: self.format.clone(), notes, numbers, scale: [1.0, 0.0] })
+        let (format, names) = (self.format.clone(), LabelNames::default());
+        Ok(Self { grid: self.grid, format, notes, names, numbers, scale: [1.0, 0.0] })
     }
 
     /// Label 1 where the value lies in a range, 0 elsewhere: a region of a probability map or a level set.
@@ -210,6 +362,7 @@ mod tests {
             grid: Grid::along_axes([2, 1, 1], Vector3::zeros(), [spacing; 3]).unwrap(),
             format: "here".into(),
             notes: Vec::new(),
+            names: LabelNames::default(),
             numbers: Numbers { scalar: Scalar::I16, order: Order::Big, bytes },
             scale: [slope, 0.0],
         }

@@ -7,6 +7,8 @@ use std::fmt;
 use pliant_geometry::Vector3;
 use serde::Serialize;
 
+use crate::cut::Border;
+use crate::grid::Grid;
 use crate::image::LabelImage;
 
 /// The voxels of one label.
@@ -26,6 +28,10 @@ pub struct RegionReport {
     pub components: u64,
     /// Voxels of the largest piece.
     pub largest_component: u64,
+    /// Its name, if it has one.
+    pub name: Option<String>,
+    /// Voxels at the border of the image, where the organ may be cut off.
+    pub border: Border,
 }
 
 impl fmt::Display for RegionReport {
@@ -33,8 +39,9 @@ impl fmt::Display for RegionReport {
         let [low, high] = [self.low, self.high].map(|x| x.map(|x| x * 1e3));
         write!(
             f,
-            "label {}: {} voxels, {:.2} ml, x {:.1} to {:.1}, y {:.1} to {:.1}, z {:.1} to {:.1} mm",
+            "label {}{}: {} voxels, {:.2} ml, x {:.1} to {:.1}, y {:.1} to {:.1}, z {:.1} to {:.1} mm",
             self.label,
+            self.name.as_ref().map_or_else(String::new, |name| format!(" ({name})")),
             self.voxels,
             self.volume * 1e6,
             low[0],
@@ -45,9 +52,67 @@ impl fmt::Display for RegionReport {
             high[2]
         )?;
         match self.components {
-            1 => write!(f, ", in one piece"),
-            n => write!(f, ", in {n} pieces, the largest of {} voxels", self.largest_component),
+            1 => write!(f, ", in one piece")?,
+            n => write!(f, ", in {n} pieces, the largest of {} voxels", self.largest_component)?,
         }
+        if self.border.is_touched() {
+            write!(f, "; at the border of the image: {}", self.border)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+impl RegionReport {
+    /// Every label but 0, increasing.
+    pub(crate) fn all(grid: &Grid, label: impl Fn(usize) -> i32) -> Vec<Self> {
+        let components = Components::new(grid.dims, label, 0);
+        let [nx, ny, nz] = grid.dims;
+        let mut found: BTreeMap<i32, (Self, [[usize; 3]; 2])> = BTreeMap::new();
+        for run in &components.runs {
+            let (report, [first, last]) = found.entry(run.label).or_insert_with(|| {
+                let empty = Self {
+                    label: run.label,
+                    voxels: 0,
+                    volume: 0.0,
+                    low: [0.0; 3],
+                    high: [0.0; 3],
+                    components: 0,
+                    largest_component: 0,
+                    name: None,
+                    border: Border::new(grid),
+                };
+                (empty, [[usize::MAX; 3], [0; 3]])
+            });
+            let length = u64::from(run.to - run.from);
+            report.voxels += length;
+            let (j, k) = (run.row as usize % ny, run.row as usize / ny);
+            let at_sides = [
+                [u64::from(run.from == 0), u64::from(run.to as usize == nx)],
+                [(j, 0), (j, ny - 1)].map(|(j, side)| if j == side { length } else { 0 }),
+                [(k, 0), (k, nz - 1)].map(|(k, side)| if k == side { length } else { 0 }),
+            ];
+            report.border.add(at_sides);
+            for (axis, (low, high)) in
+                [(run.from as usize, run.to as usize - 1), (j, j), (k, k)].into_iter().enumerate()
+            {
+                first[axis] = first[axis].min(low);
+                last[axis] = last[axis].max(high);
+            }
+        }
+        for (run, size) in components.runs.iter().zip(components.sizes()).filter(|(_, size)| *size > 0) {
+            if let Some((report, _)) = found.get_mut(&run.label) {
+                report.components += 1;
+                report.largest_component = report.largest_component.max(size);
+            }
+        }
+        let finished = |(mut report, [first, last]): (Self, [[usize; 3]; 2])| {
+            let [low, high] = grid.world_box(first, last).map(|corner: Vector3| corner.into());
+            (report.low, report.high) = (low, high);
+            report.volume = report.voxels as f64 * grid.voxel_volume();
+            report
+        };
+        found.into_values().map(finished).collect()
     }
 }
 
@@ -157,44 +222,7 @@ impl Components {
 impl LabelImage {
     /// Every label but 0, increasing, with its size, place and pieces.
     pub fn regions(&self) -> Vec<RegionReport> {
-        let components = Components::new(self.grid.dims, |at| self.labels[at], 0);
-        let ny = self.grid.dims[1] as u32;
-        let mut found: BTreeMap<i32, (RegionReport, [[usize; 3]; 2])> = BTreeMap::new();
-        for run in &components.runs {
-            let (report, [first, last]) = found.entry(run.label).or_insert_with(|| {
-                let empty = RegionReport {
-                    label: run.label,
-                    voxels: 0,
-                    volume: 0.0,
-                    low: [0.0; 3],
-                    high: [0.0; 3],
-                    components: 0,
-                    largest_component: 0,
-                };
-                (empty, [[usize::MAX; 3], [0; 3]])
-            });
-            report.voxels += u64::from(run.to - run.from);
-            let (j, k) = ((run.row % ny) as usize, (run.row / ny) as usize);
-            for (axis, (low, high)) in
-                [(run.from as usize, run.to as usize - 1), (j, j), (k, k)].into_iter().enumerate()
-            {
-                first[axis] = first[axis].min(low);
-                last[axis] = last[axis].max(high);
-            }
-        }
-        for (run, size) in components.runs.iter().zip(components.sizes()).filter(|(_, size)| *size > 0) {
-            if let Some((report, _)) = found.get_mut(&run.label) {
-                report.components += 1;
-                report.largest_component = report.largest_component.max(size);
-            }
-        }
-        let finished = |(mut report, [first, last]): (RegionReport, [[usize; 3]; 2])| {
-            let [low, high] = self.grid.world_box(first, last).map(|corner: Vector3| corner.into());
-            (report.low, report.high) = (low, high);
-            report.volume = report.voxels as f64 * self.grid.voxel_volume();
-            report
-        };
-        found.into_values().map(finished).collect()
+        RegionReport::all(&self.grid, |at| self.labels[at])
     }
 
     /// The labels of the image without 0, increasing.

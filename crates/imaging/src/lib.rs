@@ -1,13 +1,13 @@
 //! Medical images: volumes read from files, regions of a label, their cleaning, and smooth fields of them. World
 //! coordinates are metres, in RAS: x to the patient's right, y to the front, z to the head. Voxel centres lie at
 //! whole numbers of the grid.
-//! Leaves out: registration, resampling, segmentation.
+//! Leaves out: registration, resampling (but to coarser voxels), segmentation.
 //!
 //! ```no_run
 //! use pliant_imaging::{ReadOptions, read};
 //!
 //! let image = read("seg.nii.gz".as_ref(), &ReadOptions::default())?;
-//! for region in image.labels()?.regions() {
+//! for region in image.regions(&|_| {})? {
 //!     println!("{region}");
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -16,17 +16,21 @@
 // Units stand in brackets; rustdoc takes [m] for a link.
 
 mod clean;
+mod cut;
 mod distance;
 mod error;
 mod file;
 mod grid;
 mod image;
 mod labels;
+mod names;
 
 pub use clean::{Cleaned, Cleaning, Region};
+pub use cut::{Border, Choice, Cut};
 pub use distance::{DistanceField, Smoothing};
 pub use error::{ImageError, ImageProblem, LabelError};
-pub use file::{ImageFormat, ReadOptions, read, read_bytes};
+pub use file::{ImageFormat, ReadOptions, read, read_bytes, read_with};
 pub use grid::Grid;
 pub use image::{Image, LabelImage, Scalar};
 pub use labels::RegionReport;
+pub use names::{LabelChoice, LabelNames};

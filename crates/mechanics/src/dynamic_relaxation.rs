@@ -4,9 +4,16 @@
 //! A₀ a running Rayleigh quotient Δuᵀ Δr / Δuᵀ M Δu of the last increment. Masses: m_a = s/n Σ_e V_e (λ+2μ) Σ|B|²
 //! over the cells at a node, n nodes per cell, s = 1.25.
 //!
-//! Time is that of loads, motions and relaxing laws; inertia and damping of the bodies play no part. A load step that
+//! Time is that of loads, motions and relaxing laws; inertia and damping of the bodies play no part. What acts at time 0 already
+//! comes at once: the first equilibrium is that of the instantaneous laws at time 0, reached from rest. A load step that
 //! fails is tried again in halves, with twice the masses. History is committed at convergence only: inside a step every trial starts from the
 //! history of the step before.
+//!
+//! *Energies.* Internal is ∫ S:dE: the energy stored by the instantaneous laws, Σ V Ψ, less ∫ (f_Ψ − f)·du with f_Ψ their force and f
+//! the relaxed one, by Simpson's rule over each load step; so it is what is stored and what relaxing laws have dissipated. External is
+//! the work of loads, reactions and prescribed motions, by the trapezoidal rule over each load step. The two have nothing in common but
+//! the displacements. The error of a trapezium over b, after one over a, is estimated from both: (T_ab − T_a − T_b) b²/(3 a (a + b)),
+//! with a and b the lengths of the ways of all nodes.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -15,10 +22,13 @@ use crate::Real;
 use crate::applied::AppliedForces;
 use crate::energies::Energies;
 use crate::forces::InternalForces;
+use crate::load::Load;
 use crate::model::{Contradiction, FREE, Model};
+use crate::recover::Recovery;
 use crate::state::{History, State};
-use crate::stepper::{Observable, sum_owned};
-use crate::tensor::{Vector, sub};
+use crate::step_error::at_corner;
+use crate::stepper::{Observable, owned_only, sum_owned};
+use crate::tensor::{Vector, cast, scale, sub};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -35,6 +45,16 @@ const RAMP_DAMPING: f64 = 0.02;
 const ADAPT: [f64; 2] = [0.90, 1.02];
 /// Iterations from one report to the next.
 const REPORT: usize = 20;
+/// Iterations for which a search that has reached its residual goes on for the displacements.
+pub const PATIENCE: usize = 4000;
+/// Where the residual is below this many tolerances, round-off of single precision makes the slowest mode look faster than it is:
+/// from then on its estimate grows by [`FASTEST`] at the most.
+const ROUGH: f64 = 10.0;
+const FASTEST: f64 = 1.5;
+/// Reports over which an error of displacements is averaged in single precision.
+const AVERAGED: usize = 10;
+/// A way shorter than this part of another one doesn't tell how forces bend along that one.
+const SHORTEST: f64 = 0.1;
 /// The motion starts anew where the residual grows by this factor over its least.
 const RUNAWAY: f64 = 10.0;
 
@@ -43,15 +63,33 @@ const RUNAWAY: f64 = 10.0;
 pub struct RelaxationSettings {
     /// Largest residual force on a free component, over the largest internal force.
     pub tolerance: f64,
+    /// Estimated error of the displacements over the largest one, in single precision, where round-off hides how far an equilibrium
+    /// is in the residual of slender bodies: a search goes on for it, though not for more than `PATIENCE` iterations.
+    pub displacement: f64,
     /// Iterations after which a load step has failed.
     pub iterations: usize,
     /// How often a failed load step may be halved.
     pub halvings: u32,
 }
 
+impl RelaxationSettings {
+    /// The usual ones for a number type.
+    pub fn usual<R: Real>() -> Self {
+        let precise = Self::default();
+        match is_single::<R>() {
+            true => Self { tolerance: 100.0 * precise.tolerance, displacement: 1e-3, ..precise },
+            false => precise,
+        }
+    }
+}
+
+fn is_single<R: Real>() -> bool {
+    R::EPSILON > 1e-10
+}
+
 impl Default for RelaxationSettings {
     fn default() -> Self {
-        Self { tolerance: 1e-6, iterations: 20_000, halvings: 6 }
+        Self { tolerance: 1e-6, displacement: f64::INFINITY, iterations: 20_000, halvings: 6 }
     }
 }
 
@@ -79,17 +117,20 @@ pub enum RelaxationError {
     },
     /// A cell turns inside out however small the load step.
     #[error(
-        "element {element} of `{body}` is inverted (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
-         {iterations} iterations"
+        "element {element} of `{body}` is inverted{} (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
+         {iterations} iterations",
+        at_corner(*corner, *node)
     )]
     Inverted {
         /// The body.
         body: String,
         /// The element, numbered as in the user's mesh.
         element: u32,
-        /// Its first node, numbered in its body.
+        /// Its first node, or that of the corner, numbered in its body.
         node: u32,
-        /// det F.
+        /// Whether it is a corner of a hexahedron, not its middle.
+        corner: bool,
+        /// det F there.
         determinant: f64,
         /// Iterations spent on the last try.
         iterations: usize,
@@ -117,8 +158,14 @@ impl RelaxationError {
     /// What to try.
     pub fn remedy(&self) -> &'static str {
         match self {
+            Self::Inverted { time, .. } | Self::NotConverged { time, .. } | Self::NotFinite { time, .. }
+                if *time == 0.0 =>
+            {
+                "what acts at t = 0 comes at once: let it grow over time (`curve = \"smooth-step\"`), or make it smaller; a body \
+                 that nothing holds has no equilibrium"
+            }
             Self::NotConverged { .. } => {
-                "try more load steps or a looser tolerance; a body that nothing holds has no equilibrium"
+                "try more load steps, a looser tolerance or double precision; a body that nothing holds has no equilibrium"
             }
             Self::Inverted { .. } => "try more load steps, a smaller motion, or a finer mesh there",
             Self::NotFinite { .. } => "try more load steps; a body that nothing holds has no equilibrium",
@@ -186,6 +233,56 @@ pub struct Equilibrium<R> {
     pub energies: Energies,
     /// Internal minus applied force [N] of each node.
     pub residual: Vec<Vector<R>>,
+    /// How it was reached.
+    pub way: Way<R>,
+}
+
+/// The way through the equilibria found so far, as far as the work along it needs it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Way<R> {
+    /// Equilibria found.
+    pub equilibria: u64,
+    /// Estimated error of the external work [J]: the trapezia less the integral. That of a first one is known where the next way
+    /// isn't much shorter.
+    pub error: Option<f64>,
+    /// Estimated error of the displacements over the largest one, at worst.
+    pub displacement_error: f64,
+    /// From the last equilibrium but one to the last, of each node: the motion [m] and the change of load and reaction [N].
+    last: Vec<[Vector<R>; 2]>,
+}
+
+impl<R> Way<R> {
+    /// Whether it is one of a model with so many nodes.
+    pub fn fits(&self, nodes: usize) -> bool {
+        self.last.len() == if self.equilibria > 0 { nodes } else { 0 }
+    }
+}
+
+impl<R: Real> Way<R> {
+    /// Goes on by motions [m] and changes of the forces from outside [N].
+    fn go_on(&mut self, next: Vec<[Vector<R>; 2]>) {
+        let square = |way: &[[Vector<R>; 2]]| -> f64 {
+            way.iter().flat_map(|[motion, _]| motion).map(|x| x.to_f64().powi(2)).sum()
+        };
+        let [a, b] = [&self.last, &next].map(|way| square(way).sqrt());
+        if a > 0.0 && b > 0.0 {
+            let product =
+                |u: &Vector<R>, f: &Vector<R>| -> f64 { (0..3).map(|c| u[c].to_f64() * f[c].to_f64()).sum() };
+            // T_ab − T_a − T_b.
+            let difference: f64 = (self.last.iter().zip(&next))
+                .map(|([u, f], [v, g])| 0.5 * (product(u, g) - product(v, f)))
+                .sum();
+            let of = |own: f64, other: f64| difference * own * own / (3.0 * other * (own + other));
+            // A short way says little about a long one.
+            let own = of(b, a.max(SHORTEST * b));
+            self.error = match self.error {
+                None if self.equilibria == 1 && b >= SHORTEST * a => Some(own + of(a, b)),
+                before => before.map(|before| before + own),
+            };
+        }
+        self.equilibria += 1;
+        self.last = next;
+    }
 }
 
 /// Finds equilibria of one model. Holds constants, scratch and the [`Equilibrium`] last found; the next one comes from
@@ -206,10 +303,43 @@ pub struct DynamicRelaxation<'m, R> {
     residual: Vec<Vector<R>>,
     residual_before: Vec<Vector<R>>,
     sums: Vec<Sums>,
+    /// The first hexahedron of the last trial of which a corner is turned inside out, as (solid, cell).
+    folded: Option<(usize, usize)>,
     energies: Energies,
+    way: Way<R>,
 }
 
-/// At the last equilibrium. Work is by the trapezoid between equilibria; kinetic energy, damping and velocities are none.
+/// An instant that is sought or passed: the loads and motions of a time [s], or at the start a part of those of time 0.
+#[derive(Clone, Copy, Debug)]
+struct Instant {
+    time: f64,
+    part: f64,
+}
+
+/// What grows on the way to the next equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Course {
+    /// The part of what acts at time 0, from 0 to 1.
+    Start,
+    /// Time.
+    Time,
+}
+
+impl Course {
+    fn instant(self, reached: f64) -> Instant {
+        match self {
+            Self::Start => Instant { time: 0.0, part: reached },
+            Self::Time => Instant { time: reached, part: 1.0 },
+        }
+    }
+
+    /// The time [s] over which laws relax.
+    fn duration(self, from: f64, to: f64) -> f64 {
+        self.instant(to).time - self.instant(from).time
+    }
+}
+
+/// At the last equilibrium. Kinetic energy, damping and velocities are none.
 impl<R: Real> Observable<R> for DynamicRelaxation<'_, R> {
     fn energies(&self) -> &Energies {
         &self.energies
@@ -217,6 +347,10 @@ impl<R: Real> Observable<R> for DynamicRelaxation<'_, R> {
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
         sum_owned(self.model, &self.owners, constraint, &self.residual)
+    }
+
+    fn nodal_reaction(&self, node: usize) -> Vector<f64> {
+        owned_only(&self.owners[node], self.residual[node])
     }
 
     fn velocity(&self, _state: &State<R>, _node: usize) -> Vector<f64> {
@@ -243,18 +377,43 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             residual: vec![[R::ZERO; 3]; nodes],
             residual_before: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
+            folded: None,
             energies: Energies::default(),
+            way: Way::default(),
         })
     }
 
     /// What is known of the last equilibrium.
     pub fn equilibrium(&self) -> Equilibrium<R> {
-        Equilibrium { energies: self.energies, residual: self.residual.clone() }
+        Equilibrium { energies: self.energies, residual: self.residual.clone(), way: self.way.clone() }
     }
 
     /// Takes up an equilibrium of the same model, so that all that can be asked belongs to it.
-    pub fn resume(&mut self, Equilibrium { energies, residual }: Equilibrium<R>) {
-        (self.energies, self.residual) = (energies, residual);
+    pub fn resume(&mut self, Equilibrium { energies, residual, way }: Equilibrium<R>) {
+        (self.energies, self.residual, self.way) = (energies, residual, way);
+    }
+
+    /// How the last equilibrium was reached.
+    pub fn way(&self) -> &Way<R> {
+        &self.way
+    }
+
+    /// Brings a state at time 0 to its equilibrium there, if any load or motion acts then already; else nothing happens, and
+    /// neither where that is done. [`solve`](Self::solve) does it first.
+    ///
+    /// # Errors
+    /// If no equilibrium is found, however small the parts in which loads and motions are brought on.
+    pub fn begin(&mut self, state: &mut State<R>) -> Result<(), RelaxationError> {
+        let moved = |u: &Vector<R>| u.iter().any(|&x| x != R::ZERO);
+        let acts = |load: &Load| load.curve.value(0.0) != 0.0;
+        let at_rest = !state.displacement.iter().any(moved) && !self.model.loads.iter().any(acts);
+        if !state.is_at_start() || self.way.equilibria > 0 || at_rest {
+            return Ok(());
+        }
+        let before = state.displacement.clone();
+        state.displacement.fill([R::ZERO; 3]);
+        self.approach(state, Course::Start, [0.0, 1.0], &mut Convergence::default(), &mut |_| ())
+            .inspect_err(|_| state.displacement = before)
     }
 
     /// Brings a state to the equilibrium at a later time [s]. On failure the state is that of the last equilibrium.
@@ -275,52 +434,86 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         time: f64,
         watch: &mut dyn FnMut(Iteration),
     ) -> Result<Convergence, RelaxationError> {
-        let whole = time - state.time;
+        let mut convergence = Convergence::default();
+        self.begin(state)?;
+        self.approach(state, Course::Time, [state.time, time], &mut convergence, watch)?;
+        Ok(convergence)
+    }
+
+    /// Goes from one place of a course to another, in as many parts as it takes.
+    fn approach(
+        &mut self,
+        state: &mut State<R>,
+        course: Course,
+        [mut reached, goal]: [f64; 2],
+        convergence: &mut Convergence,
+        watch: &mut dyn FnMut(Iteration),
+    ) -> Result<(), RelaxationError> {
+        let whole = goal - reached;
         let mut size = whole;
         let least = whole / f64::from(1_u32 << self.settings.halvings.min(30));
-        let mut convergence = Convergence::default();
         self.slowness = 1.0;
-        while state.time < time {
-            let left = time - state.time;
-            let end = if size >= left * (1.0 - 1e-9) { time } else { state.time + size };
+        while reached < goal {
+            let left = goal - reached;
+            let end = if size >= left * (1.0 - 1e-9) { goal } else { reached + size };
             let before = state.displacement.clone();
-            match self.load_step(state, end, &mut convergence, watch) {
-                Ok(()) => convergence.parts += 1,
+            match self.load_step(state, course, [reached, end], convergence, watch) {
+                Ok(()) => {
+                    convergence.parts += 1;
+                    reached = end;
+                }
                 Err(error) => {
                     state.displacement = before;
                     self.slowness *= 2.0;
-                    size = 0.5 * (end - state.time);
+                    size = 0.5 * (end - reached);
                     if size < least * (1.0 - 1e-9) {
                         return Err(error);
                     }
                 }
             }
         }
-        Ok(convergence)
+        Ok(())
     }
 
     fn load_step(
         &mut self,
         state: &mut State<R>,
-        end: f64,
+        course: Course,
+        [from, to]: [f64; 2],
         convergence: &mut Convergence,
         watch: &mut dyn FnMut(Iteration),
     ) -> Result<(), RelaxationError> {
-        let mut forces = InternalForces::new(self.model, end - state.time);
-        let start = self.start(state);
+        let duration = course.duration(from, to);
+        let end = course.instant(to);
+        let mut forces = InternalForces::new(self.model, duration);
+        let start = self.start(state, course.instant(from));
         self.increment.fill([R::ZERO; 3]);
         let (mut slowest, mut least) = (0.0, f64::INFINITY);
+        let mut accuracy = Accuracy::default();
         let (mut greatest, mut reached) = (0.0_f64, f64::INFINITY);
         for iteration in 0..self.settings.iterations {
             let s = ((iteration + 1) as f64 / RAMP as f64).min(1.0);
-            let time = state.time + (end - state.time) * s * s * (3.0 - 2.0 * s);
             let ramped = iteration >= RAMP;
-            self.prescribe(state, if ramped { end } else { time });
-            let sums = self.evaluate(&mut forces, state, if ramped { end } else { time }, iteration)?;
+            let instant =
+                if ramped { end } else { course.instant(from + (to - from) * s * s * (3.0 - 2.0 * s)) };
+            self.prescribe(state, instant);
+            let sums = self.evaluate(&mut forces, state, instant, iteration)?;
             convergence.iterations += 1;
             convergence.residual = sums.relative_residual();
-            if ramped && convergence.residual <= self.settings.tolerance {
-                self.commit(&mut forces, state, &start, end);
+            if ramped && is_single::<R>() && iteration % REPORT == 0 {
+                accuracy.note(self.left_along_the_way(&forces, state, &start));
+            }
+            if ramped
+                && convergence.residual <= self.settings.tolerance
+                && accuracy.suffices(self.settings.displacement)
+            {
+                self.check_corners(state, iteration, end.time)?;
+                let error = match is_single::<R>() {
+                    true => accuracy.mean(),
+                    false => self.error_of_slowest(state, slowest),
+                };
+                self.way.displacement_error = self.way.displacement_error.max(error);
+                self.commit(&mut forces, state, &start, end, duration);
                 return Ok(());
             }
             if ramped && convergence.residual > RUNAWAY * least {
@@ -335,11 +528,14 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             if iteration % REPORT == 0 {
                 let tolerance = self.settings.tolerance;
                 let fraction = ((greatest / reached).ln() / (greatest / tolerance).ln()).clamp(0.0, 1.0);
-                let (span, residual) = ([state.time, end], convergence.residual);
+                let (span, residual) = ([state.time, end.time], convergence.residual);
                 watch(Iteration { span, number: iteration, residual, fraction });
             }
             let damping = if ramped {
                 slowest = follow(slowest, &sums);
+                if is_single::<R>() && convergence.residual < ROUGH * self.settings.tolerance {
+                    slowest = accuracy.hold_back(slowest);
+                }
                 2.0 * (slowest * HIGHEST / (slowest + HIGHEST)).sqrt()
             } else {
                 RAMP_DAMPING
@@ -353,18 +549,67 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             residual: convergence.residual,
             tolerance: self.settings.tolerance,
             iterations: self.settings.iterations,
-            time: end,
+            time: end.time,
         })
     }
 
-    /// Moves the prescribed components to their places at a time.
-    fn prescribe(&self, state: &mut State<R>, time: f64) {
+    /// Corners of hexahedra are judged in equilibria only: on the way there they may be out of place for a while.
+    fn check_corners(&self, state: &State<R>, iterations: usize, time: f64) -> Result<(), RelaxationError> {
+        let Some((solid, cell)) = self.folded else { return Ok(()) };
+        let solid = &self.model.solids[solid];
+        let worst = solid.cells.worst_corner(cell, |node| cast(state.displacement[node as usize]));
+        let (node, determinant) = worst.unwrap_or((solid.cells.nodes(cell)[0], 0.0));
+        Err(RelaxationError::Inverted {
+            body: self.model.bodies[solid.body].name.clone(),
+            element: solid.original[cell],
+            node: self.model.locate_node(node).1,
+            corner: true,
+            determinant,
+            iterations,
+            time,
+        })
+    }
+
+    /// The error of the displacements over themselves by the slowest mode, that of a squared frequency: |M⁻¹ r|/(ω² |u|) in the norm
+    /// of the masses.
+    fn error_of_slowest(&self, state: &State<R>, slowest: f64) -> f64 {
+        let (mut left, mut size) = (0.0, 0.0);
+        for (node, u) in state.displacement.iter().enumerate() {
+            let mass = self.slowness * self.mass[node].to_f64();
+            for (c, x) in u.iter().enumerate() {
+                size += mass * x.to_f64().powi(2);
+                if self.owners[node][c] == FREE {
+                    left += self.residual[node][c].to_f64().powi(2) / mass;
+                }
+            }
+        }
+        let error = (left / size).sqrt() / slowest;
+        if error.is_finite() { error } else { 0.0 }
+    }
+
+    /// The work of the residual along the load step over that of the forces from outside: the part of the way that is left, in which
+    /// round-off averages out.
+    fn left_along_the_way(&self, forces: &InternalForces<R>, state: &State<R>, start: &Start<R>) -> f64 {
+        let (mut left, mut work) = (0.0, 0.0);
+        for (node, (u, u0)) in state.displacement.iter().zip(&start.displacement).enumerate() {
+            let (internal, residual, before) = (forces.at(node), self.residual[node], start.outside[node]);
+            for c in 0..3 {
+                let motion = (u[c] - u0[c]).to_f64();
+                let free = if self.owners[node][c] == FREE { residual[c].to_f64() } else { 0.0 };
+                left += free * motion;
+                work += (internal[c].to_f64() - free - before[c].to_f64()) * motion;
+            }
+        }
+        if work > 0.0 { left / work } else { 0.0 }
+    }
+
+    /// Moves the prescribed components to their places at an instant.
+    fn prescribe(&self, state: &mut State<R>, Instant { time, part }: Instant) {
         for (index, constraint) in self.model.constraints.iter().enumerate() {
-            let factor = constraint.motion.factor(time);
             for (at, &node) in constraint.nodes.iter().enumerate() {
-                let amplitude = constraint.motion.amplitude(at);
+                let place = constraint.motion.displacement(at, time, part);
                 for c in (0..3).filter(|&c| self.owners[node as usize][c] == index as u32) {
-                    state.displacement[node as usize][c] = R::of(amplitude[c] * factor);
+                    state.displacement[node as usize][c] = R::of(place[c]);
                 }
             }
         }
@@ -375,12 +620,12 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         &mut self,
         forces: &mut InternalForces<R>,
         state: &State<R>,
-        time: f64,
+        Instant { time, part }: Instant,
         iterations: usize,
     ) -> Result<Sums, RelaxationError> {
         self.take_committed_history(state);
-        let inverted = forces.evaluate(&state.displacement, &mut self.trial_history).inverted;
-        if let Some((solid, cell, determinant)) = inverted
+        let found = forces.evaluate(&state.displacement, &mut self.trial_history);
+        if let Some((solid, cell, determinant)) = found.inverted
             && determinant.is_finite()
         {
             let solid = &self.model.solids[solid];
@@ -388,23 +633,25 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
                 body: self.model.bodies[solid.body].name.clone(),
                 element: solid.original[cell],
                 node: self.model.locate_node(solid.cells.nodes(cell)[0]).1,
+                corner: false,
                 determinant,
                 iterations,
                 time,
             });
         }
+        self.folded = found.folded;
         self.applied.update(time, &state.displacement);
         std::mem::swap(&mut self.residual, &mut self.residual_before);
         let (residual, before) = (&mut self.residual, &self.residual_before);
         let (increment, owners, mass, slowness) = (&self.increment, &self.owners, &self.mass, self.slowness);
-        let (applied, forces) = (&self.applied, &*forces);
+        let (applied, forces, part) = (&self.applied, &*forces, R::of(part));
         (residual.par_chunks_mut(CHUNK).zip(&mut self.sums)).enumerate().for_each(
             |(task, (residual, sums))| {
                 *sums = Sums { finite: true, ..Sums::default() };
                 for (offset, r) in residual.iter_mut().enumerate() {
                     let node = task * CHUNK + offset;
                     let internal = forces.at(node);
-                    *r = sub(internal, applied.at(node));
+                    *r = sub(internal, scale(applied.at(node), part));
                     for c in 0..3 {
                         let (force, out) = (internal[c].to_f64().abs(), r[c].to_f64().abs());
                         sums.finite &= force.is_finite() && out.is_finite();
@@ -458,21 +705,34 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             });
     }
 
-    /// Takes a converged trial as the new state. Work is that of the mean of the forces before and after.
-    fn commit(&mut self, forces: &mut InternalForces<R>, state: &mut State<R>, start: &Start<R>, end: f64) {
+    /// Takes a converged trial as the new state.
+    fn commit(
+        &mut self,
+        forces: &mut InternalForces<R>,
+        state: &mut State<R>,
+        start: &Start<R>,
+        end: Instant,
+        duration: f64,
+    ) {
+        let given_up = self.given_up(forces, state, start, duration);
         let hourglass = forces.evaluate(&state.displacement, &mut state.history).hourglass;
+        let stored = Recovery::new(self.model, state).stored_energy();
         let work = &mut state.work;
+        let mut way = Vec::with_capacity(state.displacement.len());
         for (node, (u, u0)) in state.displacement.iter().zip(&start.displacement).enumerate() {
-            let (after, before, residual) = (forces.at(node), start.internal[node], self.residual[node]);
-            for c in 0..3 {
-                let du = 0.5 * (u[c] - u0[c]).to_f64();
-                let internal = (before[c] + after[c]).to_f64();
-                let free = self.owners[node][c] == FREE;
-                let unbalanced = if free { residual[c].to_f64() } else { 0.0 };
-                work.internal += internal * du;
-                work.external += (internal - unbalanced) * du;
+            let (before, residual) = (start.outside[node], self.residual[node]);
+            let mut outside = forces.at(node);
+            for c in (0..3).filter(|&c| self.owners[node][c] == FREE) {
+                outside[c] -= residual[c];
             }
+            let motion = sub(*u, *u0);
+            for c in 0..3 {
+                work.external += 0.5 * (before[c].to_f64() + outside[c].to_f64()) * motion[c].to_f64();
+            }
+            way.push([motion, sub(outside, before)]);
         }
+        self.way.go_on(way);
+        work.internal += stored + hourglass - start.stored - given_up;
         work.largest = work.largest.max(work.internal - hourglass).max(work.external.abs());
         self.energies = Energies {
             internal: work.internal - hourglass,
@@ -481,19 +741,74 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             balance: (work.internal - work.external).abs() / work.largest.max(f64::MIN_POSITIVE),
             ..Energies::default()
         };
-        state.time = end;
-        state.steps += 1;
+        state.steps += u64::from(end.time > state.time);
+        state.time = end.time;
     }
 
-    /// Displacements and internal forces at the equilibrium a load step starts from.
-    fn start(&mut self, state: &State<R>) -> Start<R> {
+    /// ∫ (f_Ψ − f)·du [J] over a load step that came to an equilibrium: what the instantaneous laws would have stored, but relaxing ones
+    /// did not take up. By Simpson's rule; where a cell is inverted halfway on the straight line, by the trapezoidal rule.
+    fn given_up(
+        &mut self,
+        forces: &mut InternalForces<R>,
+        state: &State<R>,
+        start: &Start<R>,
+        duration: f64,
+    ) -> f64 {
+        if self.model.solids.iter().all(|solid| solid.material.prony.is_elastic()) || duration == 0.0 {
+            return 0.0;
+        }
+        let half = R::of(0.5);
+        let halfway: Vec<Vector<R>> = (start.displacement.iter().zip(&state.displacement))
+            .map(|(u, v)| [0, 1, 2].map(|c| u[c] + half * (v[c] - u[c])))
+            .collect();
+        forces.set_step(self.model, 0.5 * duration);
+        let (middle, sound) = self.missing(forces, &halfway, state);
+        forces.set_step(self.model, duration);
+        let (end, _) = self.missing(forces, &state.displacement, state);
+        let [ends, between] = if sound { [1.0 / 6.0, 4.0 / 6.0] } else { [0.5, 0.0] };
+        let of_node = |node: usize| -> f64 {
+            let motion = sub(state.displacement[node], start.displacement[node]);
+            let force = |c: usize| {
+                ends * (start.missing[node][c] + end[node][c]).to_f64() + between * middle[node][c].to_f64()
+            };
+            (0..3).map(|c| force(c) * motion[c].to_f64()).sum()
+        };
+        (0..state.displacement.len()).map(of_node).sum()
+    }
+
+    /// f_Ψ − f [N] of the nodes in some place, a step of the forces after the state's history; whether no cell is inverted there.
+    fn missing(
+        &mut self,
+        forces: &mut InternalForces<R>,
+        displacement: &[Vector<R>],
+        state: &State<R>,
+    ) -> (Vec<Vector<R>>, bool) {
         self.take_committed_history(state);
+        let nodes = 0..displacement.len();
+        forces.evaluate(displacement, &mut self.trial_history);
+        let relaxed: Vec<Vector<R>> = nodes.clone().map(|node| forces.at(node)).collect();
+        let mut none = vec![History::default(); self.model.solids.len()];
+        let inverted = forces.evaluate(displacement, &mut none).inverted;
+        (nodes.map(|node| sub(forces.at(node), relaxed[node])).collect(), inverted.is_none())
+    }
+
+    /// The equilibrium that a load step starts from.
+    fn start(&mut self, state: &State<R>, Instant { time, part }: Instant) -> Start<R> {
         // A step of no time leaves relaxing stresses as they are.
-        let mut forces = InternalForces::new(self.model, f64::MIN_POSITIVE);
-        forces.evaluate(&state.displacement, &mut self.trial_history);
+        let mut forces = InternalForces::new(self.model, 0.0);
+        let (missing, _) = self.missing(&mut forces, &state.displacement, state);
+        self.take_committed_history(state);
+        let hourglass = forces.evaluate(&state.displacement, &mut self.trial_history).hourglass;
+        self.applied.update(time, &state.displacement);
+        let outside = |node: usize| {
+            let (internal, applied) = (forces.at(node), scale(self.applied.at(node), R::of(part)));
+            [0, 1, 2].map(|c| if self.owners[node][c] == FREE { applied[c] } else { internal[c] })
+        };
         Start {
             displacement: state.displacement.clone(),
-            internal: (0..self.model.node_count()).map(|node| forces.at(node)).collect(),
+            outside: (0..self.model.node_count()).map(outside).collect(),
+            missing,
+            stored: Recovery::new(self.model, state).stored_energy() + hourglass,
         }
     }
 
@@ -507,8 +822,47 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
 /// The equilibrium a load step starts from.
 struct Start<R> {
     displacement: Vec<Vector<R>>,
-    /// Internal forces [N].
-    internal: Vec<Vector<R>>,
+    /// Loads and reactions [N].
+    outside: Vec<Vector<R>>,
+    /// f_Ψ − f [N].
+    missing: Vec<Vector<R>>,
+    /// What the instantaneous laws and hourglass control hold [J].
+    stored: f64,
+}
+
+/// What a search in single precision knows of its displacements.
+#[derive(Default)]
+struct Accuracy {
+    /// The last parts of the way that were left.
+    left: Vec<f64>,
+    /// The estimate of the slowest mode's squared frequency where the residual became rough.
+    slowest: Option<f64>,
+    /// Iterations at which the residual was low enough.
+    waited: usize,
+}
+
+impl Accuracy {
+    fn note(&mut self, left: f64) {
+        if self.left.len() == AVERAGED {
+            self.left.remove(0);
+        }
+        self.left.push(left);
+    }
+
+    fn mean(&self) -> f64 {
+        self.left.iter().sum::<f64>().abs() / self.left.len().max(1) as f64
+    }
+
+    /// Whether displacements, asked for at an equilibrium of the forces, are good enough, or won't become so.
+    fn suffices(&mut self, tolerance: f64) -> bool {
+        self.waited += 1;
+        self.waited > PATIENCE || self.mean() <= tolerance
+    }
+
+    fn hold_back(&mut self, slowest: f64) -> f64 {
+        let first = *self.slowest.get_or_insert(slowest);
+        if first > 0.0 { slowest.min(FASTEST * first) } else { slowest }
+    }
 }
 
 /// The next estimate of the slowest mode's squared frequency.

@@ -64,7 +64,7 @@ mod tangent;
 pub mod tensor;
 
 pub use dynamic_relaxation::{
-    Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings,
+    Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Way,
 };
 pub use energies::{BALANCE_LIMIT, BALANCE_STEPS, Energies, Sums, balance_floor, model_balance_floor};
 pub use fingerprint::fingerprint;

@@ -5,13 +5,13 @@ use std::ops::Range;
 
 use crate::critical_step::cell_bound;
 use crate::curve::Curve;
-use crate::element::{GaussPoints, Hex8, Rest, gauss_points, hex8, tet4};
+use crate::element::{GaussPoints, HEX_EDGES, Hex8, Rest, gauss_points, hex8, tet4};
 use crate::law::AnyLaw;
 use crate::load::Load;
 use crate::mapping::Mapping;
 use crate::order::order;
 use crate::prony::Prony;
-use crate::tensor::{Vector, add, scale};
+use crate::tensor::{Vector, add, cross, dot, scale, sub};
 
 /// Bodies, what holds and loads them, and the surfaces they carry.
 #[derive(Clone, Debug, Default)]
@@ -167,6 +167,8 @@ pub struct CellBlock<const N: usize> {
     pub rest: Vec<Rest<N>>,
     /// Stiffness against hourglass patterns; `None` for an element that has none.
     pub hourglass: Option<Hourglass<f64, N>>,
+    /// X_a − X_0 [m] of the nodes of each hexahedron, whose corners are judged; empty for tetrahedra.
+    pub offsets: Vec<[Vector<f64>; N]>,
 }
 
 /// Hourglass control: energy ½ k Σ_c |Σ_a γ_ca u_a|².
@@ -178,6 +180,8 @@ pub struct Hourglass<R, const N: usize> {
     pub moments: Vec<[Vector<R>; 4]>,
     /// k = c μ V ΣB²/8 [N/m], one per cell.
     pub stiffness: Vec<R>,
+    /// κ² [1/m²] of each cell: how far corners follow the patterns; see [`Hex8::corner_reach`].
+    pub corner_reach: Vec<R>,
 }
 
 impl<const N: usize> CellBlock<N> {
@@ -200,7 +204,9 @@ impl<const N: usize> CellBlock<N> {
                 patterns: picked(&control.patterns, order),
                 moments: picked(&control.moments, order),
                 stiffness: picked(&control.stiffness, order),
+                corner_reach: picked(&control.corner_reach, order),
             }),
+            offsets: if self.offsets.is_empty() { vec![] } else { picked(&self.offsets, order) },
         }
     }
 }
@@ -209,7 +215,7 @@ impl Cells {
     /// Tetrahedra from their nodes.
     pub fn tet4(nodes: Vec<[u32; 4]>, rest: &[Vector<f64>]) -> Self {
         let quantities = nodes.iter().map(|cell| tet4(&cell.map(|n| rest[n as usize]))).collect();
-        Self::Tet4(CellBlock { nodes, rest: quantities, hourglass: None })
+        Self::Tet4(CellBlock { nodes, rest: quantities, hourglass: None, offsets: vec![] })
     }
 
     /// Hexahedra from their nodes; `hourglass` is the coefficient c, `shear` the modulus μ [Pa] that scales it.
@@ -218,12 +224,14 @@ impl Cells {
         let stiffness =
             |hex: &Hex8| hourglass * shear * hex.rest.volume * hex.rest.gradient_square_sum() / 8.0;
         Self::Hex8(CellBlock {
+            offsets: offsets(&nodes, rest),
             nodes,
             rest: hexes.iter().map(|hex| hex.rest).collect(),
             hourglass: Some(Hourglass {
                 patterns: hexes.iter().map(|hex| hex.hourglass).collect(),
                 moments: hexes.iter().map(|hex| hex.moments).collect(),
                 stiffness: hexes.iter().map(stiffness).collect(),
+                corner_reach: hexes.iter().map(|hex| hex.corner_reach).collect(),
             }),
         })
     }
@@ -231,7 +239,8 @@ impl Cells {
     /// Tetrahedra with averaged pressure from their nodes.
     pub fn averaged_tet4(nodes: Vec<[u32; 4]>, rest: &[Vector<f64>], averaging: Averaging) -> Self {
         let quantities = nodes.iter().map(|cell| tet4(&cell.map(|n| rest[n as usize]))).collect();
-        Self::AveragedTet4(CellBlock { nodes, rest: quantities, hourglass: None }, averaging)
+        let block = CellBlock { nodes, rest: quantities, hourglass: None, offsets: vec![] };
+        Self::AveragedTet4(block, averaging)
     }
 
     /// Hexahedra with eight Gauss points from their nodes.
@@ -239,7 +248,8 @@ impl Cells {
         let corners = |cell: &[u32; 8]| cell.map(|n| rest[n as usize]);
         let quantities = nodes.iter().map(|cell| hex8(&corners(cell)).rest).collect();
         let points = nodes.iter().map(|cell| gauss_points(&corners(cell))).collect();
-        Self::FullHex8(CellBlock { nodes, rest: quantities, hourglass: None }, points)
+        let offsets = offsets(&nodes, rest);
+        Self::FullHex8(CellBlock { nodes, rest: quantities, hourglass: None, offsets }, points)
     }
 
     /// The same cells, each filled only in part, as cubes at the border of a body are: its volume and with it its stiffness
@@ -316,6 +326,24 @@ impl Cells {
         with_cells!(self, block => block.rest[cell].volume)
     }
 
+    /// The corner of a hexahedron at which det F is least, as its node and that determinant; `None` of tetrahedra.
+    pub(crate) fn worst_corner(
+        &self,
+        cell: usize,
+        displacement: impl Fn(u32) -> Vector<f64>,
+    ) -> Option<(u32, f64)> {
+        let (Self::Hex8(block) | Self::FullHex8(block, _)) = self else { return None };
+        let (nodes, rest) = (&block.nodes[cell], &block.offsets[cell]);
+        let volume = |x: &[Vector<f64>; 8], corner: usize| {
+            let [a, b, c] = HEX_EDGES[corner].map(|node| sub(x[node], x[corner]));
+            dot(cross(a, b), c)
+        };
+        let moved = std::array::from_fn(|a| add(rest[a], displacement(nodes[a])));
+        (0..8)
+            .map(|corner| (nodes[corner], volume(&moved, corner) / volume(rest, corner)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     /// Σ |B_a|² [1/m²] of a cell.
     pub fn gradient_square_sum(&self, cell: usize) -> f64 {
         with_cells!(self, block => block.rest[cell].gradient_square_sum())
@@ -344,6 +372,12 @@ impl Cells {
             Self::FullHex8(..) => "hex8-full",
         }
     }
+}
+
+/// X_a − X_0 [m] of hexahedra.
+fn offsets(nodes: &[[u32; 8]], rest: &[Vector<f64>]) -> Vec<[Vector<f64>; 8]> {
+    let of_cell = |cell: &[u32; 8]| cell.map(|node| sub(rest[node as usize], rest[cell[0] as usize]));
+    nodes.iter().map(of_cell).collect()
 }
 
 /// The nodes of some cells, numbered among themselves in increasing order, and the cells at each of them.
@@ -413,11 +447,14 @@ pub struct Constraint {
 }
 
 impl Constraint {
-    /// The amplitude of each node's motion.
-    fn amplitudes(&self) -> impl Iterator<Item = Vector<f64>> + '_ {
-        (0..self.nodes.len()).map(|index| self.motion.amplitude(index))
+    /// The amplitudes of each node's motion.
+    fn amplitudes(&self) -> impl Iterator<Item = Amplitudes> + '_ {
+        (0..self.nodes.len()).map(|index| self.motion.amplitudes(index))
     }
 }
+
+/// What the two factors of a motion multiply. All but rotations have one, the other is zero.
+pub type Amplitudes = [Vector<f64>; 2];
 
 /// The course of a prescribed motion.
 #[derive(Clone, Debug)]
@@ -430,37 +467,94 @@ pub enum Motion {
     Displacements(Vec<Vector<f64>>, Curve),
     /// Velocity [m/s] × curve; the displacement is its integral.
     Velocity(Vector<f64>, Curve),
+    /// Rotation about an axis by an angle × curve, each node on its circle; see [`Motion::rotation`].
+    Rotation {
+        /// k × r and k × (k × r) [m] of each node of the constraint, in their order: k is the axis, r the arm from it.
+        arms: Vec<Amplitudes>,
+        /// The angle [rad].
+        angle: f64,
+        /// Its course.
+        curve: Curve,
+    },
 }
 
 impl Motion {
-    /// What the factor multiplies: the displacement [m], or the velocity [m/s], of the constraint's node at `index`.
-    pub fn amplitude(&self, index: usize) -> Vector<f64> {
+    /// Rotation of nodes about an axis through a centre [m], by an angle [rad] × curve, by Rodrigues' formula
+    /// u = sin θ k × r + (1 − cos θ) k × (k × r). The axis need not be of unit length, nor zero.
+    pub fn rotation(
+        axis: Vector<f64>,
+        centre: Vector<f64>,
+        angle: f64,
+        curve: Curve,
+        rest: impl Iterator<Item = Vector<f64>>,
+    ) -> Self {
+        let axis = scale(axis, 1.0 / dot(axis, axis).sqrt());
+        let arm = |place: Vector<f64>| {
+            let across = cross(axis, sub(place, centre));
+            [across, cross(axis, across)]
+        };
+        Self::Rotation { arms: rest.map(arm).collect(), angle, curve }
+    }
+
+    /// What the factors multiply: the displacement [m], the velocity [m/s] or the arms [m] of the constraint's node at `index`.
+    pub fn amplitudes(&self, index: usize) -> Amplitudes {
+        let one = |amplitude| [amplitude, [0.0; 3]];
         match self {
-            Self::Fixed => [0.0; 3],
-            Self::Displacement(by, _) => *by,
-            Self::Displacements(by, _) => by[index],
-            Self::Velocity(velocity, _) => *velocity,
+            Self::Fixed => one([0.0; 3]),
+            Self::Displacement(by, _) => one(*by),
+            Self::Displacements(by, _) => one(by[index]),
+            Self::Velocity(velocity, _) => one(*velocity),
+            Self::Rotation { arms, .. } => arms[index],
         }
     }
 
-    /// Displacement over amplitude at a time [s].
-    pub fn factor(&self, time: f64) -> f64 {
+    /// Displacement over amplitudes at a time [s].
+    pub fn factors(&self, time: f64) -> [f64; 2] {
+        self.factors_of_part(time, 1.0)
+    }
+
+    /// Displacement over amplitudes where a part, from 0 to 1, of the way to where it is at a time [s] is gone.
+    fn factors_of_part(&self, time: f64, part: f64) -> [f64; 2] {
         match self {
-            Self::Fixed => 0.0,
-            Self::Displacement(_, curve) | Self::Displacements(_, curve) => curve.value(time),
-            Self::Velocity(_, curve) => curve.integral(time),
+            Self::Fixed => [0.0; 2],
+            Self::Displacement(_, curve) | Self::Displacements(_, curve) => [part * curve.value(time), 0.0],
+            Self::Velocity(_, curve) => [part * curve.integral(time), 0.0],
+            Self::Rotation { angle, curve, .. } => {
+                let angle = part * angle * curve.value(time);
+                // 1 − cos θ without cancellation.
+                [angle.sin(), 2.0 * (0.5 * angle).sin().powi(2)]
+            }
         }
     }
 
-    /// Whether two motions of the same amplitude are the same at all times.
+    /// Displacement [m] of the constraint's node at `index`, a part, from 0 to 1, of the way to where it is at a time [s].
+    pub fn displacement(&self, index: usize, time: f64, part: f64) -> Vector<f64> {
+        let (amplitudes, factors) = (self.amplitudes(index), self.factors_of_part(time, part));
+        [0, 1, 2].map(|c| placed(component(&amplitudes, c), factors))
+    }
+
+    /// Whether two motions of the same amplitudes are the same at all times.
     fn follows(&self, other: &Self) -> bool {
         let course = |motion: &Self| match motion {
             Self::Fixed => None,
-            Self::Displacement(_, curve) | Self::Displacements(_, curve) => Some((false, curve.clone())),
-            Self::Velocity(_, curve) => Some((true, curve.clone())),
+            Self::Displacement(_, curve) | Self::Displacements(_, curve) => Some((0, 0.0, curve.clone())),
+            Self::Velocity(_, curve) => Some((1, 0.0, curve.clone())),
+            Self::Rotation { angle, curve, .. } => Some((2, *angle, curve.clone())),
         };
         course(self) == course(other)
     }
+}
+
+/// The amplitudes of a component.
+#[inline(always)]
+pub(crate) fn component([first, second]: &Amplitudes, c: usize) -> [f64; 2] {
+    [first[c], second[c]]
+}
+
+/// A component of a displacement [m] from its amplitudes and factors.
+#[inline(always)]
+pub(crate) fn placed(amplitudes: [f64; 2], factors: [f64; 2]) -> f64 {
+    amplitudes[0] * factors[0] + amplitudes[1] * factors[1]
 }
 
 /// A surface carried by a body.
@@ -572,20 +666,20 @@ impl Model {
     /// If two constraints prescribe different motions for one component of a node.
     pub fn constrained_components(&self) -> Result<Vec<[u32; 3]>, Contradiction> {
         let mut owners = vec![[FREE; 3]; self.node_count()];
-        let mut amplitudes = vec![[0.0; 3]; self.node_count()];
+        let mut amplitudes = vec![[[0.0; 2]; 3]; self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
-            for (&node, amplitude) in constraint.nodes.iter().zip(constraint.amplitudes()) {
+            for (&node, own) in constraint.nodes.iter().zip(constraint.amplitudes()) {
                 for component in (0..3).filter(|&c| constraint.components[c]) {
+                    let own = self::component(&own, component);
                     let owner = &mut owners[node as usize][component];
                     let known = &mut amplitudes[node as usize][component];
                     if *owner == FREE {
-                        (*owner, *known) = (index as u32, amplitude[component]);
+                        (*owner, *known) = (index as u32, own);
                         continue;
                     }
                     let first = &self.constraints[*owner as usize];
-                    let still = *known == 0.0;
-                    if *known != amplitude[component] || !(still || first.motion.follows(&constraint.motion))
-                    {
+                    let still = *known == [0.0; 2];
+                    if *known != own || !(still || first.motion.follows(&constraint.motion)) {
                         let (body, local) = self.locate_node(node);
                         return Err(Contradiction {
                             first: first.name.clone(),
@@ -601,13 +695,15 @@ impl Model {
         Ok(owners)
     }
 
-    /// The amplitude of the motion of each component that has an owner (see [`Motion::amplitude`]); 0 for the others.
-    pub fn amplitudes(&self, owners: &[[u32; 3]]) -> Vec<Vector<f64>> {
-        let mut amplitudes = vec![[0.0; 3]; self.node_count()];
+    /// The amplitudes of the motion of each component that has an owner (see [`Motion::amplitudes`]); 0 for the others.
+    pub fn amplitudes(&self, owners: &[[u32; 3]]) -> Vec<Amplitudes> {
+        let mut amplitudes = vec![Amplitudes::default(); self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
-            for (&node, amplitude) in constraint.nodes.iter().zip(constraint.amplitudes()) {
+            for (&node, own) in constraint.nodes.iter().zip(constraint.amplitudes()) {
                 for c in (0..3).filter(|&c| owners[node as usize][c] == index as u32) {
-                    amplitudes[node as usize][c] = amplitude[c];
+                    for (to, from) in amplitudes[node as usize].iter_mut().zip(own) {
+                        to[c] = from[c];
+                    }
                 }
             }
         }

@@ -4,6 +4,7 @@
 //! Both updates have the form hᵢⁿ = dᵢ hᵢⁿ⁻¹ + gᵢ (Φⁿ − Φⁿ⁻¹):
 //! *exact* for Φ linear in the step (Taylor, Pister and Goudreau 1970): d = e^(−Δt/τ), g = a (1 − d) τ/Δt;
 //! *backward Euler* (thesis 5.57–5.61, there written with a − h): d = τ/(Δt + τ), g = a d.
+//! A step of no time, d = 1 and g = a, is a jump: it loads the instantaneous law. So a history begins.
 //! Leaves out: a thermodynamic derivation; for anisotropic finite strain the dissipation may be non-monotone.
 
 use schemars::JsonSchema;
@@ -185,6 +186,7 @@ impl<R: Real> Series<R> {
     fn set_step(&mut self, terms: &[(f64, f64)], update: PronyUpdate, step: f64) {
         for ((decay, gain), &(weight, time)) in self.terms.iter_mut().zip(terms) {
             let (d, g) = match update {
+                PronyUpdate::Exact if step == 0.0 => (1.0, weight),
                 PronyUpdate::Exact => {
                     let x = step / time;
                     ((-x).exp(), weight * -(-x).exp_m1() / x)
@@ -295,9 +297,13 @@ impl<R: Real> Relaxation<R> {
 mod tests {
     use super::*;
 
-    fn relax(update: PronyUpdate, step: f64, time: f64) -> f64 {
+    fn series(update: PronyUpdate) -> Prony {
         let term = PronyTerm { part: Part::Isochoric, weight: 0.5, time: 0.58 };
-        let prony = Prony::new(&[term], update).unwrap();
+        Prony::new(&[term], update).unwrap()
+    }
+
+    fn relax(update: PronyUpdate, step: f64, time: f64) -> f64 {
+        let prony = series(update);
         let relaxation = Relaxation::<f64>::new(&prony, step);
         let mut history = vec![Pack::ZERO; 6 * prony.slots()];
         let mut stress = 0.0;
@@ -318,6 +324,21 @@ mod tests {
     fn the_exact_update_is_exact_for_a_linear_stress_at_any_step() {
         for step in [0.001, 0.1, 1.0] {
             assert!((relax(PronyUpdate::Exact, step, 1.0) - truth(1.0)).abs() < 1e-12);
+        }
+    }
+
+    /// S of Φ = 1 from t = 0 on: 1 − a (1 − e^(−t/τ)), for any number of steps.
+    #[test]
+    fn a_jump_loads_the_instantaneous_law() {
+        let prony = series(PronyUpdate::Exact);
+        for steps in [1, 4, 64] {
+            let mut relaxation = Relaxation::<f64>::new(&prony, 0.0);
+            let mut history = vec![Pack::ZERO; 6 * prony.slots()];
+            let elastic = Split { isochoric: Symmetric::IDENTITY, volumetric: Symmetric::ZERO };
+            assert_eq!(relaxation.advance(elastic, &mut history, 0).0[0], 1.0);
+            relaxation.set_step(&prony, 0.5 / f64::from(steps));
+            let stress = (0..steps).fold(0.0, |_, _| relaxation.advance(elastic, &mut history, 0).0[0]);
+            assert!((stress - (0.5 + 0.5 * (-0.5 / 0.58_f64).exp())).abs() < 1e-14, "{steps}: {stress}");
         }
     }
 

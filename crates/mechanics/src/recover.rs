@@ -1,7 +1,9 @@
 //! Fields recovered from a state: strains, stresses and energies of the cells, in double precision.
 
+use rayon::prelude::*;
+
 use crate::Real;
-use crate::forces::pressure;
+use crate::forces::{pressure, volumetric_energy};
 use crate::law::{Deformation, Split};
 use crate::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
 use crate::state::{History, State};
@@ -12,15 +14,18 @@ use crate::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale, sub};
 pub struct CellFields {
     /// Deformation gradient F (mean over the cell).
     pub gradient: Tensor<f64>,
-    /// J = det F.
+    /// J that the volumetric part of the law sees, to which its pressure belongs: det F, or the average that the element takes.
     pub volume_ratio: f64,
+    /// The cell's own det F (mean over the cell).
+    pub cell_volume_ratio: f64,
     /// Green–Lagrange strain.
     pub green_strain: Symmetric<f64>,
     /// Second Piola–Kirchhoff stress [Pa], relaxation included.
     pub pk2_stress: Symmetric<f64>,
     /// Cauchy stress [Pa].
     pub cauchy_stress: Symmetric<f64>,
-    /// Strain energy per reference volume [J/m³] of the instantaneous elastic law.
+    /// Strain energy per reference volume [J/m³] of the instantaneous elastic law; its volumetric part is that of the averages
+    /// that the element takes, so that Σ V ψ is the energy that the forces are the gradient of.
     pub energy_density: f64,
     /// Unit fibre at rest; `None` if the law has none.
     pub fibre: Option<Vector<f64>>,
@@ -54,10 +59,21 @@ pub struct Recovery<'a, R> {
 enum Averages {
     /// Nothing.
     None,
-    /// Their pressure U' [Pa].
-    Pressure(Vec<f64>),
+    /// Of their volumetric part.
+    Volumetric(Vec<Dilatation>),
     /// Their volume ratio J̄, minus 1.
     VolumeChange(Vec<f64>),
+}
+
+/// The volumetric part of a law in a cell, averaged.
+#[derive(Clone, Copy)]
+struct Dilatation {
+    /// J − 1.
+    change: f64,
+    /// U' [Pa], relaxed.
+    pressure: f64,
+    /// U [J/m³].
+    energy: f64,
 }
 
 impl<'a, R: Real> Recovery<'a, R> {
@@ -66,6 +82,16 @@ impl<'a, R: Real> Recovery<'a, R> {
         let averages =
             model.solids.iter().zip(&state.history).map(|(s, h)| averages(s, h, &state.displacement));
         Self { model, state, averages: averages.collect() }
+    }
+
+    /// Σ V ψ over all cells [J], without what hourglass control holds. The number of threads never changes a bit.
+    pub fn stored_energy(&self) -> f64 {
+        let of_solid = |(index, solid): (usize, &Solid)| {
+            let stored = |cell: usize| solid.cells.volume(cell) * self.cell(index, cell).energy_density;
+            let energies: Vec<f64> = (0..solid.cells.len()).into_par_iter().map(stored).collect();
+            energies.iter().sum::<f64>()
+        };
+        self.model.solids.iter().enumerate().map(of_solid).sum()
     }
 
     /// The fields of one cell of a solid, means over its points.
@@ -118,17 +144,20 @@ fn point_fields(
         Averages::VolumeChange(changes) => {
             Deformation::from_displacement_gradient(&dilated(h, changes[cell]))
         }
-        Averages::None | Averages::Pressure(_) => Deformation::from_displacement_gradient(h),
+        Averages::None | Averages::Volumetric(_) => Deformation::from_displacement_gradient(h),
     };
     let Split { isochoric, volumetric } = law.energy(&deformation, fibres);
     let elastic = law.stress(&deformation, fibres);
-    let pk2_stress = match averages {
-        Averages::Pressure(pressures) => {
-            let volumetric = deformation.inverse_cauchy_green * (deformation.volume_ratio * pressures[cell]);
-            prony.stress(Split { isochoric: elastic.isochoric, volumetric: Symmetric::ZERO }, history)
-                + volumetric
+    let (pk2_stress, volume_ratio, volumetric) = match averages {
+        Averages::Volumetric(cells) => {
+            let Dilatation { change, pressure, energy } = cells[cell];
+            let stress = deformation.inverse_cauchy_green * (deformation.volume_ratio * pressure);
+            let isochoric = Split { isochoric: elastic.isochoric, volumetric: Symmetric::ZERO };
+            (prony.stress(isochoric, history) + stress, 1.0 + change, energy)
         }
-        Averages::None | Averages::VolumeChange(_) => prony.stress(elastic, history),
+        Averages::None | Averages::VolumeChange(_) => {
+            (prony.stress(elastic, history), deformation.volume_ratio, volumetric)
+        }
     };
     let stretch = |a: Vector<f64>| {
         let deformed = deformation.gradient.apply(a);
@@ -136,7 +165,8 @@ fn point_fields(
     };
     CellFields {
         gradient: deformation.gradient,
-        volume_ratio: deformation.volume_ratio,
+        volume_ratio,
+        cell_volume_ratio: 1.0 + volume_change(h),
         green_strain: deformation.strain_twice * 0.5,
         pk2_stress,
         cauchy_stress: pk2_stress.push_forward(&deformation.gradient) * (1.0 / deformation.volume_ratio),
@@ -146,10 +176,14 @@ fn point_fields(
     }
 }
 
+/// J − 1, without cancellation.
+fn volume_change(h: &Tensor<f64>) -> f64 {
+    h.trace() + h.second_invariant() + h.determinant()
+}
+
 /// H of F̄ = (J̄/J)^(1/3) F.
 fn dilated(h: &Tensor<f64>, change: f64) -> Tensor<f64> {
-    let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
-    let ratio = ((1.0 + change) / j).cbrt();
+    let ratio = ((1.0 + change) / (1.0 + volume_change(h))).cbrt();
     let mut scaled = Tensor(h.0.map(|row| row.map(|x| ratio * x)));
     (0..3).for_each(|i| scaled.0[i][i] += ratio - 1.0);
     scaled
@@ -161,6 +195,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
     let add_up = |sum: CellFields, (point, w): (CellFields, f64)| CellFields {
         gradient: Tensor([0, 1, 2].map(|i| add(sum.gradient.0[i], scale(point.gradient.0[i], w)))),
         volume_ratio: sum.volume_ratio + w * point.volume_ratio,
+        cell_volume_ratio: sum.cell_volume_ratio + w * point.cell_volume_ratio,
         green_strain: sum.green_strain + point.green_strain * w,
         pk2_stress: sum.pk2_stress + point.pk2_stress * w,
         cauchy_stress: sum.cauchy_stress + point.cauchy_stress * w,
@@ -171,6 +206,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
     let nothing = CellFields {
         gradient: Tensor::ZERO,
         volume_ratio: 0.0,
+        cell_volume_ratio: 0.0,
         green_strain: Symmetric::ZERO,
         pk2_stress: Symmetric::ZERO,
         cauchy_stress: Symmetric::ZERO,
@@ -182,16 +218,25 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
 }
 
 fn averages<R: Real>(solid: &Solid, history: &History<R>, displacement: &[Vector<R>]) -> Averages {
-    let relaxed = |index: usize, change: f64| {
-        let elastic = pressure(&solid.material.law, change);
-        solid.material.prony.pressure(elastic, &history.of_pressure(solid, index))
-    };
+    let Material { law, prony, .. } = &solid.material;
+    let relaxed =
+        |index: usize, change: f64| prony.pressure(pressure(law, change), &history.of_pressure(solid, index));
     let change = |cell: usize, gradients: &[Vector<f64>]| {
         let nodes = solid.cells.nodes(cell);
         let origin: Vector<f64> = cast(displacement[nodes[0] as usize]);
         let u: Vec<_> = nodes.iter().map(|&node| sub(cast(displacement[node as usize]), origin)).collect();
-        let h = gradient(&u, gradients);
-        h.trace() + h.second_invariant() + h.determinant()
+        volume_change(&gradient(&u, gradients))
+    };
+    let energies =
+        |changes: &[f64]| -> Vec<f64> { changes.iter().map(|&x| volumetric_energy(law, x)).collect() };
+    let together = |changes: Vec<f64>, pressures: Vec<f64>, energies: Vec<f64>| {
+        let cells = changes.into_iter().zip(pressures).zip(energies);
+        Averages::Volumetric(
+            cells.map(|((change, pressure), energy)| Dilatation { change, pressure, energy }).collect(),
+        )
+    };
+    let relax = |changes: &[f64]| -> Vec<f64> {
+        changes.iter().enumerate().map(|(index, &change)| relaxed(index, change)).collect()
     };
     match &solid.cells {
         Cells::Tet4(_) | Cells::Hex8(_) => Averages::None,
@@ -201,7 +246,9 @@ fn averages<R: Real>(solid: &Solid, history: &History<R>, displacement: &[Vector
                     |point: usize| points[cell].weight[point] * change(cell, &points[cell].gradient[point]);
                 (0..8).map(at).sum::<f64>() / block.rest[cell].volume
             };
-            Averages::Pressure((0..block.nodes.len()).map(|cell| relaxed(cell, mean_change(cell))).collect())
+            let changes: Vec<f64> = (0..block.nodes.len()).map(mean_change).collect();
+            let (pressures, energies) = (relax(&changes), energies(&changes));
+            together(changes, pressures, energies)
         }
         Cells::AveragedTet4(block, averaging) => {
             let local = LocalNodes::new(block);
@@ -219,13 +266,14 @@ fn averages<R: Real>(solid: &Solid, history: &History<R>, displacement: &[Vector
             let changes: Vec<f64> =
                 (0..block.nodes.len()).map(|cell| change(cell, &block.rest[cell].gradient)).collect();
             let nodal = to_nodes(&changes);
-            let relax = |values: Vec<f64>| -> Vec<f64> {
-                values.into_iter().enumerate().map(|(index, change)| relaxed(index, change)).collect()
-            };
+            let averaged = to_cells(&nodal);
             match averaging {
-                Averaging::Nodal => Averages::Pressure(to_cells(&relax(nodal))),
-                Averaging::Variational => Averages::Pressure(to_cells(&to_nodes(&relax(to_cells(&nodal))))),
-                Averaging::NiftySim => Averages::VolumeChange(to_cells(&nodal)),
+                Averaging::Nodal => together(averaged, to_cells(&relax(&nodal)), to_cells(&energies(&nodal))),
+                Averaging::Variational => {
+                    let (pressures, energies) = (relax(&averaged), energies(&averaged));
+                    together(averaged, to_cells(&to_nodes(&pressures)), energies)
+                }
+                Averaging::NiftySim => Averages::VolumeChange(averaged),
             }
         }
     }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Real;
 use crate::lanes::{PACK, Pack};
-use crate::model::{FREE, Model, Solid};
+use crate::model::{self, FREE, Model, Solid, placed};
 use crate::stability::Stability;
 use crate::tensor::{Symmetric, Vector};
 
@@ -101,10 +101,11 @@ impl<R: Real> State<R> {
         let mut displacement = vec![[R::ZERO; 3]; model.node_count()];
         if let Ok(owners) = model.constrained_components() {
             let amplitudes = model.amplitudes(&owners);
-            for ((u, owner), amplitude) in displacement.iter_mut().zip(owners).zip(amplitudes) {
+            for ((u, owner), amplitudes) in displacement.iter_mut().zip(owners).zip(amplitudes) {
                 for component in (0..3).filter(|&c| owner[c] != FREE) {
                     let motion = &model.constraints[owner[component] as usize].motion;
-                    u[component] = R::of(amplitude[component] * motion.factor(0.0));
+                    u[component] =
+                        R::of(placed(model::component(&amplitudes, component), motion.factors(0.0)));
                 }
             }
         }

@@ -98,6 +98,11 @@ impl StepControl {
         Lengths { before, next: part(self.substeps) }
     }
 
+    /// The time [s] over which relaxing laws come to the state's instant: what acts at the start came at once.
+    pub fn relaxing<R: Real>(&self, state: &State<R>) -> f64 {
+        if state.is_at_start() { 0.0 } else { self.lengths(state).before }
+    }
+
     /// Whether a look at the limit is due: the first one, `every` steps after the last, or where the deformation differs.
     pub fn is_due<R>(&self, state: &State<R>, deformed: &Deformed, every: u64) -> bool {
         let seen = &state.stability;

@@ -1,12 +1,20 @@
 //! Why a step could not be taken, with place, time and remedy.
 
+use crate::Real;
 use crate::model::Model;
 use crate::stability::Look;
+use crate::state::State;
+use crate::tensor::cast;
 
 /// The name of a node's body and the node's number in it.
 fn located(model: &Model, node: u32) -> (String, u32) {
     let (body, node) = model.locate_node(node);
     (model.bodies[body].name.clone(), node)
+}
+
+/// Where in an element, if it is a corner.
+pub(crate) fn at_corner(corner: bool, node: u32) -> String {
+    if corner { format!(" at its corner at node {node}") } else { String::new() }
 }
 
 /// Why a step could not be taken.
@@ -23,15 +31,20 @@ pub enum StepError {
         time: f64,
     },
     /// A cell is turned inside out.
-    #[error("element {element} of `{body}` is inverted (det F = {determinant:.3e}) at t = {time:.6} s")]
+    #[error(
+        "element {element} of `{body}` is inverted{} (det F = {determinant:.3e}) at t = {time:.6} s",
+        at_corner(*corner, *node)
+    )]
     Inverted {
         /// The body.
         body: String,
         /// The element, numbered as in the user's mesh.
         element: u32,
-        /// Its first node, numbered in its body.
+        /// Its first node, or that of the corner, numbered in its body.
         node: u32,
-        /// det F.
+        /// Whether it is a corner of a hexahedron, not its middle.
+        corner: bool,
+        /// det F there.
         determinant: f64,
         /// Time [s].
         time: f64,
@@ -81,7 +94,23 @@ impl StepError {
     pub(crate) fn inverted(model: &Model, solid: usize, cell: usize, determinant: f64, time: f64) -> Self {
         let solid = &model.solids[solid];
         let (body, node) = located(model, solid.cells.nodes(cell)[0]);
-        Self::Inverted { body, element: solid.original[cell], node, determinant, time }
+        Self::Inverted { body, element: solid.original[cell], node, corner: false, determinant, time }
+    }
+
+    /// Of a hexahedron with a corner turned inside out.
+    pub(crate) fn folded<R: Real>(model: &Model, (solid, cell): (usize, usize), state: &State<R>) -> Self {
+        let solid = &model.solids[solid];
+        let worst = solid.cells.worst_corner(cell, |node| cast(state.displacement[node as usize]));
+        let (node, determinant) = worst.unwrap_or((solid.cells.nodes(cell)[0], 0.0));
+        let (body, node) = located(model, node);
+        Self::Inverted {
+            body,
+            element: solid.original[cell],
+            node,
+            corner: true,
+            determinant,
+            time: state.time,
+        }
     }
 
     pub(crate) fn below_limit(model: &Model, look: &Look, step: f64, time: f64) -> Self {

@@ -15,10 +15,10 @@ use rayon::prelude::*;
 use crate::Real;
 use crate::applied::AppliedForces;
 use crate::energies::{Energies, Sums, model_balance_floor};
-use crate::forces::{Deformed, InternalForces};
+use crate::forces::{Deformed, Found, InternalForces};
 use crate::grip::Grip;
 use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
-use crate::model::{Contradiction, FREE, Model};
+use crate::model::{Amplitudes, Contradiction, FREE, Model, component, placed};
 use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
@@ -36,6 +36,14 @@ pub trait Observable<R> {
     /// Force [N] that holds or moves the nodes of a constraint, summed.
     fn reaction(&self, constraint: usize) -> Vector<f64>;
 
+    /// Force [N] by which constraints hold or move a node; zero along components that are free.
+    fn nodal_reaction(&self, node: usize) -> Vector<f64>;
+
+    /// Moment [N m] by which constraints hold or turn a node; zero of nodes that do not turn.
+    fn nodal_reaction_moment(&self, _node: usize) -> Vector<f64> {
+        [0.0; 3]
+    }
+
     /// Velocity [m/s] of a node.
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64>;
 }
@@ -46,8 +54,8 @@ struct Held {
     node: u32,
     /// The constraint of each component, or [`FREE`].
     owner: [u32; 3],
-    /// The amplitude of each component's motion.
-    amplitude: Vector<f64>,
+    /// The amplitudes of each component's motion.
+    amplitudes: Amplitudes,
 }
 
 impl Held {
@@ -57,11 +65,17 @@ impl Held {
         let owner = self.owner;
         (0..3).filter(move |&c| owner[c] != FREE).map(move |c| (c, owner[c] as usize))
     }
+
+    /// The displacement [m] of a component from the factors of its constraint.
+    #[inline(always)]
+    fn place(&self, c: usize, factors: [f64; 2]) -> f64 {
+        placed(component(&self.amplitudes, c), factors)
+    }
 }
 
-fn held(owners: &[[u32; 3]], amplitudes: &[Vector<f64>]) -> Vec<Held> {
+fn held(owners: &[[u32; 3]], amplitudes: &[Amplitudes]) -> Vec<Held> {
     let nodes = owners.iter().zip(amplitudes).zip(0..).filter(|((owner, _), _)| **owner != [FREE; 3]);
-    nodes.map(|((&owner, &amplitude), node)| Held { node, owner, amplitude }).collect()
+    nodes.map(|((&owner, &amplitudes), node)| Held { node, owner, amplitudes }).collect()
 }
 
 /// [`Lengths`] as the nodes need them.
@@ -112,8 +126,8 @@ pub struct CentralDifference<'m, R> {
     /// True if there is any load or grip.
     loaded: bool,
     processor: Processor,
-    /// Factor on the amplitudes of each constraint now and after the step.
-    factor: Vec<[f64; 2]>,
+    /// Factors on the amplitudes of each constraint now and after the step.
+    factors: Vec<[[f64; 2]; 2]>,
     next: Vec<Vector<R>>,
     reaction: Vec<Vector<R>>,
     sums: Vec<Sums>,
@@ -131,12 +145,21 @@ impl<R: Real> Observable<R> for CentralDifference<'_, R> {
         sum_owned(self.model, &self.owners, constraint, &self.reaction)
     }
 
+    fn nodal_reaction(&self, node: usize) -> Vector<f64> {
+        owned_only(&self.owners[node], self.reaction[node])
+    }
+
     /// The mean of the increments before and after.
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
         let (before, after) = (state.increment[node], self.next[node]);
         let Lengths { next, .. } = self.lengths;
         [0, 1, 2].map(|c| (before[c].to_f64() * self.lengths.ratio() + after[c].to_f64()) / (2.0 * next))
     }
+}
+
+/// A force [N] on the components of a node that have an owner.
+pub(crate) fn owned_only<R: Real>(owner: &[u32; 3], force: Vector<R>) -> Vector<f64> {
+    [0, 1, 2].map(|c| if owner[c] == FREE { 0.0 } else { force[c].to_f64() })
 }
 
 /// The sum of forces over the components that a constraint owns.
@@ -200,8 +223,8 @@ impl<R: Real> Work<R> for NodePass<'_, '_, R> {
                 let node = held.node as usize;
                 let to = node - nodes.start;
                 for (c, constraint) in held.components() {
-                    let factor = stepper.factor[constraint].map(|factor| held.amplitude[c] * factor);
-                    (block.next[to][c], reaction[node - first][c]) = block.prescribe(to, c, &pace, factor);
+                    let places = stepper.factors[constraint].map(|factors| held.place(c, factors));
+                    (block.next[to][c], reaction[node - first][c]) = block.prescribe(to, c, &pace, places);
                     block.external[to][c] += reaction[node - first][c];
                 }
                 pushed = true;
@@ -348,7 +371,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             applied: AppliedForces::new(model),
             loaded: !model.loads.is_empty(),
             processor: Processor::detect(),
-            factor: vec![[0.0; 2]; model.constraints.len()],
+            factors: vec![[[0.0; 2]; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
             reaction: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
@@ -402,8 +425,9 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
         self.control.keep(state);
         self.lengths = self.control.lengths(state);
-        if self.relaxing != self.lengths.before {
-            self.relaxing = self.lengths.before;
+        let relaxing = self.control.relaxing(state);
+        if self.relaxing != relaxing {
+            self.relaxing = relaxing;
             self.forces.set_step(self.model, self.relaxing);
         }
         let found = self.forces.evaluate(&state.displacement, &mut state.history);
@@ -419,7 +443,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         self.set_factors(state.time);
         self.pass_over_nodes(state);
         let sums = self.sums.iter().fold(Sums::default(), Sums::merge);
-        self.check_state(state, &sums, found.inverted)?;
+        self.check_state(state, &sums, &found)?;
         self.settle_energies(state, &sums, found.hourglass)?;
         below
     }
@@ -443,7 +467,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             self.processor.run(Add { increment, to: displacement });
             for held in self.held_in(first..first + displacement.len()) {
                 for (c, constraint) in held.components() {
-                    let then = held.amplitude[c] * self.factor[constraint][1];
+                    let then = held.place(c, self.factors[constraint][1]);
                     displacement[held.node as usize - first][c] = R::of(then);
                 }
             }
@@ -465,8 +489,8 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     }
 
     fn set_factors(&mut self, time: f64) {
-        for (factor, constraint) in self.factor.iter_mut().zip(&self.model.constraints) {
-            *factor = [time, time + self.lengths.next].map(|t| constraint.motion.factor(t));
+        for (factors, constraint) in self.factors.iter_mut().zip(&self.model.constraints) {
+            *factors = [time, time + self.lengths.next].map(|t| constraint.motion.factors(t));
         }
     }
 
@@ -515,15 +539,10 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         (self.next, self.reaction, self.sums) = (next, reaction, sums);
     }
 
-    fn check_state(
-        &self,
-        state: &State<R>,
-        sums: &Sums,
-        inverted: Option<(usize, usize, f64)>,
-    ) -> Result<(), StepError> {
+    fn check_state(&self, state: &State<R>, sums: &Sums, found: &Found) -> Result<(), StepError> {
         let finite = sums.is_finite();
         // An inverted cell comes first: its forces are meaningless, often not finite, so that it is the cause.
-        if let Some((solid, cell, determinant)) = inverted
+        if let Some((solid, cell, determinant)) = found.inverted
             && (finite || determinant.is_finite())
         {
             return Err(StepError::inverted(self.model, solid, cell, determinant, state.time));
@@ -532,6 +551,9 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             let lost = |u: &Vector<R>| u.iter().any(|x| !x.to_f64().is_finite());
             let node = (state.displacement.iter().position(lost)).or_else(|| self.next.iter().position(lost));
             return Err(StepError::not_finite(self.model, node.unwrap_or(0) as u32, state.time));
+        }
+        if let Some(cell) = found.folded {
+            return Err(StepError::folded(self.model, cell, state));
         }
         Ok(())
     }

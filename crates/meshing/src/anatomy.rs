@@ -6,6 +6,8 @@ use pliant_imaging::{Cleaned, Cleaning, DistanceField, LabelError, LabelImage, S
 
 use crate::complex::MOST_MATERIALS;
 use crate::field::ImplicitField;
+use crate::given::{Given, Patches};
+use crate::triangles::TriangleMesh;
 
 impl ImplicitField for DistanceField {
     fn value(&self, point: &Vector3) -> f64 {
@@ -29,17 +31,20 @@ pub struct Anatomy<'a> {
     materials: Vec<(i32, Option<Box<dyn ImplicitField + 'a>>)>,
     /// Volume of each material in the image [m³], where it comes from one.
     volumes: Vec<Option<f64>>,
+    /// What its fields were made of, if they were.
+    given: Option<Given>,
 }
 
 impl<'a> Anatomy<'a> {
     /// A body of one material.
     pub fn new(label: i32, field: impl ImplicitField + 'a) -> Self {
-        Self { whole: Box::new(field), materials: vec![(label, None)], volumes: vec![None] }
+        Self { whole: Box::new(field), materials: vec![(label, None)], volumes: vec![None], given: None }
     }
 
-    /// The same of one material with its volume known [m³], which meshes are to keep.
-    pub(crate) fn with_volume(mut self, volume: f64) -> Self {
+    /// The same of one material made of a closed surface, with its volume [m³], which meshes are to keep.
+    pub(crate) fn of_surface(mut self, surface: TriangleMesh, volume: f64) -> Self {
         self.volumes[0] = Some(volume);
+        self.given = Some(Given::Triangles(surface, self.materials[0].0));
         self
     }
 
@@ -66,8 +71,11 @@ impl<'a> Anatomy<'a> {
         let (whole, done) = image.region(labels, smoothing.margin())?.clean(cleaning)?;
         let field = DistanceField::new(&whole, smoothing, &part(0))?;
         let (mut materials, mut volumes, mut others) = (vec![(labels[0], None)], vec![None], 0.0);
+        let mut of_voxels: Vec<u8> = whole.inside.iter().map(|&inside| u8::from(inside)).collect();
         for (number, &label) in labels.iter().enumerate().skip(1) {
             let region = whole.part(image, label)?;
+            let own = of_voxels.iter_mut().zip(&region.inside).filter(|(_, inside)| **inside);
+            own.for_each(|(material, _)| *material = number as u8 + 1);
             others += region.volume();
             volumes.push(Some(region.volume()));
             let inner = DistanceField::within(&region, &whole, smoothing, &part(number))?;
@@ -84,7 +92,8 @@ impl<'a> Anatomy<'a> {
             )?;
             materials[0].1 = Some(Box::new(first));
         }
-        Ok((Anatomy { whole: Box::new(field), materials, volumes }, done))
+        let given = Some(Given::Voxels { grid: whole.grid, materials: of_voxels });
+        Ok((Anatomy { whole: Box::new(field), materials, volumes, given }, done))
     }
 
     /// Field of a material from 2 on.
@@ -127,6 +136,21 @@ impl<'a> Anatomy<'a> {
     /// Labels of the materials.
     pub fn labels(&self) -> Vec<i32> {
         self.materials.iter().map(|(label, _)| *label).collect()
+    }
+
+    /// What it was made of.
+    pub(crate) fn given(&self) -> Option<&Given> {
+        self.given.as_ref()
+    }
+
+    /// The faces of what it was made of.
+    pub(crate) fn patches(&self) -> Patches {
+        self.given.as_ref().map_or_else(Patches::default, |given| given.patches(&self.labels()))
+    }
+
+    /// How far the surface of a mesh may be from what was given without being wrong [m]: the diagonal of a voxel of an image, else 0.
+    pub fn resolution(&self) -> f64 {
+        self.given.as_ref().map_or(0.0, Given::resolution)
     }
 
     /// Volumes of the materials in the image [m³], where known.

@@ -22,6 +22,9 @@ pub(crate) const OUTSIDE: Sides = 1;
 /// Most materials in a mesh.
 pub(crate) const MOST_MATERIALS: usize = 63;
 
+/// No step makes an edge longer than this many lattice constants.
+pub(crate) const LONGEST: f64 = 1.6;
+
 /// Tets, points and how they hang together.
 pub(crate) struct Complex {
     pub(crate) points: Vec<Vector3>,
@@ -31,6 +34,8 @@ pub(crate) struct Complex {
     /// The tets round each point.
     pub(crate) star: Vec<Vec<u32>>,
     pub(crate) sides: Vec<Sides>,
+    /// Lattice constant round each point [m]: how long the edges there should be.
+    pub(crate) size: Vec<f64>,
 }
 
 /// Acoustic length of a tet [m]: 6 V / (Σ (2 A_a)²)^(1/2), negative if inverted (see `pliant_geometry::acoustic_length`).
@@ -43,14 +48,20 @@ pub(crate) fn acoustic_length(x: [Vector3; 4]) -> f64 {
 }
 
 impl Complex {
-    /// All tets of material 1.
-    pub(crate) fn new(points: Vec<Vector3>, tets: Vec<[u32; 4]>) -> Self {
+    /// All tets of material 1, of a lattice of one constant [m].
+    pub(crate) fn new(points: Vec<Vector3>, tets: Vec<[u32; 4]>, edge: f64) -> Self {
+        let size = vec![edge; points.len()];
+        Self::graded(points, tets, size)
+    }
+
+    /// All tets of material 1, of a lattice with its constant round each point [m].
+    pub(crate) fn graded(points: Vec<Vector3>, tets: Vec<[u32; 4]>, size: Vec<f64>) -> Self {
         let mut star = vec![Vec::new(); points.len()];
         for (tet, nodes) in (0..).zip(&tets) {
             nodes.iter().for_each(|&node| star[node as usize].push(tet));
         }
         let mut complex =
-            Self { material: vec![1; tets.len()], sides: vec![0; points.len()], points, tets, star };
+            Self { material: vec![1; tets.len()], sides: vec![0; points.len()], points, tets, star, size };
         complex.find_sides();
         complex
     }
@@ -83,6 +94,49 @@ impl Complex {
         acoustic_length(self.corners(tet))
     }
 
+    /// Acoustic length of the ideal tet of the lattice round some points [m]: a / (2 √2), of the finest one.
+    #[inline]
+    pub(crate) fn ideal(&self, nodes: [u32; 4]) -> f64 {
+        let [a, b, c, d] = nodes.map(|node| self.size[node as usize]);
+        a.min(b).min(c.min(d)) / 8_f64.sqrt()
+    }
+
+    /// Acoustic length of a tet as a part of that of the ideal one.
+    pub(crate) fn part(&self, tet: u32) -> f64 {
+        self.length(tet) / self.ideal(self.tets[tet as usize])
+    }
+
+    /// How long an edge may get [m].
+    pub(crate) fn longest(&self, p: u32, q: u32) -> f64 {
+        LONGEST * self.size[p as usize].max(self.size[q as usize])
+    }
+
+    /// Whether an edge between two points would be too long.
+    pub(crate) fn is_too_long(&self, p: u32, q: u32) -> bool {
+        (self.points[p as usize] - self.points[q as usize]).norm() > self.longest(p, q)
+    }
+
+    /// Whether a move of a point to `place` makes an edge of it too long, that to `without` left out, or lengthens one that is too long.
+    pub(crate) fn stretches(&self, point: u32, place: &Vector3, without: u32) -> bool {
+        let from = &self.points[point as usize];
+        let stretched = |&node: &u32| {
+            let to = &self.points[node as usize];
+            let length = (place - to).norm();
+            node != point && node != without && length > self.longest(point, node).max((from - to).norm())
+        };
+        self.star[point as usize].iter().flat_map(|&tet| &self.tets[tet as usize]).any(stretched)
+    }
+
+    /// Whether an edge gets too long where `gone` is joined into `kept` at `place`.
+    pub(crate) fn overstretches(&self, gone: u32, kept: u32, place: &Vector3) -> bool {
+        let too_long = |&node: &u32| {
+            let length = (place - self.points[node as usize]).norm();
+            node != gone && node != kept && length > self.longest(kept, node)
+        };
+        self.star[gone as usize].iter().flat_map(|&tet| &self.tets[tet as usize]).any(too_long)
+            || self.stretches(kept, place, gone)
+    }
+
     /// Faces of a tet, outward, in the order of the opposite corners.
     pub(crate) fn faces(&self, tet: u32) -> [[u32; 3]; 4] {
         FACES.map(|face| face.map(|corner| self.tets[tet as usize][corner]))
@@ -104,9 +158,9 @@ impl Complex {
         distinct(edges)
     }
 
-    /// Least acoustic length of all tets [m].
+    /// Least acoustic length of all tets as a part of the ideal one.
     pub(crate) fn worst(&self) -> f64 {
-        self.alive().map(|tet| self.length(tet)).fold(f64::INFINITY, f64::min)
+        self.alive().map(|tet| self.part(tet)).fold(f64::INFINITY, f64::min)
     }
 
     /// What a point would bear on its own if it were at `place` [m]: 1 / √(K / m) with its stiffness K = Σ V |∇N|² and its mass m = Σ V / 4
@@ -165,6 +219,7 @@ impl Complex {
         self.points.push(position);
         self.star.push(Vec::new());
         self.sides.push(0);
+        self.size.push(self.size[p as usize].min(self.size[q as usize]));
         let around: Vec<u32> = self.star[p as usize]
             .iter()
             .copied()
@@ -185,6 +240,26 @@ impl Complex {
         }
         self.sides[new as usize] = self.sides_of(new);
         new
+    }
+
+    /// Puts a tet on each of some boundary faces, outward, with a new point at `position` as the apex; that gets what `point` has.
+    pub(crate) fn cap(&mut self, point: u32, faces: &[[u32; 3]], position: Vector3) {
+        let apex = self.points.len() as u32;
+        self.points.push(position);
+        self.star.push(Vec::new());
+        self.size.push(self.size[point as usize]);
+        for &[a, b, c] in faces {
+            let has = |tet: &&u32| [b, c].iter().all(|node| self.tets[**tet as usize].contains(node));
+            let behind = self.star[a as usize].iter().find(has).map_or(1, |&tet| self.material[tet as usize]);
+            let tet = self.tets.len() as u32;
+            self.tets.push([a, b, c, apex]);
+            self.material.push(behind);
+            [a, b, c, apex].into_iter().for_each(|node| self.star[node as usize].push(tet));
+        }
+        self.sides.push(self.sides_of(apex));
+        for node in faces.concat() {
+            self.sides[node as usize] = self.sides_of(node);
+        }
     }
 
     /// Joins `gone` into `kept`, which moves to `position`. The caller has asked [`Self::may_collapse`].
@@ -304,7 +379,7 @@ mod tests {
         let points = (0..8).map(|at| Vector3::from([at & 1, at >> 1 & 1, at >> 2].map(f64::from))).collect();
         let ring = [1, 3, 2, 6, 4, 5];
         let tets = (0..6).map(|at| [0, ring[at], ring[(at + 1) % 6], 7]).collect();
-        Complex::new(points, tets)
+        Complex::new(points, tets, 1.0)
     }
 
     #[test]

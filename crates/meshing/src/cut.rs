@@ -32,12 +32,12 @@ struct Crossing {
     length: f64,
 }
 
-/// Cuts out all materials but the first. `ideal` is the acoustic length of an ideal tet [m].
-pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>, ideal: f64) {
+/// Cuts out all materials but the first.
+pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>) {
     for material in 2..=surfaces.materials() {
         let inside = |point: &Vector3| surfaces.inside(material, point);
         let values = complex.points.iter().map(inside).collect();
-        let sides = Surface { inside: &inside, ideal }.cut(complex, values);
+        let sides = Surface { inside: &inside }.cut(complex, values);
         for (tet, side) in sides {
             if side > 0.0 {
                 complex.material[tet as usize] = material as u8;
@@ -47,8 +47,20 @@ pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>, idea
     }
 }
 
+/// Cuts off what is outside a body.
+pub(crate) fn cut_outside(complex: &mut Complex, field: &dyn ImplicitField) {
+    let inside = |point: &Vector3| field.value(point);
+    let values = complex.points.iter().map(inside).collect();
+    for (tet, side) in (Surface { inside: &inside }).cut(complex, values) {
+        if side <= 0.0 {
+            complex.remove(tet);
+        }
+    }
+    complex.find_sides();
+}
+
 /// Cuts out gaps between banks of the body that edges of the mesh bridge. How many edges did.
-pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField, edge: f64, ideal: f64) -> usize {
+pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField) -> usize {
     let inside = |point: &Vector3| field.value(point);
     let mut values: Vec<f64> = complex.points.iter().map(inside).collect();
     let deepest = |[p, q]: [u32; 2]| {
@@ -61,7 +73,8 @@ pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField, edge: f
     let mut bridges: Vec<([u32; 2], f64, Vector3)> = Vec::new();
     for ends in complex.edges() {
         let (value, point) = deepest(ends);
-        if value < -GAP * edge {
+        let [p, q] = ends.map(|end| complex.size[end as usize]);
+        if value < -GAP * p.max(q) {
             bridges.push((ends, value, point));
         }
     }
@@ -75,12 +88,12 @@ pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField, edge: f
         values.push(value);
     }
     // Points of the boundary lie on the surface but for round-off.
-    for (value, sides) in values.iter_mut().zip(&complex.sides) {
-        if sides & OUTSIDE != 0 && value.abs() < 1e-6 * edge {
+    for ((value, sides), size) in values.iter_mut().zip(&complex.sides).zip(&complex.size) {
+        if sides & OUTSIDE != 0 && value.abs() < 1e-6 * size {
             *value = 0.0;
         }
     }
-    for (tet, side) in (Surface { inside: &inside, ideal }).cut(complex, values) {
+    for (tet, side) in (Surface { inside: &inside }).cut(complex, values) {
         if side < 0.0 {
             complex.remove(tet);
         }
@@ -92,7 +105,6 @@ pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField, edge: f
 /// The surface where a function is zero.
 struct Surface<'a> {
     inside: &'a dyn Fn(&Vector3) -> f64,
-    ideal: f64,
 }
 
 impl Surface<'_> {
@@ -165,8 +177,7 @@ impl Surface<'_> {
         {
             let free = complex.sides[point].count_ones() == 1 && complex.sides[point] & OUTSIDE == 0;
             let before = std::mem::replace(&mut complex.points[point], to);
-            let bears =
-                || complex.star[point].iter().all(|&tet| complex.length(tet) > LEAST_AFTER_MOVE * self.ideal);
+            let bears = || complex.star[point].iter().all(|&tet| complex.part(tet) > LEAST_AFTER_MOVE);
             if free && bears() {
                 values[point] = 0.0;
             } else {

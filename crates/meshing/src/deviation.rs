@@ -1,4 +1,5 @@
-//! How far the boundary of a mesh and the surface of the body it was made of are apart, both ways.
+//! How far the boundary of a mesh and the surface of the body it was made of are apart, both ways: the surface as it was given, or
+//! where a field is zero.
 
 use std::collections::HashMap;
 
@@ -6,9 +7,15 @@ use pliant_geometry::{Mesh, SurfaceLocator, Vector3, boundary};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::anatomy::Anatomy;
 use crate::error::MeshingError;
 use crate::extent::checked_box;
 use crate::field::ImplicitField;
+use crate::given::{MeasuredTo, Patches};
+use crate::hausdorff::{Sample, distance};
+use crate::percentiles::Percentiles;
+use crate::regions::is_outer;
+use crate::topology::faces_between_labels;
 
 /// Samples of the field along the longest side of its box at most.
 const MOST_SAMPLES: f64 = 160.0;
@@ -16,55 +23,200 @@ const MOST_SAMPLES: f64 = 160.0;
 /// Steps of Newton's method to the surface.
 const STEPS: usize = 8;
 
-/// Distances between the boundary of a mesh and the surface where a field is zero [m].
+/// Samples along an edge of the cells.
+pub(crate) const SAMPLES_PER_EDGE: f64 = 4.0;
+
+/// Distances between the boundary of a mesh and the surface of its body, both ways [m].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Deviation {
-    /// Largest distance from the nodes and face centres of the mesh's boundary to the surface.
+    /// What the surface of the body is.
+    pub to: MeasuredTo,
+    /// Largest distance from the mesh's boundary to the surface.
     pub largest_from_mesh: f64,
     /// Root mean square of the same, weighted by area.
     pub rms_from_mesh: f64,
+    /// Half of the mesh's boundary is as near as this.
+    pub median_from_mesh: f64,
+    /// 95 % of the mesh's boundary is as near as this.
+    pub p95_from_mesh: f64,
+    /// The point of the mesh's boundary that is farthest from the surface [m].
+    pub farthest_of_mesh: [f64; 3],
     /// Largest distance from the surface to the mesh's boundary.
     pub largest_from_body: f64,
     /// Root mean square of the same.
     pub rms_from_body: f64,
+    /// Half of the surface is as near as this.
+    pub median_from_body: f64,
+    /// 95 % of the surface is as near as this.
+    pub p95_from_body: f64,
     /// The point of the surface that is farthest from the mesh [m].
     pub farthest: [f64; 3],
 }
 
-impl Deviation {
-    /// Measures a mesh against a field. The surface is sampled where it crosses the edges of a grid of a quarter of `edge`
-    /// [m], of a 160th of the box at least: parts thinner than that may be overlooked.
-    pub fn new(mesh: &Mesh, field: &(impl ImplicitField + ?Sized), edge: f64) -> Result<Self, MeshingError> {
+/// Distances of samples of two surfaces from each other.
+pub(crate) struct Measured {
+    pub(crate) to: MeasuredTo,
+    from_mesh: Samples,
+    from_body: Samples,
+}
+
+/// Samples of a surface, and the distance of each from another one [m].
+type Samples = (Vec<Sample>, Vec<f64>);
+
+impl Measured {
+    /// Distances of a mesh that is to be held within one [m]: to triangles where the body is given by them, else to its field.
+    pub(crate) fn of(mesh: &Mesh, anatomy: &Anatomy<'_>, distance: f64) -> Result<Self, MeshingError> {
+        if let Some(given) = anatomy.given().filter(|given| given.measured_to() == MeasuredTo::Triangles) {
+            let (made, patches) = (faces_between_labels(mesh), anatomy.patches());
+            if let Some(found) = Self::between(&made, &patches, &is_outer, distance) {
+                return Ok(Self { to: given.measured_to(), ..found });
+            }
+        }
+        Self::to_field(mesh, anatomy.field(), 4.0 * distance)
+    }
+
+    fn to_field(mesh: &Mesh, field: &(impl ImplicitField + ?Sized), edge: f64) -> Result<Self, MeshingError> {
         let points = surface_points(field, edge)?;
         let surface = boundary(mesh);
         let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
         let locator = SurfaceLocator::new(&surface, &faces, &mesh.points);
-        let mut found = Self::default();
-        let samples = Samples::new(points, edge);
-        let (mut squares, mut weight) = (0.0, 0.0);
-        let from_mesh = surface.faces.par_iter().map(|face| {
+        let near = Near::new(points, edge);
+        let from_mesh = surface.faces.par_iter().flat_map_iter(|face| {
             let corners = face.nodes().iter().map(|&node| mesh.points[node as usize]);
-            let far = corners
-                .chain([face.centre(&mesh.points)])
-                .map(|point| way_to_surface(field, &point, edge).min(samples.distance(&point)))
-                .collect::<Vec<_>>();
-            (face.area(&mesh.points), far)
+            let points: Vec<Vector3> = corners.chain([face.centre(&mesh.points)]).collect();
+            let area = face.area(&mesh.points) / points.len() as f64;
+            let near = &near;
+            points.into_iter().map(move |point| {
+                (Sample { point, area }, way_to_surface(field, &point, edge).min(near.distance(&point)))
+            })
         });
-        for (area, far) in from_mesh.collect::<Vec<_>>() {
-            found.largest_from_mesh = far.iter().copied().fold(found.largest_from_mesh, f64::max);
-            squares += area * far.iter().map(|d| d * d).sum::<f64>() / far.len() as f64;
-            weight += area;
+        let from_mesh = from_mesh.collect::<Vec<_>>().into_iter().unzip();
+        let to: Vec<Sample> = near.points.iter().map(|&point| Sample { point, area: 1.0 }).collect();
+        let back = to.par_iter().map(|sample| distance(&locator, &sample.point)).collect();
+        Ok(Self { to: MeasuredTo::Field, from_mesh, from_body: (to, back) })
+    }
+
+    fn between(
+        mesh: &Patches,
+        given: &Patches,
+        chosen: &dyn Fn([i32; 2]) -> bool,
+        spacing: f64,
+    ) -> Option<Self> {
+        let [own, other] = [mesh, given].map(|patches| patches.between(chosen));
+        let one_way = |from: &Patches, triangles: &[[u32; 3]], to: &SurfaceLocator| {
+            let samples = from.samples(triangles, spacing);
+            let far = samples.par_iter().map(|sample| distance(to, &sample.point)).collect();
+            (samples, far)
+        };
+        let (to_mesh, to_given) = (mesh.locator(&own)?, given.locator(&other)?);
+        Some(Self {
+            to: MeasuredTo::Field,
+            from_mesh: one_way(mesh, &own, &to_given),
+            from_body: one_way(given, &other, &to_mesh),
+        })
+    }
+
+    /// The largest distance of both ways [m].
+    pub(crate) fn largest(&self) -> f64 {
+        self.from_mesh.1.iter().chain(&self.from_body.1).copied().fold(0.0, f64::max)
+    }
+
+    /// Samples of both surfaces that are farther from the other one than this [m].
+    pub(crate) fn beyond(&self, far: f64) -> Vec<Vector3> {
+        let of = |(samples, distances): &Samples| -> Vec<Vector3> {
+            let beyond = samples.iter().zip(distances).filter(|(_, distance)| **distance > far);
+            beyond.map(|(sample, _)| sample.point).collect()
+        };
+        [of(&self.from_mesh), of(&self.from_body)].concat()
+    }
+
+    fn deviation(&self) -> Deviation {
+        let [there, back] = [&self.from_mesh, &self.from_body].map(|(samples, far)| Way::new(samples, far));
+        Deviation {
+            to: self.to,
+            largest_from_mesh: there.largest,
+            rms_from_mesh: there.rms,
+            median_from_mesh: there.median,
+            p95_from_mesh: there.p95,
+            farthest_of_mesh: there.farthest,
+            largest_from_body: back.largest,
+            rms_from_body: back.rms,
+            median_from_body: back.median,
+            p95_from_body: back.p95,
+            farthest: back.farthest,
         }
-        found.rms_from_mesh = root_mean(squares, weight);
-        let to_mesh = |point: &Vector3| locator.closest(point).map_or(0.0, |at| (at.position - point).norm());
-        let distances: Vec<f64> = samples.points.par_iter().map(to_mesh).collect();
-        for (&distance, point) in distances.iter().zip(&samples.points) {
-            if distance > found.largest_from_body {
-                (found.largest_from_body, found.farthest) = (distance, (*point).into());
-            }
+    }
+}
+
+impl Deviation {
+    /// Measures a mesh with cells of `edge` [m] against its body as it was given: the triangles of a file, the faces of the voxels of an
+    /// image; against its field where it is a function. Samples lie no more than a quarter of an edge apart.
+    ///
+    /// # Errors
+    /// If the box of the field is empty or not finite.
+    pub fn of(mesh: &Mesh, anatomy: &Anatomy<'_>, edge: f64) -> Result<Self, MeshingError> {
+        let given = anatomy.given().and_then(|given| {
+            let (made, patches) = (faces_between_labels(mesh), anatomy.patches());
+            let found = Self::between(&made, &patches, &is_outer, edge / SAMPLES_PER_EDGE)?;
+            Some(Self { to: given.measured_to(), ..found })
+        });
+        given.map_or_else(|| Self::new(mesh, anatomy.field(), edge), Ok)
+    }
+
+    /// Measures a mesh against a field. The surface is sampled where it crosses the edges of a grid of a quarter of `edge`
+    /// [m], of a 160th of the box at least: parts thinner than that may be overlooked.
+    ///
+    /// # Errors
+    /// If the box of the field is empty or not finite.
+    pub fn new(mesh: &Mesh, field: &(impl ImplicitField + ?Sized), edge: f64) -> Result<Self, MeshingError> {
+        Ok(Measured::to_field(mesh, field, edge)?.deviation())
+    }
+
+    /// Between the triangles of a mesh and of its input whose sides are chosen, with samples no more than `spacing` [m] apart; `None`
+    /// where one of them has none.
+    pub(crate) fn between(
+        mesh: &Patches,
+        given: &Patches,
+        chosen: &dyn Fn([i32; 2]) -> bool,
+        spacing: f64,
+    ) -> Option<Self> {
+        Some(Measured::between(mesh, given, chosen, spacing)?.deviation())
+    }
+
+    /// The largest distance of both ways, and where it is [m].
+    pub fn largest(&self) -> (f64, [f64; 3]) {
+        if self.largest_from_mesh > self.largest_from_body {
+            (self.largest_from_mesh, self.farthest_of_mesh)
+        } else {
+            (self.largest_from_body, self.farthest)
         }
-        found.rms_from_body = root_mean(distances.iter().map(|d| d * d).sum(), distances.len() as f64);
-        Ok(found)
+    }
+}
+
+/// Distances one way [m].
+struct Way {
+    largest: f64,
+    rms: f64,
+    median: f64,
+    p95: f64,
+    farthest: [f64; 3],
+}
+
+impl Way {
+    fn new(samples: &[Sample], far: &[f64]) -> Self {
+        let weighted = samples.iter().zip(far).map(|(sample, &far)| (far, sample.area));
+        let spread = Percentiles::weighted(weighted.collect());
+        let (median, p95) = spread.map_or((0.0, 0.0), |spread| (spread.median, spread.p95));
+        let (squares, area) = samples.iter().zip(far).fold((0.0, 0.0), |(squares, area), (sample, far)| {
+            (squares + sample.area * far * far, area + sample.area)
+        });
+        let first_farthest =
+            samples.iter().zip(far).fold(None, |most: Option<(&Sample, f64)>, (sample, &far)| {
+                if most.is_none_or(|(_, most)| far > most) { Some((sample, far)) } else { most }
+            });
+        let (largest, farthest) =
+            first_farthest.map_or((0.0, [0.0; 3]), |(sample, far)| (far, sample.point.into()));
+        Self { largest, rms: root_mean(squares, area), median, p95, farthest }
     }
 }
 
@@ -73,14 +225,14 @@ fn root_mean(squares: f64, weight: f64) -> f64 {
 }
 
 /// Points of the surface, in cubes by their place.
-struct Samples {
+struct Near {
     points: Vec<Vector3>,
     cubes: HashMap<[i64; 3], Vec<u32>>,
     /// Edge of the cubes [m].
     edge: f64,
 }
 
-impl Samples {
+impl Near {
     fn new(points: Vec<Vector3>, edge: f64) -> Self {
         let mut cubes: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
         for (index, point) in (0..).zip(&points) {

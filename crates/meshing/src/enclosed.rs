@@ -178,9 +178,29 @@ impl Enclosed {
         edge: f64,
         progress: &dyn Fn(f64),
     ) -> Result<Anatomy<'static>, MeshingError> {
-        let field = self.field(edge, progress)?;
+        let (field, hull) = self.field_and_hull(edge, progress)?;
         let volume = if self.is_simple() { self.volume() } else { field.volume() };
-        Ok(Anatomy::new(label, field).with_volume(volume))
+        Ok(Anatomy::new(label, field).of_surface(hull, volume))
+    }
+
+    /// The same for cells as small as `finest` [m], or as near to that as fits into memory.
+    ///
+    /// # Errors
+    /// If the grid would not fit into memory.
+    pub fn fine_anatomy(
+        &self,
+        label: i32,
+        edge: f64,
+        finest: f64,
+        progress: &dyn Fn(f64),
+    ) -> Result<Anatomy<'static>, MeshingError> {
+        let mut fine = finest.min(edge);
+        loop {
+            match self.anatomy(label, fine, progress) {
+                Err(MeshingError::LatticeTooLarge { .. }) if fine < edge => fine = (1.25 * fine).min(edge),
+                found => return found,
+            }
+        }
     }
 
     /// Signed distances, positive inside, on a grid of a quarter to half of `edge` [m].
@@ -188,6 +208,15 @@ impl Enclosed {
     /// # Errors
     /// If the grid would not fit into memory.
     pub fn field(&self, edge: f64, progress: &dyn Fn(f64)) -> Result<DistanceField, MeshingError> {
+        self.field_and_hull(edge, progress).map(|(field, _)| field)
+    }
+
+    /// The same, and the surface that bounds the body.
+    fn field_and_hull(
+        &self,
+        edge: f64,
+        progress: &dyn Fn(f64),
+    ) -> Result<(DistanceField, TriangleMesh), MeshingError> {
         require_positive("edge", edge)?;
         let (low, high) = bounds(&self.points, &self.triangles);
         // Four points on each side stay outside.
@@ -210,7 +239,8 @@ impl Enclosed {
         progress(0.9);
         sign(&grid, &winding, &mut values);
         progress(1.0);
-        DistanceField::of_values(grid, values).ok_or(MeshingError::NothingEnclosed)
+        let field = DistanceField::of_values(grid, values).ok_or(MeshingError::NothingEnclosed)?;
+        Ok((field, hull))
     }
 
     /// The part of the surface that bounds the body: all of it, or what has the body on one side only, with triangles that

@@ -23,6 +23,26 @@ pub enum MeshingError {
         /// Part of the ideal asked for.
         target: f64,
     },
+    /// Cells that differ too much in size.
+    #[error(
+        "cells of {} m beside cells of {} m: smaller than {} m can't be", rounded(*asked), rounded(*edge), rounded(*smallest)
+    )]
+    TooFine {
+        /// Edge asked for [m].
+        edge: f64,
+        /// Smallest edge that goes with it [m].
+        smallest: f64,
+        /// Smallest edge asked for [m].
+        asked: f64,
+    },
+    /// A label asked for that is not meshed.
+    #[error("label {label} can't be protected: the labels of the mesh are {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))]
+    NoSuchLabel {
+        /// The label.
+        label: i32,
+        /// Those of the mesh.
+        labels: Vec<i32>,
+    },
     /// A position has an infinite or NaN coordinate.
     #[error("{what} is ({}, {}, {}) m; it must be finite", value.x, value.y, value.z)]
     NotFinite {

@@ -13,8 +13,8 @@ const LONGEST_RING: usize = 8;
 /// A flip must lengthen the worst tet by this factor.
 const GAIN: f64 = 1.0 + 1e-3;
 
-/// Tells whether a new edge of the boundary follows the surface, given its middle.
-pub(crate) type Follows<'a> = dyn Fn(&Vector3) -> bool + 'a;
+/// Tells whether a new edge of the boundary follows the surface, given its middle and the lattice constant there [m].
+pub(crate) type Follows<'a> = dyn Fn(&Vector3, f64) -> bool + 'a;
 
 impl Complex {
     /// Flips one tet away if that lengthens the worst acoustic length of the tets that change: its edges first, then its
@@ -37,11 +37,13 @@ impl Complex {
             |a: u32, b: u32| self.star[a as usize].iter().any(|&t| self.tets[t as usize].contains(&b));
         let last = nodes.len() - 1;
         let is_new = |i: usize, j: usize| j - i > 1 && (open || j - i < last);
-        let known = triangles.iter().any(|&[i, j, k]| {
-            [[i, j], [j, k], [i, k]].into_iter().any(|[i, j]| is_new(i, j) && joined(nodes[i], nodes[j]))
+        let unfit = |a: u32, b: u32| joined(a, b) || self.is_too_long(a, b);
+        let refused = triangles.iter().any(|&[i, j, k]| {
+            [[i, j], [j, k], [i, k]].into_iter().any(|[i, j]| is_new(i, j) && unfit(nodes[i], nodes[j]))
         });
-        let middle = (self.points[nodes[0] as usize] + self.points[nodes[last] as usize]) / 2.0;
-        if known || open && !follows(&middle) {
+        let [first, end] = [nodes[0], nodes[last]].map(|node| node as usize);
+        let middle = (self.points[first] + self.points[end]) / 2.0;
+        if refused || open && !follows(&middle, self.size[first].min(self.size[end])) {
             return false;
         }
         let new = triangles.into_iter().flat_map(|[i, j, k]| {
@@ -67,7 +69,9 @@ impl Complex {
         // The face is outward, seen from beyond: its own apex is below, the other one above.
         let new = [[apex, far, a, b], [apex, far, b, c], [apex, far, c, a]];
         let least = new.iter().map(|nodes| self.length_of(*nodes)).fold(f64::INFINITY, f64::min);
-        if least <= GAIN * self.length(tet).min(self.length(other)) || !self.round_edge(apex, far).is_empty()
+        if least <= GAIN * self.length(tet).min(self.length(other))
+            || !self.round_edge(apex, far).is_empty()
+            || self.is_too_long(apex, far)
         {
             return false;
         }
@@ -194,13 +198,13 @@ mod tests {
         };
         let points =
             |half: f64| vec![ring(0.), ring(1.), ring(2.), Vector3::z() * -half, Vector3::z() * half];
-        let mut tall = Complex::new(points(1.5), vec![[3, 4, 0, 1], [3, 4, 1, 2], [3, 4, 2, 0]]);
+        let mut tall = Complex::new(points(1.5), vec![[3, 4, 0, 1], [3, 4, 1, 2], [3, 4, 2, 0]], 3.0);
         let before = shape(&tall);
-        assert!(tall.flip(0, &|_| true));
+        assert!(tall.flip(0, &|_, _| true));
         assert_eq!(shape(&tall).0, 2);
         assert!((shape(&tall).1 - before.1).abs() < 1e-14);
-        let mut flat = Complex::new(points(0.3), vec![[0, 1, 2, 4], [0, 2, 1, 3]]);
-        assert!(flat.flip(0, &|_| false));
+        let mut flat = Complex::new(points(0.3), vec![[0, 1, 2, 4], [0, 2, 1, 3]], 3.0);
+        assert!(flat.flip(0, &|_, _| false));
         assert_eq!(shape(&flat).0, 3);
         assert!(flat.alive().all(|tet| flat.length(tet) > 0.0));
     }
@@ -216,16 +220,16 @@ mod tests {
             corner(0., 0.5, 0.),
             corner(0., 0., -1.),
         ];
-        let mut wedge = Complex::new(points, vec![[0, 1, 2, 4], [0, 1, 4, 3]]);
+        let mut wedge = Complex::new(points, vec![[0, 1, 2, 4], [0, 1, 4, 3]], 3.0);
         wedge.tets.iter_mut().for_each(|tet| {
             let x = tet.map(|node| wedge.points[node as usize]);
             if acoustic_length(x) < 0.0 {
                 tet.swap(2, 3);
             }
         });
-        assert!(!wedge.flip(0, &|_| false));
+        assert!(!wedge.flip(0, &|_, _| false));
         let before = shape(&wedge);
-        assert!(wedge.flip(0, &|_| true));
+        assert!(wedge.flip(0, &|_, _| true));
         assert_eq!(shape(&wedge), before);
         assert!(
             wedge

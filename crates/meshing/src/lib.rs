@@ -23,6 +23,7 @@
 // Units stand in brackets; rustdoc takes [m] for a link.
 
 mod anatomy;
+mod assessment;
 mod complex;
 mod crossings;
 mod curvature;
@@ -34,15 +35,19 @@ mod error;
 mod extent;
 mod field;
 mod flip;
+mod given;
+mod grading;
 mod hausdorff;
 mod isosurface;
 mod lattice;
 mod manifold;
 mod missed;
 mod nesting;
+mod octree;
 mod optimise;
 mod percentiles;
 mod phantom;
+mod regions;
 mod remesh;
 mod sheets;
 mod shells;
@@ -61,6 +66,7 @@ mod winding;
 use pliant_geometry::Mesh;
 
 pub use anatomy::Anatomy;
+pub use assessment::Assessment;
 pub use curvature::Curvature;
 pub use decimate::Fewer;
 pub use deviation::Deviation;
@@ -68,16 +74,20 @@ pub use enclosed::{Closing, Enclosed, EnclosedReport};
 pub use error::MeshingError;
 pub use extent::require_room_for;
 pub use field::{Ellipsoid, ImplicitField};
+pub use given::MeasuredTo;
 pub use hausdorff::Hausdorff;
 pub use missed::Missed;
 pub use percentiles::Percentiles;
 pub use phantom::{Organ, Phantom, brain_label};
+pub use regions::{InterfaceReport, LabelReport, Regions};
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use shells::{FitProgress, FittedShells, Flaw, ShellGoal, ShellReport};
 pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
 pub use taubin::{SURFACE_PAIRS, SURFACE_SMOOTHING};
-pub use tets::{MaterialReport, OrganMesh, OrganTets, Repairs, Steps, TetReport};
+pub use tets::{
+    DistanceReport, EdgeLengths, MaterialReport, OrganMesh, OrganTets, Repairs, Steps, TetReport,
+};
 pub use thickness::Thickness;
 pub use triangles::{SurfaceRepairs, TriangleMesh};
 pub use voxels::Voxels;

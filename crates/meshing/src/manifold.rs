@@ -1,10 +1,17 @@
 //! Mends a body that touches itself: where a gap is thinner than the cells, its two banks share points or edges. A point
 //! is doubled for every group of its tets that hang together through faces; an edge with more than two boundary faces is
 //! halved first, which gives its banks a point of their own each. Faces are kept, so no volume changes.
+//! Where two stretches of the boundary meet in a point whose tets do hang together (a sheet without thickness there), one of them gets
+//! a point of its own a little further out, with a tet on each of its faces.
 
 use std::collections::BTreeMap;
 
-use crate::complex::Complex;
+use pliant_geometry::Vector3;
+
+use crate::complex::{Complex, OUTSIDE, acoustic_length};
+
+/// How far the new point of a pinch may lie from the old one, in lattice constants.
+const LIFTS: [f64; 5] = [0.5, 0.35, 0.25, 0.15, 0.08];
 
 /// What was mended.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,11 +20,14 @@ pub(crate) struct Mended {
     pub(crate) doubled: usize,
     /// Edges halved.
     pub(crate) halved: usize,
+    /// Points parted where the boundary met itself in a point.
+    pub(crate) parted: usize,
 }
 
 /// Mends all points and edges.
 pub(crate) fn mend(complex: &mut Complex) -> Mended {
-    let mut mended = Mended { doubled: double_points(complex, 0..complex.points.len() as u32), halved: 0 };
+    let doubled = double_points(complex, 0..complex.points.len() as u32);
+    let mut mended = Mended { doubled, ..Mended::default() };
     // Halving leaves two edges that are fine, so once is enough but for edges made by doubling.
     for _ in 0..4 {
         let edges = crowded_edges(complex);
@@ -31,7 +41,68 @@ pub(crate) fn mend(complex: &mut Complex) -> Mended {
             mended.doubled += double_points(complex, new..new + 1);
         }
     }
+    for point in pinched_points(complex) {
+        while fans(complex, point).len() > 1 && part_pinch(complex, point) {
+            mended.parted += 1;
+        }
+    }
     mended
+}
+
+/// Points where the boundary touches itself: its faces there are more than one fan. Increasing.
+pub(crate) fn pinched_points(complex: &Complex) -> Vec<u32> {
+    let outer = |point: &u32| complex.sides[*point as usize] & OUTSIDE != 0;
+    (0..complex.points.len() as u32).filter(outer).filter(|&point| fans(complex, point).len() > 1).collect()
+}
+
+/// Boundary faces round a point, outward, in groups that hang together through edges at the point.
+fn fans(complex: &Complex, point: u32) -> Vec<Vec<[u32; 3]>> {
+    let mut rest = complex.rim_of(point, |_| true);
+    let meet = |a: &[u32; 3], b: &[u32; 3]| a.iter().any(|node| *node != point && b.contains(node));
+    let mut fans = Vec::new();
+    while let Some(first) = rest.pop() {
+        let mut fan = vec![first];
+        let mut at = 0;
+        while at < fan.len() {
+            let (joined, left) = rest.iter().partition(|face| meet(&fan[at], face));
+            fan.extend::<Vec<[u32; 3]>>(joined);
+            rest = left;
+            at += 1;
+        }
+        fans.push(fan);
+    }
+    fans
+}
+
+/// Gives one of the fans round a point a new point further out, and a tet on each of its faces; of all fans and places the one whose
+/// worst new tet is best. False where every one would turn a tet over.
+fn part_pinch(complex: &mut Complex, point: u32) -> bool {
+    let (here, size) = (complex.points[point as usize], complex.size[point as usize]);
+    let mut best: Option<(f64, Vec<[u32; 3]>, Vector3)> = None;
+    for fan in fans(complex, point) {
+        let corners = |face: &[u32; 3]| face.map(|node| complex.points[node as usize]);
+        let normals = fan.iter().map(|face| {
+            let [a, b, c] = corners(face);
+            (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
+        });
+        let normals: Vec<Vector3> = normals.collect();
+        let mean = normals.iter().sum::<Vector3>().try_normalize(0.0);
+        for place in
+            mean.into_iter().chain(normals).flat_map(|way| LIFTS.map(|lift| here + way * (lift * size)))
+        {
+            let lengths = fan.iter().map(|face| {
+                let [a, b, c] = corners(face);
+                acoustic_length([a, b, c, place])
+            });
+            let least = lengths.fold(f64::INFINITY, f64::min);
+            if least > best.as_ref().map_or(0.0, |best| best.0) {
+                best = Some((least, fan.clone(), place));
+            }
+        }
+    }
+    let Some((_, fan, place)) = best else { return false };
+    complex.cap(point, &fan, place);
+    true
 }
 
 /// Edges with more than two boundary faces, increasing.
@@ -60,6 +131,7 @@ fn double_points(complex: &mut Complex, points: std::ops::Range<u32>) -> usize {
             let twin = complex.points.len() as u32;
             complex.points.push(complex.points[point as usize]);
             complex.sides.push(complex.sides[point as usize]);
+            complex.size.push(complex.size[point as usize]);
             complex.star.push(group.clone());
             complex.star[point as usize].retain(|tet| !group.contains(tet));
             for &tet in group {
@@ -103,8 +175,6 @@ fn groups(complex: &Complex, point: u32) -> Vec<Vec<u32>> {
 
 #[cfg(test)]
 mod tests {
-    use pliant_geometry::Vector3;
-
     use super::*;
 
     /// Two cubes of six tets that share an edge, joined by nothing else or round it.
@@ -119,9 +189,9 @@ mod tests {
             corner(-1., 0., 0.),
             corner(-1., -0.5, 0.5),
         ];
-        let mut complex = Complex::new(points, vec![[0, 2, 3, 1], [0, 4, 5, 1]]);
+        let mut complex = Complex::new(points, vec![[0, 2, 3, 1], [0, 4, 5, 1]], 1.0);
         assert_eq!(crowded_edges(&complex), [[0, 1]]);
-        assert_eq!(mend(&mut complex), Mended { doubled: 2, halved: 0 });
+        assert_eq!(mend(&mut complex), Mended { doubled: 2, ..Mended::default() });
         assert!(crowded_edges(&complex).is_empty());
         assert_eq!(complex.points.len(), 8);
     }
@@ -142,12 +212,34 @@ mod tests {
             (0..6).filter(|at| at % 3 != 0).map(|at| [0, ring(at), ring(at + 1), 1]).collect();
         tets.extend((0..6).map(|at| [1, ring(at), ring(at + 1), 8]));
         tets.extend((0..6).map(|at| [9, ring(at), ring(at + 1), 0]));
-        let mut complex = Complex::new(points, tets);
+        let mut complex = Complex::new(points, tets, 1.0);
         // The edges opposite to it hold rings together likewise, above and below.
         assert_eq!(crowded_edges(&complex), [[0, 1], [2, 3], [5, 6]]);
         let mended = mend(&mut complex);
         assert_eq!(mended.halved, 3);
         assert!(crowded_edges(&complex).is_empty());
         assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
+    }
+
+    #[test]
+    fn a_boundary_that_meets_itself_in_a_point_is_parted() {
+        let around = |at: usize, height: f64| {
+            let (sine, cosine) = (at as f64 * std::f64::consts::FRAC_PI_3).sin_cos();
+            Vector3::new(cosine, sine, height)
+        };
+        let mut points = vec![Vector3::zeros()];
+        points.extend((0..6).map(|at| around(at, 0.4)));
+        points.extend((0..6).map(|at| around(at, -0.4)));
+        let (top, low) = (|at: u32| 1 + at % 6, |at: u32| 7 + at % 6);
+        // The wedges of a plate between two cones that meet at its middle, each of two tets.
+        let wedge = |at: u32| [[0, low(at), low(at + 1), top(at + 1)], [0, low(at), top(at + 1), top(at)]];
+        let mut complex = Complex::new(points, (0..6).flat_map(wedge).collect(), 1.0);
+        assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
+        assert!(crowded_edges(&complex).is_empty());
+        assert_eq!(pinched_points(&complex), [0]);
+        assert_eq!(mend(&mut complex).parted, 1);
+        assert!(pinched_points(&complex).is_empty());
+        assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
+        assert_eq!(complex.alive().count(), 12 + 6);
     }
 }

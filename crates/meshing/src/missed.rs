@@ -23,7 +23,7 @@ const OPPOSITE: f64 = -0.7;
 /// The middle of a thin part is missed where it is this far from the mesh, in lattice constants; nearer, the mesh cuts a crest.
 const MARGIN: f64 = 0.25;
 
-/// Something of a body that its mesh misses. Places in metres, RAS where the body comes from an image.
+/// Something of a body that its mesh misses or shows in the wrong place. Places in metres, RAS where the body comes from an image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Missed {
@@ -45,6 +45,34 @@ pub enum Missed {
         /// Lattice constant [m].
         edge: f64,
     },
+    /// The boundary of the mesh lies far from the surface.
+    Beyond {
+        /// The point of the mesh's boundary that is farthest from the surface [m].
+        place: [f64; 3],
+        /// How far it is [m].
+        distance: f64,
+    },
+    /// A label without a cell.
+    Label {
+        /// The label.
+        label: i32,
+    },
+    /// A label whose volume is not that of the input.
+    LabelVolume {
+        /// The label.
+        label: i32,
+        /// By which part it is off.
+        part: f64,
+    },
+    /// A label whose surface is far from that of the input.
+    LabelAway {
+        /// The label.
+        label: i32,
+        /// The point that is farthest from the other surface [m].
+        place: [f64; 3],
+        /// How far it is [m].
+        distance: f64,
+    },
     /// A part of the surface far from the mesh that is not thin: a crest, or a small piece that was left out.
     Behind {
         /// The point of the surface that is farthest from the mesh [m].
@@ -57,7 +85,7 @@ pub enum Missed {
 impl Missed {
     /// How far [m] the surface of a body may be from a mesh with cells of `edge` [m] before it is told: half an edge of tets; steps of
     /// cubes stay behind the body by up to half of their diagonal, and immersed ones hold all of it.
-    pub fn allowed(mesh: &Mesh, edge: f64) -> f64 {
+    pub(crate) fn allowed(mesh: &Mesh, edge: f64) -> f64 {
         match mesh.block(CellKind::Hex) {
             None => edge / 2.0,
             Some(cubes) if cubes.data.contains_key(Voxels::FRACTION) => f64::INFINITY,
@@ -66,11 +94,11 @@ impl Missed {
     }
 
     /// What a mesh with cells of `edge` [m] misses of the body of a field: the worst thin part, the worst thin gap, and the farthest
-    /// point of the surface if it is farther than `allowed` [m] and no thin part explains it.
+    /// point of the surface if it is farther than `allowed` [m] and no thin part explains it, or else of the mesh's boundary.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
-    pub fn of(
+    pub(crate) fn of(
         mesh: &Mesh,
         field: &(impl ImplicitField + ?Sized),
         edge: f64,
@@ -107,6 +135,9 @@ impl Missed {
         let thin = missed.iter().any(|missed| matches!(missed, Self::ThinPart { .. }));
         if !thin && deviation.largest_from_body > allowed {
             missed.push(Self::Behind { place: deviation.farthest, distance: deviation.largest_from_body });
+        } else if missed.is_empty() && deviation.largest_from_mesh > allowed {
+            let (place, distance) = (deviation.farthest_of_mesh, deviation.largest_from_mesh);
+            missed.push(Self::Beyond { place, distance });
         }
         Ok(missed)
     }
@@ -137,6 +168,22 @@ impl fmt::Display for Missed {
                 distance * 1e3,
                 at(place)
             ),
+            Self::Beyond { place, distance } => write!(
+                f,
+                "the boundary of the mesh is {:.1} mm off the surface of the body at {}",
+                distance * 1e3,
+                at(place)
+            ),
+            Self::Label { label } => write!(f, "label {label} has no cell: it is smaller than the cells"),
+            Self::LabelVolume { label, part } => write!(
+                f,
+                "label {label} has {:.1} % {} volume than the input",
+                100.0 * part.abs(),
+                if *part < 0.0 { "less" } else { "more" }
+            ),
+            Self::LabelAway { label, place, distance } => {
+                write!(f, "the surface of label {label} is {:.1} mm off at {}", distance * 1e3, at(place))
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Improves a tetrahedral mesh for explicit dynamics, where the least acoustic length sets the time step: tets below a
 //! rising threshold lose an edge, are flipped or change their material, then points move to where their worst tet is best. Points between
-//! sides stay between them. Deterministic: everything goes in the order of numbers, and the directions of trial moves
+//! sides stay between them. No edge gets longer than 1.6 lattice constants. Lengths are measured in those of the lattice round the points,
+//! which may be graded. Deterministic: everything goes in the order of numbers, and the directions of trial moves
 //! are turned by a fixed sequence.
 
 use pliant_geometry::{CellKind, Vector3};
@@ -64,11 +65,7 @@ pub(crate) struct Optimised {
 pub(crate) struct Optimiser<'a> {
     complex: &'a mut Complex,
     surfaces: Surfaces<'a>,
-    /// Lattice constant [m].
-    edge: f64,
-    /// Acoustic length of an ideal tet [m].
-    ideal: f64,
-    /// How far a point may be from the sides that it lies between [m].
+    /// How far a point may be from the sides that it lies between, in lattice constants.
     slack: f64,
     /// Whether points where three materials meet, or two and the outside, only keep to the outside.
     lines_are_free: bool,
@@ -77,17 +74,8 @@ pub(crate) struct Optimiser<'a> {
 }
 
 impl<'a> Optimiser<'a> {
-    pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>, edge: f64, ideal: f64) -> Self {
-        Self {
-            complex,
-            surfaces,
-            edge,
-            ideal,
-            slack: 0.0,
-            lines_are_free: false,
-            noise: 1,
-            done: Optimised::default(),
-        }
+    pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>) -> Self {
+        Self { complex, surfaces, slack: 0.0, lines_are_free: false, noise: 1, done: Optimised::default() }
     }
 
     /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh
@@ -102,27 +90,27 @@ impl<'a> Optimiser<'a> {
         let aim = (AIM * target).min(1.0);
         self.improve(aim, rounds, RAMP, &|done| progress(0.6 * done));
         for sweep in 0..FIT_SWEEPS {
-            self.fit(aim, FIT_REACH * self.edge * SHRINK.powi(sweep as i32));
+            self.fit(aim, FIT_REACH * SHRINK.powi(sweep as i32));
             if self.shift_surfaces(volumes, aim) {
                 self.improve(aim, rounds.div_ceil(2), 0.0, &|_| {});
             }
             progress(0.6 + 0.3 * (sweep + 1) as f64 / FIT_SWEEPS as f64);
         }
         for (slack, goal) in [(SLACKS[0], aim), (SLACKS[1], aim), (SLACKS[2], target)] {
-            if self.complex.worst() >= goal * self.ideal {
+            if self.complex.worst() >= goal {
                 break;
             }
-            self.slack = slack * self.edge;
+            self.slack = slack;
             self.improve(aim, rounds.div_ceil(2), 0.0, &|_| {});
         }
-        if self.complex.worst() < target * self.ideal {
+        if self.complex.worst() < target {
             self.lines_are_free = true;
             self.improve(target, rounds.div_ceil(2), 0.0, &|_| {});
         }
         // Inner points move freely, so that no surface pays for it.
         for sweep in 0..SWEEPS {
-            let reach = REACH * self.edge * SHRINK.powi(sweep as i32);
-            self.relocate(POLISH * self.ideal, reach, &|sides| sides.count_ones() == 1);
+            let reach = REACH * SHRINK.powi(sweep as i32);
+            self.relocate(POLISH, reach, &|sides| sides.count_ones() == 1);
         }
         self.done
     }
@@ -134,7 +122,11 @@ impl<'a> Optimiser<'a> {
         for (surface, (wanted, [volume, area])) in volumes.iter().zip(measured).enumerate() {
             let Some(wanted) = wanted else { continue };
             if (volume / wanted - 1.0).abs() > VOLUME_TOLERANCE && area > 0.0 {
-                let moved = self.surfaces.shift(surface, (wanted - volume) / area, LARGEST_SHIFT * self.edge);
+                let moved = self.surfaces.shift(
+                    surface,
+                    (wanted - volume) / area,
+                    LARGEST_SHIFT * self.surfaces.edge(),
+                );
                 // Bit 0 of the sides is the outside, bit m the material m.
                 shifted |= match (moved, surface) {
                     (false, _) => 0,
@@ -147,9 +139,10 @@ impl<'a> Optimiser<'a> {
             let sides = self.complex.sides[node as usize];
             if sides.count_ones() > 1 && sides & shifted != 0 {
                 let here = self.complex.points[node as usize];
-                let least = self.star_min(node, &here, u32::MAX, 0.0).min(0.6 * target * self.ideal);
+                let least = self.star_min(node, &here, u32::MAX, 0.0).min(0.6 * target);
                 if let Some(there) = self.project(node, here)
                     && self.star_min(node, &there, u32::MAX, 0.0) >= least
+                    && !self.complex.stretches(node, &there, u32::MAX)
                 {
                     self.complex.points[node as usize] = there;
                 }
@@ -163,7 +156,7 @@ impl<'a> Optimiser<'a> {
         let ramp_over = ramp == 0.0;
         for round in 0..rounds {
             let ramp = ((round + 1) as f64 / (ramp * rounds as f64)).min(1.0);
-            let threshold = self.ideal * (FIRST_THRESHOLD + (target - FIRST_THRESHOLD) * ramp);
+            let threshold = FIRST_THRESHOLD + (target - FIRST_THRESHOLD) * ramp;
             let before = self.state(target);
             self.peel(threshold);
             self.hand_over(threshold);
@@ -172,12 +165,12 @@ impl<'a> Optimiser<'a> {
             // While the threshold rises, points just above it move too.
             let threshold = if ramp_over { threshold } else { 1.05 * threshold };
             for sweep in 0..SWEEPS {
-                self.relocate(threshold, REACH * self.edge * SHRINK.powi(sweep as i32), &|_| true);
+                self.relocate(threshold, REACH * SHRINK.powi(sweep as i32), &|_| true);
             }
             self.done.rounds += 1;
             progress((round + 1) as f64 / rounds as f64);
             let after = self.state(target);
-            if after.0 >= target * self.ideal {
+            if after.0 >= target {
                 break;
             }
             let better = after.0 > before.0 * (1.0 + 1e-6) || after.1 < before.1;
@@ -188,18 +181,18 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Least acoustic length [m], and how many tets are below `target` × ideal.
+    /// Least acoustic length as a part of the ideal, and how many tets are below `target`.
     fn state(&self, target: f64) -> (f64, usize) {
-        let lengths = self.complex.alive().map(|tet| self.complex.length(tet));
-        lengths.fold((f64::INFINITY, 0), |(least, short), length| {
-            (least.min(length), short + usize::from(length < target * self.ideal))
+        let parts = self.complex.alive().map(|tet| self.complex.part(tet));
+        parts.fold((f64::INFINITY, 0), |(least, short), part| {
+            (least.min(part), short + usize::from(part < target))
         })
     }
 
-    /// Tets below a length, the worst first.
+    /// Tets below a part of the ideal length, the worst first.
     fn below(&self, threshold: f64) -> Vec<u32> {
-        let lengths = self.complex.alive().map(|tet| (self.complex.length(tet), tet));
-        let mut bad: Vec<(f64, u32)> = lengths.filter(|(length, _)| *length < threshold).collect();
+        let parts = self.complex.alive().map(|tet| (self.complex.part(tet), tet));
+        let mut bad: Vec<(f64, u32)> = parts.filter(|(part, _)| *part < threshold).collect();
         bad.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         bad.into_iter().map(|(_, tet)| tet).collect()
     }
@@ -208,8 +201,7 @@ impl<'a> Optimiser<'a> {
     /// are light for their stiffness.
     fn peel(&mut self, threshold: f64) {
         let mut peeled = 0;
-        let short =
-            |node: &u32| self.complex.nodal_length(*node, &self.complex.points[*node as usize]) < threshold;
+        let short = |node: &u32| self.nodal_part(*node, &self.complex.points[*node as usize]) < threshold;
         let is_tip = |tet: &u32| {
             let nodes = self.complex.tets[*tet as usize];
             nodes.iter().any(|node| self.complex.star[*node as usize].len() == 1 && short(node))
@@ -300,7 +292,7 @@ impl<'a> Optimiser<'a> {
             let nodes = self.complex.tets[tet as usize];
             // A collapse before may have taken it away or improved it.
             if self.complex.is_alive(tet)
-                && self.complex.length(tet) < threshold
+                && self.complex.part(tet) < threshold
                 && self.collapse_one(nodes, threshold)
             {
                 collapsed += 1;
@@ -309,10 +301,10 @@ impl<'a> Optimiser<'a> {
         self.done.collapsed += collapsed;
     }
 
-    /// Flips edges and faces of tets below a length.
+    /// Flips edges and faces of tets below a part of the ideal length.
     fn flip(&mut self, threshold: f64) {
         let surfaces = &self.surfaces;
-        let follows = |middle: &Vector3| surfaces.off(OUTSIDE, middle) <= FLIP_OFF * self.edge;
+        let follows = |middle: &Vector3, size: f64| surfaces.off(OUTSIDE, middle) <= FLIP_OFF * size;
         let mut flipped = 0;
         for tet in self.below(threshold) {
             if self.complex.is_alive(tet) && self.complex.flip(tet, &follows) {
@@ -367,20 +359,26 @@ impl<'a> Optimiser<'a> {
             let floor = best.map_or(old, |(length, _)| length);
             let new = self.star_min(gone, &place, kept, floor);
             let new = if new > floor { new.min(self.star_min(kept, &place, gone, floor)) } else { new };
-            if new > floor && (new >= threshold || new > 1.2 * old) {
+            let bears = new > floor && (new >= threshold || new > 1.2 * old);
+            if bears && !self.complex.overstretches(gone, kept, &place) {
                 best = Some((new, place));
             }
         }
         best.map(|(_, place)| place)
     }
 
-    /// Lengths that a node at `place` is responsible for [m]: least acoustic length of its tets, and its own.
-    fn lengths_round(&self, node: u32, place: &Vector3) -> [f64; 2] {
-        [self.star_min(node, place, u32::MAX, 0.0), self.complex.nodal_length(node, place)]
+    /// Parts of the ideal length that a node at `place` is responsible for: the least of its tets, and its own.
+    fn parts_round(&self, node: u32, place: &Vector3) -> [f64; 2] {
+        [self.star_min(node, place, u32::MAX, 0.0), self.nodal_part(node, place)]
     }
 
-    /// Least acoustic length of the tets round a node if it were at `place`, leaving out those with another node; stops
-    /// once it is not above `floor`.
+    /// The length that a node would bear on its own at `place`, as a part of the ideal one.
+    fn nodal_part(&self, node: u32, place: &Vector3) -> f64 {
+        self.complex.nodal_length(node, place) / self.complex.ideal([node; 4])
+    }
+
+    /// Least acoustic length of the tets round a node if it were at `place` as a part of the ideal, leaving out those with another node;
+    /// stops once it is not above `floor`.
     fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
         let mut least = f64::INFINITY;
         for &tet in &self.complex.star[node as usize] {
@@ -389,7 +387,7 @@ impl<'a> Optimiser<'a> {
                 continue;
             }
             let corners = nodes.map(|n| if n == node { *place } else { self.complex.points[n as usize] });
-            least = least.min(acoustic_length(corners));
+            least = least.min(acoustic_length(corners) / self.complex.ideal(nodes));
             if least <= floor {
                 break;
             }
@@ -409,10 +407,12 @@ impl<'a> Optimiser<'a> {
         if sides.count_ones() < 2 {
             return Some(place);
         }
-        let near = self.surfaces.off(sides, &place) < self.slack;
-        let there = match near && (sides & OUTSIDE == 0 || self.surfaces.has_room(&place, self.slack)) {
+        let size = self.complex.size[node as usize];
+        let near = self.surfaces.off(sides, &place) < self.slack * size;
+        let there = match near && (sides & OUTSIDE == 0 || self.surfaces.has_room(&place, self.slack * size))
+        {
             true => place,
-            false => self.surfaces.project(sides, &place, 0.15 * self.edge)?,
+            false => self.surfaces.project(sides, &place, 0.15 * size)?,
         };
         let looks = |point: &Vector3| self.surfaces.constraints(sides, point).first_gradient();
         let here = self.complex.points[node as usize];
@@ -420,11 +420,11 @@ impl<'a> Optimiser<'a> {
     }
 
     /// Slides points along their surface to where its facets follow the field best, as long as no tet falls below the
-    /// target. What falls short of a crest moves onto it.
+    /// target; `reach` in lattice constants. What falls short of a crest moves onto it.
     fn fit(&mut self, target: f64, reach: f64) {
         for node in 0..self.complex.points.len() as u32 {
             if self.complex.sides[node as usize].count_ones() == 2 {
-                self.fit_one(node, target * self.ideal, reach);
+                self.fit_one(node, target, reach);
             }
         }
     }
@@ -438,18 +438,20 @@ impl<'a> Optimiser<'a> {
             _ => self.complex.rim_of(node, |_| true),
         };
         let [misfit, area] = self.misfit(node, &here, &faces);
-        if misfit < area * (FIT_ENOUGH * self.edge).powi(2) {
+        let size = self.complex.size[node as usize];
+        if misfit < area * (FIT_ENOUGH * size).powi(2) {
             return;
         }
         // What a move must not lower.
-        let floors = self.lengths_round(node, &here).map(|length| length.min(least));
+        let floors = self.parts_round(node, &here).map(|part| part.min(least));
         let bears = |trial: &Vector3| {
-            let lengths = self.lengths_round(node, trial);
-            lengths.iter().zip(floors).all(|(length, floor)| *length >= floor)
+            let parts = self.parts_round(node, trial);
+            parts.iter().zip(floors).all(|(part, floor)| *part >= floor)
+                && !self.complex.stretches(node, trial, u32::MAX)
         };
         let (mut best, mut place) = (0.99 * misfit, here);
         for direction in directions() {
-            let Some(trial) = self.project(node, here + direction * reach) else { continue };
+            let Some(trial) = self.project(node, here + direction * (reach * size)) else { continue };
             let [misfit, _] = self.misfit(node, &trial, &faces);
             if misfit < best && bears(&trial) {
                 (best, place) = (misfit, trial);
@@ -481,7 +483,7 @@ impl<'a> Optimiser<'a> {
         faces.iter().map(of_face).fold([0.0; 2], |[misfit, all], [own, area]| [misfit + own, all + area])
     }
 
-    /// Moves the chosen points whose worst tet is below the threshold to the best of some places round them.
+    /// Moves the chosen points whose worst tet is below the threshold to the best of some places round them; `reach` in lattice constants.
     fn relocate(&mut self, threshold: f64, reach: f64, chosen: &dyn Fn(Sides) -> bool) {
         for node in 0..self.complex.points.len() as u32 {
             let here = self.complex.points[node as usize];
@@ -497,18 +499,18 @@ impl<'a> Optimiser<'a> {
         let neighbours = self.complex.neighbours(node);
         let sum: Vector3 = neighbours.iter().map(|&other| self.complex.points[other as usize]).sum();
         let half_way = (here + sum / neighbours.len() as f64) / 2.0;
-        let reach = reach * (0.5 + self.random());
+        let reach = reach * self.complex.size[node as usize] * (0.5 + self.random());
         // Worst tets first: most trials end at the first tet.
         let mut star = std::mem::take(&mut self.complex.star[node as usize]);
-        star.sort_by(|&a, &b| self.complex.length(a).total_cmp(&self.complex.length(b)).then(a.cmp(&b)));
+        star.sort_by(|&a, &b| self.complex.part(a).total_cmp(&self.complex.part(b)).then(a.cmp(&b)));
         self.complex.star[node as usize] = star;
         let (mut best, mut place) = (now, here);
         for trial in std::iter::once(half_way).chain(directions().map(|direction| here + direction * reach)) {
             // Free trials that are no better are not worth projecting: their tets change little.
             if let Some(trial) = self.project(node, trial) {
-                let length = self.star_min(node, &trial, u32::MAX, best);
-                if length > best {
-                    (best, place) = (length, trial);
+                let part = self.star_min(node, &trial, u32::MAX, best);
+                if part > best && !self.complex.stretches(node, &trial, u32::MAX) {
+                    (best, place) = (part, trial);
                 }
             }
         }

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 
 use crate::error::{MeshingError, require_at_most, require_positive};
 use crate::extent::allowed;
@@ -88,7 +88,8 @@ pub enum Sheet {
 }
 
 impl Sheet {
-    /// Triangles on a grid with `counts` cells along its two axes.
+    /// Triangles on a grid with `counts` cells along its two axes. Point data `normal` are the unit normals of a sheet that is curved, if
+    /// no triangle leans more than 60° from them.
     ///
     /// # Errors
     /// If a length is not positive, a count is zero, the distortion is half a cell or more, or there are too many triangles.
@@ -111,11 +112,15 @@ impl Sheet {
         let triangles = if pattern == Pattern::Crossed { 4.0 } else { 2.0 };
         require_at_most(counts[0] as f64 * counts[1] as f64 * triangles, allowed(cell_limit))?;
         let grid = Grid { counts, wraps: self.closes() };
+        let place = || grid.parameters(pattern, distortion);
         let mut mesh = Mesh {
-            points: grid.parameters(pattern, distortion).map(|[s, t]| self.point(s, t)).collect(),
+            points: place().map(|[s, t]| self.point(s, t)).collect(),
             blocks: vec![CellBlock::new(CellKind::Triangle, grid.triangles(pattern))],
             ..Mesh::default()
         };
+        if let Some(normals) = place().map(|[s, t]| self.normal(s, t)).collect() {
+            add_normals(&mut mesh, normals);
+        }
         for (name, points) in self.edge_names().into_iter().zip(grid.edges()) {
             if let Some(name) = name {
                 mesh.point_sets.insert(name.into(), points);
@@ -187,6 +192,21 @@ impl Sheet {
         }
     }
 
+    /// The unit normal there, of a sheet that is curved.
+    fn normal(&self, s: f64, t: f64) -> Option<Vector3> {
+        match *self {
+            Self::Plate { .. } | Self::Annulus { .. } => None,
+            Self::Cylinder { .. } => Some(self.point(s, t).xy().normalize().push(0.0)),
+            Self::Hemisphere { .. } => Some(self.point(s, t).normalize()),
+            Self::TwistedStrip { length, width, twist } => {
+                let (sine, cosine) = (s * twist).sin_cos();
+                let turning = (t - 0.5) * width * twist;
+                let along = Vector3::new(length, -turning * sine, turning * cosine);
+                Some(along.cross(&Vector3::new(0.0, cosine, sine)).normalize())
+            }
+        }
+    }
+
     /// Names of the edges at the start and the end of the two grid axes.
     fn edge_names(&self) -> [Option<&'static str>; 4] {
         let closes = self.closes();
@@ -198,6 +218,19 @@ impl Sheet {
             Self::Annulus { .. } => [Some("inner"), Some("outer"), Some("start"), Some("end")],
             Self::TwistedStrip { .. } => [Some("x-min"), Some("x-max"), Some("low"), Some("high")],
         }
+    }
+}
+
+/// Gives a mesh the normals of the surface that it is of, unless a triangle leans more than 60° from one of them, as folded ones do.
+fn add_normals(mesh: &mut Mesh, normals: Vec<Vector3>) {
+    let stands = |corners: &[u32]| {
+        let [a, b, c] = [0, 1, 2].map(|i| mesh.points[corners[i] as usize]);
+        let across = (b - a).cross(&(c - a)).normalize();
+        corners.iter().all(|&node| normals[node as usize].dot(&across) > 0.5)
+    };
+    if mesh.blocks[0].cells().all(stands) {
+        let values = normals.into_iter().flat_map(<[f64; 3]>::from).collect();
+        mesh.point_data.insert("normal".into(), DataArray { components: 3, values });
     }
 }
 
@@ -291,7 +324,8 @@ impl Shifts {
     }
 }
 
-/// A sphere about the origin, facing outwards: an icosahedron whose triangles are cut into four `levels` times.
+/// A sphere about the origin, facing outwards: an icosahedron whose triangles are cut into four `levels` times; point data `normal`
+/// are its normals.
 ///
 /// # Errors
 /// If the radius is not positive or there are too many triangles.
@@ -322,11 +356,13 @@ pub fn sphere(radius: f64, levels: u32, cell_limit: usize) -> Result<Mesh, Meshi
         }
         triangles = finer;
     }
-    Ok(Mesh {
-        points: points.into_iter().map(|p| radius * p).collect(),
+    let mut mesh = Mesh {
+        points: points.iter().map(|p| radius * p).collect(),
         blocks: vec![CellBlock::new(CellKind::Triangle, triangles.into_flattened())],
         ..Mesh::default()
-    })
+    };
+    add_normals(&mut mesh, points);
+    Ok(mesh)
 }
 
 /// The faces of an icosahedron: three corners that are all an edge apart, seen counter-clockwise from outside.
@@ -401,6 +437,31 @@ mod tests {
     }
 
     /// Of 5,120 triangles: area to 1 %, volume outwards to 1 %.
+    /// Within 4° of the triangles on a fine mesh, and to the same side; none of flat sheets.
+    #[test]
+    fn normals_are_those_of_the_sheet() {
+        for (sheet, _) in all() {
+            let mesh = sheet.mesh([90, 90], Pattern::Diagonal, None, 100_000).unwrap();
+            let Some(normals) = mesh.point_data.get("normal") else {
+                assert!(matches!(sheet, Sheet::Plate { .. } | Sheet::Annulus { .. }), "{sheet:?}");
+                continue;
+            };
+            for corners in mesh.blocks[0].cells() {
+                let [a, b, c] = [0, 1, 2].map(|i| mesh.points[corners[i] as usize]);
+                let across = (b - a).cross(&(c - a)).normalize();
+                for &node in corners {
+                    let off = Vector3::from_row_slice(normals.item(node as usize)).angle(&across);
+                    assert!(off < 0.07, "{sheet:?}: {off}");
+                }
+            }
+        }
+        let twisted = Sheet::TwistedStrip { length: 3.0, width: 0.5, twist: 1.0 };
+        let (s, t, h) = (0.4, 0.9, 1e-6);
+        let slope = |ds: f64, dt: f64| twisted.point(s + ds, t + dt) - twisted.point(s - ds, t - dt);
+        let across = slope(h, 0.0).cross(&slope(0.0, h)).normalize();
+        assert!((twisted.normal(s, t).unwrap() - across).norm() < 1e-8);
+    }
+
     #[test]
     fn a_sphere_is_closed_and_faces_outwards() {
         let mesh = sphere(2.0, 4, DEFAULT_CELL_LIMIT).unwrap();

@@ -11,11 +11,19 @@ pub(crate) struct Surfaces<'a> {
     anatomy: &'a Anatomy<'a>,
     /// Where the surfaces of the whole (0) and of the inner materials lie: at these values of their fields [m].
     levels: Vec<f64>,
+    /// Lattice constant of the mesh [m].
+    edge: f64,
 }
 
 impl<'a> Surfaces<'a> {
-    pub(crate) fn new(anatomy: &'a Anatomy<'a>) -> Self {
-        Self { anatomy, levels: vec![0.0; anatomy.labels().len()] }
+    /// For a mesh with a lattice constant [m].
+    pub(crate) fn new(anatomy: &'a Anatomy<'a>, edge: f64) -> Self {
+        Self { anatomy, levels: vec![0.0; anatomy.labels().len()], edge }
+    }
+
+    /// Lattice constant of the mesh [m].
+    pub(crate) fn edge(&self) -> f64 {
+        self.edge
     }
 
     /// Number of materials.

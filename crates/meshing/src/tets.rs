@@ -1,6 +1,6 @@
 //! From an anatomy to tetrahedra that an explicit solver can take large steps with: isosurface stuffing of the whole body,
 //! its materials cut out, banks that touch parted, then the optimiser. Rules and thresholds: the project's meshing
-//! specification 1.3.
+//! specification 1.3. Cells of several sizes, and cells made smaller until a distance is held: `grading.rs`.
 
 use std::fmt;
 
@@ -8,20 +8,42 @@ use pliant_geometry::{CellKind, DataArray, Mesh, QualityReport, Spread, Vector3,
 use serde::Serialize;
 
 use crate::anatomy::Anatomy;
-use crate::complex::Complex;
+use crate::complex::{Complex, LONGEST};
 use crate::cut::{cut_gaps, cut_materials};
+use crate::deviation::Measured;
 use crate::error::{MeshingError, require_positive};
-use crate::manifold::{crowded_edges, mend};
-
+use crate::given::MeasuredTo;
+use crate::grading::{Filled, Levels, Wanted, fill, tree};
+use crate::manifold::{crowded_edges, mend, pinched_points};
+use crate::octree::{Octree, around};
 use crate::optimise::Optimiser;
 use crate::surfaces::Surfaces;
 use crate::{DEFAULT_CELL_LIMIT, Stuffing};
 
+/// The smallest edge anywhere, as a part of the edge asked for.
+pub(crate) const SMALLEST_PART: f64 = 1.0 / 64.0;
+
+/// Meshes made at most until a distance is held.
+const MOST_PASSES: usize = 8;
+
+/// Cells are made smaller where the distance is above this part of what is asked for.
+const BEYOND: f64 = 0.85;
+
+/// A mesh that is not optimised yet is made finer where it is off by more than this much of the distance asked for.
+const RAW_BEYOND: f64 = 1.2;
+
 /// A request for tetrahedra of an anatomy.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct OrganTets {
     /// Lattice constant [m]: the long edges of the inner tetrahedra; the short ones are √3/2 of it.
     pub edge: f64,
+    /// Lattice constant inside, away from the surface [m], if it is to be larger: the largest `edge` × 2ⁿ that is not above it.
+    pub inner_edge: Option<f64>,
+    /// Labels with smaller cells, and their lattice constant [m]: the largest `edge` / 2ⁿ that is not above it.
+    pub protect: Vec<(i32, f64)>,
+    /// Largest distance between the boundary of the mesh and the surface of the body [m], both ways: cells are halved where it is not
+    /// held. Of an image it is the smooth surface, of triangles these.
+    pub distance: Option<f64>,
     /// A lattice point [m]; the centre of the box of the body if `None`.
     pub origin: Option<Vector3>,
     /// Least acoustic length to reach, as a part of that of the ideal tet: 0.75 is reached as a rule, 0.9 is as good as it
@@ -36,16 +58,36 @@ pub struct OrganTets {
 }
 
 impl OrganTets {
-    /// Lattice constant `edge` [m], target 0.75 in at most 10 rounds, pieces of a twentieth of the largest one and more.
+    /// Lattice constant `edge` [m] everywhere, target 0.75 in at most 10 rounds, pieces of a twentieth of the largest one and more.
     pub fn new(edge: f64) -> Self {
         Self {
             edge,
+            inner_edge: None,
+            protect: Vec::new(),
+            distance: None,
             origin: None,
             target: 0.75,
             rounds: 10,
             smallest_piece: 0.05,
             cell_limit: DEFAULT_CELL_LIMIT,
         }
+    }
+
+    /// The edge [m] to start from where only a distance [m] is asked for, given the box of the body [m].
+    pub fn edge_for(distance: f64, [low, high]: [Vector3; 2]) -> f64 {
+        (12.0 * distance).min((high - low).norm() / 15.0)
+    }
+
+    /// The same with labels that have smaller cells: of the edge given [m], or else of half the edge of the others.
+    pub fn protecting(self, labels: &[(i32, Option<f64>)]) -> Self {
+        let own = |&(label, edge): &(i32, Option<f64>)| (label, edge.unwrap_or(self.edge / 2.0));
+        Self { protect: labels.iter().map(own).collect(), ..self }
+    }
+
+    /// For cells of which edge [m] the field of a body must be good enough: the shortest one, or the distance that is to be held.
+    pub fn finest(&self) -> f64 {
+        let protected = self.protect.iter().map(|(_, edge)| *edge).fold(self.edge, f64::min);
+        self.distance.map_or(protected, |distance| protected.min(distance.max(SMALLEST_PART * self.edge)))
     }
 
     /// Fills an anatomy with tetrahedra; the label of each is its cell data `label`. `progress` hears fractions from 0 to
@@ -55,40 +97,115 @@ impl OrganTets {
             require_positive("target", self.target)?;
             return Err(MeshingError::TargetTooHigh { target: self.target });
         }
+        if let Some(inner) = self.inner_edge {
+            require_positive("inner edge", inner)?;
+        }
+        if let Some(distance) = self.distance {
+            return self.within(distance, anatomy, progress);
+        }
+        let is_even = self.inner_edge.is_none() && self.protect.is_empty();
+        let filled = if is_even {
+            self.stuffed(anatomy)?
+        } else {
+            let levels = Levels::new(self, self.edge)?;
+            fill(self, anatomy, &tree(self, anatomy, &levels, &Wanted::new())?)?
+        };
+        progress(0.1);
+        self.finished(filled, anatomy, &|done| progress(0.1 + 0.9 * done))
+    }
+
+    /// Makes cells smaller until a distance is held; the best mesh if it never is.
+    fn within(
+        &self,
+        distance: f64,
+        anatomy: &Anatomy<'_>,
+        progress: &dyn Fn(f64),
+    ) -> Result<OrganMesh, MeshingError> {
+        require_positive("distance", distance)?;
+        let levels = Levels::new(self, finest_for(distance, self.edge))?;
+        let (mut wanted, mut coarser) = (Wanted::new(), Wanted::new());
+        let (mut best, mut is_final): (Option<OrganMesh>, bool) = (None, false);
+        for pass in 0..=MOST_PASSES {
+            let share = |done: f64| progress((pass as f64 + done) / (MOST_PASSES + 1) as f64);
+            is_final |= pass + 1 >= MOST_PASSES;
+            let tree = tree(self, anatomy, &levels, &wanted)?;
+            let filled = match fill(self, anatomy, &tree) {
+                Err(MeshingError::TooManyCells { .. }) if best.is_some() => break,
+                // The one before fits, and is finished.
+                Err(MeshingError::TooManyCells { .. }) if pass > 0 && !wanted.eq(&coarser) => {
+                    (wanted, is_final) = (coarser.clone(), true);
+                    continue;
+                }
+                filled => filled?,
+            };
+            let (points, nodes, material) = filled.complex.compacted();
+            let raw =
+                Measured::of(&labelled(points, nodes, &material, &anatomy.labels()), anatomy, distance)?;
+            coarser.clone_from(&wanted);
+            if !is_final && raw.largest() > RAW_BEYOND * distance && finer(&mut wanted, &tree, &raw, distance)
+            {
+                continue;
+            }
+            let mut made = self.finished(filled, anatomy, &share)?;
+            let measured = Measured::of(&made.mesh, anatomy, distance)?;
+            let reached = measured.largest();
+            made.report.distance =
+                Some(DistanceReport { asked: distance, reached, passes: pass + 1, to: measured.to });
+            let so_far = best.as_ref().and_then(|best| best.report.distance);
+            if so_far.is_none_or(|so_far| reached < so_far.reached) {
+                best = Some(made);
+            }
+            if reached <= distance || is_final || !finer(&mut wanted, &tree, &measured, distance) {
+                break;
+            }
+        }
+        progress(1.0);
+        best.ok_or(MeshingError::NoCells { edge: self.edge, size: Vector3::zeros() })
+    }
+
+    /// Tets of one size.
+    fn stuffed(&self, anatomy: &Anatomy<'_>) -> Result<Filled, MeshingError> {
         let stuffing = Stuffing { edge: self.edge, origin: self.origin, cell_limit: self.cell_limit };
         let stuffed = stuffing.parts(anatomy.field(), self.smallest_piece)?;
-        progress(0.1);
         let block = &stuffed.mesh.blocks[0];
         let tets = block.cells().map(|cell| [cell[0], cell[1], cell[2], cell[3]]).collect();
-        let mut complex = Complex::new(stuffed.mesh.points.clone(), tets);
-        // The ideal tet of a body-centred lattice: a / (2 √2).
-        let ideal = self.edge / 8_f64.sqrt();
+        Ok(Filled {
+            complex: Complex::new(stuffed.mesh.points.clone(), tets, self.edge),
+            dropped_pieces: stuffed.dropped_components,
+            dropped_cells: stuffed.dropped_cells,
+        })
+    }
+
+    /// Cuts materials out, parts what touches, and optimises.
+    fn finished(
+        &self,
+        filled: Filled,
+        anatomy: &Anatomy<'_>,
+        progress: &dyn Fn(f64),
+    ) -> Result<OrganMesh, MeshingError> {
+        let Filled { mut complex, dropped_pieces, dropped_cells } = filled;
         let raw = complex.worst();
-        let surfaces = Surfaces::new(anatomy);
-        let bridges = cut_gaps(&mut complex, anatomy.field(), self.edge, ideal);
-        cut_materials(&mut complex, &surfaces, ideal);
+        let surfaces = Surfaces::new(anatomy, self.edge);
+        let bridges = cut_gaps(&mut complex, anatomy.field());
+        cut_materials(&mut complex, &surfaces);
         let crowded = crowded_edges(&complex).len();
         let mended = mend(&mut complex);
-        progress(0.2);
+        progress(0.1);
         let optimised = if self.target > 0.0 {
-            let onward = |done: f64| progress(0.2 + 0.75 * done);
+            let onward = |done: f64| progress(0.1 + 0.85 * done);
             let volumes = wanted_volumes(anatomy);
-            Optimiser::new(&mut complex, surfaces, self.edge, ideal).run(
-                self.target,
-                self.rounds,
-                &volumes,
-                &onward,
-            )
+            Optimiser::new(&mut complex, surfaces).run(self.target, self.rounds, &volumes, &onward)
         } else {
             Default::default()
         };
         let repairs = Repairs {
-            dropped_pieces: stuffed.dropped_components,
-            dropped_cells: stuffed.dropped_cells,
+            dropped_pieces,
+            dropped_cells,
             bridges,
             crowded_edges: crowded,
             doubled_points: mended.doubled,
             halved_edges: mended.halved,
+            parted_points: mended.parted,
         };
         let steps = Steps {
             rounds: optimised.rounds,
@@ -99,12 +216,32 @@ impl OrganTets {
             moved: optimised.moved,
         };
         let left = crowded_edges(&complex).len();
+        let pinched = pinched_points(&complex);
+        let pinched_points = pinched.iter().map(|&point| complex.points[point as usize].into()).collect();
+        let (acoustic_part, edges) = (complex.worst(), EdgeLengths::of(&complex));
         let (points, nodes, material) = complex.compacted();
         let mesh = labelled(points, nodes, &material, &anatomy.labels());
-        let report = TetReport::new(&mesh, &material, anatomy, ideal, raw, repairs, steps, left);
+        let of_complex = OfComplex { raw, acoustic_part, edges, crowded_edges_left: left, pinched_points };
+        let report = TetReport::new(&mesh, &material, anatomy, of_complex, repairs, steps);
         progress(1.0);
         Ok(OrganMesh { mesh, report })
     }
+}
+
+/// The shortest edge that serves a distance [m].
+fn finest_for(distance: f64, edge: f64) -> f64 {
+    (distance / 2.0).clamp(SMALLEST_PART * edge, edge)
+}
+
+/// Halves the cubes where a mesh is too far off; whether any is left to be halved.
+fn finer(wanted: &mut Wanted, tree: &Octree, measured: &Measured, distance: f64) -> bool {
+    let before = wanted.len();
+    for place in measured.beyond(BEYOND * distance) {
+        if let Some(level) = tree.level_at(&place).checked_sub(1) {
+            wanted.extend(around(tree.cube_at(level, &place)).map(|cube| (level, cube)));
+        }
+    }
+    wanted.len() > before
 }
 
 /// Volume of the whole and of each inner material [m³], where known.
@@ -147,6 +284,8 @@ pub struct Repairs {
     pub doubled_points: usize,
     /// Edges halved to that end.
     pub halved_edges: usize,
+    /// Points where the boundary met itself, each given a second one.
+    pub parted_points: usize,
 }
 
 /// What the optimiser did.
@@ -164,6 +303,56 @@ pub struct Steps {
     pub flipped: usize,
     /// Moves of points.
     pub moved: usize,
+}
+
+/// Lengths of the edges of a mesh [m].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct EdgeLengths {
+    /// The shortest.
+    pub least: f64,
+    /// Half of the edges are as short as this.
+    pub median: f64,
+    /// The longest.
+    pub longest: f64,
+    /// The longest one as a part of the lattice constant where it lies.
+    pub longest_part: f64,
+}
+
+impl EdgeLengths {
+    fn of(complex: &Complex) -> Self {
+        let of_edge = |[p, q]: [u32; 2]| {
+            let [x, y] = [p, q].map(|point| complex.points[point as usize]);
+            let size = complex.size[p as usize].max(complex.size[q as usize]);
+            ((x - y).norm(), size)
+        };
+        let mut found: Vec<(f64, f64)> = complex.edges().into_iter().map(of_edge).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (Some(first), Some(last)) = (found.first(), found.last()) else { return Self::default() };
+        let longest_part = found.iter().map(|(length, size)| length / size).fold(0.0, f64::max);
+        Self { least: first.0, median: found[found.len() / 2].0, longest: last.0, longest_part }
+    }
+}
+
+/// What is known before points and tets are numbered anew.
+struct OfComplex {
+    raw: f64,
+    acoustic_part: f64,
+    edges: EdgeLengths,
+    crowded_edges_left: usize,
+    pinched_points: Vec<[f64; 3]>,
+}
+
+/// How far a mesh is from the surface of its body, where that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DistanceReport {
+    /// Largest distance asked for [m].
+    pub asked: f64,
+    /// Largest distance both ways [m].
+    pub reached: f64,
+    /// How often cells were made until then.
+    pub passes: usize,
+    /// What it is measured to.
+    pub to: MeasuredTo,
 }
 
 /// One material of a mesh.
@@ -190,7 +379,7 @@ pub struct TetReport {
     pub materials: Vec<MaterialReport>,
     /// Least acoustic length [m]: a step of this over the speed of pressure waves is stable.
     pub acoustic_length: f64,
-    /// The same as a part of that of the ideal tet of the lattice.
+    /// The least one as a part of that of the ideal tet of the lattice where it lies.
     pub acoustic_part: f64,
     /// That part before the optimiser.
     pub raw_acoustic_part: f64,
@@ -200,26 +389,54 @@ pub struct TetReport {
     pub dihedral: [f64; 2],
     /// Most tets round a point.
     pub most_tets_round_a_node: usize,
+    /// Lengths of the edges [m].
+    pub edges: EdgeLengths,
     /// Edges of the boundary that still have more than two boundary faces.
     pub crowded_edges_left: usize,
+    /// Points where the boundary still meets itself [m].
+    pub pinched_points: Vec<[f64; 3]>,
     /// What was repaired.
     pub repairs: Repairs,
     /// What the optimiser did.
     pub steps: Steps,
+    /// The distance, where one was asked for.
+    pub distance: Option<DistanceReport>,
 }
 
 impl TetReport {
-    #[expect(clippy::too_many_arguments, reason = "what the stages before found, each once")]
+    /// What is not as it was asked for.
+    pub fn doubts(&self) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if let Some(DistanceReport { asked, reached, to, .. }) = self.distance.filter(|d| d.reached > d.asked)
+        {
+            doubts.push(format!(
+                "the distance of {:.3} mm to {to} was not reached: {:.3} mm is the best so far",
+                asked * 1e3,
+                reached * 1e3
+            ));
+        }
+        if self.edges.longest_part > LONGEST + 1e-9 {
+            let part = self.edges.longest_part;
+            doubts.push(format!("an edge is {part:.2} times as long as was asked for there"));
+        }
+        if let Some([x, y, z]) = self.pinched_points.first() {
+            let number = self.pinched_points.len();
+            doubts.push(format!(
+                "the boundary of the mesh meets itself in {number} points, the first at ({x:.4}, {y:.4}, {z:.4}) m"
+            ));
+        }
+        doubts
+    }
+
     fn new(
         mesh: &Mesh,
         material: &[u8],
         anatomy: &Anatomy<'_>,
-        ideal: f64,
-        raw: f64,
+        of_complex: OfComplex,
         repairs: Repairs,
         steps: Steps,
-        crowded_edges_left: usize,
     ) -> Self {
+        let OfComplex { raw, acoustic_part, edges, crowded_edges_left, pinched_points } = of_complex;
         let quality = QualityReport::new(mesh);
         let block = &mesh.blocks[0];
         let mut materials: Vec<MaterialReport> = anatomy
@@ -243,14 +460,17 @@ impl TetReport {
             tets: block.len(),
             materials,
             acoustic_length: min,
-            acoustic_part: min / ideal,
-            raw_acoustic_part: raw / ideal,
+            acoustic_part,
+            raw_acoustic_part: raw,
             median_acoustic_length: median,
             dihedral: quality.dihedral.unwrap_or([0.0; 2]),
             most_tets_round_a_node: around.into_iter().max().unwrap_or(0),
+            edges,
             crowded_edges_left,
+            pinched_points,
             repairs,
             steps,
+            distance: None,
         }
     }
 }
@@ -281,8 +501,23 @@ impl fmt::Display for TetReport {
             "acoustic length  {:.4e} m at least, {:.3} of the ideal ({:.3} before optimisation)",
             self.acoustic_length, self.acoustic_part, self.raw_acoustic_part
         )?;
-        let Repairs { dropped_pieces, dropped_cells, bridges, crowded_edges, doubled_points, halved_edges } =
-            self.repairs;
+        let EdgeLengths { least, median, longest, longest_part } = self.edges;
+        writeln!(
+            f,
+            "edges            {:.2} to {:.2} mm, half of them up to {:.2} mm, none above {longest_part:.2} of what was asked for there",
+            least * 1e3,
+            longest * 1e3,
+            median * 1e3
+        )?;
+        let Repairs {
+            dropped_pieces,
+            dropped_cells,
+            bridges,
+            crowded_edges,
+            doubled_points,
+            halved_edges,
+            parted_points,
+        } = self.repairs;
         if dropped_pieces > 0 {
             writeln!(f, "left out         {dropped_cells} cells in {dropped_pieces} small pieces")?;
         }
@@ -296,8 +531,30 @@ impl fmt::Display for TetReport {
                  {halved_edges} edges halved)"
             )?;
         }
+        if parted_points > 0 {
+            writeln!(f, "parted           {parted_points} points where the boundary met itself")?;
+        }
         if self.crowded_edges_left > 0 {
             writeln!(f, "still touching   {} edges", self.crowded_edges_left)?;
+        }
+        if let Some([x, y, z]) = self.pinched_points.first() {
+            writeln!(
+                f,
+                "still touching   at {} points, the first at ({:.2}, {:.2}, {:.2}) mm",
+                self.pinched_points.len(),
+                x * 1e3,
+                y * 1e3,
+                z * 1e3
+            )?;
+        }
+        if let Some(DistanceReport { asked, reached, passes, to }) = self.distance {
+            writeln!(
+                f,
+                "distance         {:.3} mm at most to {to}; {:.3} mm asked for, {} in {passes} passes",
+                reached * 1e3,
+                asked * 1e3,
+                if reached <= asked { "held" } else { "not reached" }
+            )?;
         }
         let Steps { rounds, peeled, given, collapsed, flipped, moved } = self.steps;
         write!(

@@ -4,6 +4,7 @@ use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
 use rayon::prelude::*;
 
 use crate::FieldMesh;
+use crate::given::{OUTSIDE_LABEL, Patches, sorted};
 
 /// Faces of a tetrahedron, outward, as local nodes.
 const TET_FACES: [&[usize]; 4] = [&[1, 2, 3], &[0, 3, 2], &[0, 1, 3], &[0, 2, 1]];
@@ -50,6 +51,47 @@ pub(crate) fn large_components(
         dropped_cells: (cells.len() - nodes.len()) / n,
         mesh: compact(kind, nodes, position),
     }
+}
+
+/// The faces of the volume cells of a mesh between different labels (cell data `label`) and to the outside, quads as two triangles.
+pub(crate) fn faces_between_labels(mesh: &Mesh) -> Patches {
+    let mut all: Vec<([u32; 4], Vec<u32>, i32)> = Vec::new();
+    for block in mesh.volume_blocks() {
+        let labels = block.data.get("label").map_or(&[][..], |labels| &labels.values);
+        // Without labels all cells are of one that is not the outside.
+        let labels = labels.iter().map(|&label| label as i32).chain(std::iter::repeat(OUTSIDE_LABEL + 1));
+        for (cell, label) in block.cells().zip(labels) {
+            for face in local_faces(block.kind) {
+                let nodes: Vec<u32> = face.iter().map(|&at| cell[at]).collect();
+                let mut key = [u32::MAX; 4];
+                key[..nodes.len()].copy_from_slice(&nodes);
+                key.sort_unstable();
+                all.push((key, nodes, label));
+            }
+        }
+    }
+    all.sort_unstable();
+    let mut found = Patches { points: mesh.points.clone(), ..Patches::default() };
+    for same in all.chunk_by(|a, b| a.0 == b.0) {
+        let other = if same.len() == 1 { OUTSIDE_LABEL } else { same[same.len() - 1].2 };
+        let (nodes, own) = (&same[0].1, same[0].2);
+        if own != other {
+            for k in 2..nodes.len() {
+                found.triangles.push([nodes[0], nodes[k - 1], nodes[k]]);
+                found.sides.push(sorted([own, other]));
+            }
+        }
+    }
+    found
+}
+
+/// Whether each cell is in a component with at least the part `smallest` of the cells of the largest one, and how many components are
+/// smaller.
+pub(crate) fn in_large_components(kind: CellKind, cells: &[u32], smallest: f64) -> (Vec<bool>, usize) {
+    let components = Components::new(kind, cells, &sorted_faces(kind, cells));
+    let kept = components.large(smallest);
+    let smaller = components.count - kept.iter().filter(|&&kept| kept).count();
+    (components.root.iter().map(|&root| kept[root as usize]).collect(), smaller)
 }
 
 /// A mesh of the cells, its points numbered without gaps.

@@ -102,9 +102,13 @@ mod drawn {
 
     /// What draws, opened once; where there is none, that is told once.
     fn graphics() -> Option<&'static Graphics> {
+        use std::io::Write as _;
         static GRAPHICS: OnceLock<Option<Graphics>> = OnceLock::new();
         let open = || {
-            let told = |error: &PictureError| eprintln!("note: no pictures: {error}; {}", error.remedy());
+            let told = |error: &PictureError| {
+                // Nobody reads it where standard error can't be written.
+                let _ = writeln!(std::io::stderr(), "note: no pictures: {error}; {}", error.remedy());
+            };
             Graphics::open().inspect_err(told).ok()
         };
         GRAPHICS.get_or_init(open).as_ref()

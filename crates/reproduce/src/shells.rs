@@ -1,5 +1,7 @@
 //! Shells of the literature: a sheet becomes a model, its edges are held and loaded by name.
 
+use std::collections::BTreeMap;
+
 use pliant_corotational::element::{Bending, Elasticity, Formulation, Membrane};
 use pliant_corotational::{
     Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
@@ -17,6 +19,10 @@ pub const CLAMPED: [bool; 6] = [true; 6];
 /// bending.
 pub const THESIS: Formulation =
     Formulation { membrane: Membrane::Cst { drilling: 1e-3 }, bending: Bending::Comas2010 };
+
+/// The element with the flat ANDES membrane, of which the prototype's numbers are.
+pub const FLAT: Formulation =
+    Formulation { membrane: Membrane::Opt { adaptation: 10.0 }, bending: Bending::Dkt };
 
 /// A shell of one thickness with its mesh.
 #[derive(Clone, Debug)]
@@ -45,6 +51,13 @@ pub fn triangles(mesh: &Mesh) -> Vec<[u32; 3]> {
     mesh.blocks[0].nodes.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
 }
 
+/// The normals that a mesh gives to its nodes.
+fn normals(mesh: &Mesh) -> BTreeMap<u32, Vector3> {
+    let Some(data) = mesh.point_data.get("normal") else { return BTreeMap::new() };
+    let of = |node: u32| (node, Vector3::from_row_slice(data.item(node as usize)));
+    (0..mesh.points.len() as u32).map(of).collect()
+}
+
 /// A sheet with cells along its two axes.
 ///
 /// # Errors
@@ -54,7 +67,7 @@ pub fn sheet(sheet: Sheet, counts: [usize; 2], pattern: Pattern) -> Result<Mesh,
 }
 
 impl Specimen {
-    /// A shell of a mesh; density 1000 kg/m³.
+    /// A shell of a mesh, curved by its normals (point data `normal`) if it has some; density 1000 kg/m³.
     ///
     /// # Errors
     /// If the mesh is no sound shell.
@@ -68,6 +81,7 @@ impl Specimen {
         let mut model = Model::new(mesh.points.clone());
         model.add_shell(&Shell {
             formulation,
+            normals: normals(&mesh),
             ..Shell::new("shell", triangles(&mesh), thickness, material)
         })?;
         Ok(Self { mesh, model })

@@ -1,6 +1,6 @@
 //! Meshes of images, kept between runs. A mesh lies in a file that is named after what it is made of: the content of the image, all
 //! parameters and the mesher itself, so that it is never stale. A file appears under its name only once it is whole, and one that
-//! is damaged counts as missing; so any number of processes can share a folder. The files that were used last stay.
+//! is damaged, or holds a mesh that no mesher makes, counts as missing; so any number of processes can share a folder. The files that were used last stay.
 //!
 //! The file: [`MAGIC`], the CRC-32 of the body (u32, little-endian), the body in postcard's encoding.
 
@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use pliant_geometry::{CellBlock, DataArray, Mesh, Vector3};
+use pliant_geometry::{CellBlock, DataArray, Mesh, Vector3, relative_acoustic_length};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -47,6 +47,30 @@ struct Body {
     point_data: BTreeMap<String, DataArray>,
     notes: Vec<String>,
     doubts: Vec<String>,
+}
+
+/// The least [`relative_acoustic_length`] of a volume cell. Those that are made have three quarters as a rule.
+const FLATTEST: f64 = 0.05;
+
+/// Whether a mesh is whole, and none of its volume cells is inverted or nearly flat: a checksum says only that it is what
+/// somebody wrote.
+fn is_sound(mesh: &Mesh) -> bool {
+    let fits = |data: &BTreeMap<String, DataArray>, items: usize| {
+        data.values().all(|data| data.values.len().checked_div(data.components) == Some(items))
+    };
+    let sound = |block: &CellBlock| {
+        let whole = block.nodes.len().is_multiple_of(block.kind.node_count())
+            && block.nodes.iter().all(|&node| (node as usize) < mesh.points.len())
+            && fits(&block.data, block.len());
+        let full = |nodes: &[u32]| {
+            let points: Vec<Vector3> = nodes.iter().map(|&node| mesh.points[node as usize]).collect();
+            relative_acoustic_length(block.kind, &points) > FLATTEST
+        };
+        whole && (block.kind.dimension() < 3 || block.nodes.chunks_exact(block.kind.node_count()).all(full))
+    };
+    mesh.points.iter().all(|point| point.iter().all(|x| x.is_finite()))
+        && fits(&mesh.point_data, mesh.points.len())
+        && mesh.blocks.iter().all(sound)
 }
 
 /// What a mesh is made of, as a number.
@@ -116,7 +140,8 @@ impl MeshCache {
         let _ =
             File::options().append(true).open(&path).and_then(|file| file.set_modified(SystemTime::now()));
         let points = points.into_iter().map(Vector3::from).collect();
-        Some(Kept { mesh: Mesh { points, blocks, point_data, ..Mesh::default() }, notes, doubts })
+        let mesh = Mesh { points, blocks, point_data, ..Mesh::default() };
+        is_sound(&mesh).then_some(Kept { mesh, notes, doubts })
     }
 
     /// Keeps a mesh under its key, and drops what was used longest ago where there is more than the limit.
@@ -176,6 +201,7 @@ mod tests {
         let mut block = CellBlock::new(CellKind::Tet, vec![0, 1, 2, 3]);
         block.data.insert("label".into(), DataArray::scalar(vec![0.1 + 0.2]));
         let mut mesh = Mesh { points: vec![Vector3::new(0.1, -0.0, 1e-300); size], ..Mesh::default() };
+        (0..3).for_each(|axis| mesh.points[axis + 1][axis] += 0.1);
         mesh.blocks.push(block);
         mesh.point_data.insert("normal".into(), DataArray { components: 3, values: vec![1.0; 3 * size] });
         Kept { mesh, notes: vec!["a note".into()], doubts: vec!["a doubt".into()] }
@@ -214,6 +240,27 @@ mod tests {
         assert_eq!(cache.get(&key("a")), None);
         cache.put(&key("a"), &kept(4)).unwrap();
         assert_eq!(fs::read(&path).unwrap(), whole);
+    }
+
+    #[test]
+    fn a_kept_mesh_is_judged_whatever_its_checksum_says() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = MeshCache::in_folder(folder.path().into());
+        let spoilt: [fn(&mut Mesh); 7] = [
+            |mesh| mesh.points[3].z = 1e-9,
+            |mesh| mesh.points.swap(0, 1),
+            |mesh| mesh.points[1].x = f64::NAN,
+            |mesh| mesh.blocks[0].nodes[2] = 99,
+            |mesh| mesh.blocks[0].nodes.push(0),
+            |mesh| mesh.blocks[0].data.values_mut().for_each(|data| data.values.push(1.0)),
+            |mesh| mesh.point_data.values_mut().for_each(|data| data.components = 0),
+        ];
+        for (number, spoil) in spoilt.into_iter().enumerate() {
+            let mut bad = kept(4);
+            spoil(&mut bad.mesh);
+            cache.put(&key("a"), &bad).unwrap();
+            assert_eq!(cache.get(&key("a")), None, "{number}");
+        }
     }
 
     #[test]

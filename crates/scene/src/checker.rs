@@ -13,6 +13,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value as Json};
 
 use crate::diagnostic::{Diagnostic, Place};
+use crate::plausible::remark;
 use crate::source::{Node, Source, Value};
 
 /// Schemas refer to one another; deeper than this they refer to themselves.
@@ -591,7 +592,8 @@ impl<'s> Checker<'s, '_> {
             let mut found = Vec::new();
             let mut checker = Checker { forms: self.forms, skip: self.skip, out: &mut found };
             let json = checker.form(node, form, trail, doc);
-            if found.is_empty() {
+            if !found.iter().any(Diagnostic::is_error) {
+                self.out.extend(found);
                 return json;
             }
             if best.as_ref().is_none_or(|(least, _)| found.len() < least.len()) {
@@ -640,6 +642,28 @@ impl<'s> Checker<'s, '_> {
         self.report(diagnostic.help(hint).help(trail.explained(doc)))
     }
 
+    /// Whether a value in its range has a size that makes sense; tells of one that has not, or is unlikely.
+    fn is_possible(
+        &mut self,
+        node: &Node,
+        x: f64,
+        positive: bool,
+        trail: &Trail<'_>,
+        doc: Option<&'s str>,
+    ) -> bool {
+        // Positions are as large as they like.
+        let unit = unit(doc);
+        if unit == "m" && !positive {
+            return true;
+        }
+        let Some(remark) = remark(x, unit, positive, &number(x)) else { return true };
+        let message = format!("`{trail}` {}", remark.message);
+        let diagnostic =
+            if remark.is_mistake { Diagnostic::error(message) } else { Diagnostic::warning(message) };
+        self.report(diagnostic.at(node.place.clone(), remark.label).help(remark.help));
+        !remark.is_mistake
+    }
+
     fn in_range(
         &mut self,
         node: &Node,
@@ -651,7 +675,8 @@ impl<'s> Checker<'s, '_> {
         let low = form.lower.filter(|bound| x < bound.value || (bound.exclusive && x == bound.value));
         let high = form.upper.filter(|bound| x > bound.value || (bound.exclusive && x == bound.value));
         let (Some(broken), range) = (low.map(|b| b.lower()).or(high.map(|b| b.upper())), form.range()) else {
-            return true;
+            let positive = form.lower.is_some_and(|bound| bound.exclusive && bound.value == 0.0);
+            return self.is_possible(node, x, positive, trail, doc);
         };
         // The limits of 32-bit types are told only to those who break them.
         let range = if range.contains(&broken) { range } else { broken };

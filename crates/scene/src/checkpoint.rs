@@ -4,7 +4,7 @@
 //! CRC-32 of all before it (u32); little-endian. The body: [`Origin`] (what the run was), [`Progressed`] (how far it
 //! and its outputs were), then [`Moment`] in the run's number type. A file appears under its name only once it is whole.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -13,9 +13,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::build::{Built, Corotational};
 use crate::diagnostic::counted;
-use crate::format::{Precision, SolverName};
-use crate::output::{OutputError, OutputFolder, Schedule, Written, number};
+use crate::format::{LoadSteps, Precision, SolverName};
+use crate::output::{OutputError, OutputFolder, Schedule, ShellStrains, Written, number, replace};
 use crate::plan::Plan;
+use crate::reads::read_regular;
 use crate::run::History;
 use crate::scene::Scene;
 use crate::solver::Memory;
@@ -23,7 +24,7 @@ use crate::solver::Memory;
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -53,6 +54,8 @@ pub(crate) struct Progressed {
     pub worst_balance: f64,
     /// The largest hourglass energy over the internal one, and its time [s].
     pub worst_hourglass: (f64, f64),
+    /// How far shells were strained.
+    pub strains: ShellStrains,
     /// Samples for plot and summary.
     pub history: History,
     pub sampling: Schedule,
@@ -151,7 +154,7 @@ pub enum ResumeError {
     },
     /// There is nothing left to do.
     #[error(
-        "the checkpoint is at t = {} s, and the scene ends at {} s: nothing is left to run",
+        "the run has finished: the checkpoint is at t = {} s, and the scene ends at {} s; nothing is left to run",
         number(*time),
         number(*until)
     )]
@@ -161,6 +164,17 @@ pub enum ResumeError {
         /// End of the scene [s].
         until: f64,
     },
+    /// The scene ends before the checkpoint.
+    #[error("the checkpoint is at t = {} s, after the end of the scene at {} s", number(*time), number(*until))]
+    BeyondTheEnd {
+        /// Time of the checkpoint [s].
+        time: f64,
+        /// End of the scene [s].
+        until: f64,
+    },
+    /// The folder can't be written to, or another run holds it.
+    #[error("{0}")]
+    Folder(#[from] OutputError),
     /// The folder does not hold the outputs that the checkpoint continues.
     #[error("`{}` does not hold what the checkpoint continues: {reason}", path.display())]
     OtherOutputs {
@@ -208,10 +222,12 @@ impl ResumeError {
                 )
             }
             Self::AtTheEnd { .. } => {
-                "to go on, let the scene last longer with `--until`; where its last instant is \
-                                      missing, resume from the checkpoint before this one"
-                    .into()
+                "nothing was changed; to go on, let the scene last longer with `--until`".into()
             }
+            Self::BeyondTheEnd { .. } => {
+                "let the scene last longer with `--until`, or resume from an earlier checkpoint".into()
+            }
+            Self::Folder(error) => error.remedy.into(),
             Self::OtherOutputs { .. } => {
                 "name the folder of the interrupted run with `--out DIR`, or run the scene from the start"
                     .into()
@@ -242,6 +258,9 @@ impl Origin {
         parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));
         parts.push(("`run.on-unstable`".into(), fingerprint(&scene.run.on_unstable.unwrap_or_default())));
         parts.push(("`run.mass-scaling`".into(), fingerprint(&scene.run.mass_scaling)));
+        if let LoadSteps::Times(times) = &scene.run.load_steps {
+            parts.push(("`run.load-steps`".into(), fingerprint(times)));
+        }
         parts.push(("`run.iterations`".into(), fingerprint(&scene.run.iterations)));
         parts.push(("`run.linear`".into(), fingerprint(&scene.run.linear)));
         Self {
@@ -276,7 +295,7 @@ impl Origin {
             return Err(ResumeError::OtherScene { parts, until });
         }
         let step = plan.steps_of(scene, built, self.until).1;
-        if step != self.step {
+        if step != self.step && plan.ends.is_none() {
             return Err(ResumeError::OtherStep { checkpoint: self.step, scene: step });
         }
         Ok(())
@@ -308,7 +327,7 @@ impl Checkpoint {
             let all = checkpoints_in(path).map_err(|error| unreadable(path, error))?;
             file = all.into_iter().last().ok_or_else(|| ResumeError::NoneIn { path: path.to_owned() })?.1;
         }
-        let bytes = fs::read(&file).map_err(|error| unreadable(&file, error))?;
+        let bytes = read_regular(&file, u64::MAX).map_err(|error| unreadable(&file, error))?;
         Self::from_bytes(&file, &bytes)
     }
 
@@ -370,16 +389,22 @@ impl Checkpoint {
         self.progressed.time
     }
 
+    /// Whether a run that ends at a time [s] has no step left: only its last instant may still have to be written.
+    pub(crate) fn is_at_the_end(&self, until: f64) -> bool {
+        self.time() + 0.5 * self.origin.step >= until
+    }
+
     /// How the scene goes on from here: its plan with the step of the checkpoint. Only `until` may differ from the
     /// scene of the interrupted run.
     ///
     /// # Errors
-    /// If this is not the scene of the checkpoint, or nothing of it is left.
+    /// If this is not the scene of the checkpoint, or it ends before.
     pub fn continues(&self, scene: &Scene, built: &Built, plan: &Plan) -> Result<Plan, ResumeError> {
         self.origin.check(scene, built, plan)?;
         let (time, until, step) = (self.time(), scene.scene.until, self.origin.step);
-        if time + 0.5 * step >= until {
-            return Err(ResumeError::AtTheEnd { time, until });
+        // The last instant is the one nearest to the end; round-off is no reason to refuse it.
+        if time > until + 0.51 * step {
+            return Err(ResumeError::BeyondTheEnd { time, until });
         }
         let whole = match self.origin.precision {
             Precision::Single => self.moment::<f32>(built).is_some(),
@@ -387,6 +412,9 @@ impl Checkpoint {
         };
         if !whole || self.progressed.outputs.len() != scene.outputs.len() {
             return Err(ResumeError::Damaged { path: self.path.clone() });
+        }
+        if plan.ends.is_some() {
+            return Ok(plan.clone());
         }
         Ok(Plan { step, steps: (until / step - 1e-9).ceil().max(1.0) as u64, ..plan.clone() })
     }
@@ -426,7 +454,7 @@ impl<'a> Checkpoints<'a> {
         time: f64,
     ) -> Option<Self> {
         let every = scene.run.checkpoint?.every;
-        let schedule = Schedule::after(every, time, plan.step);
+        let schedule = Schedule::after(every, time, plan.step_from(time));
         Some(Self { folder, origin: Origin::of(scene, built, plan), schedule })
     }
 
@@ -450,16 +478,8 @@ impl<'a> Checkpoints<'a> {
         let path = self.folder.path().join(name(progressed.steps));
         let failed = |reason: &dyn std::fmt::Display| OutputError::new(&path, reason);
         let bytes = encode(&self.origin, progressed, state, memory).map_err(|e| failed(&e))?;
-        let temporary = path.with_extension("pliant.tmp");
-        let written = File::create(&temporary).and_then(|mut file| {
-            file.write_all(&bytes)?;
-            file.sync_all()
-        });
-        if let Err(error) = written.and_then(|()| fs::rename(&temporary, &path)) {
-            // What is half written is not left behind.
-            let _ = fs::remove_file(&temporary);
-            return Err(failed(&error));
-        }
+        replace(&path, |file| file.write_all(&bytes).and_then(|()| file.sync_all()))
+            .map_err(|error| failed(&error))?;
         let mut earlier = checkpoints_in(self.folder.path()).map_err(|error| failed(&error))?;
         earlier.retain(|(steps, _)| *steps <= progressed.steps);
         for (_, old) in &earlier[..earlier.len().saturating_sub(KEPT)] {
@@ -507,6 +527,8 @@ fn checkpoints_in(folder: &Path) -> std::io::Result<Vec<(u64, PathBuf)>> {
 
 #[cfg(test)]
 mod tests {
+    use pliant_mechanics::Equilibrium;
+
     use super::*;
     use crate::plan::plan;
     use crate::testing::{built, scene};
@@ -523,6 +545,7 @@ mod tests {
             wall_seconds: 1.0,
             worst_balance: 0.0,
             worst_hourglass: (0.0, 0.0),
+            strains: ShellStrains::default(),
             history: History::default(),
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
@@ -578,9 +601,11 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_5_is_as_it_was() {
+    fn the_layout_of_format_6_is_as_it_was() {
         let state = State::<f32>::at_rest(&built("").model);
         let bytes = postcard::to_stdvec(&state).unwrap();
-        assert_eq!((FORMAT, bytes.len()), (5, 1083));
+        let memory = Memory::Equilibrium(Equilibrium::<f32>::default());
+        let memory = postcard::to_stdvec(&memory).unwrap();
+        assert_eq!((FORMAT, bytes.len(), memory.len()), (6, 1083, 61));
     }
 }

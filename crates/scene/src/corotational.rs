@@ -1,23 +1,32 @@
 //! Runs of shells and co-rotational solids behind the face of all solvers.
 
+use std::collections::VecDeque;
+use std::fmt::Write;
+
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 use pliant_corotational as corotational;
 use pliant_corotational::{
-    BackwardEuler, DynamicSettings, Explicit, Forces, LinearSolver, Phases, Preconditioner, SolveError,
-    StaticSettings, Statics,
+    BackwardEuler, DynamicSettings, Explicit, Forces, Integrator, LinearSolver, Phases, Preconditioner,
+    SolveError, StaticSettings, Statics,
 };
 use pliant_gpu::Wanted;
 use pliant_mechanics::{Energies, Observable, State};
 use serde::{Deserialize, Serialize};
 
-use crate::build::{Built, Control, Corotational};
-use crate::format::{LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName};
+use crate::build::{Built, Control, Corotational, Stop};
+use crate::diagnostic::counted;
+use crate::format::{
+    IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName,
+};
 use crate::output::{FailureSummary, number};
 use crate::plan::Plan;
 use crate::solver::{Effort, LoadStepProgress, Memory, Solver};
 
 /// Iterations from which on a lagged factorisation is made anew.
 const RENEW_AFTER: usize = 10;
+
+/// Iterations of Newton's method whose residuals are kept: the last ones.
+const ITERATIONS_KEPT: usize = 10_000;
 
 /// A run of shells and co-rotational solids.
 pub(crate) struct Corotated<'m> {
@@ -29,7 +38,6 @@ pub(crate) struct Corotated<'m> {
     /// Steps of the whole run.
     steps: u64,
     state: corotational::State,
-    forces: Forces<'m>,
     /// Which components of each node are held or moved, six a node.
     prescribed: Vec<bool>,
     /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its positions and rotations.
@@ -42,6 +50,38 @@ pub(crate) struct Corotated<'m> {
     effort: Effort,
     /// What was taken before the run was resumed.
     effort_before: Effort,
+    /// Residuals of the last iterations.
+    convergence: VecDeque<Iterated>,
+    /// The path of a run by arc length so far.
+    path: Path,
+}
+
+/// An iteration of Newton's method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Iterated {
+    /// Step, counted from 1, and the attempt at it.
+    step: u64,
+    attempt: usize,
+    /// The time that it was to reach [s].
+    time: f64,
+    iteration: usize,
+    /// Residual, and what was allowed at the end of the attempt: [N] of static steps, over the largest force of implicit ones.
+    residual: f64,
+    allowed: f64,
+    /// Whether the attempt found its equilibrium.
+    found: bool,
+}
+
+/// How far a run by arc length is.
+#[derive(Default)]
+struct Path {
+    /// Load factor at the step before.
+    factor: f64,
+    /// Its last change.
+    change: f64,
+    limit_points: u32,
+    /// Why it ended before its last step.
+    ended: Option<String>,
 }
 
 /// What a resumed run needs.
@@ -49,15 +89,18 @@ pub(crate) struct Corotated<'m> {
 pub(crate) struct Remembered {
     state: Snapshot,
     before: Option<(Vec<f64>, Snapshot)>,
+    /// The state that an implicit step takes differences with.
+    previous: Option<Snapshot>,
     energies: Energies,
     effort: Effort,
+    convergence: VecDeque<Iterated>,
 }
 
 impl Remembered {
     /// Whether it is of a model with so many nodes.
     pub(crate) fn fits(&self, nodes: usize) -> bool {
         let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
-        before && self.state.fits(nodes)
+        before && self.previous.iter().all(|state| state.fits(nodes)) && self.state.fits(nodes)
     }
 }
 
@@ -104,10 +147,29 @@ impl Snapshot {
     }
 }
 
+/// A solver, and the forces at an instant: an explicit one finds them anyway.
 enum Method<'m> {
-    Static(Box<Statics<'m>>),
-    Implicit(Box<BackwardEuler<'m>>),
+    Static(Box<Statics<'m>>, Forces<'m>),
+    Implicit(Box<BackwardEuler<'m>>, Forces<'m>),
     Explicit(Box<Explicit<'m>>),
+}
+
+impl<'m> Method<'m> {
+    /// The forces last found.
+    fn forces(&self) -> &Forces<'m> {
+        match self {
+            Self::Static(_, forces) | Self::Implicit(_, forces) => forces,
+            Self::Explicit(solver) => solver.forces(),
+        }
+    }
+
+    /// Finds the forces at a state.
+    fn evaluate(&mut self, state: &corotational::State) -> Result<(), SolveError> {
+        match self {
+            Self::Static(_, forces) | Self::Implicit(_, forces) => forces.evaluate(state),
+            Self::Explicit(solver) => solver.evaluate(state),
+        }
+    }
 }
 
 impl<'m> Corotated<'m> {
@@ -129,7 +191,8 @@ impl<'m> Corotated<'m> {
                 let mut settings = StaticSettings { linear, ..StaticSettings::default() };
                 settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
                 settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
-                Statics::new(model, settings).map(|solver| Method::Static(Box::new(solver)))
+                Statics::new(model, settings)
+                    .map(|solver| Method::Static(Box::new(solver), Forces::new(model)))
             }
             SolverName::Implicit => {
                 let mut settings = DynamicSettings { linear, ..DynamicSettings::new(plan.step) };
@@ -139,7 +202,12 @@ impl<'m> Corotated<'m> {
                 if settings.iterations == 1 {
                     settings = settings.real_time(linear);
                 }
-                BackwardEuler::new(model, settings).map(|solver| Method::Implicit(Box::new(solver)))
+                settings.integrator = match run.integrator.unwrap_or_default() {
+                    IntegratorName::BackwardEuler => Integrator::BackwardEuler,
+                    IntegratorName::Bdf2 => Integrator::Bdf2,
+                };
+                BackwardEuler::new(model, settings)
+                    .map(|solver| Method::Implicit(Box::new(solver), Forces::new(model)))
             }
             _ => Explicit::new(model, plan.step).map(|solver| Method::Explicit(Box::new(solver))),
         };
@@ -156,7 +224,6 @@ impl<'m> Corotated<'m> {
             step: plan.step,
             steps: plan.steps,
             state: part.start.clone(),
-            forces: Forces::new(model),
             outside: vec![0.0; prescribed.len()],
             prescribed,
             before: None,
@@ -165,6 +232,8 @@ impl<'m> Corotated<'m> {
             evaluated: false,
             effort: Effort::default(),
             effort_before: Effort::default(),
+            convergence: VecDeque::new(),
+            path: Path::default(),
             built,
             part,
         })
@@ -172,7 +241,8 @@ impl<'m> Corotated<'m> {
 
     /// Finds the forces from outside: loads on free components, what holds or moves the others.
     fn find_outside(&mut self) {
-        let all = self.forces.loads().iter().zip(self.forces.internal()).zip(&self.prescribed);
+        let forces = self.method.forces();
+        let all = forces.loads().iter().zip(forces.internal()).zip(&self.prescribed);
         for (own, ((load, internal), held)) in self.outside.iter_mut().zip(all) {
             *own = if *held { *internal } else { *load };
         }
@@ -202,7 +272,7 @@ impl<'m> Corotated<'m> {
     fn find_energies(&mut self) {
         self.find_outside();
         let kinetic = self.kinetic();
-        let internal = self.forces.strain_energy();
+        let internal = self.method.forces().strain_energy();
         let external = match &self.before {
             Some(_) => self.energies.external + self.work(),
             // What is given at the start.
@@ -210,7 +280,7 @@ impl<'m> Corotated<'m> {
         };
         // Backward Euler takes energy like a damper; a static path has no inertia to compare with.
         let damping = match self.method {
-            Method::Implicit(_) => external - kinetic - internal,
+            Method::Implicit(..) => external - kinetic - internal,
             _ => 0.0,
         };
         self.energies = Energies { kinetic, internal, damping, external, ..Energies::default() };
@@ -224,7 +294,8 @@ impl<'m> Corotated<'m> {
     }
 
     fn find_reactions(&mut self) {
-        let [internal, loads] = [self.forces.internal(), self.forces.loads()];
+        let forces = self.method.forces();
+        let [internal, loads] = [forces.internal(), forces.loads()];
         for (reaction, constraint) in self.reactions.iter_mut().zip(&self.built.model.constraints) {
             *reaction = [0.0; 3];
             for &node in &constraint.nodes {
@@ -234,6 +305,14 @@ impl<'m> Corotated<'m> {
                 }
             }
         }
+    }
+
+    /// What holds the three components from one on.
+    fn held(&self, first: usize) -> [f64; 3] {
+        let forces = self.method.forces();
+        let [internal, loads] = [forces.internal(), forces.loads()];
+        [first, first + 1, first + 2]
+            .map(|at| if self.prescribed[at] { internal[at] - loads[at] } else { 0.0 })
     }
 
     /// Puts the displacements where all observers look for them.
@@ -246,37 +325,125 @@ impl<'m> Corotated<'m> {
 
     /// One step of the method, to the time of its number.
     fn go(&mut self, number: u64) -> Result<(), SolveError> {
+        match self.method {
+            Method::Explicit(_) => self.go_explicitly(),
+            Method::Implicit(..) => self.go_implicitly(number),
+            Method::Static(..) => self.go_statically(number),
+        }
+    }
+
+    fn go_explicitly(&mut self) -> Result<(), SolveError> {
+        let Method::Explicit(solver) = &mut self.method else { return Ok(()) };
+        if self.evaluated {
+            solver.go(&mut self.state);
+            return Ok(());
+        }
+        solver.advance(&mut self.state)
+    }
+
+    fn go_implicitly(&mut self, number: u64) -> Result<(), SolveError> {
+        let Method::Implicit(solver, _) = &mut self.method else { return Ok(()) };
+        let allowed = solver.settings().tolerance;
+        let result = solver.advance(&mut self.state);
+        let (residuals, found) = match &result {
+            Ok(step) => (&step.residuals[..], true),
+            Err(SolveError::NotConverged { residuals, .. }) => (&residuals[..], false),
+            Err(_) => (&[][..], false),
+        };
+        // A single one is not checked.
+        if residuals.len() > 1 {
+            let time = number as f64 * self.step;
+            let iterated = |(iteration, &residual)| Iterated {
+                step: number,
+                attempt: 1,
+                time,
+                iteration,
+                residual,
+                allowed,
+                found,
+            };
+            keep(&mut self.convergence, residuals.iter().enumerate().map(iterated));
+        }
+        let phases = solver.phases();
+        let step = result?;
+        let iterations = step.residuals.len().saturating_sub(1).max(1);
+        self.effort.newton_iterations += iterations as u64;
+        self.effort.halved += u64::from(step.parts > 1);
+        self.effort.linear_residual = step.linear.residual;
+        self.effort.residual = if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
+        self.effort.take(phases, &self.effort_before);
+        Ok(())
+    }
+
+    fn go_statically(&mut self, number: u64) -> Result<(), SolveError> {
         let until = number as f64 * self.step;
-        match &mut self.method {
-            Method::Explicit(solver) => solver.advance(&mut self.state)?,
-            Method::Implicit(solver) => {
-                let step = solver.advance(&mut self.state)?;
-                let iterations = step.residuals.len().saturating_sub(1).max(1);
-                self.effort.newton_iterations += iterations as u64;
-                self.effort.halved += u64::from(step.parts > 1);
-                self.effort.linear_residual = step.linear.residual;
-                self.effort.residual =
-                    if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
-                self.effort.take(solver.phases(), &self.effort_before);
-            }
-            Method::Static(solver) => {
-                let step = match self.part.control.map(|control| part_of(control, number, self.steps)) {
-                    Some(control) => {
-                        let step = solver.control(&mut self.state, control)?;
-                        self.state.time = until;
-                        step
-                    }
-                    None => solver.solve(&mut self.state, until)?,
-                };
-                self.effort.newton_iterations += step.residuals.len().saturating_sub(1) as u64;
-                self.effort.halved += u64::from(step.parts > 1);
-                self.effort.take(solver.phases(), &self.effort_before);
-                if step.negative_pivots > 0 {
-                    self.effort.unstable_from.get_or_insert(until);
-                }
-            }
+        let control = self.part.control.map(|control| part_of(control, number, self.steps));
+        let Method::Static(solver, _) = &mut self.method else { return Ok(()) };
+        let result = match control {
+            Some(control) => solver.control(&mut self.state, control),
+            None => solver.solve(&mut self.state, until),
+        };
+        for (attempt, tried) in solver.attempts().iter().enumerate() {
+            // A control finds its equilibria at one time.
+            let time = if control.is_some() { until } else { tried.time };
+            let iterated = |(iteration, &residual)| Iterated {
+                step: number,
+                attempt: attempt + 1,
+                time,
+                iteration,
+                residual,
+                allowed: tried.allowed,
+                found: tried.found,
+            };
+            keep(&mut self.convergence, tried.residuals.iter().enumerate().map(iterated));
+        }
+        let phases = solver.phases();
+        let step = result?;
+        self.effort.newton_iterations += step.residuals.len().saturating_sub(1) as u64;
+        self.effort.halved += u64::from(step.parts > 1);
+        self.effort.take(phases, &self.effort_before);
+        if step.negative_pivots > 0 {
+            self.effort.unstable_from.get_or_insert(until);
+        }
+        if control.is_some() {
+            self.state.time = until;
+        }
+        if let Some(Control::ArcLength { stop, .. }) = self.part.control {
+            self.path.go_on(self.state.load_factor);
+            self.path.ended = self.path.end(&stop, &self.state, &self.part.model);
         }
         Ok(())
+    }
+}
+
+/// Keeps iterations, and of all the last ones.
+fn keep(all: &mut VecDeque<Iterated>, more: impl Iterator<Item = Iterated>) {
+    all.extend(more);
+    all.drain(..all.len().saturating_sub(ITERATIONS_KEPT));
+}
+
+impl Path {
+    /// Takes the load factor of the next equilibrium.
+    fn go_on(&mut self, factor: f64) {
+        let change = factor - self.factor;
+        self.limit_points += u32::from(change * self.change < 0.0);
+        (self.factor, self.change) = (factor, change);
+    }
+
+    /// Why it ends here, if it does.
+    fn end(&self, stop: &Stop, state: &corotational::State, model: &corotational::Model) -> Option<String> {
+        let limit = number(stop.load_factor.unwrap_or(f64::INFINITY));
+        if stop.load_factor.is_some_and(|limit| self.factor.abs() >= limit) {
+            return Some(format!("the load factor is {}, at least {limit} in size", number(self.factor)));
+        }
+        if let Some((node, component, by)) = stop.displacement {
+            let moved = state.displacement(model, node as usize)[component];
+            if moved * by.signum() >= by.abs() {
+                return Some(format!("the node of `displacement` has moved by {} m", number(moved)));
+            }
+        }
+        let passed = stop.limit_points.is_some_and(|limit| self.limit_points >= limit);
+        passed.then(|| format!("{} passed", counted(self.limit_points as usize, "limit point")))
     }
 }
 
@@ -297,7 +464,7 @@ fn part_of(control: Control, number: u64, of: u64) -> corotational::Control {
         Control::Displacement { node, component, by } => {
             corotational::Control::Displacement { node, component, by: by / of as f64 }
         }
-        Control::ArcLength(length) => corotational::Control::ArcLength { length },
+        Control::ArcLength { length, .. } => corotational::Control::ArcLength { length },
         Control::Volume { from, to } => {
             corotational::Control::Volume { volume: from + (to - from) * number as f64 / of as f64 }
         }
@@ -328,7 +495,7 @@ impl Solver<f64> for Corotated<'_> {
             return Ok(());
         }
         self.show(state);
-        let found = self.forces.evaluate(&self.state);
+        let found = self.method.evaluate(&self.state);
         found.map_err(|error| failure(&error, self.built, self.part, self.state.time))?;
         self.find_energies();
         self.find_reactions();
@@ -343,8 +510,7 @@ impl Solver<f64> for Corotated<'_> {
         _watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
         let number = state.steps + 1;
-        let time = self.state.time;
-        self.go(number).map_err(|error| failure(&error, self.built, self.part, time))?;
+        self.go(number).map_err(|error| failure(&error, self.built, self.part, self.state.time))?;
         state.steps = number;
         state.time = self.state.time;
         self.evaluated = false;
@@ -362,14 +528,24 @@ impl Solver<f64> for Corotated<'_> {
 
     fn memory(&self) -> Memory<f64> {
         let before = self.before.as_ref().map(|(forces, state)| (forces.clone(), Snapshot::of(state)));
+        let previous = match &self.method {
+            Method::Implicit(solver, _) => solver.previous().map(Snapshot::of),
+            _ => None,
+        };
         let (energies, effort) = (self.energies, self.effort.clone());
-        Memory::Corotated(Box::new(Remembered { state: Snapshot::of(&self.state), before, energies, effort }))
+        let state = Snapshot::of(&self.state);
+        let convergence = self.convergence.clone();
+        Memory::Corotated(Box::new(Remembered { state, before, previous, energies, effort, convergence }))
     }
 
     fn resume(&mut self, memory: Memory<f64>) {
         let Memory::Corotated(remembered) = memory else { return };
-        let Remembered { state, before, energies, effort } = *remembered;
+        let Remembered { state, before, previous, energies, effort, convergence } = *remembered;
+        self.convergence = convergence;
         self.state = state.state();
+        if let Method::Implicit(solver, _) = &mut self.method {
+            solver.go_on_from(previous.map(|previous| previous.state()));
+        }
         self.before = before.map(|(forces, state)| (forces, state.state()));
         self.energies = energies;
         (self.effort, self.effort_before) = (effort.clone(), effort);
@@ -378,6 +554,30 @@ impl Solver<f64> for Corotated<'_> {
 
     fn corotational(&self) -> Option<&corotational::State> {
         Some(&self.state)
+    }
+
+    fn ended(&self) -> Option<&str> {
+        self.path.ended.as_deref()
+    }
+
+    /// A static state stands at the last equilibrium found, which may lie within the step that failed.
+    fn keeps_what_it_found(&mut self, state: &mut State<f64>) -> bool {
+        let is_static = matches!(self.method, Method::Static(..));
+        if is_static && self.state.time > state.time {
+            state.time = self.state.time;
+            self.evaluated = false;
+        }
+        is_static
+    }
+
+    fn convergence(&self) -> Option<String> {
+        let mut table = String::from("step,attempt,time,iteration,residual,allowed,found\n");
+        for Iterated { step, attempt, time, iteration, residual, allowed, found } in &self.convergence {
+            let found = u8::from(*found);
+            // Writing to a String cannot fail.
+            let _ = writeln!(table, "{step},{attempt},{time},{iteration},{residual:e},{allowed:e},{found}");
+        }
+        (!self.convergence.is_empty()).then_some(table)
     }
 
     fn effort(&self) -> Option<Effort> {
@@ -392,6 +592,14 @@ impl Observable<f64> for Corotated<'_> {
 
     fn reaction(&self, constraint: usize) -> [f64; 3] {
         self.reactions[constraint]
+    }
+
+    fn nodal_reaction(&self, node: usize) -> [f64; 3] {
+        self.held(6 * node)
+    }
+
+    fn nodal_reaction_moment(&self, node: usize) -> [f64; 3] {
+        self.held(6 * node + 3)
     }
 
     fn velocity(&self, _state: &State<f64>, node: usize) -> [f64; 3] {
@@ -417,24 +625,30 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     let body = owner.map(|body| body.name.clone()).or_else(|| Some(built.bodies[cell?.0].name.clone()));
     let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();
     let told = numbered(error, own_node, cell.map(|(_, cell)| cell));
-    let history = match error {
-        SolveError::NotConverged { residuals, .. } => {
-            let told: Vec<String> = residuals.iter().map(|&residual| number(residual)).collect();
-            format!("; residuals [N] of the last attempt: {}", told.join(", "))
+    let slack = node.or_else(|| Some(part.model.facets.get(broken_facet(error)?)?.nodes[0]));
+    let hint = match slack.is_some_and(|node| part.is_slack(node)) {
+        true => {
+            "; a membrane resists bending and compression across by nothing: hold it on all sides, give it `pre-tension`, or take \
+             an element with bending"
         }
-        _ => String::new(),
+        false => "",
     };
     FailureSummary::of_solver(
         kind,
-        format!(
-            "after t = {} s{place}: {told}{history}; what was written before stays readable",
-            number(time)
-        ),
+        format!("after t = {} s{place}: {told}{hint}; what was written before stays readable", number(time)),
         body,
         cell.map(|(_, cell)| cell),
         own_node,
         time,
     )
+}
+
+/// The cell that an error is about, by its number in the model.
+fn broken_facet(error: &SolveError) -> Option<usize> {
+    match error {
+        SolveError::Broken { cell, .. } => Some(*cell),
+        _ => None,
+    }
 }
 
 /// An error with the numbers that a node and a cell have in their body.

@@ -13,7 +13,7 @@ use miette::{
     LabeledSpan, MietteError, MietteSpanContents, NamedSource, SourceCode, SourceSpan, SpanContents,
 };
 
-use crate::printable::{printable, shortened};
+use crate::printable::{boundary_after, boundary_before, printable, shortened};
 
 /// Mistakes that are shown of one scene; the others are counted.
 pub const MOST_SHOWN: usize = 20;
@@ -232,12 +232,12 @@ impl SourceCode for Excerpts {
         let line_start = text[..span.offset()].rfind('\n').map_or(0, |at| at + 1).max(first);
         let line_end = text[place_end..last].find('\n').map_or(last, |at| place_end + at);
         let from = match () {
-            () if span.offset() - line_start > REACH => text.ceil_char_boundary(span.offset() - REACH),
+            () if span.offset() - line_start > REACH => boundary_after(text, span.offset() - REACH),
             () if line_start - first > REACH => line_start,
             () => first,
         };
         let to = match () {
-            () if line_end - place_end > REACH => text.floor_char_boundary(place_end + REACH),
+            () if line_end - place_end > REACH => boundary_before(text, place_end + REACH),
             () if last - line_end > REACH => line_end,
             () => last,
         };
@@ -331,12 +331,12 @@ impl SceneErrors {
 
 /// The nearest span that lies in the text, on the borders of characters, not longer than what is underlined at most.
 fn clamp(text: &str, span: Range<usize>) -> Range<usize> {
-    let start = text.floor_char_boundary(span.start);
-    let end = text.ceil_char_boundary(span.end).max(start);
+    let start = boundary_before(text, span.start);
+    let end = boundary_after(text, span.end).max(start);
     if end - start <= LONGEST_PLACE {
         start..end
     } else {
-        start..text.floor_char_boundary(start + LONGEST_PLACE)
+        start..boundary_before(text, start + LONGEST_PLACE)
     }
 }
 

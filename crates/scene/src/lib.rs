@@ -32,6 +32,7 @@
 //! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
 //! ```
 
+mod advice;
 mod bound;
 mod build;
 mod cache;
@@ -46,7 +47,9 @@ mod of_mesh;
 mod output;
 mod overview;
 mod plan;
+mod plausible;
 mod printable;
+mod reads;
 pub mod reference;
 pub mod registry;
 mod run;
@@ -61,7 +64,7 @@ mod testing;
 mod view;
 
 pub use bound::element_bound;
-pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, PLAUSIBLE_SIZE, build, build_with};
+pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, SizeDoubt, Stop, build, build_with};
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use live::{Live, Standing, go_on, live};
@@ -73,9 +76,10 @@ pub use output::{
 pub use overview::overview;
 pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};
 pub use printable::printable;
+pub use reads::Reads;
 pub use run::{Options, Progress, run, run_with};
-pub use scene::{ReadError, Scene, open, scene_file};
-pub use solver::{Effort, LoadStepProgress};
+pub use scene::{ReadError, Scene, open, open_within, scene_file};
+pub use solver::{Effort, Equilibria, LoadStepProgress};
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;

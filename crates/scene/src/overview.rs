@@ -9,7 +9,7 @@ use pliant_mechanics::model::Motion;
 
 use crate::build::{BodyCells, Built, Corotational};
 use crate::diagnostic::counted;
-use crate::output::{AddedMass, bodies, number};
+use crate::output::{AddedMass, bodies, number, told_limit};
 use crate::plan::{Limits, Plan};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
@@ -87,6 +87,7 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
         let what = match constraint.motion {
             Motion::Fixed => "fixes",
             Motion::Displacement(..) | Motion::Displacements(..) | Motion::Velocity(..) => "moves",
+            Motion::Rotation { .. } => "rotates",
         };
         let own = built.corotational.iter().flat_map(|part| &part.model.constraints);
         let turns = own.filter(|own| own.name == constraint.name).flat_map(|own| &own.components[3..]);
@@ -204,7 +205,7 @@ fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> f
     writeln!(page, "\ncritical step:")?;
     writeln!(page, "  element bound {} s, set by {limiting}", number(bound.step))?;
     let calls = limit.force_calls;
-    writeln!(page, "  true limit    {} s (assembled operator, {calls} force calls)", number(limit.step))?;
+    writeln!(page, "  true limit    {} (assembled operator, {calls} force calls)", told_limit(limit.step))?;
     writeln!(
         page,
         "  step          {} s, {} steps for {} s",

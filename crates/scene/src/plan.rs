@@ -5,7 +5,7 @@ use pliant_mechanics::critical_step::{ElementBound, TrueLimit, element_bound, tr
 use serde::Serialize;
 
 use crate::build::{Built, Corotational};
-use crate::diagnostic::{Diagnostic, SceneErrors};
+use crate::diagnostic::{Diagnostic, SceneErrors, counted};
 use crate::format::{SolverName, StepChoice};
 use crate::output::number;
 use crate::scene::Scene;
@@ -13,14 +13,18 @@ use crate::target::Target;
 
 /// Part of the true limit that an automatic step takes.
 pub const SAFETY: f64 = 0.9;
+/// A step that is shortened by more than this part is told.
+const SHORTENED: f64 = 1e-3;
 /// Automatic step [s] of implicit runs.
 pub const IMPLICIT_STEP: f64 = 0.01;
 
 /// The step of a run and what limits it.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Step [s]; a whole number of them makes the duration.
+    /// Step [s]; a whole number of them makes the duration. Of unequal load steps the mean.
     pub step: f64,
+    /// Where load steps end [s], if they are not equal.
+    pub ends: Option<Vec<f64>>,
     /// Steps to take.
     pub steps: u64,
     /// What limits explicit steps of solids; `None` of shells and co-rotational solids.
@@ -87,8 +91,26 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         Ok(target) => target,
         Err(diagnostic) => return fail(*diagnostic),
     };
-    let mut plan = Plan { step: 0.0, steps: 0, limits, note, target };
+    let ends = match (scene.run.solver, scene.run.step) {
+        (SolverName::QuasiStatic, StepChoice::Auto(_)) => scene.run.load_steps.ends(scene.scene.until),
+        _ => None,
+    };
+    let mut plan = Plan { step: 0.0, ends, steps: 0, limits, note, target };
     (plan.steps, plan.step) = plan.steps_of(scene, built, scene.scene.until);
+    if let Some(ends) = &plan.ends {
+        let times: Vec<String> = ends.iter().map(|&end| number(end)).collect();
+        plan.note = Some(format!("the load steps end at t = {} s", times.join(", ")));
+    }
+    if let StepChoice::Seconds(asked) = scene.run.step
+        && plan.step < asked * (1.0 - SHORTENED)
+    {
+        let [asked, until, step] = [asked, scene.scene.until, plan.step].map(number);
+        let steps = counted(plan.steps as usize, "step");
+        let told = format!(
+            "a step of {asked} s does not divide the {until} s of the scene: it takes {steps} of {step} s"
+        );
+        plan.note = Some(plan.note.map_or(told.clone(), |note| format!("{note}; {told}")));
+    }
     Ok(plan)
 }
 
@@ -151,7 +173,10 @@ impl Plan {
         let asked = match scene.run.step {
             StepChoice::Seconds(step) => step,
             StepChoice::Auto(_) => match (scene.run.solver, &self.limits, &built.corotational) {
-                (SolverName::QuasiStatic | SolverName::Static, ..) => until / f64::from(scene.run.load_steps),
+                (SolverName::QuasiStatic, ..) if let Some(ends) = scene.run.load_steps.ends(until) => {
+                    return (ends.len() as u64, until / ends.len() as f64);
+                }
+                (SolverName::QuasiStatic | SolverName::Static, ..) => scene.run.load_steps.first(until),
                 (SolverName::Explicit, Some(limits), _) => automatic(&limits.bound, &limits.limit),
                 (SolverName::Explicit, None, Some(part)) => SAFETY * Explicit::stable_step(&part.model),
                 _ => IMPLICIT_STEP.min(until),
@@ -159,6 +184,30 @@ impl Plan {
         };
         let steps = (until / asked - 1e-9).ceil().max(1.0);
         (steps as u64, until / steps)
+    }
+}
+
+impl Plan {
+    /// The end [s] of the step of a number, counted from 1.
+    pub(crate) fn end_of(&self, number: u64) -> f64 {
+        let own = self.ends.as_ref().and_then(|ends| ends.get(number as usize - 1));
+        own.copied().unwrap_or(number as f64 * self.step)
+    }
+
+    /// The number, counted from 1, of the step that begins at a time [s].
+    pub(crate) fn number_from(&self, time: f64) -> u64 {
+        match &self.ends {
+            Some(ends) => ends.partition_point(|&end| end <= time) as u64 + 1,
+            None => (time / self.step).round() as u64 + 1,
+        }
+    }
+
+    /// The length [s] of the step that begins at a time [s]; at the end, of the last one.
+    pub(crate) fn step_from(&self, time: f64) -> f64 {
+        let Some(ends) = &self.ends else { return self.step };
+        let number = self.number_from(time).min(ends.len() as u64);
+        let before = if number > 1 { self.end_of(number - 1) } else { 0.0 };
+        self.end_of(number) - before
     }
 }
 
@@ -223,7 +272,9 @@ mod tests {
         let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
         let close = asked(0.95 * automatic.limit.step).unwrap();
         assert!(close.note.is_some_and(|note| note.contains("close to the true limit")));
-        assert!(asked(automatic.bound.step.min(0.9 * automatic.limit.step)).unwrap().note.is_none());
+        // A whole part of the duration, or the note tells that it is shortened.
+        let below = automatic.bound.step.min(0.9 * automatic.limit.step);
+        assert_eq!(asked(0.1 / (0.1 / below).ceil()).unwrap().note, None);
         let refused = asked(1.001 * automatic.limit.step).unwrap_err().plain().to_string();
         for piece in [
             "cube.toml:",
@@ -233,6 +284,29 @@ mod tests {
         ] {
             assert!(refused.contains(piece), "no `{piece}` in {refused}");
         }
+    }
+
+    #[test]
+    fn a_step_that_does_not_divide_the_duration_is_told() {
+        let with = |step: &str| planned(&format!("[run]\nsolver = 'quasi-static'\nstep = {step}\n")).unwrap();
+        let told = with("0.03");
+        assert_eq!((told.steps, told.step), (4, 0.025));
+        let note = told.note.unwrap();
+        for piece in ["0.03", "does not divide", "4 steps of 0.025"] {
+            assert!(note.contains(piece), "no `{piece}` in {note}");
+        }
+        assert_eq!(with("0.025").note, None);
+    }
+
+    #[test]
+    fn unequal_load_steps_end_where_they_are_told_to_and_with_the_scene() {
+        let plan =
+            planned("[run]\nsolver = 'quasi-static'\nload-steps = { times = [0.01, 0.04] }\n").unwrap();
+        assert_eq!(plan.ends.as_deref(), Some([0.01, 0.04, 0.1].as_slice()));
+        let of = |time: f64| (plan.number_from(time), plan.step_from(time));
+        assert_eq!([of(0.0), of(0.01)], [(1, 0.01), (2, 0.03)]);
+        assert_eq!((of(0.04).0, of(0.1).1), (3, 0.1 - 0.04));
+        assert_eq!([1, 2, 3].map(|number| plan.end_of(number)), [0.01, 0.04, 0.1]);
     }
 
     #[test]

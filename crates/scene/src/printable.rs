@@ -33,6 +33,16 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(visible).collect())
 }
 
+/// The last border between characters at or before a byte.
+pub(crate) fn boundary_before(text: &str, at: usize) -> usize {
+    (0..=at.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0)
+}
+
+/// The first border between characters at or after a byte.
+pub(crate) fn boundary_after(text: &str, at: usize) -> usize {
+    (at..=text.len()).find(|&at| text.is_char_boundary(at)).unwrap_or(text.len())
+}
+
 /// The text without codes that a terminal obeys, and where it is longer than a message should be, its beginning and how
 /// much follows.
 pub(crate) fn shortened(mut text: String) -> String {
@@ -40,7 +50,7 @@ pub(crate) fn shortened(mut text: String) -> String {
         text = visible;
     }
     if text.len() > LONGEST {
-        let end = text.floor_char_boundary(LONGEST);
+        let end = boundary_before(&text, LONGEST);
         let left = text[end..].chars().count();
         text.truncate(end);
         text.push_str(&format!(" … ({left} more characters)"));

@@ -9,17 +9,18 @@ use pliant_mechanics::stability::Stability;
 use pliant_mechanics::{Energies, Observable, Real, State};
 use serde::{Deserialize, Serialize};
 
+use crate::advice::remedy;
 use crate::build::Built;
 use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
 use crate::corotational::Corotated;
 use crate::format::{Precision, SolverName};
 use crate::output::{
-    FailureSummary, Frame, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY, Schedule, Scheduled, Snapshot,
-    Summary, markdown, observers, plot, steps_to, summarise,
+    CONVERGENCE, FailureSummary, Frame, INTERRUPTED, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY,
+    Schedule, Scheduled, ShellStrains, Snapshot, Summary, markdown, observers, plot, steps_to, summarise,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::{Effort, LoadStepProgress, Memory, Solver, on_device, on_processor};
+use crate::solver::{Effort, Equilibria, LoadStepProgress, Memory, Solver, on_device, on_processor};
 use crate::view::Draw;
 
 /// How far a run is.
@@ -70,8 +71,16 @@ pub(crate) struct Outcome {
     pub worst_hourglass: (f64, f64),
     /// What was seen of the largest stable step; `None` of a run without inertia.
     pub stability: Option<Stability>,
+    /// How good its equilibria are, if it found some by dynamic relaxation.
+    pub equilibria: Option<Equilibria>,
     /// What its equations took, if it solved some.
     pub effort: Option<Effort>,
+    /// Residuals of its last iterations, as a table.
+    pub convergence: Option<String>,
+    /// Why it ended before the time of the scene was over, without a failure.
+    pub ended: Option<String>,
+    /// How far shells were strained.
+    pub strains: ShellStrains,
     pub reactions: Vec<[f64; 3]>,
     pub history: History,
     pub files: Vec<PathBuf>,
@@ -95,7 +104,11 @@ impl Outcome {
             balance_floor: 0.0,
             worst_hourglass: (0.0, 0.0),
             stability: None,
+            equilibria: None,
             effort: None,
+            convergence: None,
+            ended: None,
+            strains: ShellStrains::default(),
             reactions: vec![[0.0; 3]; built.model.constraints.len()],
             history: History::default(),
             files: Vec::new(),
@@ -179,6 +192,12 @@ fn write_pages(
     outcome: &mut Outcome,
 ) -> Result<(), OutputError> {
     let page = folder.path().join(SUMMARY);
+    if let Some(table) = &outcome.convergence {
+        outcome.files.push(folder.write(CONVERGENCE, table)?);
+        if let Some(failure) = outcome.failure.as_mut().filter(|failure| failure.kind == "not-converged") {
+            failure.message.push_str(&format!("; the residuals of all iterations are in `{CONVERGENCE}`"));
+        }
+    }
     let svg = plot(built, &outcome.history)
         .map_err(|reason| OutputError::new(&folder.path().join(PLOT), reason))?;
     outcome.files.push(folder.write(PLOT, &svg)?);
@@ -239,9 +258,16 @@ fn go<'a, R: Real>(
             }
         };
         if let Err(failure) = course.step(wall_seconds(), stop, &mut watch) {
+            if failure.kind != INTERRUPTED {
+                course.show_what_was_found();
+            }
             break Some(failure);
         }
     };
+    let failure = failure.map(|failure| match remedy(&failure, scene, built, plan, &course.state) {
+        Some(remedy) => failure.advised(&remedy),
+        None => failure,
+    });
     let picture = options.picture.filter(|_| failure.is_none());
     let (drawn, failure) = match picture.map(|picture| course.draw(picture, folder)).transpose() {
         Ok(drawn) => (drawn, failure),
@@ -262,7 +288,11 @@ fn go<'a, R: Real>(
             .as_ref()
             .filter(|_| scene.run.solver == SolverName::Explicit)
             .map(|_| course.state.stability),
+        equilibria: course.solver.equilibria(),
         effort: course.solver.effort(),
+        convergence: course.solver.convergence(),
+        ended: course.solver.ended().map(ToOwned::to_owned),
+        strains: course.strains,
         reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
         history: course.history,
         files: course.files.into_iter().chain(course.kept).chain(drawn.clone()).collect(),
@@ -310,6 +340,7 @@ struct Course<'a, R> {
     worst_balance: f64,
     /// The largest hourglass energy over the internal one, and its time [s].
     worst_hourglass: (f64, f64),
+    strains: ShellStrains,
     checkpoints: Option<Checkpoints<'a>>,
     /// Whether the last instant becomes a picture.
     pictured: bool,
@@ -334,6 +365,9 @@ impl<'a, R: Real> Course<'a, R> {
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
         let samples = if plan.target.device.is_some() { SAMPLES_ON_DEVICE } else { SAMPLES };
         let written = before.map(|before| before.outputs.as_slice());
+        if before.is_some() {
+            folder.go_on(scene)?;
+        }
         let watching = observers::<R>(scene, built, folder.path(), &mut files, written)?;
         solver.resume(memory);
         Ok(Self {
@@ -345,6 +379,7 @@ impl<'a, R: Real> Course<'a, R> {
             sampling: before.map_or(Schedule::new(scene.scene.until / samples), |before| before.sampling),
             worst_balance: before.map_or(0.0, |before| before.worst_balance),
             worst_hourglass: before.map_or((0.0, 0.0), |before| before.worst_hourglass),
+            strains: before.map_or_else(ShellStrains::default, |before| before.strains.clone()),
             checkpoints: Checkpoints::new(scene, built, plan, folder, state.time),
             state,
             solver,
@@ -356,7 +391,8 @@ impl<'a, R: Real> Course<'a, R> {
 
     /// Evaluates the current instant and shows it to all who look; whether it is the last.
     fn see(&mut self) -> Result<bool, FailureSummary> {
-        let (time, step, last) = (self.state.time, self.plan.step, self.is_last());
+        let (time, last) = (self.state.time, self.is_last());
+        let step = self.plan.step_from(time);
         let looked_at = self.watching.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
         let wanted = if looked_at || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies };
         self.solver.evaluate(&mut self.state, wanted)?;
@@ -370,6 +406,7 @@ impl<'a, R: Real> Course<'a, R> {
         }
         if self.sampling.is_due(time, step, last) {
             self.history.sample(self.built, observable, &self.state);
+            self.strains.look(self.built, self.solver.corotational());
         }
         let frame = frame(self.built, &self.state, self.solver.as_ref());
         look(&mut self.watching, &frame, step, last)
@@ -378,12 +415,36 @@ impl<'a, R: Real> Course<'a, R> {
     }
 
     fn is_last(&self) -> bool {
-        self.state.time + 0.5 * self.plan.step >= self.scene.scene.until
+        let over = self.state.time + 0.5 * self.plan.step_from(self.state.time) >= self.scene.scene.until;
+        over || self.solver.ended().is_some()
+    }
+
+    /// After a step that failed: shows what was found until then to those who have not looked at it.
+    fn show_what_was_found(&mut self) {
+        let seen = self.state.time;
+        if !self.solver.keeps_what_it_found(&mut self.state)
+            || self.solver.evaluate(&mut self.state, Wanted::Everything).is_err()
+        {
+            return;
+        }
+        let (time, step) = (self.state.time, self.plan.step);
+        self.strains.look(self.built, self.solver.corotational());
+        if time > seen {
+            self.history.sample(self.built, self.solver.observable(), &self.state);
+        }
+        let frame = frame(self.built, &self.state, self.solver.as_ref());
+        for (schedule, observer) in &mut self.watching {
+            if (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true) {
+                // The failure of the step is what is told.
+                let _ = observer.see(&frame);
+            }
+        }
     }
 
     /// The steps to the next instant at which there is something to do.
     fn stride(&self) -> u64 {
-        let (time, step) = (self.state.time, self.plan.step);
+        let time = self.state.time;
+        let step = self.plan.step_from(time);
         (self.watching.iter().map(|(schedule, _)| schedule))
             .chain([&self.sampling])
             .map(|schedule| schedule.stride(time, step))
@@ -402,8 +463,9 @@ impl<'a, R: Real> Course<'a, R> {
         let steps = self.stride();
         self.solver.advance(&mut self.state, steps, watch)?;
         let last = self.is_last();
-        let due = (self.checkpoints.as_mut())
-            .is_some_and(|all| all.is_due(self.state.time, self.plan.step, last || stop));
+        let due = (self.checkpoints.as_mut()).is_some_and(|all| {
+            all.is_due(self.state.time, self.plan.step_from(self.state.time), last || stop)
+        });
         if due && let Some(checkpoints) = &self.checkpoints {
             self.solver.bring_back(&mut self.state)?;
             let progressed = Progressed {
@@ -412,6 +474,7 @@ impl<'a, R: Real> Course<'a, R> {
                 wall_seconds,
                 worst_balance: self.worst_balance,
                 worst_hourglass: self.worst_hourglass,
+                strains: self.strains.clone(),
                 history: self.history.clone(),
                 sampling: self.sampling,
                 outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),

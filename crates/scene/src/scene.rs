@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::checker::{nearest, read_table};
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{BodyTable, RunTable, SceneTable, SurfaceTable, ViewTable};
+use crate::reads::{LONGEST_SCENE, Reads};
 use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
 use crate::source::{Node, Source, Value};
 
@@ -34,6 +35,8 @@ pub struct Scene {
     pub outputs: Vec<(String, OutputTable)>,
     /// `[view]`
     pub view: ViewTable,
+    /// What is doubtful about values by themselves.
+    pub(crate) doubts: Vec<Diagnostic>,
 }
 
 /// The tables a scene file can have.
@@ -65,15 +68,31 @@ pub fn scene_file(path: &Path) -> PathBuf {
 /// # Errors
 /// If the file can't be read or is not TOML.
 pub fn open(path: &Path) -> Result<(Source, PathBuf), ReadError> {
+    open_within(path, Reads::anywhere())
+}
+
+/// As [`open`], with the files that may be read: the scene file itself, and all that it names.
+///
+/// # Errors
+/// If the file can't or may not be read, or is not TOML.
+pub fn open_within(path: &Path, reads: Reads) -> Result<(Source, PathBuf), ReadError> {
     let file = scene_file(path);
     let failed = |reason: String| ReadError::File { path: file.clone(), reason };
-    let bytes = std::fs::read(&file).map_err(|error| failed(error.to_string()))?;
+    let bytes = reads.read(&file, LONGEST_SCENE).map_err(|error| failed(error.to_string()))?;
     let text = String::from_utf8(bytes).map_err(|_| failed("it is not a text file (UTF-8)".into()))?;
     let source = Source::parse(file.display().to_string(), text).map_err(ReadError::Scene)?;
-    Ok((source, file.parent().unwrap_or(Path::new("")).to_owned()))
+    Ok((source.reading(reads), file.parent().unwrap_or(Path::new("")).to_owned()))
 }
 
 impl Scene {
+    /// The path of a file that the scene names.
+    ///
+    /// # Errors
+    /// If it may not be read.
+    pub(crate) fn file(&self, name: &Path) -> std::io::Result<PathBuf> {
+        self.source.reads().allow(&self.folder.join(name))
+    }
+
     /// Reads a scene from its text; file names in it are relative to `folder`.
     ///
     /// # Errors
@@ -115,6 +134,7 @@ impl Scene {
                 loads,
                 outputs,
                 view,
+                doubts: out,
             }),
             _ => Err(source.errors(out)),
         }

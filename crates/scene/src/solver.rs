@@ -52,7 +52,9 @@ impl<R> Memory<R> {
     pub(crate) fn fits(&self, nodes: usize) -> bool {
         match self {
             Self::Nothing => true,
-            Self::Equilibrium(equilibrium) => equilibrium.residual.len() == nodes,
+            Self::Equilibrium(equilibrium) => {
+                equilibrium.residual.len() == nodes && equilibrium.way.fits(nodes)
+            }
             Self::Corotated(remembered) => remembered.fits(nodes),
         }
     }
@@ -81,6 +83,17 @@ pub struct Effort {
     pub seconds_solution: f64,
     /// Beginning of the first unstable equilibrium [s], seen from a negative pivot.
     pub unstable_from: Option<f64>,
+}
+
+/// How good the equilibria of a quasi-static run are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Equilibria {
+    /// Equilibria found, that of the start and parts of load steps included.
+    pub found: u64,
+    /// Estimated error of the external work [J], a sum of trapezia between them; `None` where a first one says nothing of its own.
+    pub external_error: Option<f64>,
+    /// Estimated error of the displacements over the largest one, at worst.
+    pub displacement_error: f64,
 }
 
 /// Brings a state from instant to instant.
@@ -163,6 +176,26 @@ pub(crate) trait Solver<R> {
         None
     }
 
+    /// How good its equilibria are; `None` of one that finds none by dynamic relaxation.
+    fn equilibria(&self) -> Option<Equilibria> {
+        None
+    }
+
+    /// Why it is at its end before the time of the scene is over.
+    fn ended(&self) -> Option<&str> {
+        None
+    }
+
+    /// After a step that failed: whether what it found on the way is to be shown; the state's time then is that of it.
+    fn keeps_what_it_found(&mut self, _state: &mut State<R>) -> bool {
+        false
+    }
+
+    /// Residuals of its last iterations, as a table; `None` of one that solves no equations.
+    fn convergence(&self) -> Option<String> {
+        None
+    }
+
     /// What its equations took; `None` of one that solves none.
     fn effort(&self) -> Option<Effort> {
         None
@@ -197,14 +230,14 @@ pub(crate) fn on_processor<'m, R: Real>(
             return Err(FailureSummary::input(&"this solver is for shells and co-rotational solids"));
         }
         SolverName::QuasiStatic => {
-            let precise = RelaxationSettings::default().tolerance;
-            let tolerance =
-                run.tolerance.unwrap_or(if R::EPSILON > 1e-10 { 100.0 * precise } else { precise });
-            let settings = RelaxationSettings { tolerance, ..RelaxationSettings::default() };
+            let settings = match run.tolerance {
+                Some(tolerance) => RelaxationSettings { tolerance, ..RelaxationSettings::default() },
+                None => RelaxationSettings::usual::<R>(),
+            };
+            let tolerance = settings.tolerance;
             Box::new(LoadSteps {
                 relaxation: DynamicRelaxation::new(&built.model, settings).map_err(contradicting)?,
-                step: plan.step,
-                count: plan.steps,
+                plan: plan.clone(),
                 tolerance,
             })
         }
@@ -338,20 +371,20 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
     }
 }
 
-/// Equilibria at the ends of equal load steps.
+/// Equilibria at the start and at the ends of load steps.
 struct LoadSteps<'m, R> {
     relaxation: DynamicRelaxation<'m, R>,
-    /// Time between equilibria [s].
-    step: f64,
-    /// How many there are.
-    count: u64,
+    /// Where they end.
+    plan: Plan,
     /// Relative residual of an equilibrium.
     tolerance: f64,
 }
 
 impl<R: Real> Solver<R> for LoadSteps<'_, R> {
-    fn evaluate(&mut self, _state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
-        Ok(())
+    /// At the start the equilibrium of what acts there already; others are found when they are gone to.
+    fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
+        let begun = self.relaxation.begin(state);
+        begun.map_err(|error| FailureSummary::load_step(&error, 0, self.plan.steps))
     }
 
     fn advance(
@@ -360,11 +393,11 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
         _steps: u64,
         watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
-        let number = (state.time / self.step).round() as u64 + 1;
-        let (of, tolerance) = (self.count, self.tolerance);
+        let number = self.plan.number_from(state.time);
+        let (of, tolerance) = (self.plan.steps, self.tolerance);
         let mut told = |iteration: Iteration| watch(LoadStepProgress { number, of, iteration, tolerance });
         self.relaxation
-            .solve_watched(state, number as f64 * self.step, &mut told)
+            .solve_watched(state, self.plan.end_of(number), &mut told)
             .map(|_| ())
             .map_err(|error| FailureSummary::load_step(&error, number, of))
     }
@@ -375,6 +408,15 @@ impl<R: Real> Solver<R> for LoadSteps<'_, R> {
 
     fn observable(&self) -> &dyn Observable<R> {
         &self.relaxation
+    }
+
+    fn equilibria(&self) -> Option<Equilibria> {
+        let way = self.relaxation.way();
+        Some(Equilibria {
+            found: way.equilibria,
+            external_error: way.error,
+            displacement_error: way.displacement_error,
+        })
     }
 
     fn memory(&self) -> Memory<R> {

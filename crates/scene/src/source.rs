@@ -11,6 +11,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::checker::nearest;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
+use crate::reads::Reads;
 
 /// Syntax errors shown of one file: what follows the first is often a consequence of it.
 const MOST_SYNTAX_ERRORS: usize = 5;
@@ -24,6 +25,7 @@ pub struct Source {
     text: Arc<str>,
     root: Node,
     assignments: Vec<String>,
+    reads: Reads,
 }
 
 /// What the user types before an assignment.
@@ -207,9 +209,20 @@ impl Source {
                 text,
                 root: Node { place: Place::File(0..0), key_span: None, value },
                 assignments: Vec::new(),
+                reads: Reads::anywhere(),
             }),
             _ => Err(SceneErrors::new(name, text, diagnostics)),
         }
+    }
+
+    /// The same, for a scene that may read these files only.
+    pub fn reading(self, reads: Reads) -> Self {
+        Self { reads, ..self }
+    }
+
+    /// The files that the scene may read.
+    pub fn reads(&self) -> &Reads {
+        &self.reads
     }
 
     /// The name that is shown to the user.

@@ -12,7 +12,7 @@ use pliant_mechanics::Energies;
 use crate::build::{Built, build_with};
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
-use crate::output::{AXES, ENERGIES, OutputError, OutputFolder, Summary, number};
+use crate::output::{AXES, ENERGIES, OutputError, OutputFolder, Summary, check_own_folder, number};
 use crate::plan::{Plan, plan};
 use crate::registry::OutputTable;
 use crate::run::{Options, run_with};
@@ -198,9 +198,11 @@ impl Sweep {
         for entry in entries.flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             let own = name.strip_prefix("run-").is_some_and(|n| n.bytes().all(|byte| byte.is_ascii_digit()));
+            if own {
+                check_own_folder(&entry.path()).map_err(|error| OutputError::new(&entry.path(), error))?;
+            }
             if own && entry.path().is_dir() {
-                OutputFolder::clear(&entry.path(), &scene)
-                    .map_err(|error| OutputError::new(&entry.path(), error))?;
+                OutputFolder::clear(&entry.path(), &scene)?;
             }
         }
         Ok(folder)

@@ -56,7 +56,7 @@ impl Scene {
                 probes.insert(own, place.clone());
             }
         }
-        CsvTable { every: 1.0, reactions: None, energy: true, probes }
+        CsvTable { every: 1.0, reactions: None, moments_about: None, energy: true, probes }
     }
 
     /// A series of what is shown, with displacements and the field of the colours.

@@ -4,7 +4,7 @@
 
 use nalgebra::SMatrix;
 
-use super::{Corners, Differences, Elasticity, Matrix9};
+use super::{Corners, Differences, Matrix9, PlaneStress};
 
 /// (L2, L3) in the middle of the edges: three points that integrate quadratics exactly.
 pub(crate) const MIDSIDES: [[f64; 2]; 3] = [[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]];
@@ -75,9 +75,14 @@ pub(crate) fn curvature(corners: &Corners, [xi, eta]: [f64; 2]) -> SMatrix<f64, 
     })
 }
 
+/// Mean curvatures [1/m] over (w, θx, θy).
+pub(crate) fn mean_curvature(corners: &Corners) -> SMatrix<f64, 3, 9> {
+    MIDSIDES.iter().fold(SMatrix::zeros(), |sum, &point| sum + curvature(corners, point) / 3.0)
+}
+
 /// Stiffness of the discrete Kirchhoff triangle; three points are exact.
-pub fn discrete_kirchhoff(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
-    let stiffness = elastic.matrix() * (thickness.powi(3) / 12.0);
+pub fn discrete_kirchhoff(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+    let stiffness = elastic.matrix * (thickness.powi(3) / 12.0);
     let weight = super::area(corners) / 3.0;
     MIDSIDES.iter().fold(Matrix9::zeros(), |sum, &point| {
         let b = curvature(corners, point);

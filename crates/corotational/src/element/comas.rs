@@ -3,7 +3,7 @@
 
 use nalgebra::{SMatrix, Vector2};
 
-use super::{Corners, Elasticity, Matrix9, area};
+use super::{Corners, Matrix9, PlaneStress, area};
 
 /// (1, x, y, x², xy, y², x³, xy², y³) with its derivatives (p, p,y, −p,x).
 fn row(at: Vector2<f64>) -> [[f64; 9]; 3] {
@@ -31,7 +31,7 @@ fn curvature(at: Vector2<f64>) -> SMatrix<f64, 3, 9> {
 ///
 /// Its 9 × 9 matrix of the polynomial at the corners has the determinant x₂⁵ y₃⁶: it is singular only if the area is zero,
 /// and then the stiffness is not a number.
-pub fn comas_2010(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
+pub fn comas_2010(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
     let [origin, second, _] = *corners;
     let along = (second - origin).normalize();
     let local = corners.map(|p| Vector2::new(along.dot(&(p - origin)), along.perp(&(p - origin))));
@@ -42,7 +42,7 @@ pub fn comas_2010(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Ma
         }
     }
     let inverse = c.try_inverse().unwrap_or_else(|| Matrix9::repeat(f64::NAN));
-    let stiffness = elastic.matrix() * (thickness.powi(3) / 12.0);
+    let stiffness = elastic.matrix * (thickness.powi(3) / 12.0);
     let weight = area(corners) / 3.0;
     let middles = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| 0.5 * (local[i] + local[j]));
     let own = middles.iter().fold(Matrix9::zeros(), |sum, &point| {

@@ -3,16 +3,17 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::{Corners, Differences, Elasticity, Matrix9, area, gradients};
+use super::{Corners, Differences, Matrix9, PlaneStress, area, gradients};
 
 /// α_b: how much of the edges' normal displacement comes from drilling.
-const DRILLING_TO_EDGE: f64 = 1.5;
+pub(super) const DRILLING_TO_EDGE: f64 = 1.5;
 
-/// Lumping of constant stress to nodal forces, L [m²]; mean strain is Lᵀ v/(t A).
-fn lumping(d: &Differences, thickness: f64) -> SMatrix<f64, 9, 3> {
+/// Mean strain (εxx, εyy, γxy) of the ANDES triangle over (u, v, θz), Lᵀ/(t A) with its lumping L of constant stress.
+pub(crate) fn andes_strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
+    let d = Differences::new(corners);
     let (x13, x21, x32) = (-d.x31, -d.x12, -d.x23);
     let (y13, y21, y32) = (-d.y31, -d.y12, -d.y23);
-    let Differences { x12, x23, x31, y12, y23, y31 } = *d;
+    let Differences { x12, x23, x31, y12, y23, y31 } = d;
     let (sixth, third) = (DRILLING_TO_EDGE / 6.0, DRILLING_TO_EDGE / 3.0);
     #[rustfmt::skip]
     let rows = [
@@ -26,7 +27,7 @@ fn lumping(d: &Differences, thickness: f64) -> SMatrix<f64, 9, 3> {
         0.0, x21, y12,
         sixth * y12 * (y32 - y13), sixth * x21 * (x23 - x31), third * (x23 * y32 - x31 * y13),
     ];
-    SMatrix::<f64, 9, 3>::from_row_slice(&rows) * (0.5 * thickness)
+    SMatrix::<f64, 3, 9>::from_column_slice(&rows) / d.double_area()
 }
 
 /// Hierarchical rotations over (u, v, θz): nodal drilling less the mean rotation of the triangle.
@@ -36,15 +37,13 @@ fn hierarchical(d: &Differences) -> SMatrix<f64, 3, 9> {
     SMatrix::from_fn(|row, i| mean[i] + if i == 3 * row + 2 { 1.0 } else { 0.0 })
 }
 
-/// The basic part of the ANDES triangle: constant strain with the drilling of the edges, K = L D Lᵀ/(t A).
-pub(crate) fn andes_basic(corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
-    let d = Differences::new(corners);
-    let l = lumping(&d, thickness);
-    l * elastic.matrix() * l.transpose() / (thickness * 0.5 * d.double_area())
-}
-
-/// The ANDES triangle with β₀ = max((1 − 4ν²)/2, 0.01) min(1, κ t²/A).
-pub fn andes_opt(corners: &Corners, elastic: &Elasticity, thickness: f64, adaptation: f64) -> Matrix9 {
+/// The higher-order part over the hierarchical rotations, with β₀ = max((1 − 4ν²)/2, 0.01) min(1, κ t²/A).
+pub(crate) fn andes_higher(
+    corners: &Corners,
+    elastic: &PlaneStress,
+    thickness: f64,
+    adaptation: f64,
+) -> Matrix3<f64> {
     let d = Differences::new(corners);
     let area = 0.5 * d.double_area();
     let optimal = (0.5 * (1.0 - 4.0 * elastic.poisson * elastic.poisson)).max(0.01);
@@ -61,23 +60,29 @@ pub fn andes_opt(corners: &Corners, elastic: &Elasticity, thickness: f64, adapta
         x23 * x13 * l21, x31 * x21 * l32, x12 * x32 * l13,
         (y23 * x31 + x32 * y13) * l21, (y31 * x12 + x13 * y21) * l32, (y12 * x23 + x21 * y32) * l13,
     ) / (4.0 * area * area);
-    let elastic_natural = natural.transpose() * elastic.matrix() * natural;
+    let elastic_natural = natural.transpose() * elastic.matrix * natural;
     // Strains along the edges at the corners, from the hierarchical rotations; βs 1, 2, 1, 0, 1, −1, −1, −1, −2.
     let lengths = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / l21, 1.0 / l32, 1.0 / l13));
     let scale = lengths * (2.0 * area / 3.0);
     let q1 = scale * Matrix3::new(1.0, 2.0, 1.0, 0.0, 1.0, -1.0, -1.0, -1.0, -2.0);
     let q2 = scale * Matrix3::new(-2.0, -1.0, -1.0, 1.0, 1.0, 2.0, -1.0, 0.0, 1.0);
     let q3 = scale * Matrix3::new(1.0, -1.0, 0.0, -1.0, -2.0, -1.0, 2.0, 1.0, 1.0);
-    let sum = [(q1 + q2) * 0.5, (q2 + q3) * 0.5, (q3 + q1) * 0.5]
+    [(q1 + q2) * 0.5, (q2 + q3) * 0.5, (q3 + q1) * 0.5]
         .iter()
-        .fold(Matrix3::zeros(), |sum, q| sum + q.transpose() * elastic_natural * q);
-    let t = hierarchical(&d);
-    let higher = t.transpose() * sum * t * (0.75 * beta * area * thickness);
-    andes_basic(corners, elastic, thickness) + higher
+        .fold(Matrix3::zeros(), |sum, q| sum + q.transpose() * elastic_natural * q)
+        * (0.75 * beta * area * thickness)
+}
+
+/// The ANDES triangle: its basic and its higher-order part.
+pub fn andes_opt(corners: &Corners, elastic: &PlaneStress, thickness: f64, adaptation: f64) -> Matrix9 {
+    let t = hierarchical(&Differences::new(corners));
+    let higher = t.transpose() * andes_higher(corners, elastic, thickness, adaptation) * t;
+    let basic = andes_strain(corners);
+    basic.transpose() * elastic.matrix * basic * (thickness * area(corners)) + higher
 }
 
 /// Constant strain (εxx, εyy, γxy) over (u, v, θz).
-pub(crate) fn strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
+pub(super) fn strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
     let mut b = SMatrix::zeros();
     for (i, g) in gradients(corners).iter().enumerate() {
         b[(0, 3 * i)] = g.x;
@@ -89,10 +94,10 @@ pub(crate) fn strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
 }
 
 /// The constant-strain triangle; `drilling` G t A/3 holds each node's rotation to that of the triangle.
-pub fn constant_strain(corners: &Corners, elastic: &Elasticity, thickness: f64, drilling: f64) -> Matrix9 {
+pub fn constant_strain(corners: &Corners, elastic: &PlaneStress, thickness: f64, drilling: f64) -> Matrix9 {
     let volume = thickness * area(corners);
     let b = strain(corners);
     let t = hierarchical(&Differences::new(corners));
-    b.transpose() * elastic.matrix() * b * volume
-        + t.transpose() * t * (drilling * elastic.shear() * volume / 3.0)
+    b.transpose() * elastic.matrix * b * volume
+        + t.transpose() * t * (drilling * elastic.shear * volume / 3.0)
 }

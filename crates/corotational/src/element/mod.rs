@@ -1,8 +1,10 @@
-//! Stiffness of flat triangles in their rest shape, in their own plane. Degrees of freedom of the membrane are
+//! Stiffness of triangles in their rest shape: of flat ones in their own plane, and the membrane of curved ones. Degrees of freedom of the membrane are
 //! (u, v, θz) node by node, those of bending (w, θx, θy), with θx = ∂w/∂y and θy = −∂w/∂x.
 
 mod bending;
 mod comas;
+mod curved;
+mod layers;
 mod membrane;
 #[cfg(test)]
 mod tests;
@@ -16,18 +18,30 @@ pub type Matrix9 = SMatrix<f64, 9, 9>;
 pub type Corners = [Vector2<f64>; 3];
 
 pub use bending::discrete_kirchhoff;
+pub(crate) use bending::mean_curvature;
 pub use comas::comas_2010;
-pub(crate) use membrane::andes_basic;
+pub(crate) use curved::{CurvedMembrane, Matrix3x18};
+pub use layers::{Layer, Orthotropic};
+pub(crate) use layers::{Section, density, mean, thickness};
+pub(crate) use membrane::andes_higher;
 pub use membrane::{andes_opt, constant_strain};
 
 /// How a shell resists in its plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Membrane {
+    /// The mean strain of the curved triangle (`Opt` on flat facets), which goes with [`Spread::Curved`](crate::Spread::Curved): pressure
+    /// on a curved wall then stretches it and bends it no more than the true load. Not with `Spread::Lumped`: either without the other
+    /// scatters displacements from node to node, the more the thinner the wall. Normals of the true surface count: estimated from the
+    /// triangles they describe another wall.
+    Curved {
+        /// κ, as in `Opt`; 10 by default.
+        adaptation: f64,
+    },
     /// Felippa's optimal ANDES triangle with its higher-order part scaled by min(1, κ t²/A), so that drilling does
     /// not lock thin curved shells. κ = ∞ is Felippa's OPT. In thin curved shells under large tension, as balloons, drilling moments of
     /// unequal facets tilt the nodes, by about ε h³/(R t²) for a strain ε, edges h and a radius R: blown up to twice its volume
     /// (R/t = 50) a sphere of 128 facets folds, one of 512 tilts by 1.2 rad at a pressure 1.6 % off, one of 2048 by 0.24 rad at 0.02 %
-    /// (`validation`, `shell_balloon`). There take `Cst`, or a mesh with h³ well below R t²/ε.
+    /// (`validation`, `shell_balloon`). There take `Curved`, `Cst`, or a mesh with h³ well below R t²/ε.
     Opt {
         /// κ; 10 by default.
         adaptation: f64,
@@ -45,7 +59,7 @@ pub enum Membrane {
 
 impl Default for Membrane {
     fn default() -> Self {
-        Self::Opt { adaptation: 10.0 }
+        Self::Curved { adaptation: 10.0 }
     }
 }
 
@@ -72,17 +86,33 @@ pub struct Formulation {
 }
 
 impl Formulation {
-    /// Stiffness against (u, v, θz).
-    pub fn membrane_stiffness(&self, corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
+    /// Stiffness of a flat facet against (u, v, θz).
+    pub fn membrane_stiffness(&self, corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
         match self.membrane {
-            Membrane::Opt { adaptation } => andes_opt(corners, elastic, thickness, adaptation),
+            Membrane::Curved { adaptation } | Membrane::Opt { adaptation } => {
+                andes_opt(corners, elastic, thickness, adaptation)
+            }
             Membrane::Cst { drilling } => constant_strain(corners, elastic, thickness, drilling),
             Membrane::None => Matrix9::zeros(),
         }
     }
 
+    /// Mean strain (εxx, εyy, γxy) of a flat facet over (u, v, θz).
+    pub(crate) fn mean_strain(&self, corners: &Corners) -> SMatrix<f64, 3, 9> {
+        match self.membrane {
+            Membrane::Curved { .. } | Membrane::Opt { .. } => membrane::andes_strain(corners),
+            Membrane::Cst { .. } => membrane::strain(corners),
+            Membrane::None => SMatrix::zeros(),
+        }
+    }
+
+    /// Mean curvature [1/m] over (w, θx, θy), of elements whose layers bend and stretch together.
+    pub(crate) fn mean_curvature(&self, corners: &Corners) -> SMatrix<f64, 3, 9> {
+        if self.bending == Bending::Dkt { mean_curvature(corners) } else { SMatrix::zeros() }
+    }
+
     /// Stiffness against (w, θx, θy).
-    pub fn bending_stiffness(&self, corners: &Corners, elastic: &Elasticity, thickness: f64) -> Matrix9 {
+    pub fn bending_stiffness(&self, corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
         match self.bending {
             Bending::Dkt => discrete_kirchhoff(corners, elastic, thickness),
             Bending::Comas2010 => comas_2010(corners, elastic, thickness),
@@ -110,6 +140,23 @@ impl Elasticity {
     /// Shear modulus [Pa].
     pub(crate) fn shear(&self) -> f64 {
         0.5 * self.young / (1.0 + self.poisson)
+    }
+}
+
+/// Elasticity of a wall in its plane, and two numbers of it by which elements scale what every value of keeps their convergence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneStress {
+    /// (σxx, σyy, σxy) over (εxx, εyy, γxy) [Pa].
+    pub matrix: Matrix3<f64>,
+    /// Poisson's ratio; of layers that on the mean over all angles.
+    pub poisson: f64,
+    /// Shear modulus [Pa], the same.
+    pub shear: f64,
+}
+
+impl From<Elasticity> for PlaneStress {
+    fn from(elastic: Elasticity) -> Self {
+        Self { matrix: elastic.matrix(), poisson: elastic.poisson, shear: elastic.shear() }
     }
 }
 

@@ -67,6 +67,16 @@ impl<'a> Base64<'a> {
         Some(bytes)
     }
 
+    /// All bytes up to the end of the text; `None` if it holds other characters.
+    pub fn rest(&mut self) -> Option<Vec<u8>> {
+        let mut bytes = Vec::new();
+        while !self.text.as_slice().trim_ascii().is_empty() {
+            let (group, len) = self.group()?;
+            bytes.extend_from_slice(&group[..len]);
+        }
+        Some(bytes)
+    }
+
     /// Four characters as one to three bytes.
     fn group(&mut self) -> Option<([u8; 3], usize)> {
         let mut bits = 0_u32;

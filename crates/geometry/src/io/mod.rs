@@ -1,7 +1,7 @@
 //! Mesh files in and out.
 //!
-//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL
-//! and PLY, text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The reader goes by the first bytes
+//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL,
+//! PLY, GIfTI (`.gii`) and FreeSurfer surfaces (`lh.pial`), text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The reader goes by the first bytes
 //! where they tell the format, otherwise by the ending. Cells are linear: vertex, line, triangle, quad, tet,
 //! hex; others are left out and noted, and an error only if nothing is left.
 
@@ -9,11 +9,14 @@ mod base64;
 mod cells;
 mod cursor;
 mod error;
+mod freesurfer;
+mod gifti;
 mod gmsh;
 mod obj;
 mod off;
 mod ply;
 mod pvd;
+mod regular;
 mod stl;
 mod surface_out;
 mod vtk;
@@ -24,13 +27,14 @@ mod xml;
 
 use std::ffi::OsStr;
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::Path;
 
 use crate::Mesh;
 pub use base64::encode as encode_base64;
 pub use error::{MeshFileError, MeshFileProblem, Place};
 pub use pvd::read_pvd;
+pub use regular::{open_regular, read_limited};
 use surface_out::SurfaceOut;
 pub use vtu_write::{VtuOptions, save_vtu, write_pvd, write_vtu};
 pub use xml::{XmlError, parse_xml};
@@ -54,12 +58,26 @@ pub enum Format {
     Stl,
     /// Polygon file format, `.ply`.
     Ply,
+    /// GIfTI, `.gii`.
+    Gifti,
+    /// FreeSurfer, `.pial`, `.white` and others.
+    FreeSurfer,
 }
 
 impl Format {
     /// All formats that can be read.
-    pub const ALL: &[Self] =
-        &[Self::Gmsh, Self::Vtk, Self::Vtu, Self::Vtp, Self::Obj, Self::Off, Self::Stl, Self::Ply];
+    pub const ALL: &[Self] = &[
+        Self::Gmsh,
+        Self::Vtk,
+        Self::Vtu,
+        Self::Vtp,
+        Self::Obj,
+        Self::Off,
+        Self::Stl,
+        Self::Ply,
+        Self::Gifti,
+        Self::FreeSurfer,
+    ];
 
     /// The formats that can be written.
     pub const WRITTEN: &[Self] = &[Self::Vtu, Self::Gmsh, Self::Obj, Self::Stl, Self::Ply];
@@ -75,6 +93,8 @@ impl Format {
             Self::Off => "OFF",
             Self::Stl => "STL",
             Self::Ply => "PLY",
+            Self::Gifti => "GIfTI",
+            Self::FreeSurfer => "FreeSurfer",
         }
     }
 
@@ -89,19 +109,37 @@ impl Format {
             Self::Off => "off",
             Self::Stl => "stl",
             Self::Ply => "ply",
+            Self::Gifti => "gii",
+            Self::FreeSurfer => "pial",
         }
     }
 
     /// The format that the ending of a path names, in capitals or not.
     pub fn of_path(path: &Path) -> Option<Self> {
         let extension = path.extension().and_then(OsStr::to_str)?;
-        Self::ALL.iter().copied().find(|format| extension.eq_ignore_ascii_case(format.extension()))
+        let own = |format: &Self| extension.eq_ignore_ascii_case(format.extension());
+        let surface = || freesurfer::NAMES.contains(&extension).then_some(Self::FreeSurfer);
+        Self::ALL.iter().copied().find(own).or_else(surface)
+    }
+
+    /// The format that the ending of a path names, or the first bytes of the file tell.
+    pub fn of_file(path: &Path) -> Option<Self> {
+        Self::of_path(path).or_else(|| {
+            let mut head = Vec::new();
+            open_regular(path).ok()?.take(512).read_to_end(&mut head).ok()?;
+            Self::of_bytes(&head)
+        })
     }
 
     /// The format that the first bytes of a file tell, for formats that begin with a word of their own.
     fn of_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-        let begins: [(&[u8], Self); 8] = [
+        if bytes.starts_with(b"<?xml")
+            && bytes[..bytes.len().min(4096)].windows(6).any(|word| word == b"<GIFTI")
+        {
+            return Some(Self::Gifti);
+        }
+        let begins: [(&[u8], Self); 11] = [
             (b"$MeshFormat", Self::Gmsh),
             (b"$NOD", Self::Gmsh),
             (b"$Comments", Self::Gmsh),
@@ -110,6 +148,9 @@ impl Format {
             (b"<VTKFile", Self::Vtu),
             (b"ply\n", Self::Ply),
             (b"ply\r", Self::Ply),
+            (b"<GIFTI", Self::Gifti),
+            (&freesurfer::MAGIC, Self::FreeSurfer),
+            (freesurfer::TEXT, Self::FreeSurfer),
         ];
         begins.into_iter().find(|(begin, _)| bytes.starts_with(begin)).map(|(_, format)| format)
     }
@@ -120,6 +161,9 @@ impl Format {
         named.join(", ")
     }
 }
+
+/// Largest mesh file read [bytes].
+const LIMIT: u64 = 1 << 32;
 
 /// What a mesh file held.
 #[derive(Clone, Debug, PartialEq)]
@@ -138,7 +182,8 @@ pub struct MeshFile {
 pub fn read(path: &Path) -> Result<MeshFile, MeshFileError> {
     let by_ending = Format::of_path(path);
     // Whether it can be opened is said first: a missing file is not of an unsupported format.
-    let bytes = fs::read(path).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
+    let bytes =
+        read_limited(path, LIMIT).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
     let by_content = Format::of_bytes(&bytes);
     let Some(format) = by_content.or(by_ending) else {
         return Err(MeshFileError::UnsupportedFormat { path: path.to_owned() });
@@ -167,6 +212,8 @@ fn read_of(path: &Path, bytes: &[u8], format: Format) -> Result<MeshFile, MeshFi
         Format::Off => off::read(bytes),
         Format::Stl => stl::read(bytes),
         Format::Ply => ply::read(bytes),
+        Format::Gifti => gifti::read(bytes),
+        Format::FreeSurfer => freesurfer::read(bytes),
     };
     result.map_err(|fault| MeshFileError::Content {
         path: path.to_owned(),
@@ -213,11 +260,12 @@ fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Re
     let Some(name) = path.file_name() else {
         return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name")));
     };
+    remove_left_over(path, name);
     let mut beside = OsStr::new(".").to_owned();
     beside.push(name);
-    beside.push(format!(".{}.tmp", std::process::id()));
+    beside.push(format!(".{}{UNFINISHED}", std::process::id()));
     let beside = path.with_file_name(beside);
-    let written = fs::File::create(&beside).and_then(|file| {
+    let written = unfinished(&beside).and_then(|file| {
         let mut out = BufWriter::with_capacity(1 << 16, file);
         write(&mut out)?;
         out.flush()?;
@@ -228,6 +276,48 @@ fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Re
         let _ = fs::remove_file(&beside);
         failed(error)
     })
+}
+
+/// The ending of a file that is not whole yet.
+const UNFINISHED: &str = ".tmp";
+
+/// Makes a file that is locked as long as it is written, so that nobody takes it for left over. It is new: a link of its
+/// name is not followed.
+fn unfinished(path: &Path) -> io::Result<fs::File> {
+    loop {
+        let file = match fs::File::create_new(path) {
+            // Of a killed process that had the same number.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                fs::remove_file(path)?;
+                continue;
+            }
+            made => made?,
+        };
+        // A file system without locks has nothing removed from it, either.
+        let _ = file.lock();
+        if path.exists() {
+            return Ok(file);
+        }
+    }
+}
+
+/// Removes what killed processes left of a file of this name: unfinished files that nobody holds.
+fn remove_left_over(path: &Path, name: &OsStr) {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let start = format!(".{}.", name.to_string_lossy());
+    // Whatever can't be listed or removed stays; the file itself is written all the same.
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let found = entry.file_name().to_string_lossy().into_owned();
+        let number = found.strip_prefix(&start).and_then(|rest| rest.strip_suffix(UNFINISHED));
+        let ours = number.is_some_and(|number| number.parse::<u32>().is_ok());
+        if ours
+            && entry.file_type().is_ok_and(|kind| kind.is_file())
+            && let Ok(file) = fs::File::open(entry.path())
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Whether a mesh is whole: finite points, nodes and sets in range, data of the right length.

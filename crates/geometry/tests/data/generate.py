@@ -1,12 +1,13 @@
-"""Makes the mesh files of this folder with programs that are not ours: Gmsh, VTK (through pyvista) and meshio.
+"""Makes the mesh files of this folder with programs that are not ours: Gmsh, VTK (through pyvista), meshio and nibabel.
 
-    pip install numpy meshio==5.3.5 pyvista==0.49.1 vtk==9.7.2 gmsh==4.15.2
+    pip install numpy meshio==5.3.5 nibabel==5.4.2 pyvista==0.49.1 vtk==9.7.2 gmsh==4.15.2
     python generate.py
 
 The tests know what is in the files from the functions below, not from reading them with our code.
 """
 
 import meshio
+import nibabel as nib
 import numpy as np
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk
@@ -262,3 +263,20 @@ for name, kind in [("vtk.stl", "stl"), ("vtk-binary.stl", "stl"), ("vtk-big.ply"
         writer.SetFileTypeToBinary()
         writer.SetDataByteOrderToBigEndian()
     assert writer.Write()
+
+# --- GIfTI and FreeSurfer -----------------------------------------------------------------------------------
+for name, encoding in [("ascii", 1), ("base64", 2), ("gzip", 3)]:
+    arrays = [
+        nib.gifti.GiftiDataArray(np.asarray(values, kind), intent=intent, datatype=code, encoding=encoding)
+        for values, kind, intent, code in [
+            (TET, np.float32, "NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32"),
+            (FACES, np.int32, "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32"),
+        ]
+    ]
+    nib.save(nib.gifti.GiftiImage(darrays=arrays), f"nibabel-{name}.gii")
+footer = {
+    "head": np.array([2, 0, 20]), "valid": "1  # volume info valid", "filename": "orig.mgz", "volume": np.array([256, 256, 256]),
+    "voxelsize": np.ones(3), "xras": np.array([-1.0, 0, 0]), "yras": np.array([0.0, 0, -1]), "zras": np.array([0.0, 1, 0]),
+    "cras": np.array([1.5, -2.0, 3.0]),
+}
+nib.freesurfer.write_geometry("nibabel.pial", TET, FACES, create_stamp="made for a test", volume_info=footer)

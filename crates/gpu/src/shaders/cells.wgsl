@@ -34,7 +34,13 @@ fn outer(a: vec3f, b: vec3f) -> mat3x3f {
     return mat3x3f(a * b.x, a * b.y, a * b.z);
 }
 
-// Notes a broken cell: det F not above zero, or a force that is not a number. And how far it is deformed, if that is asked.
+// |C − I|².
+fn strain_square(strain_twice: Symmetric) -> f32 {
+    let diagonal = dot(strain_twice.diagonal, strain_twice.diagonal);
+    return diagonal + 2.0 * dot(strain_twice.shear, strain_twice.shear);
+}
+
+// Notes a broken cell: det F in its middle or at a corner not above zero, or a force that is not a number. And how far it is deformed, if that is asked.
 fn note(volume_ratio: f32, strain_twice: Symmetric, force: vec3f) {
     if !(volume_ratio > 0.0 && dot(force, vec3f(1.0)) < 3e38) {
         atomicMin(&findings[BROKEN], instant.index);
@@ -44,8 +50,7 @@ fn note(volume_ratio: f32, strain_twice: Symmetric, force: vec3f) {
         if ratio < atomicLoad(&findings[LEAST_VOLUME_RATIO]) {
             atomicMin(&findings[LEAST_VOLUME_RATIO], ratio);
         }
-        let diagonal = dot(strain_twice.diagonal, strain_twice.diagonal);
-        let strain = bitcast<u32>(diagonal + 2.0 * dot(strain_twice.shear, strain_twice.shear));
+        let strain = bitcast<u32>(strain_square(strain_twice));
         if strain > atomicLoad(&findings[LARGEST_STRAIN]) {
             atomicMax(&findings[LARGEST_STRAIN], strain);
         }

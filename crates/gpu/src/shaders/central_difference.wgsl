@@ -97,7 +97,7 @@ fn motion(node: u32, internal: vec3f) -> Motion {
                 same_speed[c] = 0.0;
                 shock[c] = 0.0;
             }
-            next[c] = hold.amplitude[c] * table[instant.row + 2u * hold.owner[c]];
+            next[c] = moved_by(hold, c, 0u);
             let velocity = (same_speed[c] + next[c]) * instant.per_two_steps;
             let acceleration = (next[c] - same_speed[c]) * instant.per_push + damping * velocity;
             reaction[c] = inertia * acceleration + internal[c] - applied[c];

@@ -1,5 +1,8 @@
 // Forces of uniform-strain hexahedra with hourglass control. Rows at rest: the eight B_a, with the volume and the stiffness
-// k [N/m] of the control beside the first two; the four patterns γ at each node.
+// k [N/m] of the control beside the first two, and 3/2 κ² [1/m²] beside the third; the four patterns γ at each node. Corners are looked
+// at where the patterns are large enough to invert one; forces/corners.rs of the mechanics says why.
+
+const FIRST_CORNER = 16u;
 
 fn compute(cell: u32) {
     let volume = row(0u, cell).w;
@@ -17,7 +20,8 @@ fn compute(cell: u32) {
     let d = deformation(h);
     let stress = relaxed_stress(law_stress(d, fibre(0u, cell), fibre(1u, cell)), cell);
     let piola = volume * gradient_times(d.gradient, stress);
-    let energy = 0.5 * stiffness * (dot(q[0], q[0]) + dot(q[1], q[1]) + dot(q[2], q[2]) + dot(q[3], q[3]));
+    let square = dot(q[0], q[0]) + dot(q[1], q[1]) + dot(q[2], q[2]) + dot(q[3], q[3]);
+    let energy = 0.5 * stiffness * square;
     q = stiffness * q;
     var first = vec3f(0.0);
     var size = vec3f(0.0);
@@ -29,5 +33,9 @@ fn compute(cell: u32) {
         give(cell, a, vec4f(whole, 0.0));
     }
     give(cell, 0u, vec4f(first + q * row(8u, cell), energy));
-    note(d.volume_ratio, d.strain_twice, size);
+    var ratio = d.volume_ratio;
+    if ratio < FLAT && row(2u, cell).w * square * (1.0 + strain_square(d.strain_twice)) >= ratio * ratio && is_folded(cell) {
+        ratio = min(ratio, 0.0);
+    }
+    note(ratio, d.strain_twice, size);
 }

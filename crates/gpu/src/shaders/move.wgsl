@@ -3,8 +3,9 @@
 struct Hold {
     // The constraint on each component, FREE without.
     owner: vec4u,
-    // What the factor of its motion multiplies [m].
-    amplitude: vec4f,
+    // What the two factors of its motion multiply [m].
+    first: vec4f,
+    second: vec4f,
 }
 
 const FREE = 0xffffffffu;
@@ -21,6 +22,12 @@ fn hold_of(tag: f32) -> u32 {
     return (bitcast<u32>(tag) & ~GRIPPED) - 1u;
 }
 
+// A component of a motion: how far it goes on by the step, or with `then` 1 where it is after it [m].
+fn moved_by(hold: Hold, c: u32, then: u32) -> f32 {
+    let at = instant.row + 4u * hold.owner[c] + then;
+    return hold.first[c] * table[at] + hold.second[c] * table[at + 2u];
+}
+
 // Where a node is to go, and where it is held its place.
 fn placed(place: vec3f, held: u32) -> vec3f {
     var u = place;
@@ -28,7 +35,7 @@ fn placed(place: vec3f, held: u32) -> vec3f {
         let hold = holds[held];
         for (var c = 0u; c < 3u; c++) {
             if hold.owner[c] != FREE {
-                u[c] = hold.amplitude[c] * table[instant.row + 2u * hold.owner[c] + 1u];
+                u[c] = moved_by(hold, c, 1u);
             }
         }
     }

@@ -104,6 +104,12 @@ fn every_motion_damping_mass_scaling_and_initial_velocities() {
     let table = Shape::Table(vec![(0.0, 0.0), (0.1, 1.0), (0.3, -0.5), (0.5, 0.2)]);
     let velocity = Motion::Velocity([0.0, 0.05, -0.1], Curve { shape: table, from: 0.0, to: 0.0 });
     compare(&device, "velocity", &with([true; 3], velocity), PLAIN);
+    let (axis, centre) = ([1.0, 2.0, 0.5], [0.3 * EDGE, 0.0, 0.8 * EDGE]);
+    let top = layer(CELLS);
+    let rest = held().rest;
+    let places = top.iter().map(|&node| rest[node as usize]);
+    let turned = Motion::rotation(axis, centre, 0.4, smooth(0.3), places);
+    compare(&device, "rotation", &with([true; 3], turned), PLAIN);
     let by = (0..layer(CELLS).len()).map(|k| [1e-3 * k as f64, -2e-4 * k as f64, 5e-3]).collect();
     compare(
         &device,

@@ -10,6 +10,7 @@ use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
 use crate::grid::Grid;
 use crate::image::{Image, Order, Scalar};
+use crate::names::LabelNames;
 
 const HEADER: usize = 256;
 
@@ -78,5 +79,12 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     let steps = [0, 1, 2].map(|axis| axes.column(axis).into());
     let grid = Grid::new(dims, world.vector(origin.into()), world.axes(steps))?;
     let numbers = input.numbers(grid.len(), scalar, Order::Big)?;
-    Ok(Image { grid, format: "GIPL".to_owned(), notes: Vec::new(), numbers, scale: [1.0, 0.0] })
+    Ok(Image {
+        grid,
+        format: "GIPL".to_owned(),
+        notes: Vec::new(),
+        names: LabelNames::default(),
+        numbers,
+        scale: [1.0, 0.0],
+    })
 }

@@ -1,38 +1,48 @@
 //! Bytes of a file, unpacked on the way. Memory grows with the bytes that arrive, never with what a header announces.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+use pliant_geometry::io::open_regular;
 
+use super::check_within;
 use crate::error::{Fault, ImageProblem};
 use crate::image::{Numbers, Order, Scalar};
 
 /// Longest header of a text format; NRRD's of 3D Slicer list every segment.
 const HEADER_LIMIT: u64 = 1 << 22;
 
+/// Voxels are read in pieces of so many bytes, after each of which progress is told.
+const PIECE: u64 = 1 << 24;
+
 /// A place that moves through the bytes of a file.
 pub(super) struct Input<'a> {
     bytes: Box<dyn BufRead + 'a>,
     /// The file, where its neighbours may be read.
     path: Option<PathBuf>,
+    /// The folder that neighbours have to be in, if there is one.
+    within: Option<PathBuf>,
     /// Bytes read (after unpacking).
     at: usize,
     packed: bool,
     /// Bytes that header lines may still take.
     header_left: u64,
+    /// Bytes that voxels may take.
+    limit: u64,
+    /// Hears which part of the voxels is read.
+    progress: &'a dyn Fn(f64),
 }
 
 impl<'a> Input<'a> {
-    pub fn open(path: &Path) -> io::Result<Self> {
-        let mut file = BufReader::with_capacity(1 << 16, File::open(path)?);
+    pub fn open(path: &Path, limit: u64, progress: &'a dyn Fn(f64)) -> io::Result<Self> {
+        let mut file = BufReader::with_capacity(1 << 16, open_regular(path)?);
         let packed = file.fill_buf()?.starts_with(&[0x1f, 0x8b]);
-        Ok(Self::new(file, packed, Some(path.to_owned())))
+        Ok(Self { limit, progress, ..Self::new(file, packed, Some(path.to_owned())) })
     }
 
-    pub fn of_bytes(bytes: &'a [u8]) -> Self {
-        Self::new(bytes, bytes.starts_with(&[0x1f, 0x8b]), None)
+    pub fn of_bytes(bytes: &'a [u8], limit: u64) -> Self {
+        Self { limit, ..Self::new(bytes, bytes.starts_with(&[0x1f, 0x8b]), None) }
     }
 
     fn new(bytes: impl BufRead + 'a, packed: bool, path: Option<PathBuf>) -> Self {
@@ -41,14 +51,27 @@ impl<'a> Input<'a> {
         } else {
             Box::new(bytes)
         };
-        Self { bytes, path, at: 0, packed, header_left: HEADER_LIMIT }
+        Self {
+            bytes,
+            path,
+            within: None,
+            at: 0,
+            packed,
+            header_left: HEADER_LIMIT,
+            limit: u64::MAX,
+            progress: &|_| {},
+        }
+    }
+
+    /// From now on neighbours are read in this folder only.
+    pub fn stay_within(&mut self, folder: Option<PathBuf>) {
+        self.within = folder;
     }
 
     /// What follows, as an input of its own.
     pub fn rest(&mut self) -> Input<'_> {
-        let Self { path, at, packed, header_left, .. } = self;
-        let (path, at, packed, header_left) = (path.clone(), *at, *packed, *header_left);
-        Input { bytes: Box::new(&mut self.bytes), path, at, packed, header_left }
+        let (path, within, progress) = (self.path.clone(), self.within.clone(), self.progress);
+        Input { bytes: Box::new(&mut self.bytes), path, within, progress, ..*self }
     }
 
     /// What follows, packed with gzip.
@@ -63,7 +86,7 @@ impl<'a> Input<'a> {
 
     /// The file of this name beside this one, from its beginning, packed or not: it begins with voxels, which may look like
     /// anything.
-    pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'static>, Fault> {
+    pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'a>, Fault> {
         let Some(path) = &self.path else {
             return Err(ImageProblem::Unsupported {
                 what: format!("data in another file (`{name}`)"),
@@ -72,8 +95,12 @@ impl<'a> Input<'a> {
             .into());
         };
         let path = path.with_file_name("").join(name);
-        match File::open(&path) {
-            Ok(file) => Ok(Input::new(BufReader::with_capacity(1 << 16, file), false, Some(path))),
+        match check_within(&path, self.within.as_deref()).and_then(|()| open_regular(&path)) {
+            Ok(file) => {
+                let file = BufReader::with_capacity(1 << 16, file);
+                let (within, limit, progress) = (self.within.clone(), self.limit, self.progress);
+                Ok(Input { within, limit, progress, ..Input::new(file, false, Some(path)) })
+            }
             Err(error) => {
                 let expected = "that file must lie beside the header and be readable";
                 Err(ImageProblem::bad(field, name, expected).with_cause(&error).into())
@@ -159,8 +186,24 @@ impl<'a> Input<'a> {
 
     /// The numbers of `count` voxels.
     pub fn numbers(&mut self, count: usize, scalar: Scalar, order: Order) -> Result<Numbers, Fault> {
-        let bytes = self.exact(count as u64 * scalar.size() as u64, "the voxels")?;
+        let (needed, start) = (self.within_limit(count, scalar)?, self.at);
+        let mut bytes = Vec::new();
+        while (bytes.len() as u64) < needed {
+            let piece = self.up_to(PIECE.min(needed - bytes.len() as u64), "the voxels")?;
+            if piece.is_empty() {
+                let (reading, found) = ("the voxels", bytes.len() as u64);
+                return Err(ImageProblem::Truncated { reading, expected: needed, found }.at_byte(start));
+            }
+            bytes.extend_from_slice(&piece);
+            (self.progress)(bytes.len() as f64 / needed as f64);
+        }
         Ok(Numbers { scalar, order, bytes })
+    }
+
+    /// Bytes of so many numbers, if that many may be read.
+    pub fn within_limit(&self, count: usize, scalar: Scalar) -> Result<u64, ImageProblem> {
+        let (bytes, limit) = (count as u64 * scalar.size() as u64, self.limit);
+        if bytes > limit { Err(ImageProblem::TooManyBytes { bytes, limit }) } else { Ok(bytes) }
     }
 
     fn broken(&self, reading: &'static str, error: &io::Error) -> Fault {

@@ -12,6 +12,7 @@ use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
 use crate::grid::Grid;
 use crate::image::{Image, Order, Scalar};
+use crate::names::LabelNames;
 
 /// Keys that are read, each with its synonyms; all others are passed over.
 const KEYS: [&[&str]; 15] = [
@@ -55,7 +56,7 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
         return Err(header.need("BinaryData")?.bad("it must be True; write the image in binary"));
     }
     let numbers = header.data(input)?.numbers(grid.len(), scalar, order)?;
-    Ok(Image { grid, format: "MetaImage".to_owned(), notes, numbers, scale })
+    Ok(Image { grid, format: "MetaImage".to_owned(), notes, names: LabelNames::default(), numbers, scale })
 }
 
 struct Header {

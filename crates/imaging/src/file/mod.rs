@@ -1,7 +1,7 @@
-//! Image files in: NIfTI-1 and -2, NRRD, MetaImage, GIPL, and DICOM series. The reader goes by the first bytes where
+//! Image files in: NIfTI-1 and -2, NRRD, MetaImage, GIPL, DICOM series and segmentations. The reader goes by the first bytes where
 //! they tell the format, otherwise by the ending; gzip is recognised by its own first bytes. Sizes are held against the
 //! limit and the bytes that are there before anything is allocated.
-//! Leaves out: more than one value a voxel, time series, compressed DICOM slices.
+//! Leaves out: more than one value a voxel, time series, compressed DICOM slices, contours.
 
 mod dicom;
 mod gipl;
@@ -12,7 +12,8 @@ mod nrrd;
 mod text;
 
 use std::ffi::OsStr;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Fault, ImageError, ImageProblem};
 use crate::image::Image;
@@ -23,14 +24,18 @@ use input::Input;
 pub struct ReadOptions {
     /// Most voxels allowed.
     pub voxel_limit: u64,
+    /// Most bytes of voxels allowed, unpacked.
+    pub byte_limit: u64,
     /// UID of the DICOM series to read, where a folder holds several.
     pub series: Option<String>,
+    /// Folder, links resolved, that files named in headers and slices have to be in; anywhere if not given.
+    pub within: Option<PathBuf>,
 }
 
 impl Default for ReadOptions {
-    /// 2²⁹ voxels (1 GiB of 16-bit numbers), the only series of a folder.
+    /// 2²⁹ voxels of 2 GiB at most (as of 32-bit numbers), the only series of a folder.
     fn default() -> Self {
-        Self { voxel_limit: 1 << 29, series: None }
+        Self { voxel_limit: 1 << 29, byte_limit: 1 << 31, series: None, within: None }
     }
 }
 
@@ -45,7 +50,7 @@ pub enum ImageFormat {
     MetaImage,
     /// GIPL: `.gipl`.
     Gipl,
-    /// DICOM: a folder of slices.
+    /// DICOM: a folder of slices, or a file of several frames.
     Dicom,
 }
 
@@ -90,14 +95,24 @@ impl ImageFormat {
 
 /// Reads an image file, or the DICOM series of a folder.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Image, ImageError> {
+    read_with(path, options, &|_| {})
+}
+
+/// The same; `progress` hears fractions from 0 to 1.
+pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Fn(f64)) -> Result<Image, ImageError> {
     if path.is_dir() {
-        return dicom::read_folder(path, options);
+        return dicom::read_folder(path, options, progress);
     }
     // Whether it can be opened is said first: a missing file is not of an unknown format.
-    let mut input = Input::open(path).map_err(|source| ImageError::Open { path: path.to_owned(), source })?;
+    let mut input = Input::open(path, options.byte_limit, progress)
+        .map_err(|source| ImageError::Open { path: path.to_owned(), source })?;
+    input.stay_within(options.within.clone());
     let content = |fault: Fault| fault.in_file(path);
     let head = input.peek(352).map_err(content)?;
     match ImageFormat::of_bytes(&head).or(ImageFormat::of_path(path)) {
+        Some(ImageFormat::Dicom) => {
+            dicom::read_file(&dicom::file_bytes(path)?, false, options).map_err(content)
+        }
         Some(format) => read_input(&mut input, format, options).map_err(content),
         None => Err(ImageError::UnknownFormat { path: path.to_owned() }),
     }
@@ -107,8 +122,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Image, ImageError> {
 /// are refused. A DICOM slice counts as a volume of one slice.
 pub fn read_bytes(bytes: &[u8], format: ImageFormat, options: &ReadOptions) -> Result<Image, ImageError> {
     let result = match format {
-        ImageFormat::Dicom => dicom::read_slice_bytes(bytes, options),
-        _ => read_input(&mut Input::of_bytes(bytes), format, options),
+        ImageFormat::Dicom => dicom::read_file(bytes, true, options),
+        _ => read_input(&mut Input::of_bytes(bytes, options.byte_limit), format, options),
     };
     result.map_err(|fault| fault.in_file(Path::new("bytes")))
 }
@@ -119,17 +134,25 @@ fn read_input(input: &mut Input<'_>, format: ImageFormat, options: &ReadOptions)
         ImageFormat::Nrrd => nrrd::read(input, options),
         ImageFormat::MetaImage => metaimage::read(input, options),
         ImageFormat::Gipl => gipl::read(input, options),
-        ImageFormat::Dicom => Err(ImageProblem::Unsupported {
-            what: "a single DICOM slice".to_owned(),
-            remedy: "give the folder that holds the whole series",
-        }
-        .into()),
+        ImageFormat::Dicom => Err(ImageProblem::NoSlices { files: 1 }.into()),
     }
 }
 
 impl Fault {
-    fn in_file(self, path: &Path) -> ImageError {
+    pub(crate) fn in_file(self, path: &Path) -> ImageError {
         ImageError::Content { path: path.to_owned(), place: self.place, problem: Box::new(self.problem) }
+    }
+}
+
+/// Refuses a file that really lies outside a folder.
+fn check_within(path: &Path, folder: Option<&Path>) -> io::Result<()> {
+    match folder {
+        Some(folder) if !path.canonicalize()?.starts_with(folder) => {
+            let reason =
+                format!("it is outside the folder `{}`, and nothing else may be read", folder.display());
+            Err(io::Error::new(io::ErrorKind::PermissionDenied, reason))
+        }
+        _ => Ok(()),
     }
 }
 

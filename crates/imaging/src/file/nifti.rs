@@ -1,6 +1,6 @@
 //! NIfTI-1 and NIfTI-2, single files (`.nii`) and pairs (`.hdr`, `.img`). Fields and methods 1 to 3 of orientation: nifti1.h
 //! of the NIfTI Data Format Working Group; 540-byte header: nifti2.h. The sform is taken where its code is above 0, else
-//! the qform, else the spacing alone.
+//! the qform, else the spacing alone. A table of labels in an extension (Caret, Connectome Workbench, TotalSegmentator) names them.
 //! Leaves out: several volumes, colours, complex numbers, ANALYZE 7.5 (which has no orientation).
 
 use nalgebra::Matrix3;
@@ -11,6 +11,10 @@ use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
 use crate::grid::Grid;
 use crate::image::{Image, Order, Scalar};
+use crate::names::{self, LabelNames};
+
+/// Bytes of the extensions in which names of labels are looked for.
+const EXTENSIONS: u64 = 1 << 22;
 
 /// Bytes of the headers of version 1 and 2.
 const HEADER: [usize; 2] = [348, 540];
@@ -33,15 +37,19 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     let grid = header.grid(dims, &mut notes)?;
     let scale = header.scale()?;
     let offset = header.vox_offset()?;
+    let mut names = LabelNames::default();
     let numbers = if header.single {
-        input.skip(offset - header.bytes.len() as u64, "the extensions of the header")?;
+        let extensions = offset - header.bytes.len() as u64;
+        let looked = input.exact(extensions.min(EXTENSIONS), "the extensions of the header")?;
+        input.skip(extensions - looked.len() as u64, "the extensions of the header")?;
+        names::of_xml(&String::from_utf8_lossy(&looked), &mut names);
         input.numbers(grid.len(), scalar, header.order)?
     } else {
         let mut data = header.pair(input)?;
         data.skip(offset, "the bytes before the voxels")?;
         data.numbers(grid.len(), scalar, header.order)?
     };
-    Ok(Image { grid, format: format!("NIfTI-{}", header.version), notes, numbers, scale })
+    Ok(Image { grid, format: format!("NIfTI-{}", header.version), notes, names, numbers, scale })
 }
 
 /// The header as bytes, and how to read them.
@@ -293,7 +301,7 @@ impl Header {
     }
 
     /// The `.img` that belongs to a `.hdr`.
-    fn pair(&self, input: &Input<'_>) -> Result<Input<'static>, Fault> {
+    fn pair<'i>(&self, input: &Input<'i>) -> Result<Input<'i>, Fault> {
         let names = input.sibling_names("img");
         let [plain, packed] = names.as_slice() else {
             return input.beside("magic", "the .img of this .hdr");

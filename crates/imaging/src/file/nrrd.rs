@@ -1,6 +1,9 @@
 //! NRRD: a text header, `field: value`, that ends at an empty line or with the file (detached header), then the voxels
-//! (Teem's definition of the format, NRRD0001 to NRRD0005). An axis of one element without direction is dropped.
+//! (Teem's definition of the format, NRRD0001 to NRRD0005). An axis of one element without direction is dropped. The names of labels are those
+//! that 3D Slicer writes: `Segment0_Name:=liver` beside `Segment0_LabelValue:=5`.
 //! Leaves out: several values a voxel, encodings hex and bzip2, data spread over several files.
+
+use std::collections::BTreeMap;
 
 use pliant_geometry::Vector3;
 
@@ -10,6 +13,7 @@ use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
 use crate::grid::Grid;
 use crate::image::{Image, Numbers, Order, Scalar};
+use crate::names::LabelNames;
 
 /// Fields that are read, each with its synonyms; all others are passed over.
 const FIELDS: [&[&str]; 16] = [
@@ -44,11 +48,14 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     let grid = Grid::new(size, world.vector(header.origin(&axes)?), world.axes(axes.steps))
         .map_err(|problem| problem.at_line(line))?;
     let numbers = header.numbers(input, grid.len(), scalar)?;
-    Ok(Image { grid, format: "NRRD".to_owned(), notes, numbers, scale: [1.0, 0.0] })
+    let names = header.names();
+    Ok(Image { grid, format: "NRRD".to_owned(), notes, names, numbers, scale: [1.0, 0.0] })
 }
 
 struct Header {
     fields: Vec<Field>,
+    /// `key:=value`.
+    pairs: Vec<(String, String)>,
 }
 
 /// The three axes of the image, in units of the file.
@@ -67,11 +74,15 @@ impl Header {
                 format!("it begins with `{}`", magic.chars().take(12).collect::<String>().escape_debug());
             return Err(ImageProblem::NotThisFormat { format: "NRRD", found }.at_line(1));
         }
-        let mut fields = Vec::new();
+        let (mut fields, mut pairs) = (Vec::new(), Vec::new());
         let mut line_number = 1;
         while let Some(line) = input.line()?.filter(|line| !line.is_empty()) {
             line_number += 1;
-            if line.starts_with('#') || line.contains(":=") {
+            if line.starts_with('#') {
+                continue;
+            }
+            if let Some((key, value)) = line.split_once(":=") {
+                pairs.push((key.to_owned(), value.to_owned()));
                 continue;
             }
             let Some((key, value)) = line.split_once(": ") else {
@@ -83,7 +94,25 @@ impl Header {
                 fields.push(Field { name: names[0], value: value.trim().to_owned(), line: line_number });
             }
         }
-        Ok(Self { fields })
+        Ok(Self { fields, pairs })
+    }
+
+    /// The names of the segments by their labels.
+    fn names(&self) -> LabelNames {
+        let labels = self.pairs.iter().filter_map(|(key, value)| {
+            Some((
+                key.strip_suffix("_LabelValue").filter(|key| key.starts_with("Segment"))?,
+                value.trim().parse().ok()?,
+            ))
+        });
+        let labels: BTreeMap<&str, i32> = labels.collect();
+        let mut names = LabelNames::default();
+        for (key, name) in &self.pairs {
+            if let Some(&label) = key.strip_suffix("_Name").and_then(|key| labels.get(key)) {
+                names.insert(label, name);
+            }
+        }
+        names
     }
 
     fn get(&self, name: &str) -> Option<&Field> {
@@ -308,6 +337,7 @@ fn vectors(field: &Field) -> Result<Vec<Option<Vector3>>, Fault> {
 /// Numbers as text, kept in the type of the header.
 fn read_text(data: &mut Input<'_>, count: usize, scalar: Scalar) -> Result<Numbers, Fault> {
     // A voxel takes a digit and a space at least, so memory stays within a few times the file.
+    data.within_limit(count, scalar)?;
     let text = data.up_to(count as u64 * 32, "the voxels")?;
     let mut bytes = Vec::new();
     let mut found = 0;

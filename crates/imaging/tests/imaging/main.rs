@@ -4,6 +4,7 @@ mod bad;
 mod cleaning;
 mod fields;
 mod formats;
+mod labels;
 mod mutation;
 mod real;
 mod write;

@@ -36,6 +36,12 @@ fn seeds() -> Vec<(ImageFormat, Vec<u8>)> {
     for syntax in [Syntax::Implicit, Syntax::Explicit, Syntax::Deflated, Syntax::BigEndian] {
         seeds.push((ImageFormat::Dicom, dicom(&volume, 1, syntax, "1.2")));
     }
+    let labels =
+        Volume { values: volume.values.iter().map(|value| value.rem_euclid(3)).collect(), ..volume.clone() };
+    for kind in [Segments::Bits, Segments::Fractions, Segments::Labels] {
+        seeds.push((ImageFormat::Dicom, segmentation(&labels, kind, &["a", "b"], Syntax::Explicit)));
+    }
+    seeds.push((ImageFormat::Dicom, segmentation(&labels, Segments::Bits, &["a", "b"], Syntax::Implicit)));
     seeds
 }
 
@@ -185,5 +191,14 @@ fn write_the_corpus() {
         &[&slice[..slice.len() - 52], b"\xE0\x7F\x08\x00OB\0\0\xF0\xFF\xFF\xFF"].concat(),
     );
     save("dicom-deep", &[&slice[..160], &b"\x08\0\x40\x11SQ\0\0\xFF\xFF\xFF\xFF".repeat(100)[..]].concat());
+    let labels =
+        Volume { values: volume.values.iter().map(|value| value.rem_euclid(3)).collect(), ..volume.clone() };
+    let seg = segmentation(&labels, Segments::Bits, &["a", "b"], Syntax::Explicit);
+    save("dicom-contours", &structure_set());
+    save("dicom-seg-cut", &seg[..seg.len() - 30]);
+    let frames = seg.windows(4).position(|tag| tag == [0x28, 0, 8, 0]).expect("NumberOfFrames");
+    save("dicom-seg-frames", &with(seg.clone(), frames + 8, b"9"));
+    let segment = seg.windows(4).position(|tag| tag == [0x62, 0, 0x0B, 0]).expect("ReferencedSegmentNumber");
+    save("dicom-seg-zero", &with(seg.clone(), segment + 8, &[0, 0]));
     save("dicom-deflated-cut", &dicom(&volume, 0, Syntax::Deflated, "1")[..250]);
 }

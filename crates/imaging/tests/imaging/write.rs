@@ -280,6 +280,138 @@ pub fn dicom(volume: &Volume, k: usize, syntax: Syntax, series: &str) -> Vec<u8>
     file
 }
 
+/// How a segmentation tells what is inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Segments {
+    Bits,
+    /// A byte a pixel, 200 at most; half of it and more is inside.
+    Fractions,
+    /// A number a pixel.
+    Labels,
+}
+
+/// A segmentation of the labels of a volume by PS3.3 C.8.20, with the names of its segments. Frames without any voxel are left out.
+pub fn segmentation(volume: &Volume, kind: Segments, names: &[&str], syntax: Syntax) -> Vec<u8> {
+    let [nx, ny, nz] = volume.dims;
+    let (plane, [row, column, _], [along, down, between]) =
+        (nx * ny, volume.directions_lps(), volume.spacing());
+    let text = |values: &[f64]| {
+        values.iter().map(|x| format!("{x:.14}")).collect::<Vec<_>>().join("\\").into_bytes()
+    };
+    let number = |x: usize| {
+        if syntax == Syntax::BigEndian { (x as u16).to_be_bytes() } else { (x as u16).to_le_bytes() }
+    };
+    let item = |content: &[u8]| {
+        let mut item = Vec::new();
+        tag(&mut item, 0xFFFE_E000, syntax);
+        let length = content.len() as u32;
+        item.extend(if syntax == Syntax::BigEndian { length.to_be_bytes() } else { length.to_le_bytes() });
+        item.extend(content);
+        item
+    };
+    let sequence = |out: &mut Vec<u8>, number: u32, items: &[Vec<u8>]| {
+        let mut content: Vec<u8> = items.iter().flat_map(|content| item(content)).collect();
+        tag(&mut content, 0xFFFE_E0DD, syntax);
+        content.extend([0; 4]);
+        element(out, number, b"SQ", &content, syntax);
+    };
+    let segments: Vec<i16> =
+        if kind == Segments::Labels { vec![0] } else { (1..=names.len() as i16).collect() };
+    let (mut frames, mut pixels) = (Vec::new(), Vec::new());
+    for &segment in &segments {
+        for k in 0..nz {
+            let values = &volume.values[k * plane..(k + 1) * plane];
+            if !values.iter().any(|&value| value != 0 && (segment == 0 || value == segment)) {
+                continue;
+            }
+            let mut frame = Vec::new();
+            let position = volume.origin + volume.axes.column(2) * k as f64;
+            let mut place = Vec::new();
+            element(&mut place, 0x0020_0032, b"DS", &text(&[-position.x, -position.y, position.z]), syntax);
+            sequence(&mut frame, 0x0020_9113, &[place]);
+            let mut which = Vec::new();
+            element(&mut which, 0x0062_000B, b"US", &number(segment as usize), syntax);
+            sequence(&mut frame, 0x0062_000A, &[which]);
+            frames.push(frame);
+            pixels.extend(values.iter().map(|&value| match kind {
+                Segments::Labels => value as u8,
+                _ => u8::from(value == segment),
+            }));
+        }
+    }
+    let pixels: Vec<u8> = match kind {
+        Segments::Bits => {
+            pixels.chunks(8).map(|bits| bits.iter().rev().fold(0, |byte, bit| byte << 1 | bit)).collect()
+        }
+        Segments::Fractions => pixels.iter().map(|inside| if *inside == 1 { 100 } else { 99 }).collect(),
+        Segments::Labels => pixels,
+    };
+    let mut shared = Vec::new();
+    let mut directions = Vec::new();
+    element(&mut directions, 0x0020_0037, b"DS", &text(&[row, column].concat()), syntax);
+    sequence(&mut shared, 0x0020_9116, &[directions]);
+    let mut measures = Vec::new();
+    element(&mut measures, 0x0018_0050, b"DS", &text(&[between]), syntax);
+    element(&mut measures, 0x0018_0088, b"DS", &text(&[between]), syntax);
+    element(&mut measures, 0x0028_0030, b"DS", &text(&[down, along]), syntax);
+    sequence(&mut shared, 0x0028_9110, &[measures]);
+    let named = (1..).zip(names).map(|(label, name)| {
+        let mut segment = Vec::new();
+        element(&mut segment, 0x0062_0004, b"US", &number(label), syntax);
+        element(&mut segment, 0x0062_0005, b"LO", name.as_bytes(), syntax);
+        segment
+    });
+    let uid = match syntax {
+        Syntax::Implicit => "1.2.840.10008.1.2",
+        Syntax::BigEndian => "1.2.840.10008.1.2.2",
+        _ => "1.2.840.10008.1.2.1",
+    };
+    let mut file = vec![0; 128];
+    file.extend(b"DICM");
+    element(&mut file, 0x0002_0010, b"UI", uid.as_bytes(), Syntax::Explicit);
+    let class = if kind == Segments::Labels {
+        "1.2.840.10008.5.1.4.1.1.66.7"
+    } else {
+        "1.2.840.10008.5.1.4.1.1.66.4"
+    };
+    let bits = if kind == Segments::Bits { 1 } else { 8 };
+    let word: &[u8] = match kind {
+        Segments::Bits => b"BINARY",
+        Segments::Fractions => b"FRACTIONAL",
+        Segments::Labels => b"LABELMAP",
+    };
+    element(&mut file, 0x0008_0016, b"UI", class.as_bytes(), syntax);
+    element(&mut file, 0x0020_000E, b"UI", b"1.9", syntax);
+    element(&mut file, 0x0028_0002, b"US", &number(1), syntax);
+    element(&mut file, 0x0028_0004, b"CS", b"MONOCHROME2", syntax);
+    element(&mut file, 0x0028_0008, b"IS", frames.len().to_string().as_bytes(), syntax);
+    element(&mut file, 0x0028_0010, b"US", &number(ny), syntax);
+    element(&mut file, 0x0028_0011, b"US", &number(nx), syntax);
+    element(&mut file, 0x0028_0100, b"US", &number(bits), syntax);
+    element(&mut file, 0x0028_0101, b"US", &number(bits), syntax);
+    element(&mut file, 0x0028_0102, b"US", &number(bits - 1), syntax);
+    element(&mut file, 0x0028_0103, b"US", &number(0), syntax);
+    element(&mut file, 0x0062_0001, b"CS", word, syntax);
+    sequence(&mut file, 0x0062_0002, &named.collect::<Vec<_>>());
+    if kind == Segments::Fractions {
+        element(&mut file, 0x0062_000E, b"US", &number(200), syntax);
+    }
+    sequence(&mut file, 0x5200_9229, &[shared]);
+    sequence(&mut file, 0x5200_9230, &frames);
+    element(&mut file, 0x7FE0_0010, b"OW", &pixels, syntax);
+    file
+}
+
+/// A structure set: contours, no pixels.
+pub fn structure_set() -> Vec<u8> {
+    let mut file = vec![0; 128];
+    file.extend(b"DICM");
+    element(&mut file, 0x0002_0010, b"UI", b"1.2.840.10008.1.2.1", Syntax::Explicit);
+    element(&mut file, 0x0008_0016, b"UI", b"1.2.840.10008.5.1.4.1.1.481.3", Syntax::Explicit);
+    element(&mut file, 0x3006_0002, b"SH", b"organs", Syntax::Explicit);
+    file
+}
+
 /// An item of undefined length with ImagePositionPatient in it, ended by its delimiters.
 fn nested(syntax: Syntax) -> Vec<u8> {
     let mut item = Vec::new();

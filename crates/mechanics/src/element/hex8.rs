@@ -17,6 +17,10 @@ pub const HEX_CORNERS: [[f64; 3]; 8] = [
     [-1.0, 1.0, 1.0],
 ];
 
+/// The ends of the three edges at each corner, in the order in which a valid cell has them right-handed.
+pub const HEX_EDGES: [[usize; 3]; 8] =
+    [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]];
+
 /// A hexahedron at rest.
 #[derive(Clone, Copy, Debug)]
 pub struct Hex8 {
@@ -28,6 +32,8 @@ pub struct Hex8 {
     pub moments: [Vector<f64>; 4],
     /// Smallest Jacobian determinant at the corners over the mean one; ≤ 0 for a folded cell.
     pub worst_corner: f64,
+    /// κ² [1/m²]: at no corner does F differ from the mean one by more than κ |q|, with q_c = Σ_a γ_ca u_a.
+    pub corner_reach: f64,
 }
 
 /// The rest quantities of a hexahedron from its nodes [m].
@@ -48,13 +54,33 @@ pub fn hex8(x: &[Vector<f64>; 8]) -> Hex8 {
         *b /= volume;
     }
     let moments = hourglass_moments(x);
-    let worst = HEX_CORNERS.iter().map(|&c| shape_derivatives(x, c).0).fold(f64::INFINITY, f64::min);
+    let hourglass = hourglass_vectors(&moments, &gradient);
+    let corners = HEX_CORNERS.map(|corner| shape_derivatives(x, corner));
+    let worst = corners.iter().map(|corner| corner.0).fold(f64::INFINITY, f64::min);
     Hex8 {
         rest: Rest { volume, gradient },
-        hourglass: hourglass_vectors(&moments, &gradient),
+        hourglass,
         moments,
         worst_corner: worst * 8.0 / volume.abs(),
+        corner_reach: corner_reach(&corners.map(|corner| corner.1), &gradient, &hourglass),
     }
+}
+
+/// κ². ∂N_a/∂X at a corner less the mean one gives zero for linear fields, so that it is Σ_c γ_ca W_c; κ bounds the norm of
+/// every W, whose largest eigenvalue of WᵀW is at most the mean of all and √2 times their scatter.
+fn corner_reach(corners: &[[Vector<f64>; 8]; 8], mean: &[Vector<f64>; 8], hourglass: &[[f64; 8]; 4]) -> f64 {
+    let gamma = nalgebra::SMatrix::<f64, 4, 8>::from_fn(|c, a| hourglass[c][a]);
+    let inverse = (gamma * gamma.transpose()).try_inverse();
+    let reach = |corner: &[Vector<f64>; 8]| {
+        let off = nalgebra::SMatrix::<f64, 8, 3>::from_fn(|a, i| corner[a][i] - mean[a][i]);
+        let w = inverse? * (gamma * off);
+        let square = w.transpose() * w;
+        let centre = square.trace() / 3.0;
+        let scatter = (square.norm_squared() / 3.0 - centre * centre).max(0.0).sqrt();
+        Some(centre + std::f64::consts::SQRT_2 * scatter)
+    };
+    // A cell so flat that nothing is known is always looked at.
+    corners.iter().map(|corner| reach(corner).unwrap_or(f64::MAX)).fold(0.0, f64::max)
 }
 
 /// The eight Gauss points of a hexahedron at rest.

@@ -182,6 +182,15 @@ pub(super) fn pressures<R: Real, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack<R
     }
 }
 
+/// U(J) [J/m³] at one J − 1, of a law whose volumetric energy is one of J alone.
+pub(crate) fn volumetric_energy(law: &AnyLaw, volume_change: f64) -> f64 {
+    let c = (1.0 + volume_change).cbrt();
+    let (stretch, o) = (volume_change / (c * c + c + 1.0), 0.0);
+    let dilation = Tensor([[stretch, o, o], [o, stretch, o], [o, o, stretch]]);
+    let any = [[1.0, 0.0, 0.0]; FAMILIES];
+    law.energy(&Deformation::from_displacement_gradient(&dilation), &any[..law.families()]).volumetric
+}
+
 /// U'(J) [Pa] at one J − 1.
 pub(crate) fn pressure(law: &AnyLaw, volume_change: f64) -> f64 {
     struct One<'a>(&'a AnyLaw, Pack<f64>);

@@ -4,6 +4,7 @@
 use super::averaged::{relaxed_pressures, volume_change};
 use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
+use super::corners::{Look, PackedCorners, is_flat};
 use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
 use crate::Real;
 use crate::element::GaussPoints;
@@ -25,6 +26,7 @@ struct Constants<R> {
     law: AnyLaw,
     cells: PackedCells<R, 8>,
     points: Vec<[Point<R>; 8]>,
+    corners: Vec<PackedCorners<R>>,
     /// 1/V [1/m³]; zero beyond the last cell.
     inverse_volume: Vec<Pack<R>>,
     relaxation: Relaxation<R>,
@@ -59,6 +61,7 @@ impl<R: Real> FullHexes<R> {
                 inverse_volume: (packed.packs())
                     .map(|pack| packed.pack(pack, |cell| R::of(1.0 / cells.rest[cell].volume)))
                     .collect(),
+                corners: PackedCorners::of(&packed, &cells.offsets),
                 cells: packed,
                 relaxation: Relaxation::new(prony, step),
                 isochoric_slots: prony.isochoric_slots(),
@@ -81,7 +84,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Findings<R> {
         let Self { constants, displacement, mut task } = self;
-        let Constants { law, cells, points, inverse_volume, relaxation, .. } = constants;
+        let Constants { law, cells, points, corners, inverse_volume, relaxation, .. } = constants;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, pressures, .. } = task;
         sums.fill([R::ZERO; 4]);
@@ -107,6 +110,18 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                     change += L::load(weight, at) * volume_change(&h);
                 }
                 (change * L::load(&inverse_volume[pack], at)).store(&mut pressure, at);
+            }
+            let mut ratio = pressure;
+            ratio.0.iter_mut().for_each(|change| *change += R::ONE);
+            if findings.folded.is_none() && ratio.0.iter().any(|&ratio| is_flat(ratio)) {
+                let pack_of_block = pack - packs.start;
+                let look = Look::<R, 8, 7> {
+                    corners: &corners[pack],
+                    local: &local,
+                    ratio: &ratio,
+                    pack: pack_of_block,
+                };
+                findings.folded = L::call(look).map(|lane| pack * PACK + lane);
             }
             // U'(v/V), relaxed where the law's volumetric part relaxes.
             let slots = constants.volumetric_slots;

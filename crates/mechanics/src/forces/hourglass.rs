@@ -15,6 +15,8 @@ pub(super) struct PackedHourglass<R> {
     moments: [Vector<Pack<R>>; 4],
     /// k [N/m].
     stiffness: Pack<R>,
+    /// 3/2 κ² [1/m²]; see `corners.rs`.
+    reach: Pack<R>,
 }
 
 impl<R: Real> PackedHourglass<R> {
@@ -22,6 +24,7 @@ impl<R: Real> PackedHourglass<R> {
         let of_pack = |pack: usize| Self {
             moments: [0, 1, 2, 3].map(|c| packed.vector(pack, |cell| cast(control.moments[cell][c]))),
             stiffness: packed.pack(pack, |cell| R::of(control.stiffness[cell])),
+            reach: packed.pack(pack, |cell| R::of((1.5 * control.corner_reach[cell]).min(1e30))),
         };
         packed.packs().map(of_pack).collect()
     }
@@ -36,7 +39,8 @@ impl<R: Real> Resistance<R> {
         Self([[Pack::ZERO; 3]; 4])
     }
 
-    /// Finds k q_c from the displacements relative to the first node and their gradient; returns the energy ½ k Σ |q_c|² [J].
+    /// Finds k q_c from the displacements relative to the first node and their gradient; returns the energy ½ k Σ |q_c|² [J] and
+    /// 3/2 κ² Σ |q_c|².
     #[inline(always)]
     pub(super) fn find<L: Lanes<R>, const M: usize>(
         &mut self,
@@ -44,7 +48,7 @@ impl<R: Real> Resistance<R> {
         u: &[Vector<L>; M],
         h: &Tensor<L>,
         at: usize,
-    ) -> L {
+    ) -> [L; 2] {
         let stiffness = L::load(&control.stiffness, at);
         let mut energy = L::ZERO;
         for ((signed, moment), kq) in signed_sums(u).into_iter().zip(&control.moments).zip(&mut self.0) {
@@ -52,7 +56,7 @@ impl<R: Real> Resistance<R> {
             energy += dot(q, q);
             store_vector(scale(q, stiffness), kq, at);
         }
-        L::of(0.5) * stiffness * energy
+        [L::of(0.5) * stiffness * energy, L::load(&control.reach, at) * energy]
     }
 
     /// Takes Σ_c k q_c ⊗ Y_c from V P.

@@ -8,6 +8,7 @@
 mod averaged;
 mod batch;
 mod blocks;
+mod corners;
 mod full_hex;
 mod hourglass;
 mod plain;
@@ -15,7 +16,7 @@ mod plain;
 mod tests;
 
 use averaged::AveragedTets;
-pub(crate) use batch::pressure;
+pub(crate) use batch::{pressure, volumetric_energy};
 pub(crate) use blocks::BLOCK;
 use blocks::{Blocks, Quad, Shares};
 use full_hex::FullHexes;
@@ -39,6 +40,8 @@ pub struct Findings<R> {
     hourglass: Pack<R>,
     /// The first cell of the pass with det F ≤ 0 or not a number, and its det F.
     inverted: Option<(usize, f64)>,
+    /// A cell of the pass with a corner turned inside out.
+    folded: Option<usize>,
     /// The least det F.
     least_volume_ratio: Pack<R>,
     /// The largest |C − I|².
@@ -48,7 +51,13 @@ pub struct Findings<R> {
 impl<R: Real> Default for Findings<R> {
     fn default() -> Self {
         let least_volume_ratio = Pack([R::ONE; PACK]);
-        Self { hourglass: Pack::ZERO, inverted: None, least_volume_ratio, largest_strain: Pack::ZERO }
+        Self {
+            hourglass: Pack::ZERO,
+            inverted: None,
+            folded: None,
+            least_volume_ratio,
+            largest_strain: Pack::ZERO,
+        }
     }
 }
 
@@ -90,6 +99,8 @@ pub(crate) struct Found {
     pub hourglass: f64,
     /// The first inverted cell as (solid, cell, det F).
     pub inverted: Option<(usize, usize, f64)>,
+    /// The first hexahedron of which a corner is turned inside out, as (solid, cell).
+    pub folded: Option<(usize, usize)>,
     /// How far the cells are deformed.
     pub(crate) deformed: Deformed,
 }
@@ -308,6 +319,7 @@ impl<R: Real> InternalForces<R> {
             field.evaluate(displacement, &mut history[index], forces, &mut self.findings[index]);
             for findings in &self.findings[index] {
                 found.inverted = found.inverted.or(findings.inverted.map(|(cell, j)| (index, cell, j)));
+                found.folded = found.folded.or(findings.folded.map(|cell| (index, cell)));
                 for lane in 0..PACK {
                     found.hourglass += findings.hourglass.0[lane].to_f64();
                     found.deformed = found.deformed.merge(Deformed {

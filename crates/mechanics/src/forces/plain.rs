@@ -2,6 +2,7 @@
 
 use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
+use super::corners::{Look, PackedCorners, may_fold};
 use super::hourglass::{PackedHourglass, Resistance};
 use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
@@ -27,6 +28,8 @@ struct Constants<R, const N: usize, const M: usize> {
     cells: PackedCells<R, N>,
     rest: Vec<PackedRest<R, M>>,
     hourglass: Option<Vec<PackedHourglass<R>>>,
+    /// Of hexahedra.
+    corners: Vec<PackedCorners<R>>,
     relaxation: Relaxation<R>,
     /// Packs of history for a pack of cells.
     history: usize,
@@ -36,6 +39,10 @@ impl<R: Real, const N: usize, const M: usize> SolidForces<R, N, M> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<N>, step: f64) -> Self {
         let (packed, blocks) = PackedCells::new(solid, cells);
         let hourglass = cells.hourglass.as_ref().map(|control| PackedHourglass::of(&packed, control));
+        let corners = match hourglass {
+            Some(_) => PackedCorners::of(&packed, &cells.offsets),
+            None => Vec::new(),
+        };
         Self {
             processor: Processor::detect(),
             moved: Moved::new(blocks),
@@ -44,6 +51,7 @@ impl<R: Real, const N: usize, const M: usize> SolidForces<R, N, M> {
                 rest: PackedRest::of(&packed, cells),
                 cells: packed,
                 hourglass,
+                corners,
                 relaxation: Relaxation::new(&solid.material.prony, step),
                 history: 6 * solid.material.prony.slots(),
             },
@@ -64,13 +72,14 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Findings<R> {
         let Self { constants, displacement, mut task } = self;
-        let Constants { law, cells, rest, hourglass, relaxation, history: per_pack } = constants;
+        let Constants { law, cells, rest, hourglass, corners, relaxation, history: per_pack } = constants;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);
         let mut findings = Findings::default();
         let mut batch = Batch::new();
         let mut resistance = [Resistance::new(); PACKS];
+        let mut reach = [Pack::ZERO; PACKS];
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); N];
         let packs = cells.packs_of(block);
         let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
@@ -83,7 +92,8 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                     let h = displacement_gradient(&u, &rest[pack].gradient, at);
                     batch.set(index, at, &h);
                     if let Some(control) = hourglass {
-                        let energy = resistance.find(&control[pack], &u, &h, at);
+                        let [energy, far] = resistance.find(&control[pack], &u, &h, at);
+                        far.store(&mut reach[index], at);
                         (energy + L::load(&findings.hourglass, at)).store(&mut findings.hourglass, at);
                     }
                 }
@@ -92,6 +102,18 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
             for (index, resistance) in resistance[..count].iter().enumerate() {
                 let pack = first + index;
                 batch.note(index, pack * PACK, &mut findings);
+                let (ratio, strain) = (&batch.volume_ratio[index], &batch.strain[index]);
+                if hourglass.is_some() && may_fold(&reach[index], ratio, strain) && findings.folded.is_none()
+                {
+                    let pack_of_block = pack - packs.start;
+                    let look = Look::<R, N, M> {
+                        corners: &corners[pack],
+                        local: &local,
+                        ratio,
+                        pack: pack_of_block,
+                    };
+                    findings.folded = L::call(look).map(|lane| pack * PACK + lane);
+                }
                 let own = (pack - packs.start) * per_pack;
                 let own = own.min(history.len())..(own + per_pack).min(history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {

@@ -71,6 +71,33 @@ pub fn dihedral_range(mesh: &Mesh) -> [f64; 2] {
     range
 }
 
+/// Length of the longest edge [m].
+pub fn longest_edge(mesh: &Mesh) -> f64 {
+    let of_tet =
+        |[a, b, c, d]: [Vector3; 4]| [a - b, a - c, a - d, b - c, b - d, c - d].map(|edge| edge.norm());
+    tets(mesh).flat_map(of_tet).fold(0.0, f64::max)
+}
+
+/// Points of a boundary whose faces there are more than one fan.
+pub fn pinched(faces: &[Vec<u32>]) -> Vec<u32> {
+    let mut others: BTreeMap<u32, Vec<[u32; 2]>> = BTreeMap::new();
+    for face in faces {
+        for (at, &node) in face.iter().enumerate() {
+            others.entry(node).or_default().push([face[(at + 1) % 3], face[(at + 2) % 3]]);
+        }
+    }
+    // From the first face on to the next by the edge that both have: one fan comes back after all of them.
+    let is_one_fan = |links: &Vec<[u32; 2]>| {
+        let (mut at, mut length) = (links[0][1], 1);
+        while at != links[0][0] {
+            at = links.iter().find(|link| link[0] == at).expect("the boundary is closed")[1];
+            length += 1;
+        }
+        length == links.len()
+    };
+    others.into_iter().filter(|(_, links)| !is_one_fan(links)).map(|(node, _)| node).collect()
+}
+
 /// Smallest acoustic length 6V / √Σ (2A)² of a tetrahedron in the mesh [m].
 pub fn least_acoustic_length(mesh: &Mesh) -> f64 {
     let length = |tet: [Vector3; 4]| {

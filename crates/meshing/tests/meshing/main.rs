@@ -9,6 +9,7 @@ mod errors;
 mod images;
 mod organs;
 mod phantoms;
+mod sizes;
 mod smoothing;
 mod structured;
 mod stuffing;

@@ -9,7 +9,7 @@ use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets};
 use crate::checks::*;
 use crate::images;
 
-fn anatomy(image: &LabelImage, labels: &[i32]) -> Anatomy<'static> {
+pub fn anatomy(image: &LabelImage, labels: &[i32]) -> Anatomy<'static> {
     let cleaning = Cleaning { keep_largest: true, ..Cleaning::default() };
     Anatomy::from_image(image, labels, &cleaning, &Smoothing::default(), &|_| {})
         .expect("the labels are there")
@@ -23,11 +23,19 @@ fn meshed(anatomy: &Anatomy<'_>, edge: f64, origin: Vector3) -> OrganMesh {
 
 /// T4: every inner face has two cells, volumes are positive, no point is unused, no edge of the boundary has more than
 /// two faces; and the report tells what is there.
-fn check_sound(made: &OrganMesh) -> Vec<Vec<u32>> {
+pub fn check_sound(made: &OrganMesh) -> Vec<Vec<u32>> {
+    check_sound_within(made, 1.6)
+}
+
+/// The same of a mesh whose edges are no longer than `longest` times what was asked for at their place.
+pub fn check_sound_within(made: &OrganMesh, longest: f64) -> Vec<Vec<u32>> {
     let faces = conforming_boundary(&made.mesh);
     assert!(tet_volumes(&made.mesh).iter().all(|&volume| volume > 0.0));
     assert!(edge_counts(&faces).values().all(|&count| count == 2));
     assert_eq!(made.report.crowded_edges_left, 0);
+    assert!(pinched(&faces).is_empty() && made.report.pinched_points.is_empty());
+    assert!((made.report.edges.longest / longest_edge(&made.mesh) - 1.0).abs() < 1e-12);
+    assert!(made.report.edges.longest_part <= longest + 1e-9, "{}", made.report);
     assert_eq!((made.report.nodes, made.report.tets), (made.mesh.points.len(), made.mesh.blocks[0].len()));
     assert!((made.report.acoustic_length / least_acoustic_length(&made.mesh) - 1.0).abs() < 1e-12);
     faces

@@ -338,11 +338,8 @@ struct Ellipsoid {
 impl Ellipsoid {
     fn new(levels: u32, axes: [f64; 3]) -> Result<Self, CaseError> {
         let mesh = sphere(1.0, levels, DEFAULT_CELL_LIMIT)?;
-        let mut model = Specimen::new(mesh, [1e6, 0.3], 0.01, Formulation::default())?.model;
-        // The sphere's own normals, not means of facets.
-        for normal in &mut model.normals {
-            normal.direction = model.rest[normal.node as usize];
-        }
+        // Curved by the sphere's own normals, not by means of facets.
+        let model = Specimen::new(mesh, [1e6, 0.3], 0.01, Formulation::default())?.model;
         let axes = Vector3::from(axes);
         let mut state = State::at_rest(&model);
         for ((x, rotation), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(&model.rest) {

@@ -15,7 +15,7 @@ use pliant_mechanics::curve::{Curve as Course, Shape};
 
 use crate::case::{Case, CaseError, Findings, Row};
 use crate::plot::{Curve, Key, Pen, Plot};
-use crate::shells::ramp;
+use crate::shells::{FLAT, ramp};
 
 /// Length of a step [s].
 const STEP: f64 = 0.04;
@@ -57,7 +57,8 @@ fn tube(shells: usize) -> Result<Model, CaseError> {
     };
     let mut model = Model::new((0..around * (along + 1)).map(point).collect());
     let material = Material { elastic: Elasticity { young: 1e5, poisson: 0.45 }, density: 1000.0 };
-    model.add_shell(&Shell::new("tube", (0..around * along).flat_map(cell).collect(), 0.002, material))?;
+    let cells = (0..around * along).flat_map(cell).collect();
+    model.add_shell(&Shell { formulation: FLAT, ..Shell::new("tube", cells, 0.002, material) })?;
     let last = (around * (along + 1)) as u32;
     model.constraints.push(Constraint {
         name: "ends".into(),

@@ -66,7 +66,15 @@ impl Builder<'_> {
         self.set_velocity(name, table, first as usize);
         let nodes = first..self.model.rest.len() as u32;
         self.model.bodies.push(Body { name: name.into(), nodes, damping: table.damping });
-        self.check_labels(name, ["law", "\"law\""], &table.law, mesh);
+        if table.layers.is_empty() {
+            if table.law.values().is_empty() {
+                let message = format!("missing key `law` in `body.{name}`");
+                let help = "`law`: the name of a table `[law.NAME]`, or one for each label";
+                self.error(&["body", name], message, "`law` is missing here", help);
+                return;
+            }
+            self.check_labels(name, ["law", "\"law\""], &table.law, mesh);
+        }
         self.check_labels(name, ["density", "1000"], &table.density, mesh);
         self.check_labels(name, ["hourglass", "0.2"], &table.hourglass, mesh);
         if table.model != BodyModel::Solid {
@@ -224,7 +232,10 @@ impl Builder<'_> {
                 _ => None,
             };
             self.notes.extend(unused.map(|what| format!("law `{name}` {what}")));
-            let used = scene.bodies.iter().any(|(_, body)| body.law.values().contains(&name));
+            let used = scene.bodies.iter().any(|(_, body)| {
+                body.law.values().contains(&name)
+                    || body.layers.iter().any(|layer| layer.law.as_ref() == Some(name))
+            });
             if !used {
                 self.notes.push(format!("law `{name}` is used by no body"));
             }

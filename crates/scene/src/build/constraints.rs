@@ -1,11 +1,13 @@
 //! Constraints: which nodes are held or moved, and that no two contradict each other.
 
-use pliant_geometry::Selection;
+use pliant_geometry::{Mesh, Selection, Vector3};
+use pliant_mechanics::curve::Curve;
 use pliant_mechanics::model::{Constraint, Motion};
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
-use crate::format::{MoveTable, SolverName, Vectors};
+use crate::format::{MoveTable, RotateTable, SolverName, Vectors};
+use crate::output::number;
 use crate::registry::{ConstraintTable, LoadTable};
 
 impl Builder<'_> {
@@ -55,6 +57,9 @@ impl Builder<'_> {
     /// The motion of some nodes of a body (`None`: they are not known, which has been told).
     fn motion(&mut self, table: &MoveTable, nodes: Option<(usize, &[u32])>, path: &[&str]) -> Option<Motion> {
         let curve = self.curve(&table.timing, path);
+        if let Some(rotate) = &table.rotate {
+            return self.rotation(table, rotate, curve?, nodes?.1, path);
+        }
         match (&table.by, table.velocity) {
             (Some(Vectors::Uniform(by)), None) => Some(Motion::Displacement(*by, curve?)),
             (Some(Vectors::PerNode(by)), None) => {
@@ -75,11 +80,42 @@ impl Builder<'_> {
             }
             (by, _) => {
                 let found = if by.is_some() { "both" } else { "neither" };
-                let message = format!("a motion has exactly one of `by` and `velocity`, found {found}");
-                self.error(path, message, "this motion", "`by` in metres, `velocity` in metres per second");
+                let message =
+                    format!("a motion has exactly one of `by`, `velocity` and `rotate`, found {found}");
+                let help = "`by` in metres, `velocity` in metres per second, `rotate` with an axis";
+                self.error(path, message, "this motion", help);
                 None
             }
         }
+    }
+
+    /// The rotation of some nodes of a solid.
+    fn rotation(
+        &mut self,
+        table: &MoveTable,
+        rotate: &RotateTable,
+        curve: Curve,
+        nodes: &[u32],
+        path: &[&str],
+    ) -> Option<Motion> {
+        let others = [
+            ("by", table.by.is_some()),
+            ("velocity", table.velocity.is_some()),
+            ("turn", table.turn.is_some()),
+            ("components", table.components.is_some()),
+        ];
+        if let Some((key, _)) = others.iter().find(|(_, given)| *given) {
+            let message = format!("`rotate` prescribes all of a motion, `{key}` does not go with it");
+            self.error(&[path, &[*key]].concat(), message, "not with `rotate`", "leave one of them out");
+            return None;
+        }
+        if rotate.axis.iter().all(|&x| x == 0.0) {
+            let at = [path, &["rotate", "axis"]].concat();
+            self.error(&at, "the axis of the rotation is zero", "no direction", "such as `[0, 0, 1]`");
+            return None;
+        }
+        let rest = nodes.iter().map(|&node| self.model.rest[node as usize]);
+        Some(Motion::rotation(rotate.axis, rotate.centre, rotate.angle, curve, rest))
     }
 
     /// The nodes of a body that a selection holds, numbered in the model.
@@ -92,7 +128,24 @@ impl Builder<'_> {
         let built = &self.bodies[body];
         let first = self.model.bodies[body].nodes.start;
         match selection.nodes(&built.mesh, &built.boundary) {
-            Ok(nodes) => Some(nodes.into_iter().map(|node| first + node).collect()),
+            Ok(nodes) => {
+                let (mesh, name) = (&built.mesh, &built.name);
+                let size = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
+                for (point, distance) in nearest_points(selection, mesh) {
+                    if distance > FAR * size {
+                        let message = format!(
+                            "the node nearest to {point:?} is {} m away, and `{name}` measures {} m across",
+                            number(distance),
+                            number(size)
+                        );
+                        let help =
+                            "points are in metres, where the body is after its mesh's `scale` and `at`";
+                        let place = self.source().span(path);
+                        self.out.push(Diagnostic::warning(message).at(place, "far outside").help(help));
+                    }
+                }
+                Some(nodes.into_iter().map(|node| first + node).collect())
+            }
             Err(error) => {
                 self.error(path, error.to_string(), "this selection", "");
                 None
@@ -134,6 +187,24 @@ impl Builder<'_> {
     }
 }
 
+/// A nearest node farther from its point than so many times the size of its body is doubted.
+const FAR: f64 = 10.0;
+
+/// The points by which a selection takes nearest nodes, each with its distance [m] from the first of these.
+fn nearest_points(selection: &Selection, mesh: &Mesh) -> Vec<([f64; 3], f64)> {
+    match selection {
+        Selection::Nearest { point, .. } => {
+            let place = Vector3::from(*point);
+            let distance = mesh.points.iter().map(|p| (p - place).norm()).fold(f64::INFINITY, f64::min);
+            vec![(*point, distance)]
+        }
+        Selection::Union(parts) | Selection::Intersection(parts) | Selection::Difference(parts) => {
+            parts.iter().flat_map(|part| nearest_points(part, mesh)).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use pliant_mechanics::model::Motion;
@@ -156,7 +227,19 @@ mod tests {
     #[test]
     fn a_motion_has_one_of_two_forms_and_some_components() {
         for (what, says) in [
-            ("type = 'move'", "exactly one of `by` and `velocity`, found neither"),
+            ("type = 'move'", "exactly one of `by`, `velocity` and `rotate`, found neither"),
+            (
+                "type = 'move'\nby = [0, 0, 1]\nrotate = { axis = [0, 0, 1], centre = [0, 0, 0], angle = 1 }",
+                "`by` does not go with it",
+            ),
+            (
+                "type = 'move'\nrotate = { axis = [0, 0, 0], centre = [0, 0, 0], angle = 1 }",
+                "the axis of the rotation is zero",
+            ),
+            (
+                "type = 'move'\ncomponents = ['x']\nrotate = { axis = [0, 0, 1], centre = [0, 0, 0], angle = 1 }",
+                "`components` does not go with it",
+            ),
             ("type = 'move'\nby = [0, 0, 1]\nvelocity = [0, 0, 1]", "found both"),
             ("type = 'fix'\ncomponents = []", "`components` is empty"),
         ] {

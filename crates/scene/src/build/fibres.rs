@@ -65,6 +65,23 @@ impl Builder<'_> {
         Some((0..cells.len()).flat_map(|cell| found.iter().map(move |family| family[cell])).collect())
     }
 
+    /// The direction of a body's fibres in the triangles of a shell.
+    pub(super) fn shell_directions(
+        &mut self,
+        draft: &Draft<'_>,
+        fibre: &Fibre,
+        block: &CellBlock,
+    ) -> Option<Vec<[f64; 3]>> {
+        let path = ["body", draft.name, "fibre"];
+        if matches!(fibre, Fibre::PerCell(FibreRule::Laplace { .. })) {
+            let message = "a rule by Laplace's equation needs a solid";
+            self.error(&path, message, "not of a shell", "take another rule, or cell data of the mesh");
+            return None;
+        }
+        let cells: Vec<u32> = (0..block.len() as u32).collect();
+        self.family("fibre", Some((fibre, path)), draft, block, &cells)
+    }
+
     /// The unit direction of one family of fibres in some cells of a body, from what was given and where.
     fn family(
         &mut self,

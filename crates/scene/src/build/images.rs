@@ -1,24 +1,30 @@
 //! Meshes of segmented images and of surface files: read, cut out, cleaned and made of the cells asked for, or taken from the cache.
 
 use std::f64::consts::FRAC_PI_3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{self, MeshFile, MeshFileError};
-use pliant_geometry::{CellKind, Mesh};
-use pliant_imaging::{Cleaning, Image, ImageError, LabelError, ReadOptions, Smoothing};
+use pliant_geometry::{CellKind, Mesh, Vector3};
+use pliant_imaging::{
+    Border, Choice, Cleaning, Image, ImageError, LabelChoice, LabelError, LabelNames, ReadOptions, Smoothing,
+};
 use pliant_meshing::{
-    Anatomy, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
+    Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
     Missed, OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
     require_room_for,
 };
 
+use super::meshes::unscaled;
 use super::{Builder, MeshOrigin};
 use crate::cache::{Kept, Key};
 use crate::diagnostic::Diagnostic;
-use crate::format::{Cells, CleanTable, MeshTable};
+use crate::format::{Cells, CleanTable, Label, MeshTable, Protected};
 
 /// Faces that meet at more than this angle meet at a crease, which even triangles keep [rad].
 const CREASE: f64 = FRAC_PI_3;
+
+/// Voxels may be made coarser up to this part of the edge of the cells.
+const COARSEST: f64 = 0.25;
 
 /// All that a mesh is made by, but for the image. Its debug text is its part of the key in the cache.
 #[derive(Clone, Debug)]
@@ -29,24 +35,29 @@ struct Recipe {
 
 /// What a body is made of.
 enum Scan {
-    Image(Image, Cut),
+    Image(Image, Choice),
     /// Triangles or quads in metres, and what is said about their file.
     Surface(MeshFile),
 }
 
-/// What of an image is the body.
+/// How fine tets or hexes are.
 #[derive(Clone, Debug)]
-enum Cut {
-    Labels(Vec<i32>),
-    /// Voxels of at least this value.
-    From(f64),
+struct Fineness {
+    /// Their edge [m], if it is given.
+    edge: Option<f64>,
+    /// Edge of tets inside [m].
+    inner_edge: Option<f64>,
+    /// Labels with smaller tets, and their edges [m].
+    protect: Vec<(i32, Option<f64>)>,
+    /// Largest distance of tets from the body [m].
+    distance: Option<f64>,
 }
 
 /// The cells and how fine they are.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Goal {
-    /// Tets or hexes with their edge [m].
-    Volume(Cells, f64),
+    /// Tets or hexes.
+    Volume(Cells, Fineness),
     /// Even triangles of this edge [m].
     Even(f64),
     Triangles(u32),
@@ -59,14 +70,20 @@ enum Goal {
 struct Fault {
     key: &'static str,
     message: String,
-    help: &'static str,
+    help: String,
 }
 
 impl Builder<'_> {
     /// The mesh of what is segmented in an image, or of what the surface of a file encloses.
-    pub(super) fn scanned(&mut self, file: &Path, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
-        let made = recipe(table).and_then(|recipe| Ok((self.scan(file, table)?, recipe)));
-        let name = file.display().to_string();
+    pub(super) fn scanned(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+        let made = recipe(table).and_then(|recipe| Ok((self.scan(table)?, recipe)));
+        let name = match (&table.file, &table.image, &table.masks) {
+            (Some(file), ..) | (None, Some(file), _) => file.display().to_string(),
+            (None, None, masks) => {
+                let names = masks.iter().flatten().map(|mask| mask.display().to_string());
+                names.collect::<Vec<_>>().join(", ")
+            }
+        };
         let made = made.and_then(|(scan, recipe)| {
             let key = self.cache.is_on().then(|| Key::new(|sink| scan.content(sink), &recipe));
             let kept = match key.as_ref().and_then(|key| self.cache.get(key)) {
@@ -97,57 +114,135 @@ impl Builder<'_> {
         self.notes.extend(how.map(|how| format!("mesh of {name}: {how}")));
         self.notes.extend(notes.iter().chain(&kept.notes).map(|note| format!("{name}: {note}")));
         let place = self.source().span(path);
-        self.out.extend(kept.doubts.into_iter().map(|doubt| {
-            let help = "use finer cells, or `clean = { keep-largest = true }` for small pieces";
-            Diagnostic::warning(doubt).at(place.clone(), "this mesh").help(help)
-        }));
+        let doubt = |message: String, help: &'static str| {
+            Diagnostic::warning(message).at(place.clone(), "this mesh").help(help)
+        };
+        let finer = "use finer cells, or `clean = { keep-largest = true }` for small pieces";
+        self.out.extend(kept.doubts.into_iter().map(|message| doubt(message, finer)));
+        let whole = "if the organ goes on beyond the image, its mesh ends there with a flat face";
+        self.out.extend(scan.cut_off().into_iter().map(|message| doubt(message, whole)));
         let origin = format!("{name} ({format}), {}", recipe.words(&scan));
         Some(MeshOrigin { mesh: kept.mesh, origin })
     }
 
-    fn scan(&self, file: &Path, table: &MeshTable) -> Result<Scan, Fault> {
-        if table.image.is_some() {
-            let cut = cut(table)?;
-            return self.read_images(file, table).map(|image| Scan::Image(image, cut));
-        }
-        let mut read = io::read(&self.scene.folder.join(file)).map_err(|error| {
+    fn scan(&self, table: &MeshTable) -> Result<Scan, Fault> {
+        let Some(file) = &table.file else {
+            require_one_cut(table)?;
+            let image = self.read_images(table)?;
+            let choice = choice(&image, table)?;
+            return Ok(Scan::Image(image, choice));
+        };
+        let opened = |source| MeshFileError::Open { path: file.to_owned(), source };
+        let read = self.scene.file(file).map_err(opened).and_then(|path| io::read(&path));
+        let mut read = read.map_err(|error| {
             let help = match error {
                 MeshFileError::Open { .. } => "file names are relative to the scene file",
                 _ => "`pliant info` reads a mesh file on its own",
             };
-            Fault { key: "file", message: error.to_string(), help }
+            Fault { key: "file", message: error.to_string(), help: help.into() }
         })?;
-        read.mesh.points.iter_mut().for_each(|point| *point *= table.scale);
-        Ok(Scan::Surface(read))
+        match unscaled(&mut read.mesh, table) {
+            Some((message, help)) => Err(Fault { key: "file", message, help }),
+            None => Ok(Scan::Surface(read)),
+        }
     }
 
-    /// The image, with the one that is added to it.
-    fn read_images(&self, image: &Path, table: &MeshTable) -> Result<Image, Fault> {
-        let read = |key, file: &Path| {
-            pliant_imaging::read(&self.scene.folder.join(file), &ReadOptions::default()).map_err(|error| {
-                let help = match error {
-                    ImageError::Open { .. } => "file names are relative to the scene file",
-                    _ => "`pliant labels` reads an image on its own",
-                };
-                Fault { key, message: error.to_string(), help }
-            })
+    /// The image, with the one that is added to it, or several masks as one; with the names of its labels.
+    fn read_images(&self, table: &MeshTable) -> Result<Image, Fault> {
+        let failed = |key, error: ImageError| {
+            let help = match error {
+                ImageError::Open { .. } => "file names are relative to the scene file",
+                _ => "`pliant labels` reads an image on its own",
+            };
+            Fault { key, message: error.to_string(), help: help.into() }
         };
-        let first = read("image", image)?;
-        let Some(second) = &table.add else { return Ok(first) };
-        first.plus(&read("add", second)?).map_err(|error| Fault {
-            key: "add",
-            message: error.to_string(),
-            help: "",
-        })
+        let within = self.scene.source.reads().folder().map(Path::to_owned);
+        let options = ReadOptions { within, ..ReadOptions::default() };
+        let allowed = |file: &Path| {
+            let opened = |source| ImageError::Open { path: file.to_owned(), source };
+            self.scene.file(file).map_err(opened)
+        };
+        let read = |key, file: &Path| {
+            let image = allowed(file).and_then(|path| pliant_imaging::read(&path, &options));
+            image.map_err(|error| failed(key, error))
+        };
+        let mut image = match (&table.image, &table.masks) {
+            (Some(image), _) => read("image", image)?,
+            (None, masks) => {
+                let one = |mask: &PathBuf| Ok((mask.clone(), read("masks", mask)?));
+                let masks = masks.iter().flatten().map(one).collect::<Result<Vec<_>, Fault>>()?;
+                Image::of_masks(&masks, table.threshold)
+                    .map_err(|error| label_fault("masks", table, &error))?
+            }
+        };
+        if let Some(second) = &table.add {
+            image = image.plus(&read("add", second)?).map_err(|error| label_fault("add", table, &error))?;
+        }
+        if let Some(names) = &table.names {
+            let word = Path::new("totalsegmentator");
+            let names = if names == word { Ok(word.to_owned()) } else { allowed(names) };
+            let names = names.and_then(|names| LabelNames::read(&names));
+            image.names.extend(&names.map_err(|error| failed("names", error))?);
+        }
+        Ok(image)
     }
 }
 
+/// The labels that a table asks for, as far as the image has them, or the value from which on voxels are inside.
+fn choice(image: &Image, table: &MeshTable) -> Result<Choice, Fault> {
+    if let (Some(threshold), None) = (table.threshold, &table.masks) {
+        return Ok(Choice::From(threshold));
+    }
+    let (key, labels) = match (&table.label, &table.labels, &table.masks) {
+        (Some(label), ..) => ("label", vec![label.choice()]),
+        (None, Some(labels), _) => ("labels", labels.iter().map(Label::choice).collect()),
+        (None, None, Some(masks)) => ("masks", vec![LabelChoice::Range(1, masks.len() as i32)]),
+        (None, None, None) => ("image", Vec::new()),
+    };
+    image.choose(&labels).map_err(|error| {
+        let whole = matches!(error, LabelError::Grey { .. } | LabelError::NotWhole { .. });
+        label_fault(if whole { "image" } else { key }, table, &error)
+    })
+}
+
+fn label_fault(key: &'static str, table: &MeshTable, error: &LabelError) -> Fault {
+    let help = match error {
+        LabelError::NoneChosen { .. } => "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`",
+        LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
+        LabelError::Grey { .. } => "`threshold` takes all voxels from a value on, as 200 for bone in a CT",
+        LabelError::NoMask { .. } => "`threshold = 0.5` takes the voxels of each mask from this value on",
+        LabelError::NoSuchName { .. } | LabelError::AmbiguousName { .. } => {
+            "`names = \"table.txt\"` gives the labels names; `pliant labels` lists them"
+        }
+        LabelError::Absent { .. } if table.threshold.is_some() => {
+            "no voxel is as large as that; use a lower threshold"
+        }
+        LabelError::OtherVoxels { .. } => "",
+        _ => "`pliant labels` lists the labels of an image",
+    };
+    let key = if matches!(error, LabelError::BadLength { .. }) { "clean" } else { key };
+    Fault { key, message: error.to_string(), help: help.into() }
+}
+
 impl Scan {
+    /// What of the body the image may cut off.
+    fn cut_off(&self) -> Vec<String> {
+        let Self::Image(image, choice) = self else { return Vec::new() };
+        let told = |(label, border): (i32, Border)| {
+            let what = match choice {
+                Choice::Labels(_) => format!("label {}", image.names.shown(label)),
+                Choice::From(_) => "the body".into(),
+            };
+            format!("{what} lies at the border of the image ({border}): it may be cut off there")
+        };
+        image.border(choice).into_iter().map(told).collect()
+    }
+
     /// Gives all bytes that a mesh can depend on, in pieces.
     fn content(&self, sink: &mut dyn FnMut(&[u8])) {
         match self {
-            Self::Image(image, cut) => {
-                sink(format!("{cut:?}").as_bytes());
+            Self::Image(image, choice) => {
+                sink(format!("{choice:?}").as_bytes());
                 image.content(sink);
             }
             Self::Surface(file) => {
@@ -164,7 +259,8 @@ impl Scan {
 
 /// What a table asks for.
 fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
-    let refuse = |key, message: &str, help| Err(Fault { key, message: message.into(), help });
+    let refuse =
+        |key, message: &str, help: &str| Err(Fault { key, message: message.into(), help: help.into() });
     let CleanTable { close_gaps, fill_holes, keep_largest } = table.clean.unwrap_or_default();
     let cleaning = Cleaning { close_gaps, fill_holes, keep_largest };
     let cells = goal(table)?;
@@ -182,29 +278,46 @@ fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
         }
         return Ok(Recipe { cleaning, cells });
     }
-    if table.scale != 1.0 {
+    if table.factor() != 1.0 {
         return refuse("scale", "`scale` does not go with `image`", "an image tells its own unit");
     }
     Ok(Recipe { cleaning, cells })
 }
 
-/// What of an image a table asks for.
-fn cut(table: &MeshTable) -> Result<Cut, Fault> {
-    let refuse = |key, message: &str, help| Err(Fault { key, message: message.into(), help });
-    let cut = match (table.label, &table.labels, table.threshold) {
-        (Some(label), None, None) => Cut::Labels(vec![label]),
-        (None, Some(labels), None) => Cut::Labels(labels.clone()),
-        (None, None, Some(threshold)) => Cut::From(threshold),
-        (None, None, None) => Cut::Labels(Vec::new()),
-        _ => {
-            let message = "an image is cut out by exactly one of `label`, `labels`, `threshold`";
-            return refuse("image", message, "leave the others out");
+/// Whether a table says in one way only what of an image the body is.
+fn require_one_cut(table: &MeshTable) -> Result<(), Fault> {
+    let refuse =
+        |key, message: &str, help: &str| Err(Fault { key, message: message.into(), help: help.into() });
+    let ways =
+        [table.label.is_some(), table.labels.is_some(), table.threshold.is_some() && table.masks.is_none()];
+    match &table.masks {
+        Some(masks) if masks.is_empty() => {
+            return refuse("masks", "`masks` names no image", "name one at least");
         }
-    };
-    if table.add.is_some() && table.threshold.is_none() {
-        return refuse("add", "`add` goes with `threshold` only", "labels are not added up");
+        Some(masks) if masks.len() > 1000 => {
+            return refuse("masks", "`masks` names more than 1000 images", "mesh them in parts");
+        }
+        _ => {}
     }
-    Ok(cut)
+    if ways.iter().filter(|way| **way).count() > 1 {
+        let message = "an image is cut out by exactly one of `label`, `labels`, `threshold`";
+        return refuse(
+            if table.image.is_some() { "image" } else { "masks" },
+            message,
+            "leave the others out",
+        );
+    }
+    if table.add.is_some() && table.masks.is_some() {
+        return refuse("add", "`add` goes with `image`, not with `masks`", "name it among the `masks`");
+    }
+    if table.add.is_some() && table.threshold.is_none() {
+        return refuse(
+            "add",
+            "`add` goes with `threshold` only",
+            "labels are not added up; `masks` takes several masks",
+        );
+    }
+    Ok(())
 }
 
 /// The cells that a table asks for: of the sizes that it gives exactly one that goes with them.
@@ -224,14 +337,27 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
     let given: Vec<&'static str> =
         sizes.into_iter().filter(|(_, given)| *given).map(|(key, _)| key).collect();
     let words = words(cells);
-    let source = if table.file.is_some() { "file" } else { "image" };
+    let of_tets = [
+        ("inner-edge", table.inner_edge.is_some()),
+        ("protect", table.protect.is_some()),
+        ("distance", table.distance.is_some()),
+    ];
+    if let Some((key, _)) = of_tets.into_iter().find(|(_, given)| *given && cells != Cells::Tets) {
+        let message = format!("`{key}` does not go with {words}");
+        return Err(Fault { key, message, help: "it is for tets".into() });
+    }
+    let source = match (&table.file, &table.masks) {
+        (Some(_), _) => "file",
+        (None, Some(_)) => "masks",
+        (None, None) => "image",
+    };
     if let Some(key) = given.iter().copied().find(|key| !fitting.contains(key)) {
         let help = match cells {
             Cells::Shells => "shells are as many as `shells`, or as close as `error`",
             Cells::Surface => "a surface has even triangles of `edge`, or as few as `triangles`",
             _ => "their size is `edge`, in metres",
         };
-        return Err(Fault { key, message: format!("`{key}` does not go with {words}"), help });
+        return Err(Fault { key, message: format!("`{key}` does not go with {words}"), help: help.into() });
     }
     match (cells, table.edge, table.triangles, table.shells, table.error) {
         (Cells::Surface, Some(edge), None, ..) => Ok(Goal::Even(edge)),
@@ -239,11 +365,17 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
         (Cells::Surface, None, None, ..) => Ok(Goal::Finest),
         (Cells::Shells, _, _, Some(number), None) => Ok(Goal::Shells(ShellGoal::Shells(number as usize))),
         (Cells::Shells, _, _, None, Some(error)) => Ok(Goal::Shells(ShellGoal::Error(error))),
-        (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, Some(edge), ..) => Ok(Goal::Volume(cells, edge)),
+        (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, edge, ..)
+            if edge.is_some() || table.distance.is_some() =>
+        {
+            let protect = table.protect.iter().flatten().map(Protected::label_and_edge).collect();
+            let MeshTable { inner_edge, distance, .. } = *table;
+            Ok(Goal::Volume(cells, Fineness { edge, inner_edge, protect, distance }))
+        }
         (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, None, ..) => Err(Fault {
             key: source,
             message: format!("{words} of an image or a surface need `edge`"),
-            help: "add `edge`, the size of a cell in metres, for example `edge = 0.008`",
+            help: "add `edge`, the size of a cell in metres, for example `edge = 0.008`".into(),
         }),
         _ => Err(Fault {
             key: source,
@@ -251,7 +383,7 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
                 "{words} of an image or a surface need exactly one of {}",
                 fitting.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
             ),
-            help: "for example `error = 0.005`, half a percent of the diagonal, or `shells = 800`",
+            help: "for example `error = 0.005`, half a percent of the diagonal, or `shells = 800`".into(),
         }),
     }
 }
@@ -267,17 +399,49 @@ pub(super) fn words(cells: Cells) -> &'static str {
     }
 }
 
+impl Fineness {
+    /// The edge of the cells [m], or of the first ones where a distance is asked for, given the box of the body [m].
+    fn edge_in(&self, bounds: [Vector3; 2]) -> f64 {
+        let chosen = self.distance.map_or(0.0, |distance| OrganTets::edge_for(distance, bounds));
+        self.edge.unwrap_or(chosen)
+    }
+
+    /// The shortest edge, or the distance that is to be held [m].
+    fn finest(&self) -> f64 {
+        self.tets(self.edge.or(self.distance).unwrap_or(f64::INFINITY)).finest()
+    }
+
+    /// Tets as fine as this.
+    fn tets(&self, edge: f64) -> OrganTets {
+        let Self { inner_edge, distance, .. } = *self;
+        OrganTets { inner_edge, distance, ..OrganTets::new(edge) }.protecting(&self.protect)
+    }
+
+    fn words(&self) -> String {
+        let edge = self.edge.map(|edge| format!("of {edge} m"));
+        let inner = self.inner_edge.map(|edge| format!("of {edge} m inside"));
+        let distance = self.distance.map(|distance| format!("within {distance} m"));
+        let protected = self.protect.iter().map(|(label, edge)| match edge {
+            Some(edge) => format!("of {edge} m in label {label}"),
+            None => format!("finer in label {label}"),
+        });
+        let all: Vec<String> = edge.into_iter().chain(inner).chain(protected).chain(distance).collect();
+        all.join(", ")
+    }
+}
+
 impl Recipe {
     fn words(&self, scan: &Scan) -> String {
         let cut = match scan {
             Scan::Surface(_) => "what it encloses".into(),
-            Scan::Image(_, Cut::From(least)) => format!("from {least} on"),
-            Scan::Image(_, Cut::Labels(labels)) => {
-                format!("label {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))
+            Scan::Image(_, Choice::From(least)) => format!("from {least} on"),
+            Scan::Image(image, Choice::Labels(labels)) => {
+                let shown = labels.iter().map(|&label| image.names.shown(label));
+                format!("label {}", shown.collect::<Vec<_>>().join(", "))
             }
         };
-        let cells = match self.cells {
-            Goal::Volume(cells, edge) => format!("{} of {edge} m", words(cells)),
+        let cells = match &self.cells {
+            Goal::Volume(cells, fineness) => format!("{} {}", words(*cells), fineness.words()),
             Goal::Even(edge) => format!("surface in triangles of {edge} m"),
             Goal::Triangles(number) => format!("surface in {number} triangles"),
             Goal::Finest => "surface as fine as it is given".into(),
@@ -289,7 +453,8 @@ impl Recipe {
 
     /// Cuts the body out, cleans it and makes its cells.
     fn make(&self, scan: &Scan) -> Result<Kept, Fault> {
-        let key = match (self.cells, scan) {
+        let key = match (&self.cells, scan) {
+            (Goal::Volume(_, Fineness { edge: None, .. }), _) => "distance",
             (Goal::Volume(..) | Goal::Even(_), _) => "edge",
             (Goal::Triangles(_), _) => "triangles",
             (Goal::Finest, Scan::Image(..)) => "image",
@@ -297,26 +462,32 @@ impl Recipe {
             (Goal::Shells(ShellGoal::Shells(_)), _) => "shells",
             (Goal::Shells(ShellGoal::Error(_)), _) => "error",
         };
-        let fault = |error: MeshingError| Fault { key, message: error.to_string(), help: "" };
+        let fault = |error: MeshingError| {
+            let key = if matches!(error, MeshingError::NoSuchLabel { .. }) { "protect" } else { key };
+            Fault { key, message: error.to_string(), help: String::new() }
+        };
         let mut notes = Vec::new();
-        let (mesh, doubts) = match (scan, self.cells) {
-            (Scan::Image(image, cut), goal) => {
-                let (anatomy, cleaned) = self.anatomy(image, cut)?;
+        let (mesh, doubts) = match (scan, &self.cells) {
+            (Scan::Image(image, choice), goal) => {
+                let (anatomy, cleaned, voxel) = self.anatomy(image, choice, &mut notes)?;
                 if self.cleaning != Cleaning::default() {
                     notes.push(cleaned.to_string());
                 }
                 match goal {
-                    Goal::Volume(cells, edge) => fill(&anatomy, cells, edge, &mut notes),
-                    goal => {
-                        let voxel = image.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
-                        extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal))
+                    Goal::Volume(cells, fineness) => {
+                        let edge = fineness.edge_in(anatomy.field().bounds().into());
+                        fill(&anatomy, *cells, &fineness.tets(edge), &mut notes)
                     }
+                    goal => extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal)),
                 }
             }
-            (Scan::Surface(file), Goal::Volume(cells, edge)) => self
-                .enclosed(&file.mesh, edge, &mut notes)
-                .map_err(|error| Fault { key: "file", ..fault(error) })
-                .map(|anatomy| fill(&anatomy, cells, edge, &mut notes))?,
+            (Scan::Surface(file), Goal::Volume(cells, fineness)) => {
+                let edge = fineness.edge_in(file.mesh.bounds().unwrap_or_default().into());
+                let request = fineness.tets(edge);
+                self.enclosed(&file.mesh, &request, &mut notes)
+                    .map_err(|error| Fault { key: "file", ..fault(error) })
+                    .map(|anatomy| fill(&anatomy, *cells, &request, &mut notes))?
+            }
             (Scan::Surface(file), goal) => {
                 TriangleMesh::from_mesh(&file.mesh).and_then(|(surface, repairs)| {
                     if repairs != SurfaceRepairs::default() {
@@ -334,9 +505,10 @@ impl Recipe {
     fn enclosed(
         &self,
         mesh: &Mesh,
-        edge: f64,
+        request: &OrganTets,
         notes: &mut Vec<String>,
     ) -> Result<Anatomy<'static>, MeshingError> {
+        let edge = request.edge;
         let Cleaning { close_gaps, fill_holes, keep_largest } = self.cleaning;
         let closing = Closing { holes: close_gaps, fill_cavities: fill_holes, keep_largest };
         let surface = Enclosed::new(mesh, edge, &closing)?;
@@ -346,40 +518,35 @@ impl Recipe {
         let kind =
             if matches!(self.cells, Goal::Volume(Cells::Tets, _)) { CellKind::Tet } else { CellKind::Hex };
         require_room_for(kind, edge, surface.volume(), DEFAULT_CELL_LIMIT)?;
-        surface.anatomy(1, edge, &|_| {})
+        surface.fine_anatomy(1, edge, request.finest(), &|_| {})
     }
 
+    /// The body cut out of an image, what its cleaning changed, and the least step of its voxels [m].
     fn anatomy(
         &self,
         image: &Image,
-        cut: &Cut,
-    ) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned), Fault> {
-        let (key, labels, chosen) = match cut {
-            Cut::From(least) => ("threshold", Ok(image.threshold(*least..=f64::INFINITY)), vec![1]),
-            Cut::Labels(labels) => {
-                let key = ["image", "label", "labels"][labels.len().min(2)];
-                (key, image.labels(), labels.clone())
-            }
+        choice: &Choice,
+        notes: &mut Vec<String>,
+    ) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned, f64), Fault> {
+        let key = match choice {
+            Choice::From(_) => "threshold",
+            Choice::Labels(labels) => ["image", "label", "labels"][labels.len().min(2)],
         };
-        let fault = |key, error: LabelError| {
-            let help = match error {
-                LabelError::NoneChosen { .. } => "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`",
-                LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
-                LabelError::Absent { .. } if matches!(cut, Cut::From(_)) => {
-                    "no voxel is as large as that; use a lower threshold"
-                }
-                _ => "`pliant labels` lists the labels of an image",
-            };
-            let key = if matches!(error, LabelError::BadLength { .. }) { "clean" } else { key };
-            Fault { key, message: error.to_string(), help }
+        let table =
+            MeshTable { threshold: matches!(choice, Choice::From(_)).then_some(0.0), ..MeshTable::default() };
+        let fault = |error: LabelError| label_fault(key, &table, &error);
+        let (smoothing, coarsest) = match &self.cells {
+            Goal::Volume(_, fineness) => (Smoothing::default(), fineness.finest() * COARSEST),
+            Goal::Even(edge) => (SURFACE_SMOOTHING, edge * COARSEST),
+            _ => (SURFACE_SMOOTHING, f64::INFINITY),
         };
-        let labels = labels.map_err(|error| fault("image", error))?;
-        let smoothing = match self.cells {
-            Goal::Volume(..) => Smoothing::default(),
-            _ => SURFACE_SMOOTHING,
-        };
-        Anatomy::from_image(&labels, &chosen, &self.cleaning, &smoothing, &|_| {})
-            .map_err(|error| fault(key, error))
+        let cut = image.cut(choice, coarsest, &|_| {}).map_err(fault)?;
+        notes.extend(cut.note());
+        let voxel = cut.labels.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let (anatomy, cleaned) =
+            Anatomy::from_image(&cut.labels, &cut.chosen, &self.cleaning, &smoothing, &|_| {})
+                .map_err(fault)?;
+        Ok((anatomy, cleaned, voxel))
     }
 }
 
@@ -387,11 +554,14 @@ impl Recipe {
 fn fill(
     anatomy: &Anatomy<'_>,
     cells: Cells,
-    edge: f64,
+    request: &OrganTets,
     notes: &mut Vec<String>,
 ) -> Result<(Mesh, Vec<String>), MeshingError> {
+    let edge = request.edge;
+    let mut doubts = Vec::new();
     let (mesh, dropped, pieces) = if cells == Cells::Tets {
-        let made = OrganTets::new(edge).mesh(anatomy, &|_| {})?;
+        let made = request.mesh(anatomy, &|_| {})?;
+        doubts = made.report.doubts();
         (made.mesh, made.report.repairs.dropped_cells, made.report.repairs.dropped_pieces)
     } else {
         let voxels = Voxels::new(edge);
@@ -404,10 +574,9 @@ fn fill(
     if pieces > 0 {
         notes.push(format!("{dropped} cells in {pieces} loose parts were dropped"));
     }
-    let allowed = Missed::allowed(&mesh, edge);
-    let deviation = Deviation::new(&mesh, anatomy.field(), edge)?;
-    let missed = Missed::of(&mesh, anatomy.field(), edge, &deviation, allowed)?;
-    Ok((mesh, missed.iter().map(Missed::to_string).collect()))
+    let assessment = Assessment::of(&mesh, anatomy, edge)?;
+    doubts.splice(0..0, assessment.missed.iter().map(Missed::to_string));
+    Ok((mesh, doubts))
 }
 
 /// The surface of an anatomy as fine as its voxels [m].
@@ -418,18 +587,18 @@ fn extracted(anatomy: &Anatomy<'_>, voxel: f64) -> Result<TriangleMesh, MeshingE
 }
 
 /// A surface in the triangles or shells asked for, and what is doubtful about it.
-fn cover(mut surface: TriangleMesh, goal: Goal) -> Result<(Mesh, Vec<String>), MeshingError> {
+fn cover(mut surface: TriangleMesh, goal: &Goal) -> Result<(Mesh, Vec<String>), MeshingError> {
     match goal {
         Goal::Shells(goal) => {
-            let FittedShells { mesh, report, .. } = FittedShells::new(&surface, goal, &|_| {})?;
+            let FittedShells { mesh, report, .. } = FittedShells::new(&surface, *goal, &|_| {})?;
             return Ok((mesh, report.warnings()));
         }
         Goal::Even(edge) => {
             surface.mark_creases(CREASE);
-            surface.remesh(edge, DEFAULT_CELL_LIMIT)?;
+            surface.remesh(*edge, DEFAULT_CELL_LIMIT)?;
         }
         Goal::Triangles(number) => {
-            surface.decimate(Fewer::Triangles(number as usize))?;
+            surface.decimate(Fewer::Triangles(*number as usize))?;
         }
         Goal::Finest | Goal::Volume(..) => {}
     }

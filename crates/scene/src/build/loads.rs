@@ -263,6 +263,16 @@ impl Builder<'_> {
             let message = "only shells have a curved surface";
             self.error(&at("curved"), message, "no shell", "leave `curved` out");
         }
+        let reactions = [FieldName::Reaction, FieldName::ReactionMoment];
+        if table.curved.is_some() && table.data.iter().any(|field| reactions.contains(field)) {
+            let message = "reactions act on nodes, which a curved surface does not show";
+            self.error(
+                &at("data"),
+                message,
+                "not with `curved`",
+                "write them in another output without `curved`",
+            );
+        }
         if table.curved.is_some() && table.at == At::Points {
             let message = "on a curved surface fields of cells are written on the cells";
             self.error(&at("at"), message, "not with `curved`", "leave `at` or `curved` out");
@@ -283,7 +293,7 @@ impl Builder<'_> {
                 BodyModel::Shell => {
                     "fields of a shell: `displacement`, `velocity`, `rotation`, `von-mises`, `stress-top`, `stress-middle`, \
                      `stress-bottom`, `membrane-force`, `bending-moment`, `membrane-energy`, `bending-energy`, \
-                     `drilling-energy`, `thickness`, `element-step`"
+                     `drilling-energy`, `thickness`, `current-thickness`, `surface-strain`, `element-step`"
                 }
                 BodyModel::Corotational => {
                     "fields of a co-rotational solid: `displacement`, `velocity`, `cauchy-stress`, `von-mises`, `pressure`, \
@@ -345,8 +355,10 @@ impl Builder<'_> {
             self.error(path, message, "not on a surface", "write it on the body");
             return;
         }
-        if let Some(FieldName::Rotation) = fields.iter().find(|field| **field == FieldName::Rotation) {
-            self.error(path, "surfaces have no `rotation`", "not on a surface", "write it on the body");
+        let of_nodes = [FieldName::Rotation, FieldName::Reaction, FieldName::ReactionMoment];
+        if let Some(field) = fields.iter().find(|field| of_nodes.contains(field)) {
+            let message = format!("surfaces have no `{}`", field.name());
+            self.error(path, message, "not on a surface", "write it on the body");
             return;
         }
         if let Some(field) = fields.iter().find(|field| !field.is_nodal()) {

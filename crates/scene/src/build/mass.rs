@@ -2,7 +2,7 @@
 
 use super::Builder;
 use crate::diagnostic::{Diagnostic, counted};
-use crate::format::SolverName;
+use crate::format::{LoadSteps, LoadTimes, SolverName, StepChoice};
 use crate::output::number;
 
 /// Added mass, as a fraction, from which on a scene is doubted.
@@ -11,6 +11,7 @@ const MUCH: f64 = 0.05;
 impl Builder<'_> {
     /// Refuses what means nothing to a solver without inertia.
     pub(super) fn check_explicit_only(&mut self) {
+        self.check_load_times();
         let run = &self.scene.run;
         if run.solver != SolverName::QuasiStatic {
             return;
@@ -26,6 +27,32 @@ impl Builder<'_> {
                 message,
                 "means nothing here",
                 "remove it, or take `solver = \"explicit\"`",
+            );
+        }
+    }
+
+    /// Refuses times of load steps that can't be.
+    fn check_load_times(&mut self) {
+        let run = &self.scene.run;
+        let LoadSteps::Times(LoadTimes { times }) = &run.load_steps else { return };
+        let path = ["run", "load-steps"];
+        let increasing = [&[0.0], times.as_slice()].concat().windows(2).all(|pair| pair[0] < pair[1]);
+        if !increasing {
+            let help =
+                "such as `load-steps = { times = [0.1, 0.2, 0.5] }`; the last load step ends with the scene";
+            self.error(&path, "times of load steps lie above 0 s and increase", "out of order", help);
+        }
+        if matches!(run.step, StepChoice::Seconds(_)) {
+            let message = "the load steps are given in two ways, by `step` and by their times";
+            self.error(&path, message, "and by `step`", "leave one of them out");
+        }
+        if run.solver == SolverName::Static {
+            let message = "the load steps of `solver = \"static\"` are equal";
+            self.error(
+                &path,
+                message,
+                "for `quasi-static` only",
+                "give their number, such as `load-steps = 10`",
             );
         }
     }

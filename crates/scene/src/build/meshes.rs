@@ -22,7 +22,66 @@ pub(crate) struct MeshOrigin {
 }
 
 /// An organ larger or smaller than this [m] is probably in other units.
-pub const PLAUSIBLE_SIZE: [f64; 2] = [1e-3, 10.0];
+const PLAUSIBLE_SIZE: [f64; 2] = [1e-3, 10.0];
+
+/// A size that no organ has: the mesh is probably not in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SizeDoubt {
+    /// Diagonal of the box [m].
+    size: f64,
+}
+
+impl SizeDoubt {
+    /// `None` for a size that an organ can have, and for a mesh without points.
+    pub fn of(mesh: &Mesh) -> Option<Self> {
+        let (low, high) = mesh.bounds()?;
+        let size = (high - low).norm();
+        (!(PLAUSIBLE_SIZE[0]..=PLAUSIBLE_SIZE[1]).contains(&size) && size > 0.0).then_some(Self { size })
+    }
+
+    /// Whether it is too large, not too small.
+    pub fn is_large(&self) -> bool {
+        self.size > PLAUSIBLE_SIZE[1]
+    }
+
+    /// What to do; `scale` is how the factor is given, such as `--scale `.
+    pub fn advice(&self, scale: &str) -> String {
+        match self.size {
+            size if size > 1e4 => {
+                format!("`{scale}1e-6` brings micrometres to metres, `{scale}0.001` millimetres")
+            }
+            _ if self.is_large() => {
+                format!("`{scale}0.001` brings millimetres to metres, `{scale}0.01` centimetres")
+            }
+            _ => format!(
+                "`{scale}1` is for a file in metres: it is the size of one unit of the file in metres"
+            ),
+        }
+    }
+}
+
+impl std::fmt::Display for SizeDoubt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let size = number(self.size);
+        match self.size {
+            size_in_metres if size_in_metres > 1e4 => {
+                write!(f, "{size} m across, larger than any organ: its lengths are probably micrometres")
+            }
+            size_in_metres if size_in_metres > 40.0 => {
+                write!(f, "{size} m across, larger than any organ: its lengths are probably millimetres")
+            }
+            _ if self.is_large() => {
+                write!(
+                    f,
+                    "{size} m across, larger than any organ: its lengths are probably centimetres or millimetres"
+                )
+            }
+            _ => {
+                write!(f, "{size} m across, smaller than any organ: it was probably scaled to metres before")
+            }
+        }
+    }
+}
 
 /// Shapes of volume cells.
 const SOLID_SHAPES: [&str; 4] = ["block", "ellipsoid", "tube", "organ"];
@@ -36,6 +95,7 @@ impl Builder<'_> {
         let given = [
             ("file", table.file.is_some()),
             ("image", table.image.is_some()),
+            ("masks", table.masks.is_some()),
             ("block", table.block.is_some()),
             ("ellipsoid", table.ellipsoid.is_some()),
             ("tube", table.tube.is_some()),
@@ -50,7 +110,7 @@ impl Builder<'_> {
         let sources: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
         let [source] = sources[..] else {
             let message = format!("a mesh comes from exactly one source, found {}", sources.len());
-            let help = "give one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, or for shells `plate`, `cylinder`, \
+            let help = "give one of `file`, `image`, `masks`, `block`, `ellipsoid`, `tube`, `organ`, or for shells `plate`, `cylinder`, \
                         `sphere`, `hemisphere`, `annulus`, `twisted-strip`";
             self.error(path, message, "this mesh", help);
             return None;
@@ -61,21 +121,25 @@ impl Builder<'_> {
             ("labels", table.labels.is_some(), false),
             ("threshold", table.threshold.is_some(), false),
             ("add", table.add.is_some(), false),
+            ("names", table.names.is_some(), false),
             ("clean", table.clean.is_some(), from_file),
             ("triangles", table.triangles.is_some(), from_file),
             ("shells", table.shells.is_some(), from_file),
             ("error", table.error.is_some(), from_file),
+            ("inner-edge", table.inner_edge.is_some(), from_file),
+            ("protect", table.protect.is_some(), from_file),
+            ("distance", table.distance.is_some(), from_file),
         ];
-        let misplaced = |&(_, given, fits): &(&str, bool, bool)| given && !fits && source != "image";
+        let misplaced =
+            |&(_, given, fits): &(&str, bool, bool)| given && !fits && !matches!(source, "image" | "masks");
         if let Some((key, ..)) = of_scans.into_iter().find(misplaced) {
             let message = format!("`{key}` is for images, and this mesh comes from `{source}`");
             self.error(&[path, &[key]].concat(), message, "here", "leave it out");
             return None;
         }
-        let mut made = match (&table.file, &table.image) {
-            (Some(file), _) if from_file => self.scanned(file, table, path)?,
-            (_, Some(image)) => self.scanned(image, table, path)?,
-            (Some(file), _) => self.file(file.clone(), table, path)?,
+        let mut made = match &table.file {
+            Some(file) if !from_file => self.file(file.clone(), table, path)?,
+            _ if matches!(source, "file" | "image" | "masks") => self.scanned(table, path)?,
             _ if SOLID_SHAPES.contains(&source) => self.shape(source, table, path)?,
             _ => self.sheet(source, table, path)?,
         };
@@ -92,9 +156,13 @@ impl Builder<'_> {
             self.error(&at("edge"), message, "here", help);
             return None;
         }
-        match io::read(&self.scene.folder.join(&file)) {
+        let opened = |source| MeshFileError::Open { path: file.clone(), source };
+        match self.scene.file(&file).map_err(opened).and_then(|path| io::read(&path)) {
             Ok(mut read) => {
-                read.mesh.points.iter_mut().for_each(|point| *point *= table.scale);
+                if let Some((message, help)) = unscaled(&mut read.mesh, table) {
+                    self.error(&at("file"), message, "this file", help);
+                    return None;
+                }
                 let name = file.display();
                 self.notes.extend(read.notes.iter().map(|note| format!("{name}: {note}")));
                 Some(MeshOrigin { mesh: read.mesh, origin: format!("{name} ({})", read.format) })
@@ -145,7 +213,7 @@ impl Builder<'_> {
             return None;
         }
         // The scale of an organ is applied to its field, so that `edge` stays in metres; other shapes are in metres.
-        if table.organ.is_none() && table.scale != 1.0 {
+        if table.organ.is_none() && table.factor() != 1.0 {
             let help = "give the shape in metres, or use `scale` with `file` or `organ`";
             self.error(&at("scale"), format!("`scale` does not go with `{source}`"), "here", help);
             return None;
@@ -224,19 +292,19 @@ impl Builder<'_> {
 
     /// Warns of a size that no organ has.
     fn doubt_size(&mut self, mesh: &Mesh, path: &[&str]) {
-        let Some((low, high)) = mesh.bounds() else { return };
-        let size = (high - low).norm();
-        let help = if size > PLAUSIBLE_SIZE[1] {
-            "`scale` brings a mesh to metres: 0.001 for one in millimetres, 0.01 for centimetres"
-        } else if size < PLAUSIBLE_SIZE[0] {
-            "is `scale` too small? It is the size of one unit of the mesh in metres"
-        } else {
-            return;
-        };
-        let message = format!("`{}` measures {} m across: is that so?", path[1], number(size));
+        let Some(doubt) = SizeDoubt::of(mesh) else { return };
+        let message = format!("`{}` measures {doubt}", path[1]);
         let place = self.source().span(path);
-        self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(help));
+        self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(doubt.advice("scale = ")));
     }
+}
+
+/// Brings the mesh of a file to metres; the message and what to do where it is in metres only by default, and too large for that.
+pub(super) fn unscaled(mesh: &mut Mesh, table: &MeshTable) -> Option<(String, String)> {
+    mesh.points.iter_mut().for_each(|point| *point *= table.factor());
+    let doubt = SizeDoubt::of(mesh).filter(|doubt| doubt.is_large() && table.scale.is_none())?;
+    let help = format!("{}; `scale = 1` if it is in metres", doubt.advice("scale = "));
+    Some((format!("the mesh measures {doubt}"), help))
 }
 
 /// What keeps a mesh of cells of a dimension from being simulated, with what to do about it. Other cells may be as they are.
@@ -308,11 +376,11 @@ fn make_shape(table: &MeshTable, edge: f64) -> Result<FieldMesh, MeshingError> {
     }
     match table.organ {
         Some(Organ::Brain) => {
-            let mut made = fill(&Phantom::new(pliant_meshing::Organ::Brain, table.scale)?)?;
-            label_brain(&mut made.mesh, table.scale);
+            let mut made = fill(&Phantom::new(pliant_meshing::Organ::Brain, table.factor())?)?;
+            label_brain(&mut made.mesh, table.factor());
             Ok(made)
         }
-        _ => fill(&Phantom::new(pliant_meshing::Organ::Liver, table.scale)?),
+        _ => fill(&Phantom::new(pliant_meshing::Organ::Liver, table.factor())?),
     }
 }
 
@@ -446,6 +514,9 @@ mod tests {
             ("{ image = 'a.nii', edge = 1, label = 1, as = 'shells' }", "`edge` does not go with shells"),
             ("{ image = 'a.nii', label = 1, as = 'shells' }", "exactly one of `shells`, `error`"),
             ("{ image = 'a.nii', edge = 1, label = 1, add = 'b.nii' }", "`add` goes with `threshold`"),
+            ("{ masks = ['a.nii'], edge = 1, threshold = 1, add = 'b.nii' }", "`add` goes with `image`"),
+            ("{ masks = [], edge = 1 }", "`masks` names no image"),
+            ("{ organ = 'liver', edge = 1, names = 'a.txt' }", "`names` is for images"),
             ("{ organ = 'liver', edge = 1, error = 0.1 }", "`error` is for images"),
             ("{ organ = 'liver', edge = 1, as = 'shells' }", "`organ` is not made of shells"),
             (

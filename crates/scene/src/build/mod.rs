@@ -25,9 +25,9 @@ use crate::format::{CurveShape, Timing};
 use crate::scene::Scene;
 use crate::source::Source;
 
-pub use corotational::{BodyCells, Control, Corotational};
+pub use corotational::{BodyCells, Control, Corotational, Stop};
 pub(crate) use meshes::MeshOrigin;
-pub use meshes::PLAUSIBLE_SIZE;
+pub use meshes::SizeDoubt;
 
 /// A model, and what the outputs need beside it.
 #[derive(Clone, Debug)]
@@ -96,7 +96,7 @@ pub fn build_with(scene: &Scene, cache: &MeshCache) -> Result<Built, SceneErrors
         corotational: None,
         bodies: Vec::new(),
         surfaces: Vec::new(),
-        out: Vec::new(),
+        out: scene.doubts.clone(),
         notes: Vec::new(),
     };
     builder.check_models();

@@ -1,13 +1,15 @@
 //! Vectors on some nodes of a body, from its mesh file or a table beside the scene.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use pliant_geometry::{DataArray, Mesh};
 
 use super::{Builder, suggestion};
 use crate::diagnostic::counted;
 use crate::format::{NodeVectorSource, NodeVectors};
+use crate::reads::{LONGEST_TABLE, read_regular};
 
 /// What is wrong with a table of vectors, and what to do about it.
 #[derive(Debug)]
@@ -38,7 +40,7 @@ impl Builder<'_> {
                 point_data(name, &built.name, &built.mesh).and_then(|data| of_data(name, data, &own)),
             ),
             NodeVectorSource::Csv(file) => {
-                let rows = read_rows(&self.scene.folder.join(file), built.file_nodes);
+                let rows = read_rows(self.scene.file(file), file, built.file_nodes);
                 let numbers = own.iter().map(|&node| built.number_in_file(node));
                 ("csv", rows.and_then(|rows| of_rows(file, &rows, numbers)))
             }
@@ -80,10 +82,16 @@ fn of_data(name: &str, data: &DataArray, nodes: &[u32]) -> Result<Vec<[f64; 3]>,
 }
 
 /// The rows of a table by node; `count` nodes are in the mesh file. Empty lines and what follows a # are passed over.
-fn read_rows(path: &Path, count: usize) -> Result<BTreeMap<u32, [f64; 3]>, Fault> {
+fn read_rows(
+    found: io::Result<PathBuf>,
+    path: &Path,
+    count: usize,
+) -> Result<BTreeMap<u32, [f64; 3]>, Fault> {
     const FORM: &str =
         "each row is `node,x,y,z`: a node counted from 0 and three numbers in metres (or newtons)";
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let read = found.and_then(|found| read_regular(&found, LONGEST_TABLE));
+    let text = read.and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other));
+    let text = text.map_err(|error| {
         let help = "it must be a text file; file names are relative to the scene file";
         fault(format!("`{}` cannot be read: {error}", path.display()), help)
     })?;
@@ -148,7 +156,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("motion.csv");
         std::fs::write(&path, text).unwrap();
-        read_rows(&path, 4).map_err(|fault| fault.message)
+        read_rows(Ok(path.clone()), &path, 4).map_err(|fault| fault.message)
     }
 
     #[test]

@@ -18,6 +18,11 @@ struct OnGrid<'t> {
 }
 
 impl MeshTable {
+    /// Whether it is a built-in shape of triangles.
+    pub(in crate::build) fn is_sheet(&self) -> bool {
+        self.sphere.is_some() || self.sheet().is_some()
+    }
+
     /// The shape on a grid that it names.
     fn sheet(&self) -> Option<OnGrid<'_>> {
         let made = |sheet, lengths, grid| Some(OnGrid { sheet, lengths, grid });
@@ -53,7 +58,7 @@ impl Builder<'_> {
         let at = |key| [path, &[key]].concat();
         let refused = [
             ("fix", table.fix.is_some(), "`fix` repairs mesh files; shapes need none"),
-            ("scale", table.scale != 1.0, "shapes are given in metres, without `scale`"),
+            ("scale", table.factor() != 1.0, "shapes are given in metres, without `scale`"),
             ("as", table.cells.is_some(), "this shape is made of triangles"),
         ];
         for (key, given, message) in refused {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use pliant_geometry::Selection;
+use pliant_imaging::LabelChoice;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,12 +20,14 @@ pub struct BodyTable {
     /// Its mesh, from a file, a built-in shape, or a segmented image. A shell's mesh is of triangles (quads are cut into
     /// two); a volume mesh gives it its boundary.
     pub mesh: MeshTable,
-    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-opt` for shells. For soft tissue prefer
+    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells. For soft tissue prefer
     /// `tet4-anp` to `tet4`.
     #[serde(default)]
     pub element: Option<Element>,
     /// The name of its law, or a law for each cell label: `{ 1 = "parenchyma", 2 = "tumour" }`. Shells and co-rotational solids
-    /// take Young's modulus and Poisson's ratio of an isotropic law at small strain.
+    /// take Young's modulus and Poisson's ratio of an isotropic law at small strain; a shell whose `layers` all have their own elasticity
+    /// needs none.
+    #[serde(default = "no_law")]
     pub law: ByLabel<String>,
     /// Mass per volume [kg/m³], or one for each cell label. Elements with averaged pressure average it apart on parts of
     /// different density.
@@ -32,8 +35,17 @@ pub struct BodyTable {
     /// Thickness of a shell [m]: one, or one for each triangle.
     #[serde(default)]
     pub thickness: Option<Thickness>,
+    /// Layers of a shell from the side that its triangles face away from to the side that they face, instead of a `thickness`. Their
+    /// angles count from `fibre`, projected on each triangle.
+    #[serde(default)]
+    pub layers: Vec<LayerTable>,
+    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: what holds a flat `membrane` across. Not for the
+    /// element `plate`.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub pre_tension: f64,
     /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the mesh where it has
-    /// some and there is no `crease`, else from the triangles.
+    /// some, as built-in shapes have, and there is no `crease`, else from the triangles.
     #[serde(default)]
     pub normals: Option<Normals>,
     /// Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved surface has a kink; 45
@@ -67,12 +79,47 @@ pub struct BodyTable {
     /// triangles round them. The mesh is the shape at rest.
     #[serde(default)]
     pub initial_displacement: Option<NodeVectors>,
-    /// Fibre direction at rest; overrides that of the law.
+    /// Fibre direction at rest; overrides that of the law. Of a shell, the direction that the angles of its `layers` count from.
     #[serde(default)]
     pub fibre: Option<Fibre>,
     /// Direction of the second family of fibres at rest; overrides that of the law.
     #[serde(default)]
     pub second_fibre: Option<Fibre>,
+}
+
+fn no_law() -> ByLabel<String> {
+    ByLabel::Each(BTreeMap::new())
+}
+
+/// A layer of a shell: linearly elastic in plane stress, by a `law` (that of the body if not given) or by moduli of its own along and
+/// across its direction.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LayerTable {
+    /// Thickness [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub thickness: f64,
+    /// Angle [degrees] of its direction from the `fibre` of the body, counter-clockwise seen from the side that the triangles face.
+    #[serde(default)]
+    #[schemars(range(min = -180.0, max = 180.0))]
+    pub angle: f64,
+    /// The name of an isotropic law, whose Young's modulus and Poisson's ratio at small strain are taken.
+    #[serde(default)]
+    pub law: Option<String>,
+    /// Young's moduli along and across its direction [Pa]; with `poisson-ratio` and `shear-modulus`, instead of a law.
+    #[serde(default)]
+    pub young_modulus: Option<[f64; 2]>,
+    /// Poisson's ratio: how much it narrows across its direction when it is pulled along it.
+    #[serde(default)]
+    pub poisson_ratio: Option<f64>,
+    /// Shear modulus in its plane [Pa].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub shear_modulus: Option<f64>,
+    /// Mass per volume [kg/m³]; that of the body if not given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub density: Option<f64>,
 }
 
 fn default_hourglass() -> ByLabel<Hourglass> {
@@ -174,7 +221,8 @@ pub struct Density(pub f64);
 #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
 pub struct Hourglass(pub f64);
 
-/// Fibre direction.
+/// Fibre direction at rest: `fibre = [x, y, z]` for one direction everywhere, whose length does not matter, or a table with exactly
+/// one of the keys below for a direction in each element, such as `fibre = { cell-data = "fibre" }`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Fibre {
@@ -245,7 +293,10 @@ pub enum Element {
     Hex8,
     /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell.
     Hex8Full,
-    /// Shell: discrete Kirchhoff triangle and optimal ANDES membrane, whose drilling adapts to the thickness: the recommended one.
+    /// Shell: discrete Kirchhoff triangle and the mean membrane strain of the curved triangle: the recommended one.
+    DktCurved,
+    /// Shell: discrete Kirchhoff triangle and optimal flat ANDES membrane, whose drilling adapts to the thickness. `dkt-curved` is this
+    /// on flat walls; on curved walls under pressure this one scatters displacements from node to node.
     DktOpt,
     /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane, and calm under pressures
     /// that stretch thin curved walls much.
@@ -263,7 +314,10 @@ pub enum Element {
 impl Element {
     /// True for elements of shells.
     pub fn is_shell(self) -> bool {
-        matches!(self, Self::DktOpt | Self::DktCst | Self::Membrane | Self::Plate | Self::Comas2010)
+        matches!(
+            self,
+            Self::DktCurved | Self::DktOpt | Self::DktCst | Self::Membrane | Self::Plate | Self::Comas2010
+        )
     }
 
     /// True for tetrahedra.
@@ -282,24 +336,31 @@ impl Element {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
-    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY. Its own cells are taken, unless `as`
+    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY, GIfTI, FreeSurfer. Its own cells are taken, unless `as`
     /// asks for others made of its surface.
     #[serde(default)]
     pub file: Option<PathBuf>,
-    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, or the folder of a
-    /// DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
+    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a DICOM segmentation, or the
+    /// folder of a DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
     #[serde(default)]
     pub image: Option<PathBuf>,
     /// Another image of the same voxels whose values are added before the `threshold`, as grey matter to white matter.
     #[serde(default)]
     pub add: Option<PathBuf>,
-    /// Label of the image to mesh.
+    /// Several masks of the same voxels, each an image with 0 outside, as one image: the first has label 1, the second 2, and so on, each
+    /// with the name of its file. Where they overlap, the last one counts.
     #[serde(default)]
-    pub label: Option<i32>,
-    /// Several labels of the image as one body; each cell has its own as cell data `label`, for `law`, `density` and
+    pub masks: Option<Vec<PathBuf>>,
+    /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    #[serde(default)]
+    pub names: Option<PathBuf>,
+    /// Label of the image to mesh, by number or name.
+    #[serde(default)]
+    pub label: Option<Label>,
+    /// Several labels of the image as one body, by number, name or range as `"5-8"`; of `masks` all if not given. Each cell has its own as cell data `label`, for `law`, `density` and
     /// `hourglass` by label. The first label takes what cleaning adds.
     #[serde(default)]
-    pub labels: Option<Vec<i32>>,
+    pub labels: Option<Vec<Label>>,
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
     #[serde(default)]
     pub threshold: Option<f64>,
@@ -342,6 +403,20 @@ pub struct MeshTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
+    /// Tets of an image or of what the surface of a file encloses: longer edge inside, away from the surface [m], rounded down to 2, 4, 8,
+    /// ... times `edge`.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub inner_edge: Option<f64>,
+    /// Labels with smaller tets: numbers, for half of `edge`, or tables with their edge, as `[4, { label = 5, edge = 0.002 }]`. Edges are
+    /// rounded down to a half, a quarter, ... of `edge`.
+    #[serde(default)]
+    pub protect: Option<Vec<Protected>>,
+    /// Largest distance between the boundary of tets and the body [m], both ways: they are made smaller where it is not held. It is
+    /// measured to the triangles of a file, or to the smooth surface of an image. Without `edge` the first edge is chosen.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub distance: Option<f64>,
     /// Number of triangles of a `surface` of an image or a file, instead of `edge`: as few, placed where the shape needs them.
     #[serde(default)]
     #[schemars(range(min = 4))]
@@ -357,10 +432,11 @@ pub struct MeshTable {
     /// Cells of a built-in shape or an image (tets if not given), or of the closed surface of a `file`.
     #[serde(default, rename = "as")]
     pub cells: Option<Cells>,
-    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).
-    #[serde(default = "one")]
+    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres); 1 if not given. A file that would be
+    /// larger than 10 m needs it.
+    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub scale: f64,
+    pub scale: Option<f64>,
     /// Shift after scaling [m].
     #[serde(default)]
     pub at: [f64; 3],
@@ -369,14 +445,69 @@ pub struct MeshTable {
     pub fix: Option<Fixes>,
 }
 
-fn one() -> f64 {
-    1.0
-}
-
 impl MeshTable {
+    /// The factor on all lengths.
+    pub fn factor(&self) -> f64 {
+        self.scale.unwrap_or(1.0)
+    }
+
     /// The cells of a built-in shape or an image.
     pub fn made_of(&self) -> Cells {
         self.cells.unwrap_or_default()
+    }
+}
+
+/// A label of an image: its number, or in quotes its name or a range of numbers.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Label {
+    /// Its number.
+    Number(i32),
+    /// Its name, or a range as `"5-8"`.
+    Text(String),
+}
+
+impl Label {
+    /// What of an image it stands for.
+    pub fn choice(&self) -> LabelChoice {
+        match self {
+            Self::Number(label) => LabelChoice::One(*label),
+            Self::Text(text) => match text.parse() {
+                Ok(choice) => choice,
+                Err(never) => match never {},
+            },
+        }
+    }
+}
+
+/// A label with smaller tets.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Protected {
+    /// A label with tets of half of `edge`.
+    Half(i32),
+    /// A label with tets of an edge of its own.
+    Own(ProtectedTable),
+}
+
+/// A label and the edge of its tets.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ProtectedTable {
+    /// The label.
+    pub label: i32,
+    /// Edge of its tets [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub edge: f64,
+}
+
+impl Protected {
+    /// The label, and the edge of its tets if it is given [m].
+    pub fn label_and_edge(&self) -> (i32, Option<f64>) {
+        match *self {
+            Self::Half(label) => (label, None),
+            Self::Own(ProtectedTable { label, edge }) => (label, Some(edge)),
+        }
     }
 }
 

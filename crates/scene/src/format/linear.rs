@@ -101,14 +101,47 @@ pub struct ControlTable {
     /// How a node moves over the whole run, in equal parts.
     #[serde(default)]
     pub displacement: Option<ControlledNode>,
-    /// Length [m] that all displacements together go in a load step, √Σ|Δu|².
+    /// Length [m] that all displacements together go in a load step, √Σ|Δu|². The path ends where `stop` says, or with the last load
+    /// step.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub arc_length: Option<f64>,
+    /// Where a path by `arc-length` ends before its last load step; if not given, at a load factor of 1, where the load is as written.
+    #[serde(default)]
+    pub stop: Option<StopTable>,
     /// Volume [m³] that the pressurised triangles, which must be closed, enclose at the end; it changes in equal parts.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub volume: Option<f64>,
+}
+
+/// Where a path by arc length ends: at the first state that meets one of these.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct StopTable {
+    /// Size of the load factor, forwards or backwards.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub load_factor: Option<f64>,
+    /// How far a node has moved.
+    #[serde(default)]
+    pub displacement: Option<ControlledNode>,
+    /// Number of limit points passed, where the load turns round.
+    #[serde(default)]
+    #[schemars(range(min = 1))]
+    pub limit_points: Option<u32>,
+}
+
+/// How an implicit run goes on in time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntegratorName {
+    /// Backward Euler, of first order: robust, and it damps a vibration of f hertz in steps of h seconds by about π f h of critical.
+    #[default]
+    BackwardEuler,
+    /// The backward differentiation formula of second order: it damps by about 62 (f h)³ of critical, and less accurate steps show
+    /// as vibrations.
+    Bdf2,
 }
 
 /// A component of the displacement of a node.

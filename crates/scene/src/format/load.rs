@@ -88,7 +88,8 @@ pub struct SpringTable {
     pub to: Option<[f64; 3]>,
 }
 
-/// Nodes moved as prescribed: exactly one of `by` and `velocity`, or `turn` alone or with `by`. Curve: `smooth-step` if not given.
+/// Nodes moved as prescribed: exactly one of `by`, `velocity` and `rotate`; of shells `by`, `turn` or both. Curve: `smooth-step` if not
+/// given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MoveTable {
@@ -105,12 +106,27 @@ pub struct MoveTable {
     /// Rotation of nodes of shells about their own places [rad]: about the axis of this vector by its length, reached along the curve.
     #[serde(default)]
     pub turn: Option<[f64; 3]>,
-    /// Components prescribed; if not given, all three of the displacement, and with `turn` the rotations.
+    /// Rotation of nodes of a solid about an axis, reached along the curve; each node stays on its circle all the way.
+    #[serde(default)]
+    pub rotate: Option<RotateTable>,
+    /// Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A rotation takes all three.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
     /// Its course.
     #[serde(flatten)]
     pub timing: Timing,
+}
+
+/// A rotation about an axis.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RotateTable {
+    /// Direction of the axis; its length does not matter.
+    pub axis: [f64; 3],
+    /// A point of the axis [m].
+    pub centre: [f64; 3],
+    /// Angle [rad] by which it turns, right-handed about the axis; 6.2832 is a whole turn.
+    pub angle: f64,
 }
 
 /// Displacements [m] or forces [N] of nodes.
@@ -230,9 +246,10 @@ pub struct PressureTable {
     /// Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face (a closed one that faces
     /// outwards is blown up).
     pub pressure: f64,
-    /// How it comes to the nodes of a shell.
+    /// How it comes to the nodes of a shell; if not given, `curved` with `dkt-curved` and `lumped` with other elements. Only these
+    /// pairs go together.
     #[serde(default)]
-    pub spread: SpreadName,
+    pub spread: Option<SpreadName>,
     /// Its course.
     #[serde(flatten)]
     pub timing: Timing,
@@ -256,11 +273,10 @@ pub struct GravityTable {
 }
 
 /// How a pressure on a shell comes to its nodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpreadName {
     /// A third of the force on each flat triangle to each of its corners.
-    #[default]
     Lumped,
     /// From the curved surface, as forces and moments.
     Curved,

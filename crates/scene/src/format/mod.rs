@@ -9,14 +9,18 @@ mod view;
 
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
-    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, MeshTable, Normals,
-    Organ, PatternName, PlateShape, SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule,
-    TubeShape, TwistedStripShape,
+    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, LayerTable,
+    MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape, SurfaceTable,
+    Thickness, ThicknessRule, TubeShape, TwistedStripShape,
 };
-pub use linear::{ControlTable, ControlledNode, LinearName, LinearTable, LinearWay, PreconditionerName};
+pub use linear::{
+    ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,
+    StopTable,
+};
 pub use load::{
     Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MomentTable, MoveTable,
-    NodeVectorSource, NodeVectors, PressureTable, SpreadName, SpringTable, Timing, TractionTable, Vectors,
+    NodeVectorSource, NodeVectors, PressureTable, RotateTable, SpreadName, SpringTable, Timing,
+    TractionTable, Vectors,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use view::{
@@ -65,8 +69,8 @@ pub struct RunTable {
     /// How the state goes from instant to instant.
     #[serde(default)]
     pub solver: SolverName,
-    /// Time step [s]; `auto`: 0.9 × the true limit of the assembled model at rest, one of `load-steps` equal ones where
-    /// the solver is `quasi-static` or `static`, and 0.01 s where it is `implicit`.
+    /// Time step [s], made a little shorter where it does not divide the duration; `auto`: 0.9 × the true limit of the assembled
+    /// model at rest, `load-steps` where the solver is `quasi-static` or `static`, and 0.01 s where it is `implicit`.
     #[serde(default)]
     pub step: StepChoice,
     /// What an explicit run does when the largest stable step of the deformed model, watched during the run, falls below
@@ -76,10 +80,9 @@ pub struct RunTable {
     /// Makes the elements that limit an explicit step heavier.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
-    /// Load steps of a quasi-static or static run with `step = "auto"`.
-    #[serde(default = "ten")]
-    #[schemars(range(min = 1, max = 1_000_000))]
-    pub load_steps: u32,
+    /// Load steps of a quasi-static or static run with `step = "auto"`: so many equal ones, or the times at which they end.
+    #[serde(default)]
+    pub load_steps: LoadSteps,
     /// Largest residual force over the largest internal force (or load, or inertial force) at which an equilibrium is found; if not
     /// given, 1e-6 in double and 1e-4 in single precision with the solver `quasi-static`, 1e-8 with `static`, 1e-6 with
     /// `implicit`.
@@ -91,6 +94,9 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
+    /// How `implicit` goes on in time; `backward-euler` if not given.
+    #[serde(default)]
+    pub integrator: Option<IntegratorName>,
     /// How `implicit` and `static` solve their linear equations.
     #[serde(default)]
     pub linear: LinearWay,
@@ -125,8 +131,45 @@ pub struct MassScalingTable {
     pub target_step: f64,
 }
 
-fn ten() -> u32 {
-    10
+/// The load steps of a quasi-static or static run.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum LoadSteps {
+    /// So many equal ones.
+    Count(#[schemars(range(min = 1, max = 1_000_000))] u32),
+    /// Unequal ones, of a quasi-static run.
+    Times(LoadTimes),
+}
+
+/// The instants of unequal load steps.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LoadTimes {
+    /// Times [s] at which load steps end, above 0 and increasing; the last one ends with the scene.
+    pub times: Vec<f64>,
+}
+
+impl Default for LoadSteps {
+    fn default() -> Self {
+        Self::Count(10)
+    }
+}
+
+impl LoadSteps {
+    /// The first one of a scene of a duration [s].
+    pub(crate) fn first(&self, until: f64) -> f64 {
+        match self {
+            Self::Count(count) => until / f64::from(*count),
+            Self::Times(_) => self.ends(until).and_then(|ends| ends.first().copied()).unwrap_or(until),
+        }
+    }
+
+    /// Where unequal ones end [s]; the last one with the scene.
+    pub(crate) fn ends(&self, until: f64) -> Option<Vec<f64>> {
+        let Self::Times(LoadTimes { times }) = self else { return None };
+        let within = times.iter().copied().filter(|&time| time < until * (1.0 - 1e-9));
+        Some(within.chain([until]).collect())
+    }
 }
 
 /// How the state goes from instant to instant.

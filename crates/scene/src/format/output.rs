@@ -17,6 +17,13 @@ pub enum FieldName {
     Velocity,
     /// Rotation vector [rad] of the nodes of shells, of length at most π.
     Rotation,
+    /// Force [N] by which constraints hold or move a node; zero where it is free.
+    Reaction,
+    /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero where it is free.
+    ReactionMoment,
+    /// Deformation gradient F of a solid, the mean over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x
+    /// along y at rest.
+    DeformationGradient,
     /// Cauchy stress [Pa].
     CauchyStress,
     /// Second Piola–Kirchhoff stress [Pa].
@@ -31,10 +38,15 @@ pub enum FieldName {
     FibreStretch,
     /// Pressure [Pa], minus a third of the trace of the Cauchy stress.
     Pressure,
-    /// Volume ratio J.
+    /// Volume ratio J that the law's volumetric part sees, to which `pressure` belongs: det F of the element, of `tet4-anp` and the
+    /// other averaged tets the mean over its nodes, of `hex8-full` the mean over the element.
     #[serde(rename = "J")]
     VolumeRatio,
-    /// Strain energy of the instantaneous elastic law per volume at rest [J/m³].
+    /// The element's own det F, whatever its `J` is.
+    #[serde(rename = "cell-J")]
+    CellVolumeRatio,
+    /// Strain energy of the instantaneous elastic law per volume at rest [J/m³], with the element's averages of volume: times the
+    /// volumes it sums to the stored energy.
     EnergyDensity,
     /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells and co-rotational solids that
     /// at rest, which turns with them. The smallest one bounds the step of the whole.
@@ -58,22 +70,30 @@ pub enum FieldName {
     DrillingEnergy,
     /// Thickness of a shell at rest [m].
     Thickness,
+    /// Thickness [m] that a shell has with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1−ν)); forces do not feel it.
+    CurrentThickness,
+    /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity holds to about 0.1.
+    SurfaceStrain,
 }
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 28] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
+        Self::Reaction,
+        Self::ReactionMoment,
         Self::CauchyStress,
         Self::Pk2Stress,
         Self::VonMises,
         Self::GreenStrain,
+        Self::DeformationGradient,
         Self::Fibre,
         Self::FibreStretch,
         Self::Pressure,
         Self::VolumeRatio,
+        Self::CellVolumeRatio,
         Self::EnergyDensity,
         Self::ElementStep,
         Self::MembraneForce,
@@ -85,6 +105,8 @@ impl FieldName {
         Self::BendingEnergy,
         Self::DrillingEnergy,
         Self::Thickness,
+        Self::CurrentThickness,
+        Self::SurfaceStrain,
     ];
 
     /// The name in files.
@@ -100,9 +122,13 @@ impl FieldName {
             Self::FibreStretch => "fibre-stretch",
             Self::Pressure => "pressure",
             Self::VolumeRatio => "J",
+            Self::CellVolumeRatio => "cell-J",
             Self::EnergyDensity => "energy-density",
             Self::ElementStep => "element-step",
             Self::Rotation => "rotation",
+            Self::Reaction => "reaction",
+            Self::ReactionMoment => "reaction-moment",
+            Self::DeformationGradient => "deformation-gradient",
             Self::MembraneForce => "membrane-force",
             Self::BendingMoment => "bending-moment",
             Self::StressTop => "stress-top",
@@ -112,6 +138,8 @@ impl FieldName {
             Self::BendingEnergy => "bending-energy",
             Self::DrillingEnergy => "drilling-energy",
             Self::Thickness => "thickness",
+            Self::CurrentThickness => "current-thickness",
+            Self::SurfaceStrain => "surface-strain",
         }
     }
 
@@ -123,9 +151,11 @@ impl FieldName {
     /// Its unit; empty for none.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Displacement | Self::Thickness => "m",
+            Self::Displacement | Self::Thickness | Self::CurrentThickness => "m",
             Self::Velocity => "m/s",
             Self::Rotation => "rad",
+            Self::Reaction => "N",
+            Self::ReactionMoment => "N m",
             Self::CauchyStress
             | Self::Pk2Stress
             | Self::VonMises
@@ -133,7 +163,13 @@ impl FieldName {
             | Self::StressTop
             | Self::StressMiddle
             | Self::StressBottom => "Pa",
-            Self::GreenStrain | Self::Fibre | Self::FibreStretch | Self::VolumeRatio => "",
+            Self::GreenStrain
+            | Self::DeformationGradient
+            | Self::Fibre
+            | Self::FibreStretch
+            | Self::VolumeRatio
+            | Self::CellVolumeRatio
+            | Self::SurfaceStrain => "",
             Self::EnergyDensity => "J/m³",
             Self::ElementStep => "s",
             Self::MembraneForce => "N/m",
@@ -148,6 +184,9 @@ impl FieldName {
             Self::Displacement => "displacement",
             Self::Velocity => "velocity",
             Self::Rotation => "rotation",
+            Self::Reaction => "reaction",
+            Self::ReactionMoment => "reaction moment",
+            Self::DeformationGradient => "deformation gradient",
             Self::CauchyStress => "Cauchy stress",
             Self::Pk2Stress => "2nd Piola–Kirchhoff stress",
             Self::VonMises => "von Mises stress",
@@ -156,6 +195,7 @@ impl FieldName {
             Self::FibreStretch => "fibre stretch",
             Self::Pressure => "pressure",
             Self::VolumeRatio => "volume ratio",
+            Self::CellVolumeRatio => "volume ratio of the cell",
             Self::EnergyDensity => "energy density",
             Self::ElementStep => "element step",
             Self::MembraneForce => "membrane force",
@@ -167,16 +207,24 @@ impl FieldName {
             Self::BendingEnergy => "bending energy",
             Self::DrillingEnergy => "drilling energy",
             Self::Thickness => "thickness",
+            Self::CurrentThickness => "current thickness",
+            Self::SurfaceStrain => "strain at the surface",
         }
     }
 
     /// Numbers per point or cell.
     pub fn components(self) -> usize {
         match self {
-            Self::Displacement | Self::Velocity | Self::Rotation | Self::Fibre => 3,
+            Self::Displacement
+            | Self::Velocity
+            | Self::Rotation
+            | Self::Reaction
+            | Self::ReactionMoment
+            | Self::Fibre => 3,
             Self::CauchyStress
             | Self::Pk2Stress
             | Self::GreenStrain
+            | Self::DeformationGradient
             | Self::MembraneForce
             | Self::BendingMoment
             | Self::StressTop
@@ -186,30 +234,40 @@ impl FieldName {
             | Self::FibreStretch
             | Self::Pressure
             | Self::VolumeRatio
+            | Self::CellVolumeRatio
             | Self::EnergyDensity
             | Self::ElementStep
             | Self::MembraneEnergy
             | Self::BendingEnergy
             | Self::DrillingEnergy
-            | Self::Thickness => 1,
+            | Self::Thickness
+            | Self::CurrentThickness
+            | Self::SurfaceStrain => 1,
         }
     }
 
     /// True for fields that live on nodes.
     pub fn is_nodal(self) -> bool {
-        matches!(self, Self::Displacement | Self::Velocity | Self::Rotation)
+        matches!(
+            self,
+            Self::Displacement | Self::Velocity | Self::Rotation | Self::Reaction | Self::ReactionMoment
+        )
     }
 
     /// True for fields that bodies of a model have.
     pub fn is_of(self, model: BodyModel) -> bool {
         match self {
-            Self::Displacement | Self::Velocity | Self::VonMises | Self::ElementStep => true,
-            Self::CauchyStress | Self::Pressure | Self::VolumeRatio | Self::EnergyDensity => {
-                model != BodyModel::Shell
-            }
-            Self::Pk2Stress | Self::GreenStrain | Self::Fibre | Self::FibreStretch => {
-                model == BodyModel::Solid
-            }
+            Self::Displacement | Self::Velocity | Self::Reaction | Self::VonMises | Self::ElementStep => true,
+            Self::CauchyStress
+            | Self::Pressure
+            | Self::VolumeRatio
+            | Self::CellVolumeRatio
+            | Self::EnergyDensity => model != BodyModel::Shell,
+            Self::Pk2Stress
+            | Self::GreenStrain
+            | Self::DeformationGradient
+            | Self::Fibre
+            | Self::FibreStretch => model == BodyModel::Solid,
             _ => model == BodyModel::Shell,
         }
     }
@@ -236,7 +294,8 @@ pub struct VtuTable {
     /// Time between frames [s]; the first and the last instant are always written.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
-    /// The fields.
+    /// The fields. Tensors have nine components xx, xy, xz, yx, yy, yz, zx, zy, zz in this order; `[view]` colours by one of them
+    /// with `component`, and probes of a `csv` output write each into a column.
     #[serde(default = "default_fields")]
     pub data: Vec<FieldName>,
     /// Where fields of cells are written.
@@ -259,9 +318,14 @@ pub struct CsvTable {
     /// Time between rows [s]; the first and the last instant are always written.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
-    /// Constraints whose reaction [N] is written; if not given, all.
+    /// Constraints whose reaction [N] is written; if not given, all. Columns `reaction.NAME.x`, `.y`, `.z`: the sum of the forces by
+    /// which the constraint holds or moves its nodes.
     #[serde(default)]
     pub reactions: Option<Vec<String>>,
+    /// A point [m], fixed in space, about which the moments of these reactions are written [N m], in columns `moment.NAME.x`, `.y`, `.z`:
+    /// the sum of (place − point) × force over the nodes where they are, and of shells also of the moments on the nodes.
+    #[serde(default)]
+    pub moments_about: Option<[f64; 3]>,
     /// Whether energies [J] are written.
     #[serde(default = "yes")]
     pub energy: bool,
@@ -282,7 +346,8 @@ pub struct ProbeTable {
     pub on: String,
     /// Its place at rest [m]; outside the body, the nearest cell carries it.
     pub at: [f64; 3],
-    /// The fields; tensors as nine columns xx, xy, …, zz.
+    /// The fields, in columns `probe.NAME.FIELD`; vectors with `.x`, `.y`, `.z`, tensors with `.xx`, `.xy`, `.xz`, `.yx`, `.yy`, `.yz`, `.zx`,
+    /// `.zy`, `.zz`, such as `probe.tip.cauchy-stress.xy`.
     #[serde(default = "default_probe_fields")]
     pub data: Vec<FieldName>,
 }

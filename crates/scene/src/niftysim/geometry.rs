@@ -1,11 +1,10 @@
 //! The mesh of a model or submodel: listed in the XML, or read from a file and then turned, scaled and shifted.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use pliant_geometry::io::{self, MeshFileError};
 use pliant_geometry::{CellKind, Mesh, Vector3};
 
+use super::Files;
 use super::error::{Fault, ImportProblem};
 use super::xml::{
     Element, attribute, child, count, fault, indices, needed, number, numbers, numbers_of, text,
@@ -95,9 +94,9 @@ impl Geometry {
 }
 
 /// Reads the geometry of a model or submodel.
-pub(super) fn read(of: Element<'_>, folder: &Path, notes: &mut Vec<String>) -> Result<Geometry, Fault> {
+pub(super) fn read(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Result<Geometry, Fault> {
     let geometry = match child(of, "VTKMesh").or_else(|| child(of, "MSHMesh")) {
-        Some(file) => from_file(file, folder, notes)?,
+        Some(file) => from_file(file, files, notes)?,
         None => listed(of)?,
     };
     if geometry.cells().is_empty() {
@@ -137,20 +136,14 @@ fn check_listed(
     Err(fault(of, ImportProblem::Count { what, found, wanted }))
 }
 
-fn from_file(of: Element<'_>, folder: &Path, notes: &mut Vec<String>) -> Result<Geometry, Fault> {
+fn from_file(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Result<Geometry, Fault> {
     let solid = Solid::read(of)?;
     let name = text(of);
     if name.is_empty() {
         let problem = ImportProblem::Count { what: "names of mesh files", found: 0, wanted: "1".into() };
         return Err(fault(of, problem));
     }
-    // NiftySim itself knows only the working directory.
-    let beside = io::read(&folder.join(&name));
-    let read = match beside {
-        Err(MeshFileError::Open { .. }) => io::read(Path::new(&name)).or(beside),
-        _ => beside,
-    };
-    let file = read.map_err(|error| fault(of, ImportProblem::Mesh(Box::new(error))))?;
+    let file = files.mesh(&name).map_err(|error| fault(of, ImportProblem::Mesh(Box::new(error))))?;
     // Labels are not taken over: materials go by <ElementSet>.
     let told = file.notes.iter().filter(|note| !note.contains("`label`"));
     notes.extend(told.map(|note| format!("{name}: {note}")));

@@ -2,8 +2,8 @@
 //!
 //! What NiftySim computes is kept, also where it is not what its guide says: the published fibre modulus, hourglass
 //! stiffness by λ + 2μ, backward Euler for relaxation, tractions that pull against the vector they are given by. The
-//! notes name each.
-//! Leaves out: shells, membranes, contact, reduced bases, values read from files; named in one note.
+//! notes name each. Load shapes act at the same steps as NiftySim's, which sets a load after a step for the next one.
+//! Leaves out: shells, membranes, contact, reduced bases, values read from files; [`Imported::missing`] names them.
 
 mod conditions;
 mod error;
@@ -16,9 +16,33 @@ mod xml;
 use std::path::Path;
 
 use pliant_geometry::Mesh;
-use pliant_geometry::io::parse_xml;
+use pliant_geometry::io::{self, MeshFile, MeshFileError, parse_xml};
 
 pub use error::{ImportError, ImportProblem};
+
+use crate::reads::{LONGEST_TABLE, Reads};
+
+/// Where mesh files of a model are.
+struct Files<'a> {
+    folder: &'a Path,
+    reads: &'a Reads,
+}
+
+impl Files<'_> {
+    /// Reads a mesh beside the model; else in the working directory, which is all that NiftySim itself knows.
+    fn mesh(&self, name: &str) -> Result<MeshFile, MeshFileError> {
+        let read = |path: &Path| {
+            let allowed = self.reads.allow(path);
+            let path = allowed.map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
+            io::read(&path)
+        };
+        let beside = read(&self.folder.join(name));
+        match beside {
+            Err(MeshFileError::Open { .. }) => read(Path::new(name)).or(beside),
+            _ => beside,
+        }
+    }
+}
 
 /// A scene that says what a NiftySim model says.
 #[derive(Clone, Debug)]
@@ -29,6 +53,8 @@ pub struct Imported {
     pub meshes: Vec<(String, Mesh)>,
     /// What is worth knowing of the translation, a sentence each; what was left out is one of them.
     pub notes: Vec<String>,
+    /// Parts of the model that the scene does not have. Unless this is empty, the scene is another model.
+    pub missing: Vec<String>,
 }
 
 /// Reads a NiftySim model. Mesh files are looked for beside the model, then in the working directory.
@@ -36,9 +62,18 @@ pub struct Imported {
 /// # Errors
 /// If a file can't be read, or the model says something that it cannot mean.
 pub fn import(path: &Path) -> Result<Imported, ImportError> {
-    let bytes = std::fs::read(path)
+    import_within(path, &Reads::anywhere())
+}
+
+/// As [`import`], with the files that may be read.
+///
+/// # Errors
+/// If a file can't or may not be read, or the model says something that it cannot mean.
+pub fn import_within(path: &Path, reads: &Reads) -> Result<Imported, ImportError> {
+    let bytes = reads
+        .read(path, LONGEST_TABLE)
         .map_err(|error| ImportError::File { path: path.to_owned(), reason: error.to_string() })?;
-    import_bytes(path, &bytes)
+    import_read(path, &bytes, reads)
 }
 
 /// Reads a NiftySim model that was read from `path`, beside which its mesh files are looked for.
@@ -46,6 +81,10 @@ pub fn import(path: &Path) -> Result<Imported, ImportError> {
 /// # Errors
 /// If a mesh file can't be read, or the model says something that it cannot mean.
 pub fn import_bytes(path: &Path, bytes: &[u8]) -> Result<Imported, ImportError> {
+    import_read(path, bytes, &Reads::anywhere())
+}
+
+fn import_read(path: &Path, bytes: &[u8], reads: &Reads) -> Result<Imported, ImportError> {
     let text = String::from_utf8_lossy(bytes);
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let document = parse_xml(text).map_err(|error| ImportError::Xml {
@@ -53,10 +92,10 @@ pub fn import_bytes(path: &Path, bytes: &[u8]) -> Result<Imported, ImportError> 
         line: error.line,
         reason: error.reason,
     })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let files = Files { folder: path.parent().unwrap_or(Path::new("")), reads };
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let read = || {
-        let model = parts::read(document.root_element(), folder)?;
+        let model = parts::read(document.root_element(), &files)?;
         write::write(model, &stem)
     };
     read().map_err(|fault| ImportError::Content {

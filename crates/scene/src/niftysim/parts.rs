@@ -1,9 +1,8 @@
 //! A NiftySim model as plain data: parts with their materials and conditions, the system's parameters, the outputs.
 
-use std::path::Path;
-
 use pliant_geometry::Mesh;
 
+use super::Files;
 use super::conditions::{self, Condition, Remarks, settle, sorted};
 use super::error::{Fault, ImportProblem};
 use super::geometry::{self, Geometry, join, positive};
@@ -59,7 +58,7 @@ pub(super) struct Output {
 }
 
 /// Reads a model.
-pub(super) fn read(root: Element<'_>, folder: &Path) -> Result<Model, Fault> {
+pub(super) fn read(root: Element<'_>, files: &Files<'_>) -> Result<Model, Fault> {
     if !root.has_tag_name("Model") {
         return Err(fault(root, ImportProblem::NotAModel));
     }
@@ -71,9 +70,9 @@ pub(super) fn read(root: Element<'_>, folder: &Path) -> Result<Model, Fault> {
         remarks: Remarks::default(),
     };
     if child(root, "SubModel").is_some() {
-        model.read_submodels(root, folder)?;
+        model.read_submodels(root, files)?;
     } else {
-        model.read_whole(root, folder)?;
+        model.read_whole(root, files)?;
     }
     if model.parts.iter().any(|part| part.geometry.solid == geometry::Solid::H8)
         && model.system.hourglass.is_none()
@@ -88,8 +87,8 @@ pub(super) fn read(root: Element<'_>, folder: &Path) -> Result<Model, Fault> {
 }
 
 impl Model {
-    fn read_whole(&mut self, root: Element<'_>, folder: &Path) -> Result<(), Fault> {
-        let geometry = geometry::read(root, folder, &mut self.remarks.notes)?;
+    fn read_whole(&mut self, root: Element<'_>, files: &Files<'_>) -> Result<(), Fault> {
+        let geometry = geometry::read(root, files, &mut self.remarks.notes)?;
         let mut sets = Sets::new(&geometry);
         sets.read(root, self)?;
         let (material, density) = sets.finish(root)?;
@@ -99,13 +98,13 @@ impl Model {
     }
 
     /// Submodels stay bodies of their own, unless nodes merge or the model itself has constraints or materials.
-    fn read_submodels(&mut self, root: Element<'_>, folder: &Path) -> Result<(), Fault> {
+    fn read_submodels(&mut self, root: Element<'_>, files: &Files<'_>) -> Result<(), Fault> {
         let distance = child(root, "SubModelNodeMergerDistance").map(number).transpose()?;
         let whole = distance.is_some_and(|d| d >= 0.0)
             || ["Constraint", "ElementSet"].iter().any(|name| child(root, name).is_some());
         if !whole {
             for submodel in children(root, "SubModel") {
-                self.read_whole(submodel, folder)?;
+                self.read_whole(submodel, files)?;
                 self.check_solid(submodel)?;
             }
             return Ok(());
@@ -114,7 +113,7 @@ impl Model {
         let mut assigned = Vec::new();
         let mut apart = Vec::new();
         for submodel in children(root, "SubModel") {
-            let geometry = geometry::read(submodel, folder, &mut self.remarks.notes)?;
+            let geometry = geometry::read(submodel, files, &mut self.remarks.notes)?;
             if let Some(first) = geometries.first().filter(|first| first.solid != geometry.solid) {
                 return Err(mixed(submodel, first.solid, geometry.solid));
             }
@@ -179,7 +178,7 @@ impl Model {
         let missing = &mut self.remarks.missing;
         let shells = within("ShellElementSet").max(within("ShellElements"));
         if shells > 0 {
-            missing.push("shells and membranes (they come later)".into());
+            missing.push("shells and membranes".into());
         }
         let contact =
             ["ContactPlate", "ContactCylinder", "ContactUSProbe", "KinematicContact", "ContactSurface"];
@@ -191,10 +190,11 @@ impl Model {
         let mut found: Vec<&str> = contact.into_iter().filter(|name| within(name) > 0).collect();
         found.extend(["DoDeformableCollision", "DoSelfCollision"].into_iter().filter(|name| is_on(name)));
         if !found.is_empty() {
-            missing.push(format!("contact ({}; it comes later)", found.join(", ")));
+            missing.push(format!("contact ({})", found.join(", ")));
         }
         if is_on("ROM") {
-            missing.push("the reduced basis (ROM): the full model is computed".into());
+            let note = "ROM: the full model is computed, not its reduction to a basis";
+            self.remarks.notes.push(note.into());
         }
         let known = [
             "Nodes",

@@ -14,8 +14,14 @@ use super::parts::{Model, Output, Part, System};
 
 /// Greatest multiple of the shear modulus that a scene takes as hourglass stiffness.
 const MOST_HOURGLASS: f64 = 10.0;
-/// Pairs by which the curve HILLY is written; the straight lines between them are off by 1e-4 at the most.
-const HILLY_POINTS: u32 = 500;
+/// Most pairs by which the curve HILLY is written: one for each step, or straight lines between them that are off by 1e-5 at
+/// the most.
+const HILLY_POINTS: f64 = 2000.0;
+/// π as NiftySim has it, in the curve HILLY.
+#[expect(clippy::approx_constant, reason = "NiftySim's")]
+const PI: f64 = 3.14159_f32 as f64;
+/// From this excess over 1 on, in NiftySim's step after the total time, POLY345 is told to go on there.
+const TOLD_EXCESS: f64 = 1e-5;
 /// Frames of a model that asks for no output.
 const FRAMES: f64 = 20.0;
 
@@ -114,7 +120,7 @@ impl Writer {
             mesh.block_mut(solid.cell()).data.insert("label".into(), DataArray::scalar(labels));
         }
         self.line(format!("[body.{body}]"));
-        self.line(format!("mesh = {{ file = \"{file}\" }}"));
+        self.line(format!("mesh = {{ file = \"{file}\", scale = 1 }}"));
         self.line(format!("element = \"{}\"", solid.element()));
         self.line(format!(
             "law = {}",
@@ -242,7 +248,12 @@ impl Writer {
             }
             Action::Force(force) => self.line(format!("each = {}", vector(force))),
             Action::Gravity(acceleration) => self.line(format!("acceleration = {}", vector(acceleration))),
-            Action::Pressure(pressure) => self.line(format!("pressure = {pressure:?}")),
+            Action::Pressure(pressure) => {
+                self.note(
+                    "Pressure: NiftySim takes areas and normals of the step before, the scene those of the instant",
+                );
+                self.line(format!("pressure = {pressure:?}"));
+            }
             Action::Traction(traction) => {
                 self.note(
                     "Traction: NiftySim pulls against the vector that it is given; the scene's has the other sign",
@@ -267,43 +278,57 @@ impl Writer {
         let total = self.system.total;
         match shape {
             Shape::Polynomial => {
+                let s = self.system.end() / total;
+                let excess = s * s * s * (10.0 - s * (15.0 - 6.0 * s)) - 1.0;
+                if excess > TOLD_EXCESS {
+                    self.note(&format!(
+                        "POLY345: in the one step after the total time NiftySim's load grows on by {excess:.1e} of it, the \
+                         scene's holds"
+                    ));
+                }
                 self.line("curve = \"polynomial-10-15-6\"".into());
                 self.line(format!("to = {total:?}"));
             }
             Shape::Ramp => {
-                self.note(
-                    "RAMP: NiftySim's load grows on in the one step after the total time, the scene's holds",
-                );
-                self.line("curve = \"ramp\"".into());
-                self.line(format!("to = {total:?}"));
+                let end = self.system.end();
+                self.line(format!(
+                    "curve = {{ table = [[0.0, 0.0], [{end:?}, {:?}]] }}  # t / {total:?} s, also in the step after the total time",
+                    end / total
+                ));
             }
             Shape::RampHold => {
                 self.line("curve = \"ramp\"".into());
                 self.line(format!("to = {:?}  # a tenth of the total time", 0.1 * total));
             }
             Shape::Step => {
-                if !matches!(action, Action::Move(_)) {
-                    self.note(
-                        "STEP: NiftySim's load acts from the second step on, the scene's from the start",
-                    );
-                }
                 self.line("curve = \"hold\"".into());
+                // Nodes that jump while the run goes on would throw its energies off balance.
+                if matches!(action, Action::Move(_)) {
+                    self.note("STEP of a Disp: the nodes start displaced; NiftySim displaces them in its first step");
+                    return;
+                }
+                self.line(format!(
+                    "from = {:?}  # half a step: NiftySim's is there after the first one",
+                    0.5 * self.system.step
+                ));
             }
             Shape::Hilly => self.hilly(),
         }
     }
 
     fn hilly(&mut self) {
-        let System { total, .. } = self.system;
+        let System { total, step, .. } = self.system;
         self.line(format!("# s exp(cos 4πs − 1), s = t / {total:?} s"));
         self.line("curve = { table = [".into());
+        let steps = (self.system.end() / step).round();
+        let count = steps.min(HILLY_POINTS);
         let point = |i: u32| {
-            let time = self.system.end() * f64::from(i) / f64::from(HILLY_POINTS);
+            let time = self.system.end() * (f64::from(i) / count);
             let s = time / total;
-            let factor = s * ((4.0 * std::f64::consts::PI * s).cos() - 1.0).exp();
+            let factor = s * ((4.0 * PI * s).cos() - 1.0).exp();
             format!("[{time:?}, {factor:.9}]")
         };
-        let points: Vec<String> = (0..=HILLY_POINTS).map(point).collect();
+        let points: Vec<String> = (0..=count as u32).map(point).collect();
         for row in points.chunks(4) {
             self.line(format!("    {},", row.join(", ")));
         }
@@ -397,7 +422,7 @@ impl Writer {
         }
         scene.push_str(self.tables.trim_end());
         scene.push('\n');
-        Imported { scene, meshes, notes: self.notes }
+        Imported { scene, meshes, notes: self.notes, missing: self.missing }
     }
 }
 

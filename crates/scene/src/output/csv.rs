@@ -1,7 +1,7 @@
 //! A table over time: reactions, energies, probes. Each row is on disk before the next step.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{Seek, SeekFrom, Write};
+use std::fs::{self, File};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use pliant_corotational::Carried;
@@ -10,6 +10,7 @@ use pliant_mechanics::Real;
 
 use crc32fast::Hasher;
 
+use super::file::{create, reopen};
 use super::{Frame, Observer, OutputError, Written, fields};
 use crate::build::{BodyCells, Built};
 use crate::format::{CsvTable, FieldName, ProbeTable};
@@ -40,6 +41,8 @@ pub struct Column {
 pub(crate) struct Samples {
     columns: Vec<Column>,
     reactions: Vec<usize>,
+    /// The point [m] about which moments of reactions are taken, and what each of them prescribes.
+    moments: Option<([f64; 3], Vec<Held>)>,
     energy: bool,
     probes: Vec<Probe>,
     /// Fields of the cells of shells and co-rotational solids, if a probe wants some.
@@ -81,6 +84,13 @@ impl Samples {
             let name = &built.model.constraints[constraint].name;
             AXES.iter().for_each(|axis| add(format!("reaction.{name}.{axis}"), "N"));
         }
+        let moments = table.moments_about.map(|point| {
+            for &constraint in &reactions {
+                let name = &built.model.constraints[constraint].name;
+                AXES.iter().for_each(|axis| add(format!("moment.{name}.{axis}"), "N m"));
+            }
+            (point, held(built, &reactions))
+        });
         let shells = built.corotational.as_ref().is_some_and(|part| !part.model.facets.is_empty());
         if table.energy {
             for energy in ENERGIES {
@@ -104,7 +114,7 @@ impl Samples {
         }
         let probes = table.probes.values().map(|probe| Probe::new(built, probe)).collect();
         let corotated = fields::Corotated::default();
-        Self { columns, reactions, energy: table.energy, probes, corotated }
+        Self { columns, reactions, moments, energy: table.energy, probes, corotated }
     }
 
     pub(crate) fn columns(&self) -> &[Column] {
@@ -115,6 +125,11 @@ impl Samples {
     pub(crate) fn read<R: Real>(&mut self, frame: &Frame<'_, R>, row: &mut Vec<f64>) {
         for &constraint in &self.reactions {
             row.extend(frame.stepper.reaction(constraint));
+        }
+        for (point, held) in
+            self.moments.iter().flat_map(|(point, all)| all.iter().map(move |held| (point, held)))
+        {
+            row.extend(held.moment(frame, *point));
         }
         if self.energy {
             let e = frame.stepper.energies();
@@ -144,6 +159,50 @@ impl Samples {
     }
 }
 
+/// The nodes of a constraint, with the components that are its own: translations, of shells then rotations.
+struct Held(Vec<(u32, [bool; 6])>);
+
+/// Those of some constraints.
+fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
+    let model = &built.model;
+    // Contradictions are told before.
+    let owners = model.constrained_components().unwrap_or_default();
+    let of = |&index: &usize| {
+        let constraint = &model.constraints[index];
+        let own = |node: u32| match &built.corotational {
+            None => {
+                let [x, y, z] = owners[node as usize].map(|owner| owner as usize == index);
+                [x, y, z, false, false, false]
+            }
+            Some(part) => {
+                let named = part.model.constraints.iter().find(|own| own.name == constraint.name);
+                named.map_or([false; 6], |own| own.components)
+            }
+        };
+        Held(constraint.nodes.iter().map(|&node| (node, own(node))).collect())
+    };
+    constraints.iter().map(of).collect()
+}
+
+impl Held {
+    /// The moment [N m] of the forces and moments on the nodes about a point [m].
+    fn moment<R: Real>(&self, frame: &Frame<'_, R>, point: [f64; 3]) -> [f64; 3] {
+        let mut sum = Vector3::zeros();
+        for &(node, own) in &self.0 {
+            let node = node as usize;
+            let masked = |value: [f64; 3], first: usize| {
+                Vector3::from_fn(|c, _| if own[first + c] { value[c] } else { 0.0 })
+            };
+            let displacement = frame.state.displacement[node].map(R::to_f64);
+            let arm = Vector3::from(frame.built.model.rest[node]) + Vector3::from(displacement)
+                - Vector3::from(point);
+            sum += arm.cross(&masked(frame.stepper.nodal_reaction(node), 0));
+            sum += masked(frame.stepper.nodal_reaction_moment(node), 3);
+        }
+        sum.into()
+    }
+}
+
 impl Rows {
     pub(super) fn new(built: &Built, table: &CsvTable, folder: &Path, name: &str) -> Self {
         let samples = Samples::new(built, table);
@@ -163,19 +222,20 @@ impl Rows {
 
     /// Begins the file with its header.
     pub(super) fn start(&mut self) -> Result<(), OutputError> {
-        self.file = Some(File::create(&self.path).map_err(|error| self.failed(error))?);
+        self.file = Some(create(&self.path).map_err(|error| self.failed(error))?);
         let header = self.header.clone();
         self.write(header)
     }
 
     /// Goes on after the rows that an interrupted run had written at its checkpoint.
     pub(super) fn take_up(&mut self, bytes: u64, crc: u32) -> Result<(), OutputError> {
-        let mut content = fs::read(&self.path).map_err(|error| self.failed(error))?;
-        let file = OpenOptions::new().write(true).open(&self.path).and_then(|mut file| {
+        let mut content = Vec::new();
+        let opened = reopen(&self.path).and_then(|mut file| {
+            file.read_to_end(&mut content)?;
             file.seek(SeekFrom::Start(bytes))?;
             Ok(file)
         });
-        self.file = Some(file.map_err(|error| self.failed(error))?);
+        self.file = Some(opened.map_err(|error| self.failed(error))?);
         self.beyond = content.split_off((bytes as usize).min(content.len()));
         (self.length, self.crc) = (bytes, Hasher::new_with_initial_len(crc, bytes));
         Ok(())
@@ -240,6 +300,12 @@ pub(super) fn verify(path: &Path, bytes: u64, crc: u32) -> Result<(), String> {
         }
         Some(_) => Ok(()),
     }
+}
+
+/// The time [s] of the last row of a table, if it is whole.
+pub(super) fn last_time(path: &Path) -> Option<f64> {
+    let text = fs::read_to_string(path).ok()?;
+    text.strip_suffix('\n')?.lines().next_back()?.split(',').next()?.parse().ok()
 }
 
 impl<R: Real> Observer<R> for Rows {

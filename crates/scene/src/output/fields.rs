@@ -18,6 +18,8 @@ pub(super) type Value = [f64; 9];
 pub(super) fn nodal<R: Real>(frame: &Frame<'_, R>, field: FieldName, node: usize) -> Value {
     let vector = match field {
         FieldName::Velocity => frame.stepper.velocity(frame.state, node),
+        FieldName::Reaction => frame.stepper.nodal_reaction(node),
+        FieldName::ReactionMoment => frame.stepper.nodal_reaction_moment(node),
         FieldName::Rotation => {
             frame.corotational.map_or([0.0; 3], |state| state.rotation[node].scaled_axis().into())
         }
@@ -58,11 +60,13 @@ pub(super) fn of_cell(Found(fields, step): &Found, field: FieldName) -> Value {
         FieldName::CauchyStress => tensor(&fields.cauchy_stress),
         FieldName::Pk2Stress => tensor(&fields.pk2_stress),
         FieldName::GreenStrain => tensor(&fields.green_strain),
+        FieldName::DeformationGradient => padded(fields.gradient.0.as_flattened()),
         FieldName::VonMises => padded(&[fields.von_mises()]),
         FieldName::Fibre => padded(&fields.fibre.unwrap_or_default()),
         FieldName::FibreStretch => padded(&[fields.fibre_stretch.unwrap_or(f64::NAN)]),
         FieldName::Pressure => padded(&[fields.pressure()]),
         FieldName::VolumeRatio => padded(&[fields.volume_ratio]),
+        FieldName::CellVolumeRatio => padded(&[fields.cell_volume_ratio]),
         FieldName::EnergyDensity => padded(&[fields.energy_density]),
         _ => [f64::NAN; 9],
     }
@@ -133,6 +137,8 @@ impl Corotated {
                     FieldName::BendingEnergy => padded(&[fields.energy[at].bending]),
                     FieldName::DrillingEnergy => padded(&[fields.energy[at].drilling]),
                     FieldName::Thickness => padded(&[model.facets[at].thickness]),
+                    FieldName::CurrentThickness => padded(&[fields.thickness[at]]),
+                    FieldName::SurfaceStrain => padded(&[fields.strain[at].surface]),
                     FieldName::ElementStep => padded(&[self.step(0, at)]),
                     _ => [f64::NAN; 9],
                 }
@@ -144,7 +150,7 @@ impl Corotated {
                     FieldName::VonMises => padded(&[fields.von_mises[at]]),
                     FieldName::Pressure => padded(&[fields.pressure[at]]),
                     FieldName::EnergyDensity => padded(&[fields.energy[at]]),
-                    FieldName::VolumeRatio => padded(&[fields.volume_ratio[at]]),
+                    FieldName::VolumeRatio | FieldName::CellVolumeRatio => padded(&[fields.volume_ratio[at]]),
                     FieldName::ElementStep => padded(&[self.step(1, at)]),
                     _ => [f64::NAN; 9],
                 }

@@ -1,8 +1,11 @@
-//! The folder a run writes to.
+//! The folder a run writes to. One run at a time holds it.
 
-use std::fs;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use super::file::{check_own, check_own_folder, is_at, replace, temporary};
 use super::{OutputError, Written, csv, vtu};
 use crate::checkpoint::{Checkpoint, ResumeError, steps_of};
 use crate::registry::OutputTable;
@@ -12,13 +15,18 @@ use crate::scene::Scene;
 pub(crate) const SUMMARY: &str = "summary.md";
 /// The plot in it.
 pub(crate) const PLOT: &str = "plot.svg";
+/// Residuals of the iterations of a run that solves equations.
+pub(crate) const CONVERGENCE: &str = "convergence.csv";
 /// The picture of the last instant, if one was asked for.
 pub(crate) const PICTURE: &str = "picture.png";
+/// Locked by the run that writes to the folder; holds the number of its process.
+const LOCK: &str = ".pliant-lock";
 
-/// Where a run writes.
+/// Where a run writes. As long as it or a clone of it lives, no other run gets the folder.
 #[derive(Clone, Debug)]
 pub struct OutputFolder {
     path: PathBuf,
+    _lock: Arc<Lock>,
 }
 
 impl OutputFolder {
@@ -38,10 +46,11 @@ impl OutputFolder {
     /// same outputs left is removed, and nothing else.
     ///
     /// # Errors
-    /// If the folder holds something, or can't be written to.
+    /// If the folder holds something, holds a link where this run would write, is held by another run, or can't be
+    /// written to.
     pub fn prepare(path: PathBuf, scene: &Scene, force: bool) -> Result<Self, OutputError> {
         let folder = Self::claim(path, force, |_| false)?;
-        remove_earlier(folder.path(), scene).map_err(|error| OutputError::new(folder.path(), error))?;
+        remove_earlier(folder.path(), scene)?;
         Ok(folder)
     }
 
@@ -49,63 +58,84 @@ impl OutputFolder {
     /// given.
     ///
     /// # Errors
-    /// If the folder holds something, or can't be written to.
+    /// If the folder holds something, is held by another run, or can't be written to.
     pub fn claim(path: PathBuf, force: bool, own: impl Fn(&str) -> bool) -> Result<Self, OutputError> {
-        let failed = |error: std::io::Error| OutputError::new(&path, error);
+        let failed = |error: io::Error| OutputError::new(&path, error);
         let refused =
             |reason: &str, remedy| OutputError { path: path.clone(), reason: reason.into(), remedy };
         if path.exists() && !path.is_dir() {
             return Err(refused("it is a file, not a folder", "choose another name with `--out DIR`"));
         }
-        if path.is_dir() {
-            let mut entries = fs::read_dir(&path).map_err(failed)?;
-            let filled =
-                entries.any(|entry| !entry.is_ok_and(|entry| own(&entry.file_name().to_string_lossy())));
-            if filled && !force {
-                let remedy = "add `--force` to replace what an earlier run left there, or choose another with `--out DIR`";
-                return Err(refused("it is not empty", remedy));
-            }
-        } else {
-            fs::create_dir_all(&path).map_err(failed)?;
+        fs::create_dir_all(&path).map_err(failed)?;
+        let lock = Lock::take(&path)?;
+        let mut entries = fs::read_dir(&path).map_err(failed)?;
+        let filled = entries.any(|entry| {
+            let name = entry.map(|entry| entry.file_name().to_string_lossy().into_owned());
+            !name.is_ok_and(|name| name == LOCK || own(&name))
+        });
+        if filled && !force {
+            let remedy =
+                "add `--force` to replace what an earlier run left there, or choose another with `--out DIR`";
+            return Err(refused("it is not empty", remedy));
         }
-        probe(&path).map_err(failed)?;
-        Ok(Self { path })
+        Ok(Self { path, _lock: Arc::new(lock) })
     }
 
-    /// Opens the folder of an interrupted run to go on with it. Nothing in it changes yet.
+    /// Opens the folder of an interrupted run to go on with it. Nothing of the run changes yet.
     ///
     /// # Errors
-    /// If it does not hold the outputs as they were at the checkpoint, or can't be written to.
+    /// If it does not hold the outputs as they were at the checkpoint, if nothing is left to run, or if the folder is
+    /// held by another run or can't be written to.
     pub fn reopen(path: PathBuf, scene: &Scene, checkpoint: &Checkpoint) -> Result<Self, ResumeError> {
         let refused = |path: &Path, reason| ResumeError::OtherOutputs { path: path.to_owned(), reason };
         if !path.is_dir() {
             return Err(refused(&path, "there is no such folder".into()));
         }
+        let lock = Lock::take(&path)?;
+        check_links(&path, scene)?;
         for ((name, _), (_, written)) in scene.outputs.iter().zip(&checkpoint.progressed.outputs) {
             let (file, verified) = match written {
                 Written::Rows { bytes, crc } => {
-                    let file = path.join(format!("{name}.csv"));
+                    let file = table_file(&path, name);
                     let verified = csv::verify(&file, *bytes, *crc);
                     (file, verified)
                 }
-                Written::Frames(times) => (path.join(format!("{name}.pvd")), vtu::verify(&path, name, times)),
+                Written::Frames(times) => (series_file(&path, name), vtu::verify(&path, name, times)),
             };
             verified.map_err(|reason| refused(&file, reason))?;
         }
-        probe(&path).map_err(|error| refused(&path, error.to_string()))?;
-        Ok(Self { path })
+        let (time, until) = (checkpoint.time(), scene.scene.until);
+        if checkpoint.is_at_the_end(until) && has_ended(&path, scene, time) {
+            return Err(ResumeError::AtTheEnd { time, until });
+        }
+        Ok(Self { path, _lock: Arc::new(lock) })
+    }
+
+    /// Removes what tells of a whole run and what a killed one left unfinished, before a resumed run goes on: pages
+    /// are there only of a run that has ended.
+    pub(crate) fn go_on(&self, scene: &Scene) -> Result<(), OutputError> {
+        let removed = || -> io::Result<()> {
+            remove_pages(&self.path)?;
+            let mut frames = scene.outputs.iter().map(|(name, _)| self.path.join(name));
+            frames.try_for_each(|frames| remove_frames(&frames, ".vtu.tmp"))
+        };
+        removed().map_err(|error| OutputError::new(&self.path, error))
     }
 
     /// Removes a folder with the outputs of an earlier run of a scene; what is not of it stays.
-    pub(crate) fn clear(path: &Path, scene: &Scene) -> std::io::Result<()> {
+    pub(crate) fn clear(path: &Path, scene: &Scene) -> Result<(), OutputError> {
         remove_earlier(path, scene)?;
-        for (name, table) in &scene.outputs {
-            match table {
-                OutputTable::Csv(_) => remove(&path.join(format!("{name}.csv")))?,
-                OutputTable::Vtu(_) => remove_empty(&path.join(name))?,
+        let cleared = || -> io::Result<()> {
+            remove(&path.join(LOCK))?;
+            for (name, table) in &scene.outputs {
+                match table {
+                    OutputTable::Csv(_) => remove(&table_file(path, name))?,
+                    OutputTable::Vtu(_) => remove_empty(&path.join(name))?,
+                }
             }
-        }
-        remove_empty(path)
+            remove_empty(path)
+        };
+        cleared().map_err(|error| OutputError::new(path, error))
     }
 
     /// Its path.
@@ -118,53 +148,161 @@ impl OutputFolder {
     /// # Errors
     /// If it can't be written.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<PathBuf, OutputError> {
-        let (path, temporary) = (self.path.join(name), self.path.join(format!("{name}.tmp")));
-        let written = fs::write(&temporary, content).and_then(|()| fs::rename(&temporary, &path));
-        written.map_err(|error| {
-            // What is half written is not left behind.
-            let _ = fs::remove_file(&temporary);
-            OutputError::new(&path, error)
-        })?;
+        let path = self.path.join(name);
+        replace(&path, |file| file.write_all(content.as_ref()))
+            .map_err(|error| OutputError::new(&path, error))?;
         Ok(path)
     }
 }
 
-/// Whether files can be made in a folder.
-fn probe(folder: &Path) -> std::io::Result<()> {
-    let probe = folder.join(".pliant-write-test");
-    fs::write(&probe, b"")?;
-    fs::remove_file(&probe)
+/// A locked file in a folder. The system gives the lock back when the process ends, however it ends.
+#[derive(Debug)]
+struct Lock {
+    path: PathBuf,
+    file: File,
 }
 
-/// Removes what an earlier run of the same outputs left, so that no file tells of another run than its neighbours.
-/// A CSV file stays until it is written anew.
-fn remove_earlier(folder: &Path, scene: &Scene) -> std::io::Result<()> {
-    for page in [SUMMARY, PLOT, PICTURE] {
-        remove(&folder.join(page))?;
-    }
-    for entry in fs::read_dir(folder)? {
-        let name = entry?.file_name().to_string_lossy().into_owned();
-        if steps_of(name.strip_suffix(".tmp").unwrap_or(&name)).is_some() {
-            remove(&folder.join(name))?;
+impl Lock {
+    fn take(folder: &Path) -> Result<Self, OutputError> {
+        let path = folder.join(LOCK);
+        let failed = |error: io::Error| OutputError::new(folder, error);
+        loop {
+            check_own(&path).map_err(|error| OutputError::new(&path, error))?;
+            let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+            let mut file = opened.map_err(failed)?;
+            if let Err(TryLockError::WouldBlock) = file.try_lock() {
+                return Err(held(folder, &mut file));
+            }
+            // Otherwise locked, or on a file system without locks. The last holder may have removed the file meanwhile.
+            if is_at(&file, &path).map_err(failed)? {
+                let lock = Self { path, file };
+                lock.sign();
+                return Ok(lock);
+            }
         }
     }
+
+    /// Leaves the number of this process to those who come later. A lock without it holds as well.
+    fn sign(&self) {
+        let mut file = &self.file;
+        let _ = self.file.set_len(0).and_then(|()| write!(file, "{}", std::process::id()));
+    }
+}
+
+impl Drop for Lock {
+    /// The name goes before the lock does, so that nobody locks a file that is about to go.
+    fn drop(&mut self) {
+        if is_at(&self.file, &self.path).unwrap_or(false) {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// The error of a folder that another run holds.
+fn held(folder: &Path, file: &mut File) -> OutputError {
+    let mut number = String::new();
+    let read = file.rewind().and_then(|()| file.take(20).read_to_string(&mut number));
+    let process = match read {
+        Ok(_) if number.parse::<u32>().is_ok() => format!(" (process {number})"),
+        _ => String::new(),
+    };
+    OutputError {
+        path: folder.to_owned(),
+        reason: format!("another run{process} is writing to it"),
+        remedy: "wait until it has ended, or choose another folder with `--out DIR`",
+    }
+}
+
+/// The table of an output.
+fn table_file(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.csv"))
+}
+
+/// The list of the frames of an output.
+fn series_file(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.pvd"))
+}
+
+/// Refuses links where a run of a scene writes.
+fn check_links(folder: &Path, scene: &Scene) -> Result<(), OutputError> {
+    let check = |path: PathBuf| check_own(&path).map_err(|error| OutputError::new(&path, error));
+    for page in [SUMMARY, PLOT, PICTURE, CONVERGENCE] {
+        check(folder.join(page))?;
+    }
     for (name, table) in &scene.outputs {
-        if let OutputTable::Vtu(_) = table {
-            remove(&folder.join(format!("{name}.pvd")))?;
-            remove_frames(&folder.join(name))?;
+        match table {
+            OutputTable::Csv(_) => check(table_file(folder, name))?,
+            OutputTable::Vtu(_) => {
+                check(series_file(folder, name))?;
+                let frames = folder.join(name);
+                check_own_folder(&frames).map_err(|error| OutputError::new(&frames, error))?;
+            }
         }
     }
     Ok(())
 }
 
-/// Removes `000000.vtu`, … and one that a killed run left unfinished.
-fn remove_frames(folder: &Path) -> std::io::Result<()> {
+/// Whether all that a run writes at its end is there.
+fn has_ended(folder: &Path, scene: &Scene, time: f64) -> bool {
+    let pages = [SUMMARY, PLOT].iter().all(|page| folder.join(page).is_file());
+    let outputs = || {
+        scene.outputs.iter().all(|(name, table)| match table {
+            OutputTable::Csv(_) => csv::last_time(&table_file(folder, name)) == Some(time),
+            OutputTable::Vtu(_) => vtu::last_time(folder, name) == Some(time),
+        })
+    };
+    pages && outputs()
+}
+
+/// Removes what an earlier run of the same outputs left, so that no file tells of another run than its neighbours.
+/// A CSV file stays until it is written anew.
+fn remove_earlier(folder: &Path, scene: &Scene) -> Result<(), OutputError> {
+    check_links(folder, scene)?;
+    let removed = || -> io::Result<()> {
+        remove_pages(folder)?;
+        for entry in fs::read_dir(folder)? {
+            let name = entry?.file_name().to_string_lossy().into_owned();
+            if steps_of(&name).is_some() {
+                remove(&folder.join(name))?;
+            }
+        }
+        for (name, table) in &scene.outputs {
+            if let OutputTable::Vtu(_) = table {
+                remove(&series_file(folder, name))?;
+                for ending in [".vtu", ".vtu.tmp"] {
+                    remove_frames(&folder.join(name), ending)?;
+                }
+            }
+        }
+        Ok(())
+    };
+    removed().map_err(|error| OutputError::new(folder, error))
+}
+
+/// Removes the pages of a run, and pages and checkpoints that a killed run left unfinished.
+fn remove_pages(folder: &Path) -> io::Result<()> {
+    for page in [SUMMARY, PLOT, PICTURE, CONVERGENCE] {
+        let page = folder.join(page);
+        remove(&page)?;
+        remove(&temporary(&page))?;
+    }
+    for entry in fs::read_dir(folder)? {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        if name.strip_suffix(".tmp").and_then(steps_of).is_some() {
+            remove(&folder.join(name))?;
+        }
+    }
+    Ok(())
+}
+
+/// Removes `000000.vtu`, …, or those of another ending that a killed run left unfinished.
+fn remove_frames(folder: &Path, ending: &str) -> io::Result<()> {
     if !folder.is_dir() {
         return Ok(());
     }
     for entry in fs::read_dir(folder)? {
         let name = entry?.file_name().to_string_lossy().into_owned();
-        let stem = name.strip_suffix(".tmp").unwrap_or(&name).strip_suffix(".vtu");
+        let stem = name.strip_suffix(ending);
         if stem.is_some_and(|stem| !stem.is_empty() && stem.bytes().all(|byte| byte.is_ascii_digit())) {
             remove(&folder.join(name))?;
         }
@@ -173,13 +311,13 @@ fn remove_frames(folder: &Path) -> std::io::Result<()> {
 }
 
 /// Removes a folder that holds nothing, if there is one.
-fn remove_empty(path: &Path) -> std::io::Result<()> {
+fn remove_empty(path: &Path) -> io::Result<()> {
     let empty = path.is_dir() && fs::read_dir(path)?.next().is_none();
     if empty { fs::remove_dir(path) } else { Ok(()) }
 }
 
 /// Removes a regular file, if there is one.
-fn remove(path: &Path) -> std::io::Result<()> {
+fn remove(path: &Path) -> io::Result<()> {
     match fs::symlink_metadata(path) {
         Ok(found) if found.is_file() => fs::remove_file(path),
         _ => Ok(()),

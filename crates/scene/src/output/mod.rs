@@ -3,10 +3,12 @@
 mod csv;
 mod curved;
 mod fields;
+mod file;
 mod folder;
 mod plot;
 mod snapshot;
 mod stability;
+mod strains;
 mod summary;
 mod vtu;
 
@@ -15,9 +17,12 @@ use std::path::{Path, PathBuf};
 use pliant_mechanics::{Observable, Real, State};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use file::{check_own_folder, replace};
 pub use folder::OutputFolder;
-pub(crate) use folder::{PICTURE, PLOT, SUMMARY};
+pub(crate) use folder::{CONVERGENCE, PICTURE, PLOT, SUMMARY};
 pub use stability::{AddedMass, StabilitySummary};
+pub(crate) use strains::ShellStrains;
+pub use strains::StrainSummary;
 pub use summary::{
     BodySummary, FailureSummary, LoadStepSummary, Summary, failed_input, failed_output, number,
 };
@@ -26,14 +31,14 @@ pub use csv::Column;
 pub(crate) use csv::{AXES, ENERGIES, Samples};
 pub(crate) use plot::plot;
 pub(crate) use snapshot::Snapshot;
-pub(crate) use summary::{bodies, markdown, summarise};
+pub(crate) use summary::{INTERRUPTED, bodies, markdown, summarise, told_limit};
 
 use crate::build::Built;
 use crate::registry::OutputTable;
 use crate::scene::Scene;
 
 /// An output that could not be written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{path}` cannot be written: {reason}")]
 pub struct OutputError {
     /// The file or folder.
@@ -98,11 +103,13 @@ pub(crate) enum Written {
 pub(crate) struct Schedule {
     every: f64,
     seen: u64,
+    /// The last instant that it was due at; before the first, none is.
+    last: f64,
 }
 
 impl Schedule {
     pub fn new(every: f64) -> Self {
-        Self { every, seen: 0 }
+        Self { every, seen: 0, last: f64::NEG_INFINITY }
     }
 
     /// One that has seen all up to an instant, that included.
@@ -127,8 +134,14 @@ impl Schedule {
         let due = self.awaits(time, step, last);
         if due {
             self.seen = (((time + 0.5 * step) / self.every).floor() as u64).saturating_add(1);
+            self.last = time;
         }
         due
+    }
+
+    /// Whether it was due at this instant.
+    pub fn has_seen(&self, time: f64) -> bool {
+        self.last == time
     }
 }
 

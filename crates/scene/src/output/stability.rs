@@ -3,6 +3,7 @@
 use std::fmt;
 
 use pliant_mechanics::stability::{Look, OnUnstable};
+use pliant_mechanics::{BALANCE_LIMIT, Energies};
 use serde::Serialize;
 
 use super::number;
@@ -40,6 +41,9 @@ pub struct StabilitySummary {
     pub most_substeps: u32,
     /// Steps taken beyond the whole ones.
     pub extra_steps: u64,
+    /// Whether a node is free to move, so that there is a limit.
+    #[serde(skip)]
+    limited: bool,
 }
 
 impl StabilitySummary {
@@ -58,6 +62,7 @@ impl StabilitySummary {
             last_cut: seen.last_cut,
             most_substeps: seen.most_substeps,
             extra_steps: seen.extra_steps,
+            limited: plan.limits.as_ref().is_some_and(|limits| limits.limit.step.is_finite()),
         })
     }
 
@@ -78,7 +83,8 @@ impl fmt::Display for StabilitySummary {
                 number(limit),
                 number(time)
             )?,
-            _ => write!(f, "the stable step was not looked at")?,
+            _ if self.limited => write!(f, "the run ended before the stable step was checked")?,
+            _ => write!(f, "any step is stable, as no node is free to move")?,
         }
         if let (Some(first), Some(last)) = (self.first_cut, self.last_cut) {
             let [first, last] = [first, last].map(number);
@@ -139,7 +145,38 @@ pub(crate) fn doubts(built: &Built, outcome: &Outcome, stability: Option<&Stabil
             bodies.join(", ")
         )
     });
-    hourglass.into_iter().chain(stability.and_then(StabilitySummary::doubt)).collect()
+    (hourglass.into_iter())
+        .chain(stability.and_then(StabilitySummary::doubt))
+        .chain(equilibria_doubts(outcome))
+        .chain(outcome.strains.doubts())
+        .collect()
+}
+
+/// Estimated error of displacements, over the largest one, from which on equilibria are doubted.
+const MUCH_ERROR: f64 = 1e-3;
+
+/// What is doubtful about equilibria.
+fn equilibria_doubts(outcome: &Outcome) -> impl Iterator<Item = String> {
+    let Energies { internal, hourglass, external, .. } = outcome.energies;
+    let largest = internal.abs().max(external.abs());
+    let displacement = outcome.equilibria.filter(|found| found.displacement_error > MUCH_ERROR).map(|found| {
+        format!(
+            "the equilibria are found to about {:.1} % of the displacements: take a smaller `tolerance`, in single precision with \
+             `precision = \"double\"`",
+            found.displacement_error * 100.0
+        )
+    });
+    let lost = outcome.equilibria.and_then(|found| found.external_error).and_then(|error| {
+        let missing = (internal + hourglass - external).abs() - error.abs();
+        (missing > BALANCE_LIMIT * largest).then(|| {
+            format!(
+                "{:.1} % of the energy is missing between equilibria: the body has snapped from one shape to another, or the load steps \
+                 are too few",
+                100.0 * missing / largest
+            )
+        })
+    });
+    displacement.into_iter().chain(lost)
 }
 
 const HOURGLASS_REMEDY: &str =

@@ -8,17 +8,17 @@ use pliant_mechanics::{Energies, RelaxationError, StepError};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
-use super::OutputError;
 use super::stability::{AddedMass, StabilitySummary, doubts};
+use super::{OutputError, StrainSummary};
 use crate::build::Built;
 use crate::plan::{LimitingElement, Limits, Plan};
 use crate::printable::printable;
 use crate::run::{History, Outcome};
 use crate::scene::Scene;
-use crate::solver::Effort;
+use crate::solver::{Effort, Equilibria};
 
 /// The status of a run that was told to stop.
-const INTERRUPTED: &str = "interrupted";
+pub(crate) const INTERRUPTED: &str = "interrupted";
 
 /// The result of a run.
 #[derive(Clone, Debug, Serialize)]
@@ -45,6 +45,12 @@ pub struct Summary {
     pub limiting_element: Option<LimitingElement>,
     /// What its equations took; `null` where none were solved.
     pub solver: Option<Effort>,
+    /// How good the equilibria of a quasi-static run are; `null` of others.
+    pub equilibria: Option<Equilibria>,
+    /// Why a path by arc length ended before its last load step; `null` of all others.
+    pub ended: Option<String>,
+    /// How far each shell was strained at most, of the instants that were looked at (up to 1000).
+    pub shell_strains: Vec<StrainSummary>,
     /// Where it was computed: `cpu`, or the name of the graphics processor.
     pub device: String,
     /// `single` or `double`.
@@ -121,6 +127,20 @@ pub struct FailureSummary {
     pub load_step: Option<Box<LoadStepSummary>>,
     /// What happened and what to try.
     pub message: String,
+    /// What to try, as the message says it at its end; empty where it says it otherwise.
+    #[serde(skip)]
+    pub remedy: &'static str,
+}
+
+impl FailureSummary {
+    /// The same with another remedy.
+    pub(crate) fn advised(mut self, remedy: &str) -> Self {
+        if let Some(told) = self.message.strip_suffix(self.remedy).filter(|_| !self.remedy.is_empty()) {
+            self.message = format!("{told}{remedy}");
+            self.remedy = "";
+        }
+        self
+    }
 }
 
 fn as_map<S: Serializer>(pairs: &[(String, [f64; 3])], serializer: S) -> Result<S::Ok, S::Error> {
@@ -142,7 +162,7 @@ fn empty(status: &str, error: FailureSummary) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "true_limit": null, "limiting_element": null, "solver": null, "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "true_limit": null, "limiting_element": null, "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
@@ -197,16 +217,20 @@ impl FailureSummary {
     }
 
     fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
-        Self { kind, body: None, element: None, node: None, time, load_step: None, message }
+        Self { kind, body: None, element: None, node: None, time, load_step: None, message, remedy: "" }
     }
 }
 
 impl FailureSummary {
-    /// A load step, counted from 1, of so many that came to no equilibrium.
+    /// A load step, counted from 1 (0: what acts at the start), of so many that came to no equilibrium.
     pub(crate) fn load_step(error: &RelaxationError, number: u64, of: u64) -> Self {
-        let message = format!("load step {number} of {of}: {error}; {}", error.remedy());
+        let which = match number {
+            0 => "what acts at t = 0".to_owned(),
+            _ => format!("load step {number} of {of}"),
+        };
+        let message = format!("{which}: {error}; {}", error.remedy());
         let (kind, body, element, node, time, iterations, residual) = match error {
-            RelaxationError::NotFinite { body, node, iterations, time } => {
+            RelaxationError::NotFinite { body, node, iterations, time, .. } => {
                 ("not-finite", body, None, *node, *time, *iterations, None)
             }
             RelaxationError::Inverted { body, element, node, iterations, time, .. } => {
@@ -239,7 +263,14 @@ impl From<&StepError> for FailureSummary {
             }
             StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
         };
-        Self { body: Some(body.clone()), element, node: Some(node), ..Self::about(kind, message, Some(time)) }
+        let remedy = error.remedy();
+        Self {
+            body: Some(body.clone()),
+            element,
+            node: Some(node),
+            remedy,
+            ..Self::about(kind, message, Some(time))
+        }
     }
 }
 
@@ -288,6 +319,9 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
         true_limit: plan.limits.as_ref().map(|limits| limits.limit.step),
         limiting_element: plan.limits.as_ref().map(|limits| limits.limiting.clone()),
         solver: outcome.effort.clone(),
+        equilibria: outcome.equilibria,
+        ended: outcome.ended.clone(),
+        shell_strains: outcome.strains.0.clone(),
         device: plan.target.name().to_owned(),
         precision: plan.target.precision.word(),
         steps: outcome.steps,
@@ -330,7 +364,12 @@ fn write_page(
     let title = if scene.scene.title.is_empty() { "Untitled scene" } else { &scene.scene.title };
     writeln!(page, "# {title}\n")?;
     match &outcome.failure {
-        None => writeln!(page, "Done: {} s simulated in {} steps.\n", number(outcome.time), outcome.steps)?,
+        None => {
+            writeln!(page, "Done: {} s simulated in {} steps.\n", number(outcome.time), outcome.steps)?;
+            if let Some(why) = &outcome.ended {
+                writeln!(page, "It ended before its last step: {why}.\n")?;
+            }
+        }
         Some(failure) if failure.kind == INTERRUPTED => {
             writeln!(page, "**Interrupted**: {}\n", failure.message)?;
         }
@@ -368,7 +407,7 @@ fn write_page(
     writeln!(page, "| step | {} s |", number(plan.step))?;
     if let Some(Limits { bound, limit, limiting }) = &plan.limits {
         writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
-        writeln!(page, "| true limit (assembled operator) | {} s |", number(limit.step))?;
+        writeln!(page, "| true limit (assembled operator) | {} |", told_limit(limit.step))?;
     }
     if let Some(AddedMass { mass, percent, elements, .. }) = &summary.added_mass {
         let mass = number(*mass);
@@ -383,6 +422,7 @@ fn write_page(
     if let Some(effort) = &summary.solver {
         write_effort(page, effort, outcome.steps)?;
     }
+    write_strains(page, &summary.shell_strains)?;
     write_energies(page, outcome)?;
     write_reactions(page, built, outcome)?;
     writeln!(page, "\n## Cost\n\n| | |\n|---|---|")?;
@@ -433,6 +473,21 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
     Ok(())
 }
 
+fn write_strains(page: &mut String, strains: &[StrainSummary]) -> std::fmt::Result {
+    if strains.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        page,
+        "\n## Largest strains of shells\n\n| body | at a surface | there in the middle | triangle | at t [s] |\n|---|---|---|---|---|"
+    )?;
+    for StrainSummary { body, largest, membrane, element, time, .. } in strains {
+        let [largest, membrane] = [largest, membrane].map(|strain| format!("{:.2} %", 100.0 * strain));
+        writeln!(page, "| {body} | {largest} | {membrane} | {element} | {} |", number(*time))?;
+    }
+    Ok(())
+}
+
 fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
     let Energies { kinetic, internal, damping, hourglass, external, balance } = outcome.energies;
     writeln!(page, "\n## Energy at the end\n\n| | J |\n|---|---|")?;
@@ -451,12 +506,33 @@ fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
             "\nThe balance is not judged: an implicit step takes energy like a damper, and external work is a sum of trapezia."
         );
     }
+    let Some(equilibria) = &outcome.equilibria else {
+        return writeln!(
+            page,
+            "\nBalance: {:.3} % of the largest energy at the end, {:.3} % at worst (judged above {} J).",
+            balance * 100.0,
+            outcome.worst_balance * 100.0,
+            number(outcome.balance_floor)
+        );
+    };
+    let of_largest = |energy: f64| 100.0 * energy / internal.abs().max(external.abs()).max(f64::MIN_POSITIVE);
+    let error = match equilibria.external_error {
+        Some(error) => {
+            let found = equilibria.found;
+            format!(
+                "with {found} equilibria off by about {} J, {:.3} %",
+                number(error),
+                of_largest(error.abs())
+            )
+        }
+        None => "whose error isn't known: a large part of the way was made in one".to_owned(),
+    };
     writeln!(
         page,
-        "\nBalance: {:.3} % of the largest energy at the end, {:.3} % at worst (judged above {} J).",
-        balance * 100.0,
-        outcome.worst_balance * 100.0,
-        number(outcome.balance_floor)
+        "\nInternal and external energy differ by {:.3} % of the largest energy. Internal is what the laws store, and what relaxing ones \
+         have dissipated. External is the work of loads, reactions and prescribed motions by the trapezoidal rule over each load step, \
+         {error}; more load steps make it better, and change neither forces nor displacements of elastic bodies.",
+        balance * 100.0
     )
 }
 
@@ -483,12 +559,24 @@ fn short(file: &Path) -> String {
 
 /// A number for people: four significant digits.
 pub fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return if value.is_nan() { "unknown" } else { "unlimited" }.into();
+    }
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
         return format!("{value:.3e}");
     }
     let digits = if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 6) };
     format!("{value:.*}", digits as usize)
+}
+
+/// The true limit of a step [s] in words.
+pub(crate) fn told_limit(limit: f64) -> String {
+    if limit.is_finite() {
+        format!("{} s", number(limit))
+    } else {
+        "none: every node is held or moved as prescribed".into()
+    }
 }
 
 impl History {

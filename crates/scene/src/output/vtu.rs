@@ -2,12 +2,13 @@
 //! that can be read. Points are at rest; `displacement` warps them.
 
 use std::fs;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_vtu};
 use pliant_mechanics::Real;
 
+use super::file::{check_own_folder, replace};
 use super::snapshot::Snapshot;
 use super::{Frame, Observer, OutputError, Written};
 use crate::build::Built;
@@ -31,7 +32,9 @@ impl<R: Real> Series<R> {
         name: &str,
     ) -> Result<Self, OutputError> {
         let own = folder.join(name);
-        fs::create_dir_all(&own).map_err(|error| OutputError::new(&own, error))?;
+        check_own_folder(&own)
+            .and_then(|()| fs::create_dir_all(&own))
+            .map_err(|error| OutputError::new(&own, error))?;
         Ok(Self {
             folder: own,
             index: folder.join(format!("{name}.pvd")),
@@ -67,22 +70,18 @@ impl<R: Real> Series<R> {
 impl<R: Real> Observer<R> for Series<R> {
     fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
         self.snapshot.fill(frame);
-        let file = frame_name(self.times.len());
-        let (path, temporary) = (self.folder.join(&file), self.folder.join(format!("{file}.tmp")));
+        let path = self.folder.join(frame_name(self.times.len()));
         let options =
             VtuOptions { compress: true, single: R::PRECISION == "single", time: Some(frame.time()) };
-        let written = || -> Result<(), Box<dyn std::error::Error>> {
-            let mut writer = BufWriter::new(fs::File::create(&temporary)?);
-            write_vtu(&mut writer, self.snapshot.mesh(), &options)?;
-            writer.flush()?;
-            fs::rename(&temporary, &path)?;
-            Ok(())
-        };
-        if let Err(error) = written() {
-            // What is half written is not left behind.
-            let _ = fs::remove_file(&temporary);
-            return Err(OutputError::new(&path, error));
-        }
+        let written = replace(&path, |file| {
+            let mut writer = BufWriter::new(file);
+            write_vtu(&mut writer, self.snapshot.mesh(), &options).map_err(|error| match error {
+                MeshFileError::Write { source, .. } => source,
+                other => io::Error::other(other),
+            })?;
+            writer.flush()
+        });
+        written.map_err(|error| OutputError::new(&path, error))?;
         self.times.push(frame.time());
         // A later frame of the interrupted run stays in the list as long as it comes later.
         if !self.beyond.is_empty() {
@@ -130,6 +129,13 @@ fn frame_name(index: usize) -> String {
 fn listed(index: &Path) -> Result<Vec<f64>, String> {
     let frames = read_pvd(index).map_err(|error| error.to_string())?;
     Ok(frames.into_iter().map(|(time, _)| time).collect())
+}
+
+/// The time [s] of the last frame of a series, if it is there.
+pub(super) fn last_time(folder: &Path, name: &str) -> Option<f64> {
+    let times = listed(&folder.join(format!("{name}.pvd"))).ok()?;
+    let there = folder.join(name).join(frame_name(times.len().checked_sub(1)?)).is_file();
+    times.last().copied().filter(|_| there)
 }
 
 /// Whether a series begins with frames of these times; the reason if not.

@@ -472,7 +472,9 @@ impl eframe::App for App {
         let written =
             recording.to_bytes().and_then(|bytes| std::fs::write(path, bytes).map_err(|e| e.to_string()));
         if let Err(reason) = written {
-            eprintln!("error: `{}` cannot be written: {reason}", path.display());
+            use std::io::Write as _;
+            // Nobody reads it where standard error can't be written.
+            let _ = writeln!(std::io::stderr(), "error: `{}` cannot be written: {reason}", path.display());
         }
     }
 }

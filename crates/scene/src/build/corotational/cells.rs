@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use pliant_corotational as corotational;
-use pliant_corotational::element::{Bending, Elasticity, Formulation, Membrane};
+use pliant_corotational::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
 use pliant_corotational::{Material, ModelError, Motion, Shell};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 
@@ -12,13 +12,19 @@ use crate::build::bodies::{Draft, nodes};
 use crate::build::meshes::surface_of;
 use crate::build::{Builder, SCENE, bodies, suggestion};
 use crate::diagnostic::{Diagnostic, counted};
-use crate::format::{BodyModel, BodyTable, Element, Normals, Thickness, ThicknessRule};
+use crate::format::{BodyModel, BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
 
 /// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
 const DRILLING: f64 = 0.01;
 
 /// Point data with the normals of a surface.
 const NORMAL: &str = "normal";
+
+/// Normals whose cosine is as close to 1 are parallel: to 0.1°.
+const FLAT: f64 = 1e-6;
+
+/// Thickness over width from which on a wall is told to be stout: a strip is then 3 % too stiff against twist.
+const STOUT: f64 = 0.05;
 
 impl Builder<'_> {
     /// The mesh of a shell as triangles only: quads cut in two, volume cells left for their boundary.
@@ -87,8 +93,11 @@ impl Builder<'_> {
         let &Draft { name, table, mesh, .. } = draft;
         let block = mesh.block(CellKind::Triangle)?;
         let formulation = self.formulation(name, table)?;
-        let material = self.materials(draft, block)?;
-        let thickness = self.thickness(name, table, block)?;
+        let (layers, direction) = self.layers(draft, block)?;
+        let (material, thickness) = match layers[..] {
+            [] => (self.materials(draft, block)?, self.thickness(name, table, block)?),
+            _ => (Vec::new(), Vec::new()),
+        };
         let normals = self.normals(draft, first)?;
         let cells: Vec<[u32; 3]> = (0..block.len() as u32).map(|cell| nodes(block, cell, first)).collect();
         let count = cells.len();
@@ -98,6 +107,9 @@ impl Builder<'_> {
             thickness,
             material,
             formulation,
+            layers,
+            direction,
+            tension: table.pre_tension,
             crease: table.crease.unwrap_or(45.0).to_radians(),
             normals,
             branches: table.branches,
@@ -107,6 +119,7 @@ impl Builder<'_> {
         match part.model.add_shell(&shell) {
             Ok(notes) => {
                 self.tell_notes(name, notes, count);
+                self.tell_slack(name, table, formulation, start as usize);
                 if formulation.bending == Bending::None && formulation.membrane != Membrane::None {
                     let held = corotational::Constraint {
                         name: format!("membrane {name}"),
@@ -128,13 +141,14 @@ impl Builder<'_> {
     fn formulation(&mut self, name: &str, table: &BodyTable) -> Option<Formulation> {
         let cst = Membrane::Cst { drilling: DRILLING };
         let (membrane, bending) = match table.element {
-            None | Some(Element::DktOpt) => (Membrane::default(), Bending::Dkt),
+            None | Some(Element::DktCurved) => (Membrane::default(), Bending::Dkt),
+            Some(Element::DktOpt) => (Membrane::Opt { adaptation: 10.0 }, Bending::Dkt),
             Some(Element::DktCst) => (cst, Bending::Dkt),
             Some(Element::Membrane) => (cst, Bending::None),
             Some(Element::Plate) => (Membrane::None, Bending::Dkt),
             Some(Element::Comas2010) => (cst, Bending::Comas2010),
             Some(_) => {
-                let help = "elements of shells: `dkt-opt`, `dkt-cst`, `membrane`, `plate`, `comas-2010`";
+                let help = "elements of shells: `dkt-curved`, `dkt-opt`, `dkt-cst`, `membrane`, `plate`, `comas-2010`";
                 let message = format!("`{name}` is a shell, and this element is of a solid");
                 self.error(&["body", name, "element"], message, "not of a shell", help);
                 return None;
@@ -157,7 +171,8 @@ impl Builder<'_> {
                     // A label without a value has been told.
                     let law = table.law.of(label.as_deref())?;
                     let density = table.density.of(label.as_deref())?.0;
-                    let material = Material { elastic: self.elasticity(name, table, law)?, density };
+                    let path = bodies::law_path(name, &table.law, law);
+                    let material = Material { elastic: self.elasticity(name, table, law, &path)?, density };
                     *known.entry(label).or_insert(material)
                 }
             };
@@ -170,13 +185,18 @@ impl Builder<'_> {
     }
 
     /// Young's modulus and Poisson's ratio of a law at small strain.
-    fn elasticity(&mut self, name: &str, table: &BodyTable, law_name: &str) -> Option<Elasticity> {
+    fn elasticity(
+        &mut self,
+        name: &str,
+        table: &BodyTable,
+        law_name: &str,
+        path: &[&str],
+    ) -> Option<Elasticity> {
         let scene = self.scene;
-        let path = bodies::law_path(name, &table.law, law_name);
         let Some((_, law)) = scene.laws.iter().find(|(known, _)| known == law_name) else {
             let known: Vec<&str> = scene.laws.iter().map(|(name, _)| name.as_str()).collect();
             let help = suggestion(law_name, &known, SCENE, "laws");
-            self.error(&path, format!("there is no law `{law_name}`"), "no such law", help);
+            self.error(path, format!("there is no law `{law_name}`"), "no such law", help);
             return None;
         };
         let what = match (law.law.is_isotropic(), law.extras.prony.is_empty()) {
@@ -199,8 +219,85 @@ impl Builder<'_> {
         };
         let message = format!("law `{law_name}` {what}, and `{name}` is of model `{}`", table.model.word());
         let help = "take an isotropic law without `prony`, such as `neo-hookean`, or `model = \"solid\"`";
-        self.error(&path, message, "not for this model", help);
+        self.error(path, message, "not for this model", help);
         None
+    }
+
+    /// The layers of a shell, if it has some, and the direction in each triangle that their angles count from.
+    fn layers(&mut self, draft: &Draft<'_>, block: &CellBlock) -> Option<(Vec<Layer>, Vec<Vector3>)> {
+        let &Draft { name, table, mesh, .. } = draft;
+        if table.layers.is_empty() {
+            return Some((Vec::new(), Vec::new()));
+        }
+        if table.element == Some(Element::Comas2010) {
+            let help = "take `dkt-opt`, or one `thickness` and `law`";
+            let message = format!("`{name}` has layers, and its element is of one material");
+            self.error(&["body", name, "element"], message, "not with `layers`", help);
+            return None;
+        }
+        let all: Vec<Option<Layer>> =
+            (0..table.layers.len()).map(|number| self.layer(draft, number)).collect();
+        let layers: Vec<Layer> = all.into_iter().collect::<Option<_>>()?;
+        if let Some(fibre) = &table.fibre {
+            let directions = self.shell_directions(draft, fibre, block)?;
+            return Some((layers, directions.into_iter().map(Vector3::from).collect()));
+        }
+        if let Some(number) = table.layers.iter().position(|layer| layer.young_modulus.is_some()) {
+            let message =
+                format!("layer {number} of `{name}` is stiffer in one direction, and there is no direction");
+            let help = "add `fibre = [x, y, z]` to the body, `{ cell-data = \"name\" }` or a rule such as `around`: what angles \
+                        count from, projected on each triangle";
+            self.error(&["body", name, "layers", &number.to_string()], message, "from where?", help);
+            return None;
+        }
+        // The same in all directions: along an edge.
+        let along = |cell: &[u32]| mesh.points[cell[1] as usize] - mesh.points[cell[0] as usize];
+        Some((layers, block.cells().map(along).collect()))
+    }
+
+    fn layer(&mut self, draft: &Draft<'_>, number: usize) -> Option<Layer> {
+        let &Draft { name, table, .. } = draft;
+        let layer = &table.layers[number];
+        let index = number.to_string();
+        let path = ["body", name, "layers", &index];
+        let elastic = match (layer.young_modulus, layer.poisson_ratio, layer.shear_modulus) {
+            (Some(young), Some(poisson), Some(shear)) if layer.law.is_none() => {
+                Orthotropic { young, poisson, shear }
+            }
+            (None, None, None) => {
+                let (own, whole) = ([path.as_slice(), &["law"]].concat(), ["body", name, "law"]);
+                let (law, path) = match (&layer.law, &table.law) {
+                    (Some(law), _) => (law, own.as_slice()),
+                    (None, ByLabel::One(law)) => (law, whole.as_slice()),
+                    (None, ByLabel::Each(_)) => {
+                        let message = format!("layer {number} of `{name}` has no elasticity");
+                        let help = "give it a `law`, or `young-modulus = [along, across]` with `poisson-ratio` and \
+                                    `shear-modulus`; or the body one `law`";
+                        self.error(&path, message, "of what?", help);
+                        return None;
+                    }
+                };
+                self.elasticity(name, table, law, path)?.into()
+            }
+            _ => {
+                let message = format!("layer {number} of `{name}` has a part of its elasticity, or too much");
+                let help =
+                    "give it either a `law`, or all of `young-modulus`, `poisson-ratio` and `shear-modulus`";
+                self.error(&path, message, "this layer", help);
+                return None;
+            }
+        };
+        let density = match (layer.density, &table.density) {
+            (Some(density), _) => density,
+            (None, ByLabel::One(density)) => density.0,
+            (None, ByLabel::Each(_)) => {
+                let message =
+                    format!("layer {number} of `{name}` has no density, and that of the body goes by label");
+                self.error(&path, message, "of which density?", "give the layer a `density`");
+                return None;
+            }
+        };
+        Some(Layer { elastic, thickness: layer.thickness, angle: layer.angle.to_radians(), density })
     }
 
     fn thickness(&mut self, name: &str, table: &BodyTable, block: &CellBlock) -> Option<Vec<f64>> {
@@ -284,15 +381,46 @@ impl Builder<'_> {
                     .filter(|(_, normal)| *normal != Vector3::zeros())
                     .collect();
                 let creased = mesh.points.len() - given.len();
-                self.notes.push(match creased {
-                    0 => format!("`{name}` is curved by the normals of its mesh"),
-                    _ => format!(
+                if creased > 0 {
+                    self.notes.push(format!(
                         "`{name}` is curved by the normals of its mesh, but for {} without one, which may be creases",
                         counted(creased, "node")
-                    ),
-                });
+                    ));
+                } else if !table.mesh.is_sheet() {
+                    self.notes.push(format!("`{name}` is curved by the normals of its mesh"));
+                }
                 Some(given)
             }
+        }
+    }
+
+    /// Tells of nodes of a membrane that nothing holds across at the start of a static run.
+    fn tell_slack(&mut self, name: &str, table: &BodyTable, formulation: Formulation, first: usize) {
+        let slack = formulation.bending == Bending::None && formulation.membrane != Membrane::None;
+        let Some(part) = self.corotational.as_ref().filter(|_| slack && table.pre_tension == 0.0) else {
+            return;
+        };
+        if self.scene.run.solver != SolverName::Static {
+            return;
+        }
+        // Of each node the normal of a triangle, and whether all are parallel to it.
+        let mut flat: BTreeMap<u32, (Vector3, bool)> = BTreeMap::new();
+        for facet in &part.model.facets[first..] {
+            let [a, b, c] = facet.nodes.map(|node| part.model.rest[node as usize]);
+            let normal = (b - a).cross(&(c - a)).normalize();
+            for node in facet.nodes {
+                let known = flat.entry(node).or_insert((normal, true));
+                known.1 &= known.0.dot(&normal).abs() > 1.0 - FLAT;
+            }
+        }
+        let count = flat.values().filter(|(_, flat)| *flat).count();
+        if count > 0 {
+            self.notes.push(format!(
+                "`{name}`: {} of the membrane lie in one plane with all triangles round them, and without tension nothing holds \
+                 them across: the static solver starts with an artificial stiffness there, proportional to the residual, of \
+                 which nothing is left at equilibrium; `pre-tension` [N/m] would hold them",
+                counted(count, "node")
+            ));
         }
     }
 
@@ -312,6 +440,13 @@ impl Builder<'_> {
             let help = "take larger triangles, a smaller thickness, or model the wall with tets";
             self.out.push(Diagnostic::warning(message).at(place, "thick").help(help));
         }
+        if let Some(stoutness) = notes.stoutness.filter(|&stoutness| stoutness > STOUT) {
+            self.notes.push(format!(
+                "`{name}` is {stoutness:.2} times as thick as wide (twice its area over its border): shear across the thickness is \
+                 left out, which makes such a strip about {:.0} % too stiff against twist (0.63 times that)",
+                63.0 * stoutness
+            ));
+        }
         if let Some((inverted, first)) = notes.inverted {
             let message = format!(
                 "{} of `{name}` folded back onto all neighbours, as inverted ones are: the first is triangle {first} (counted \
@@ -329,7 +464,7 @@ impl Builder<'_> {
                  plates 6 to 26 % too soft"
             );
             let place = self.source().span(&["body", name, "element"]);
-            let help = "it is there for comparison; take `dkt-opt`";
+            let help = "it is there for comparison; take `dkt-curved`";
             self.out.push(Diagnostic::warning(message).at(place, "converges to a wrong plate").help(help));
         }
     }
@@ -337,10 +472,17 @@ impl Builder<'_> {
     /// Tells why a part was refused, at the key that is about it.
     fn refuse_part(&mut self, name: &str, error: &ModelError) {
         let (key, help) = match error {
-            ModelError::OutOfRange { what, .. } if what.starts_with("thickness") => {
+            ModelError::OutOfRange { what, .. }
+                if what.starts_with("thickness") && !what.contains("layer") =>
+            {
                 ("thickness", "give every triangle a thickness above 0, in metres")
             }
+            ModelError::OutOfRange { what, .. } if what.contains("of layer") => ("layers", ""),
             ModelError::OutOfRange { what, .. } if what.starts_with("density") => ("density", ""),
+            ModelError::Direction { .. } => (
+                "fibre",
+                "take a direction that lies along the wall, or a rule such as `around` or `tangential`",
+            ),
             ModelError::OutOfRange { .. } => ("law", "give the law other constants"),
             ModelError::Normal { .. } => {
                 ("mesh", "`normals = \"triangles\"` takes the mean of the triangles instead")

@@ -100,6 +100,12 @@ impl Builder<'_> {
         nodes: Option<(usize, &[u32])>,
     ) -> Option<model::Motion> {
         let path = ["constraint", name];
+        if table.rotate.is_some() {
+            let message = "a rotation about an axis is for nodes of solids";
+            let help = "of shells `turn` turns the nodes about their own places; give their way node by node in `by`";
+            self.error(&[path[0], path[1], "rotate"], message, "not for this model", help);
+            return None;
+        }
         let shift = match (&table.by, table.velocity) {
             (_, Some(_)) => {
                 let message = "nodes of shells and co-rotational solids move by a way, not with a velocity";

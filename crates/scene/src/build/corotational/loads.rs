@@ -3,16 +3,19 @@
 use std::collections::BTreeMap;
 
 use pliant_corotational as corotational;
-use pliant_corotational::Spread;
+use pliant_corotational::element::Membrane;
+use pliant_corotational::{Resolution, Spread};
 use pliant_geometry::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
 
-use super::{BodyCells, Control};
+use super::{BodyCells, Control, Stop};
 use crate::build::{Builder, SCENE, Target, suggestion};
+use crate::diagnostic::{Diagnostic, counted};
 use crate::format::{
     Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SolverName, SpreadName,
-    StepChoice,
+    StepChoice, StopTable,
 };
+use crate::output::number;
 use crate::registry::LoadTable;
 
 impl Builder<'_> {
@@ -48,7 +51,7 @@ impl Builder<'_> {
                 let until = self.scene.scene.until;
                 let step = match run.step {
                     StepChoice::Seconds(step) => step.min(until),
-                    StepChoice::Auto(_) => until / f64::from(run.load_steps),
+                    StepChoice::Auto(_) => run.load_steps.first(until),
                 };
                 Curve { shape: Shape::Ramp, from: 0.0, to: step }
             }
@@ -226,11 +229,77 @@ impl Builder<'_> {
         path: &[&str],
     ) -> Option<corotational::LoadKind> {
         let cells = self.facets(body, &table.faces, &[path, &["faces"]].concat())?;
+        let model = &self.corotational.as_ref()?.model;
+        let membrane = cells.first().map(|&cell| model.facets[cell as usize].membrane());
+        let curved = matches!(membrane, Some(Membrane::Curved { .. }));
         let spread = match table.spread {
-            SpreadName::Lumped => Spread::Lumped,
-            SpreadName::Curved => Spread::Curved,
+            Some(SpreadName::Lumped) => Spread::Lumped,
+            Some(SpreadName::Curved) => Spread::Curved,
+            None if curved => Spread::Curved,
+            None => Spread::Lumped,
         };
+        let resolution = model.resolution(&cells);
+        match (membrane, spread) {
+            (Some(Membrane::Curved { .. }), Spread::Lumped) => self.warn_of_spread(true, body, path),
+            (Some(Membrane::Opt { .. } | Membrane::Cst { .. }), Spread::Curved) => {
+                self.warn_of_spread(false, body, path);
+            }
+            _ => {}
+        }
+        if curved {
+            self.tell_resolution(resolution, cells.len(), body, path);
+        }
         Some(corotational::LoadKind::Pressure { cells, pressure: table.pressure, spread })
+    }
+
+    /// Warns of a pressure and a membrane, curved or not, that are not of the same surface.
+    fn warn_of_spread(&mut self, curved: bool, body: usize, path: &[&str]) {
+        let name = &self.bodies[body].name;
+        let (message, help) = if curved {
+            (
+                format!("a lumped pressure does not go with `dkt-curved`, the element of `{name}`"),
+                "leave `spread` out, or take `element = \"dkt-opt\"`",
+            )
+        } else {
+            (
+                format!("a pressure from the curved surface does not go with the flat membrane of `{name}`"),
+                "take `element = \"dkt-curved\"`, or leave `spread` out",
+            )
+        };
+        let message = format!("{message}: on a thin curved wall displacements scatter from node to node");
+        let place = self.source().span(&[path, &["spread"]].concat());
+        self.out.push(Diagnostic::warning(message).at(place, "not of one surface").help(help));
+    }
+
+    /// Says where a mesh is too coarse for pressure on a thin curved wall, or its normals are estimated.
+    fn tell_resolution(&mut self, found: Resolution, count: usize, body: usize, path: &[&str]) {
+        let name = self.bodies[body].name.clone();
+        if found.estimated > 0 {
+            self.notes.push(format!(
+                "`{name}`: the normals of {} of {count} curved triangles under pressure are estimated from the triangles, which costs \
+                 accuracy on irregular meshes; meshes of `pliant mesh --as shells` and built-in shapes bring the normals of their \
+                 surface",
+                found.estimated
+            ));
+        }
+        if found.coarse > 0 {
+            let message = format!(
+                "{} of {count} of `{name}` under pressure have edges above 2 √(R t), with R the radius of curvature: the \
+                 worst is triangle {} (counted from 0) with {} m, where {} m is the limit",
+                counted(found.coarse, "triangle"),
+                self.own_cell(body, found.worst),
+                number(found.edge),
+                number(found.limit)
+            );
+            let help = "on an irregular mesh displacements scatter there from node to node: take shorter edges or a regular mesh";
+            let place = self.source().span(path);
+            self.out.push(Diagnostic::warning(message).at(place, "on a coarse curved wall").help(help));
+        }
+    }
+
+    /// The number of a facet in its body.
+    fn own_cell(&self, body: usize, cell: u32) -> u32 {
+        self.shell_cells(body).and_then(|cells| cells.first().copied()).map_or(cell, |first| cell - first)
     }
 
     /// The facets of a shell, numbered in the model; `None` for another body.
@@ -295,18 +364,43 @@ impl Builder<'_> {
             return;
         }
         let control = match (&table.displacement, table.arc_length, table.volume) {
-            (Some(wanted), _, _) => self.controlled_node(wanted),
-            (_, Some(length), _) => Some(Control::ArcLength(length)),
+            (Some(wanted), _, _) => (self.controlled_node(wanted, &["run", "control", "displacement"]))
+                .map(|(node, component, by)| Control::Displacement { node, component, by }),
+            (_, Some(length), _) => {
+                self.stop(table.stop.as_ref()).map(|stop| Control::ArcLength { length, stop })
+            }
             (_, _, Some(volume)) => self.controlled_volume(&table.load, volume),
             _ => None,
         };
+        if table.stop.is_some() && table.arc_length.is_none() {
+            let message = "`stop` is for `arc-length`: other controls end where they are told to";
+            self.error(&["run", "control", "stop"], message, "means nothing here", "remove it");
+        }
         if let Some(part) = &mut self.corotational {
             part.control = control;
         }
     }
 
-    fn controlled_node(&mut self, wanted: &ControlledNode) -> Option<Control> {
-        let at = |key| ["run", "control", "displacement", key];
+    /// Where a path by arc length ends: where the load is as written, if nothing else is told.
+    fn stop(&mut self, table: Option<&StopTable>) -> Option<Stop> {
+        let Some(table) = table else { return Some(Stop { load_factor: Some(1.0), ..Stop::default() }) };
+        let path = ["run", "control", "stop", "displacement"];
+        let displacement = match &table.displacement {
+            Some(wanted) => Some(self.controlled_node(wanted, &path)?),
+            None => None,
+        };
+        let (load_factor, limit_points) = (table.load_factor, table.limit_points);
+        if load_factor.is_none() && displacement.is_none() && limit_points.is_none() {
+            let message = "`stop` needs one of `load-factor`, `displacement` and `limit-points`";
+            self.error(&path[..3], message, "says nothing", "remove it to end at a load factor of 1");
+            return None;
+        }
+        Some(Stop { load_factor, displacement, limit_points })
+    }
+
+    /// The node nearest to a place, the component and how far it moves [m].
+    fn controlled_node(&mut self, wanted: &ControlledNode, path: &[&str]) -> Option<(u32, usize, f64)> {
+        let at = |key| [path, &[key]].concat();
         let body = self.find_body(&wanted.body, &at("body"))?;
         let nodes = self.model.bodies[body].nodes.clone();
         let place = Vector3::from(wanted.at);
@@ -322,7 +416,7 @@ impl Builder<'_> {
                 return None;
             }
         };
-        Some(Control::Displacement { node, component, by: wanted.by })
+        Some((node, component, wanted.by))
     }
 
     fn controlled_volume(&mut self, load: &str, to: f64) -> Option<Control> {

@@ -14,7 +14,8 @@ use pliant_mechanics::fingerprint;
 
 use crate::build::Builder;
 use crate::diagnostic::counted;
-use crate::format::{BodyModel, BodyTable, SolverName};
+use crate::format::{BodyModel, BodyTable, Element, SolverName};
+use crate::registry::OutputTable;
 
 /// Shells and co-rotational solids of a scene. Nodes are those of the scene's model.
 #[derive(Clone, Debug)]
@@ -55,7 +56,12 @@ pub enum Control {
         by: f64,
     },
     /// All translations together move by a length [m] in each load step.
-    ArcLength(f64),
+    ArcLength {
+        /// The length [m].
+        length: f64,
+        /// Where the path ends.
+        stop: Stop,
+    },
     /// The pressurised facets enclose a volume [m³] in the end, and another at the start.
     Volume {
         /// At the start [m³].
@@ -63,6 +69,17 @@ pub enum Control {
         /// At the end [m³].
         to: f64,
     },
+}
+
+/// Where a path by arc length ends: at the first state that meets one of these.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stop {
+    /// Size of the load factor.
+    pub load_factor: Option<f64>,
+    /// A node, a component (0 to 2) of its displacement, and how large that is [m], with its sign.
+    pub displacement: Option<(u32, usize, f64)>,
+    /// Limit points passed.
+    pub limit_points: Option<u32>,
 }
 
 impl Builder<'_> {
@@ -155,23 +172,47 @@ impl Builder<'_> {
             ("iterations", newton, "`solver = \"implicit\"` and `\"static\"`"),
             ("linear", newton, "`solver = \"implicit\"` and `\"static\"`"),
             ("control", newton && run.solver == SolverName::Static, "`solver = \"static\"`"),
+            ("integrator", newton && run.solver == SolverName::Implicit, "`solver = \"implicit\"`"),
         ] {
             if self.source().node(&["run", key]).is_some() && !wanted {
                 let message = format!("`{key}` is for {of} of shells and co-rotational solids");
                 self.error(&["run", key], message, "means nothing here", "remove it");
             }
         }
+        let taken = self
+            .scene
+            .outputs
+            .iter()
+            .any(|(name, table)| newton && name == "convergence" && matches!(table, OutputTable::Csv(_)));
+        if taken {
+            let message = format!(
+                "a run with `solver = \"{}\"` writes its residuals into `convergence.csv`",
+                run.solver.word()
+            );
+            self.error(&["output", "convergence"], message, "the same file", "give the output another name");
+        }
         for (name, body) in &self.scene.bodies {
             let shell = body.model == BodyModel::Shell;
             let others = [
                 ("thickness", shell, "a shell"),
+                (
+                    "pre-tension",
+                    shell && body.element != Some(Element::Plate),
+                    "a shell that resists in its plane",
+                ),
                 ("crease", shell, "a shell"),
                 ("normals", shell, "a shell"),
                 ("branches", shell, "a shell"),
                 ("stiffness-damping", body.model != BodyModel::Solid, "shells and co-rotational solids"),
                 ("initial-displacement", body.model != BodyModel::Solid, "shells and co-rotational solids"),
                 ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
-                ("fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
+                ("layers", shell, "a shell"),
+                ("thickness", body.layers.is_empty(), "a shell without `layers`"),
+                (
+                    "fibre",
+                    body.model == BodyModel::Solid || (shell && !body.layers.is_empty()),
+                    "`model = \"solid\"` and shells with `layers`",
+                ),
                 ("second-fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
             ];
             for (key, wanted, of) in others {
@@ -269,6 +310,12 @@ impl Corotational {
         };
         let (BodyCells::Facets(range) | BodyCells::Tets(range)) = self.cells.get(body)?;
         Some((range.len(), volume))
+    }
+
+    /// Whether only membranes hold a node.
+    pub(crate) fn is_slack(&self, node: u32) -> bool {
+        let mut facets = self.model.facets.iter().filter(|facet| facet.nodes.contains(&node)).peekable();
+        facets.peek().is_some() && facets.all(|facet| !facet.bends())
     }
 
     /// Each part of the model in words with a number that tells it from others; see [`fingerprint`].

@@ -1,0 +1,240 @@
+//! What people say to `pliant labels`, `pliant mesh` and in a scene about scans: names, ranges, masks, units; and what is told back.
+
+mod support;
+
+#[allow(dead_code)]
+#[path = "../../imaging/tests/imaging/write.rs"]
+mod write;
+
+use pliant_geometry::io;
+use pliant_meshing::sphere;
+use support::{BLOCK, Told, Workshop};
+use write::{Form, Segments, Syntax, Volume, metaimage, nifti1, segmentation, structure_set};
+
+/// Voxels of 2 mm along each side.
+const SIDE: usize = 20;
+
+/// Labels by the place of a voxel.
+fn volume(label: impl Fn([usize; 3]) -> i16) -> Volume {
+    let at = |n: usize| [n % SIDE, n / SIDE % SIDE, n / SIDE / SIDE];
+    let axes = nalgebra::Matrix3::identity() * 2.0;
+    let values = (0..SIDE.pow(3)).map(|n| label(at(n))).collect();
+    Volume { dims: [SIDE; 3], origin: nalgebra::Vector3::zeros(), axes, values }
+}
+
+/// A box of label 1 with a core of label 2, and one of label 3 that the head side of the image cuts off.
+fn organ() -> Volume {
+    volume(|[i, j, k]| match [i, j, k] {
+        [6..=9, 6..=9, 6..=9] => 2,
+        [3..=12, 3..=12, 3..=12] => 1,
+        [14..=17, 3..=12, 8..=19] => 3,
+        _ => 0,
+    })
+}
+
+fn workshop() -> Workshop {
+    let workshop = Workshop::new(BLOCK);
+    workshop.write("seg.nii", nifti1(&organ(), Form::Sform, false));
+    workshop.write(
+        "seg.dcm",
+        segmentation(&organ(), Segments::Bits, &["Liver", "tumour", "heart"], Syntax::Explicit),
+    );
+    workshop
+}
+
+/// `pliant mesh … --edge 8mm -o out.vtu --json`
+fn mesh(workshop: &Workshop, more: &[&str]) -> Told {
+    workshop.pliant(&[&["mesh", "--edge", "8mm", "-o", "out.vtu", "--json"], more].concat())
+}
+
+#[track_caller]
+fn refused(told: &Told, says: &[&str]) {
+    assert_eq!(told.code, 2, "{}{}", told.err, told.out);
+    for part in says {
+        assert!(told.words().contains(part), "no `{part}` in: {}", told.err);
+    }
+}
+
+/// Labels of the materials of a mesh that was made.
+#[track_caller]
+fn materials(told: &Told) -> Vec<i64> {
+    assert_eq!(told.code, 0, "{}", told.err);
+    told.json()["materials"].as_array().unwrap().iter().map(|one| one["label"].as_i64().unwrap()).collect()
+}
+
+#[test]
+fn labels_are_listed_with_names_and_where_the_image_cuts_them_off() {
+    let workshop = workshop();
+    let told = workshop.pliant(&["labels", "seg.dcm"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    for part in [
+        "DICOM segmentation",
+        "label 1 (Liver): 936 voxels",
+        "label 2 (tumour): 64 voxels",
+        "label 3 (heart)",
+    ] {
+        assert!(told.out.contains(part), "no `{part}` in: {}", told.out);
+    }
+    let told = workshop.pliant(&["labels", "seg.nii"]);
+    assert!(told.out.contains("at the border of the image: 40 voxels on the head side"), "{}", told.out);
+    assert_eq!(told.out.matches("border").count(), 1, "{}", told.out);
+    let json = workshop.pliant(&["labels", "seg.dcm", "--json"]).json();
+    assert_eq!(
+        (&json["labels"][1]["name"], &json["labels"][1]["border"]),
+        (&"tumour".into(), &serde_json::json!({}))
+    );
+    workshop
+        .write("names.txt", "# IDX   -R-  -G-  -B-  -A--  VIS MSH  LABEL\n 1 255 0 0 1 1 1 \"right lobe\"\n");
+    let told = workshop.pliant(&["labels", "seg.nii", "--names", "names.txt"]);
+    assert!(told.out.contains("label 1 (right lobe)"), "{}", told.out);
+    let told = workshop.pliant(&["labels", "seg.nii", "--names", "totalsegmentator"]);
+    assert!(told.out.contains("label 3 (kidney_left)"), "{}", told.out);
+    refused(&workshop.pliant(&["labels", "seg.nii", "--names", "seg.nii"]), &["not a table of names"]);
+}
+
+#[test]
+fn a_label_is_chosen_by_name_and_range() {
+    let workshop = workshop();
+    let told = mesh(&workshop, &["seg.dcm", "--label", "liver", "--label", "Tumour"]);
+    assert_eq!(materials(&told), [1, 2]);
+    assert_eq!(told.json()["image"]["names"], serde_json::json!({ "1": "Liver", "2": "tumour" }));
+    assert_eq!(materials(&mesh(&workshop, &["seg.nii", "--label", "1-2"])), [1, 2]);
+    assert_eq!(
+        materials(&mesh(&workshop, &["seg.nii", "--names", "totalsegmentator", "--label", "kidney_right"])),
+        [2]
+    );
+    refused(&mesh(&workshop, &["seg.dcm", "--label", "lung"]), &["no label is named `lung`", "Liver (1)"]);
+    refused(&mesh(&workshop, &["seg.nii", "--label", "liver"]), &["have no names", "--names TABLE"]);
+    refused(
+        &mesh(&workshop, &["seg.nii", "--label", "7-9"]),
+        &["no voxel has a label of 7-9; the image has 1, 2, 3"],
+    );
+}
+
+#[test]
+fn an_organ_that_the_image_cuts_off_is_warned_of() {
+    let workshop = workshop();
+    let told = mesh(&workshop, &["seg.nii", "--label", "3"]);
+    assert_eq!(materials(&told), [3]);
+    assert!(
+        told.err.contains("warning: label 3 lies at the border of the image (40 voxels on the head side)"),
+        "{}",
+        told.err
+    );
+    let told = mesh(&workshop, &["seg.nii", "--label", "1"]);
+    assert!(!told.err.contains("border"), "{}", told.err);
+}
+
+#[test]
+fn masks_are_one_image_of_labels() {
+    let workshop = workshop();
+    for (name, label) in [("liver.nii", 1), ("tumour.nii", 2)] {
+        let mask =
+            Volume { values: organ().values.iter().map(|&own| i16::from(own == label)).collect(), ..organ() };
+        workshop.write(name, nifti1(&mask, Form::Sform, false));
+    }
+    let told = mesh(&workshop, &["liver.nii", "tumour.nii"]);
+    assert_eq!(materials(&told), [1, 2]);
+    let expected = materials(&mesh(&workshop, &["seg.nii", "--label", "1-2"]));
+    assert_eq!(materials(&told), expected);
+    assert_eq!(materials(&mesh(&workshop, &["liver.nii", "tumour.nii", "--label", "tumour"])), [2]);
+    let told = workshop.pliant(&["labels", "liver.nii", "tumour.nii"]);
+    assert!(told.out.contains("label 2 (tumour): 64 voxels"), "{}", told.out);
+    refused(
+        &mesh(&workshop, &["liver.nii", "seg.nii"]),
+        &["`seg.nii` is no mask: it has the labels 1, 2, 3"],
+    );
+}
+
+#[test]
+fn what_would_be_ignored_or_is_no_label_image_is_refused() {
+    let workshop = workshop();
+    refused(
+        &mesh(&workshop, &["seg.nii", "--add", "seg.nii", "--label", "1"]),
+        &["`--add` goes with `--threshold`", "labels are not"],
+    );
+    refused(&mesh(&workshop, &["seg.nii", "--label", "1", "--threshold", "2"]), &["two ways"]);
+    let scan = volume(
+        |[i, j, k]| if i < 5 { -1024 } else { ((i * 7919 + j * 104_729 + k * 1_299_709) % 901) as i16 },
+    );
+    workshop.write("ct.mha", metaimage(&scan, false, false, "LOCAL"));
+    for told in [workshop.pliant(&["labels", "ct.mha"]), mesh(&workshop, &["ct.mha", "--label", "7"])] {
+        refused(&told, &["this is no label image", "values from -1024 to 900", "--threshold VALUE"]);
+    }
+    workshop.write("rtss.dcm", structure_set());
+    refused(&workshop.pliant(&["labels", "rtss.dcm"]), &["RTSTRUCT", "contours", "SlicerRT"]);
+}
+
+#[test]
+fn a_surface_in_millimetres_is_not_taken_for_one_in_metres() {
+    let workshop = workshop();
+    let ball = sphere(60.0, 4, 100_000).expect("a sphere");
+    io::write(&workshop.path("ball.stl"), &ball).expect("the mesh is written");
+    let plain = ["ball.stl", "--edge", "8"];
+    let told = workshop.pliant(&[&["mesh"], &plain[..], &["-o", "out.vtu"]].concat());
+    refused(
+        &told,
+        &["measures 207.8", "probably millimetres", "--scale 0.001", "`--scale 1` if it is in metres"],
+    );
+    assert!(!workshop.path("out.vtu").exists());
+    let told = mesh(&workshop, &["ball.stl", "--scale", "0.001"]);
+    assert!(told.code == 0 && !told.err.contains("larger than"), "{}", told.err);
+    let told = workshop.pliant(&[&["mesh"], &plain[..], &["--scale", "1", "-o", "out.vtu"]].concat());
+    assert!(told.code == 0 && told.err.contains("larger than any organ"), "{}", told.err);
+}
+
+/// A scene of one body whose mesh is what stands here.
+fn scene(mesh: &str) -> Workshop {
+    let text = format!(
+        "[scene]\nuntil = 0.001\n[law.tissue]\ntype = \"neo-hookean\"\nyoung-modulus = 3e3\npoisson-ratio = 0.45\n\
+         [body.organ]\nmesh = {mesh}\nlaw = \"tissue\"\ndensity = 1000\n"
+    );
+    let workshop = Workshop::new(&text);
+    workshop.write(
+        "case/seg.dcm",
+        segmentation(&organ(), Segments::Bits, &["Liver", "tumour", "heart"], Syntax::Explicit),
+    );
+    workshop.write("case/seg.nii", nifti1(&organ(), Form::Sform, false));
+    for (name, label) in [("liver.nii", 1), ("tumour.nii", 2)] {
+        let mask =
+            Volume { values: organ().values.iter().map(|&own| i16::from(own == label)).collect(), ..organ() };
+        workshop.write(&format!("case/{name}"), nifti1(&mask, Form::Sform, false));
+    }
+    let ball = sphere(60.0, 3, 100_000).expect("a sphere");
+    io::write(&workshop.path("case/ball.stl"), &ball).expect("the mesh is written");
+    workshop
+}
+
+#[test]
+fn a_scene_says_labels_by_name_and_masks_and_is_asked_about_units() {
+    for (mesh, code, says) in [
+        ("{ image = \"seg.dcm\", label = \"liver\", edge = 0.008 }", 0, "label 1 (Liver), tets"),
+        (
+            "{ image = \"seg.dcm\", labels = [\"tumour\", \"1-1\"], edge = 0.008 }",
+            0,
+            "label 2 (tumour), 1 (Liver)",
+        ),
+        ("{ masks = [\"liver.nii\", \"tumour.nii\"], edge = 0.008 }", 0, "label 1 (liver), 2 (tumour)"),
+        ("{ image = \"seg.nii\", label = 3, edge = 0.008 }", 0, "40 voxels on the head side"),
+        ("{ image = \"seg.dcm\", label = \"lung\", edge = 0.008 }", 2, "no label is named `lung`"),
+        ("{ image = \"seg.dcm\", label = 1, names = \"none.txt\", edge = 0.008 }", 2, "cannot open"),
+        ("{ file = \"ball.stl\", as = \"tets\", edge = 8.0 }", 2, "probably millimetres"),
+        ("{ file = \"ball.stl\", as = \"tets\", edge = 0.008, scale = 0.001 }", 0, "what it encloses"),
+    ] {
+        let told = scene(mesh).pliant(&["check", "case"]);
+        assert_eq!(told.code, code, "{mesh}: {}", told.err);
+        let all = format!("{} {}", told.words(), told.out);
+        assert!(all.contains(says), "{mesh}: no `{says}` in: {all}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn pipes_are_refused_at_once() {
+    let workshop = workshop();
+    for name in ["pipe.stl", "pipe.nii"] {
+        let made = std::process::Command::new("mkfifo").arg(workshop.path(name)).status();
+        assert!(made.is_ok_and(|status| status.success()));
+        refused(&mesh(&workshop, &[name, "--label", "1"]), &["no regular file"]);
+    }
+}

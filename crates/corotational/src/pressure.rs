@@ -1,0 +1,276 @@
+//! Pressure on a curved triangle: the nodal forces and moments ∫ Jᵀ n dA of a pressure of 1, and how they change. With h_a = ∫ F_a n dA on
+//! each control point b_a that is Σ D_aᵀ h_a, where D_a are the control points' velocities. h is a sum of b_b × b_c with constant weights,
+//! so all is exact.
+//! Over a closed surface, or one whose rim does not move, the force is the gradient of the volume, and its change is symmetric; else the
+//! sides at the rim add an unsymmetric part.
+
+use std::sync::LazyLock;
+
+use nalgebra::{Matrix3, Vector3};
+use pliant_geometry::EDGES;
+
+use crate::control::points;
+use crate::element::Matrix3x18;
+use crate::facet::{Matrix18, Vector18};
+use crate::rotation::skew;
+use crate::surface::Patch;
+
+/// ∫ F_a (F_b,u F_c,v − F_c,u F_b,v) over the triangle of area ½: constants of the cubic patch.
+static WEIGHTS: LazyLock<[[[f64; 9]; 9]; 9]> = LazyLock::new(|| {
+    let mut all = [[[0.0; 9]; 9]; 9];
+    for point in points() {
+        let [along, across] = &point.slopes;
+        for (a, weights) in all.iter_mut().enumerate() {
+            let value = 0.5 * point.weight * point.value[a];
+            for (b, weights) in weights.iter_mut().enumerate() {
+                for (c, weight) in weights.iter_mut().enumerate() {
+                    *weight += value * (along[b] * across[c] - along[c] * across[b]);
+                }
+            }
+        }
+    }
+    all
+});
+
+impl Patch {
+    /// Nodal forces [m²] and moments [m³] of a pressure of 1: ∫ Jᵀ n dA.
+    pub fn pressure_forces(&self) -> Vector18 {
+        back(&self.control_forces(), &self.control_maps())
+    }
+
+    /// ∫ F_a n dA on each control point [m²].
+    fn control_forces(&self) -> [Vector3<f64>; 9] {
+        let place = self.centred();
+        let mut forces = [Vector3::zeros(); 9];
+        for b in 0..9 {
+            for c in b + 1..9 {
+                let cross = place[b].cross(&place[c]);
+                for (force, weights) in forces.iter_mut().zip(&*WEIGHTS) {
+                    *force += cross * weights[b][c];
+                }
+            }
+        }
+        forces
+    }
+
+    /// The control points from the mean of the corners: no place in space makes a difference but for round-off.
+    fn centred(&self) -> [Vector3<f64>; 9] {
+        let centre = self.corners().iter().sum::<Vector3<f64>>() / 3.0;
+        self.controls().map(|point| point - centre)
+    }
+
+    /// The change of [`Self::pressure_forces`] with positions and spins.
+    pub fn pressure_change(&self) -> Matrix18 {
+        let (place, maps, forces) = (self.centred(), self.edge_maps(), self.control_forces());
+        let mut change = Matrix18::zeros();
+        for (a, weights) in WEIGHTS.iter().enumerate() {
+            // δh_a = Σ_c (Σ_b w_abc b_b) × δb_c.
+            let mut moved = Matrix3x18::zeros();
+            for c in 0..9 {
+                let arm: Vector3<f64> = place.iter().zip(weights).map(|(b, weights)| b * weights[c]).sum();
+                let arm = skew(&arm);
+                let mut add = |column: usize, block: Matrix3<f64>| {
+                    let mut own = moved.fixed_columns_mut::<3>(column);
+                    own += block;
+                };
+                if c < 3 {
+                    add(6 * c, arm);
+                    continue;
+                }
+                let ([start, end], [along, turning]) = (EDGES[c - 3], &maps[c - 3]);
+                let followed = arm * along;
+                add(6 * start, arm - followed);
+                add(6 * end, followed);
+                add(6 * start + 3, arm * turning);
+            }
+            let mut add = |row: usize, block: &Matrix3x18| {
+                let mut own = change.fixed_rows_mut::<3>(row);
+                own += block;
+            };
+            if a < 3 {
+                add(6 * a, &moved);
+                continue;
+            }
+            let ([start, end], [along, turning]) = (EDGES[a - 3], &maps[a - 3]);
+            let followed = along.tr_mul(&moved);
+            add(6 * start, &(moved - followed));
+            add(6 * end, &followed);
+            add(6 * start + 3, &turning.tr_mul(&moved));
+        }
+        for (k, force) in forces[3..].iter().enumerate() {
+            self.add_turning(k, force, &mut change);
+        }
+        change
+    }
+
+    /// Adds how Dᵀ h of an edge's control point changes with D.
+    fn add_turning(&self, k: usize, force: &Vector3<f64>, change: &mut Matrix18) {
+        let [start, end] = EDGES[k];
+        let normal = &self.normals()[start];
+        let [ee, en, nn] = self.edge_second_derivative(k, force);
+        // Over the spin of the start, δn = −S(n) φ.
+        let spin = skew(normal);
+        let turned = -en * spin;
+        let slope = self.edge_derivative(k).1.tr_mul(force);
+        let both = -spin * nn * spin + normal * slope.transpose() - Matrix3::identity() * slope.dot(normal);
+        let mut add = |row: usize, column: usize, block: &Matrix3<f64>| {
+            let mut own = change.fixed_view_mut::<3, 3>(row, column);
+            own += block;
+        };
+        for (row, sign) in [(start, -1.0), (end, 1.0)] {
+            for (column, other) in [(start, -1.0), (end, 1.0)] {
+                add(6 * row, 6 * column, &(ee * (sign * other)));
+            }
+            add(6 * row, 6 * start + 3, &(turned * sign));
+            add(6 * start + 3, 6 * row, &(turned.transpose() * sign));
+        }
+        add(6 * start + 3, 6 * start + 3, &both);
+    }
+}
+
+/// Σ D_aᵀ h_a.
+fn back(forces: &[Vector3<f64>; 9], maps: &[Matrix3x18; 9]) -> Vector18 {
+    forces.iter().zip(maps).fold(Vector18::zeros(), |sum, (force, map)| sum + map.tr_mul(force))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rotation::exponential;
+    use crate::surface::EdgeRule;
+    use crate::testing::Random;
+    use crate::tests::{ball, model};
+    use crate::{CurvedSurface, State};
+
+    const STRAIGHT: [[bool; 6]; 2] = [[false; 6], [true, true, false, false, false, true]];
+
+    type Pose = ([Vector3<f64>; 3], [Vector3<f64>; 3]);
+
+    fn vector(random: &mut Random) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| random.number())
+    }
+
+    /// A random triangle far from the origin with normals tilted by up to 0.3 rad.
+    fn pose(random: &mut Random) -> Pose {
+        let p = [[5.0, 0.0, 0.0], [6.0, 0.1, 0.0], [5.2, 0.9, 0.0]]
+            .map(|p| Vector3::from(p) + 0.2 * vector(random));
+        let normal = (p[1] - p[0]).cross(&(p[2] - p[0])).normalize();
+        (p, [(); 3].map(|()| exponential(&(0.3 * vector(random))) * normal))
+    }
+
+    fn moved((p, n): &Pose, place: usize, by: f64) -> Pose {
+        let (mut p, mut n) = (*p, *n);
+        let mut change = Vector3::zeros();
+        change[place % 3] = by;
+        if place % 6 < 3 {
+            p[place / 6] += change;
+        } else {
+            n[place / 6] = exponential(&change) * n[place / 6];
+        }
+        (p, n)
+    }
+
+    /// Central differences with steps of 1e-5: 1e-8 of the largest.
+    #[test]
+    fn the_change_is_the_derivative_of_the_forces() {
+        let mut random = Random::new(1);
+        for rule in [EdgeRule::Arc, EdgeRule::Third] {
+            for straight in STRAIGHT {
+                let pose = pose(&mut random);
+                let forces = |(p, n): Pose| Patch::new(p, n, straight, rule).pressure_forces();
+                let change = Patch::new(pose.0, pose.1, straight, rule).pressure_change();
+                for place in 0..18 {
+                    let h = 1e-5;
+                    let slope =
+                        (forces(moved(&pose, place, h)) - forces(moved(&pose, place, -h))) / (2.0 * h);
+                    let off = (slope - change.column(place)).amax() / change.amax();
+                    assert!(off < 1e-8, "{rule:?} {straight:?} {place}: {off:e}");
+                }
+            }
+        }
+    }
+
+    /// f = dV + ⅓ ∮ (x × x_s)·dx over the rim, run through with the surface on its left, with the volume V = ⅓ ∫ x·n dA of the cone to the origin: 1e-12. Five points of Gauss are
+    /// exact for the rim, of the eighth degree.
+    #[test]
+    fn forces_are_the_gradient_of_the_volume_and_a_rim() {
+        let mut random = Random::new(2);
+        for straight in STRAIGHT {
+            let (p, n) = pose(&mut random);
+            let patch = Patch::new(p, n, straight, EdgeRule::Arc);
+            let (place, maps, forces) = (patch.controls(), patch.control_maps(), patch.control_forces());
+            let gradient: Vec<Vector3<f64>> = (0..9)
+                .map(|c| {
+                    // ⅓ (h_c + Σ_a ∂h_a/∂b_cᵀ b_a).
+                    let moved = (0..9).fold(Vector3::zeros(), |sum, a| {
+                        let arm: Vector3<f64> = (0..9).map(|b| place[b] * WEIGHTS[a][b][c]).sum();
+                        sum + place[a].cross(&arm)
+                    });
+                    (forces[c] + moved) / 3.0
+                })
+                .collect();
+            let gradient: [Vector3<f64>; 9] = gradient.try_into().unwrap();
+            let mut expected = back(&gradient, &maps);
+            // The points of one row of the rule on the triangle lie on a line: their weights there by their own rule.
+            let line = [
+                (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+                (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+                (0.0, 0.568_888_888_888_888_9),
+                (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+                (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+            ];
+            for side in 0..3 {
+                let own = [side, 3 + 2 * side, 4 + 2 * side, (side + 1) % 3];
+                for (at, weight) in line {
+                    let (s, r) = (0.5 * (1.0 + at), 0.5 * (1.0 - at));
+                    let value = [r * r * r, 3.0 * r * r * s, 3.0 * r * s * s, s * s * s];
+                    let slope = [-3.0 * r * r, 3.0 * r * (r - 2.0 * s), 3.0 * s * (2.0 * r - s), 3.0 * s * s];
+                    let sum =
+                        |w: [f64; 4]| own.iter().zip(w).map(|(&b, w)| place[b] * w).sum::<Vector3<f64>>();
+                    let moment = sum(value).cross(&sum(slope)) * (0.5 * weight / 3.0);
+                    for (&b, value) in own.iter().zip(value) {
+                        expected += maps[b].tr_mul(&(moment * value));
+                    }
+                }
+            }
+            let off = (patch.pressure_forces() - expected).amax();
+            assert!(off < 1e-12, "{off:e}");
+        }
+    }
+
+    /// A closed surface, shaken: no force and no moment in sum; the change of the forces is symmetric but for −S(m)/2 of the moments,
+    /// which those of the elements balance: 1e-12.
+    #[test]
+    fn a_closed_surface_has_no_resultant_and_a_symmetric_change() {
+        let mut random = Random::new(3);
+        let model = model(ball(1), 0.01);
+        let surface = CurvedSurface::new(&model, EdgeRule::Arc);
+        let mut state = State::at_rest(&model);
+        let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| 0.1 * random.number()).collect();
+        state.advance(&shake, 1.0);
+        let size = shake.len();
+        let mut forces = nalgebra::DVector::<f64>::zeros(size);
+        let mut change = nalgebra::DMatrix::<f64>::zeros(size, size);
+        for (number, facet) in model.facets.iter().enumerate() {
+            let patch = surface.patch(&model, &state, number as u32);
+            let (own, moved) = (patch.pressure_forces(), patch.pressure_change());
+            let place = |i: usize| 6 * facet.nodes[i / 6] as usize + i % 6;
+            for i in 0..18 {
+                forces[place(i)] += own[i];
+                (0..18).for_each(|j| change[(place(i), place(j))] += moved[(i, j)]);
+            }
+        }
+        let part =
+            |node: usize, first: usize| -> Vector3<f64> { forces.fixed_rows::<3>(6 * node + first).into() };
+        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        for node in 0..model.rest.len() {
+            force += part(node, 0);
+            moment += state.position[node].cross(&part(node, 0)) + part(node, 3);
+            let mut own = change.fixed_view_mut::<3, 3>(6 * node + 3, 6 * node + 3);
+            own += 0.5 * skew(&part(node, 3));
+        }
+        assert!(force.norm() < 1e-12 && moment.norm() < 1e-12, "{force} {moment}");
+        let off = (&change - change.transpose()).amax() / change.amax();
+        assert!(off < 1e-13, "{off:e}");
+    }
+}

@@ -1,0 +1,62 @@
+//! Files that may be read: regular ones, of a size that is bounded. A pipe would be waited for without end, a device such as
+//! `/dev/zero` read without end.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Opens a regular file, or a link to one. Pipes, devices, sockets and folders are refused without being opened.
+///
+/// # Errors
+/// What the operating system says, or that this is no regular file.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    let kind = fs::metadata(path)?.file_type();
+    if kind.is_file() {
+        return File::open(path);
+    }
+    let what = if kind.is_dir() {
+        "it is a folder"
+    } else {
+        "it is a pipe, a socket or a device, and no regular file"
+    };
+    Err(io::Error::new(io::ErrorKind::InvalidInput, what))
+}
+
+/// All bytes of a regular file of at most `limit` bytes.
+///
+/// # Errors
+/// Those of [`open_regular`], or that the file is larger.
+pub fn read_limited(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let file = open_regular(path)?;
+    let announced = file.metadata()?.len();
+    let mut bytes = Vec::new();
+    // A file can grow while it is read.
+    if announced <= limit && file.take(limit + 1).read_to_end(&mut bytes)? as u64 <= limit {
+        return Ok(bytes);
+    }
+    let length = announced.max(bytes.len() as u64);
+    let what = format!("it has {length} bytes, more than the {limit} that are read");
+    Err(io::Error::new(io::ErrorKind::FileTooLarge, what))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_read_up_to_the_limit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("seven");
+        fs::write(&path, "seven77").unwrap();
+        assert_eq!(read_limited(&path, 7).unwrap(), b"seven77");
+        assert!(read_limited(&path, 6).unwrap_err().to_string().contains("7 bytes, more than the 6"));
+        assert!(read_limited(folder.path(), 6).unwrap_err().to_string().contains("folder"));
+        assert_eq!(read_limited(&folder.path().join("none"), 6).unwrap_err().kind(), io::ErrorKind::NotFound);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn devices_are_refused() {
+        assert!(open_regular(Path::new("/dev/zero")).unwrap_err().to_string().contains("no regular file"));
+    }
+}

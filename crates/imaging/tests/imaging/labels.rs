@@ -1,0 +1,215 @@
+//! Labels and their names: segmentations in DICOM, names in NRRD and NIfTI, masks, scans that are none of labels, files that are no files.
+
+use std::fs;
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+use pliant_imaging::{
+    Choice, Image, ImageError, ImageFormat, LabelChoice, LabelError, ReadOptions, read, read_bytes,
+};
+
+use crate::write::*;
+
+/// Labels 1 to 3 in slices 1, 2 and 4 of six, so that frames are missing at both ends and in between.
+fn labelled() -> Volume {
+    let dims = [5, 4, 6];
+    let label = |at: usize| match (at % 5, at / 5 % 4, at / 20) {
+        (0..=2, 1, 1 | 2) => 1,
+        (3, 0..=2, 2) => 2,
+        (4, 3, 4) => 3,
+        _ => 0,
+    };
+    Volume { dims, values: (0..120).map(label).collect(), ..Volume::oblique() }
+}
+
+/// The voxels with labels are those of a volume, in their places.
+fn assert_same(image: &Image, volume: &Volume) {
+    let inverse = volume.axes.try_inverse().unwrap();
+    let mut found = 0;
+    for at in 0..image.grid.len() {
+        let label = image.value(at) as i16;
+        let place = image.grid.position(&Vector3::from(image.grid.triple(at).map(|i| i as f64))) * 1e3;
+        let index = (inverse * (place - volume.origin)).map(f64::round);
+        assert!((volume.axes * index + volume.origin - place).norm() < 1e-4, "{place}");
+        let [i, j, k] = [0, 1, 2].map(|axis| index[axis] as usize);
+        assert_eq!(label, volume.values[i + 5 * (j + 4 * k)], "{i} {j} {k}");
+        found += usize::from(label != 0);
+    }
+    assert_eq!(found, volume.values.iter().filter(|value| **value != 0).count());
+}
+
+#[test]
+fn a_segmentation_is_a_label_image_with_names() {
+    let volume = labelled();
+    let names = ["liver", "tumour", "vessel"];
+    for syntax in [Syntax::Explicit, Syntax::Implicit, Syntax::BigEndian] {
+        for kind in [Segments::Bits, Segments::Fractions, Segments::Labels] {
+            let bytes = segmentation(&volume, kind, &names, syntax);
+            let image = read_bytes(&bytes, ImageFormat::Dicom, &ReadOptions::default())
+                .unwrap_or_else(|error| panic!("{kind:?} {syntax:?}: {error}"));
+            assert_same(&image, &volume);
+            assert_eq!(
+                image.grid.dims,
+                [5, 4, 6],
+                "slices without any voxel are there, between the others and at either end"
+            );
+            let regions = image.regions(&|_| {}).unwrap();
+            assert_eq!(
+                regions.iter().map(|region| region.name.as_deref().unwrap()).collect::<Vec<_>>(),
+                names
+            );
+        }
+    }
+}
+
+#[test]
+fn a_segmentation_is_found_as_a_file_and_beside_the_series_it_was_made_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("seg.dcm");
+    let volume = labelled();
+    fs::write(&file, segmentation(&volume, Segments::Bits, &["liver", "tumour", "vessel"], Syntax::Explicit))
+        .unwrap();
+    assert_same(&read(&file, &ReadOptions::default()).unwrap(), &volume);
+    assert_same(&read(folder.path(), &ReadOptions::default()).unwrap(), &volume);
+    dicom_folder(folder.path(), &volume, Syntax::Explicit);
+    let told = read(folder.path(), &ReadOptions::default()).unwrap_err().to_string();
+    assert!(told.contains("1.9 (segmentation, seg.dcm)") && told.contains("1.2.3.4"), "{told}");
+    for (series, format) in [("1.9", "DICOM segmentation"), ("1.2.3.4", "DICOM")] {
+        let options = ReadOptions { series: Some(series.into()), ..ReadOptions::default() };
+        assert_eq!(read(folder.path(), &options).unwrap().format, format);
+    }
+}
+
+#[test]
+fn contours_are_named_with_what_turns_them_into_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rtss.dcm");
+    fs::write(&file, structure_set()).unwrap();
+    for path in [&file, &folder.path().to_owned()] {
+        let told = read(path, &ReadOptions::default()).unwrap_err().to_string();
+        for part in ["RTSTRUCT", "contours", "SlicerRT", "plastimatch"] {
+            assert!(told.contains(part), "{told}");
+        }
+    }
+    // Beside a series they are passed over, and noted.
+    dicom_folder(folder.path(), &Volume::oblique(), Syntax::Explicit);
+    let image = read(folder.path(), &ReadOptions::default()).unwrap();
+    assert!(image.notes.iter().any(|note| note.contains("RT structure sets")), "{:?}", image.notes);
+}
+
+#[test]
+fn names_stand_in_the_headers_of_nrrd_and_nifti() {
+    let text = String::from_utf8(nrrd(&labelled(), "ascii", false)).unwrap();
+    let pairs = "Segment0_LabelValue:=2\nSegment0_Name:=tumour\nSegment1_Name:=liver\nSegment1_LabelValue:=1\nSegment2_Name:=lost\n";
+    let slicer = text.replace("key:=value\n", pairs);
+    let mut nifti = nifti1(&labelled(), Form::Sform, false);
+    let xml = b"<?xml version=\"1.0\"?> <CaretExtension><VolumeInformation Index=\"0\"><LabelTable>\n<Label Key=\"1\" Red=\"1.0\" \
+                Alpha=\"1\"><![CDATA[liver]]></Label>\n<Label Key=\"2\" Red=\"0.0\"><![CDATA[tumour]]></Label></LabelTable>";
+    let padded = xml.len().div_ceil(16) * 16 + 8;
+    let mut extension = vec![1, 0, 0, 0];
+    extension.extend((padded as i32).to_le_bytes());
+    extension.extend(0_i32.to_le_bytes());
+    extension.extend(xml);
+    extension.resize(4 + padded, 0);
+    nifti.splice(348..352, extension);
+    nifti[108..112].copy_from_slice(&((352 + padded) as f32).to_le_bytes());
+    for (bytes, format) in [(slicer.into_bytes(), ImageFormat::Nrrd), (nifti, ImageFormat::Nifti)] {
+        let image =
+            read_bytes(&bytes, format, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_same(&image, &labelled());
+        assert_eq!(
+            (image.names.get(1), image.names.get(2), image.names.get(3)),
+            (Some("liver"), Some("tumour"), None)
+        );
+        let choice = image.choose(&[LabelChoice::Named("Tumour".into()), LabelChoice::Range(1, 1)]);
+        assert_eq!(choice, Ok(Choice::Labels(vec![2, 1])));
+    }
+}
+
+fn image(value: impl Fn(usize) -> i16, dims: [usize; 3]) -> Image {
+    let values = (0..dims.iter().product()).map(value).collect();
+    let bytes = nifti1(&Volume { dims, values, ..Volume::oblique() }, Form::Sform, false);
+    read_bytes(&bytes, ImageFormat::Nifti, &ReadOptions::default()).unwrap()
+}
+
+#[test]
+fn a_scan_is_no_label_image() {
+    // Air around a patient of noise, as in a CT.
+    let scan = image(
+        |at| if at % 30 < 8 { -1024 } else { (at.wrapping_mul(2_654_435_761) >> 7) as i16 % 700 },
+        [30, 30, 12],
+    );
+    let told = scan.labels().unwrap_err();
+    assert!(matches!(told, LabelError::Grey { values: 500.., more: false, range: [-1024, _] }), "{told}");
+    assert!(
+        told.to_string().contains("no label image") && told.to_string().contains("from -1024 to 69"),
+        "{told}"
+    );
+    // Many labels of a few voxels each are labels.
+    let atlas = image(|at| (at / 5) as i16, [30, 30, 12]);
+    assert_eq!(atlas.labels().unwrap().present().len(), 2159);
+}
+
+#[test]
+fn masks_become_one_image_in_which_the_last_counts() {
+    let [first, second] =
+        [0, 2].map(|from| image(move |at| i16::from((from..from + 4).contains(&(at % 10))), [10, 4, 3]));
+    let masks = [(PathBuf::from("a/liver.nii.gz"), first), (PathBuf::from("tumour.nrrd"), second)];
+    let both = Image::of_masks(&masks, None).unwrap();
+    let regions = both.regions(&|_| {}).unwrap();
+    let told: Vec<_> =
+        regions.iter().map(|region| (region.label, region.voxels, region.name.as_deref().unwrap())).collect();
+    assert_eq!(told, [(1, 24, "liver"), (2, 48, "tumour")]);
+    assert!(both.notes[0].contains("overlap in 24 voxels"), "{:?}", both.notes);
+    let labels = (PathBuf::from("seg.nii"), image(|at| (at % 4) as i16, [10, 4, 3]));
+    let [mask, _] = masks;
+    let masks = [mask, labels];
+    let told = Image::of_masks(&masks, None).unwrap_err().to_string();
+    assert!(told.contains("`seg.nii` is no mask: it has the labels 1, 2, 3"), "{told}");
+    assert_eq!(Image::of_masks(&masks, Some(3.0)).unwrap().regions(&|_| {}).unwrap()[0].label, 2);
+    let other = image(|_| 1, [4, 10, 3]);
+    let masks = [masks.into_iter().next().unwrap(), (PathBuf::from("other.nii"), other)];
+    assert!(matches!(Image::of_masks(&masks, None), Err(LabelError::OtherVoxels { .. })));
+}
+
+#[test]
+fn images_of_too_many_bytes_are_refused_before_they_are_read() {
+    let options = ReadOptions { byte_limit: 239, ..ReadOptions::default() };
+    for (bytes, format) in [
+        (nifti1(&labelled(), Form::Sform, false), ImageFormat::Nifti),
+        (nrrd(&labelled(), "gzip", false), ImageFormat::Nrrd),
+        (nrrd(&labelled(), "ascii", false), ImageFormat::Nrrd),
+        (metaimage(&labelled(), true, false, "LOCAL"), ImageFormat::MetaImage),
+        (gipl(&labelled()), ImageFormat::Gipl),
+    ] {
+        let told = read_bytes(&bytes, format, &options).unwrap_err().to_string();
+        assert!(told.contains("unpacked, more than") && told.contains("crop"), "{told}");
+        assert!(read_bytes(&bytes, format, &ReadOptions { byte_limit: 240, ..options.clone() }).is_ok());
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn pipes_and_devices_are_refused_and_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.nii");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let zero = folder.path().join("zero.nii.gz");
+    std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
+    for path in [&pipe, &zero] {
+        let error = read(path, &ReadOptions::default()).unwrap_err();
+        assert!(
+            matches!(error, ImageError::Open { .. }) && error.to_string().contains("no regular file"),
+            "{error}"
+        );
+    }
+    for (name, bytes) in [
+        ("device.mhd", metaimage(&labelled(), false, false, "/dev/zero")),
+        ("pipe.mhd", metaimage(&labelled(), false, false, "pipe.nii")),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        let told = read(&path, &ReadOptions::default()).unwrap_err().to_string();
+        assert!(told.contains("ElementDataFile") && told.contains("no regular file"), "{told}");
+    }
+}

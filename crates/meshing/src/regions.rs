@@ -1,0 +1,139 @@
+//! The labels of a mesh: cells, volume and distances of each, and distances of each interface between two of them, against the input.
+
+use std::collections::BTreeMap;
+
+use pliant_geometry::{Mesh, Vector3, volume};
+use serde::Serialize;
+
+use crate::anatomy::Anatomy;
+use crate::deviation::{Deviation, SAMPLES_PER_EDGE};
+use crate::given::{OUTSIDE_LABEL, Patches};
+use crate::missed::Missed;
+use crate::topology::faces_between_labels;
+use crate::voxels::Voxels;
+
+/// Volumes off by more than this part are told.
+const LARGEST_VOLUME_ERROR: f64 = 0.05;
+
+/// One label of a mesh.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LabelReport {
+    /// The label.
+    pub label: i32,
+    /// Its cells.
+    pub cells: usize,
+    /// Their volume [m³], of cells that are filled in part that part.
+    pub volume: f64,
+    /// Volume of its voxels after cleaning, or within the surface [m³], where known.
+    pub input_volume: Option<f64>,
+    /// Distances between its whole surface in the mesh and in the input, where there are several labels in both.
+    pub distances: Option<Deviation>,
+}
+
+impl LabelReport {
+    /// By which part its volume is off, where it is known.
+    pub fn volume_error(&self) -> Option<f64> {
+        self.input_volume.map(|input| self.volume / input - 1.0)
+    }
+}
+
+/// The faces between two labels of a mesh.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InterfaceReport {
+    /// The labels, 0 for the outside.
+    pub labels: [i32; 2],
+    /// Area of the faces in the mesh [m²].
+    pub area: f64,
+    /// Distances between the faces in the mesh and in the input, where both have some.
+    pub distances: Option<Deviation>,
+}
+
+/// The labels of a mesh and their interfaces.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Regions {
+    /// Its labels.
+    pub labels: Vec<LabelReport>,
+    /// Its interfaces, where there are several labels and the input knows where they are.
+    pub interfaces: Vec<InterfaceReport>,
+}
+
+impl Regions {
+    /// Of a mesh with cells of `edge` [m] of an anatomy.
+    pub fn of(mesh: &Mesh, anatomy: &Anatomy<'_>, edge: f64) -> Self {
+        let mut found = Self { labels: volumes(mesh, anatomy), interfaces: Vec::new() };
+        // Cubes that are filled in part have no surface of their own.
+        let is_filled = mesh.blocks.iter().all(|block| !block.data.contains_key(Voxels::FRACTION));
+        if let Some(given) = anatomy.given().filter(|_| found.labels.len() > 1 && is_filled) {
+            let (made, given, to) = (faces_between_labels(mesh), anatomy.patches(), given.measured_to());
+            let measured = |chosen: &dyn Fn([i32; 2]) -> bool| {
+                let distances = Deviation::between(&made, &given, chosen, edge / SAMPLES_PER_EDGE);
+                distances.map(|distances| Deviation { to, ..distances })
+            };
+            for region in &mut found.labels {
+                region.distances = measured(&|sides| sides.contains(&region.label));
+            }
+            let interface = |labels: [i32; 2]| InterfaceReport {
+                labels,
+                area: made.area(&made.between(|sides| sides == labels)),
+                distances: measured(&|sides| sides == labels),
+            };
+            found.interfaces = pairs(&[&made, &given]).into_iter().map(interface).collect();
+        }
+        found
+    }
+
+    /// Labels that are lost, whose volume is off by more than 5 %, or whose surface is farther off than `allowed` [m].
+    pub fn missed(&self, allowed: f64) -> Vec<Missed> {
+        let mut missed = Vec::new();
+        for region in &self.labels {
+            let label = region.label;
+            if region.cells == 0 {
+                missed.push(Missed::Label { label });
+                continue;
+            }
+            if let Some(part) = region.volume_error().filter(|part| part.abs() > LARGEST_VOLUME_ERROR) {
+                missed.push(Missed::LabelVolume { label, part });
+            }
+            if let Some((distance, place)) = region.distances.map(|distances| distances.largest())
+                && distance > allowed
+            {
+                missed.push(Missed::LabelAway { label, distance, place });
+            }
+        }
+        missed
+    }
+}
+
+/// Pairs of labels between which there are faces.
+fn pairs(all: &[&Patches]) -> Vec<[i32; 2]> {
+    let mut pairs: Vec<[i32; 2]> = all.iter().flat_map(|patches| &patches.sides).copied().collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// Cells and volume of each label of a mesh, filled by the fractions of its cells, beside the volume of the input.
+fn volumes(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<LabelReport> {
+    let mut found: BTreeMap<i32, (usize, f64)> = BTreeMap::new();
+    for block in mesh.volume_blocks() {
+        let labels = block.data.get("label").map_or(&[][..], |labels| &labels.values);
+        let fractions = block.data.get(Voxels::FRACTION).map_or(&[][..], |fractions| &fractions.values);
+        let fractions = fractions.iter().copied().chain(std::iter::repeat(1.0));
+        for ((cell, label), fraction) in block.cells().zip(labels).zip(fractions) {
+            let corners: Vec<Vector3> = cell.iter().map(|&node| mesh.points[node as usize]).collect();
+            let (cells, sum) = found.entry(*label as i32).or_default();
+            *cells += 1;
+            *sum += fraction * volume(block.kind, &corners);
+        }
+    }
+    let of_label = |(label, &input_volume): (i32, &Option<f64>)| {
+        let (cells, volume) = found.get(&label).copied().unwrap_or_default();
+        LabelReport { label, cells, volume, input_volume, distances: None }
+    };
+    anatomy.labels().into_iter().zip(anatomy.volumes()).map(of_label).collect()
+}
+
+/// Whether a pair of sides is on the boundary of the whole.
+pub(crate) fn is_outer(sides: [i32; 2]) -> bool {
+    sides.contains(&OUTSIDE_LABEL)
+}

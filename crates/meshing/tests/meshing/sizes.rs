@@ -1,0 +1,172 @@
+//! Distances to what the user gave, labels that are off, cells of several sizes, and distances that are held.
+
+use pliant_geometry::{CellKind, Mesh, Vector3};
+use pliant_imaging::{Grid, LabelImage};
+use pliant_meshing::{
+    Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Ellipsoid, Enclosed, Hausdorff, MeasuredTo,
+    MeshingError, Missed, OrganMesh, OrganTets, TriangleMesh, sphere,
+};
+
+use crate::checks::{conforming_boundary, tet_volume};
+use crate::organs::{anatomy, check_sound, check_sound_within};
+
+/// A ball of 30 mm with a spike that ends 55 mm from its centre and stands on a cap of so many degrees.
+fn spiked(cap: f64) -> Mesh {
+    let mut mesh = sphere(0.03, 5, DEFAULT_CELL_LIMIT).expect("a sphere");
+    for point in &mut mesh.points {
+        let from_axis = point.angle(&Vector3::z()).to_degrees();
+        *point *= 1.0 + 25.0 / 30.0 * (1.0 - from_axis / cap).max(0.0);
+    }
+    mesh
+}
+
+/// The boundary of a mesh of tets.
+fn skin(mesh: &Mesh) -> TriangleMesh {
+    let mut skin = Mesh { points: mesh.points.clone(), ..Mesh::default() };
+    skin.block_mut(CellKind::Triangle).nodes = conforming_boundary(mesh).concat();
+    TriangleMesh::from_mesh(&skin).expect("a surface").0
+}
+
+/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field: told was what it is off that.
+#[test]
+fn tets_of_a_surface_are_measured_to_its_triangles() {
+    let edge = 0.008;
+    let given = spiked(3.0);
+    let body = Enclosed::new(&given, edge, &Closing::default()).expect("closed");
+    let anatomy = body.anatomy(1, edge, &|_| {}).expect("a field");
+    let made = OrganTets::new(edge).mesh(&anatomy, &|_| {}).expect("a mesh");
+    let Assessment { deviation, missed, .. } = Assessment::of(&made.mesh, &anatomy, edge).expect("a body");
+    let given = TriangleMesh::from_mesh(&given).expect("a surface").0;
+    let truth = Hausdorff::between(&skin(&made.mesh), &given, 2e-4);
+    assert_eq!(deviation.to, MeasuredTo::Triangles);
+    // Samples are a quarter of an edge apart; the tip is one of them.
+    assert!(
+        (deviation.largest_from_body / truth.largest_backward - 1.0).abs() < 0.01,
+        "{deviation:?} {truth:?}"
+    );
+    assert!(
+        (deviation.largest_from_mesh - truth.largest_forward).abs() < 0.05 * edge,
+        "{deviation:?} {truth:?}"
+    );
+    assert!(deviation.largest_from_body > 0.01 && deviation.farthest[2] > 0.054);
+    assert!(deviation.median_from_body <= deviation.p95_from_body);
+    assert!(deviation.p95_from_body < 0.1 * deviation.largest_from_body, "{deviation:?}");
+    assert!(!missed.is_empty());
+    let field = pliant_meshing::Deviation::new(&made.mesh, anatomy.field(), edge).expect("a body");
+    println!(
+        "to the field {:.4}, to the triangles {:.4}",
+        field.largest_from_body, deviation.largest_from_body
+    );
+}
+
+/// A block of 40 mm of label 1 with a plate of label 2, 4 mm thick, and a ball of label 3 of 3 mm in it.
+fn block_with_plate() -> LabelImage {
+    let grid = Grid::along_axes([50, 50, 50], Vector3::zeros(), [1e-3; 3]).expect("a grid");
+    let label = |at: usize| {
+        let [i, j, k] = grid.triple(at);
+        let inside = |low: usize, high: usize| [i, j, k].iter().all(|x| (low..high).contains(x));
+        let speck =
+            [i, j, k].iter().zip([11, 11, 11]).map(|(&x, c)| (x as f64 - c as f64).powi(2)).sum::<f64>();
+        match () {
+            () if speck < 9.0 => 3,
+            () if inside(15, 35) && (23..27).contains(&k) => 2,
+            () => i32::from(inside(5, 45)),
+        }
+    };
+    LabelImage { labels: (0..grid.len()).map(label).collect(), grid }
+}
+
+fn off(made: &OrganMesh, label: i32) -> f64 {
+    let material = made.report.materials.iter().find(|material| material.label == label).expect("a label");
+    (material.volume / material.voxel_volume.expect("the image knows") - 1.0).abs()
+}
+
+#[test]
+fn labels_that_are_off_are_told_and_better_where_they_are_protected() {
+    let edge = 0.008;
+    let image = block_with_plate();
+    let block = anatomy(&image, &[1, 2, 3]);
+    let plain = OrganTets::new(edge);
+    let coarse = plain.mesh(&block, &|_| {}).expect("a mesh");
+    let found = Assessment::of(&coarse.mesh, &block, edge).expect("a body");
+    assert_eq!(found.deviation.to, MeasuredTo::Voxels);
+    let told = |found: &Assessment, label: i32| {
+        found.missed.iter().any(|missed| match missed {
+            Missed::Label { label: own }
+            | Missed::LabelVolume { label: own, .. }
+            | Missed::LabelAway { label: own, .. } => *own == label,
+            _ => false,
+        })
+    };
+    assert!(told(&found, 3), "{:?}", found.missed);
+    let between = |found: &Assessment| {
+        let interface = found.regions.interfaces.iter().find(|interface| interface.labels == [1, 2]);
+        interface.expect("the image has it").distances.map(|distances| distances.p95_from_body)
+    };
+    let fine = plain.protecting(&[(2, Some(0.002)), (3, Some(0.001))]).mesh(&block, &|_| {}).expect("a mesh");
+    println!("{}\n{}", coarse.report, fine.report);
+    // Where sizes differ fourfold over a few cells, the longest edge of one size reaches into the smaller one: 1.84 was seen.
+    check_sound_within(&fine, 2.0);
+    let better = Assessment::of(&fine.mesh, &block, edge).expect("a body");
+    // The sharp corners of the block are still cut.
+    assert!(!told(&better, 2) && !told(&better, 3), "{:?}", better.missed);
+    assert!(off(&fine, 2) < 0.02 && off(&fine, 3) < 0.05, "{}", fine.report);
+    assert!(between(&better).is_some_and(|better| better < between(&found).unwrap_or(f64::INFINITY)));
+    assert!(fine.report.acoustic_part > 0.6, "{}", fine.report);
+    // Only where it is asked for: cells of 2 mm everywhere would be 64 times as many as those of 8 mm.
+    assert!(fine.report.tets < 40 * coarse.report.tets);
+    let error =
+        OrganTets::new(edge).protecting(&[(4, None)]).mesh(&block, &|_| {}).expect_err("no such label");
+    assert!(matches!(error, MeshingError::NoSuchLabel { label: 4, .. }));
+}
+
+#[test]
+fn cells_are_larger_inside_and_the_threads_never_change_a_bit() {
+    let ball = Anatomy::new(1, Ellipsoid::sphere(Vector3::zeros(), 0.05));
+    let even = OrganTets::new(0.005);
+    let graded = OrganTets { inner_edge: Some(0.01), ..even.clone() };
+    let made = graded.mesh(&ball, &|_| {}).expect("a mesh");
+    println!("{}", made.report);
+    check_sound(&made);
+    let all = even.mesh(&ball, &|_| {}).expect("a mesh");
+    assert!(4 * made.report.tets < 3 * all.report.tets, "{} of {}", made.report.tets, all.report.tets);
+    assert!(made.report.acoustic_part >= 0.7 && made.report.dihedral[0] > 10.0, "{}", made.report);
+    assert!((tet_volume(&made.mesh) / tet_volume(&all.mesh) - 1.0).abs() < 0.005);
+    assert!(made.report.edges.longest > 0.009 && made.report.edges.longest < 0.016);
+    let bits = |made: &OrganMesh| -> Vec<u64> {
+        made.mesh.points.iter().flat_map(|point| point.iter().map(|x| x.to_bits())).collect()
+    };
+    let coarser = OrganTets { inner_edge: Some(0.02), ..OrganTets::new(0.01) };
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| coarser.mesh(&ball, &|_| {})).expect("a mesh")
+    };
+    let one = with(1);
+    for other in [with(2), with(8)] {
+        assert_eq!((&other.mesh.blocks, bits(&other)), (&one.mesh.blocks, bits(&one)));
+    }
+}
+
+#[test]
+fn a_distance_is_held_or_the_best_so_far_is_told() {
+    let given = spiked(25.0);
+    let closed = Enclosed::new(&given, 0.016, &Closing::default()).expect("closed");
+    let held = OrganTets { distance: Some(0.0015), ..OrganTets::new(0.016) };
+    let body = closed.fine_anatomy(1, held.edge, held.finest(), &|_| {}).expect("a field");
+    let made = held.mesh(&body, &|_| {}).expect("a mesh");
+    println!("{}", made.report);
+    check_sound(&made);
+    let found = made.report.distance.expect("a distance was asked for");
+    let truth =
+        Hausdorff::between(&skin(&made.mesh), &TriangleMesh::from_mesh(&given).expect("a surface").0, 2e-4);
+    assert!(
+        found.to == MeasuredTo::Triangles && found.reached <= 0.0015 && found.passes > 1,
+        "{}",
+        made.report
+    );
+    assert!(truth.largest() < 1.53e-3, "{truth:?}");
+    assert!(made.report.doubts().is_empty());
+    // Few cells are allowed.
+    let made = OrganTets { cell_limit: 2000, ..held }.mesh(&body, &|_| {}).expect("a mesh");
+    assert!(made.report.tets <= 2000 && made.report.doubts()[0].contains("not reached"), "{}", made.report);
+}

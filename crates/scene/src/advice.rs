@@ -1,0 +1,75 @@
+//! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what is on, to take a
+//! smaller step where steps are kept below the limit, or to damp more where damping is the trouble.
+
+use pliant_mechanics::stability::OnUnstable;
+use pliant_mechanics::{Real, State};
+
+use crate::build::Built;
+use crate::format::{Precision, SolverName};
+use crate::output::{FailureSummary, number};
+use crate::plan::Plan;
+use crate::scene::Scene;
+
+/// Damping [1/s] times step [s] from which on a step does not resolve the damping: central differences take
+/// (1 − a) / (1 + a) of a velocity over a step, a = ½ damping × step, and 2 turns it round.
+const RESOLVED: f64 = 1.0;
+
+/// The remedy of a failed explicit step, where the run's state says more than the failure itself.
+pub(crate) fn remedy<R: Real>(
+    failure: &FailureSummary,
+    scene: &Scene,
+    built: &Built,
+    plan: &Plan,
+    state: &State<R>,
+) -> Option<String> {
+    if scene.run.solver != SolverName::Explicit || built.corotational.is_some() {
+        return None;
+    }
+    if let Some(told) = too_much_damping(failure, built, plan) {
+        return Some(told);
+    }
+    let on_unstable = scene.run.on_unstable.unwrap_or_default();
+    let seen = state.stability.smallest.as_ref().map(|look| look.limit / plan.step);
+    Some(match (failure.kind, on_unstable) {
+        ("unstable", OnUnstable::Substep) => "its steps are cut into 100 parts at the most, and that is not enough: try a slower or smaller \
+                                              motion, or a coarser mesh there"
+            .into(),
+        ("unstable", _) => {
+            "try a smaller `step` or a slower motion, or let the run cut its steps (`on-unstable = \"substep\"`)".into()
+        }
+        ("inverted", OnUnstable::Substep) => {
+            "the run cuts its steps already: try a slower or smaller motion or load, more damping, or a finer mesh there".into()
+        }
+        ("inverted", _) => "try a slower or smaller motion or load, `on-unstable = \"substep\"`, a smaller `step`, more damping, or a finer \
+                            mesh there"
+            .into(),
+        ("not-finite" | "unbalanced", OnUnstable::Report) => {
+            let limit = seen.map_or(String::new(), |ratio| format!(" (smallest stable step seen: {ratio:.2} × the step)"));
+            format!(
+                "try a smaller `step` or `on-unstable = \"substep\"`{limit}; else a slower motion or a smoother curve"
+            )
+        }
+        ("not-finite" | "unbalanced", _) => {
+            let single = plan.target.precision == Precision::Single;
+            let precise = if single { ", or `precision = \"double\"`" } else { "" };
+            format!("the step is held below the limit already: try a slower motion, a smoother curve or a smaller load{precise}")
+        }
+        _ => return None,
+    })
+}
+
+/// That damping is what the steps are too long for, where it is so.
+fn too_much_damping(failure: &FailureSummary, built: &Built, plan: &Plan) -> Option<String> {
+    let body = built.model.bodies.iter().find(|body| failure.body.as_ref() == Some(&body.name))?;
+    (body.damping * plan.step > RESOLVED).then(|| {
+        format!(
+            "the damping of `{}`, {} 1/s, is too strong for steps of {} s: it turns velocities round; take `damping` below {} 1/s or a \
+             `step` below {} s",
+            body.name,
+            number(body.damping),
+            number(plan.step),
+            number(RESOLVED / plan.step),
+            number(RESOLVED / body.damping)
+        )
+    })
+}

@@ -1,0 +1,66 @@
+//! Which values a quantity can have and is likely to have, by its unit. Unlikely values are doubts; properties beyond all sense, which
+//! have to be positive, are mistakes.
+
+use std::ops::RangeInclusive;
+
+/// What is known of a unit.
+pub(crate) struct Quantity {
+    unit: &'static str,
+    /// Values that tissue, tools and scenes have.
+    likely: RangeInclusive<f64>,
+    /// Values that can be computed with.
+    possible: RangeInclusive<f64>,
+    /// What a value in another unit would have to be multiplied by.
+    units: &'static str,
+}
+
+/// Sizes of values. Those of positions are not among them: a box may well reach to 1e9 m.
+const QUANTITIES: [Quantity; 8] = [
+    Quantity {
+        unit: "Pa",
+        likely: 1e-2..=1e13,
+        possible: 1e-20..=1e20,
+        units: "1 kPa is 1e3 Pa, 1 MPa is 1e6 Pa",
+    },
+    Quantity { unit: "kg/m³", likely: 0.1..=1e5, possible: 1e-15..=1e15, units: "1 g/cm³ is 1000 kg/m³" },
+    Quantity { unit: "m", likely: 1e-7..=1e3, possible: 1e-20..=1e12, units: "1 mm is 0.001 m" },
+    Quantity { unit: "s", likely: 1e-9..=1e7, possible: 1e-20..=1e15, units: "1 ms is 0.001 s" },
+    Quantity { unit: "N", likely: 1e-9..=1e9, possible: 1e-20..=1e20, units: "1 kN is 1000 N" },
+    Quantity { unit: "m/s", likely: 1e-9..=1e4, possible: 1e-20..=1e9, units: "1 mm/s is 0.001 m/s" },
+    Quantity { unit: "m/s²", likely: 1e-9..=1e7, possible: 1e-20..=1e12, units: "gravity is 9.81 m/s²" },
+    Quantity { unit: "1/s", likely: 1e-9..=1e7, possible: 1e-20..=1e15, units: "1/ms is 1000 1/s" },
+];
+
+/// What is to say about a value.
+pub(crate) struct Remark {
+    pub is_mistake: bool,
+    /// What follows the name of the value.
+    pub message: String,
+    pub label: &'static str,
+    pub help: String,
+}
+
+/// What is to say about a value in a unit; nothing where it is likely. A value that need not be `positive`, such as a load, may be as
+/// small as it likes, and a size beyond all sense is no mistake.
+pub(crate) fn remark(value: f64, unit: &str, positive: bool, shown: &str) -> Option<Remark> {
+    let quantity = QUANTITIES.iter().find(|quantity| quantity.unit == unit)?;
+    let outside = |range: &RangeInclusive<f64>| {
+        let size = value.abs();
+        size > *range.end() || (positive && size < *range.start())
+    };
+    let range = |range: &RangeInclusive<f64>| format!("{:e} to {:e} {unit}", range.start(), range.end());
+    let help = format!("values are in SI units: {}", quantity.units);
+    if positive && outside(&quantity.possible) {
+        let message =
+            format!("is {shown} {unit}; values from {} can be computed with", range(&quantity.possible));
+        return Some(Remark { is_mistake: true, message, label: "beyond all sense", help });
+    }
+    outside(&quantity.likely).then(|| {
+        let usual = match positive {
+            true => format!("usual are {}", range(&quantity.likely)),
+            false => format!("usual is less than {:e} {unit}", quantity.likely.end()),
+        };
+        let message = format!("is {shown} {unit}, and {usual}: is that so?");
+        Remark { is_mistake: false, message, label: "unusual", help }
+    })
+}

@@ -1,0 +1,119 @@
+//! Files that a scene is read from: regular ones of a bounded length, and where a sandbox is asked for, only those in its folder.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// Longest scene file [bytes].
+pub(crate) const LONGEST_SCENE: u64 = 1 << 26;
+/// Longest table and XML model [bytes].
+pub(crate) const LONGEST_TABLE: u64 = 1 << 30;
+
+/// Which files may be read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reads {
+    within: Option<PathBuf>,
+}
+
+impl Reads {
+    /// Any file that this user can read.
+    pub fn anywhere() -> Self {
+        Self::default()
+    }
+
+    /// Files in a folder and in folders in it. Links are resolved before: where they lead counts.
+    ///
+    /// # Errors
+    /// If there is no such folder.
+    pub fn within(folder: &Path) -> io::Result<Self> {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        Ok(Self { within: Some(folder.canonicalize()?) })
+    }
+
+    /// The folder that files have to be in, links resolved.
+    pub fn folder(&self) -> Option<&Path> {
+        self.within.as_deref()
+    }
+
+    /// The path by which a file may be read, links resolved where it matters.
+    ///
+    /// # Errors
+    /// If it may not, or is not there.
+    pub fn allow(&self, path: &Path) -> io::Result<PathBuf> {
+        let Some(folder) = &self.within else { return Ok(path.to_owned()) };
+        let found = path.canonicalize()?;
+        if found.starts_with(folder) {
+            return Ok(found);
+        }
+        let reason = format!(
+            "it is outside the scene's folder `{}`, and `--sandbox` allows nothing else; move it there, or leave \
+             `--sandbox` out if you trust the scene",
+            folder.display()
+        );
+        Err(io::Error::new(io::ErrorKind::PermissionDenied, reason))
+    }
+
+    /// The bytes of a file that may be read.
+    ///
+    /// # Errors
+    /// If it may not be read, is no regular file or is longer than `longest` bytes.
+    pub(crate) fn read(&self, path: &Path, longest: u64) -> io::Result<Vec<u8>> {
+        read_regular(&self.allow(path)?, longest)
+    }
+}
+
+/// The bytes of a regular file of at most so many. Pipes and devices could keep a reader waiting for ever.
+pub(crate) fn read_regular(path: &Path, longest: u64) -> io::Result<Vec<u8>> {
+    let about = fs::metadata(path)?;
+    if !about.is_file() && !about.is_dir() {
+        let reason =
+            "it is not a regular file but a pipe, a socket or a device; write what it gives to a file first";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
+    }
+    let too_long = |length: u64| {
+        let reason = format!("it has {} MB, more than the {} MB that are read", length >> 20, longest >> 20);
+        io::Error::new(io::ErrorKind::FileTooLarge, reason)
+    };
+    if about.is_file() && about.len() > longest {
+        return Err(too_long(about.len()));
+    }
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(about.len() as usize).map_err(io::Error::from)?;
+    // It may grow while it is read.
+    File::open(path)?.take(longest.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > longest { Err(too_long(bytes.len() as u64)) } else { Ok(bytes) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_files_are_refused_before_they_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sparse");
+        File::create(&path).unwrap().set_len(1 << 40).unwrap();
+        let told = read_regular(&path, LONGEST_TABLE).unwrap_err().to_string();
+        assert_eq!(told, "it has 1048576 MB, more than the 1024 MB that are read");
+        fs::write(&path, "abc").unwrap();
+        assert_eq!(read_regular(&path, 3).unwrap(), b"abc");
+        assert!(read_regular(&path, 2).is_err());
+    }
+
+    #[test]
+    fn a_sandbox_allows_what_really_lies_in_its_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = folder.path().join("scene");
+        fs::create_dir_all(inside.join("meshes")).unwrap();
+        fs::write(inside.join("meshes/a.vtk"), "a").unwrap();
+        fs::write(folder.path().join("b.vtk"), "b").unwrap();
+        let reads = Reads::within(&inside).unwrap();
+        assert!(reads.allow(&inside.join("meshes/a.vtk")).is_ok());
+        assert!(reads.allow(&inside.join("meshes/../meshes/a.vtk")).is_ok());
+        for outside in [inside.join("../b.vtk"), folder.path().join("b.vtk")] {
+            let error = reads.allow(&outside).unwrap_err();
+            assert!(error.to_string().contains("outside the scene's folder"), "{error}");
+        }
+        assert!(Reads::anywhere().allow(Path::new("/")).is_ok());
+    }
+}
