@@ -243,7 +243,7 @@ fn rectum_under_pressure() {
     let organ = Organ { young: 0.5e6, thickness: 3e-3, pressure: 3e3, membrane: FLAT.membrane };
     // As it is, a pair of slivers of 0.2 mm folds over at 0.8 of the load; half of it is borne.
     let failure = organ.equilibrium(&mesh).unwrap_err();
-    assert!(failure.contains("folded over"), "{failure}");
+    assert!(failure.contains("folded over") || failure.contains("folds over"), "{failure}");
     study(&Organ { pressure: 1.5e3, ..organ }, &mesh);
     let mut better = mesh;
     println!("{} edges of slivers flipped", flip_slivers(&mut better));

@@ -255,7 +255,7 @@ impl<'m> BackwardEuler<'m> {
             }
             if iteration == self.settings.iterations || !norm.is_finite() {
                 let node = self.worst_node();
-                return Err(SolveError::NotConverged { time, node, residuals });
+                return Err(SolveError::NotConverged { time, node, residuals, broken: None });
             }
             // The motion goes on, to begin with.
             let going_on = if iteration == 0 { h } else { 0.0 };

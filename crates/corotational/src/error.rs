@@ -177,8 +177,9 @@ pub enum SolveError {
     },
     /// No equilibrium, with load steps halved as often as allowed.
     #[error(
-        "no equilibrium at t = {time:.6} after {} iterations: residual {:.3e}, largest at node {node}; try smaller \
-         load steps, displacement control or the dynamic solver", residuals.len(), residuals.last().copied().unwrap_or(f64::NAN)
+        "no equilibrium at t = {time:.6} after {} iterations: residual {:.3e}, largest at node {node}{}; try smaller \
+         load steps, displacement control or the dynamic solver",
+        residuals.len(), residuals.last().copied().unwrap_or(f64::NAN), in_larger_steps(*broken)
     )]
     NotConverged {
         /// Time of the load step that failed.
@@ -187,6 +188,8 @@ pub enum SolveError {
         node: u32,
         /// Norm of the residual at each iteration of the last attempt [N].
         residuals: Vec<f64>,
+        /// The element that broke in an attempt with a larger step, the last such, and how.
+        broken: Option<(usize, Broken)>,
     },
     /// A balloon that is not closed.
     #[error(transparent)]
@@ -194,6 +197,35 @@ pub enum SolveError {
     /// What was asked for cannot be done; the text says why and what to do instead.
     #[error("{0}")]
     Impossible(&'static str),
+}
+
+impl SolveError {
+    /// The element that is broken, or was in a larger step, by its number in the model.
+    pub fn broken(&self) -> Option<(usize, Broken)> {
+        match self {
+            Self::Broken { cell, why } => Some((*cell, *why)),
+            Self::NotConverged { broken, .. } => *broken,
+            _ => None,
+        }
+    }
+
+    /// The same error where a larger step failed before, with the element that broke there.
+    pub(crate) fn after(mut self, larger: Option<(usize, Broken)>) -> Self {
+        if let Self::NotConverged { broken, .. } = &mut self {
+            *broken = broken.or(larger);
+        }
+        self
+    }
+}
+
+fn in_larger_steps(found: Option<(usize, Broken)>) -> String {
+    let Some((cell, why)) = found else { return String::new() };
+    let what = match why {
+        Broken::Inverted(_) => "is inverted",
+        Broken::Area(_) => "collapses",
+        Broken::Folded(_) => "folds over",
+    };
+    format!("; in a larger step element {cell} {what}")
 }
 
 fn broken(why: Broken) -> String {

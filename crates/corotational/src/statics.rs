@@ -17,7 +17,7 @@ use crate::system::{Phases, System};
 /// How equilibria are sought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticSettings {
-    /// Iterations of Newton's method at the most in a load step.
+    /// Iterations of Newton's method at most in a load step; more while each leaves less than a tenth of the residual.
     pub iterations: usize,
     /// How often a load step that fails is halved.
     pub halvings: usize,
@@ -53,6 +53,9 @@ impl Default for StaticSettings {
 
 /// Growth of the residual along an increment above which it is shortened. With 1 the slit annulus takes a fifth more iterations.
 const GROWTH: f64 = 10.0;
+
+/// What an iteration leaves of the residual where Newton's method converges.
+const CONVERGING: f64 = 0.1;
 
 /// What a residual on a node of a membrane may move it in an iteration, as a part of the extent of the membranes.
 const REACH: f64 = 0.1;
@@ -220,6 +223,7 @@ impl<'m> Statics<'m> {
         let mut done = Step::default();
         let mut size = until - state.time;
         let mut halvings = 0;
+        let mut broken = None;
         loop {
             let rest = until - state.time;
             let target = if size >= rest * (1.0 - 1e-12) { until } else { state.time + size };
@@ -234,8 +238,9 @@ impl<'m> Statics<'m> {
                 Err(Attempt { error, retry }) => {
                     *state = before;
                     if !retry || halvings == self.settings.halvings {
-                        return Err(error);
+                        return Err(error.after(broken));
                     }
+                    broken = error.broken().or(broken);
                     halvings += 1;
                     size *= 0.5;
                 }
@@ -279,11 +284,12 @@ impl<'m> Statics<'m> {
                 }
                 Ok(Step { parts: 1, ..step })
             }
-            Err(Attempt { retry: true, .. }) if halvings > 0 => {
+            Err(Attempt { retry: true, error: larger }) if halvings > 0 => {
                 *state = before;
                 let [first, second] = self.halves(control, state);
-                let parts = self.halved(state, first, halvings - 1)?.parts;
-                let step = self.halved(state, second, halvings - 1)?;
+                let told = |Attempt { error, retry }| Attempt { error: error.after(larger.broken()), retry };
+                let parts = self.halved(state, first, halvings - 1).map_err(told)?.parts;
+                let step = self.halved(state, second, halvings - 1).map_err(told)?;
                 Ok(Step { parts: parts + step.parts, ..step })
             }
             Err(attempt) => Err(attempt),
@@ -320,7 +326,7 @@ impl<'m> Statics<'m> {
         self.system.prescribed(state.time, time, &mut self.pending);
         let mut residuals: Vec<f64> = Vec::new();
         let mut negative_pivots = 0;
-        for iteration in 0..=self.settings.iterations {
+        for iteration in 0.. {
             self.system
                 .evaluate(state, time, Some((self.settings.tangent, &self.pending)))
                 .map_err(failed)?;
@@ -337,7 +343,8 @@ impl<'m> Statics<'m> {
                 state.time = time;
                 return Ok(Step { time, residuals, negative_pivots, parts: 0 });
             }
-            if !norm.is_finite() || iteration == self.settings.iterations {
+            let converging = residuals.len() > 1 && norm < CONVERGING * residuals[residuals.len() - 2];
+            if !norm.is_finite() || iteration >= self.settings.iterations && !converging {
                 break;
             }
             negative_pivots = match self.find_direction() {
@@ -366,7 +373,7 @@ impl<'m> Statics<'m> {
             }
         }
         let node = self.worst_node();
-        Err(Attempt { error: SolveError::NotConverged { time, node, residuals }, retry: true })
+        Err(Attempt { error: SolveError::NotConverged { time, node, residuals, broken: None }, retry: true })
     }
 
     /// Solves for the residual; the negative pivots of the stiffness.

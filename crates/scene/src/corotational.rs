@@ -624,8 +624,10 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     let own_node = node.zip(owner).map(|(node, body)| node - body.nodes.start);
     let body = owner.map(|body| body.name.clone()).or_else(|| Some(built.bodies[cell?.0].name.clone()));
     let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();
-    let told = numbered(error, own_node, cell.map(|(_, cell)| cell));
-    let slack = node.or_else(|| Some(part.model.facets.get(broken_facet(error)?)?.nodes[0]));
+    let of_body =
+        |cell| part.cell(cell).filter(|(owner, _)| body.as_ref() == Some(&built.bodies[*owner].name));
+    let told = numbered(error, own_node, |cell| of_body(cell).map(|(_, cell)| cell));
+    let slack = node.or_else(|| Some(part.model.facets.get(error.broken()?.0)?.nodes[0]));
     let hint = match slack.is_some_and(|node| part.is_slack(node)) {
         true => {
             "; a membrane resists bending and compression across by nothing: hold it on all sides, give it `pre-tension`, or take \
@@ -643,22 +645,24 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     )
 }
 
-/// The cell that an error is about, by its number in the model.
-fn broken_facet(error: &SolveError) -> Option<usize> {
-    match error {
-        SolveError::Broken { cell, .. } => Some(*cell),
-        _ => None,
-    }
-}
-
 /// An error with the numbers that a node and a cell have in their body.
-fn numbered(error: &SolveError, own_node: Option<u32>, own_cell: Option<u32>) -> SolveError {
+fn numbered(
+    error: &SolveError,
+    own_node: Option<u32>,
+    own_cell: impl Fn(usize) -> Option<u32>,
+) -> SolveError {
     let mut own = error.clone();
+    if let SolveError::NotConverged { node, .. }
+    | SolveError::Singular { node, .. }
+    | SolveError::FreeBody { node, .. } = &mut own
+    {
+        *node = own_node.unwrap_or(*node);
+    }
     match &mut own {
-        SolveError::NotConverged { node, .. }
-        | SolveError::Singular { node, .. }
-        | SolveError::FreeBody { node, .. } => *node = own_node.unwrap_or(*node),
-        SolveError::Broken { cell, .. } => *cell = own_cell.map_or(*cell, |cell| cell as usize),
+        SolveError::Broken { cell, .. } => *cell = own_cell(*cell).map_or(*cell, |cell| cell as usize),
+        SolveError::NotConverged { broken, .. } => {
+            *broken = broken.and_then(|(cell, why)| Some((own_cell(cell)? as usize, why)));
+        }
         _ => {}
     }
     own
