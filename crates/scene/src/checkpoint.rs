@@ -8,6 +8,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use pliant_geometry::io::read_limited;
 use pliant_mechanics::{Real, State, fingerprint};
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,6 @@ use crate::diagnostic::counted;
 use crate::format::{LoadSteps, Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, ShellStrains, Written, number, replace};
 use crate::plan::Plan;
-use crate::reads::read_regular;
 use crate::run::History;
 use crate::scene::Scene;
 use crate::solver::Memory;
@@ -327,7 +327,7 @@ impl Checkpoint {
             let all = checkpoints_in(path).map_err(|error| unreadable(path, error))?;
             file = all.into_iter().last().ok_or_else(|| ResumeError::NoneIn { path: path.to_owned() })?.1;
         }
-        let bytes = read_regular(&file, u64::MAX).map_err(|error| unreadable(&file, error))?;
+        let bytes = read_limited(&file, u64::MAX).map_err(|error| unreadable(&file, error))?;
         Self::from_bytes(&file, &bytes)
     }
 

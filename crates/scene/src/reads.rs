@@ -1,8 +1,9 @@
 //! Files that a scene is read from: regular ones of a bounded length, and where a sandbox is asked for, only those in its folder.
 
-use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
+
+use pliant_geometry::io::read_limited;
 
 /// Longest scene file [bytes].
 pub(crate) const LONGEST_SCENE: u64 = 1 << 26;
@@ -58,47 +59,15 @@ impl Reads {
     /// # Errors
     /// If it may not be read, is no regular file or is longer than `longest` bytes.
     pub(crate) fn read(&self, path: &Path, longest: u64) -> io::Result<Vec<u8>> {
-        read_regular(&self.allow(path)?, longest)
+        read_limited(&self.allow(path)?, longest)
     }
-}
-
-/// The bytes of a regular file of at most so many. Pipes and devices could keep a reader waiting for ever.
-pub(crate) fn read_regular(path: &Path, longest: u64) -> io::Result<Vec<u8>> {
-    let about = fs::metadata(path)?;
-    if !about.is_file() && !about.is_dir() {
-        let reason =
-            "it is not a regular file but a pipe, a socket or a device; write what it gives to a file first";
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
-    }
-    let too_long = |length: u64| {
-        let reason = format!("it has {} MB, more than the {} MB that are read", length >> 20, longest >> 20);
-        io::Error::new(io::ErrorKind::FileTooLarge, reason)
-    };
-    if about.is_file() && about.len() > longest {
-        return Err(too_long(about.len()));
-    }
-    let mut bytes = Vec::new();
-    bytes.try_reserve_exact(about.len() as usize).map_err(io::Error::from)?;
-    // It may grow while it is read.
-    File::open(path)?.take(longest.saturating_add(1)).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > longest { Err(too_long(bytes.len() as u64)) } else { Ok(bytes) }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::fs;
 
-    #[test]
-    fn long_files_are_refused_before_they_are_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("sparse");
-        File::create(&path).unwrap().set_len(1 << 40).unwrap();
-        let told = read_regular(&path, LONGEST_TABLE).unwrap_err().to_string();
-        assert_eq!(told, "it has 1048576 MB, more than the 1024 MB that are read");
-        fs::write(&path, "abc").unwrap();
-        assert_eq!(read_regular(&path, 3).unwrap(), b"abc");
-        assert!(read_regular(&path, 2).is_err());
-    }
+    use super::*;
 
     #[test]
     fn a_sandbox_allows_what_really_lies_in_its_folder() {

@@ -34,7 +34,9 @@ fn compute(cell: u32) {
     }
     give(cell, 0u, vec4f(first + q * row(8u, cell), energy));
     var ratio = d.volume_ratio;
-    if ratio < FLAT && row(2u, cell).w * square * (1.0 + strain_square(d.strain_twice)) >= ratio * ratio && is_folded(cell) {
+    let strain = strain_square(d.strain_twice);
+    let flat = ratio * ratio < FLAT * FLAT * (1.0 + 0.5 * strain);
+    if flat && row(2u, cell).w * square * (1.0 + strain) >= ratio * ratio && is_folded(cell) {
         ratio = min(ratio, 0.0);
     }
     note(ratio, d.strain_twice, size);

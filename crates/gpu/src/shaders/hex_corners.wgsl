@@ -1,7 +1,7 @@
 // Corners of hexahedra that turn inside out while the cell as a whole does not. Rows at rest from FIRST_CORNER on: X_a − X_0 [m]
 // of all nodes but the first. What is less than round-off inside out is left to the next instants.
 
-// Part of its volume below which a cell is judged by its corners, as in forces/corners.rs.
+// Flatness below which a cell is judged by its corners, as in forces/corners.rs.
 const FLAT: f32 = 0.25;
 
 fn is_folded(cell: u32) -> bool {

@@ -51,19 +51,31 @@ fn depth_at<N: Number>(x: &[Vector<N>; 8], corner: usize) -> N {
     -dot(cross(sub(x[a], origin), sub(x[b], origin)), sub(x[c], origin))
 }
 
-/// Part of its volume below which a cell is judged by its corners. At glued edges, where stresses grow without end, corners fold at moderate
+/// Flatness below which a cell is judged by its corners. At glued edges, where stresses grow without end, corners fold at moderate
 /// strains, the more the finer the mesh, while forces stay those of other codes (the reference cubes at 20 and 30 %).
 const FLAT: f64 = 0.25;
 
-/// Whether a cell is flat enough that its corners count, by its volume over that at rest.
+/// Whether a cell is so flat that its corners count: by its volume over that at rest.
 #[inline(always)]
-pub(super) fn is_flat<R: Real>(ratio: R) -> bool {
-    ratio < R::of(FLAT)
+pub(super) fn is_flat<R: Real>(flatness: R) -> bool {
+    flatness < R::of(FLAT)
+}
+
+/// The square of what J is divided by for the flatness of a uniform-strain hexahedron, about its least stretch: nearly incompressible
+/// cells keep their volume when they are squeezed flat.
+#[inline(always)]
+fn widening<R: Real>(strain: R) -> R {
+    R::ONE + R::of(0.5) * strain
+}
+
+/// J over √(1 + S/2) of the cells of a pack.
+pub(super) fn flatness<R: Real>(ratio: &Pack<R>, strain: &Pack<R>) -> Pack<R> {
+    Pack::from_fn(|lane| ratio.0[lane] / widening(strain.0[lane]).sqrt())
 }
 
 /// The first flat cell of a pack of which a corner's determinant, with its sign turned, is not below zero.
-pub(super) fn first_folded<R: Real>(depths: &Pack<R>, ratio: &Pack<R>) -> Option<usize> {
-    (0..PACK).find(|&lane| depths.0[lane] >= R::ZERO && is_flat(ratio.0[lane]))
+fn first_folded<R: Real>(depths: &Pack<R>, flatness: &Pack<R>) -> Option<usize> {
+    (0..PACK).find(|&lane| depths.0[lane] >= R::ZERO && is_flat(flatness.0[lane]))
 }
 
 /// Whether one of the cells of a pack may have an inverted corner, from 3/2 κ² |q|², J and |C − I|².
@@ -71,8 +83,9 @@ pub(super) fn first_folded<R: Real>(depths: &Pack<R>, ratio: &Pack<R>) -> Option
 pub(super) fn may_fold<R: Real>(reach: &Pack<R>, ratio: &Pack<R>, strain: &Pack<R>) -> bool {
     let mut sound = true;
     for lane in 0..PACK {
-        let flat = is_flat(ratio.0[lane]);
-        sound &= !flat | (reach.0[lane] * (R::ONE + strain.0[lane]) < ratio.0[lane] * ratio.0[lane]);
+        let square = ratio.0[lane] * ratio.0[lane];
+        let flat = square < R::of(FLAT * FLAT) * widening(strain.0[lane]);
+        sound &= !flat | (reach.0[lane] * (R::ONE + strain.0[lane]) < square);
     }
     !sound
 }
@@ -81,8 +94,8 @@ pub(super) fn may_fold<R: Real>(reach: &Pack<R>, ratio: &Pack<R>, strain: &Pack<
 pub(super) struct Look<'a, 'l, R, const N: usize, const M: usize> {
     pub corners: &'a PackedCorners<R>,
     pub local: &'a Local<'l, R, N>,
-    /// Volumes over those at rest.
-    pub ratio: &'a Pack<R>,
+    /// How flat the cells are.
+    pub flatness: &'a Pack<R>,
     /// The pack, counted in the block.
     pub pack: usize,
 }
@@ -100,6 +113,6 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Look<'_, '_, R, N, M> 
             all.iter_mut().zip(u).for_each(|(to, u)| *to = u);
             self.corners.depth(&all, at).store(&mut depths, at);
         }
-        first_folded(&depths, self.ratio)
+        first_folded(&depths, self.flatness)
     }
 }

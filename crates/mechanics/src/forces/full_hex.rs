@@ -118,7 +118,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
                 let look = Look::<R, 8, 7> {
                     corners: &corners[pack],
                     local: &local,
-                    ratio: &ratio,
+                    flatness: &ratio,
                     pack: pack_of_block,
                 };
                 findings.folded = L::call(look).map(|lane| pack * PACK + lane);

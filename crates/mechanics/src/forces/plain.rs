@@ -2,7 +2,7 @@
 
 use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
-use super::corners::{Look, PackedCorners, may_fold};
+use super::corners::{Look, PackedCorners, flatness, may_fold};
 use super::hourglass::{PackedHourglass, Resistance};
 use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
@@ -109,7 +109,7 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                     let look = Look::<R, N, M> {
                         corners: &corners[pack],
                         local: &local,
-                        ratio,
+                        flatness: &flatness(ratio, strain),
                         pack: pack_of_block,
                     };
                     findings.folded = L::call(look).map(|lane| pack * PACK + lane);

@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(upright(&[tilted(-61.0), tilted(61.0)], &tilted(0.0)), None);
         // Round a spike whose faces lean by 59° from its axis there is one, whatever the wish; by 61° there is none.
         let spike = |degrees: f64| {
-            (0..7).map(|k| f64::from(k) * 0.9).map(|turn| {
+            (0..7).map(|k| f64::from(k) * 0.9).map(move |turn| {
                 let (s, c) = degrees.to_radians().sin_cos();
                 Vector3::new(s * turn.cos(), s * turn.sin(), c)
             })

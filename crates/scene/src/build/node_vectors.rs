@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use pliant_geometry::io::read_limited;
 use pliant_geometry::{DataArray, Mesh};
 
 use super::{Builder, suggestion};
 use crate::diagnostic::counted;
 use crate::format::{NodeVectorSource, NodeVectors};
-use crate::reads::{LONGEST_TABLE, read_regular};
+use crate::reads::LONGEST_TABLE;
 
 /// What is wrong with a table of vectors, and what to do about it.
 #[derive(Debug)]
@@ -89,7 +90,7 @@ fn read_rows(
 ) -> Result<BTreeMap<u32, [f64; 3]>, Fault> {
     const FORM: &str =
         "each row is `node,x,y,z`: a node counted from 0 and three numbers in metres (or newtons)";
-    let read = found.and_then(|found| read_regular(&found, LONGEST_TABLE));
+    let read = found.and_then(|found| read_limited(&found, LONGEST_TABLE));
     let text = read.and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other));
     let text = text.map_err(|error| {
         let help = "it must be a text file; file names are relative to the scene file";
