@@ -17,7 +17,7 @@ pub fn run<R: Real>(
     step: f64,
     until: f64,
     observe: impl FnMut(&CentralDifference<R>, &State<R>),
-) -> Result<(CentralDifference<'_, R>, State<R>), StepError> {
+) -> Result<(CentralDifference<R>, State<R>), StepError> {
     pliant_reproduce::run(model, step, until, observe).map_err(|error| match error {
         CaseError::Step(error) => error,
         other => panic!("{other}"),
@@ -37,7 +37,7 @@ pub fn run_watched<R: Real>(
     on_unstable: OnUnstable,
     until: f64,
     observe: impl FnMut(&CentralDifference<R>, &State<R>),
-) -> Result<(CentralDifference<'_, R>, State<R>), StepError> {
+) -> Result<(CentralDifference<R>, State<R>), StepError> {
     run_on(watched(model, step, on_unstable), State::at_rest(model), until, observe)
 }
 
@@ -45,9 +45,9 @@ pub fn run_watched<R: Real>(
 ///
 /// # Panics
 /// If constraints contradict each other.
-pub fn watched<R: Real>(model: &Model, step: f64, on_unstable: OnUnstable) -> CentralDifference<'_, R> {
+pub fn watched<R: Real>(model: &Model, step: f64, on_unstable: OnUnstable) -> CentralDifference<R> {
     let limit = true_limit(model).unwrap_or_else(|error| panic!("{error}")).step;
-    let stepper = CentralDifference::new(model, step).unwrap_or_else(|error| panic!("{error}"));
+    let stepper = CentralDifference::new(model.clone(), step).unwrap_or_else(|error| panic!("{error}"));
     stepper.watched(Monitor::new(model, limit, on_unstable))
 }
 
@@ -55,7 +55,7 @@ pub fn watched<R: Real>(model: &Model, step: f64, on_unstable: OnUnstable) -> Ce
 ///
 /// # Panics
 /// If a step fails or the model still moves.
-pub fn settle(model: &Model, step: f64, until: f64) -> Equilibrium<'_> {
+pub fn settle(model: &Model, step: f64, until: f64) -> Equilibrium {
     pliant_reproduce::settle(model, step, until).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -63,6 +63,6 @@ pub fn settle(model: &Model, step: f64, until: f64) -> Equilibrium<'_> {
 ///
 /// # Panics
 /// If there is no equilibrium.
-pub fn relax(model: &Model) -> (DynamicRelaxation<'_, f64>, State<f64>) {
+pub fn relax(model: &Model) -> (DynamicRelaxation<f64>, State<f64>) {
     pliant_reproduce::relax(model).unwrap_or_else(|error| panic!("{error}"))
 }

@@ -32,7 +32,7 @@ fn a_cube_squeezed_between_glued_plates_fails() {
     let (name, nodes) = ("top".into(), cube.face("z-max"));
     cube.model.constraints.push(Constraint { name, nodes, components: [true; 3], motion });
     let step = 0.3 * cube.element_bound();
-    let mut stepper = CentralDifference::<f64>::new(&cube.model, step).unwrap();
+    let mut stepper = CentralDifference::<f64>::new(cube.model.clone(), step).unwrap();
     let mut state = State::at_rest(&cube.model);
     let failure = loop {
         if let Err(failure) = stepper.evaluate(&mut state) {

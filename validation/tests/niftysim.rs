@@ -32,7 +32,7 @@ fn displacements_of(model: &Path) -> Vec<Vector<f64>> {
     let scene = Scene::from_source(source, folder.clone()).unwrap();
     let built = pliant_scene::build(&scene).unwrap();
     let StepChoice::Seconds(step) = scene.run.step else { panic!("no step was imported") };
-    let mut stepper = CentralDifference::<f64>::new(&built.model, step).unwrap();
+    let mut stepper = CentralDifference::<f64>::new(built.model.clone(), step).unwrap();
     let mut state = State::at_rest(&built.model);
     for _ in 0..STEPS {
         stepper.evaluate(&mut state).unwrap();

@@ -27,7 +27,7 @@ fn a_failed_load_step_leaves_the_state_untouched() {
             .shift("x-max", -0.02, smooth_step(1.0))
             .fix("x-min", [true; 3]);
         let patient = RelaxationSettings::default();
-        let solver = |settings| DynamicRelaxation::<f64>::new(&cube.model, settings).unwrap();
+        let solver = |settings| DynamicRelaxation::<f64>::new(cube.model.clone(), settings).unwrap();
         let mut state = State::at_rest(&cube.model);
         solver(patient).solve(&mut state, 0.5).unwrap();
         assert!(

@@ -57,7 +57,7 @@ fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
     balloon = balloon.load(LoadKind::Pressure { cells: cells.clone(), pressure: 1.0, spread });
     balloon.model.loads[0].controlled = true;
     let model = &balloon.model;
-    let mut solver = Statics::new(model, StaticSettings::default()).unwrap();
+    let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(model);
     state.time = 1.0;
     let rest = model.enclosed_volume(&cells, &model.rest);

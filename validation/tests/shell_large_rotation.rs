@@ -28,7 +28,7 @@ fn follow(
     look: impl Fn(&State) -> [f64; 2],
 ) -> ([f64; 2], [f64; 2]) {
     let mut solver =
-        Statics::new(&specimen.model, StaticSettings { linear, ..StaticSettings::default() }).unwrap();
+        Statics::new(specimen.model.clone(), StaticSettings { linear, ..StaticSettings::default() }).unwrap();
     let mut state = State::at_rest(&specimen.model);
     let mut off = [0.0_f64; 2];
     let largest = [1, 2].map(|c| rows.iter().map(|row| row[c].abs()).fold(0.0, f64::max));
@@ -195,7 +195,7 @@ fn hinged_roof(cells: usize) -> Vec<[f64; 3]> {
     let centre = roof.node(2540.0, 0.0, 0.0);
     let mut roof = roof.pull(centre, [-3000.0 / 4.0, 0.0, 0.0]);
     roof.model.loads[0].controlled = true;
-    let mut solver = Statics::new(&roof.model, StaticSettings::default()).unwrap();
+    let mut solver = Statics::new(roof.model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&roof.model);
     state.time = 1.0;
     let mut curve = Vec::new();

@@ -131,7 +131,7 @@ impl Organ {
     fn equilibrium(&self, mesh: &Mesh) -> Result<(Model, State), String> {
         let model = self.model(mesh);
         let start = Instant::now();
-        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         let mut state = State::at_rest(&model);
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
         let rest = model.enclosed_volume(&cells, &model.rest);
@@ -178,7 +178,8 @@ impl Organ {
             preconditioner: Preconditioner::LaggedFactors { renew_after: 12 },
         };
         let mut solver =
-            BackwardEuler::new(&model, DynamicSettings { linear, ..DynamicSettings::new(0.01) }).unwrap();
+            BackwardEuler::new(model.clone(), DynamicSettings { linear, ..DynamicSettings::new(0.01) })
+                .unwrap();
         let mut state = State::at_rest(&model);
         let start = Instant::now();
         let (mut newton, mut parts, mut residual) = (0, 0, 0.0_f64);
@@ -345,7 +346,7 @@ fn valve_leaflets_close() {
         let course = Curve { shape: Shape::Table(curve.clone()), from: 0.0, to: 1.0 };
         model.loads.push(Load { name: "valve".into(), kind, curve: course, controlled: false });
         model.mass_damping = 2.0;
-        let mut solver = BackwardEuler::new(&model, DynamicSettings::new(step)).unwrap();
+        let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(step)).unwrap();
         let mut state = State::at_rest(&model);
         let start = Instant::now();
         // Where the leaflets hang side by side on the wall they are close from the start.

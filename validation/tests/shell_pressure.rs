@@ -75,7 +75,7 @@ fn pressed(mesh: Mesh, whole: bool, thickness: f64, formulation: Formulation, sp
 
 /// Radial displacement of each node by linear theory over Lamé's.
 fn ratios(cylinder: &Specimen) -> Vec<f64> {
-    let mut solver = Statics::new(&cylinder.model, StaticSettings::default()).unwrap();
+    let mut solver = Statics::new(cylinder.model.clone(), StaticSettings::default()).unwrap();
     let moved = solver.linear(&State::at_rest(&cylinder.model), 1.0).unwrap();
     let radial = |(u, x): (&[f64; 6], &Vector3)| (u[0] * x.x + u[1] * x.y) / 1e-6;
     moved.iter().zip(&cylinder.model.rest).map(radial).collect()
@@ -161,7 +161,8 @@ fn an_irregular_cylinder_is_blown_up_in_one_step() {
     let LoadKind::Pressure { pressure, .. } = &mut model.loads[0].kind else { panic!("no pressure") };
     *pressure *= 1e3;
     let mut state = State::at_rest(&model);
-    let step = Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+    let step =
+        Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     let ratio = |(x, rest): (&Vector3, &Vector3)| (x - rest).xy().dot(&rest.xy()) / 1e-3;
     let found: Vec<f64> = state.position.iter().zip(&model.rest).map(ratio).collect();
     println!("{} iterations, {:?}", step.residuals.len() - 1, bounds(&found));
@@ -214,7 +215,7 @@ fn spheres_under_pressure() {
             let cells: Vec<u32> = (0..20 * 4_u32.pow(levels)).collect();
             let ball = ball.unwrap().hold(vec![0], [true; 6]);
             let ball = ball.load(LoadKind::Pressure { cells, pressure: 1e-6 * thickness, spread: DEFAULT.1 });
-            let mut solver = Statics::new(&ball.model, StaticSettings::default()).unwrap();
+            let mut solver = Statics::new(ball.model.clone(), StaticSettings::default()).unwrap();
             let moved = solver.linear(&State::at_rest(&ball.model), 1.0).unwrap();
             let places = moved.iter().zip(&ball.model.rest).map(|(u, x)| x + Vector3::new(u[0], u[1], u[2]));
             let places: Vec<Vector3> = places.collect();
@@ -244,7 +245,7 @@ fn an_explicit_cylinder_comes_to_rest_in_equilibrium() {
     // A quarter of the breathing frequency √(E/ρ)/R.
     model.mass_damping = 0.5 * (1.0_f64 / 1000.0).sqrt();
     let step = 0.9 * Explicit::stable_step(model);
-    let mut solver = Explicit::new(model, step).unwrap();
+    let mut solver = Explicit::new(model.clone(), step).unwrap();
     let mut state = State::at_rest(model);
     let steps = (40.0 / model.mass_damping / step) as usize;
     for _ in 0..steps {

@@ -238,7 +238,7 @@ fn a_limit_below_a_hundredth_of_the_step_ends_the_run() {
     // Nobody is asked for the true limit when a run begins above it.
     let monitor = Monitor::new(&block.model, 1e-7, OnUnstable::Substep);
     let step = 500.0 * block.true_limit();
-    let stepper = CentralDifference::new(&block.model, step).unwrap().watched(monitor);
+    let stepper = CentralDifference::new(block.model.clone(), step).unwrap().watched(monitor);
     let ended = run_on::<f64>(stepper, State::at_rest(&block.model), 1.0, |_, _| ()).err();
     assert!(matches!(ended, Some(StepError::BelowLimit { .. })), "{ended:?}");
 }
@@ -293,7 +293,7 @@ fn a_free_fall_in_cut_steps_is_exact() {
     let limit = block.true_limit();
     let monitor = Monitor::new(&block.model, limit, OnUnstable::Substep);
     // Twice the limit: cut from the first step.
-    let stepper = CentralDifference::new(&block.model, 2.0 * limit).unwrap().watched(monitor);
+    let stepper = CentralDifference::new(block.model.clone(), 2.0 * limit).unwrap().watched(monitor);
     let mut worst = 0.0;
     let (_, state) = run_on::<f64>(stepper, State::at_rest(&block.model), 0.2, |_, state| {
         let fallen = -0.5 * 9.81 * state.time * state.time;

@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let displacement =
             model.rest.iter().map(|x| [-0.02 * x[0], 0.01 * x[0], 0.005 * x[0]].map(|u| u as f32));
         let state = State { displacement: displacement.collect(), ..State::at_rest(model) };
-        clocked.push(Clocked::new(model, 0.5 * specimen.element_bound(), state)?);
+        clocked.push(Clocked::new(model.clone(), 0.5 * specimen.element_bound(), state)?);
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut times = vec![Vec::new(); meshes.len()];

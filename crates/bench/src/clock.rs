@@ -1,5 +1,6 @@
 //! Steps against the clock.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure};
@@ -36,17 +37,17 @@ pub trait Timed {
 }
 
 /// A model under the clock: a stepper and the state that it steps.
-pub struct Clocked<'m, R> {
-    stepper: CentralDifference<'m, R>,
+pub struct Clocked<R> {
+    stepper: CentralDifference<R>,
     state: State<R>,
 }
 
-impl<'m, R: Real> Clocked<'m, R> {
+impl<R: Real> Clocked<R> {
     /// A state of a model, to be advanced by steps of `step` seconds.
     ///
     /// # Errors
     /// If constraints contradict each other.
-    pub fn new(model: &'m Model, step: f64, state: State<R>) -> Result<Self, Contradiction> {
+    pub fn new(model: impl Into<Arc<Model>>, step: f64, state: State<R>) -> Result<Self, Contradiction> {
         Ok(Self { stepper: CentralDifference::new(model, step)?, state })
     }
 
@@ -60,7 +61,7 @@ impl<'m, R: Real> Clocked<'m, R> {
 }
 
 /// On the current rayon pool.
-impl<R: Real> Timed for Clocked<'_, R> {
+impl<R: Real> Timed for Clocked<R> {
     type Error = StepError;
 
     fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepError> {
@@ -75,20 +76,20 @@ impl<R: Real> Timed for Clocked<'_, R> {
 }
 
 /// A model under the clock on a graphics processor.
-pub struct ClockedOnDevice<'m> {
+pub struct ClockedOnDevice {
     device: Device,
-    stepper: GpuStepper<'m>,
+    stepper: GpuStepper,
     state: State<f32>,
 }
 
-impl<'m> ClockedOnDevice<'m> {
+impl ClockedOnDevice {
     /// A state of a model, to be advanced by steps of `step` seconds.
     ///
     /// # Errors
     /// If the device can't take the model.
     pub fn new(
         device: &Device,
-        model: &'m Model,
+        model: impl Into<Arc<Model>>,
         step: f64,
         design: Design,
         state: State<f32>,
@@ -100,7 +101,7 @@ impl<'m> ClockedOnDevice<'m> {
 }
 
 /// The looks that the stepper takes now and then are steps' cost, too.
-impl Timed for ClockedOnDevice<'_> {
+impl Timed for ClockedOnDevice {
     type Error = StepFailure;
 
     fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepFailure> {

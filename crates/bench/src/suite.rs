@@ -4,6 +4,8 @@
 //! so all cells are deformed from the first step on and go on to vibrate. It is warmed up, then stepped for so many steps
 //! that a repeat takes [`Settings::seconds`].
 
+use std::sync::Arc;
+
 use pliant_gpu::{Device, DeviceRates, GpuError, StepFailure};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::model::Contradiction;
@@ -177,14 +179,14 @@ impl Bench {
         let specimen = squeezed(case.specimen());
         let (limit, from) = self.limit(case, &specimen, most);
         let (step, settings) = (PART_UNDER_THE_CLOCK * limit, self.settings);
-        let model = &specimen.model;
+        let model = Arc::new(specimen.model);
         let (seconds, place) = match case.place {
             Place::Processor(threads) => {
                 let processor = self.machine.processor.clone();
                 let (pool, rates) = self.pool(threads)?;
                 let seconds = pool.install(|| match case.precision {
-                    Precision::Single => on_processor::<f32>(case, model, step, settings),
-                    Precision::Double => on_processor::<f64>(case, model, step, settings),
+                    Precision::Single => on_processor::<f32>(case, &model, step, settings),
+                    Precision::Double => on_processor::<f64>(case, &model, step, settings),
                 })?;
                 let multiply_add = rates.multiply_add(case.precision);
                 let threads = Some(rates.threads);
@@ -194,7 +196,8 @@ impl Bench {
             }
             Place::Device(design) => {
                 let (device, rates) = self.device()?;
-                let mut clocked = ClockedOnDevice::new(device, model, step, design, start::<f32>(model))?;
+                let start = start::<f32>(&model);
+                let mut clocked = ClockedOnDevice::new(device, model, step, design, start)?;
                 let seconds = repeats(&mut clocked, settings).map_err(|failure| match failure {
                     StepFailure::Step(source) => BenchError::Step { id: case.id(), source },
                     StepFailure::Device(error) => error.into(),
@@ -253,11 +256,11 @@ fn start<R: Real>(model: &Model) -> State<R> {
 /// Wall times of a step on the current pool [s].
 fn on_processor<R: Real>(
     case: &Case,
-    model: &Model,
+    model: &Arc<Model>,
     step: f64,
     settings: Settings,
 ) -> Result<Vec<f64>, BenchError> {
-    let clocked = Clocked::new(model, step, start::<R>(model))?;
+    let clocked = Clocked::new(Arc::clone(model), step, start::<R>(model))?;
     let mut clocked = clocked.in_lanes(settings.lanes)?;
     repeats(&mut clocked, settings).map_err(|source| BenchError::Step { id: case.id(), source })
 }
@@ -318,7 +321,7 @@ mod tests {
         let specimen = squeezed(case.specimen());
         let step = 0.5 * specimen.element_bound();
         let settings = Settings { repeats: 1, seconds: 0.0, ..Settings::default() };
-        assert!(on_processor::<f32>(&case, &specimen.model, step, settings).unwrap()[0] > 0.0);
+        assert!(on_processor::<f32>(&case, &specimen.model.clone().into(), step, settings).unwrap()[0] > 0.0);
         let displacement = start::<f64>(&specimen.model).displacement;
         let rest = State::<f64>::at_rest(&specimen.model).displacement;
         assert!(

@@ -8,6 +8,8 @@
 //! start of the step.
 //! Leaves out: gyroscopic moments (the lumped inertia of a node is the same about every axis) and step control by accuracy.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use crate::error::SolveError;
@@ -86,8 +88,8 @@ pub struct DynamicStep {
 }
 
 /// The implicit solver.
-pub struct BackwardEuler<'m> {
-    system: System<'m>,
+pub struct BackwardEuler {
+    system: System,
     settings: DynamicSettings,
     length: f64,
     round_off: f64,
@@ -144,13 +146,14 @@ impl Course {
     }
 }
 
-impl<'m> BackwardEuler<'m> {
+impl BackwardEuler {
     /// A solver for a model.
     ///
     /// # Errors
     /// If the equations are too many for the solver chosen.
-    pub fn new(model: &'m Model, settings: DynamicSettings) -> Result<Self, SolveError> {
-        let system = System::new(model, settings.linear)?;
+    pub fn new(model: impl Into<Arc<Model>>, settings: DynamicSettings) -> Result<Self, SolveError> {
+        let model = model.into();
+        let system = System::new(Arc::clone(&model), settings.linear)?;
         let (all, free) = (6 * model.rest.len(), system.equations.len());
         let damper = if model.stiffness_damping > 0.0 { system.matrix.value.len() } else { 0 };
         Ok(Self {
@@ -164,7 +167,7 @@ impl<'m> BackwardEuler<'m> {
             solution: vec![0.0; free],
             damper: vec![0.0; damper],
             product: vec![0.0; free],
-            start: State::at_rest(model),
+            start: State::at_rest(&model),
             previous: None,
             course: Course::default(),
             system,
@@ -234,7 +237,7 @@ impl<'m> BackwardEuler<'m> {
 
     fn newton(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
         let time = state.time + h;
-        let model = self.system.model;
+        let model = Arc::clone(&self.system.model);
         self.system.prescribed(state.time, time, &mut self.pending);
         self.moved.fill(0.0);
         let mut residuals = Vec::with_capacity(self.settings.iterations + 1);
@@ -315,7 +318,7 @@ impl<'m> BackwardEuler<'m> {
 
     /// Loads less internal, inertial and damping forces on the free components; its norm and that of the largest of them.
     fn find_residual(&mut self, state: &State) -> (f64, f64) {
-        let model = self.system.model;
+        let model = Arc::clone(&self.system.model);
         let Course { step: h, shift, rate } = &self.course;
         let h = *h;
         let system = &mut self.system;
@@ -375,7 +378,7 @@ impl<'m> BackwardEuler<'m> {
 
     /// K + (1/h*² + α/h*) M + β/h* K.
     fn add_inertia(&mut self) {
-        let (model, h) = (self.system.model, self.course.step);
+        let (model, h) = (Arc::clone(&self.system.model), self.course.step);
         let factor = model.stiffness_damping / h;
         self.system.matrix.value.iter_mut().zip(&self.damper).for_each(|(k, d)| *k += factor * d);
         let rate = 1.0 / (h * h) + model.mass_damping / h;
@@ -394,13 +397,13 @@ impl<'m> BackwardEuler<'m> {
 }
 
 /// Explicit central differences: velocities stand half a step before positions.
-pub struct Explicit<'m> {
-    forces: Forces<'m>,
+pub struct Explicit {
+    forces: Forces,
     step: f64,
     pending: Vec<f64>,
 }
 
-impl<'m> Explicit<'m> {
+impl Explicit {
     /// The longest stable step [s] about rest: 2/√(ω² + max k/m) of the stiffest element and the stiffest springs on a node, a lower bound
     /// of the model's.
     pub fn stable_step(model: &Model) -> f64 {
@@ -419,8 +422,9 @@ impl<'m> Explicit<'m> {
     ///
     /// # Errors
     /// If the step is longer than is stable, or damping is proportional to stiffness.
-    pub fn new(model: &'m Model, step: f64) -> Result<Self, SolveError> {
-        if !(step > 0.0 && step <= Self::stable_step(model)) {
+    pub fn new(model: impl Into<Arc<Model>>, step: f64) -> Result<Self, SolveError> {
+        let model = model.into();
+        if !(step > 0.0 && step <= Self::stable_step(&model)) {
             return Err(SolveError::Impossible(
                 "the step is longer than the stable one (`Explicit::stable_step`); shorten it or use the implicit solver",
             ));
@@ -430,7 +434,7 @@ impl<'m> Explicit<'m> {
                 "damping by stiffness needs the implicit solver; damp by mass instead",
             ));
         }
-        Ok(Self { pending: vec![0.0; 6 * model.rest.len()], forces: Forces::new(model), step })
+        Ok(Self { pending: vec![0.0; 6 * model.rest.len()], forces: Forces::new(model.clone()), step })
     }
 
     /// Makes one step: [`evaluate`](Self::evaluate), then [`go`](Self::go).
@@ -452,13 +456,13 @@ impl<'m> Explicit<'m> {
     }
 
     /// The forces last evaluated.
-    pub fn forces(&self) -> &Forces<'m> {
+    pub fn forces(&self) -> &Forces {
         &self.forces
     }
 
     /// The second half of a step: moves the state on with the forces that were evaluated at it.
     pub fn go(&mut self, state: &mut State) {
-        let (h, model) = (self.step, self.forces.system.model);
+        let (h, model) = (self.step, Arc::clone(&self.forces.system.model));
         let system = &self.forces.system;
         system.prescribed(state.time, state.time + h, &mut self.pending);
         // (1 + αh/2) v⁺ = (1 − αh/2) v + h f/m.
@@ -569,12 +573,12 @@ mod tests {
         let model = clamped(0.03);
         let exact = TAU / first_frequency(0.03);
         let step = 0.9 * Explicit::stable_step(&model);
-        let mut explicit = Explicit::new(&model, step).unwrap();
+        let mut explicit = Explicit::new(model.clone(), step).unwrap();
         let found = period(|state| explicit.advance(state).unwrap(), &model, step);
         println!("period {found:.4} s, exact {exact:.4} s, explicit step {step:.1e} s");
         assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
         let step = exact / 400.0;
-        let mut implicit = BackwardEuler::new(&model, DynamicSettings::new(step)).unwrap();
+        let mut implicit = BackwardEuler::new(model.clone(), DynamicSettings::new(step)).unwrap();
         let found = period(|state| drop(implicit.advance(state).unwrap()), &model, step);
         assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
     }
@@ -589,7 +593,7 @@ mod tests {
         }
         let settings =
             DynamicSettings { integrator, tolerance: 1e-10, ..DynamicSettings::new(1.0 / f64::from(steps)) };
-        let mut solver = BackwardEuler::new(&model, settings).unwrap();
+        let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
         let mut state = State::at_rest(&model);
         state.position.iter_mut().for_each(|x| x.z = 0.1);
         for _ in 0..steps * periods {
@@ -648,13 +652,13 @@ mod tests {
                 tolerance: 1e-10,
                 ..DynamicSettings::new(0.8 / f64::from(steps))
             };
-            let mut solver = BackwardEuler::new(&model, settings).unwrap();
+            let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
             let mut state = State::at_rest(&model);
             for step in 0..steps {
                 if elsewhere && step == steps / 2 {
                     let previous = solver.previous().cloned();
                     assert!(previous.is_some());
-                    solver = BackwardEuler::new(&model, settings).unwrap();
+                    solver = BackwardEuler::new(model.clone(), settings).unwrap();
                     solver.go_on_from(previous);
                 }
                 solver.advance(&mut state).unwrap();
@@ -672,8 +676,8 @@ mod tests {
     fn explicit_steps_that_are_too_long_are_refused() {
         let model = clamped(THIN);
         let stable = Explicit::stable_step(&model);
-        assert!(Explicit::new(&model, stable).is_ok());
-        assert!(matches!(Explicit::new(&model, 1.01 * stable), Err(SolveError::Impossible(_))));
+        assert!(Explicit::new(model.clone(), stable).is_ok());
+        assert!(matches!(Explicit::new(model.clone(), 1.01 * stable), Err(SolveError::Impossible(_))));
     }
 
     /// A spring a hundred times as stiff as the strip sets the step, and 2000 steps of it stay bounded.
@@ -688,7 +692,7 @@ mod tests {
         assert!(step < 0.1 * free && step > 0.09 * free, "{step:e} {free:e}");
         let mut state = State::at_rest(&model);
         state.velocity[node].z = 1e-3;
-        let mut solver = Explicit::new(&model, step).unwrap();
+        let mut solver = Explicit::new(model.clone(), step).unwrap();
         for _ in 0..2000 {
             solver.advance(&mut state).unwrap();
         }
@@ -714,7 +718,7 @@ mod tests {
                 })
                 .sum()
         };
-        let mut solver = Explicit::new(&model, 0.5 * Explicit::stable_step(&model)).unwrap();
+        let mut solver = Explicit::new(model.clone(), 0.5 * Explicit::stable_step(&model)).unwrap();
         let first = kinetic(&state);
         let mut largest = 0.0_f64;
         for _ in 0..3000 {
@@ -743,7 +747,7 @@ mod tests {
             })
         };
         let settings = DynamicSettings { tolerance: 1e-10, ..DynamicSettings::new(2e-3) };
-        let mut solver = BackwardEuler::new(&model, settings).unwrap();
+        let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
         let first = momentum(&state);
         for _ in 0..20 {
             solver.advance(&mut state).unwrap();
@@ -760,7 +764,7 @@ mod tests {
         let mut model = clamped(THIN);
         weigh(&mut model, 0.5);
         let mut rest = State::at_rest(&model);
-        Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut rest, 1.0).unwrap();
+        Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut rest, 1.0).unwrap();
         assert!(rest.position[16].z < -0.2, "{}", rest.position[16]);
         // About critical.
         model.mass_damping = 2.0 * first_frequency(THIN);
@@ -776,7 +780,7 @@ mod tests {
             iterative(Preconditioner::LaggedFactors { renew_after: 10 }),
         ] {
             let settings = DynamicSettings { linear, ..DynamicSettings::new(1.0) };
-            let mut solver = BackwardEuler::new(&model, settings).unwrap();
+            let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
             let mut state = State::at_rest(&model);
             for _ in 0..60 {
                 solver.advance(&mut state).unwrap();
@@ -793,7 +797,7 @@ mod tests {
         weigh(&mut model, 0.5);
         model.mass_damping = 1.0;
         let run = |settings: DynamicSettings| {
-            let mut solver = BackwardEuler::new(&model, settings).unwrap();
+            let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
             let mut state = State::at_rest(&model);
             for _ in 0..100 {
                 solver.advance(&mut state).unwrap();

@@ -1,19 +1,21 @@
 //! What acts on the nodes of a model at a state, without a solver: for reactions, energies and whoever looks at a run.
 
+use std::sync::Arc;
+
 use crate::error::SolveError;
 use crate::model::Model;
 use crate::state::State;
 use crate::system::System;
 
 /// Forces and moments on the nodes of a model at the state last evaluated.
-pub struct Forces<'m> {
-    pub(crate) system: System<'m>,
+pub struct Forces {
+    pub(crate) system: System,
 }
 
-impl<'m> Forces<'m> {
+impl Forces {
     /// For a model; nothing is known before the first evaluation.
-    pub fn new(model: &'m Model) -> Self {
-        Self { system: System::forces_only(model) }
+    pub fn new(model: impl Into<Arc<Model>>) -> Self {
+        Self { system: System::forces_only(model.into()) }
     }
 
     /// Finds the forces at a state and its time.

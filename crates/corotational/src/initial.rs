@@ -86,7 +86,7 @@ mod tests {
         let mut state = State::at_rest(&model);
         let nodes: Vec<u32> = (0..model.rest.len() as u32).collect();
         state.set_motion(&nodes, velocity, spin, Vector3::zeros());
-        let mut solver = BackwardEuler::new(&model, DynamicSettings::new(0.02)).unwrap();
+        let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(0.02)).unwrap();
         for _ in 0..5 {
             solver.advance(&mut state).unwrap();
         }
@@ -109,7 +109,7 @@ mod tests {
         end.motion = Motion::Moved { by: [0.0, 0.0, 0.0, vector.x, vector.y, vector.z], curve: ramp() };
         model.constraints.push(end);
         let mut state = State::at_rest(&model);
-        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         for time in [0.3, 0.5, 1.0] {
             solver.solve(&mut state, time).unwrap();
             let wanted = exponential(&(vector * time));
@@ -118,7 +118,7 @@ mod tests {
             }
         }
         let mut state = State::at_rest(&model);
-        let mut solver = BackwardEuler::new(&model, DynamicSettings::new(0.1)).unwrap();
+        let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(0.1)).unwrap();
         for _ in 0..7 {
             solver.advance(&mut state).unwrap();
         }
@@ -140,7 +140,8 @@ mod tests {
         let kind = LoadKind::Carried { points: points.clone(), forces: vec![force] };
         model.loads.push(Load { name: "pull".into(), kind, curve: ramp(), controlled: false });
         let mut state = State::at_rest(&model);
-        let step = Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+        let step =
+            Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         println!("{} iterations", step.residuals.len());
         let point = surface.carried(&model, &state, &points[0]);
         let arm = point - state.position[17];

@@ -27,7 +27,7 @@
 //! model.loads.push(Load { name: "lift".into(), kind, curve, controlled: false });
 //!
 //! let mut state = State::at_rest(&model);
-//! let step = Statics::new(&model, StaticSettings::default())?.solve(&mut state, 1.0)?;
+//! let step = Statics::new(model.clone(), StaticSettings::default())?.solve(&mut state, 1.0)?;
 //! assert!(step.residuals.len() < 20 && step.negative_pivots == 0);
 //! assert!(state.displacement(&model, 21).z > 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -250,7 +250,7 @@ mod tests {
             let mut model = balloon(cuts, pressure);
             model.loads[0].controlled = false;
             let mut state = State::at_rest(&model);
-            Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+            Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
             let mut fields = ShellFields::default();
             fields.fill(&model, &state).unwrap();
             let count = model.facets.len() as f64;
@@ -307,7 +307,7 @@ mod tests {
             model.loads.push(Load { name: "load".into(), kind, curve: curve.clone(), controlled: false });
         }
         let mut state = State::at_rest(&model);
-        Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+        Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         let mut fields = ShellFields::default();
         fields.fill(&model, &state).unwrap();
         let ratios = model.facets.iter().zip(&fields.membrane).map(|(facet, n)| {

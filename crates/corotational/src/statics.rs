@@ -4,6 +4,8 @@
 //! largest residual on them (Levenberg 1944, Marquardt 1963): it bounds what an iteration moves them and vanishes at equilibrium.
 //! Leaves out: branch switching at bifurcations.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 
 use crate::error::SolveError;
@@ -17,7 +19,7 @@ use crate::system::{Phases, System};
 /// How equilibria are sought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticSettings {
-    /// Iterations of Newton's method at most in a load step; more while each leaves less than a tenth of the residual.
+    /// Iterations of Newton's method at most in a load step.
     pub iterations: usize,
     /// How often a load step that fails is halved.
     pub halvings: usize,
@@ -53,9 +55,6 @@ impl Default for StaticSettings {
 
 /// Growth of the residual along an increment above which it is shortened. With 1 the slit annulus takes a fifth more iterations.
 const GROWTH: f64 = 10.0;
-
-/// What an iteration leaves of the residual where Newton's method converges.
-const CONVERGING: f64 = 0.1;
 
 /// What a residual on a node of a membrane may move it in an iteration, as a part of the extent of the membranes.
 const REACH: f64 = 0.1;
@@ -116,8 +115,8 @@ pub struct Attempted {
 }
 
 /// A static solver.
-pub struct Statics<'m> {
-    system: System<'m>,
+pub struct Statics {
+    system: System,
     settings: StaticSettings,
     /// Equations of the translations of nodes that only membranes hold.
     slack: Vec<u32>,
@@ -151,16 +150,17 @@ struct Attempt {
     retry: bool,
 }
 
-impl<'m> Statics<'m> {
+impl Statics {
     /// A solver for a model.
     ///
     /// # Errors
     /// If a part of the model is free to move as a rigid body.
-    pub fn new(model: &'m Model, settings: StaticSettings) -> Result<Self, SolveError> {
-        check_held(model)?;
-        let system = System::new(model, settings.linear)?;
+    pub fn new(model: impl Into<Arc<Model>>, settings: StaticSettings) -> Result<Self, SolveError> {
+        let model = model.into();
+        check_held(&model)?;
+        let system = System::new(Arc::clone(&model), settings.linear)?;
         let (all, free) = (6 * model.rest.len(), system.equations.len());
-        let (slack, extent) = slack(model, &system);
+        let (slack, extent) = slack(&model, &system);
         let stiffest = model.facets.iter().map(|facet| facet.stiffest()).fold(0.0, f64::max);
         Ok(Self {
             settings,
@@ -304,7 +304,7 @@ impl<'m> Statics<'m> {
             }
             Control::ArcLength { length } => [Control::ArcLength { length: 0.5 * length }; 2],
             Control::Volume { volume } => {
-                let now = controlled_volume(self.system.model, state);
+                let now = controlled_volume(&self.system.model, state);
                 [Control::Volume { volume: 0.5 * (now + volume) }, control]
             }
         }
@@ -326,7 +326,7 @@ impl<'m> Statics<'m> {
         self.system.prescribed(state.time, time, &mut self.pending);
         let mut residuals: Vec<f64> = Vec::new();
         let mut negative_pivots = 0;
-        for iteration in 0.. {
+        for iteration in 0..=self.settings.iterations {
             self.system
                 .evaluate(state, time, Some((self.settings.tangent, &self.pending)))
                 .map_err(failed)?;
@@ -343,8 +343,7 @@ impl<'m> Statics<'m> {
                 state.time = time;
                 return Ok(Step { time, residuals, negative_pivots, parts: 0 });
             }
-            let converging = residuals.len() > 1 && norm < CONVERGING * residuals[residuals.len() - 2];
-            if !norm.is_finite() || iteration >= self.settings.iterations && !converging {
+            if !norm.is_finite() || iteration == self.settings.iterations {
                 break;
             }
             negative_pivots = match self.find_direction() {
@@ -478,7 +477,7 @@ impl<'m> Statics<'m> {
                 squared - length * length
             }
             Control::Volume { volume } => {
-                let model = self.system.model;
+                let model = Arc::clone(&self.system.model);
                 for load in model.loads.iter().filter(|load| load.controlled) {
                     let LoadKind::Pressure { cells, .. } = &load.kind else { continue };
                     for &cell in cells {
@@ -492,7 +491,7 @@ impl<'m> Statics<'m> {
                         }
                     }
                 }
-                controlled_volume(model, state) - volume
+                controlled_volume(&model, state) - volume
             }
         }
     }
@@ -542,7 +541,7 @@ impl<'m> Statics<'m> {
 }
 
 /// The equations of the translations of nodes that only membranes hold, and the extent of these nodes [m].
-fn slack(model: &Model, system: &System<'_>) -> (Vec<u32>, f64) {
+fn slack(model: &Model, system: &System) -> (Vec<u32>, f64) {
     let mut slack = vec![false; model.rest.len()];
     let mut mark = |nodes: &[u32], is: bool| nodes.iter().for_each(|&node| slack[node as usize] = is);
     model.facets.iter().for_each(|facet| mark(&facet.nodes, true));

@@ -1,6 +1,7 @@
 //! Forces and stiffness of a model at a state: cells side by side, then added up in their order, so that the number of
 //! threads changes no bit.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -35,8 +36,8 @@ pub struct Phases {
 }
 
 /// A model's equations with the forces and the stiffness last found.
-pub(crate) struct System<'m> {
-    pub(crate) model: &'m Model,
+pub(crate) struct System {
+    pub(crate) model: Arc<Model>,
     pub(crate) equations: Equations,
     pub(crate) matrix: LowerMatrix,
     places: Vec<Vec<u32>>,
@@ -85,9 +86,9 @@ struct FacetResult {
     broken: Option<Broken>,
 }
 
-impl<'m> System<'m> {
-    pub(crate) fn new(model: &'m Model, solver: LinearSolver) -> Result<Self, SolveError> {
-        let mut system = Self::forces_only(model);
+impl System {
+    pub(crate) fn new(model: Arc<Model>, solver: LinearSolver) -> Result<Self, SolveError> {
+        let mut system = Self::forces_only(Arc::clone(&model));
         let matrix = &mut system.matrix;
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
         let cells = facets.chain(model.tets.iter().map(|tet| &tet.nodes[..]));
@@ -109,7 +110,7 @@ impl<'m> System<'m> {
     }
 
     /// A system that has forces, but no stiffness.
-    pub(crate) fn forces_only(model: &'m Model) -> Self {
+    pub(crate) fn forces_only(model: Arc<Model>) -> Self {
         let nodes = model.rest.len();
         let mut free = vec![false; 6 * nodes];
         for facet in &model.facets {
@@ -128,7 +129,6 @@ impl<'m> System<'m> {
             }
         }
         Self {
-            model,
             equations: Equations::new(&free),
             matrix: LowerMatrix::default(),
             places: Vec::new(),
@@ -148,12 +148,13 @@ impl<'m> System<'m> {
                     use LoadKind::{Carried, Pressure};
                     matches!(load.kind, Carried { .. } | Pressure { spread: Spread::Curved, .. })
                 })
-                .then(|| CurvedSurface::new(model, EdgeRule::Arc)),
+                .then(|| CurvedSurface::new(&model, EdgeRule::Arc)),
             energy: 0.0,
             largest: 0.0,
             results: vec![FacetResult::none(); CHUNK.min(model.facets.len())],
             phases: Phases::default(),
             last_solution: LinearReport::default(),
+            model,
         }
     }
 
@@ -217,7 +218,7 @@ impl<'m> System<'m> {
 
     /// Loads on nodes, and pressures on facets.
     fn nodal_loads(&mut self, state: &State, time: f64) {
-        let model = self.model;
+        let model = Arc::clone(&self.model);
         self.external.fill(0.0);
         self.controlled.fill(0.0);
         self.pressure.fill(Pressure::default());
@@ -252,7 +253,7 @@ impl<'m> System<'m> {
                     let Some(surface) = &self.surface else { continue };
                     for (point, force) in points.iter().zip(forces) {
                         let facet = point.place.facet;
-                        let back = surface.patch(model, state, facet).carried_forces(point, force);
+                        let back = surface.patch(&model, state, facet).carried_forces(point, force);
                         for (i, &node) in model.facets[facet as usize].nodes.iter().enumerate() {
                             add(node, 0, back.fixed_rows::<3>(6 * i).into());
                             add(node, 3, back.fixed_rows::<3>(6 * i + 3).into());
@@ -278,7 +279,7 @@ impl<'m> System<'m> {
         state: &State,
         tangent: Option<(Tangent, &[f64])>,
     ) -> Result<(), SolveError> {
-        let model = self.model;
+        let model = Arc::clone(&self.model);
         let mut results = std::mem::take(&mut self.results);
         let wanted = Wanted {
             kind: tangent.map(|(kind, _)| kind),
@@ -291,7 +292,7 @@ impl<'m> System<'m> {
             let (pressure, surface) = (&self.pressure, self.surface.as_ref());
             results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
                 let number = first + at;
-                let patch = || surface.map(|surface| surface.patch(model, state, number as u32));
+                let patch = || surface.map(|surface| surface.patch(&model, state, number as u32));
                 let facet = &model.facets[number];
                 result.broken = result.fill(facet, state, pressure[number], patch, wanted).err();
             });
@@ -339,7 +340,7 @@ impl<'m> System<'m> {
     }
 
     fn evaluate_tets(&mut self, state: &State, moved: Option<&[f64]>) -> Result<(), SolveError> {
-        let model = self.model;
+        let model = Arc::clone(&self.model);
         let mut results = std::mem::take(&mut self.tet_results);
         let mut broken = None;
         for first in (0..model.tets.len()).step_by(CHUNK) {

@@ -193,7 +193,7 @@ fn bad_shells_are_told_with_their_element() {
 #[test]
 fn a_body_that_nothing_holds_is_named_with_its_free_modes() {
     let mut model = model(strip(), 0.1);
-    let free = |model: &Model| match Statics::new(model, StaticSettings::default()) {
+    let free = |model: &Model| match Statics::new(model.clone(), StaticSettings::default()) {
         Err(SolveError::FreeBody { free_modes, .. }) => free_modes,
         Err(error) => panic!("{error}"),
         Ok(_) => 0,
@@ -215,7 +215,7 @@ fn a_singular_stiffness_names_its_node() {
     let formulation = Formulation { membrane: Membrane::Cst { drilling: 0.0 }, ..Formulation::default() };
     model.add_shell(&Shell { formulation, ..Shell::new("skin", cells, 0.1, MATERIAL) }).unwrap();
     model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
-    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let error = solver.linear(&State::at_rest(&model), 1.0).unwrap_err();
     assert!(matches!(error, SolveError::Singular { component: "rotation about z", .. }), "{error}");
 }
@@ -285,7 +285,7 @@ fn all_linear_solvers_find_the_same_equilibrium() {
     ] {
         let mut state = State::at_rest(&model);
         let mut solver =
-            Statics::new(&model, StaticSettings { linear, ..StaticSettings::default() }).unwrap();
+            Statics::new(model.clone(), StaticSettings { linear, ..StaticSettings::default() }).unwrap();
         let step = solver.solve(&mut state, 1.0).unwrap();
         assert!(step.residuals.len() < 15, "{linear:?}: {:?}", step.residuals);
         found.push(state);
@@ -307,7 +307,7 @@ fn threads_change_no_bit() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let mut state = State::at_rest(&model);
-            Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+            Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
             state
         })
     };
@@ -325,7 +325,7 @@ fn threads_change_no_bit_of_conjugate_gradients() {
         pool.install(|| {
             let mut state = State { load_factor: 1.0, ..State::at_rest(&model) };
             let mut solver =
-                BackwardEuler::new(&model, DynamicSettings::new(0.04).real_time(linear)).unwrap();
+                BackwardEuler::new(model.clone(), DynamicSettings::new(0.04).real_time(linear)).unwrap();
             for _ in 0..3 {
                 solver.advance(&mut state).unwrap();
             }
@@ -352,10 +352,10 @@ fn iterations_that_run_out_are_taken_if_told_so() {
     };
     let settings = DynamicSettings { halvings: 0, ..DynamicSettings::new(0.04).real_time(linear) };
     let mut state = State { load_factor: 1.0, ..State::at_rest(&model) };
-    let error = BackwardEuler::new(&model, settings).unwrap().advance(&mut state).unwrap_err();
+    let error = BackwardEuler::new(model.clone(), settings).unwrap().advance(&mut state).unwrap_err();
     assert!(matches!(error, SolveError::Stalled { iterations: 4, .. }), "{error}");
     let settings = DynamicSettings { accept_stalled: true, ..settings };
-    let step = BackwardEuler::new(&model, settings).unwrap().advance(&mut state).unwrap();
+    let step = BackwardEuler::new(model.clone(), settings).unwrap().advance(&mut state).unwrap();
     assert_eq!(step.linear.iterations, 4);
     assert!(step.linear.residual > 1e-9 && step.linear.residual < 1.0, "{:?}", step.linear);
     assert_ne!(state.position, model.rest);
@@ -374,7 +374,7 @@ fn a_turned_support_turns_the_whole_strip() {
         motion: Motion::Moved { by, curve: ramp() },
     });
     let mut state = State::at_rest(&model);
-    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     for step in 1..=4 {
         solver.solve(&mut state, f64::from(step) / 4.0).unwrap();
     }
@@ -390,7 +390,7 @@ fn a_turned_support_turns_the_whole_strip() {
 fn reactions_balance_the_loads() {
     let model = cantilever();
     let mut state = State::at_rest(&model);
-    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     solver.solve(&mut state, 1.0).unwrap();
     let sum: f64 = solver.reactions().enumerate().filter(|(node, _)| node % 9 == 0).map(|(_, r)| r[2]).sum();
     assert!((sum + 1.5).abs() < 1e-6, "{sum}");
@@ -405,7 +405,7 @@ fn a_balloon_takes_the_volume_it_is_told() {
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
         let rest = model.enclosed_volume(&cells, &model.rest);
         let mut state = State::at_rest(&model);
-        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         solver.control(&mut state, Control::Volume { volume: rest * growth.powi(3) }).unwrap();
         let volume = model.enclosed_volume(&cells, &state.position);
         assert!((volume / (rest * growth.powi(3)) - 1.0).abs() < 1e-8);
@@ -432,7 +432,7 @@ fn a_balloon_doubles_its_volume() {
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
         let rest = model.enclosed_volume(&cells, &model.rest);
         let mut state = State::at_rest(&model);
-        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         for part in 1..=10 {
             let volume = rest * (1.0 + 0.1 * f64::from(part));
             solver.control(&mut state, Control::Volume { volume }).unwrap();
@@ -453,7 +453,7 @@ fn arc_length_and_displacement_control_agree() {
     let mut model = cantilever();
     model.loads[0].controlled = true;
     model.loads[0].curve = hold();
-    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&model);
     for _ in 0..4 {
         solver.control(&mut state, Control::ArcLength { length: 1.0 }).unwrap();
@@ -481,7 +481,7 @@ fn a_failed_load_step_keeps_what_was_found() {
     model.loads.push(Load { name: "crush".into(), kind, curve: ramp(), controlled: false });
     let settings = StaticSettings { halvings: 3, iterations: 8, ..StaticSettings::default() };
     let mut state = State::at_rest(&model);
-    let mut solver = Statics::new(&model, settings).unwrap();
+    let mut solver = Statics::new(model.clone(), settings).unwrap();
     let error = solver.solve(&mut state, 1.0).unwrap_err();
     println!("{error}");
     assert!(state.time < 1.0 && state.position.iter().all(|x| x.iter().all(|c| c.is_finite())));
@@ -642,7 +642,7 @@ fn a_block_of_tets_is_stretched_as_by_hooke() {
         }
     }
     let mut state = State::at_rest(&model);
-    Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+    Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     for (x, rest) in state.position.iter().zip(&model.rest) {
         let strain = stress / 1e6;
         let exact = Vector3::new(
@@ -678,7 +678,7 @@ fn shells_and_tets_move_together() {
     };
     let sag = |model: &Model| {
         let mut state = State::at_rest(model);
-        Statics::new(model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+        Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         state.position[8].z
     };
     let mut both = build(true);
@@ -687,7 +687,7 @@ fn shells_and_tets_move_together() {
     assert!(skinned < 0.0 && bare < 1.05 * skinned, "{bare} {skinned}");
     both.mass_damping = 2.0;
     let mut state = State::at_rest(&both);
-    let mut solver = BackwardEuler::new(&both, DynamicSettings::new(0.5)).unwrap();
+    let mut solver = BackwardEuler::new(both.clone(), DynamicSettings::new(0.5)).unwrap();
     for _ in 0..100 {
         solver.advance(&mut state).unwrap();
     }
@@ -789,7 +789,7 @@ fn blown_up(
     let model = sphere_of_320(formulation, spread);
     let settings = StaticSettings { linear, halvings: 0, ..StaticSettings::default() };
     let mut state = State::at_rest(&model);
-    let step = Statics::new(&model, settings)?.solve(&mut state, 1.0)?;
+    let step = Statics::new(model.clone(), settings)?.solve(&mut state, 1.0)?;
     Ok((step, radii(&state)))
 }
 
@@ -833,7 +833,7 @@ fn conjugate_gradients_tell_why_they_stop() {
         let mut state = State::at_rest(&model);
         state.position.iter_mut().for_each(|x| x.x *= squeeze);
         let settings = StaticSettings { linear, ..StaticSettings::default() };
-        Statics::new(&model, settings).unwrap().linear(&state, 1.0).map(|_| ())
+        Statics::new(model.clone(), settings).unwrap().linear(&state, 1.0).map(|_| ())
     };
     assert_eq!(solve(5000, 1.0), Ok(()));
     assert!(matches!(solve(3, 1.0), Err(SolveError::Stalled { iterations: 3, .. })));
@@ -846,7 +846,7 @@ fn a_balloon_must_be_closed() {
     let mut model = balloon(2, 1.0);
     let cells = (1..128).collect();
     model.loads[0].kind = LoadKind::Pressure { cells, pressure: 1.0, spread: Spread::Lumped };
-    let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+    let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&model);
     let error = solver.control(&mut state, Control::Volume { volume: 5.0 }).unwrap_err();
     assert!(error.to_string().contains("1 open border: 3 nodes"), "{error}");
@@ -859,7 +859,7 @@ fn hencky_slack_membrane_under_pressure() {
     let off = [8, 16, 32].map(|cells| {
         let (model, middle) = round_membrane(cells);
         let mut state = State::at_rest(&model);
-        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         let step = solver.solve(&mut state, 1.0).unwrap();
         let ratio = state.position[middle].z / (0.653 * 1e-3_f64.cbrt());
         println!("{cells} cells: w over Hencky's {ratio:.4}, {} iterations", step.residuals.len() - 1);
@@ -877,7 +877,7 @@ fn hencky_slack_membrane_under_pressure() {
     };
     for linear in [LinearSolver::Direct, gradients] {
         let settings = StaticSettings { linear, ..StaticSettings::default() };
-        let mut solver = Statics::new(&model, settings).unwrap();
+        let mut solver = Statics::new(model.clone(), settings).unwrap();
         let mut state = State::at_rest(&model);
         for time in [0.25, 0.5, 0.75, 1.0] {
             assert_eq!(solver.solve(&mut state, time).unwrap().parts, 1);
@@ -946,7 +946,7 @@ fn a_taut_membrane_rises_as_by_poisson() {
         let kind = LoadKind::Pressure { cells: all, pressure, spread: Spread::Lumped };
         model.loads.push(Load { name: "pressure".into(), kind, curve: ramp(), controlled: false });
         let mut state = State::at_rest(&model);
-        Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+        Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         let ratio = state.position[(row * row / 2) as usize].z / (0.073671 * pressure / tension);
         println!("{membrane:?}: rise over Poisson's {ratio:.4}");
         assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
@@ -977,7 +977,7 @@ fn a_twisted_strip_is_one_of_kirchhoff() {
             });
         }
         let mut state = State::at_rest(&model);
-        let mut solver = Statics::new(&model, StaticSettings::default()).unwrap();
+        let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         solver.solve(&mut state, 1.0).unwrap();
         let reactions: Vec<[f64; 6]> = solver.reactions().collect();
         let torque: f64 =
@@ -1036,7 +1036,7 @@ fn timoshenko_two_layer_strip_stretches_as_it_bends() {
         1e6 * (own + area * (0.025 + neutral).powi(2)) + 4e6 * (own + area * (0.025 - neutral).powi(2));
     let curvature = moment / rigidity;
     let mut state = State::at_rest(&model);
-    Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+    Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     for node in [8, 17, 26] {
         let moved = state.displacement(&model, node);
         // Lifted, so that the stiff top is pressed; the middle lies on the side of the neutral axis that is pulled.
@@ -1096,7 +1096,7 @@ fn layers_pass_the_patch_test() {
             x.z -= 0.5 * (kx * a * a + ky * b * b + kxy * a * b);
             *r = exponential(&Vector3::new(-ky * b - 0.5 * kxy * a, kx * a + 0.5 * kxy * b, 0.0));
         }
-        let mut forces = Forces::new(&model);
+        let mut forces = Forces::new(model.clone());
         forces.evaluate(&state).unwrap();
         let largest = forces.internal().iter().fold(0.0_f64, |all, force| all.max(force.abs()));
         for node in 10..16 {
@@ -1148,7 +1148,7 @@ fn navier_orthotropic_plate() {
         model.loads.push(Load { name: "pressure".into(), kind, curve: ramp(), controlled: false });
     }
     let mut state = State::at_rest(&model);
-    Statics::new(&model, StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+    Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     let part = 1.0 - 0.25 * 0.25 / 25.0;
     let [stiff, soft] = [25e6 / part, 1e6 / part];
     let (whole, core) = (0.01_f64.powi(3) / 12.0, 0.004_f64.powi(3) / 12.0);

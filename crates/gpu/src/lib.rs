@@ -14,7 +14,7 @@
 //!
 //! fn fall(device: &Device, model: &Model, step: f64) -> Result<State<f32>, StepFailure> {
 //!     let mut state = State::at_rest(model);
-//!     let mut stepper = GpuStepper::new(device, model, step, None)?;
+//!     let mut stepper = GpuStepper::new(device, model.clone(), step, None)?;
 //!     stepper.advance(&mut state, 1000)?;
 //!     stepper.evaluate(&mut state, Wanted::Everything)?;
 //!     println!("{} J", stepper.energies().kinetic);

@@ -1,5 +1,6 @@
 //! The central difference method on a device; the method itself stands in the stepper of `pliant-mechanics`.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
 
 use pliant_mechanics::grip::Grip;
@@ -72,9 +73,9 @@ struct Results {
 /// changes of the one that is handed in is its clock, its energies, what was seen of the limit, and what it is asked for.
 ///
 /// The first state that is handed in is taken up; [`upload`](Self::upload) takes up another one.
-pub struct GpuStepper<'m> {
+pub struct GpuStepper {
     device: Device,
-    model: &'m Model,
+    model: Arc<Model>,
     design: Design,
     owners: Vec<[u32; 3]>,
     control: StepControl,
@@ -115,7 +116,7 @@ pub struct GpuStepper<'m> {
     next: Vec<Vector<f32>>,
 }
 
-impl Observable<f32> for GpuStepper<'_> {
+impl Observable<f32> for GpuStepper {
     fn energies(&self) -> &Energies {
         &self.energies
     }
@@ -138,27 +139,28 @@ impl Observable<f32> for GpuStepper<'_> {
     }
 }
 
-impl<'m> GpuStepper<'m> {
+impl GpuStepper {
     /// A stepper for steps of `step` seconds, of a design or [`Design::usual`].
     ///
     /// # Errors
     /// If constraints contradict each other, or the device can't take the model.
     pub fn new(
         device: &Device,
-        model: &'m Model,
+        model: impl Into<Arc<Model>>,
         step: f64,
         design: Option<Design>,
     ) -> Result<Self, GpuError> {
+        let model = model.into();
         let owners = model.constrained_components()?;
         let memory = Memory::new(device);
         let design = design.unwrap_or(Design::usual(device.adapter().kind));
-        device.fill(|| memory.bytes(), || Self::on_device(device, &memory, model, step, design, owners))
+        device.fill(|| memory.bytes(), || Self::on_device(device, &memory, &model, step, design, owners))
     }
 
     fn on_device(
         device: &Device,
         memory: &Memory<'_>,
-        model: &'m Model,
+        model: &Arc<Model>,
         step: f64,
         design: Design,
         owners: Vec<[u32; 3]>,
@@ -186,7 +188,7 @@ impl<'m> GpuStepper<'m> {
         let control = StepControl::new(step);
         Ok(Self {
             device: device.clone(),
-            model,
+            model: Arc::clone(model),
             design,
             control,
             lengths: Lengths { before: step, next: step },
@@ -333,7 +335,7 @@ impl<'m> GpuStepper<'m> {
             let square = |u: &Vector<f32>| u.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>();
             let fastest = (0..).zip(&self.next).max_by(|(_, a), (_, b)| square(a).total_cmp(&square(b)));
             let fastest = fastest.map_or(0, |(node, _)| node);
-            return Err(StepError::unbalanced(self.model, fastest, self.energies.balance, state.time).into());
+            return Err(StepError::unbalanced(&self.model, fastest, self.energies.balance, state.time).into());
         }
         Ok(below?)
     }
@@ -386,7 +388,7 @@ impl<'m> GpuStepper<'m> {
     /// If there are too many for the device.
     pub fn hold(&mut self, grips: &[Grip]) -> Result<(), GpuError> {
         self.nodes.mark(&self.device, &self.grips.nodes, false);
-        let numbers = self.grips.take(self.model, grips);
+        let numbers = self.grips.take(&self.model, grips);
         self.nodes.mark(&self.device, &self.grips.nodes, true);
         self.instants.hold(&self.device, &numbers)
     }
@@ -459,7 +461,7 @@ impl<'m> GpuStepper<'m> {
                     _ => Lengths { before: self.lengths.next, next: self.lengths.next },
                 };
                 let instant = Instant::new(self.since, flags::MOVES, lengths);
-                self.instants.push(self.model, state.time, lengths.next, instant);
+                self.instants.push(&self.model, state.time, lengths.next, instant);
                 self.count(state);
             }
             let count = self.instants.len();
@@ -522,9 +524,9 @@ impl<'m> GpuStepper<'m> {
                     displacement.iter_mut().zip(fours).for_each(|(to, &[x, y, z, _])| *to = [x, y, z]);
                 },
             )?;
-            self.control.look(self.model, &self.owners, state, deformed);
+            self.control.look(&self.model, &self.owners, state, deformed);
         }
-        let below = self.control.choose(self.model, state);
+        let below = self.control.choose(&self.model, state);
         self.control.note(state);
         Ok(below)
     }
@@ -542,7 +544,7 @@ impl<'m> GpuStepper<'m> {
     /// Evaluates an instant, with the forces of cells found anew or as they stand.
     fn submit_evaluation(&mut self, time: f64, flags: u32, anew: bool) -> Result<Results, GpuError> {
         let instant = Instant::new(self.since, flags, self.lengths);
-        self.instants.push(self.model, time, self.lengths.next, instant);
+        self.instants.push(&self.model, time, self.lengths.next, instant);
         let (nodes, side) = (&self.kernels, self.side);
         let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
         self.instants.submit(&self.device, |pass, bound, _, offset| {
@@ -684,7 +686,7 @@ impl<'m> GpuStepper<'m> {
             return error.into();
         }
         let mut copy = State { work: Default::default(), ..state.clone() };
-        let found = CentralDifference::new(self.model, self.control.step())
+        let found = CentralDifference::new(Arc::clone(&self.model), self.control.step())
             .map_err(|error| error.to_string())
             .and_then(|mut stepper| match stepper.evaluate(&mut copy) {
                 Err(error) => Ok(error),

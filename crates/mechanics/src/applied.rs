@@ -1,5 +1,7 @@
 //! The forces of loads and gravity on the nodes of a model at one instant.
 
+use std::sync::Arc;
+
 use crate::Real;
 use crate::grip::Grip;
 use crate::load::LoadKind;
@@ -7,8 +9,8 @@ use crate::model::Model;
 use crate::tensor::{Vector, add, cast};
 
 /// Forces applied to the nodes, found anew for each instant.
-pub(crate) struct AppliedForces<'m> {
-    model: &'m Model,
+pub(crate) struct AppliedForces {
+    model: Arc<Model>,
     /// Forces of loads [N], one per node.
     nodal: Vec<Vector<f64>>,
     /// Acceleration [m/s²] by gravity, one per body.
@@ -17,16 +19,16 @@ pub(crate) struct AppliedForces<'m> {
     grips: Vec<Grip>,
 }
 
-impl<'m> AppliedForces<'m> {
-    pub(crate) fn new(model: &'m Model) -> Self {
+impl AppliedForces {
+    pub(crate) fn new(model: Arc<Model>) -> Self {
         let mut body_of = vec![0; model.node_count()];
         for (index, body) in model.bodies.iter().enumerate() {
             body_of[body.nodes.start as usize..body.nodes.end as usize].fill(index as u16);
         }
         Self {
-            model,
             nodal: vec![[0.0; 3]; model.node_count()],
             gravity: vec![[0.0; 3]; model.bodies.len()],
+            model,
             body_of,
             grips: Vec::new(),
         }
@@ -47,7 +49,7 @@ impl<'m> AppliedForces<'m> {
         }
         self.nodal.fill([0.0; 3]);
         self.gravity.fill([0.0; 3]);
-        let model = self.model;
+        let model = &self.model;
         for load in &model.loads {
             if let LoadKind::Gravity { body, acceleration } = load.kind {
                 let factor = load.curve.value(time);

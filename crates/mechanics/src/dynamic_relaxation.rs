@@ -15,6 +15,8 @@
 //! the displacements. The error of a trapezium over b, after one over a, is estimated from both: (T_ab − T_a − T_b) b²/(3 a (a + b)),
 //! with a and b the lengths of the ways of all nodes.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -287,15 +289,15 @@ impl<R: Real> Way<R> {
 
 /// Finds equilibria of one model. Holds constants, scratch and the [`Equilibrium`] last found; the next one comes from
 /// the state alone.
-pub struct DynamicRelaxation<'m, R> {
-    model: &'m Model,
+pub struct DynamicRelaxation<R> {
+    model: Arc<Model>,
     settings: RelaxationSettings,
     owners: Vec<[u32; 3]>,
     /// Fictitious masses.
     mass: Vec<R>,
     /// Factor on them.
     slowness: f64,
-    applied: AppliedForces<'m>,
+    applied: AppliedForces,
     trial_history: Vec<History<R>>,
     /// u − u one iteration before.
     increment: Vec<Vector<R>>,
@@ -340,13 +342,13 @@ impl Course {
 }
 
 /// At the last equilibrium. Kinetic energy, damping and velocities are none.
-impl<R: Real> Observable<R> for DynamicRelaxation<'_, R> {
+impl<R: Real> Observable<R> for DynamicRelaxation<R> {
     fn energies(&self) -> &Energies {
         &self.energies
     }
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
-        sum_owned(self.model, &self.owners, constraint, &self.residual)
+        sum_owned(&self.model, &self.owners, constraint, &self.residual)
     }
 
     fn nodal_reaction(&self, node: usize) -> Vector<f64> {
@@ -358,20 +360,20 @@ impl<R: Real> Observable<R> for DynamicRelaxation<'_, R> {
     }
 }
 
-impl<'m, R: Real> DynamicRelaxation<'m, R> {
+impl<R: Real> DynamicRelaxation<R> {
     /// A solver for a model.
     ///
     /// # Errors
     /// If constraints contradict each other.
-    pub fn new(model: &'m Model, settings: RelaxationSettings) -> Result<Self, Contradiction> {
+    pub fn new(model: impl Into<Arc<Model>>, settings: RelaxationSettings) -> Result<Self, Contradiction> {
+        let model = model.into();
         let nodes = model.node_count();
         Ok(Self {
-            model,
             settings,
             owners: model.constrained_components()?,
-            mass: fictitious_masses(model).into_iter().map(R::of).collect(),
+            mass: fictitious_masses(&model).into_iter().map(R::of).collect(),
             slowness: 1.0,
-            applied: AppliedForces::new(model),
+            applied: AppliedForces::new(Arc::clone(&model)),
             trial_history: vec![History::default(); model.solids.len()],
             increment: vec![[R::ZERO; 3]; nodes],
             residual: vec![[R::ZERO; 3]; nodes],
@@ -380,6 +382,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             folded: None,
             energies: Energies::default(),
             way: Way::default(),
+            model,
         })
     }
 
@@ -485,7 +488,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
     ) -> Result<(), RelaxationError> {
         let duration = course.duration(from, to);
         let end = course.instant(to);
-        let mut forces = InternalForces::new(self.model, duration);
+        let mut forces = InternalForces::new(&self.model, duration);
         let start = self.start(state, course.instant(from));
         self.increment.fill([R::ZERO; 3]);
         let (mut slowest, mut least) = (0.0, f64::INFINITY);
@@ -716,7 +719,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
     ) {
         let given_up = self.given_up(forces, state, start, duration);
         let hourglass = forces.evaluate(&state.displacement, &mut state.history).hourglass;
-        let stored = Recovery::new(self.model, state).stored_energy();
+        let stored = Recovery::new(&self.model, state).stored_energy();
         let work = &mut state.work;
         let mut way = Vec::with_capacity(state.displacement.len());
         for (node, (u, u0)) in state.displacement.iter().zip(&start.displacement).enumerate() {
@@ -761,9 +764,9 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
         let halfway: Vec<Vector<R>> = (start.displacement.iter().zip(&state.displacement))
             .map(|(u, v)| [0, 1, 2].map(|c| u[c] + half * (v[c] - u[c])))
             .collect();
-        forces.set_step(self.model, 0.5 * duration);
+        forces.set_step(&self.model, 0.5 * duration);
         let (middle, sound) = self.missing(forces, &halfway, state);
-        forces.set_step(self.model, duration);
+        forces.set_step(&self.model, duration);
         let (end, _) = self.missing(forces, &state.displacement, state);
         let [ends, between] = if sound { [1.0 / 6.0, 4.0 / 6.0] } else { [0.5, 0.0] };
         let of_node = |node: usize| -> f64 {
@@ -795,7 +798,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
     /// The equilibrium that a load step starts from.
     fn start(&mut self, state: &State<R>, Instant { time, part }: Instant) -> Start<R> {
         // A step of no time leaves relaxing stresses as they are.
-        let mut forces = InternalForces::new(self.model, 0.0);
+        let mut forces = InternalForces::new(&self.model, 0.0);
         let (missing, _) = self.missing(&mut forces, &state.displacement, state);
         self.take_committed_history(state);
         let hourglass = forces.evaluate(&state.displacement, &mut self.trial_history).hourglass;
@@ -808,7 +811,7 @@ impl<'m, R: Real> DynamicRelaxation<'m, R> {
             displacement: state.displacement.clone(),
             outside: (0..self.model.node_count()).map(outside).collect(),
             missing,
-            stored: Recovery::new(self.model, state).stored_energy() + hourglass,
+            stored: Recovery::new(&self.model, state).stored_energy() + hourglass,
         }
     }
 

@@ -27,7 +27,7 @@
 //!
 //! let step = 0.9 * critical_step::element_bound(&model).unwrap().step;
 //! let mut state = State::<f64>::at_rest(&model);
-//! let mut stepper = CentralDifference::new(&model, step)?;
+//! let mut stepper = CentralDifference::new(model.clone(), step)?;
 //! for _ in 0..10 {
 //!     stepper.evaluate(&mut state)?;
 //!     stepper.advance(&mut state);

@@ -9,6 +9,7 @@
 //! Runs on the current rayon pool; sums go in the order of the nodes for any number of threads.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -108,8 +109,8 @@ impl<R: Real> Pace<R> {
 
 /// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that a restart
 /// would lose.
-pub struct CentralDifference<'m, R> {
-    model: &'m Model,
+pub struct CentralDifference<R> {
+    model: Arc<Model>,
     control: StepControl,
     lengths: Lengths,
     /// Length of a step [s] that relaxing laws are set to.
@@ -122,7 +123,7 @@ pub struct CentralDifference<'m, R> {
     mass: Vec<Vector<R>>,
     /// α of each component [1/s].
     damping: Vec<Vector<R>>,
-    applied: AppliedForces<'m>,
+    applied: AppliedForces,
     /// True if there is any load or grip.
     loaded: bool,
     processor: Processor,
@@ -136,13 +137,13 @@ pub struct CentralDifference<'m, R> {
 }
 
 /// At the last evaluation.
-impl<R: Real> Observable<R> for CentralDifference<'_, R> {
+impl<R: Real> Observable<R> for CentralDifference<R> {
     fn energies(&self) -> &Energies {
         &self.energies
     }
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
-        sum_owned(self.model, &self.owners, constraint, &self.reaction)
+        sum_owned(&self.model, &self.owners, constraint, &self.reaction)
     }
 
     fn nodal_reaction(&self, node: usize) -> Vector<f64> {
@@ -184,15 +185,15 @@ pub(crate) fn sum_owned<R: Real>(
 const BLOCK: usize = 16;
 
 /// A pass over the nodes from `first` on: the coming increments, reactions and sums.
-struct NodePass<'a, 'm, R> {
-    stepper: &'a CentralDifference<'m, R>,
+struct NodePass<'a, R> {
+    stepper: &'a CentralDifference<R>,
     first: usize,
     before: &'a [Vector<R>],
     next: &'a mut [Vector<R>],
     reaction: &'a mut [Vector<R>],
 }
 
-impl<R: Real> Work<R> for NodePass<'_, '_, R> {
+impl<R: Real> Work<R> for NodePass<'_, R> {
     type Output = Sums;
 
     /// Plain loops over a block of components, which the compiler makes wide.
@@ -346,12 +347,13 @@ impl<R: Real> Block<R> {
     }
 }
 
-impl<'m, R: Real> CentralDifference<'m, R> {
+impl<R: Real> CentralDifference<R> {
     /// A stepper for steps of `step` seconds.
     ///
     /// # Errors
     /// If constraints contradict each other.
-    pub fn new(model: &'m Model, step: f64) -> Result<Self, Contradiction> {
+    pub fn new(model: impl Into<Arc<Model>>, step: f64) -> Result<Self, Contradiction> {
+        let model = model.into();
         let nodes = model.node_count();
         let mut damping = vec![[R::ZERO; 3]; nodes];
         for body in &model.bodies {
@@ -359,16 +361,15 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         }
         let owners = model.constrained_components()?;
         Ok(Self {
-            model,
             control: StepControl::new(step),
             lengths: Lengths { before: step, next: step },
             relaxing: step,
-            forces: InternalForces::new(model, step),
+            forces: InternalForces::new(&model, step),
             held: held(&owners, &model.amplitudes(&owners)),
             owners,
             mass: (0..nodes).map(|node| [R::of(model.inertia(node)); 3]).collect(),
             damping,
-            applied: AppliedForces::new(model),
+            applied: AppliedForces::new(Arc::clone(&model)),
             loaded: !model.loads.is_empty(),
             processor: Processor::detect(),
             factors: vec![[[0.0; 2]; 2]; model.constraints.len()],
@@ -376,7 +377,8 @@ impl<'m, R: Real> CentralDifference<'m, R> {
             reaction: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
             energies: Energies::default(),
-            balance_floor: model_balance_floor::<R>(model),
+            balance_floor: model_balance_floor::<R>(&model),
+            model,
         })
     }
 
@@ -428,7 +430,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         let relaxing = self.control.relaxing(state);
         if self.relaxing != relaxing {
             self.relaxing = relaxing;
-            self.forces.set_step(self.model, self.relaxing);
+            self.forces.set_step(&self.model, self.relaxing);
         }
         let found = self.forces.evaluate(&state.displacement, &mut state.history);
         let below = match found.inverted {
@@ -451,9 +453,9 @@ impl<'m, R: Real> CentralDifference<'m, R> {
     /// Looks at the limit where one is due, and chooses the parts of the step to come.
     fn watch(&mut self, state: &mut State<R>, deformed: &Deformed) -> Result<(), StepError> {
         if self.control.is_due(state, deformed, CHECK_EVERY) {
-            self.control.look(self.model, &self.owners, state, deformed);
+            self.control.look(&self.model, &self.owners, state, deformed);
         }
-        let below = self.control.choose(self.model, state);
+        let below = self.control.choose(&self.model, state);
         self.control.note(state);
         below
     }
@@ -545,15 +547,15 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         if let Some((solid, cell, determinant)) = found.inverted
             && (finite || determinant.is_finite())
         {
-            return Err(StepError::inverted(self.model, solid, cell, determinant, state.time));
+            return Err(StepError::inverted(&self.model, solid, cell, determinant, state.time));
         }
         if !finite {
             let lost = |u: &Vector<R>| u.iter().any(|x| !x.to_f64().is_finite());
             let node = (state.displacement.iter().position(lost)).or_else(|| self.next.iter().position(lost));
-            return Err(StepError::not_finite(self.model, node.unwrap_or(0) as u32, state.time));
+            return Err(StepError::not_finite(&self.model, node.unwrap_or(0) as u32, state.time));
         }
         if let Some(cell) = found.folded {
-            return Err(StepError::folded(self.model, cell, state));
+            return Err(StepError::folded(&self.model, cell, state));
         }
         Ok(())
     }
@@ -568,7 +570,7 @@ impl<'m, R: Real> CentralDifference<'m, R> {
         self.energies = state.work.settle(sums, hourglass, before, self.balance_floor);
         if state.work.has_lost_balance() {
             let (fastest, balance) = (self.fastest_node(), self.energies.balance);
-            return Err(StepError::unbalanced(self.model, fastest, balance, state.time));
+            return Err(StepError::unbalanced(&self.model, fastest, balance, state.time));
         }
         Ok(())
     }

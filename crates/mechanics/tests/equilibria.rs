@@ -84,8 +84,8 @@ fn hold() -> Curve {
 }
 
 /// The equilibrium after one second in so many load steps.
-fn in_steps(cube: &Model, steps: u32) -> (DynamicRelaxation<'_, f64>, State<f64>) {
-    let mut solver = DynamicRelaxation::new(cube, RelaxationSettings::default()).unwrap();
+fn in_steps(cube: &Model, steps: u32) -> (DynamicRelaxation<f64>, State<f64>) {
+    let mut solver = DynamicRelaxation::new(cube.clone(), RelaxationSettings::default()).unwrap();
     let mut state = State::at_rest(cube);
     for step in 1..=steps {
         solver.solve(&mut state, f64::from(step) / f64::from(steps)).unwrap();
@@ -136,7 +136,7 @@ fn a_motion_held_from_the_start_does_the_work_of_one_that_grows() {
     let held = squeezed(0.45, Prony::default(), "tet4-anp", hold());
     let internal = |cube: &Model| in_steps(cube, 2).0.energies().internal;
     claim("energy of a motion at once", (internal(&held) / internal(&grown) - 1.0).abs(), 1e-5);
-    let mut solver = DynamicRelaxation::<f64>::new(&held, RelaxationSettings::default()).unwrap();
+    let mut solver = DynamicRelaxation::<f64>::new(held.clone(), RelaxationSettings::default()).unwrap();
     let mut state = State::at_rest(&held);
     solver.begin(&mut state).unwrap();
     assert_eq!((state.time, state.steps), (0.0, 0));
@@ -199,7 +199,7 @@ fn an_explicit_run_begins_with_the_instantaneous_law() {
         let stress = |prony: Prony| {
             let cube = squeezed(0.45, prony, element, hold());
             let mut state = State::<R>::at_rest(&cube);
-            CentralDifference::<R>::new(&cube, 1e-4).unwrap().evaluate(&mut state).unwrap();
+            CentralDifference::<R>::new(cube.clone(), 1e-4).unwrap().evaluate(&mut state).unwrap();
             let recovery = Recovery::new(&cube, &state);
             let cells = cube.solids[0].cells.len();
             (0..cells).map(|cell| recovery.cell(0, cell).pk2_stress.0[0]).fold(0.0, |a: f64, b| a.min(b))
@@ -222,7 +222,7 @@ fn single_precision_bends_a_slender_beam_as_far() {
     let kind = LoadKind::Forces(end);
     beam.loads.push(Load { name: "end".into(), kind, curve: ramp(), surface: None });
     fn bent<R: Real>(beam: &Model) -> (f64, f64) {
-        let mut solver = DynamicRelaxation::<R>::new(beam, RelaxationSettings::usual::<R>()).unwrap();
+        let mut solver = DynamicRelaxation::<R>::new(beam.clone(), RelaxationSettings::usual::<R>()).unwrap();
         let mut state = State::at_rest(beam);
         solver.solve(&mut state, 1.0).unwrap();
         (

@@ -18,20 +18,20 @@ pub fn run<R: Real>(
     step: f64,
     until: f64,
     observe: impl FnMut(&CentralDifference<R>, &State<R>),
-) -> Result<(CentralDifference<'_, R>, State<R>), CaseError> {
-    Ok(run_on(CentralDifference::new(model, step)?, State::at_rest(model), until, observe)?)
+) -> Result<(CentralDifference<R>, State<R>), CaseError> {
+    Ok(run_on(CentralDifference::new(model.clone(), step)?, State::at_rest(model), until, observe)?)
 }
 
 /// Steps a state to a time [s], both ends included.
 ///
 /// # Errors
 /// If a step fails.
-pub fn run_on<'m, R: Real>(
-    mut stepper: CentralDifference<'m, R>,
+pub fn run_on<R: Real>(
+    mut stepper: CentralDifference<R>,
     mut state: State<R>,
     until: f64,
     mut observe: impl FnMut(&CentralDifference<R>, &State<R>),
-) -> Result<(CentralDifference<'m, R>, State<R>), StepError> {
+) -> Result<(CentralDifference<R>, State<R>), StepError> {
     loop {
         stepper.evaluate(&mut state)?;
         observe(&stepper, &state);
@@ -43,9 +43,9 @@ pub fn run_on<'m, R: Real>(
 }
 
 /// A state that has come to rest.
-pub struct Equilibrium<'m> {
+pub struct Equilibrium {
     /// The stepper, for its reactions.
-    pub stepper: CentralDifference<'m, f64>,
+    pub stepper: CentralDifference<f64>,
     /// The state.
     pub state: State<f64>,
     /// The largest displacement of a node [m].
@@ -58,7 +58,7 @@ pub struct Equilibrium<'m> {
 ///
 /// # Errors
 /// If a step fails or the model still moves.
-pub fn settle(model: &Model, step: f64, until: f64) -> Result<Equilibrium<'_>, CaseError> {
+pub fn settle(model: &Model, step: f64, until: f64) -> Result<Equilibrium, CaseError> {
     let (stepper, state) = run(model, step, until, |_, _| ())?;
     let length = |v: Vector<f64>| dot(v, v).sqrt();
     let largest = state.displacement.iter().map(|&u| length(u)).fold(0.0, f64::max);
@@ -76,9 +76,9 @@ pub fn settle(model: &Model, step: f64, until: f64) -> Result<Equilibrium<'_>, C
 ///
 /// # Errors
 /// If there is none.
-pub fn relax(model: &Model) -> Result<(DynamicRelaxation<'_, f64>, State<f64>), CaseError> {
+pub fn relax(model: &Model) -> Result<(DynamicRelaxation<f64>, State<f64>), CaseError> {
     let settings = RelaxationSettings { tolerance: 1e-8, ..RelaxationSettings::default() };
-    let mut solver = DynamicRelaxation::new(model, settings)?;
+    let mut solver = DynamicRelaxation::new(model.clone(), settings)?;
     let mut state = State::at_rest(model);
     solver.solve(&mut state, 1.0)?;
     Ok((solver, state))

@@ -156,7 +156,7 @@ impl Specimen {
     /// # Errors
     /// If the stiffness is singular.
     pub fn linear(&self, node: u32) -> Result<[f64; 6], CaseError> {
-        let mut solver = Statics::new(&self.model, StaticSettings::default())?;
+        let mut solver = Statics::new(self.model.clone(), StaticSettings::default())?;
         Ok(solver.linear(&State::at_rest(&self.model), 1.0)?[node as usize])
     }
 }

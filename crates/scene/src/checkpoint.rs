@@ -12,7 +12,7 @@ use pliant_geometry::io::read_limited;
 use pliant_mechanics::{Real, State, fingerprint};
 use serde::{Deserialize, Serialize};
 
-use crate::build::{Built, Corotational};
+use crate::build::Built;
 use crate::diagnostic::counted;
 use crate::format::{LoadSteps, Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, ShellStrains, Written, number, replace};
@@ -252,7 +252,7 @@ fn differing(parts: &[String]) -> String {
 impl Origin {
     fn of(scene: &Scene, built: &Built, plan: &Plan) -> Self {
         let mut parts = built.model.fingerprints();
-        parts.extend(built.corotational.iter().flat_map(Corotational::fingerprints));
+        parts.extend(built.corotational.iter().flat_map(|part| part.fingerprints()));
         let outputs = scene.outputs.iter();
         parts.extend(outputs.map(|(name, table)| (format!("output `{name}`"), fingerprint(table))));
         parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));

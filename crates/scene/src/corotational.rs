@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::fmt::Write;
+use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 use pliant_corotational as corotational;
@@ -29,10 +30,11 @@ const RENEW_AFTER: usize = 10;
 const ITERATIONS_KEPT: usize = 10_000;
 
 /// A run of shells and co-rotational solids.
-pub(crate) struct Corotated<'m> {
-    built: &'m Built,
-    part: &'m Corotational,
-    method: Method<'m>,
+pub(crate) struct Corotated {
+    /// Bodies, and the constraints whose reactions are asked for.
+    model: Arc<pliant_mechanics::Model>,
+    part: Arc<Corotational>,
+    method: Method,
     /// Step [s].
     step: f64,
     /// Steps of the whole run.
@@ -148,15 +150,15 @@ impl Snapshot {
 }
 
 /// A solver, and the forces at an instant: an explicit one finds them anyway.
-enum Method<'m> {
-    Static(Box<Statics<'m>>, Forces<'m>),
-    Implicit(Box<BackwardEuler<'m>>, Forces<'m>),
-    Explicit(Box<Explicit<'m>>),
+enum Method {
+    Static(Box<Statics>, Forces),
+    Implicit(Box<BackwardEuler>, Forces),
+    Explicit(Box<Explicit>),
 }
 
-impl<'m> Method<'m> {
+impl Method {
     /// The forces last found.
-    fn forces(&self) -> &Forces<'m> {
+    fn forces(&self) -> &Forces {
         match self {
             Self::Static(_, forces) | Self::Implicit(_, forces) => forces,
             Self::Explicit(solver) => solver.forces(),
@@ -172,12 +174,12 @@ impl<'m> Method<'m> {
     }
 }
 
-impl<'m> Corotated<'m> {
+impl Corotated {
     /// The run that a scene asks for, at its start.
     pub(crate) fn new(
         run: &RunTable,
-        built: &'m Built,
-        part: &'m Corotational,
+        built: &Built,
+        part: &Arc<Corotational>,
         plan: &Plan,
     ) -> Result<Self, FailureSummary> {
         let table = match &run.linear {
@@ -191,8 +193,8 @@ impl<'m> Corotated<'m> {
                 let mut settings = StaticSettings { linear, ..StaticSettings::default() };
                 settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
                 settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
-                Statics::new(model, settings)
-                    .map(|solver| Method::Static(Box::new(solver), Forces::new(model)))
+                Statics::new(model.clone(), settings)
+                    .map(|solver| Method::Static(Box::new(solver), Forces::new(model.clone())))
             }
             SolverName::Implicit => {
                 let mut settings = DynamicSettings { linear, ..DynamicSettings::new(plan.step) };
@@ -206,10 +208,10 @@ impl<'m> Corotated<'m> {
                     IntegratorName::BackwardEuler => Integrator::BackwardEuler,
                     IntegratorName::Bdf2 => Integrator::Bdf2,
                 };
-                BackwardEuler::new(model, settings)
-                    .map(|solver| Method::Implicit(Box::new(solver), Forces::new(model)))
+                BackwardEuler::new(model.clone(), settings)
+                    .map(|solver| Method::Implicit(Box::new(solver), Forces::new(model.clone())))
             }
-            _ => Explicit::new(model, plan.step).map(|solver| Method::Explicit(Box::new(solver))),
+            _ => Explicit::new(model.clone(), plan.step).map(|solver| Method::Explicit(Box::new(solver))),
         };
         let mut prescribed = vec![false; 6 * model.rest.len()];
         for constraint in &model.constraints {
@@ -220,7 +222,7 @@ impl<'m> Corotated<'m> {
             }
         }
         Ok(Self {
-            method: method.map_err(|error| failure(&error, built, part, 0.0))?,
+            method: method.map_err(|error| failure(&error, &built.model, part, 0.0))?,
             step: plan.step,
             steps: plan.steps,
             state: part.start.clone(),
@@ -234,8 +236,8 @@ impl<'m> Corotated<'m> {
             effort_before: Effort::default(),
             convergence: VecDeque::new(),
             path: Path::default(),
-            built,
-            part,
+            model: Arc::clone(&built.model),
+            part: Arc::clone(part),
         })
     }
 
@@ -296,7 +298,7 @@ impl<'m> Corotated<'m> {
     fn find_reactions(&mut self) {
         let forces = self.method.forces();
         let [internal, loads] = [forces.internal(), forces.loads()];
-        for (reaction, constraint) in self.reactions.iter_mut().zip(&self.built.model.constraints) {
+        for (reaction, constraint) in self.reactions.iter_mut().zip(&self.model.constraints) {
             *reaction = [0.0; 3];
             for &node in &constraint.nodes {
                 for c in (0..3).filter(|&c| constraint.components[c]) {
@@ -489,14 +491,14 @@ fn linear_solver(table: &LinearTable) -> LinearSolver {
     }
 }
 
-impl Solver<f64> for Corotated<'_> {
+impl Solver<f64> for Corotated {
     fn evaluate(&mut self, state: &mut State<f64>, _wanted: Wanted) -> Result<(), FailureSummary> {
         if self.evaluated {
             return Ok(());
         }
         self.show(state);
         let found = self.method.evaluate(&self.state);
-        found.map_err(|error| failure(&error, self.built, self.part, self.state.time))?;
+        found.map_err(|error| failure(&error, &self.model, &self.part, self.state.time))?;
         self.find_energies();
         self.find_reactions();
         self.evaluated = true;
@@ -510,7 +512,7 @@ impl Solver<f64> for Corotated<'_> {
         _watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
         let number = state.steps + 1;
-        self.go(number).map_err(|error| failure(&error, self.built, self.part, self.state.time))?;
+        self.go(number).map_err(|error| failure(&error, &self.model, &self.part, self.state.time))?;
         state.steps = number;
         state.time = self.state.time;
         self.evaluated = false;
@@ -585,7 +587,7 @@ impl Solver<f64> for Corotated<'_> {
     }
 }
 
-impl Observable<f64> for Corotated<'_> {
+impl Observable<f64> for Corotated {
     fn energies(&self) -> &Energies {
         &self.energies
     }
@@ -608,8 +610,13 @@ impl Observable<f64> for Corotated<'_> {
 }
 
 /// What a user is told of a step that failed, from a time on.
-fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) -> FailureSummary {
-    let body_of = |node: u32| built.model.bodies.iter().find(|body| body.nodes.contains(&node));
+fn failure(
+    error: &SolveError,
+    model: &pliant_mechanics::Model,
+    part: &Corotational,
+    time: f64,
+) -> FailureSummary {
+    let body_of = |node: u32| model.bodies.iter().find(|body| body.nodes.contains(&node));
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
         SolveError::Stalled { .. } => ("not-converged", None, None),
@@ -622,10 +629,10 @@ fn failure(error: &SolveError, built: &Built, part: &Corotational, time: f64) ->
     };
     let owner = node.and_then(body_of);
     let own_node = node.zip(owner).map(|(node, body)| node - body.nodes.start);
-    let body = owner.map(|body| body.name.clone()).or_else(|| Some(built.bodies[cell?.0].name.clone()));
+    let body = owner.map(|body| body.name.clone()).or_else(|| Some(model.bodies[cell?.0].name.clone()));
     let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();
     let of_body =
-        |cell| part.cell(cell).filter(|(owner, _)| body.as_ref() == Some(&built.bodies[*owner].name));
+        |cell| part.cell(cell).filter(|(owner, _)| body.as_ref() == Some(&model.bodies[*owner].name));
     let told = numbered(error, own_node, |cell| of_body(cell).map(|(_, cell)| cell));
     let slack = node.or_else(|| Some(part.model.facets.get(error.broken()?.0)?.nodes[0]));
     let hint = match slack.is_some_and(|node| part.is_slack(node)) {

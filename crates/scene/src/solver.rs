@@ -210,16 +210,16 @@ fn monitor(run: &RunTable, built: &Built, plan: &Plan) -> Option<Monitor> {
 }
 
 /// The solver that a scene asks for, on the processor.
-pub(crate) fn on_processor<'m, R: Real>(
+pub(crate) fn on_processor<R: Real>(
     run: &RunTable,
-    built: &'m Built,
+    built: &Built,
     plan: &Plan,
-) -> Result<Box<dyn Solver<R> + 'm>, FailureSummary> {
+) -> Result<Box<dyn Solver<R>>, FailureSummary> {
     // Refused when the model was built.
     let contradicting = |error: Contradiction| FailureSummary::input(&error);
     Ok(match run.solver {
         SolverName::Explicit => {
-            let stepper = CentralDifference::new(&built.model, plan.step).map_err(contradicting)?;
+            let stepper = CentralDifference::new(built.model.clone(), plan.step).map_err(contradicting)?;
             match monitor(run, built, plan) {
                 Some(monitor) => Box::new(stepper.watched(monitor)),
                 None => Box::new(stepper),
@@ -236,7 +236,7 @@ pub(crate) fn on_processor<'m, R: Real>(
             };
             let tolerance = settings.tolerance;
             Box::new(LoadSteps {
-                relaxation: DynamicRelaxation::new(&built.model, settings).map_err(contradicting)?,
+                relaxation: DynamicRelaxation::new(built.model.clone(), settings).map_err(contradicting)?,
                 plan: plan.clone(),
                 tolerance,
             })
@@ -245,14 +245,14 @@ pub(crate) fn on_processor<'m, R: Real>(
 }
 
 /// The solver that a scene asks for, on a graphics processor, from a state on.
-pub(crate) fn on_device<'m>(
+pub(crate) fn on_device(
     run: &RunTable,
-    built: &'m Built,
+    built: &Built,
     plan: &Plan,
     device: &Device,
     state: &State<f32>,
-) -> Result<Box<dyn Solver<f32> + 'm>, FailureSummary> {
-    let stepper = GpuStepper::new(device, &built.model, plan.step, run.design);
+) -> Result<Box<dyn Solver<f32>>, FailureSummary> {
+    let stepper = GpuStepper::new(device, built.model.clone(), plan.step, run.design);
     let mut stepper = stepper.map_err(|error| FailureSummary::device(&error, None))?;
     if let Some(monitor) = monitor(run, built, plan) {
         stepper = stepper.watched(monitor);
@@ -264,7 +264,7 @@ pub(crate) fn on_device<'m>(
 /// Most steps in one go on a graphics processor, so that a run can be stopped and shows how far it is.
 const STRIDE: u64 = 1024;
 
-impl Solver<f32> for GpuStepper<'_> {
+impl Solver<f32> for GpuStepper {
     fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), FailureSummary> {
         GpuStepper::evaluate(self, state, wanted)
             .map_err(|failure| FailureSummary::step(&failure, state.time))
@@ -329,7 +329,7 @@ impl Solver<f32> for GpuStepper<'_> {
     }
 }
 
-impl<R: Real> Solver<R> for CentralDifference<'_, R> {
+impl<R: Real> Solver<R> for CentralDifference<R> {
     fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
         CentralDifference::evaluate(self, state).map_err(|error| FailureSummary::from(&error))
     }
@@ -372,15 +372,15 @@ impl<R: Real> Solver<R> for CentralDifference<'_, R> {
 }
 
 /// Equilibria at the start and at the ends of load steps.
-struct LoadSteps<'m, R> {
-    relaxation: DynamicRelaxation<'m, R>,
+struct LoadSteps<R> {
+    relaxation: DynamicRelaxation<R>,
     /// Where they end.
     plan: Plan,
     /// Relative residual of an equilibrium.
     tolerance: f64,
 }
 
-impl<R: Real> Solver<R> for LoadSteps<'_, R> {
+impl<R: Real> Solver<R> for LoadSteps<R> {
     /// At the start the equilibrium of what acts there already; others are found when they are gone to.
     fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
         let begun = self.relaxation.begin(state);

@@ -17,7 +17,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     let what = if kind.is_dir() {
         "it is a folder"
     } else {
-        "it is no regular file but a pipe, a socket or a device; write what it gives to a file first"
+        "it is not a regular file but a pipe, a socket or a device; write what it gives to a file first"
     };
     Err(io::Error::new(io::ErrorKind::InvalidInput, what))
 }
@@ -31,7 +31,7 @@ pub fn read_limited(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let announced = file.metadata()?.len();
     let mut bytes = Vec::new();
     // A file can grow while it is read.
-    if announced <= limit && file.take(limit + 1).read_to_end(&mut bytes)? as u64 <= limit {
+    if announced <= limit && file.take(limit.saturating_add(1)).read_to_end(&mut bytes)? as u64 <= limit {
         return Ok(bytes);
     }
     let length = announced.max(bytes.len() as u64);
@@ -64,6 +64,6 @@ mod tests {
     #[test]
     #[cfg(unix)]
     fn devices_are_refused() {
-        assert!(open_regular(Path::new("/dev/zero")).unwrap_err().to_string().contains("no regular file"));
+        assert!(open_regular(Path::new("/dev/zero")).unwrap_err().to_string().contains("not a regular file"));
     }
 }

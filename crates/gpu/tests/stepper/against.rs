@@ -40,8 +40,8 @@ pub fn numbers(energies: &Energies) -> [f64; 5] {
 }
 
 /// One of a design.
-pub fn stepper<'m>(device: &Device, model: &'m Model, step: f64, design: Design) -> GpuStepper<'m> {
-    GpuStepper::new(device, model, step, Some(design)).unwrap_or_else(|error| panic!("{error}"))
+pub fn stepper(device: &Device, model: &Model, step: f64, design: Design) -> GpuStepper {
+    GpuStepper::new(device, model.clone(), step, Some(design)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// ‖a − b‖ over ‖a‖, or over a size.
@@ -65,7 +65,7 @@ pub fn compare_from(
 ) {
     let mut reference = State::<f64>::at_rest(model);
     reference.displacement.copy_from_slice(start);
-    let mut processor = CentralDifference::new(model, step).unwrap();
+    let mut processor = CentralDifference::new(model.clone(), step).unwrap();
     for _ in 0..STEPS {
         processor.evaluate(&mut reference).unwrap_or_else(|error| panic!("{what}: {error}"));
         processor.advance(&mut reference);

@@ -31,7 +31,7 @@ fn a_force_out_of_the_range_of_whole_numbers_is_told_and_never_wraps() {
 /// Runs on the processor until it fails.
 fn failure_of(model: &Model, step: f64) -> StepError {
     let mut state = State::<f32>::at_rest(model);
-    let mut stepper = CentralDifference::new(model, step).unwrap();
+    let mut stepper = CentralDifference::new(model.clone(), step).unwrap();
     for _ in 0..2000 {
         if let Err(error) = stepper.evaluate(&mut state) {
             return error;
@@ -100,11 +100,11 @@ fn contradictions_and_elements_without_their_law_are_refused_by_name() {
     let Some(device) = support::device() else { return };
     let mut model = moved_cube("tet4", elastic(neo_hookean()));
     model.constraints[1].nodes.push(0);
-    let refused = GpuStepper::new(&device, &model, 1e-3, None).err();
+    let refused = GpuStepper::new(&device, model.clone(), 1e-3, None).err();
     assert!(matches!(refused, Some(GpuError::Contradiction(_))), "{refused:?}");
     let law = every_law().into_iter().find(|law| !law.has_volumetric_energy()).unwrap();
     let model = moved_cube("tet4-anp", elastic(law));
-    let refused = GpuStepper::new(&device, &model, 1e-3, None).err();
+    let refused = GpuStepper::new(&device, model.clone(), 1e-3, None).err();
     assert!(matches!(refused, Some(GpuError::Unsupported { .. })), "{refused:?}");
 }
 
@@ -115,7 +115,7 @@ fn lessened(lessen: impl FnOnce(&mut wgpu::Limits, &mut wgpu::Features)) -> Opti
 }
 
 fn refusal(device: &Device, model: &Model, design: Design) -> GpuError {
-    let error = GpuStepper::new(device, model, 1e-3, Some(design)).err().expect("it is refused");
+    let error = GpuStepper::new(device, model.clone(), 1e-3, Some(design)).err().expect("it is refused");
     // Being refused leaves the device as it was.
     assert_eq!(device.check(), Ok(()));
     error
@@ -199,7 +199,7 @@ fn failure_while(happens: impl FnOnce(&Device) + Send, design: Design) -> Option
     }
     stepper.upload(&state);
     assert_eq!(
-        GpuStepper::new(&device, &model, 1e-3, Some(design)).err().as_ref(),
+        GpuStepper::new(&device, model.clone(), 1e-3, Some(design)).err().as_ref(),
         device.check().err().as_ref()
     );
     match failure {
@@ -251,7 +251,7 @@ fn a_device_that_is_lost_before_a_run_takes_no_model() {
     device.wgpu().0.destroy();
     let failure = begun.evaluate(&mut state, Wanted::Everything);
     assert!(matches!(failure, Err(StepFailure::Device(GpuError::Lost { .. }))), "{failure:?}");
-    let refused = GpuStepper::new(&device, &model, 1e-3, None).err();
+    let refused = GpuStepper::new(&device, model.clone(), 1e-3, None).err();
     assert!(matches!(refused, Some(GpuError::Lost { .. })), "{refused:?}");
 }
 
@@ -259,7 +259,7 @@ fn a_device_that_is_lost_before_a_run_takes_no_model() {
 fn a_stepper_takes_the_usual_design_of_its_kind_of_adapter() {
     let Some(device) = support::device() else { return };
     let model = moved_cube("tet4", elastic(neo_hookean()));
-    let usual = GpuStepper::new(&device, &model, 1e-3, None).map(|stepper| stepper.design());
+    let usual = GpuStepper::new(&device, model.clone(), 1e-3, None).map(|stepper| stepper.design());
     assert_eq!(usual, Ok(Design::usual(device.adapter().kind)));
     assert_eq!(PLAIN, [Design::usual(pliant_gpu::Kind::Software)]);
 }

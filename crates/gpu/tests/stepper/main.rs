@@ -172,14 +172,14 @@ fn a_state_goes_from_the_processor_to_the_device_and_back() {
         let model = relaxing_cube(element);
         let step = step_of(&model);
         let on_processor = |state: &mut State<f32>| {
-            let mut stepper = CentralDifference::new(&model, step).unwrap();
+            let mut stepper = CentralDifference::new(model.clone(), step).unwrap();
             for _ in 0..50 {
                 stepper.evaluate(state).unwrap();
                 stepper.advance(state);
             }
         };
         let last = |state: &mut State<f32>| {
-            let mut stepper = CentralDifference::new(&model, step).unwrap();
+            let mut stepper = CentralDifference::new(model.clone(), step).unwrap();
             stepper.evaluate(state).unwrap();
             (double(&state.displacement), *stepper.energies())
         };
@@ -229,7 +229,7 @@ fn steps_are_cut_where_the_limit_falls_and_end_a_run_where_they_must_not_be() {
     };
     let mut expected = State::<f64>::at_rest(&model);
     let monitor = Monitor::new(&model, limit, OnUnstable::Substep);
-    let mut processor = CentralDifference::new(&model, step).unwrap().watched(monitor);
+    let mut processor = CentralDifference::new(model.clone(), step).unwrap().watched(monitor);
     while expected.steps < (1.2 / step) as u64 {
         processor.evaluate(&mut expected).unwrap();
         processor.advance(&mut expected);

@@ -35,7 +35,7 @@ fn grips_pull_as_on_the_processor_in_every_design_and_let_go() {
     let step = step_of(&model);
     let held = grips(&model, step);
     let mut reference = State::<f64>::at_rest(&model);
-    let mut processor = CentralDifference::new(&model, step).unwrap();
+    let mut processor = CentralDifference::new(model.clone(), step).unwrap();
     let mut go = |grips: &[Grip], steps: u64| {
         processor.hold(grips);
         // An instant is evaluated once, or its work would be entered twice.

@@ -71,7 +71,7 @@ fn measure(cells: usize, device: Option<&Device>) -> Result<Vec<[f64; 4]>, CaseE
         None => {
             let mut running = Vec::new();
             for Specimen { model, .. } in &cubes {
-                running.push(Clocked::<f32>::new(model, step, State::at_rest(model))?);
+                running.push(Clocked::<f32>::new(model.clone(), step, State::at_rest(model))?);
             }
             interleaved(&mut running, REPEATS, steps)
         }
@@ -79,7 +79,7 @@ fn measure(cells: usize, device: Option<&Device>) -> Result<Vec<[f64; 4]>, CaseE
             let mut running = Vec::new();
             for Specimen { model, .. } in &cubes {
                 let (design, state) = (Design::usual(device.adapter().kind), State::at_rest(model));
-                running.push(ClockedOnDevice::new(device, model, step, design, state)?);
+                running.push(ClockedOnDevice::new(device, model.clone(), step, design, state)?);
             }
             interleaved(&mut running, REPEATS_ON_DEVICE, steps)
         }

@@ -66,7 +66,7 @@ impl Program {
     /// Wall time of a step of the solver alone [s], on threads of its own as the whole program has.
     fn bare(&self) -> Result<f64, CaseError> {
         let model = &self.built.model;
-        let mut clocked = Clocked::<f32>::new(model, self.plan.step, State::at_rest(model))?;
+        let mut clocked = Clocked::<f32>::new(model.clone(), self.plan.step, State::at_rest(model))?;
         let pool = ThreadPoolBuilder::new().build().map_err(|error| CaseError::Run(error.to_string()))?;
         Ok(pool.install(|| clocked.seconds_per_step(self.plan.steps as usize))?)
     }

@@ -60,10 +60,10 @@ impl Stretched {
 
     /// The elastic equilibrium with a part of the moduli left.
     fn elastic(built: &Built, part: f64, until: f64) -> Result<Self, CaseError> {
-        let mut model = built.model.clone();
+        let mut model = pliant_mechanics::Model::clone(&built.model);
         model.solids[0].material.prony = Prony::default();
         model.solids[0].material.law = tissue(part);
-        let mut solver = DynamicRelaxation::<f64>::new(&model, RelaxationSettings::default())?;
+        let mut solver = DynamicRelaxation::<f64>::new(model.clone(), RelaxationSettings::default())?;
         let mut state = State::at_rest(&model);
         solver.solve(&mut state, until)?;
         Ok(Self::new(&model, &state, &solver))

@@ -100,7 +100,7 @@ pub fn deflections(loads: &[f64]) -> Result<Vec<f64>, CaseError> {
         .hold_edge("y-max", symmetry(1))
         .cover([0.0, 0.0, 5.0]);
     let centre = plate.node(0.5 * SIDE, 0.5 * SIDE, 0.0) as usize;
-    let mut solver = Statics::new(&plate.model, StaticSettings::default())?;
+    let mut solver = Statics::new(plate.model.clone(), StaticSettings::default())?;
     let mut state = State::at_rest(&plate.model);
     let mut found = Vec::new();
     for load in loads {

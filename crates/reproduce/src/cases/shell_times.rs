@@ -100,7 +100,7 @@ struct Measured {
 
 fn measure(shells: usize, settings: DynamicSettings, steps: usize) -> Result<Measured, CaseError> {
     let model = tube(shells)?;
-    let mut solver = BackwardEuler::new(&model, settings)?;
+    let mut solver = BackwardEuler::new(model.clone(), settings)?;
     let mut state = State::at_rest(&model);
     let (mut times, mut residual) = (Vec::new(), 0.0_f64);
     for _ in 0..steps {
@@ -174,7 +174,7 @@ fn hexagon() -> Result<f64, CaseError> {
     let kind = LoadKind::Gravity { acceleration: Vector3::new(0.0, 0.0, -9.81) };
     model.loads.push(Load { name: "weight".into(), kind, curve: ramp(), controlled: false });
     let mut times = Vec::new();
-    let mut solver = Statics::new(&model, StaticSettings::default())?;
+    let mut solver = Statics::new(model.clone(), StaticSettings::default())?;
     for _ in 0..50 {
         let before = solver.phases();
         solver.linear(&State::at_rest(&model), 1.0)?;

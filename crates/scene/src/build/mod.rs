@@ -14,6 +14,8 @@ mod node_vectors;
 mod sheets;
 mod surfaces;
 
+use std::sync::Arc;
+
 use pliant_geometry::{Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
@@ -33,9 +35,9 @@ pub use meshes::SizeDoubt;
 #[derive(Clone, Debug)]
 pub struct Built {
     /// The model.
-    pub model: Model,
+    pub model: Arc<Model>,
     /// Shells and co-rotational solids; the model then holds their nodes, but no cells and no loads.
-    pub corotational: Option<Corotational>,
+    pub corotational: Option<Arc<Corotational>>,
     /// The bodies' meshes, in the order of the model's bodies.
     pub bodies: Vec<BuiltBody>,
     /// The carried surfaces' meshes, in the order of the model's surfaces.
@@ -120,6 +122,7 @@ pub fn build_with(scene: &Scene, cache: &MeshCache) -> Result<Built, SceneErrors
         return Err(scene.source.errors(builder.out));
     }
     let Builder { model, corotational, bodies, surfaces, out: warnings, notes, .. } = builder;
+    let (model, corotational) = (Arc::new(model), corotational.map(Arc::new));
     Ok(Built { model, corotational, bodies, surfaces, warnings, notes })
 }
 

@@ -74,7 +74,7 @@ impl Builder<'_> {
     /// Adds the cells of a shell or a co-rotational solid whose nodes are the last of the model.
     pub(in crate::build) fn add_corotational(&mut self, draft: &Draft<'_>, first: u32) {
         let rest = &self.model.rest;
-        let model = &mut self.corotational.get_or_insert_with(Corotational::new).model;
+        let model = self.corotational.get_or_insert_with(Corotational::new).model_mut();
         model.rest.extend(rest[model.rest.len()..].iter().map(|&p| Vector3::from(p)));
         model.mass.resize(rest.len(), 0.0);
         model.inertia.resize(rest.len(), 0.0);
@@ -116,7 +116,7 @@ impl Builder<'_> {
         };
         let part = self.corotational.as_mut()?;
         let start = part.model.facets.len() as u32;
-        match part.model.add_shell(&shell) {
+        match part.model_mut().add_shell(&shell) {
             Ok(notes) => {
                 self.tell_notes(name, notes, count);
                 self.tell_slack(name, table, formulation, start as usize);
@@ -127,7 +127,7 @@ impl Builder<'_> {
                         components: [false, false, false, true, true, true],
                         motion: Motion::Fixed,
                     };
-                    self.corotational.as_mut()?.model.constraints.push(held);
+                    self.corotational.as_mut()?.model_mut().constraints.push(held);
                 }
                 Some(BodyCells::Facets(start..start + count as u32))
             }
@@ -521,9 +521,9 @@ impl Builder<'_> {
         let all: Vec<[u32; 4]> = (0..block.len() as u32).map(|cell| nodes(block, cell, first)).collect();
         let part = self.corotational.as_mut()?;
         let added = match material[..] {
-            [one] => part.model.add_solid(name, &all, one),
+            [one] => part.model_mut().add_solid(name, &all, one),
             _ => (all.iter().zip(&material))
-                .try_for_each(|(cell, &material)| part.model.add_solid(name, &[*cell], material)),
+                .try_for_each(|(cell, &material)| part.model_mut().add_solid(name, &[*cell], material)),
         };
         if let Err(error) = added {
             self.refuse_part(name, &error);

@@ -81,7 +81,7 @@ impl Builder<'_> {
             .iter()
             .find(|known| all.iter().any(|own| clash(known, own)))
             .map(|known| known.name.clone());
-        part.model.constraints.extend(all);
+        part.model_mut().constraints.extend(all);
         if let Some(other) = clash {
             let first = self.source().key_span(&["constraint", &other]);
             let second = self.source().key_span(&["constraint", name]);
@@ -143,7 +143,7 @@ impl Builder<'_> {
         };
         for node in nodes {
             let anchor = table.to.map_or(part.model.rest[node as usize], Vector3::from);
-            part.model.springs.push(Spring { node, anchor, stiffness: table.stiffness });
+            part.model_mut().springs.push(Spring { node, anchor, stiffness: table.stiffness });
         }
     }
 }

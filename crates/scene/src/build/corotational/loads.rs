@@ -60,7 +60,7 @@ impl Builder<'_> {
         let Some(part) = &mut self.corotational else { return };
         let load =
             |kind| corotational::Load { name: name.to_owned(), kind, curve: curve.clone(), controlled };
-        part.model.loads.extend(kinds.into_iter().map(load));
+        part.model_mut().loads.extend(kinds.into_iter().map(load));
     }
 
     /// A controlled load has no course of its own.

@@ -6,6 +6,7 @@ mod loads;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use pliant_corotational as corotational;
 use pliant_corotational::{Carried, CurvedSurface, State};
@@ -21,7 +22,7 @@ use crate::registry::OutputTable;
 #[derive(Clone, Debug)]
 pub struct Corotational {
     /// Their model.
-    pub model: corotational::Model,
+    pub model: Arc<corotational::Model>,
     /// The cells of each body, in the order of the scene's bodies.
     pub cells: Vec<BodyCells>,
     /// What a static run prescribes instead of the size of a load.
@@ -289,12 +290,17 @@ impl Corotational {
         let model = corotational::Model::default();
         Self {
             start: State::at_rest(&model),
-            model,
+            model: Arc::new(model),
             cells: Vec::new(),
             control: None,
             surface: None,
             carried: BTreeMap::new(),
         }
+    }
+
+    /// The model, to be added to while it is built.
+    fn model_mut(&mut self) -> &mut corotational::Model {
+        Arc::make_mut(&mut self.model)
     }
 
     /// How many cells a body has, and their volume at rest [m³].
@@ -376,7 +382,8 @@ mod tests {
             build(&Scene::from_source(source, folder.path().into()).unwrap())
         };
         let off = |file: &str, more: &str| {
-            let model = built(file, more).unwrap().corotational.unwrap().model;
+            let part = built(file, more).unwrap().corotational.unwrap();
+            let model = &part.model;
             assert_eq!(model.normals.len(), 12);
             let wanted = model.rest.iter().map(|p| Vector3::new(p.x, p.y, 2.0 * p.z).normalize());
             let off = model.normals.iter().zip(wanted).map(|(n, wanted)| (n.direction - wanted).norm());
@@ -417,7 +424,7 @@ mod tests {
         let source = Source::parse("plate.toml", text).unwrap();
         let scene = Scene::from_source(source, folder.path().into()).unwrap();
         let part = build(&scene).unwrap().corotational.unwrap();
-        let mut forces = Forces::new(&part.model);
+        let mut forces = Forces::new(part.model.clone());
         forces.evaluate(&part.start).unwrap();
         let moved = (part.start.position[8] - part.model.rest[8]).norm();
         assert!((moved - 2.0).abs() < 1e-12 && forces.strain_energy() < 1e-20, "{}", forces.strain_energy());
