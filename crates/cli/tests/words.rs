@@ -235,6 +235,6 @@ fn pipes_are_refused_at_once() {
     for name in ["pipe.stl", "pipe.nii"] {
         let made = std::process::Command::new("mkfifo").arg(workshop.path(name)).status();
         assert!(made.is_ok_and(|status| status.success()));
-        refused(&mesh(&workshop, &[name, "--label", "1"]), &["no regular file"]);
+        refused(&mesh(&workshop, &[name, "--label", "1"]), &["not a regular file"]);
     }
 }

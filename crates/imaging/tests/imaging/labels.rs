@@ -199,7 +199,7 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
     for path in [&pipe, &zero] {
         let error = read(path, &ReadOptions::default()).unwrap_err();
         assert!(
-            matches!(error, ImageError::Open { .. }) && error.to_string().contains("no regular file"),
+            matches!(error, ImageError::Open { .. }) && error.to_string().contains("not a regular file"),
             "{error}"
         );
     }
@@ -210,6 +210,6 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
         let told = read(&path, &ReadOptions::default()).unwrap_err().to_string();
-        assert!(told.contains("ElementDataFile") && told.contains("no regular file"), "{told}");
+        assert!(told.contains("ElementDataFile") && told.contains("not a regular file"), "{told}");
     }
 }
