@@ -676,10 +676,10 @@ pub struct MeshImage {
     /// UID of the DICOM series, where the folder holds several.
     #[arg(long, value_name = "UID")]
     pub series: Option<String>,
-    /// Tissue whose stable step is told: brain-like is E = 3000 Pa, liver-like E = 19 kPa; both without this. Both have ν = 0.45.
+    /// Tissue whose stable step is reported: brain-like is E = 3000 Pa, liver-like E = 19 kPa; both without this. Both have ν = 0.45.
     #[arg(long, value_name = "NAME", conflicts_with = "young")]
     pub law: Option<Tissue>,
-    /// Young's modulus of the tissue whose stable step is told [Pa].
+    /// Young's modulus of the tissue whose stable step is reported [Pa].
     #[arg(long, value_name = "PA", value_parser = positive)]
     pub young: Option<f64>,
     /// Poisson's ratio of that tissue.

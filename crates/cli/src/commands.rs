@@ -362,7 +362,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(1))
 }
 
-/// Refuses a sweep some of whose combinations are no scene; mistakes that several share are told once.
+/// Refuses a sweep some of whose combinations are no scene; mistakes that several share are reported once.
 fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
     let mistakes = sweep.check(threads);
     let mut told = Vec::<String>::new();

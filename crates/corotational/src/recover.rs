@@ -355,7 +355,7 @@ mod tests {
         }
     }
 
-    /// A collapsed facet is told with its number; the number of threads does not matter to which.
+    /// A collapsed facet is reported with its number, the same one for any number of threads.
     #[test]
     fn the_first_broken_cell_is_told() {
         let model = model(strip(), 0.1);

@@ -1,5 +1,5 @@
 //! The part of an image that is a body, cut out of it: only the box round it is kept, and where that has too many voxels it is resampled to coarser
-//! ones, by majority. What lies at the border of the image may be cut off there, and is told.
+//! ones, by majority. What lies at the border of the image may be cut off there, which is reported.
 
 use std::fmt;
 

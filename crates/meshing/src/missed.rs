@@ -83,7 +83,7 @@ pub enum Missed {
 }
 
 impl Missed {
-    /// How far [m] the surface of a body may be from a mesh with cells of `edge` [m] before it is told: half an edge of tets; steps of
+    /// How far [m] the surface of a body may be from a mesh with cells of `edge` [m] before it is reported: half an edge of tets; steps of
     /// cubes stay behind the body by up to half of their diagonal, and immersed ones hold all of it.
     pub(crate) fn allowed(mesh: &Mesh, edge: f64) -> f64 {
         match mesh.block(CellKind::Hex) {

@@ -12,7 +12,7 @@ use crate::missed::Missed;
 use crate::topology::faces_between_labels;
 use crate::voxels::Voxels;
 
-/// Volumes off by more than this part are told.
+/// Volumes off by more than this part are reported.
 const LARGEST_VOLUME_ERROR: f64 = 0.05;
 
 /// One label of a mesh.

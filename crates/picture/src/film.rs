@@ -45,7 +45,7 @@ impl Film {
     /// Adds a picture.
     ///
     /// # Errors
-    /// If ffmpeg has ended; the reason is told by [`Self::finish`].
+    /// If ffmpeg has ended; [`Self::finish`] gives the reason.
     pub fn add(&mut self, picture: &Picture) -> Result<(), PictureError> {
         let written = self.input.as_mut().is_some_and(|input| input.write_all(&picture.rgb()).is_ok());
         if written {

@@ -141,7 +141,7 @@ impl Fibres {
         [0, 1, 2].map(|c| (place[c] / self.cube).floor() as i64)
     }
 
-    /// The fibre of a cell, through a place in it that is told as parts of its nodes. `None` where it has none.
+    /// The fibre of a cell, through a place in it given as parts of its nodes. `None` where it has none.
     pub fn line(
         &self,
         cell: usize,

@@ -100,7 +100,7 @@ mod drawn {
     /// Room around the bodies, over their size.
     const MARGIN: f64 = 0.05;
 
-    /// What draws, opened once; where there is none, that is told once.
+    /// What draws, opened once; where there is none, that is reported once.
     fn graphics() -> Option<&'static Graphics> {
         use std::io::Write as _;
         static GRAPHICS: OnceLock<Option<Graphics>> = OnceLock::new();

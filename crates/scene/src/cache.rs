@@ -31,7 +31,7 @@ pub struct MeshCache {
     limit: u64,
 }
 
-/// A mesh as it was made, with all that was said about it.
+/// A mesh as it was made, with its report.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Kept {
     pub mesh: Mesh,

@@ -156,7 +156,7 @@ pub(crate) struct Form<'s> {
     letters_range: (Option<u64>, Option<u64>),
     pub(crate) lower: Option<Bound>,
     pub(crate) upper: Option<Bound>,
-    /// What is said of this form, such as one word of several or one key of which a table has exactly one.
+    /// The description of this form, such as one word of several or one key of which a table has exactly one.
     pub(crate) doc: Option<&'s str>,
 }
 
@@ -678,7 +678,7 @@ impl<'s> Checker<'s, '_> {
             let positive = form.lower.is_some_and(|bound| bound.exclusive && bound.value == 0.0);
             return self.is_possible(node, x, positive, trail, doc);
         };
-        // The limits of 32-bit types are told only to those who break them.
+        // Limits of 32-bit types are shown only to those who break them.
         let range = if range.contains(&broken) { range } else { broken };
         let message = match trail {
             Trail::Start("") => format!("the value must be {range}, found {}", number(x)),
@@ -943,7 +943,7 @@ impl<'s> Checker<'s, '_> {
             .copied()
             .filter(|key| !entries.iter().any(|(given, _)| given == key) && !self.skipped(key, trail))
             .collect();
-        // A misspelt key is told once, not also as a missing one.
+        // A misspelt key is reported once, not also as a missing one.
         let missing: Vec<&str> = missing.into_iter().filter(|key| !guesses.contains(key)).collect();
         if !missing.is_empty() {
             self.missing_keys(node, &missing, form, trail);

@@ -609,7 +609,7 @@ impl Observable<f64> for Corotated {
     }
 }
 
-/// What a user is told of a step that failed, from a time on.
+/// The report of a step that failed after a time.
 fn failure(
     error: &SolveError,
     model: &pliant_mechanics::Model,

@@ -1,4 +1,4 @@
-//! What a user is told about a mistake in a scene: a message, the place in the user's own file, what to try.
+//! Mistakes in a scene: each a message, its place in the user's own file, and a remedy.
 //!
 //! All mistakes of a file are collected; the first [`MOST_SHOWN`] are shown together. [`SceneErrors`] is what a command
 //! line prints: through miette's graphical handler with the lines underlined, or one mistake a line with

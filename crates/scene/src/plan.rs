@@ -13,7 +13,7 @@ use crate::target::Target;
 
 /// Part of the true limit that an automatic step takes.
 pub const SAFETY: f64 = 0.9;
-/// A step that is shortened by more than this part is told.
+/// A step that is shortened by more than this part is reported.
 const SHORTENED: f64 = 1e-3;
 /// Automatic step [s] of implicit runs.
 pub const IMPLICIT_STEP: f64 = 0.01;

@@ -109,7 +109,7 @@ fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<P
     let mut parameters: Vec<Parameter> = Vec::new();
     let common = |key: &str| forms.len() > 1 && forms.iter().all(|form| form.property(key).is_some());
     for form in forms {
-        // What is said of one of several tables is said of the key that tells it from the others.
+        // The description of one of several tables goes to the key that tells it from the others.
         let own = form.properties.iter().filter(|(key, _)| !common(key)).count();
         for (key, schema) in &form.properties {
             let of_all = forms.iter().all(|form| form.required.contains(key));
@@ -156,7 +156,7 @@ fn parameter(schemas: Forms<'_>, key: &str, schema: &Json, required: bool, depth
     }
 }
 
-/// One word of several that a value may be, if something is said of it.
+/// One word of several that a value may be, if it has a description.
 fn word(form: &Form<'_>) -> Option<Parameter> {
     let [word] = form.words.as_deref()? else { return None };
     Some(Parameter {

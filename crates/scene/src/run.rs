@@ -435,7 +435,7 @@ impl<'a, R: Real> Course<'a, R> {
         let frame = frame(self.built, &self.state, self.solver.as_ref());
         for (schedule, observer) in &mut self.watching {
             if (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true) {
-                // The failure of the step is what is told.
+                // The failure of the step is reported.
                 let _ = observer.see(&frame);
             }
         }

@@ -1,6 +1,6 @@
 //! Reads surfaces in GIfTI (`.gii`): XML with an array of points and one of triangles, as text, base64, or base64 packed with zlib or gzip
 //! (GIfTI Surface Data Format 1.0). Lengths are millimetres by custom.
-//! Leaves out: data in other files, data at the points, transforms (which are told).
+//! Leaves out: data in other files, data at the points, transforms (which are reported).
 
 use std::collections::BTreeMap;
 use std::io::Read;

@@ -181,7 +181,7 @@ pub struct MeshFile {
 /// Reads a mesh file.
 pub fn read(path: &Path) -> Result<MeshFile, MeshFileError> {
     let by_ending = Format::of_path(path);
-    // Whether it can be opened is said first: a missing file is not of an unsupported format.
+    // A file that cannot be opened is reported first: a missing one is not of an unsupported format.
     let bytes =
         read_limited(path, LIMIT).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
     let by_content = Format::of_bytes(&bytes);

@@ -13,7 +13,7 @@ use crate::image::{Numbers, Order, Scalar};
 /// Longest header of a text format; NRRD's of 3D Slicer list every segment.
 const HEADER_LIMIT: u64 = 1 << 22;
 
-/// Voxels are read in pieces of so many bytes, after each of which progress is told.
+/// Voxels are read in pieces of so many bytes, with progress reported after each.
 const PIECE: u64 = 1 << 24;
 
 /// A place that moves through the bytes of a file.

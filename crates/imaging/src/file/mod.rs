@@ -103,7 +103,7 @@ pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Fn(f64)) -> 
     if path.is_dir() {
         return dicom::read_folder(path, options, progress);
     }
-    // Whether it can be opened is said first: a missing file is not of an unknown format.
+    // A file that cannot be opened is reported first: a missing one is not of an unknown format.
     let mut input = Input::open(path, options.byte_limit, progress)
         .map_err(|source| ImageError::Open { path: path.to_owned(), source })?;
     input.stay_within(options.within.clone());

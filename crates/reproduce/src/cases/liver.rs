@@ -37,7 +37,7 @@ fn tissue(part: f64) -> AnyLaw {
     law("transversely-isotropic", parameters)
 }
 
-/// What is told of a stretched liver.
+/// The results of a stretched liver.
 struct Stretched {
     displacement: Vec<[f64; 3]>,
     /// Von Mises stress [Pa], one per cell.

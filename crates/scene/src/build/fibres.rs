@@ -50,7 +50,7 @@ impl Builder<'_> {
             ("second-fibre", &draft.table.second_fibre, &law.extras.second_fibre),
         ];
         let wanted = families.iter().take(law.law.families());
-        // Both, so that the mistakes of both are told.
+        // Both, so that the mistakes of both are reported.
         let found: Vec<_> = wanted
             .map(|&(key, of_body, of_law)| {
                 let given = match (of_body, of_law) {

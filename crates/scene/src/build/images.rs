@@ -36,7 +36,7 @@ struct Recipe {
 /// What a body is made of.
 enum Scan {
     Image(Image, Choice),
-    /// Triangles or quads in metres, and what is said about their file.
+    /// Triangles or quads in metres, and the notes about their file.
     Surface(MeshFile),
 }
 

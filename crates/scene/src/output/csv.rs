@@ -165,7 +165,7 @@ struct Held(Vec<(u32, [bool; 6])>);
 /// Those of some constraints.
 fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
     let model = &built.model;
-    // Contradictions are told before.
+    // Contradictions were reported before.
     let owners = model.constrained_components().unwrap_or_default();
     let of = |&index: &usize| {
         let constraint = &model.constraints[index];

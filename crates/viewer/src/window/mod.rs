@@ -433,7 +433,7 @@ impl App {
     }
 }
 
-/// What is told after a scene was read anew.
+/// The message after a scene was read again.
 const REPLACED: &str = "the scene was read anew";
 
 impl eframe::App for App {

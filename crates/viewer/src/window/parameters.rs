@@ -112,7 +112,7 @@ impl App {
         }
     }
 
-    /// Takes a stage that is made; numbers that cannot be are told and taken back.
+    /// Takes a stage that is made; invalid numbers are reported and taken back.
     fn take_stage(&mut self, context: &egui::Context) {
         let Some((values, made)) = &self.numbers.making else { return };
         let made = match made.try_recv() {

@@ -23,7 +23,7 @@ const NORMAL: &str = "normal";
 /// Normals whose cosine is as close to 1 are parallel: to 0.1°.
 const FLAT: f64 = 1e-6;
 
-/// Thickness over width from which on a wall is told to be stout: a strip is then 3 % too stiff against twist.
+/// Thickness over width above which a wall is reported as stout: a strip is then 3 % too stiff against twist.
 const STOUT: f64 = 0.05;
 
 impl Builder<'_> {

@@ -373,7 +373,7 @@ impl Builder<'_> {
             _ => None,
         };
         if table.stop.is_some() && table.arc_length.is_none() {
-            let message = "`stop` is for `arc-length`: other controls end where they are told to";
+            let message = "`stop` is for `arc-length`: other controls end where they are set to end";
             self.error(&["run", "control", "stop"], message, "means nothing here", "remove it");
         }
         if let Some(part) = &mut self.corotational {
@@ -381,7 +381,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Where a path by arc length ends: where the load is as written, if nothing else is told.
+    /// Where a path by arc length ends: at the load as written, unless `stop` says otherwise.
     fn stop(&mut self, table: Option<&StopTable>) -> Option<Stop> {
         let Some(table) = table else { return Some(Stop { load_factor: Some(1.0), ..Stop::default() }) };
         let path = ["run", "control", "stop", "displacement"];
