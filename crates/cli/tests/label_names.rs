@@ -39,7 +39,7 @@ young-modulus = 9e3
 poisson-ratio = 0.45
 
 [body.organs]
-mesh = { image = "organs.seg.nrrd", labels = ["liver", "spleen", "tumour"], edge = 0.004, protect = ["tumour"] }
+mesh = { image = "organs.seg.nrrd", labels = ["liver", "spleen", "tumour"], edge = 0.006, protect = ["tumour"] }
 law = { liver = "soft", spleen = "soft", Tumour = "stiff" }
 density = { liver = 1060, 2 = 1050, tumour = 1100 }
 
@@ -122,16 +122,16 @@ fn unknown_names_are_refused_where_they_stand_with_those_there_are() {
 fn a_mesh_of_an_image_keeps_the_names_and_protects_by_name() {
     let workshop = workshop(&[]);
     let mesh = |more: &[&str]| {
-        let start = ["mesh", "case/organs.seg.nrrd", "--label", "1-3", "--edge", "4mm", "-o", "organs.vtu"];
+        let start = ["mesh", "case/organs.seg.nrrd", "--label", "1-3", "--edge", "6mm", "-o", "organs.vtu"];
         workshop.pliant(&[&start, more].concat())
     };
     done(mesh(&[]));
     let coarse = io::read(&workshop.path("organs.vtu")).unwrap().mesh;
     assert_eq!(Labels::of(&coarse).all_shown(), ["1 (liver)", "2 (spleen)", "3 (tumour)"]);
-    done(mesh(&["--protect", "Tumour=1mm"]));
+    done(mesh(&["--protect", "Tumour=2mm"]));
     let fine = io::read(&workshop.path("organs.vtu")).unwrap().mesh;
     assert!(fine.points.len() > 2 * coarse.points.len());
-    let told = mesh(&["--protect", "tumor=1mm"]);
+    let told = mesh(&["--protect", "tumor=2mm"]);
     assert!(told.code == 2 && told.words().contains("did you mean `tumour`?"), "{}", told.err);
     assert_eq!(mesh(&["--protect", "=1mm"]).code, 2);
 }
@@ -180,7 +180,7 @@ mod with_pictures {
         render("out/case", &["--colour", "displacement"]);
         assert_eq!(shown(&workshop, "p/frame-00002.png"), [false; 4]);
         // A mesh alone is drawn as it is.
-        let mesh = ["mesh", "case/organs.seg.nrrd", "--label", "1-3", "--edge", "3mm", "-o", "organs.vtu"];
+        let mesh = ["mesh", "case/organs.seg.nrrd", "--label", "1-3", "--edge", "5mm", "-o", "organs.vtu"];
         done(workshop.pliant(&mesh));
         render("organs.vtu", &[]);
         assert_eq!(shown(&workshop, "p/frame-00000.png"), [false, true, true, true]);

@@ -76,11 +76,19 @@ const FIRST: [[u8; 3]; 8] = [
 ];
 /// Turn of the hue from one label to the next, the golden section: any number of labels spread evenly.
 const TURN: f64 = 0.618_033_988_749_894_9;
-/// Lightness and chroma (OKLab) that follow each other, so that near hues differ in them.
-const TONES: [[f64; 2]; 3] = [[0.66, 0.15], [0.45, 0.11], [0.86, 0.09]];
-/// How far lightness drifts, so that labels whose hues meet again after a Fibonacci number of turns still differ, and by which
-/// part of that from one label to the next (the inverse of the plastic number).
-const DRIFT: [f64; 2] = [0.1, 0.754_877_666_246_692_7];
+/// Lightness and chroma (OKLab) that follow each other. Hues come close after a Fibonacci number of labels; the first one that nine
+/// divides is 144, so that near hues differ in lightness before.
+const TONES: [[f64; 2]; 9] = [
+    [0.69, 0.11],
+    [0.55, 0.16],
+    [0.75, 0.16],
+    [0.81, 0.10],
+    [0.36, 0.11],
+    [0.62, 0.08],
+    [0.42, 0.11],
+    [0.88, 0.10],
+    [0.49, 0.11],
+];
 
 /// The colour (sRGB) of a label, the same in every picture. The first two dozen are easily told apart; of hundreds some are alike.
 pub fn label_colour(label: i32) -> [u8; 3] {
@@ -90,9 +98,7 @@ pub fn label_colour(label: i32) -> [u8; 3] {
     // Labels below zero are the highest of all as unsigned numbers.
     let number = label as u32;
     let [lightness, chroma] = TONES[number as usize % TONES.len()];
-    let part = |of: f64| (f64::from(number) * of).fract();
-    let hue = std::f64::consts::TAU * part(TURN);
-    let lightness = lightness + DRIFT[0] * (part(DRIFT[1]) - 0.5);
+    let hue = std::f64::consts::TAU * (f64::from(number) * TURN).fract();
     of_oklab(lightness, chroma * hue.cos(), chroma * hue.sin())
 }
 
@@ -186,13 +192,13 @@ mod tests {
     #[test]
     fn labels_have_colours_that_are_told_apart() {
         assert_eq!(label_colour(5), [0, 114, 178], "Okabe and Ito's blue");
-        let colours: Vec<[u8; 3]> = (0..118).chain([1001, 1002, -1, i32::MIN]).map(label_colour).collect();
+        let colours: Vec<[u8; 3]> = (0..118).chain([1001, 1002, -1]).map(label_colour).collect();
         let apart = |[a, b]: [&[u8; 3]; 2]| -> u32 {
             (0..3).map(|c| u32::from(a[c].abs_diff(b[c])).pow(2)).sum::<u32>().isqrt()
         };
         for (at, colour) in colours.iter().enumerate() {
             for other in &colours[..at] {
-                let least = if at < 24 { 20 } else { 1 };
+                let least = if at < 24 { 30 } else { 10 };
                 assert!(apart([colour, other]) >= least, "{at}: {colour:?} and {other:?}");
             }
         }
