@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand, ValueEnum};
 use pliant_bench::Instructions;
+use pliant_geometry::CellLabel;
 use pliant_imaging::LabelChoice;
 use pliant_scene::format::{BackgroundName, Choice, MapName, TextureName};
 
@@ -147,16 +148,18 @@ Examples:
   pliant render scenes/liver --colour pressure --edges --clip 0,0,0,0,1,0
   pliant render scenes/cube --colour displacement:z --map cividis --range 0,0.02 --ghost
   pliant render scenes/liver --fibres --critical --colour element-step
+  pliant render organs.vtu --colour label --hide skin,5-8    the labels of a mesh in colours, without some
   pliant render scenes -o gallery                            a page with a picture of each scene in a folder
 
-A scene is run first, without its own outputs; its table [view] tells how it is seen, the options below come before it. A film
+A scene is run first, without its own outputs; its table [view] tells how it is seen, the options below come before it. A mesh
+file with labels is drawn as it is; of another one, or for a film, a scene is made as for `pliant view`. A film
 whose name ends in .mp4 takes ffmpeg; without one, or with a name that ends in .png, it is an animated PNG.
 
 Exit codes: 0 done, 1 the run or a picture failed, 2 the input is wrong or nothing draws here, 130 interrupted (Ctrl-C; 128 + its number for another signal).";
 
 #[derive(Debug, clap::Args)]
 pub struct Render {
-    /// The folder of a finished run, or a scene file, a folder with a scene.toml, a NiftySim model (.xml), a folder of scenes.
+    /// The folder of a finished run, or a scene file, a folder with a scene.toml, a NiftySim model (.xml), a mesh file, a folder of scenes.
     pub what: PathBuf,
     /// Frames: `all`, `last`, a number counted from 0, or several as in 0..20 (without the 20) and 10.. (to the end).
     #[arg(long, value_name = "FRAMES")]
@@ -176,9 +179,13 @@ pub struct Render {
     /// Width and height [pixels].
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
-    /// What colours tell: a field, a component of one as in `displacement:z` or `cauchy-stress:xx`, or `none`.
+    /// What colours tell: a field, a component of one as in `displacement:z` or `cauchy-stress:xx`, `label` for a colour of each label,
+    /// or `none`.
     #[arg(long, value_name = "FIELD")]
     pub colour: Option<String>,
+    /// Leave out the cells of labels, so that what lies inside is seen: numbers, names or ranges, as 2,tumour,5-8.
+    #[arg(long, value_name = "LABELS", value_delimiter = ',', allow_hyphen_values = true)]
+    pub hide: Vec<CellLabel>,
     /// Map of colours.
     #[arg(long, value_name = "MAP", value_parser = word::<MapName>())]
     pub map: Option<MapName>,
@@ -635,9 +642,9 @@ pub struct MeshImage {
     /// Tets: longer edge inside, away from the surface, rounded down to 2, 4, 8, ... times `--edge`.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     pub inner_edge: Option<f64>,
-    /// Tets: a label with smaller cells, as 4 for half of `--edge` or 4=2mm, rounded down to a half, quarter, ... of `--edge`.
+    /// Tets: a label with smaller cells, by number or name, as 4 for half of `--edge` or tumour=2mm, rounded down to a half, quarter, ... of `--edge`.
     #[arg(long, value_name = "LABEL[=LENGTH]", value_parser = protected, allow_hyphen_values = true)]
-    pub protect: Vec<(i32, Option<f64>)>,
+    pub protect: Vec<(CellLabel, Option<f64>)>,
     /// Triangles of a surface, instead of their edge: as few, placed where the shape needs them.
     #[arg(long = "cells", value_name = "N", conflicts_with = "edge")]
     pub triangles: Option<usize>,
@@ -720,12 +727,16 @@ fn length(typed: &str) -> Result<f64, String> {
 }
 
 /// A label, and the length after it if there is one.
-fn protected(typed: &str) -> Result<(i32, Option<f64>), String> {
-    let (label, edge) = typed.split_once('=').map_or((typed, None), |(label, edge)| (label, Some(edge)));
-    let label = label
-        .trim()
-        .parse()
-        .map_err(|_| "a label to protect is a number, as 4, or one with an edge, as 4=2mm")?;
+fn protected(typed: &str) -> Result<(CellLabel, Option<f64>), String> {
+    let (label, edge) = typed.rsplit_once('=').map_or((typed, None), |(label, edge)| (label, Some(edge)));
+    let label = match label.trim() {
+        "" => {
+            return Err(
+                "a label to protect is a number or a name, as 4, or one with an edge, as tumour=2mm".into()
+            );
+        }
+        text => text.parse().unwrap_or_else(|never: std::convert::Infallible| match never {}),
+    };
     Ok((label, edge.map(str::trim).map(length).transpose()?))
 }
 

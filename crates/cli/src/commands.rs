@@ -1,5 +1,6 @@
 //! What each subcommand does.
 
+use std::cell::OnceCell;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -10,8 +11,8 @@ use pliant_gpu::{Adapter, GpuError};
 use pliant_scene::diagnostic::{Diagnostic, SceneErrors};
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, Draw, MeshCache, Options, OutputFolder, Plan, Reads, Scene, Sweep, SweepOptions,
-    niftysim, number, reference, registry,
+    Built, Checkpoint, Draw, MeshCache, Meshing, Options, OutputFolder, Plan, Reads, Scene, Sweep,
+    SweepOptions, niftysim, number, reference, registry,
 };
 use serde_json::{Value as Json, json};
 use tempfile::TempDir;
@@ -94,13 +95,26 @@ pub fn prepare_changed(
     }
     let mut scene = Scene::from_source(source, folder)?;
     change(&mut scene);
-    let mut built = pliant_scene::build_with(&scene, &mesh_cache(overrides.no_cache))?;
+    let mut built = build(&scene, &mesh_cache(overrides.no_cache))?;
     built.warnings.extend(assumed.map(Diagnostic::warning));
     if !built.warnings.is_empty() {
         report::show(&scene.source.errors(built.warnings.clone()));
     }
     let plan = in_pool(&scene, || pliant_scene::plan(&scene, &built))?;
     Ok((scene, built, plan))
+}
+
+/// Builds a scene; a bar shows how far meshes of images are.
+fn build(scene: &Scene, cache: &MeshCache) -> Result<Built, Failure> {
+    let bar: OnceCell<Bar> = OnceCell::new();
+    let built = pliant_scene::build_watched(scene, cache, &|meshing| {
+        let Meshing { body, part, now } = meshing;
+        bar.get_or_init(Bar::new).update_mesh(part, format!("mesh of `{body}`: {now}"));
+    });
+    if let Some(bar) = bar.get() {
+        bar.finish();
+    }
+    Ok(built?)
 }
 
 /// A scene that was read.
@@ -220,7 +234,7 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     for note in built.notes.iter().chain(&plan.note).chain(&plan.target.note) {
         eprintln!("note: {note}");
     }
-    let photographer = arguments.picture.then(|| pictures::Photographer::new(&scene)).transpose()?;
+    let photographer = arguments.picture.then(|| pictures::Photographer::new(&scene, &built)).transpose()?;
     let bar = Bar::new();
     let options = Options {
         resume: checkpoint.as_ref(),

@@ -7,7 +7,9 @@ use std::process::ExitCode;
 
 use pliant_bench::{elastic, law, liver_matrix, soft_tissue};
 use pliant_geometry::io::{self, Format, MeshFile};
-use pliant_geometry::{CellKind, Mesh, QualityReport, Vector3, diagnose};
+use pliant_geometry::{
+    CellKind, CellLabel, Labels as CellLabels, Mesh, QualityReport, UnknownLabel, Vector3, diagnose,
+};
 use pliant_imaging::{
     Border, Choice, Cleaned, Cleaning, Image, ImageError, ImageProblem, LabelChoice, LabelError, LabelImage,
     LabelNames, ReadOptions, RegionReport, Smoothing, read_with,
@@ -191,6 +193,10 @@ pub fn mesh_file(arguments: &MeshImage, warnings: &mut Vec<String>) -> Result<Me
 pub struct Segmented {
     pub labels: LabelImage,
     pub chosen: Vec<i32>,
+    /// Names of the chosen labels, of those that have one.
+    pub names: BTreeMap<i32, String>,
+    /// Labels with smaller cells, and their edges [m].
+    pub protect: Vec<(i32, Option<f64>)>,
     /// Least step from voxel to voxel [m].
     pub voxel: f64,
     /// For people and for programs.
@@ -228,7 +234,10 @@ pub fn regions(arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
         }
         _ => image.choose(&arguments.label).map_err(refused)?,
     };
-    let finest = arguments.edge.or(arguments.distance).map(|edge| tets(arguments, edge).finest());
+    let chosen = if let Choice::Labels(labels) = &choice { &labels[..] } else { &[1] };
+    let names = if matches!(choice, Choice::Labels(_)) { image.names.of(chosen) } else { BTreeMap::new() };
+    let protect = protected(arguments, chosen, &names)?;
+    let finest = arguments.edge.or(arguments.distance).map(|edge| tets(arguments, edge, &protect).finest());
     let coarsest = finest.map_or(f64::INFINITY, |finest| finest * COARSEST);
     let progress = |done: f64| bar.update_mesh(READING * (1.0 + done), "cutting the body out");
     let cut = image.cut(&choice, coarsest, &progress).map_err(|error| match (&error, &choice) {
@@ -265,7 +274,24 @@ pub fn regions(arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
     };
     let warnings = image.border(&choice).into_iter().map(warning).collect();
     let voxel = cut.labels.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
-    Ok(Segmented { labels: cut.labels, chosen: cut.chosen, voxel, lines, object, warnings })
+    Ok(Segmented { labels: cut.labels, chosen: cut.chosen, names, protect, voxel, lines, object, warnings })
+}
+
+/// The labels with smaller cells that were typed, by their numbers, of those that the cells get.
+fn protected(
+    arguments: &MeshImage,
+    labels: &[i32],
+    names: &BTreeMap<i32, String>,
+) -> Result<Vec<(i32, Option<f64>)>, Failure> {
+    let known: CellLabels = labels.iter().map(|label| (*label, names.get(label).cloned())).collect();
+    let number = |(label, edge): &(CellLabel, Option<f64>)| match label {
+        // What none of the cells has is told once they are made.
+        CellLabel::Number(label) => Ok((*label, *edge)),
+        CellLabel::Name(_) => Ok((known.find(label)?, *edge)),
+    };
+    let help = "`--label` chooses the labels that are meshed; `pliant labels IMAGE` lists them, and `--names TABLE` names them";
+    let found: Result<_, UnknownLabel> = arguments.protect.iter().map(number).collect();
+    found.map_err(|error| Failure::plain(error, help))
 }
 
 /// Refuses a name whose ending no volume mesh can be written to, before any work.
@@ -354,7 +380,7 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
     let refused = |error: MeshingError| meshing_failure(&error, force);
     let (mesh, cells) = match arguments.cells {
         MeshCells::Tets => {
-            let request = OrganTets { cell_limit, ..tets(arguments, edge) };
+            let request = OrganTets { cell_limit, ..tets(arguments, edge, &found.protect) };
             let made = request.mesh(anatomy, &filling).map_err(refused)?;
             (made.mesh, Cells::Tets(Box::new(made.report)))
         }
@@ -379,7 +405,7 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
         components: diagnose(&mesh).components,
         steps: steps(arguments, &mesh),
         warnings,
-        mesh,
+        mesh: Mesh { label_names: found.names, ..mesh },
         cells,
         lines: found.lines,
         object: found.object,
@@ -387,10 +413,10 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
     })
 }
 
-/// The tets asked for.
-fn tets(arguments: &MeshImage, edge: f64) -> OrganTets {
+/// The tets asked for; labels with smaller ones come with their edges [m].
+fn tets(arguments: &MeshImage, edge: f64, protect: &[(i32, Option<f64>)]) -> OrganTets {
     let MeshImage { inner_edge, distance, .. } = *arguments;
-    OrganTets { inner_edge, distance, ..OrganTets::new(edge) }.protecting(&arguments.protect)
+    OrganTets { inner_edge, distance, ..OrganTets::new(edge) }.protecting(protect)
 }
 
 /// The edge of the cells [m], or of the first ones where a distance is asked for, given the box of the body [m].
@@ -439,6 +465,8 @@ fn steps(arguments: &MeshImage, mesh: &Mesh) -> Vec<(String, f64)> {
 /// A body to fill, and what there is to say of where it comes from.
 struct Found {
     anatomy: Anatomy<'static>,
+    names: BTreeMap<i32, String>,
+    protect: Vec<(i32, Option<f64>)>,
     /// Edge of the cells [m].
     edge: f64,
     lines: Vec<String>,
@@ -454,10 +482,11 @@ fn segmented(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
         require_few(arguments, edge, voxels as f64 * found.labels.grid.voxel_volume())?;
     }
     let (anatomy, cleaned) = anatomy(arguments, &found, &Smoothing::default(), bar)?;
-    let Segmented { mut lines, object, warnings, .. } = found;
+    let Segmented { mut lines, object, warnings, names, protect, .. } = found;
     lines.push(format!("cleaned          {cleaned}"));
     let edge = edge_of(arguments, anatomy.field().bounds().into());
-    Ok(Found { anatomy, edge, lines, object: json!({ "image": object, "cleaned": cleaned }), warnings })
+    let object = json!({ "image": object, "cleaned": cleaned });
+    Ok(Found { anatomy, names, protect, edge, lines, object, warnings })
 }
 
 /// The body that a closed surface encloses.
@@ -489,7 +518,9 @@ fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
             ));
         }
     };
-    let finest = tets(arguments, edge).finest();
+    let names = BTreeMap::new();
+    let protect = protected(arguments, &[label], &names)?;
+    let finest = tets(arguments, edge, &protect).finest();
     let anatomy = surface.fine_anatomy(label, edge, finest, &progress).map_err(refused)?;
     let report = &surface.report;
     let mut lines =
@@ -502,7 +533,7 @@ fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
         lines.push(format!("surface          {} pieces, of which {cavities} {word}", report.shells));
     }
     let object = json!({ "surface": { "format": file.format, "notes": file.notes }, "mended": report });
-    Ok(Found { anatomy, edge, lines, object, warnings })
+    Ok(Found { anatomy, names, protect, edge, lines, object, warnings })
 }
 
 /// Refuses cells that would be too many for a volume [m³], before they are made.

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use pliant_geometry::{Mesh, Vector3};
+use pliant_geometry::{CellLabel, Labels, Mesh, Vector3, io};
 use pliant_picture::{
     AnimatedPng, Axis, Background, Camera, ColourMap, Film, Graphics, Legend, Look, Picture, PictureError,
     Plane, Projection, Series, SeriesError, Style, Texture, ffmpeg,
 };
 use pliant_scene::format::{BackgroundName, FieldName, MapName, TextureName, UpName, VtuTable};
 use pliant_scene::registry::OutputTable;
-use pliant_scene::{Draw, Options, OutputFolder, Scene};
+use pliant_scene::{Built, Draw, Options, OutputFolder, Scene};
 
 use crate::arguments::{Frames, Overrides, Render};
 use crate::commands::prepare_changed;
@@ -38,6 +38,7 @@ pub fn look_of(scene: &Scene) -> Look {
         style: Style {
             map: map_of(view.map),
             range: view.range,
+            labels: view.shows_labels(),
             edges: view.edges,
             wireframe: view.wireframe,
             ghost: view.ghost,
@@ -107,10 +108,11 @@ fn colour_by(look: &mut Look, field: FieldName, component: Option<&str>) {
     look.legend.unit = field.unit().into();
 }
 
-/// Colours by a field of any name, as files have them.
+/// Colours by a field of any name, as files have them, or by labels.
 fn colour_by_name(look: &mut Look, name: &str) {
+    look.style.labels = name == "label";
     let (own, part) = name.split_once(':').map_or((name, None), |(own, part)| (own, Some(part)));
-    if name == "none" {
+    if name == "none" || look.style.labels {
         look.field = None;
         look.style.range = None;
     } else if let Some(field) = FieldName::of_name(own) {
@@ -170,8 +172,9 @@ pub struct Photographer {
 }
 
 impl Photographer {
-    pub fn new(scene: &Scene) -> Result<Self, Failure> {
-        Ok(Self { look: look_of(scene), graphics: Graphics::open()? })
+    pub fn new(scene: &Scene, built: &Built) -> Result<Self, Failure> {
+        let look = Look { hide: built.hidden(&scene.view), ..look_of(scene) };
+        Ok(Self { look, graphics: Graphics::open()? })
     }
 }
 
@@ -199,10 +202,16 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
             colour_by_name(&mut look, field);
         }
         typed(&mut look, arguments);
+        if !arguments.hide.is_empty() {
+            look.hide = hidden(&series.labels()?, &arguments.hide)?;
+        }
         return shoot(arguments, &look, &graphics, &series, &folder, film);
     }
     if arguments.series.is_some() {
         return Err(Failure::plain("`--series` chooses among the series of a finished run", "leave it out"));
+    }
+    if let Some(mesh) = labelled_mesh(arguments)? {
+        return portrait(arguments, &mesh, &graphics, &folder);
     }
     let Some(shown) = run_scene(&arguments.what, arguments)? else {
         return Ok(ExitCode::from(signals::exit_code()));
@@ -210,6 +219,47 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
     let code = shoot(arguments, &shown.look, &graphics, &shown.series, &folder, film)?;
     // What a failed run came to is worth a look.
     Ok(if shown.failed { ExitCode::from(1) } else { code })
+}
+
+/// The labels that were typed, of those there are.
+fn hidden(labels: &Labels, typed: &[CellLabel]) -> Result<Vec<i32>, Failure> {
+    let found = typed.iter().map(|label| labels.find_all(label)).collect::<Result<Vec<_>, _>>();
+    let help = "`--hide` takes numbers, names and ranges, as 2,tumour,5-8";
+    Ok(found.map_err(|error| Failure::plain(error, help))?.concat())
+}
+
+/// The mesh of a file that is drawn as it is: one with labels, of which nothing is asked for that takes a run.
+fn labelled_mesh(arguments: &Render) -> Result<Option<Mesh>, Failure> {
+    let of_cells = matches!(arguments.colour.as_deref(), None | Some("label" | "none"));
+    let runs = arguments.film.is_some() || arguments.frames.is_some() || changes_a_run(arguments);
+    if !of_cells || runs || arguments.critical || arguments.fibres || !pliant_scene::is_mesh(&arguments.what)
+    {
+        return Ok(None);
+    }
+    let file = io::read(&arguments.what).map_err(|error| Failure::plain(error, "check the path"))?;
+    Ok(Some(file.mesh).filter(|mesh| !Labels::of(mesh).is_empty()))
+}
+
+/// Draws a mesh alone, in the colours of its labels.
+fn portrait(
+    arguments: &Render,
+    mesh: &Mesh,
+    graphics: &Graphics,
+    folder: &OutputFolder,
+) -> Result<ExitCode, Failure> {
+    let cells: usize = mesh.blocks.iter().map(|block| block.len()).sum();
+    let note = format!("{} nodes, {cells} cells", mesh.points.len());
+    let title =
+        arguments.what.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let legend = Legend { title, note, ..Legend::default() };
+    let mut look = Look { size: [1280, 800], legend, ..Look::default() };
+    look.style.labels = true;
+    typed(&mut look, arguments);
+    look.hide = hidden(&Labels::of(mesh), &arguments.hide)?;
+    let picture = look.picture(graphics, mesh, 0.0)?;
+    save(folder, &picture_name(0), &picture)?;
+    say(format_args!("wrote {} in {} ({})", picture_name(0), folder.path().display(), graphics.adapter()))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
@@ -235,12 +285,12 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
             "check the free space, or set TMPDIR",
         )
     })?;
-    let overrides = with_colour(&arguments.overrides, arguments.colour.as_deref());
+    let overrides = with_view(arguments);
     let mut every = 0.0;
     let (mut scene, built, plan) =
         prepare_changed(path, &overrides, |scene| every = forget_outputs(scene, arguments))?;
     scene.outputs = vec![("shown".into(), OutputTable::Vtu(scene.shown(every)))];
-    let mut look = look_of(&scene);
+    let mut look = Look { hide: built.hidden(&scene.view), ..look_of(&scene) };
     typed(&mut look, arguments);
     let run = OutputFolder::prepare(space.path().join("run"), &scene, false)
         .map_err(|error| Failure::plain(&error, error.remedy))?;
@@ -331,14 +381,18 @@ fn is_folder_of_run(path: &Path) -> bool {
     path.is_dir() && !path.join("scene.toml").exists()
 }
 
-fn refuse_words_of_scenes(arguments: &Render) -> Result<(), Failure> {
+/// Whether options change how a scene runs.
+fn changes_a_run(arguments: &Render) -> bool {
     let changes = &arguments.overrides;
-    let changed = !changes.set.is_empty()
+    !changes.set.is_empty()
         || [changes.until, changes.step, arguments.every].iter().any(Option::is_some)
         || changes.threads.is_some()
         || changes.precision.is_some()
-        || changes.device.is_some();
-    if changed {
+        || changes.device.is_some()
+}
+
+fn refuse_words_of_scenes(arguments: &Render) -> Result<(), Failure> {
+    if changes_a_run(arguments) {
         let message =
             format!("`{}` is a finished run: its scene can't be changed any more", arguments.what.display());
         return Err(Failure::plain(message, "give the scene, or leave these options out"));
@@ -361,13 +415,16 @@ fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
     arguments.every.or(own).unwrap_or(0.01 * scene.scene.until)
 }
 
-/// The colour that was typed as values of the scene, so that they are checked with it.
-fn with_colour(overrides: &Overrides, colour: Option<&str>) -> Overrides {
-    let mut all = overrides.clone();
-    if let Some(name) = colour {
+/// The colour and the hidden labels that were typed as values of the scene, so that they are checked with it.
+fn with_view(arguments: &Render) -> Overrides {
+    let mut all = arguments.overrides.clone();
+    if let Some(name) = arguments.colour.as_deref() {
         let (own, part) = name.split_once(':').map_or((name, None), |(own, part)| (own, Some(part)));
         all.set.push(format!("view.colour={own}"));
         all.set.extend(part.map(|part| format!("view.component={part}")));
+    }
+    if !arguments.hide.is_empty() {
+        all.set.push(format!("view.hide={}", serde_json::json!(arguments.hide)));
     }
     all
 }

@@ -38,6 +38,7 @@ mod cell;
 mod closest;
 mod diagnosis;
 pub mod io;
+mod labels;
 mod locate;
 mod mesh;
 mod quality;
@@ -50,6 +51,7 @@ pub use bezier::{ControlWeights, CurvedTriangle, EDGES, EdgeRule};
 pub use cell::{CellId, body_blocks};
 pub use closest::{SurfaceLocator, SurfacePoint};
 pub use diagnosis::{CrowdedFace, Diagnosis, diagnose, reorder};
+pub use labels::{CellLabel, Labels, UnknownLabel};
 pub use locate::{Location, Locator, barycentric_of_closest};
 pub use mesh::{CellBlock, CellKind, DataArray, Mesh};
 pub use quality::{
@@ -57,7 +59,7 @@ pub use quality::{
     scaled_jacobian, vector_area, volume,
 };
 pub use selection::{Selection, SelectionError};
-pub use surface::{Face, Surface, boundary, label_boundary, label_nodes, labels};
+pub use surface::{Face, Surface, boundary, cell_label, label_boundary, label_nodes, labels};
 
 /// A point or a vector in space.
 pub type Vector3 = nalgebra::Vector3<f64>;

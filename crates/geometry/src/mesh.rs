@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::Vector3;
+use crate::surface::cell_label;
 
 /// Shape of a cell and the number and order of its nodes (the order of VTK).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -124,17 +125,16 @@ impl CellBlock {
         &self.nodes[index * n..(index + 1) * n]
     }
 
-    /// Removes the cells whose nodes `keep` refuses, with their data and places in sets.
-    fn retain(&mut self, keep: impl Fn(&[u32]) -> bool) {
-        let kept: Vec<bool> = self.cells().map(keep).collect();
+    /// Removes the cells that are not kept, with their data and places in sets.
+    fn retain(&mut self, kept: &[bool]) {
         if kept.iter().all(|&kept| kept) {
             return;
         }
-        self.nodes = kept_items(&self.nodes, self.kind.node_count(), &kept);
+        self.nodes = kept_items(&self.nodes, self.kind.node_count(), kept);
         for array in self.data.values_mut() {
-            array.values = kept_items(&array.values, array.components, &kept);
+            array.values = kept_items(&array.values, array.components, kept);
         }
-        let numbers = numbers_of(&kept);
+        let numbers = numbers_of(kept);
         for set in self.sets.values_mut() {
             set.retain_mut(|cell| {
                 let old = *cell as usize;
@@ -161,6 +161,8 @@ pub struct Mesh {
     pub point_data: BTreeMap<String, DataArray>,
     /// Named sets of points: indices, increasing.
     pub point_sets: BTreeMap<String, Vec<u32>>,
+    /// Names of labels of cells (cell data `label`), of some or all.
+    pub label_names: BTreeMap<i32, String>,
 }
 
 impl Mesh {
@@ -240,10 +242,21 @@ impl Mesh {
     pub fn drop_unused_points(&mut self) -> usize {
         let used = self.used_points();
         for block in &mut self.blocks {
-            block.retain(|nodes| nodes.iter().all(|&node| used.get(node as usize) != Some(&false)));
+            let hangs_on = |nodes: &[u32]| nodes.iter().all(|&node| used.get(node as usize) != Some(&false));
+            let kept: Vec<bool> = block.cells().map(hangs_on).collect();
+            block.retain(&kept);
         }
         let target: Vec<u32> = (0..self.points.len() as u32).collect();
         self.renumber(&target, &used)
+    }
+
+    /// Removes the cells of some labels, with their data and places in sets; all points stay.
+    pub fn drop_labels(&mut self, labels: &[i32]) {
+        for block in &mut self.blocks {
+            let kept = |cell| cell_label(block, cell).is_none_or(|label| !labels.contains(&label));
+            let kept: Vec<bool> = (0..block.len() as u32).map(kept).collect();
+            block.retain(&kept);
+        }
     }
 
     /// Joins pairs of points, each second one into its first, and removes the second ones; returns how many.

@@ -8,7 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cell::{diagonal, finite_bounds, is_finite};
-use crate::surface::{cell_label, face_key, label_boundary, label_nodes, labels};
+use crate::labels::{CellLabel, Labels, UnknownLabel};
+use crate::surface::{cell_label, face_key, label_boundary, label_nodes};
 use crate::{CellBlock, Mesh, Surface, Vector3};
 
 /// Slack of every comparison of positions, as part of the diagonal of the mesh's bounding box.
@@ -83,10 +84,10 @@ pub enum Selection {
     },
     /// A named set of the mesh file, of points or of cells: `{ set = "left-lobe" }`.
     Set(String),
-    /// Everything of the cells with a label (cell data `label`): `{ label = 2 }`.
-    Label(i32),
-    /// Nodes shared by cells of two labels, the interface of two regions: `{ label-boundary = [1, 2] }`.
-    LabelBoundary([i32; 2]),
+    /// Everything of the cells with a label (cell data `label`), by number or name: `{ label = 2 }`, `{ label = "liver" }`.
+    Label(CellLabel),
+    /// Nodes shared by cells of two labels, the interface of two regions: `{ label-boundary = [1, "tumour"] }`.
+    LabelBoundary([CellLabel; 2]),
     /// Nodes by index, counted from 0: `{ ids = [0, 5, 17] }`.
     Ids(Vec<u32>),
     /// What any of the selections holds: `{ union = [{ set = "a" }, { set = "b" }] }`.
@@ -137,13 +138,8 @@ pub enum SelectionError {
         count: usize,
     },
     /// No cell has the label.
-    #[error("no cell has label {label}: {}", known_labels(.known))]
-    UnknownLabel {
-        /// The label asked for.
-        label: i32,
-        /// All labels, increasing.
-        known: Vec<i32>,
-    },
+    #[error(transparent)]
+    UnknownLabel(#[from] UnknownLabel),
     /// A direction without length.
     #[error("{what} is zero: it must point somewhere, for example [0, 0, 1]")]
     ZeroDirection {
@@ -207,17 +203,6 @@ fn sets_instead(nearest: &Option<String>, known: &[String]) -> String {
         Some(name) => format!("; did you mean `{name}`? ({all})"),
         None => format!(": {all}"),
     }
-}
-
-fn known_labels(labels: &[i32]) -> String {
-    match labels {
-        [] => "the mesh has no cell data named `label`".to_owned(),
-        _ => format!("the mesh has {}", list(labels)),
-    }
-}
-
-fn list<T: ToString>(items: &[T]) -> String {
-    items.iter().map(T::to_string).collect::<Vec<_>>().join(", ")
 }
 
 type Indices = Result<Vec<u32>, SelectionError>;
@@ -367,13 +352,10 @@ impl View<'_> {
                 let nodes: Vec<u32> = nodes.chain(set.points).copied().collect();
                 self.check_nodes(&nodes).map(|()| sorted(nodes))
             }
-            Selection::Label(label) => {
-                self.check_label(*label)?;
-                Ok(label_nodes(self.mesh, *label))
-            }
-            Selection::LabelBoundary(pair) => {
-                pair.iter().try_for_each(|&label| self.check_label(label))?;
-                Ok(label_boundary(self.mesh, *pair))
+            Selection::Label(label) => Ok(label_nodes(self.mesh, Labels::of(self.mesh).find(label)?)),
+            Selection::LabelBoundary([a, b]) => {
+                let labels = Labels::of(self.mesh);
+                Ok(label_boundary(self.mesh, [labels.find(a)?, labels.find(b)?]))
             }
             Selection::Ids(ids) => self.check_nodes(ids).map(|()| sorted(ids.clone())),
             _ => Ok(self.region(leaf)),
@@ -391,11 +373,11 @@ impl View<'_> {
                 }))
             }
             Selection::Label(label) => {
-                self.check_label(*label)?;
+                let label = Labels::of(self.mesh).find(label)?;
                 Ok(self.faces_where(|face| {
                     let parent = self.surface.faces[face].parent;
                     let block = self.mesh.block(parent.kind);
-                    block.and_then(|block| cell_label(block, parent.index)) == Some(*label)
+                    block.and_then(|block| cell_label(block, parent.index)) == Some(label)
                 }))
             }
             Selection::Set(name) => self.faces_of_set(name),
@@ -503,11 +485,6 @@ impl View<'_> {
         let count = self.mesh.points.len();
         let beyond = nodes.iter().find(|&&node| node as usize >= count);
         beyond.map_or(Ok(()), |&id| Err(SelectionError::NoSuchNode { id, count }))
-    }
-
-    fn check_label(&self, label: i32) -> Result<(), SelectionError> {
-        let known = labels(self.mesh);
-        if known.contains(&label) { Ok(()) } else { Err(SelectionError::UnknownLabel { label, known }) }
     }
 
     /// The error for a selection that selects nothing.
@@ -672,6 +649,7 @@ mod tests {
         let mut mesh = block_of_hexes([2, 2, 2]);
         let labels = (0..8).map(|cell| if cell % 2 == 0 { 1.0 } else { 2.0 }).collect();
         mesh.blocks[0].data.insert("label".into(), DataArray::scalar(labels));
+        mesh.label_names = [(1, "liver".to_owned()), (2, "tumour".to_owned())].into();
         mesh.blocks[0].sets.insert("first-cell".into(), vec![0]);
         mesh.point_sets.insert("bottom".into(), (0..9).collect());
         mesh.block_mut(CellKind::Quad).nodes.extend([0, 1, 4, 3, 4, 13, 14, 5]);
@@ -695,7 +673,7 @@ mod tests {
         parse(toml).nodes(&mesh, &boundary(&mesh)).unwrap_err().to_string()
     }
 
-    const FORMS: [&str; 17] = [
+    const FORMS: [&str; 19] = [
         r#""all""#,
         r#""boundary""#,
         "{ box = [[0, 0, 0], [1, 1.5, 1]] }",
@@ -713,11 +691,13 @@ mod tests {
         r#"{ union = [{ ids = [1] }, "boundary"] }"#,
         r#"{ intersection = ["boundary", { label = 2 }] }"#,
         r#"{ difference = ["all", "boundary"] }"#,
+        r#"{ label = "Tumour" }"#,
+        r#"{ label-boundary = ["liver", 2] }"#,
     ];
 
     #[test]
     fn every_form_is_read_written_back_and_selects_nodes() {
-        let counts = [27, 26, 8, 4, 18, 9, 9, 9, 1, 4, 9, 18, 9, 2, 26, 17, 1];
+        let counts = [27, 26, 8, 4, 18, 9, 9, 9, 1, 4, 9, 18, 9, 2, 26, 17, 1, 18, 9];
         for (form, count) in FORMS.into_iter().zip(counts) {
             let selection = parse(form);
             let again = serde_json::to_string(&selection).unwrap();
@@ -761,6 +741,7 @@ mod tests {
         assert_eq!(faces(r#"{ set = "first-cell" }"#).len(), 3);
         assert_eq!(faces(r#"{ set = "skin" }"#).len(), 1);
         assert_eq!(faces("{ label = 1 }").len(), 12);
+        assert_eq!(faces("{ label = 'liver' }"), faces("{ label = 1 }"));
         assert_eq!(faces("{ intersection = [{ label = 1 }, { set = \"bottom\" }] }").len(), 2);
         assert_eq!(faces("{ difference = [\"all\", { label = 1 }, { set = \"bottom\" }] }").len(), 10);
     }
@@ -798,7 +779,9 @@ mod tests {
                 "; did you mean `bottom`? (the mesh has `bottom`, `first-cell`, `inner`",
             ),
             ("{ ids = [27] }", "there is no node 27: the mesh has 27 nodes, counted from 0"),
-            ("{ label = 3 }", "no cell has label 3: the mesh has 1, 2"),
+            ("{ label = 3 }", "no cell has label 3: the mesh has 1 (liver), 2 (tumour)"),
+            ("{ label = 'livr' }", "no label is named `livr`; did you mean `liver`? (the mesh has 1 (liver)"),
+            ("{ label-boundary = [1, 'lung'] }", "no label is named `lung`"),
             ("{ box = [[0, 5, 0], [1, 1, 1]] }", "along y: it begins at 5 m and ends at 1 m"),
             ("{ plane = { point = [0, 0, 0], normal = [0, 0, 0] } }", "normal of the plane is zero"),
             (

@@ -212,8 +212,8 @@ pub fn label_boundary(mesh: &Mesh, labels: [i32; 2]) -> Vec<u32> {
     nodes
 }
 
-/// The label of a cell, if its block has labels.
-pub(crate) fn cell_label(block: &CellBlock, index: u32) -> Option<i32> {
+/// The label of a cell (cell data `label`, rounded), if its block has labels.
+pub fn cell_label(block: &CellBlock, index: u32) -> Option<i32> {
     let data = block.data.get("label")?;
     let at = index as usize;
     (at < data.len()).then(|| label_number(data.item(at)))

@@ -89,6 +89,27 @@ fn with_sets() -> Mesh {
 // --- files of other programs --------------------------------------------------------------------------------
 
 #[test]
+fn names_of_labels_come_back_from_vtu_files() {
+    let mut mesh = mixed();
+    let names = [(10, "liver"), (11, "left kidney"), (-3, "Größe & <b>")];
+    mesh.label_names = names.iter().map(|&(label, name)| (label, name.to_owned())).collect();
+    for options in
+        [VtuOptions::default(), VtuOptions { compress: true, time: Some(0.5), ..VtuOptions::default() }]
+    {
+        let mut bytes = Vec::new();
+        write_vtu(&mut bytes, &mesh, &options).unwrap();
+        let back = read_bytes(&bytes, Format::Vtu).unwrap();
+        assert_eq!((&back.mesh.label_names, back.time), (&mesh.label_names, options.time));
+        // What names nothing is passed over; what are no codes is refused.
+        let text = String::from_utf8(bytes).unwrap();
+        let odd = text.replace("\"ascii\">45 51 32", "\"ascii\">32 300 0 7 0 45 51 32");
+        assert_eq!(read_bytes(odd.as_bytes(), Format::Vtu).unwrap().mesh.label_names.len(), 3);
+        let broken = text.replace("\"ascii\">45 51 32", "\"ascii\">45 x 32");
+        assert!(read_bytes(broken.as_bytes(), Format::Vtu).is_err());
+    }
+}
+
+#[test]
 fn vtu_of_vtk_in_every_storage() {
     for name in [
         "ascii.vtu",

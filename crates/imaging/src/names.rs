@@ -64,6 +64,11 @@ impl LabelNames {
         self.0.get(&label).map(String::as_str)
     }
 
+    /// The names of some labels, of those that have one.
+    pub fn of(&self, labels: &[i32]) -> BTreeMap<i32, String> {
+        labels.iter().filter_map(|&label| Some((label, self.get(label)?.to_owned()))).collect()
+    }
+
     /// Takes names over those that are there.
     pub fn extend(&mut self, others: &Self) {
         self.0.extend(others.0.iter().map(|(label, name)| (*label, name.clone())));
@@ -268,6 +273,7 @@ mod tests {
     #[test]
     fn the_classes_of_totalsegmentator_have_their_numbers() {
         let names = LabelNames::total_segmentator();
+        assert_eq!(names.of(&[5, 118]), [(5, "liver".to_owned())].into());
         let expected = [
             (1, "spleen"),
             (5, "liver"),

@@ -1,4 +1,5 @@
-//! From values to colours: perceptual maps, most of them safe for the colour-blind, and the range that they span.
+//! From values to colours: perceptual maps, most of them safe for the colour-blind, and the range that they span. From labels to
+//! colours: one for each, the same in every picture.
 
 /// A map of colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,6 +61,61 @@ impl ColourMap {
         };
         (0..256).map(colour).collect()
     }
+}
+
+/// Colours of the labels from 0 on: grey, then those that Okabe and Ito (2008) chose so that the colour-blind tell them apart.
+const FIRST: [[u8; 3]; 8] = [
+    [153, 153, 153],
+    [230, 159, 0],
+    [86, 180, 233],
+    [0, 158, 115],
+    [240, 228, 66],
+    [0, 114, 178],
+    [213, 94, 0],
+    [204, 121, 167],
+];
+/// Turn of the hue from one label to the next, the golden section: any number of labels spread evenly.
+const TURN: f64 = 0.618_033_988_749_894_9;
+/// Lightness and chroma (OKLab) that follow each other. Hues come close after a Fibonacci number of labels; the first one that nine
+/// divides is 144, so that near hues differ in lightness before.
+const TONES: [[f64; 2]; 9] = [
+    [0.69, 0.11],
+    [0.55, 0.16],
+    [0.75, 0.16],
+    [0.81, 0.10],
+    [0.36, 0.11],
+    [0.62, 0.08],
+    [0.42, 0.11],
+    [0.88, 0.10],
+    [0.49, 0.11],
+];
+
+/// The colour (sRGB) of a label, the same in every picture. The first two dozen are easily told apart; of hundreds some are alike.
+pub fn label_colour(label: i32) -> [u8; 3] {
+    if let Some(&colour) = usize::try_from(label).ok().and_then(|label| FIRST.get(label)) {
+        return colour;
+    }
+    // Labels below zero are the highest of all as unsigned numbers.
+    let number = label as u32;
+    let [lightness, chroma] = TONES[number as usize % TONES.len()];
+    let hue = std::f64::consts::TAU * (f64::from(number) * TURN).fract();
+    of_oklab(lightness, chroma * hue.cos(), chroma * hue.sin())
+}
+
+/// The nearest colour (sRGB) of one in OKLab (Ottosson 2020).
+fn of_oklab(lightness: f64, a: f64, b: f64) -> [u8; 3] {
+    let long = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
+    let medium = (lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b).powi(3);
+    let short = (lightness - 0.089_484_177_5 * a - 1.291_485_548_0 * b).powi(3);
+    [
+        4.076_741_662_1 * long - 3.307_711_591_3 * medium + 0.230_969_929_2 * short,
+        -1.268_438_004_6 * long + 2.609_757_401_1 * medium - 0.341_319_396_5 * short,
+        -0.004_196_086_3 * long - 0.703_418_614_7 * medium + 1.707_614_701_0 * short,
+    ]
+    .map(|light| {
+        let coded = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+        (255.0 * coded.clamp(0.0, 1.0)).round() as u8
+    })
 }
 
 /// The light of a byte of sRGB (IEC 61966-2-1).
@@ -131,6 +187,24 @@ mod tests {
         }
         assert_eq!(ColourMap::Viridis.at(0.0), [0x44, 0x01, 0x54]);
         assert!(ColourMap::BlueRed.at(0.0)[2] > 90 && ColourMap::BlueRed.at(1.0)[0] > 90);
+    }
+
+    #[test]
+    fn labels_have_colours_that_are_told_apart() {
+        assert_eq!(label_colour(5), [0, 114, 178], "Okabe and Ito's blue");
+        let colours: Vec<[u8; 3]> = (0..118).chain([1001, 1002, -1]).map(label_colour).collect();
+        let apart = |[a, b]: [&[u8; 3]; 2]| -> u32 {
+            (0..3).map(|c| u32::from(a[c].abs_diff(b[c])).pow(2)).sum::<u32>().isqrt()
+        };
+        for (at, colour) in colours.iter().enumerate() {
+            for other in &colours[..at] {
+                let least = if at < 24 { 30 } else { 10 };
+                assert!(apart([colour, other]) >= least, "{at}: {colour:?} and {other:?}");
+            }
+        }
+        // Neighbours, as organs of one atlas, are far from each other.
+        assert!(colours[..40].windows(2).all(|pair| apart([&pair[0], &pair[1]]) > 60), "{colours:?}");
+        assert_eq!(of_oklab(1.0, 0.0, 0.0), [255; 3]);
     }
 
     fn range(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {

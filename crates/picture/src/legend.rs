@@ -1,5 +1,7 @@
-//! What is written into a picture: the scale of its colours with ticks and unit, a title and the time.
+//! What is written into a picture: the scale of its colours with ticks and unit or the colours of labels with their names, a title
+//! and the time.
 
+use crate::colour::label_colour;
 use crate::picture::Picture;
 use crate::style::Style;
 use crate::text::{Align, Pen};
@@ -15,6 +17,27 @@ pub struct Legend {
     pub title: String,
     /// At the bottom left.
     pub note: String,
+    /// Labels with their names, empty for none: each has a swatch where colours are those of labels.
+    pub labels: Vec<(i32, String)>,
+}
+
+/// Part of the picture's width that names of labels take at most.
+const WIDEST: f32 = 0.3;
+/// Where swatches begin and end, as parts of the picture's height.
+const SWATCHES: [f32; 2] = [0.12, 0.92];
+/// Distance from swatch to swatch over the height of letters.
+const ROW: f32 = 1.45;
+
+/// What stands below the swatches where not all fit.
+fn told_of(more: usize) -> String {
+    format!("+ {more} more")
+}
+
+/// The lines of swatches that fit into so many: the label of each and what stands beside it; and how many labels do not fit.
+pub fn swatches(labels: &[(i32, String)], most: usize) -> (Vec<(i32, String)>, usize) {
+    let shown = if labels.len() > most { most.saturating_sub(1) } else { labels.len() };
+    let line = |(label, name): &(i32, String)| (*label, format!("{label} {name}").trim_end().to_owned());
+    (labels[..shown].iter().map(line).collect(), labels.len() - shown)
 }
 
 /// Prefixes of units: powers of ten.
@@ -46,10 +69,24 @@ pub fn readable(unit: &str, size: f64) -> (String, f64) {
 }
 
 impl Legend {
-    /// Part of the picture's width that the scale of colours takes at the right.
+    /// Part of the picture's width that the scale of colours or the names of labels take at the right.
     pub fn width(&self, style: &Style, [width, height]: [u32; 2]) -> f64 {
-        let size = f64::from(letters(height));
-        if style.range.is_some() { (6.2 * size / f64::from(width)).min(0.4) } else { 0.0 }
+        let size = letters(height);
+        if !style.labels {
+            let scale = (6.2 * f64::from(size) / f64::from(width)).min(0.4);
+            return if style.range.is_some() { scale } else { 0.0 };
+        }
+        let Some(pen) = Pen::new(size) else { return 0.0 };
+        let (lines, more) = swatches(&self.labels, rows(height));
+        let rest = (more > 0).then(|| told_of(more));
+        let widest =
+            lines.iter().map(|(_, text)| text).chain(&rest).map(|text| pen.width(text)).fold(0.0, f32::max);
+        let most = WIDEST * width as f32;
+        if lines.is_empty() {
+            0.0
+        } else {
+            f64::from((widest.min(most) + 4.0 * size) / width as f32).min(0.45)
+        }
     }
 
     /// Writes it.
@@ -61,8 +98,32 @@ impl Legend {
         let margin = 1.1 * size;
         large.write(picture, &self.title, [margin, 1.4 * size], Align::Left, ink);
         pen.write(picture, &self.note, [margin, height - 1.3 * size], Align::Left, ink);
-        if let Some(range) = style.range {
+        if style.labels {
+            self.write_labels(picture, style, &pen, size);
+        } else if let Some(range) = style.range {
             self.write_scale(picture, style, range, &pen, [width, height, size]);
+        }
+    }
+
+    /// A swatch, the number and the name of each label, as many as fit.
+    fn write_labels(&self, picture: &mut Picture, style: &Style, pen: &Pen, size: f32) {
+        let ink = style.background.ink();
+        let part = self.width(style, [picture.width, picture.height]) as f32;
+        let left = (picture.width as f32 * (1.0 - part) + size).round();
+        let room = picture.width as f32 - left - 2.4 * size;
+        // In a tiny picture nobody could read it.
+        if room < size {
+            return;
+        }
+        let (lines, more) = swatches(&self.labels, rows(picture.height));
+        let middle = |row: usize| SWATCHES[0] * picture.height as f32 + (row as f32 + 0.5) * ROW * size;
+        let places: Vec<f32> = (0..=lines.len()).map(middle).collect();
+        for ((label, text), &y) in lines.iter().zip(&places) {
+            write_swatch(picture, [left, y], size, label_colour(*label), ink);
+            pen.write(picture, &cut_to(pen, text, room), [left + 1.6 * size, y], Align::Left, ink);
+        }
+        if more > 0 {
+            pen.write(picture, &told_of(more), [left + 1.6 * size, places[lines.len()]], Align::Left, ink);
         }
     }
 
@@ -132,6 +193,33 @@ impl Legend {
     }
 }
 
+/// A square with a thin border, its left side and its middle line at a place.
+fn write_swatch(picture: &mut Picture, [left, y]: [f32; 2], size: f32, colour: [u8; 3], ink: [u8; 3]) {
+    let (x, top, side) = (left as i64, (y - 0.5 * size).round() as i64, size.round() as i64);
+    for row in 0..side {
+        for column in 0..side {
+            let border = [row, column].iter().any(|&at| at == 0 || at == side - 1);
+            let (bytes, cover) = if border { (ink, 0.6) } else { (colour, 1.0) };
+            picture.mix(x + column, top + row, bytes, cover);
+        }
+    }
+}
+
+/// A text as far as there is room for it [pixels].
+fn cut_to(pen: &Pen, text: &str, room: f32) -> String {
+    if pen.width(text) <= room {
+        return text.to_owned();
+    }
+    let mut cut = text.to_owned();
+    while cut.pop().is_some() && pen.width(&format!("{cut}…")) > room {}
+    format!("{cut}…")
+}
+
+/// Swatches that fit into a picture of a height [pixels].
+fn rows(height: u32) -> usize {
+    ((SWATCHES[1] - SWATCHES[0]) * height as f32 / (ROW * letters(height))) as usize
+}
+
 /// Height of letters in a picture of a height [pixels].
 fn letters(height: u32) -> f32 {
     (height as f32 / 36.0).clamp(11.0, 60.0).round()
@@ -156,6 +244,48 @@ mod tests {
         assert_eq!(readable("m", 1.0).0, "m");
         assert_eq!(readable("", 1e-5).0, "");
         assert_eq!(readable("J/m³", 2e4).0, "J/m³");
+    }
+
+    fn organs(count: i32) -> Vec<(i32, String)> {
+        (1..=count).map(|label| (label, if label == 2 { "liver".into() } else { String::new() })).collect()
+    }
+
+    #[test]
+    fn labels_that_do_not_fit_are_counted() {
+        let (lines, more) = swatches(&organs(3), 3);
+        assert_eq!((lines[0].1.as_str(), lines[1].1.as_str(), lines.len(), more), ("1", "2 liver", 3, 0));
+        let (lines, more) = swatches(&organs(9), 3);
+        assert_eq!((lines.len(), more), (2, 7));
+        assert_eq!(swatches(&organs(2), 0), (Vec::new(), 2));
+    }
+
+    #[test]
+    fn each_label_has_a_swatch_of_its_colour_and_a_name() {
+        let blank = Picture { width: 640, height: 400, rgba: vec![255; 4 * 640 * 400] };
+        let style = Style { labels: true, ..Style::default() };
+        let written = |labels: Vec<(i32, String)>| {
+            let mut picture = blank.clone();
+            Legend { labels, ..Legend::default() }.write(&mut picture, &style);
+            picture
+        };
+        let count = |picture: &Picture, colour: [u8; 3]| {
+            picture.rgba.chunks(4).filter(|pixel| pixel[..3] == colour).count()
+        };
+        let picture = written(organs(3));
+        for label in 1..=3 {
+            assert!(count(&picture, label_colour(label)) > 60, "label {label}");
+        }
+        assert_eq!(count(&picture, label_colour(4)), 0);
+        let unnamed = written(vec![(2, String::new())]);
+        let named =
+            written(vec![(2, "a name that is much longer than there is room in the picture for".into())]);
+        let inked = |picture: &Picture| 640 * 400 - count(picture, [255; 3]);
+        assert!(inked(&named) > inked(&unnamed) + 100);
+        // All of many are not there, but some are, and nothing fails in a tiny picture.
+        let many = written(organs(200));
+        assert!(count(&many, label_colour(10)) > 60 && count(&many, label_colour(200)) == 0);
+        let mut tiny = Picture { width: 20, height: 9, rgba: vec![255; 4 * 20 * 9] };
+        Legend { labels: organs(5), ..Legend::default() }.write(&mut tiny, &style);
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! Pictures of bodies: surfaces in smooth light, coloured by a field, with the edges of their cells, the shape at rest as a
-//! ghost and sections with what lies inside; drawn by any graphics processor, Mesa's software Vulkan included, into a
-//! window or off screen. Films from a series of them. Leaves out: where bodies and fields come from.
+//! Pictures of bodies: surfaces in smooth light, coloured by a field or by the labels of their cells, with the edges of their
+//! cells, the shape at rest as a ghost and sections with what lies inside; drawn by any graphics processor, Mesa's software Vulkan
+//! included, into a window or off screen. Films from a series of them. Leaves out: where bodies and fields come from.
 //!
 //! ```no_run
 //! use pliant_geometry::{CellKind, Mesh, Vector3};
@@ -39,15 +39,15 @@ mod subject;
 mod text;
 
 pub use camera::{Axis, Camera, Projection};
-pub use colour::{ColourMap, Extremes};
+pub use colour::{ColourMap, Extremes, label_colour};
 pub use error::PictureError;
 pub use film::{AnimatedPng, Film, ffmpeg};
 pub use graphics::Graphics;
-pub use legend::{Legend, readable, ticks};
+pub use legend::{Legend, readable, swatches, ticks};
 pub use picture::{Difference, Picture};
 pub use renderer::{Drawn, Renderer, Target, drawn_value};
 pub use section::{Plane, Section};
 pub use series::{Look, Series, SeriesError};
 pub use studio::{Frame, Studio};
 pub use style::{Background, Style, Texture};
-pub use subject::{Subject, critical_cell, nodal_values};
+pub use subject::{Subject, critical_cell, nodal_values, visible};

@@ -67,20 +67,22 @@ impl Picture {
         Ok(file)
     }
 
+    /// Reads what [`Self::png`] wrote; all of it counts as covered.
+    ///
+    /// # Errors
+    /// If it is no such file.
+    pub fn from_png(file: &[u8]) -> Result<Self, PictureError> {
+        let (rgb, [width, height]) = decoded(file, png::ColorType::Rgb)?;
+        let rgba = rgb.chunks_exact(3).flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
+        Ok(Self { width, height, rgba })
+    }
+
     /// Reads what [`Self::png_with_coverage`] wrote.
     ///
     /// # Errors
     /// If it is no such file.
     pub fn from_png_with_coverage(file: &[u8]) -> Result<Self, PictureError> {
-        let mut reader = png::Decoder::new(Cursor::new(file)).read_info().map_err(coding)?;
-        let (kind, width, height) = (reader.output_color_type(), reader.info().width, reader.info().height);
-        if kind != (png::ColorType::Rgba, png::BitDepth::Eight) {
-            return Err(PictureError::Coding(format!("its pixels are {:?} of {:?} bits", kind.0, kind.1)));
-        }
-        let size =
-            reader.output_buffer_size().ok_or_else(|| PictureError::Coding("it is too large".into()))?;
-        let mut rgba = vec![0; size];
-        reader.next_frame(&mut rgba).map_err(coding)?;
+        let (rgba, [width, height]) = decoded(file, png::ColorType::Rgba)?;
         Ok(Self { width, height, rgba })
     }
 
@@ -122,6 +124,19 @@ pub(crate) fn coding(error: impl ToString) -> PictureError {
     PictureError::Coding(error.to_string())
 }
 
+/// The bytes of the pixels of a PNG file, and its size; an error if they are of another kind.
+fn decoded(file: &[u8], wanted: png::ColorType) -> Result<(Vec<u8>, [u32; 2]), PictureError> {
+    let mut reader = png::Decoder::new(Cursor::new(file)).read_info().map_err(coding)?;
+    let (kind, size) = (reader.output_color_type(), [reader.info().width, reader.info().height]);
+    if kind != (wanted, png::BitDepth::Eight) {
+        return Err(PictureError::Coding(format!("its pixels are {:?} of {:?} bits", kind.0, kind.1)));
+    }
+    let length = reader.output_buffer_size().ok_or_else(|| PictureError::Coding("it is too large".into()))?;
+    let mut bytes = vec![0; length];
+    reader.next_frame(&mut bytes).map_err(coding)?;
+    Ok((bytes, size))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,7 +171,11 @@ mod tests {
         assert!(picture.difference(&disc(30, [197, 30, 30])).unwrap().is_same(), "nearly the same red");
         let none = Picture { width: 10, height: 10, rgba: vec![0; 400] };
         assert!(picture.difference(&none).is_none());
-        assert!(Picture::from_png_with_coverage(&picture.png().unwrap()).is_err(), "no coverage");
+        let opaque = picture.png().unwrap();
+        assert!(Picture::from_png_with_coverage(&opaque).is_err(), "no coverage");
+        let again = Picture::from_png(&opaque).unwrap();
+        assert_eq!(again.rgb(), picture.rgb());
+        assert!(again.rgba.chunks(4).all(|pixel| pixel[3] == 255));
         assert!(Picture::from_png_with_coverage(b"no picture").is_err());
     }
 }

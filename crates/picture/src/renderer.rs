@@ -523,7 +523,11 @@ fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> 
         range: [
             low as f32,
             (1.0 / (high - low).max(f64::MIN_POSITIVE)).min(f64::from(f32::MAX)) as f32,
-            if style.range.is_some() { 1.0 } else { 0.0 },
+            match style.range {
+                _ if style.labels => 2.0,
+                Some(_) => 1.0,
+                None => 0.0,
+            },
             if code { 1.0 } else { 0.0 },
         ],
         plain: colour(PLAIN, 1.0),
@@ -534,7 +538,7 @@ fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> 
         line: [aspect as f32, WIDTHS[0], WIDTHS[1], 0.0],
         skin: match style.texture {
             Texture::None => [0.0; 4],
-            Texture::Skin => [0.0, SKIN[usize::from(style.range.is_some())], 0.0, 0.0],
+            Texture::Skin => [0.0, SKIN[usize::from(style.tells())], 0.0, 0.0],
         },
     }
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{MeshFileError, read, read_pvd};
-use pliant_geometry::{Mesh, Vector3};
+use pliant_geometry::{Labels, Mesh, Vector3};
 
 use crate::camera::Camera;
 use crate::colour::Extremes;
@@ -14,7 +14,7 @@ use crate::legend::{Legend, readable};
 use crate::picture::Picture;
 use crate::studio::{Frame, Studio};
 use crate::style::Style;
-use crate::subject::{Subject, critical_cell, nodal_values};
+use crate::subject::{Subject, critical_cell, nodal_values, visible};
 
 /// A series of frames that can't be shown.
 #[derive(Debug, thiserror::Error)]
@@ -52,6 +52,12 @@ pub enum SeriesError {
     /// The critical cell is to be marked where no steps are known.
     #[error("the cells of the frames have no stable steps (the field `element-step`)")]
     NoSteps,
+    /// Colours of labels are asked for where there are none.
+    #[error("the cells of the frames have no labels (the field `label`)")]
+    NoLabels,
+    /// All cells are hidden.
+    #[error("the labels that are hidden are all there are: nothing is left to be seen")]
+    AllHidden,
     /// A frame of another mesh than the first.
     #[error("frame {0} has another mesh than the first one")]
     OtherMesh(usize),
@@ -79,6 +85,10 @@ impl SeriesError {
             Self::NoSteps => {
                 "show bodies and no carried surface; a finished run needs `element-step` in `data` of its output, `at = \"cells\"`"
             }
+            Self::NoLabels => {
+                "show bodies whose mesh has cell data `label`, as those of images with several labels have"
+            }
+            Self::AllHidden => "hide fewer",
             Self::OtherMesh(_) => "run the scene again into an empty folder",
             Self::Picture(error) => error.remedy(),
         }
@@ -126,6 +136,14 @@ impl Series {
         Ok(Self { name, frames })
     }
 
+    /// The labels of the cells of its first frame.
+    ///
+    /// # Errors
+    /// If it can't be read.
+    pub fn labels(&self) -> Result<Labels, SeriesError> {
+        Ok(Labels::of(&self.mesh(0)?))
+    }
+
     fn mesh(&self, index: usize) -> Result<Mesh, SeriesError> {
         Ok(read(&self.frames[index].1)?.mesh)
     }
@@ -149,6 +167,8 @@ fn quoted(names: &[String]) -> String {
 pub struct Look {
     /// The field that colours tell (see [`nodal_values`]); `None` for the colour of tissue.
     pub field: Option<String>,
+    /// Labels whose cells are left out, so that what lies inside is seen.
+    pub hide: Vec<i32>,
     /// How bodies are shown; without a range, that of the values.
     pub style: Style,
     /// The camera; its target and height are those that fit, but for the two below.
@@ -159,7 +179,7 @@ pub struct Look {
     pub zoom: f64,
     /// Width and height of pictures [pixels].
     pub size: [u32; 2],
-    /// What is written into them.
+    /// What is written into them; labels are those of the mesh.
     pub legend: Legend,
 }
 
@@ -213,8 +233,9 @@ impl Look {
             None => Vec::new(),
             Some(field) => nodal_values(mesh, field).ok_or_else(|| missing(field))?,
         };
-        let critical =
-            self.style.critical.then(|| critical_cell(mesh).ok_or(SeriesError::NoSteps)).transpose()?;
+        let critical = (self.style.critical)
+            .then(|| critical_cell(&visible(mesh, &self.hide)).ok_or(SeriesError::NoSteps))
+            .transpose()?;
         let mut points = mesh.points.clone();
         if let Some(moved) = mesh.point_data.get("displacement").filter(|array| array.components == 3) {
             for (point, by) in points.iter_mut().zip(moved.values.chunks_exact(3)) {
@@ -225,9 +246,30 @@ impl Look {
         Ok((Frame { points, values, critical }, step))
     }
 
+    /// The same with the labels of a mesh in its legend.
+    fn with_labels_of(&self, mesh: &Mesh) -> Result<Self, SeriesError> {
+        let mut look = self.clone();
+        if self.style.labels {
+            let labels = Labels::of(&visible(mesh, &self.hide));
+            if labels.is_empty() {
+                return Err(if self.hide.is_empty() {
+                    SeriesError::NoLabels
+                } else {
+                    SeriesError::AllHidden
+                });
+            }
+            look.legend.labels =
+                labels.iter().map(|(label, name)| (label, name.unwrap_or_default().to_owned())).collect();
+        }
+        Ok(look)
+    }
+
     /// What is drawn of a mesh.
     fn subject(&self, mesh: &Mesh) -> Result<Subject, SeriesError> {
-        let subject = Subject::new(mesh);
+        let subject = Subject::new(&visible(mesh, &self.hide));
+        if subject.triangle_count() == 0 && !self.hide.is_empty() {
+            return Err(SeriesError::AllHidden);
+        }
         if self.style.fibres && !subject.has_fibres() {
             return Err(SeriesError::NoFibres);
         }
@@ -269,13 +311,14 @@ impl Look {
     /// # Errors
     /// If it has no such field, or can't be drawn.
     pub fn picture(&self, graphics: &Graphics, mesh: &Mesh, time: f64) -> Result<Picture, SeriesError> {
-        let subject = self.subject(mesh)?;
-        let (frame, step) = self.frame(mesh)?;
+        let look = self.with_labels_of(mesh)?;
+        let subject = look.subject(mesh)?;
+        let (frame, step) = look.frame(mesh)?;
         let mut common = Common::default();
-        common.add(&subject, &frame, self.style.ghost);
-        let (camera, style) = self.settle(common);
-        let picture = Studio::new(graphics, &subject, self.size)?.draw(&frame, &camera, &style)?;
-        Ok(self.finished(picture, &style, time, step))
+        common.add(&subject, &frame, look.style.ghost);
+        let (camera, style) = look.settle(common);
+        let picture = Studio::new(graphics, &subject, look.size)?.draw(&frame, &camera, &style)?;
+        Ok(look.finished(picture, &style, time, step))
     }
 
     /// Pictures of chosen frames of a series: each goes to `take`, with how many were taken before it.
@@ -291,7 +334,8 @@ impl Look {
     ) -> Result<(), SeriesError> {
         let Some(&first) = frames.first() else { return Ok(()) };
         let mesh = series.mesh(first)?;
-        let subject = self.subject(&mesh)?;
+        let look = self.with_labels_of(&mesh)?;
+        let subject = look.subject(&mesh)?;
         let blocks =
             |mesh: &Mesh| mesh.blocks.iter().map(|block| (block.kind, block.len())).collect::<Vec<_>>();
         let shape = (mesh.points.len(), blocks(&mesh));
@@ -300,18 +344,18 @@ impl Look {
             if (mesh.points.len(), blocks(&mesh)) != shape {
                 return Err(SeriesError::OtherMesh(index));
             }
-            self.frame(&mesh)
+            look.frame(&mesh)
         };
         let mut common = Common::default();
         for &index in frames {
-            common.add(&subject, &read(index)?.0, self.style.ghost);
+            common.add(&subject, &read(index)?.0, look.style.ghost);
         }
-        let (camera, style) = self.settle(common);
-        let mut studio = Studio::new(graphics, &subject, self.size)?;
+        let (camera, style) = look.settle(common);
+        let mut studio = Studio::new(graphics, &subject, look.size)?;
         for (count, &index) in frames.iter().enumerate() {
             let (frame, step) = read(index)?;
             let picture = studio.draw(&frame, &camera, &style)?;
-            take(count, self.finished(picture, &style, series.frames[index].0, step))?;
+            take(count, look.finished(picture, &style, series.frames[index].0, step))?;
         }
         Ok(())
     }

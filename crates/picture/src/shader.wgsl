@@ -9,7 +9,7 @@ struct View {
     eye: vec4<f32>,
     // What lies on the side of the normal is taken away.
     plane: vec4<f32>,
-    // First value, 1 / span; whether there is a range; whether colours are coded as sRGB here.
+    // First value, 1 / span; 1 for colours of values, 2 for colours of labels; whether colours are coded as sRGB here.
     range: vec4<f32>,
     plain: vec4<f32>,
     ghost: vec4<f32>,
@@ -28,7 +28,7 @@ struct View {
 
 // Position [m] and value of each point.
 @group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
-// Three vertices and the bits of the edges that are drawn.
+// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that the cell has a label, bits 8 to 31 its colour.
 @group(1) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 // The point of each vertex.
 @group(1) @binding(2) var<storage, read> vertices: array<u32>;
@@ -60,6 +60,7 @@ fn surface(@builtin(vertex_index) index: u32) -> Corner {
 struct Cut {
     point: vec4<f32>,
     rest: vec3<f32>,
+    // As of triangles.
     edges: u32,
 }
 
@@ -98,6 +99,26 @@ fn colour_of(value: f32) -> vec3<f32> {
     let low = u32(floor(part));
     let high = min(low + 1u, 255u);
     return mix(colours[low].rgb, colours[high].rgb, part - f32(low));
+}
+
+fn no_colour(at: Corner) -> bool {
+    if view.range.z > 1.5 {
+        return (at.edges & 8u) == 0u;
+    }
+    return view.range.z < 0.5 || at.value > 1.0e30;
+}
+
+// Light of the label where labels have colours, else of the value.
+fn colour_at(at: Corner) -> vec3<f32> {
+    if view.range.z < 1.5 {
+        return colour_of(at.value);
+    }
+    if no_colour(at) {
+        return view.plain.rgb;
+    }
+    let bytes = vec3((at.edges >> 8u) & 255u, (at.edges >> 16u) & 255u, at.edges >> 24u);
+    let code = vec3<f32>(bytes) / 255.0;
+    return select(pow((code + 0.055) / 1.055, vec3(2.4)), code / 12.92, code <= vec3(0.04045));
 }
 
 // A key light over the left shoulder, a fill from the right, sky above and ground below (all of them turn with the camera).
@@ -142,7 +163,7 @@ fn shade(at: Corner) -> vec4<f32> {
     let eye = towards_eye(at.position);
     var normal = normalize(at.normal);
     normal = select(-normal, normal, dot(normal, eye) >= 0.0);
-    let albedo = colour_of(at.value);
+    let albedo = colour_at(at);
     var colour = lit(albedo, normal, eye);
     // Derivatives over pixels are taken where all pixels pass.
     let bumpy = uneven(at, normal);
@@ -351,8 +372,7 @@ fn stroke(at: Stroke) -> @location(0) vec4<f32> {
 @fragment
 fn wireframe(at: Corner) -> @location(0) vec4<f32> {
     let cover = edge_cover(at.corner, at.edges);
-    let plain = view.range.z < 0.5 || at.value > 1.0e30;
-    let colour = select(colour_of(at.value), view.ghost.rgb, plain);
+    let colour = select(colour_at(at), view.ghost.rgb, no_colour(at));
     if dot(view.plane.xyz, at.position) > view.plane.w || cover < 0.05 {
         discard;
     }

@@ -62,6 +62,8 @@ pub struct Style {
     pub map: ColourMap,
     /// The values of the first and the last colour; without, a body has the colour of tissue.
     pub range: Option<[f64; 2]>,
+    /// Whether cells have the colours of their labels, in place of those of values; cells without a label have that of tissue.
+    pub labels: bool,
     /// Whether the edges of the cells are drawn.
     pub edges: bool,
     /// Whether nothing of the surface but the edges of its cells is drawn.
@@ -78,4 +80,11 @@ pub struct Style {
     pub clip: Option<Plane>,
     /// What stands behind.
     pub background: Background,
+}
+
+impl Style {
+    /// Whether colours tell something.
+    pub(crate) fn tells(&self) -> bool {
+        self.labels || self.range.is_some()
+    }
 }

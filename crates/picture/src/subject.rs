@@ -1,10 +1,12 @@
 //! What is drawn of a mesh: its surface as triangles whose corners share normals where the surface is smooth, and its volume
 //! cells for sections.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::colour::label_colour;
 use crate::lines::{Fibres, Line, outline};
-use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, vector_area, volume};
+use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, cell_label, vector_area, volume};
 
 /// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
 const SHARP: f64 = 0.26;
@@ -14,7 +16,8 @@ const SHARP: f64 = 0.26;
 pub struct Subject {
     /// Points at rest [m].
     pub points: Vec<Vector3>,
-    /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a cell.
+    /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a cell; beside these bits
+    /// the paint of the cell.
     pub(crate) triangles: Vec<[u32; 4]>,
     /// The point of each vertex. Points on sharp edges are several vertices, each with a normal of its own.
     pub(crate) vertices: Vec<u32>,
@@ -24,21 +27,39 @@ pub struct Subject {
     pub(crate) around: Vec<u32>,
     /// Cells with a face: kind and nodes.
     cells: Vec<(CellKind, Vec<u32>)>,
+    /// Of each volume cell; empty without labels.
+    paints: Vec<u32>,
     pub(crate) fibres: Fibres,
+}
+
+/// A face that is drawn: its three or four nodes, and the paint of its cell.
+struct Patch {
+    nodes: Vec<u32>,
+    paint: u32,
+}
+
+/// The colour of the label of a cell as the shader takes it, beside the bits of edges; 0 without a label.
+fn paint(block: Option<&CellBlock>, cell: u32) -> u32 {
+    block.and_then(|block| cell_label(block, cell)).map_or(0, |label| paint_of(label_colour(label)))
+}
+
+fn paint_of(colour: [u8; 3]) -> u32 {
+    let [r, g, b] = colour.map(u32::from);
+    0b1000 | (r << 8) | (g << 16) | (b << 24)
 }
 
 impl Subject {
     /// The boundary of the volume cells, and triangles and quads that are not on it.
     pub fn new(mesh: &Mesh) -> Self {
         let faces = faces(mesh);
-        let normals: Vec<Vector3> = faces.iter().map(|face| normal(face, &mesh.points)).collect();
+        let normals: Vec<Vector3> = faces.iter().map(|face| normal(&face.nodes, &mesh.points)).collect();
         let (corners, vertices) = split_at_sharp_edges(&faces, &normals, mesh.points.len());
         let mut triangles = Vec::with_capacity(2 * faces.len());
-        for corners in &corners {
+        for (corners, Patch { paint, .. }) in corners.iter().zip(&faces) {
             match corners[..] {
-                [a, b, c] => triangles.push([a, b, c, 0b111]),
+                [a, b, c] => triangles.push([a, b, c, paint | 0b111]),
                 // The second bit of the first half and the third of the other are the diagonal.
-                [a, b, c, d] => triangles.extend([[a, b, c, 0b101], [a, c, d, 0b011]]),
+                [a, b, c, d] => triangles.extend([[a, b, c, paint | 0b101], [a, c, d, paint | 0b011]]),
                 _ => {}
             }
         }
@@ -62,8 +83,12 @@ impl Subject {
             }
         }
         let cells: Vec<_> = shown_blocks(mesh).map(|block| (block.kind, block.nodes.clone())).collect();
+        let volumes = shown_blocks(mesh).filter(|block| block.kind.dimension() == 3);
+        let labelled = volumes.clone().any(|block| block.data.contains_key("label"));
+        let painted = |block| (0..CellBlock::len(block) as u32).map(move |cell| paint(Some(block), cell));
+        let paints = volumes.filter(|_| labelled).flat_map(painted).collect();
         let fibres = Fibres::new(mesh, &cells);
-        Self { points: mesh.points.clone(), triangles, vertices, offsets, around, cells, fibres }
+        Self { points: mesh.points.clone(), triangles, vertices, offsets, around, cells, paints, fibres }
     }
 
     /// Whether its cells have fibres (the field `fibre` of its mesh).
@@ -98,6 +123,11 @@ impl Subject {
         points
     }
 
+    /// The paint of a volume cell.
+    pub(crate) fn paint(&self, cell: usize) -> u32 {
+        self.paints.get(cell).copied().unwrap_or(0)
+    }
+
     /// Volume cells with their nodes.
     pub(crate) fn volume_cells(&self) -> impl Iterator<Item = (CellKind, &[u32])> {
         let volumes = self.cells.iter().filter(|(kind, _)| kind.dimension() == 3);
@@ -105,8 +135,18 @@ impl Subject {
     }
 }
 
+/// A mesh without the cells of labels that are hidden; its points stay.
+pub fn visible<'m>(mesh: &'m Mesh, hidden: &[i32]) -> Cow<'m, Mesh> {
+    if hidden.is_empty() {
+        return Cow::Borrowed(mesh);
+    }
+    let mut rest = mesh.clone();
+    rest.drop_labels(hidden);
+    Cow::Owned(rest)
+}
+
 /// Blocks of cells that have a face, and whose nodes are known.
-fn shown_blocks(mesh: &Mesh) -> impl Iterator<Item = &CellBlock> {
+fn shown_blocks(mesh: &Mesh) -> impl Iterator<Item = &CellBlock> + Clone {
     let known = |block: &&CellBlock| {
         block.kind.dimension() >= 2 && block.nodes.iter().all(|&node| (node as usize) < mesh.points.len())
     };
@@ -131,20 +171,30 @@ pub fn critical_cell(mesh: &Mesh) -> Option<(u32, f64)> {
     least
 }
 
-/// Nodes of the faces that are drawn, three or four each.
-fn faces(mesh: &Mesh) -> Vec<Vec<u32>> {
-    let mut faces: Vec<Vec<u32>> = boundary(mesh).faces.iter().map(|face| face.nodes().to_vec()).collect();
-    if mesh.volume_blocks().any(|block| !block.is_empty()) {
-        let key = |nodes: &[u32]| {
-            let mut key = nodes.to_vec();
-            key.sort_unstable();
-            key
-        };
-        let drawn: BTreeSet<Vec<u32>> = faces.iter().map(|face| key(face)).collect();
-        let flat = mesh.blocks.iter().filter(|block| block.kind.dimension() == 2);
-        let others = flat.flat_map(CellBlock::cells).filter(|nodes| !drawn.contains(&key(nodes)));
-        let known = others.filter(|nodes| nodes.iter().all(|&node| (node as usize) < mesh.points.len()));
-        faces.extend(known.map(<[u32]>::to_vec));
+/// The faces that are drawn.
+fn faces(mesh: &Mesh) -> Vec<Patch> {
+    let skin = boundary(mesh);
+    let of_skin = skin.faces.iter().map(|face| Patch {
+        nodes: face.nodes().to_vec(),
+        paint: paint(mesh.block(face.parent.kind), face.parent.index),
+    });
+    let mut faces: Vec<Patch> = of_skin.collect();
+    if mesh.volume_blocks().all(|block| block.is_empty()) {
+        return faces;
+    }
+    let key = |nodes: &[u32]| {
+        let mut key = nodes.to_vec();
+        key.sort_unstable();
+        key
+    };
+    let drawn: BTreeSet<Vec<u32>> = faces.iter().map(|face| key(&face.nodes)).collect();
+    for block in mesh.blocks.iter().filter(|block| block.kind.dimension() == 2) {
+        for (nodes, cell) in block.cells().zip(0..) {
+            let known = nodes.iter().all(|&node| (node as usize) < mesh.points.len());
+            if known && !drawn.contains(&key(nodes)) {
+                faces.push(Patch { nodes: nodes.to_vec(), paint: paint(Some(block), cell) });
+            }
+        }
     }
     faces
 }
@@ -156,21 +206,21 @@ fn normal(face: &[u32], points: &[Vector3]) -> Vector3 {
 
 /// The vertices of each face, and the point of each vertex: around a point, faces that meet in edges that are not sharp share
 /// one.
-fn split_at_sharp_edges(faces: &[Vec<u32>], normals: &[Vector3], points: usize) -> (Vec<Vec<u32>>, Vec<u32>) {
+fn split_at_sharp_edges(faces: &[Patch], normals: &[Vector3], points: usize) -> (Vec<Vec<u32>>, Vec<u32>) {
     let mut at_point: Vec<Vec<(u32, u32)>> = vec![Vec::new(); points];
     for (face, number) in faces.iter().zip(0..) {
-        for (&node, corner) in face.iter().zip(0..) {
+        for (&node, corner) in face.nodes.iter().zip(0..) {
             at_point[node as usize].push((number, corner));
         }
     }
-    let mut corners: Vec<Vec<u32>> = faces.iter().map(|face| vec![0; face.len()]).collect();
+    let mut corners: Vec<Vec<u32>> = faces.iter().map(|face| vec![0; face.nodes.len()]).collect();
     let mut vertices = Vec::new();
     for (around, point) in at_point.iter().zip(0..) {
         // Groups of the faces around the point, by the smallest index in it.
         let mut group: Vec<usize> = (0..around.len()).collect();
         let mut by_edge: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, &(face, corner)) in around.iter().enumerate() {
-            let nodes = &faces[face as usize];
+            let nodes = &faces[face as usize].nodes;
             let (corner, count) = (corner as usize, nodes.len());
             for other in [nodes[(corner + 1) % count], nodes[(corner + count - 1) % count]] {
                 let Some(&first) = by_edge.get(&other) else {
@@ -303,6 +353,22 @@ pub(crate) mod tests {
         mesh.points[3].z = 0.2;
         mesh.block_mut(CellKind::Triangle).nodes = vec![0, 1, 2, 2, 1, 3];
         assert_eq!(Subject::new(&mesh).vertices.len(), 4);
+    }
+
+    #[test]
+    fn triangles_and_cells_have_the_paint_of_their_label() {
+        let mut mesh = tets(1);
+        mesh.blocks[0].data.insert("label".into(), DataArray::scalar(vec![1.0, 1.0, 2.0, 2.0, 2.0, 1.0]));
+        let subject = Subject::new(&mesh);
+        let [one, two] = [1, 2].map(|label| paint_of(label_colour(label)));
+        let painted = |paint: u32| subject.triangles.iter().filter(|t| t[3] & !0b111 == paint).count();
+        assert_eq!((painted(one), painted(two)), (6, 6), "two faces of each tet are on the boundary");
+        assert_eq!([subject.paint(0), subject.paint(2), subject.paint(6)], [one, two, 0]);
+        // Without what hides them, the faces between the labels are drawn.
+        mesh.drop_labels(&[1]);
+        let rest = Subject::new(&mesh);
+        assert!(rest.triangles.iter().all(|t| t[3] & !0b111 == two) && rest.triangle_count() > 6);
+        assert_eq!(Subject::new(&tets(1)).triangles[0][3], 0b111, "without labels");
     }
 
     #[test]

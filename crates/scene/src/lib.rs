@@ -64,7 +64,10 @@ mod testing;
 mod view;
 
 pub use bound::element_bound;
-pub use build::{BodyCells, Built, BuiltBody, Control, Corotational, SizeDoubt, Stop, build, build_with};
+pub use build::{
+    BodyCells, Built, BuiltBody, Control, Corotational, Meshing, SizeDoubt, Stop, build, build_watched,
+    build_with,
+};
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use live::{Live, Standing, go_on, live};

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use pliant_geometry::Labels;
 use pliant_geometry::io::{self, Format, MeshFileError};
 
 use crate::output::number;
@@ -30,7 +31,7 @@ pub fn is_mesh(path: &Path) -> bool {
 }
 
 /// Makes a scene of a mesh file: soft tissue, held where its lowest tenth along its longest side is. What a surface encloses is filled with
-/// tets. Damping is half of the critical one of the slowest vibration along that side, α = 2 · ½ · (π/2) √(E/ρ)/L.
+/// tets; the elements of a volume mesh with labels have their colours. Damping is half of the critical one of the slowest vibration along that side, α = 2 · ½ · (π/2) √(E/ρ)/L.
 ///
 /// # Errors
 /// If the file can't be read.
@@ -52,6 +53,8 @@ pub fn scene_of_mesh(path: &Path) -> Result<SceneOfMesh, MeshFileError> {
     };
     let [young, poisson, density] = TISSUE;
     let damping = rounded(0.5 * std::f64::consts::PI * (young / density).sqrt() / length.max(1e-6));
+    let labelled = !filled && !Labels::of(&mesh).is_empty();
+    let view = if labelled { "\n[view]\ncolour = \"label\"\n" } else { "" };
     let mut point = scale * low;
     point[axis] += 0.1 * length;
     let mut normal = [0, 0, 0];
@@ -76,7 +79,7 @@ damping = {damping}
 type = "fix"
 body = "body"
 nodes = {{ half-space = {{ point = {point:?}, normal = {normal:?} }} }}
-"#,
+{view}"#,
         point = <[f64; 3]>::from(point),
     );
     let side = ["x", "y", "z"][axis];
@@ -159,5 +162,11 @@ mod tests {
         );
         assert!((length(&built) - 0.12).abs() < 1e-12);
         assert_eq!(built.model.node_count(), bar(1.0).points.len());
+        assert!(!made.text.contains("[view]"));
+        let mut labelled = bar(1.0);
+        let labels = (0..labelled.blocks[0].len()).map(|cell| f64::from(u8::from(cell > 9))).collect();
+        labelled.blocks[0].data.insert("label".into(), pliant_geometry::DataArray::scalar(labels));
+        let (made, built) = opened("organs.vtu", &labelled);
+        assert!(made.text.contains("colour = \"label\"") && built.labels(None).len() == 2);
     }
 }

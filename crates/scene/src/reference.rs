@@ -115,8 +115,10 @@ fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<P
             let of_all = forms.iter().all(|form| form.required.contains(key));
             if parameters.iter().all(|known| known.key != *key) {
                 let mut found = parameter(schemas, key, schema, of_all, depth);
-                if found.description.is_empty() && own == 1 && !common(key) {
-                    found.description = form.doc.unwrap_or_default().to_owned();
+                // It says more than what is said of the type of the value.
+                let said = schema.get("description").is_some();
+                if let Some(doc) = form.doc.filter(|_| !said && own == 1 && !common(key)) {
+                    found.description = doc.to_owned();
                 }
                 parameters.push(found);
             }

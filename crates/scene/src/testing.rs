@@ -1,5 +1,10 @@
 //! Small scenes for the tests of this crate.
 
+use std::path::Path;
+
+use pliant_geometry::DataArray;
+use pliant_meshing::{Block, Resolution, VolumeCell};
+
 use crate::build::{Built, build};
 use crate::diagnostic::SceneErrors;
 use crate::scene::Scene;
@@ -32,6 +37,21 @@ pub(crate) fn scene(more: &str) -> Scene {
 pub(crate) fn read(text: &str) -> Scene {
     let source = Source::parse("cube.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
     Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()))
+}
+
+/// A scene in a folder with a bar of three hexes along x, with the labels 1 (liver), 2 (tumour) and 5: what is given goes on after its
+/// `mesh`. There are the laws `tissue` and `hard`.
+pub(crate) fn labelled(folder: &Path, more: &str) -> Scene {
+    let block = Block::new([0.3, 0.1, 0.1]);
+    let mut mesh = block.mesh(Resolution::Counts([3, 1, 1]), VolumeCell::Hex, 100).unwrap();
+    mesh.blocks[0].data.insert("label".into(), DataArray::scalar(vec![1.0, 2.0, 5.0]));
+    mesh.label_names = [(1, "liver".to_owned()), (2, "tumour".to_owned())].into();
+    pliant_geometry::io::write(&folder.join("bar.vtu"), &mesh).unwrap();
+    let start = &CUBE[..CUBE.find("[body").unwrap()];
+    let hard = "[law.hard]\ntype = 'neo-hookean'\nyoung-modulus = 30e3\npoisson-ratio = 0.3\n";
+    let text = format!("{start}{hard}[body.bar]\nmesh = {{ file = 'bar.vtu' }}\n{more}");
+    let source = Source::parse("bar.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
+    Scene::from_source(source, folder.to_owned()).unwrap_or_else(|error| panic!("{}", error.plain()))
 }
 
 /// What is built from [`CUBE`] with more tables.

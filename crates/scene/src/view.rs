@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use pliant_geometry::Mesh;
+use pliant_geometry::{Labels, Mesh};
 
+use crate::build::{Built, labels_of};
 use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, ViewTable, VtuTable};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
@@ -18,8 +19,32 @@ pub trait Draw: fmt::Debug + Sync {
     fn draw(&self, mesh: &Mesh, time: f64) -> Result<Vec<u8>, String>;
 }
 
+impl ViewTable {
+    /// Whether the colours are those of labels.
+    pub fn shows_labels(&self) -> bool {
+        matches!(self.colour, Some(ColourBy::Labels(_)))
+    }
+
+    /// The labels that it hides of those there are. Others are left out: a scene that asks for them is refused when it is built.
+    pub fn hidden(&self, labels: &Labels) -> Vec<i32> {
+        self.hide.iter().filter_map(|label| labels.find_all(label).ok()).flatten().collect()
+    }
+}
+
+impl Built {
+    /// The labels of a body or a surface by name, or of all bodies.
+    pub fn labels(&self, on: Option<&str>) -> Labels {
+        labels_of(&self.model, &self.bodies, &self.surfaces, on)
+    }
+
+    /// The labels that a view hides.
+    pub fn hidden(&self, view: &ViewTable) -> Vec<i32> {
+        if view.hide.is_empty() { Vec::new() } else { view.hidden(&self.labels(view.on.as_deref())) }
+    }
+}
+
 impl Scene {
-    /// The field that colours tell; `None` for the colour of tissue.
+    /// The field that colours tell; `None` for the colours of labels and that of tissue.
     pub fn shown_field(&self) -> Option<FieldName> {
         self.field_of(&self.view)
     }
@@ -28,7 +53,7 @@ impl Scene {
     pub fn field_of(&self, view: &ViewTable) -> Option<FieldName> {
         match view.colour {
             Some(ColourBy::Field(field)) => Some(field),
-            Some(ColourBy::Nothing(_)) => None,
+            Some(ColourBy::Nothing(_) | ColourBy::Labels(_)) => None,
             None if self.shows_surface_of_shell(view) => Some(FieldName::Displacement),
             None => Some(FieldName::VonMises),
         }
@@ -88,7 +113,8 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{built, mistakes, scene};
+    use crate::testing::{built, labelled, mistakes, scene};
+    use pliant_geometry::CellLabel;
 
     #[test]
     fn a_view_shows_what_it_names_and_von_mises_stresses_otherwise() {
@@ -109,6 +135,34 @@ mod tests {
             "[view]\ncolour = 'displacement'\ncomponent = 'z'\nclip = { point = [0, 0, 0], normal = [1, 0, 0] }\n",
         );
         built("[view]\ncolour = 'cauchy-stress'\ncomponent = 'xy'\n");
+    }
+
+    #[test]
+    fn labels_are_shown_and_hidden_by_number_name_and_range() {
+        let folder = tempfile::tempdir().unwrap();
+        let bar = |view: &str| {
+            labelled(folder.path(), &format!("law = 'tissue'\ndensity = 1000\n[view]\n{view}\n"))
+        };
+        let scene = bar("colour = 'label'\nhide = ['Tumour', 5]");
+        let built = crate::build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
+        assert!(scene.view.shows_labels() && scene.shown_field().is_none());
+        assert_eq!(scene.shown(0.1).data, [FieldName::Displacement]);
+        assert_eq!(built.hidden(&scene.view), [2, 5]);
+        assert_eq!(built.labels(None).all_shown(), ["1 (liver)", "2 (tumour)", "5"]);
+        let range = ViewTable { hide: vec![CellLabel::Name("2-9".into())], ..scene.view.clone() };
+        assert_eq!(built.hidden(&range), [2, 5]);
+        for (view, piece) in [
+            ("hide = ['tumor']", "no label is named `tumor`; did you mean `tumour`?"),
+            ("hide = [1, 7]", "no cell has label 7: the mesh has 1 (liver), 2 (tumour), 5"),
+            ("hide = [1, '2-5']", "all labels are hidden"),
+        ] {
+            let told = crate::build(&bar(view)).unwrap_err().plain().to_string();
+            assert!(told.contains(piece) && told.contains("bar.toml:"), "{view}: {told}");
+        }
+        for view in ["colour = 'label'", "hide = [1]"] {
+            let told = mistakes(&format!("[view]\n{view}\n")).plain().to_string();
+            assert!(told.contains("have no labels") && told.contains("cell data `label`"), "{view}: {told}");
+        }
     }
 
     #[test]

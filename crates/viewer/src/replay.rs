@@ -3,8 +3,8 @@
 
 use std::time::{Duration, Instant};
 
-use pliant_geometry::Vector3;
-use pliant_picture::Subject;
+use pliant_geometry::{CellLabel, Vector3};
+use pliant_picture::{Subject, visible};
 use pliant_scene::format::ViewTable;
 use pliant_scene::{Live, Standing};
 use serde::{Deserialize, Serialize};
@@ -35,18 +35,30 @@ pub struct Surface {
     pub fibres: bool,
     /// Whether the critical cell is marked; shells are then flat.
     pub critical: bool,
+    /// Labels whose cells are left out, as they are typed.
+    pub hide: Vec<String>,
 }
 
 impl Surface {
     /// That of a view.
     pub fn of(view: &ViewTable) -> Self {
-        Self { on: view.on.clone(), curved: view.curved, fibres: view.fibres, critical: view.critical }
+        Self {
+            on: view.on.clone(),
+            curved: view.curved,
+            fibres: view.fibres,
+            critical: view.critical,
+            hide: view.hide.iter().map(CellLabel::to_string).collect(),
+        }
     }
 
     /// A view with this surface.
     fn put_into(&self, view: &ViewTable) -> ViewTable {
-        let Self { on, curved, fibres, critical } = self.clone();
-        ViewTable { on, curved, fibres, critical, ..view.clone() }
+        let Self { on, curved, fibres, critical, hide } = self.clone();
+        let hide = hide.iter().map(|label| match label.parse() {
+            Ok(label) => label,
+            Err(never) => match never {},
+        });
+        ViewTable { on, curved, fibres, critical, hide: hide.collect(), ..view.clone() }
     }
 }
 
@@ -199,6 +211,12 @@ struct Replay<'r> {
     largest_force: f64,
 }
 
+/// What a view shows of a run.
+fn subject_of(stage: &Stage, view: &ViewTable, live: &mut dyn Live) -> Result<Subject, String> {
+    let mesh = live.mesh().map_err(|failure| failure.message)?;
+    Ok(Subject::new(&visible(mesh, &stage.built.hidden(view))))
+}
+
 enum Ended<'r> {
     /// Numbers are others from here on.
     Change(Option<Box<Standing>>, &'r [Number]),
@@ -214,7 +232,7 @@ impl<'r> Replay<'r> {
         }
         let subject = match self.subject.take() {
             Some(subject) => subject,
-            None => Subject::new(live.mesh().map_err(|failure| failure.message)?),
+            None => subject_of(stage, &stage.scene.view, live.as_mut())?,
         };
         let subject = self.subject.insert(subject);
         let (model, step) = (&stage.built.model, stage.plan.step);
@@ -233,8 +251,9 @@ impl<'r> Replay<'r> {
                     }
                     Done::Surface(surface) => {
                         self.surface = Some(surface);
-                        live.show(&stage.scene.shown_as(&surface.put_into(&stage.scene.view), 1.0));
-                        *subject = Subject::new(live.mesh().map_err(|failure| failure.message)?);
+                        let view = surface.put_into(&stage.scene.view);
+                        live.show(&stage.scene.shown_as(&view, 1.0));
+                        *subject = subject_of(stage, &view, live.as_mut())?;
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {

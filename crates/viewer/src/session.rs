@@ -10,7 +10,7 @@ use pliant_geometry::Vector3;
 use pliant_gpu::{DevicePoints, PointValue};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
-use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values};
+use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values, visible};
 use pliant_scene::format::ViewTable;
 use pliant_scene::{Built, Column, Live, Plan, Scene, Standing, go_on, live};
 
@@ -280,6 +280,8 @@ enum Left {
 struct Player<'s> {
     stage: &'s Stage,
     subject: Arc<Subject>,
+    /// Labels whose cells are not shown.
+    hidden: Vec<i32>,
     live: Box<dyn Live + 's>,
     /// Whether the state lies on a device.
     on_device: bool,
@@ -435,7 +437,8 @@ impl<'s> Player<'s> {
         let on_device = stage.plan.target.device.is_some();
         let known = subject.filter(|_| goes_on);
         let is_known = known.is_some();
-        let mut player = Self { stage, subject: known.unwrap_or_default(), live, on_device, course };
+        let mut player =
+            Self { stage, subject: known.unwrap_or_default(), hidden: Vec::new(), live, on_device, course };
         player.show_as_viewed();
         if !is_known {
             player.renew_subject()?;
@@ -603,6 +606,7 @@ impl<'s> Player<'s> {
 
     fn show_as_viewed(&mut self) {
         let (scene, course) = (&self.stage.scene, &mut self.course);
+        self.hidden = self.stage.built.hidden(&course.view);
         self.live.show(&scene.shown_as(&course.view, 1.0));
         let part = course.view.component.map(|part| format!(":{}", part.word())).unwrap_or_default();
         course.field = scene.field_of(&course.view).map(|field| format!("{}{part}", field.name()));
@@ -610,7 +614,8 @@ impl<'s> Player<'s> {
     }
 
     fn renew_subject(&mut self) -> Result<(), String> {
-        self.subject = Arc::new(Subject::new(self.live.mesh().map_err(|failure| failure.message)?));
+        let mesh = self.live.mesh().map_err(|failure| failure.message)?;
+        self.subject = Arc::new(Subject::new(&visible(mesh, &self.hidden)));
         Ok(())
     }
 
@@ -652,8 +657,8 @@ impl<'s> Player<'s> {
                     }
                 }
                 seen.values = course.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
-                seen.critical =
-                    course.view.critical.then(|| critical_cell(mesh)).flatten().map(|(cell, _)| cell);
+                let critical = || critical_cell(&visible(mesh, &self.hidden));
+                seen.critical = course.view.critical.then(critical).flatten().map(|(cell, _)| cell);
                 seen.energies = self.live.energies();
             }
             // The last good picture stays.

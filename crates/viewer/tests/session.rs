@@ -4,11 +4,12 @@ mod support;
 
 use std::time::{Duration, Instant};
 
-use pliant_geometry::Vector3;
+use pliant_geometry::{CellLabel, Vector3};
 use pliant_picture::{Camera, Projection, Subject};
+use pliant_scene::format::ViewTable;
 use pliant_viewer::{
-    Done, Hand, Lags, Number, Order, Point, Recording, Samples, Session, Stage, parameters, pick, replay,
-    replay_in_real_time, with_numbers,
+    Done, Frame, Hand, Lags, Number, Order, Point, Recording, Samples, Session, Stage, parameters, pick,
+    replay, replay_in_real_time, with_numbers,
 };
 use support::{BALL, shell, stage, subject, wait};
 
@@ -60,6 +61,33 @@ fn what_is_taken_away_by_a_section_is_not_picked() {
     let (_, near) = pick(&subject, &subject.points, &from, &along, |_| true).unwrap();
     let (_, far) = pick(&subject, &subject.points, &from, &along, |point| point.x < 0.0).unwrap();
     assert!(near.x > 0.04 && far.x < -0.04);
+}
+
+#[test]
+fn hidden_labels_show_what_lies_inside_and_are_repeated() {
+    let brain = BALL
+        .lines()
+        .map(|line| if line.starts_with("mesh") { "mesh = { organ = 'brain', edge = 0.012 }" } else { line })
+        .collect::<Vec<_>>();
+    let stage = stage(&brain.join("\n"));
+    let mut session = Session::start(stage.clone(), || ()).unwrap();
+    session.order(Order::Record);
+    let whole = wait(&mut session, |frame| !frame.points.is_empty());
+    let hide = vec![CellLabel::Name("tissue".into())];
+    session.order(Order::Show(Box::new(ViewTable { hide, ..stage.scene.view.clone() })));
+    let count = whole.subject.triangle_count();
+    let inside = wait(&mut session, |frame| frame.subject.triangle_count() != count);
+    let reach = |frame: &Frame| {
+        let points = frame.subject.surface_points();
+        points.iter().map(|&point| frame.points[point as usize].norm()).fold(0.0, f64::max)
+    };
+    assert!(inside.subject.triangle_count() > 0 && reach(&inside) < reach(&whole));
+    session.order(Order::Step(3));
+    wait(&mut session, |frame| frame.steps == 3);
+    let recording = session.end().unwrap();
+    assert_eq!(Recording::from_bytes(&recording.to_bytes().unwrap()).unwrap(), recording);
+    assert!(matches!(&recording.moves[0].done, Done::Surface(surface) if surface.hide == ["tissue"]));
+    replay(&stage, &recording).unwrap();
 }
 
 #[test]

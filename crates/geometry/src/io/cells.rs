@@ -8,6 +8,8 @@ use crate::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 
 /// Prefix of arrays that hold a named set: 1 inside, 0 outside.
 pub(super) const SET_PREFIX: &str = "set:";
+/// The texts of a file that name labels.
+pub(super) const LABEL_NAMES: &str = "label-names";
 
 /// Where the cells that came from one cell of the file are.
 #[derive(Clone, Copy)]

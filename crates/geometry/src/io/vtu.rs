@@ -8,12 +8,13 @@ use std::io::Read;
 use roxmltree::Node;
 
 use super::base64::Base64;
-use super::cells::{Cells, array_limit, finite_points, index_limit};
+use super::cells::{Cells, LABEL_NAMES, array_limit, finite_points, index_limit};
 use super::cursor::{Cursor, Order, Scalar};
 use super::error::{Fault, Place};
 use super::vtk_cells::{Connectivity, PolyList, add_grid, add_poly};
 use super::xml::parse_xml;
 use super::{Format, MeshFile};
+use crate::labels::clean_name;
 use crate::{DataArray, Vector3};
 
 /// Zlib makes at most 1032 bytes of one; more is announced by no honest file.
@@ -183,10 +184,13 @@ impl<'a> Storage<'a> {
         };
         let limit = self.budget;
         let mut notes = Vec::new();
-        let mut time = None;
+        let (mut time, mut label_names) = (None, BTreeMap::new());
         for array in child(set, "FieldData").into_iter().flat_map(|fields| children(fields, "DataArray")) {
-            if array.attribute("Name").is_some_and(|name| name.eq_ignore_ascii_case("TimeValue")) {
+            let name = array.attribute("Name").unwrap_or_default();
+            if name.eq_ignore_ascii_case("TimeValue") {
                 time = self.reals(array)?.first().copied().filter(|time| time.is_finite());
+            } else if name == LABEL_NAMES && array.attribute("type") == Some("String") {
+                label_names = self.label_names(array)?;
             }
         }
         let mut points: Vec<Vector3> = Vec::new();
@@ -217,8 +221,25 @@ impl<'a> Storage<'a> {
         for (name, array) in &cell_data.arrays {
             cells.add_data(name, array);
         }
-        let mesh = cells.into_mesh(points, point_data.arrays, &mut notes)?;
+        let mut mesh = cells.into_mesh(points, point_data.arrays, &mut notes)?;
+        mesh.label_names = label_names;
         Ok(MeshFile { mesh, format: String::new(), notes, time })
+    }
+
+    /// The names in texts such as `5 liver`, a 0 behind each. Other texts name nothing.
+    fn label_names(&mut self, array: Node<'a, 'a>) -> Result<BTreeMap<i32, String>, Fault> {
+        let bytes: Bytes<'a> = if is_text(array) {
+            let codes = self.words(array, |cursor, what| cursor.integer(format_args!("{what}")))?;
+            codes.into_iter().map(|code| u8::try_from(code).unwrap_or(b'?')).collect::<Vec<u8>>().into()
+        } else {
+            self.bytes(array)?
+        };
+        let named = bytes.split(|&byte| byte == 0).filter_map(|text| {
+            let text = String::from_utf8_lossy(text);
+            let (label, name) = text.split_once(' ')?;
+            Some((label.parse().ok()?, clean_name(name)?))
+        });
+        Ok(named.collect())
     }
 
     /// The line, from 1, of a byte of the XML.

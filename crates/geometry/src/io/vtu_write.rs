@@ -11,7 +11,7 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::cells::SET_PREFIX;
+use super::cells::{LABEL_NAMES, SET_PREFIX};
 use super::vtk_cells::type_number;
 use super::{MeshFileError, base64, check, save};
 use crate::{DataArray, Mesh};
@@ -37,7 +37,7 @@ const LEVEL: u32 = 1;
 /// Writes a mesh as a `.vtu` file into `writer`, as one piece with all its cells.
 ///
 /// Sets become arrays `set:NAME` of 0 and 1. Cell data that a kind of cells does not have are NaN there.
-/// `label` is written as integers if it is integral everywhere.
+/// `label` is written as integers if it is integral everywhere; the names of labels become texts of the file.
 pub fn write_vtu(writer: impl Write, mesh: &Mesh, options: &VtuOptions) -> Result<(), MeshFileError> {
     let path = Path::new("stream.vtu");
     check(path, mesh)?;
@@ -164,12 +164,7 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions) -> i
         parts.xml,
         "byte_order=\"LittleEndian\" header_type=\"UInt64\"{compressor}>\n  <UnstructuredGrid>"
     )?;
-    if let Some(time) = options.time {
-        parts.push(
-            "    <FieldData>\n      <DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\"",
-        );
-        writeln!(parts.xml, " format=\"ascii\">{time:?}</DataArray>\n    </FieldData>")?;
-    }
+    write_field_data(&mut parts, mesh, options)?;
     let points = mesh.points.len();
     writeln!(parts.xml, "    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">")?;
     write_point_data(&mut parts, mesh, options)?;
@@ -182,6 +177,34 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions) -> i
     write_cells(&mut parts, mesh)?;
     parts.push("    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
     out.write_all(&parts.xml)
+}
+
+/// The time, and the names of labels: a text such as `5 liver` for each, in the codes of its bytes with a 0 behind it.
+fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
+    if options.time.is_none() && mesh.label_names.is_empty() {
+        return Ok(());
+    }
+    parts.push("    <FieldData>\n");
+    if let Some(time) = options.time {
+        parts.push("      <DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\"");
+        writeln!(parts.xml, " format=\"ascii\">{time:?}</DataArray>")?;
+    }
+    if !mesh.label_names.is_empty() {
+        let count = mesh.label_names.len();
+        write!(
+            parts.xml,
+            "      <DataArray type=\"String\" Name=\"{LABEL_NAMES}\" NumberOfTuples=\"{count}\""
+        )?;
+        parts.push(" format=\"ascii\">");
+        for (label, name) in &mesh.label_names {
+            for byte in format!("{label} {name}\0").bytes() {
+                write!(parts.xml, "{byte} ")?;
+            }
+        }
+        parts.push("</DataArray>\n");
+    }
+    parts.push("    </FieldData>\n");
+    Ok(())
 }
 
 fn write_point_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {

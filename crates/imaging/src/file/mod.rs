@@ -1,11 +1,12 @@
 //! Image files in: NIfTI-1 and -2, NRRD, MetaImage, GIPL, DICOM series and segmentations. The reader goes by the first bytes where
 //! they tell the format, otherwise by the ending; gzip is recognised by its own first bytes. Sizes are held against the
 //! limit and the bytes that are there before anything is allocated.
-//! Leaves out: more than one value a voxel, time series, compressed DICOM slices, contours.
+//! Leaves out: more than one value a voxel but for layers of segments, time series, compressed DICOM slices, contours.
 
 mod dicom;
 mod gipl;
 mod input;
+mod layers;
 mod metaimage;
 mod nifti;
 mod nrrd;

@@ -1,13 +1,14 @@
 //! NRRD: a text header, `field: value`, that ends at an empty line or with the file (detached header), then the voxels
 //! (Teem's definition of the format, NRRD0001 to NRRD0005). An axis of one element without direction is dropped. The names of labels are those
-//! that 3D Slicer writes: `Segment0_Name:=liver` beside `Segment0_LabelValue:=5`.
-//! Leaves out: several values a voxel, encodings hex and bzip2, data spread over several files.
+//! that 3D Slicer writes: `Segment0_Name:=liver` beside `Segment0_LabelValue:=5`. A first axis of layers of segments becomes one image.
+//! Leaves out: several values a voxel otherwise, encodings hex and bzip2, data spread over several files.
 
 use std::collections::BTreeMap;
 
 use pliant_geometry::Vector3;
 
 use super::input::Input;
+use super::layers;
 use super::text::{Field, ToWorld};
 use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
@@ -47,8 +48,17 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
         header.get("space directions").or(header.get("spacings")).map_or(dims.line, |field| field.line);
     let grid = Grid::new(size, world.vector(header.origin(&axes)?), world.axes(axes.steps))
         .map_err(|problem| problem.at_line(line))?;
-    let numbers = header.numbers(input, grid.len(), scalar)?;
-    let names = header.names();
+    let (numbers, names) = if axes.layers > 1 {
+        let voxels = (grid.len() as u64).saturating_mul(axes.layers);
+        if voxels > options.voxel_limit {
+            let limit = options.voxel_limit;
+            return Err(ImageProblem::TooManyVoxels { voxels, limit }.at_line(dims.line));
+        }
+        let read = header.numbers(input, voxels as usize, scalar)?;
+        layers::joined(axes.layers as usize, &read, &layers::segments(&header.pairs), &mut notes)
+    } else {
+        (header.numbers(input, grid.len(), scalar)?, header.names())
+    };
     Ok(Image { grid, format: "NRRD".to_owned(), notes, names, numbers, scale: [1.0, 0.0] })
 }
 
@@ -64,6 +74,8 @@ struct Axes {
     steps: [Vector3; 3],
     /// Their places among the axes of the file.
     kept: [usize; 3],
+    /// Layers of segments, of which each voxel has a number.
+    layers: u64,
 }
 
 impl Header {
@@ -162,11 +174,13 @@ impl Header {
         }
         let steps = self.steps(rank)?;
         let (mut dims, mut kept_steps, mut kept) = ([1; 3], [Vector3::zeros(); 3], [usize::MAX; 3]);
-        let mut count = 0;
+        let (mut count, mut layers) = (0, 1);
+        let layered = !layers::segments(&self.pairs).is_empty();
         for (axis, (&size, step)) in sizes.iter().zip(&steps).enumerate() {
             match step {
                 Some(_) if count == 3 && size == 1 => {}
                 None if size == 1 => {}
+                None if axis == 0 && layered => layers = size,
                 Some(step) if count < 3 => {
                     (dims[count], kept_steps[count], kept[count]) = (size, *step, axis);
                     count += 1;
@@ -189,7 +203,7 @@ impl Header {
             // A single slice: one unit thick, square to it.
             kept_steps[2] = kept_steps[0].cross(&kept_steps[1]).try_normalize(0.0).unwrap_or_default();
         }
-        Ok(Axes { dims, steps: kept_steps, kept })
+        Ok(Axes { dims, steps: kept_steps, kept, layers })
     }
 
     /// The step along each axis of the file; `None` for one without direction.

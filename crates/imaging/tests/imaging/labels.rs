@@ -126,6 +126,53 @@ fn names_stand_in_the_headers_of_nrrd_and_nifti() {
     }
 }
 
+/// Layers of segments as 3D Slicer writes them: two numbers for each of the 2 × 2 × 1 voxels.
+fn layered(values: &str, segments: &str) -> Result<Image, String> {
+    let text = format!(
+        "NRRD0004\ntype: unsigned char\ndimension: 4\nspace: left-posterior-superior\nsizes: 2 2 2 1\n\
+         space directions: none (-1,0,0) (0,-1,0) (0,0,2)\nkinds: list domain domain domain\nencoding: ascii\n\
+         space origin: (0,0,0)\n{segments}\n{values}\n"
+    );
+    read_bytes(text.as_bytes(), ImageFormat::Nrrd, &ReadOptions::default()).map_err(|error| error.to_string())
+}
+
+#[test]
+fn layers_of_segments_become_one_image() {
+    let segment = |number: u32, layer: u32, value: i32, name: &str| {
+        format!(
+            "Segment{number}_Layer:={layer}\nSegment{number}_Name:={name}\nSegment{number}_LabelValue:={value}\n"
+        )
+    };
+    let labels = |image: &Image| image.labels().unwrap().labels;
+    // Values of their own stay; the tumour, which comes later, lies in the liver.
+    let own = segment(1, 1, 7, "tumour") + &segment(0, 0, 5, "liver");
+    let image = layered("5 0  5 7  0 7  0 0", &own).unwrap();
+    assert_eq!((image.grid.dims, labels(&image)), ([2, 2, 1], vec![5, 7, 7, 0]));
+    assert_eq!((image.names.get(5), image.names.get(7)), (Some("liver"), Some("tumour")));
+    assert_eq!(image.notes, ["segments overlap in 1 voxels, which count to the later one"]);
+    assert!((image.grid.spacing()[2] - 2e-3).abs() < 1e-12);
+    // The same value in two layers: numbers from 1 on.
+    let again = segment(0, 0, 1, "liver") + &segment(1, 1, 1, "tumour") + &segment(2, 0, 2, "vein");
+    let image = layered("1 0  2 1  0 1  2 0", &again).unwrap();
+    assert_eq!(labels(&image), [1, 3, 2, 3], "the vein comes after the tumour");
+    assert_eq!(image.names.get(3), Some("vein"));
+    assert!(image.notes[0].contains("use a value again") && image.notes[1].contains("overlap in 1"));
+    // A number of no segment is background, and told.
+    let image = layered("9 0  5 0  0 0  0 3", &own).unwrap();
+    assert_eq!(labels(&image), [0, 5, 0, 0]);
+    assert_eq!(image.notes, ["2 numbers belong to no segment and were not used"]);
+}
+
+#[test]
+fn layers_without_segments_or_with_too_few_numbers_are_refused() {
+    let told = layered("5 0 5 7 0 7 0 0", "").unwrap_err();
+    assert!(told.contains("several values a voxel"), "{told}");
+    let odd = "Segment0_LabelValue:=5\nSegment0_Layer:=-1\nSegmentx_Layer:=1\nSegment1_LabelValue:=many\n";
+    assert_eq!(layered("5 0 5 0 0 0 0 0", odd).unwrap().labels().unwrap().labels, [0; 4]);
+    let told = layered("5 0 5", "Segment0_LabelValue:=5\n").unwrap_err();
+    assert!(told.contains("the voxels"), "{told}");
+}
+
 fn image(value: impl Fn(usize) -> i16, dims: [usize; 3]) -> Image {
     let values = (0..dims.iter().product()).map(value).collect();
     let bytes = nifti1(&Volume { dims, values, ..Volume::oblique() }, Form::Sform, false);

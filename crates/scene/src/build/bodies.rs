@@ -2,19 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use pliant_geometry::{CellBlock, CellKind, Mesh, Surface, body_blocks, boundary};
+use pliant_geometry::{
+    CellBlock, CellKind, CellLabel, Labels, Mesh, Surface, UnknownLabel, body_blocks, boundary,
+};
 use pliant_mechanics::model::{Averaging, Body, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
 
 use super::{Builder, BuiltBody, SCENE, suggestion};
 use crate::diagnostic::counted;
-use crate::format::{BodyModel, BodyTable, ByLabel, Density, Element, Hourglass};
+use crate::format::{BodyModel, BodyTable, ByLabel, Density, Element, Hourglass, Thickness, ThicknessRule};
 use crate::registry::LawTable;
 
 /// A body that is being built.
 pub(super) struct Draft<'a> {
     pub name: &'a str,
+    /// Its table, where values by label have the labels' numbers.
     pub table: &'a BodyTable,
+    /// The same as the scene has it.
+    pub given: &'a BodyTable,
     pub mesh: &'a Mesh,
     pub boundary: &'a Surface,
 }
@@ -37,14 +42,22 @@ impl Builder<'_> {
             let file_nodes = made.mesh.points.len();
             let file_numbers = self.repair(&mut made.mesh, &table.mesh, &mesh_path);
             if table.model == BodyModel::Shell {
+                let label_names = std::mem::take(&mut made.mesh.label_names);
                 let Some(mesh) = self.triangles(made.mesh, &mesh_path) else { continue };
-                made.mesh = mesh;
+                made.mesh = Mesh { label_names, ..mesh };
             }
             if !self.check_mesh(&made.mesh, table, &mesh_path) {
                 continue;
             }
+            let Some(numbered) = self.by_numbers(name, table, &made.mesh) else { continue };
             let boundary = boundary(&made.mesh);
-            self.add_body(&Draft { name, table, mesh: &made.mesh, boundary: &boundary });
+            self.add_body(&Draft {
+                name,
+                table: &numbered,
+                given: table,
+                mesh: &made.mesh,
+                boundary: &boundary,
+            });
             self.bodies.push(BuiltBody {
                 name: name.clone(),
                 mesh: made.mesh,
@@ -122,6 +135,59 @@ impl Builder<'_> {
         fits
     }
 
+    /// The table of a body with the numbers of labels in place of their names in its mesh; diagnostics where there is no such name.
+    fn by_numbers(&mut self, name: &str, table: &BodyTable, mesh: &Mesh) -> Option<BodyTable> {
+        let labels = Labels::of(mesh);
+        let mut numbered = table.clone();
+        let mut all = self.numbered(&labels, &["body", name, "law"], &mut numbered.law);
+        all &= self.numbered(&labels, &["body", name, "density"], &mut numbered.density);
+        all &= self.numbered(&labels, &["body", name, "hourglass"], &mut numbered.hourglass);
+        if let Some(Thickness::PerCell(ThicknessRule::ByLabel(map))) = &mut numbered.thickness {
+            all &= self.number_keys(&labels, &["body", name, "thickness", "by-label"], map);
+        }
+        all.then_some(numbered)
+    }
+
+    fn numbered<T>(&mut self, labels: &Labels, path: &[&str], values: &mut ByLabel<T>) -> bool {
+        match values {
+            ByLabel::One(_) => true,
+            ByLabel::Each(map) => self.number_keys(labels, path, map),
+        }
+    }
+
+    /// Puts the number of a label in place of its name; whether all names are known. Numbers stay as they are written.
+    fn number_keys<T>(&mut self, labels: &Labels, path: &[&str], map: &mut BTreeMap<String, T>) -> bool {
+        let mut all = true;
+        let mut numbered = BTreeMap::new();
+        for (key, value) in std::mem::take(map) {
+            let is_number = key.parse::<f64>().is_ok();
+            let found = if is_number { Ok(key.clone()) } else { number_of(labels, &key) };
+            match found {
+                Ok(number) if numbered.contains_key(&number) => {
+                    let message = format!("`{key}` is label {number}, which has a value already");
+                    self.error(
+                        &[path, &[key.as_str()]].concat(),
+                        message,
+                        "given twice",
+                        "leave one of them out",
+                    );
+                    all = false;
+                }
+                Ok(number) => {
+                    numbered.insert(number, value);
+                }
+                Err(error) => {
+                    let help =
+                        "labels go by number, or by the name that the image or the mesh file gives them";
+                    self.error(&[path, &[key.as_str()]].concat(), error.to_string(), "no such label", help);
+                    all = false;
+                }
+            }
+        }
+        *map = numbered;
+        all
+    }
+
     /// Where values (law, density, …) go by label: whether each cell's label has one, and each label of theirs a cell. The
     /// key comes with an example of a value.
     fn check_labels<T>(&mut self, name: &str, [key, example]: [&str; 2], values: &ByLabel<T>, mesh: &Mesh) {
@@ -143,13 +209,17 @@ impl Builder<'_> {
         }
         let list = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
         let missing = counts.iter().filter(|(label, _)| !map.contains_key(*label));
-        let missing = list(&mut missing.map(|(label, n)| format!("{label} ({})", counted(*n, "cell"))));
+        let named = |label: &str| label.parse().ok().and_then(|label: i32| mesh.label_names.get(&label));
+        let missing = list(&mut missing.map(|(label, n)| match named(label) {
+            Some(name) => format!("{label} ({name}, {})", counted(*n, "cell")),
+            None => format!("{label} ({})", counted(*n, "cell")),
+        }));
         if !missing.is_empty() {
             let message = format!("cells of `{name}` have labels without {key}: {missing}");
             let help = format!("add `LABEL = {example}` for each of them");
             self.error(&path, message, "not for these", help);
         }
-        let known = list(&mut counts.keys().cloned());
+        let known = Labels::of(mesh).all_shown().join(", ");
         for label in map.keys().filter(|label| !counts.contains_key(*label)) {
             let message = format!("no cell of `{name}` has label `{label}`");
             let help = format!("remove it; labels of the mesh: {known}");
@@ -159,12 +229,12 @@ impl Builder<'_> {
 
     fn add_solid(&mut self, draft: &Draft<'_>, body: usize, block: &CellBlock, part: Part) {
         let Part { law: law_name, density, hourglass, cells } = part;
-        let (scene, &Draft { name, table, .. }) = (self.scene, draft);
+        let (scene, &Draft { name, table, given, .. }) = (self.scene, draft);
         let Some((_, law)) = scene.laws.iter().find(|(known, _)| *known == law_name) else {
             let known: Vec<&str> = scene.laws.iter().map(|(name, _)| name.as_str()).collect();
             let message = format!("there is no law `{law_name}`");
             let help = suggestion(&law_name, &known, SCENE, "laws");
-            self.error(&law_path(name, &table.law, &law_name), message, "no such law", help);
+            self.error(&law_path(name, &given.law, &law_name), message, "no such law", help);
             return;
         };
         if table.element.is_some_and(Element::averages_pressure) && !law.law.has_volumetric_energy() {
@@ -243,6 +313,11 @@ impl Builder<'_> {
     }
 }
 
+/// The number of a label by its name, as the keys of values have it.
+fn number_of(labels: &Labels, name: &str) -> Result<String, UnknownLabel> {
+    labels.find(&CellLabel::Name(name.to_owned())).map(|number| number.to_string())
+}
+
 /// The cells of a block by material, laws in the order of their names.
 fn parts(table: &BodyTable, block: &CellBlock) -> Vec<Part> {
     let labels = block.data.get("label");
@@ -286,7 +361,9 @@ mod tests {
     use pliant_geometry::DataArray;
 
     use super::*;
-    use crate::testing::{CUBE, built, read};
+    use crate::build;
+    use crate::testing::{CUBE, built, labelled, read};
+    use pliant_mechanics::Model;
 
     #[test]
     fn cells_go_to_the_material_of_their_label() {
@@ -321,6 +398,44 @@ mod tests {
         let map = [("7".to_owned(), "soft".to_owned())];
         assert_eq!(law_path("liver", &ByLabel::Each(map.into()), "soft"), ["body", "liver", "law", "7"]);
         assert_eq!(law_path("liver", &ByLabel::One("soft".into()), "soft"), ["body", "liver", "law"]);
+    }
+
+    #[test]
+    fn values_go_by_the_names_of_labels_as_by_their_numbers() {
+        let folder = tempfile::tempdir().unwrap();
+        let model = |more: &str| {
+            let scene = labelled(folder.path(), more);
+            build(&scene).map(|built| built.model).map_err(|errors| errors.plain().to_string())
+        };
+        let shown = |model: Model| {
+            let part = |solid: &Solid| (format!("{:?}", solid.material), solid.cells.len());
+            (model.solids.iter().map(part).collect::<Vec<_>>(), model.mass)
+        };
+        let rest = "\nhourglass = { 1 = 0.1, 2 = 0.3, 5 = 0.2 }";
+        let numbers =
+            "law = { 1 = 'tissue', 2 = 'hard', 5 = 'hard' }\ndensity = { 1 = 900, 2 = 1000, 5 = 1000 }";
+        let names = "law = { Liver = 'tissue', tumour = 'hard', 5 = 'hard' }\ndensity = { liver = 900, 2 = 1000, 5 = 1000 }";
+        let [numbers, by_names] =
+            [numbers, names].map(|more| shown(model(&format!("{more}{rest}")).unwrap()));
+        assert_eq!(numbers, by_names);
+        assert_eq!(numbers.0.len(), 3);
+        for (law, pieces) in [
+            (
+                "{ livr = 'tissue', 2 = 'hard', 5 = 'hard' }",
+                &["no label is named `livr`; did you mean `liver`?", "the mesh has 1 (liver), 2 (tumour), 5"]
+                    [..],
+            ),
+            (
+                "{ liver = 'tissue', 1 = 'hard', 2 = 'hard', 5 = 'hard' }",
+                &["`liver` is label 1, which has a value"],
+            ),
+            ("{ liver = 'tissue', 5 = 'hard' }", &["have labels without law: 2 (tumour, 1 cell)"]),
+            ("{ liver = 'tissue', 2 = 'stiff', 5 = 'hard' }", &["there is no law `stiff`"]),
+            ("{ 1 = 'tissue', 2 = 'hard', 4 = 'hard', 5 = 'hard' }", &["no cell of `bar` has label `4`"]),
+        ] {
+            let told = model(&format!("law = {law}\ndensity = 1000")).unwrap_err();
+            assert!(pieces.iter().all(|piece| told.contains(piece)), "{law}: {told}");
+        }
     }
 
     #[test]

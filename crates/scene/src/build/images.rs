@@ -1,30 +1,40 @@
 //! Meshes of segmented images and of surface files: read, cut out, cleaned and made of the cells asked for, or taken from the cache.
 
+use std::cell::Cell;
 use std::f64::consts::FRAC_PI_3;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{self, MeshFile, MeshFileError};
-use pliant_geometry::{CellKind, Mesh, Vector3};
+use pliant_geometry::{CellKind, CellLabel, Labels, Mesh, Vector3, labels};
 use pliant_imaging::{
     Border, Choice, Cleaning, Image, ImageError, LabelChoice, LabelError, LabelNames, ReadOptions, Smoothing,
 };
 use pliant_meshing::{
-    Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Enclosed, Fewer, FieldMesh, FittedShells, MeshingError,
-    Missed, OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
-    require_room_for,
+    Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Enclosed, Fewer, FieldMesh, FitProgress, FittedShells,
+    MeshingError, Missed, OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs,
+    TriangleMesh, Voxels, require_room_for,
 };
 
 use super::meshes::unscaled;
-use super::{Builder, MeshOrigin};
+use super::{Builder, MeshOrigin, Meshing};
 use crate::cache::{Kept, Key};
 use crate::diagnostic::Diagnostic;
-use crate::format::{Cells, CleanTable, Label, MeshTable, Protected};
+use crate::format::{Cells, CleanTable, Label, MeshTable};
 
 /// Faces that meet at more than this angle meet at a crease, which even triangles keep [rad].
 const CREASE: f64 = FRAC_PI_3;
 
 /// Voxels may be made coarser up to this part of the edge of the cells.
 const COARSEST: f64 = 0.25;
+
+/// Parts of the whole work that are done once the input is read, the body is cut out, and its shape is found.
+const DONE: [f64; 3] = [0.2, 0.3, 0.5];
+
+/// What is being done after that.
+const MAKING: &str = "making cells";
+
+/// Hears which part of the work is done, from 0 to 1, and what is being done.
+type Watch<'w> = &'w dyn Fn(f64, &'static str);
 
 /// All that a mesh is made by, but for the image. Its debug text is its part of the key in the cache.
 #[derive(Clone, Debug)]
@@ -76,7 +86,14 @@ struct Fault {
 impl Builder<'_> {
     /// The mesh of what is segmented in an image, or of what the surface of a file encloses.
     pub(super) fn scanned(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
-        let made = recipe(table).and_then(|recipe| Ok((self.scan(table)?, recipe)));
+        let body = path.get(1).copied().unwrap_or_default();
+        let heard = self.watch;
+        let watch: Watch<'_> = &|part, now| heard(Meshing { body, part, now });
+        let made = recipe(table).and_then(|mut recipe| {
+            let scan = self.scan(table, watch)?;
+            recipe.protect(&scan, table)?;
+            Ok((scan, recipe))
+        });
         let name = match (&table.file, &table.image, &table.masks) {
             (Some(file), ..) | (None, Some(file), _) => file.display().to_string(),
             (None, None, masks) => {
@@ -89,7 +106,7 @@ impl Builder<'_> {
             let kept = match key.as_ref().and_then(|key| self.cache.get(key)) {
                 Some(kept) => (kept, Some("from the cache".into())),
                 None => {
-                    let made = recipe.make(&scan)?;
+                    let made = recipe.make(&scan, watch)?;
                     let put = key.map(|key| self.cache.put(&key, &made));
                     let how = put.map(|put| match put {
                         Ok(()) => "made, and kept in the cache".into(),
@@ -122,13 +139,16 @@ impl Builder<'_> {
         let whole = "if the organ goes on beyond the image, its mesh ends there with a flat face";
         self.out.extend(scan.cut_off().into_iter().map(|message| doubt(message, whole)));
         let origin = format!("{name} ({format}), {}", recipe.words(&scan));
-        Some(MeshOrigin { mesh: kept.mesh, origin })
+        let mut mesh = kept.mesh;
+        let present = labels(&mesh).into_iter();
+        mesh.label_names = present.filter_map(|label| Some((label, scan.name(label)?))).collect();
+        Some(MeshOrigin { mesh, origin })
     }
 
-    fn scan(&self, table: &MeshTable) -> Result<Scan, Fault> {
+    fn scan(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Scan, Fault> {
         let Some(file) = &table.file else {
             require_one_cut(table)?;
-            let image = self.read_images(table)?;
+            let image = self.read_images(table, watch)?;
             let choice = choice(&image, table)?;
             return Ok(Scan::Image(image, choice));
         };
@@ -148,7 +168,7 @@ impl Builder<'_> {
     }
 
     /// The image, with the one that is added to it, or several masks as one; with the names of its labels.
-    fn read_images(&self, table: &MeshTable) -> Result<Image, Fault> {
+    fn read_images(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Image, Fault> {
         let failed = |key, error: ImageError| {
             let help = match error {
                 ImageError::Open { .. } => "file names are relative to the scene file",
@@ -162,8 +182,13 @@ impl Builder<'_> {
             let opened = |source| ImageError::Open { path: file.to_owned(), source };
             self.scene.file(file).map_err(opened)
         };
+        let files = table.masks.as_ref().map_or(1, Vec::len).max(1) + usize::from(table.add.is_some());
+        let each = DONE[0] / files as f64;
+        let before = Cell::new(0.0);
         let read = |key, file: &Path| {
-            let image = allowed(file).and_then(|path| pliant_imaging::read(&path, &options));
+            let progress = |done: f64| watch(before.get() + each * done, "reading the image");
+            let image = allowed(file).and_then(|path| pliant_imaging::read_with(&path, &options, &progress));
+            before.set(before.get() + each);
             image.map_err(|error| failed(key, error))
         };
         let mut image = match (&table.image, &table.masks) {
@@ -225,6 +250,21 @@ fn label_fault(key: &'static str, table: &MeshTable, error: &LabelError) -> Faul
 }
 
 impl Scan {
+    /// The labels that the cells get.
+    fn labels(&self) -> &[i32] {
+        match self {
+            Self::Image(_, Choice::Labels(labels)) => labels,
+            Self::Image(_, Choice::From(_)) | Self::Surface(_) => &[1],
+        }
+    }
+
+    fn name(&self, label: i32) -> Option<String> {
+        match self {
+            Self::Image(image, Choice::Labels(_)) => image.names.get(label).map(str::to_owned),
+            _ => None,
+        }
+    }
+
     /// What of the body the image may cut off.
     fn cut_off(&self) -> Vec<String> {
         let Self::Image(image, choice) = self else { return Vec::new() };
@@ -368,9 +408,8 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
         (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, edge, ..)
             if edge.is_some() || table.distance.is_some() =>
         {
-            let protect = table.protect.iter().flatten().map(Protected::label_and_edge).collect();
             let MeshTable { inner_edge, distance, .. } = *table;
-            Ok(Goal::Volume(cells, Fineness { edge, inner_edge, protect, distance }))
+            Ok(Goal::Volume(cells, Fineness { edge, inner_edge, protect: Vec::new(), distance }))
         }
         (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, None, ..) => Err(Fault {
             key: source,
@@ -431,6 +470,27 @@ impl Fineness {
 }
 
 impl Recipe {
+    /// Takes the labels with smaller tets, by their numbers.
+    fn protect(&mut self, scan: &Scan, table: &MeshTable) -> Result<(), Fault> {
+        let Goal::Volume(_, fineness) = &mut self.cells else { return Ok(()) };
+        let named = |label: i32| (label, scan.name(label));
+        let known: Labels = scan.labels().iter().copied().map(named).collect();
+        for protected in table.protect.iter().flatten() {
+            let (label, edge) = protected.label_and_edge();
+            let number = match label {
+                // What none of the cells has is told once they are made.
+                CellLabel::Number(number) => *number,
+                CellLabel::Name(_) => known.find(label).map_err(|error| {
+                    let help =
+                        "`names = \"table.txt\"` gives the labels of an image names; `pliant labels` lists them";
+                    Fault { key: "protect", message: error.to_string(), help: help.into() }
+                })?,
+            };
+            fineness.protect.push((number, edge));
+        }
+        Ok(())
+    }
+
     fn words(&self, scan: &Scan) -> String {
         let cut = match scan {
             Scan::Surface(_) => "what it encloses".into(),
@@ -452,7 +512,7 @@ impl Recipe {
     }
 
     /// Cuts the body out, cleans it and makes its cells.
-    fn make(&self, scan: &Scan) -> Result<Kept, Fault> {
+    fn make(&self, scan: &Scan, watch: Watch<'_>) -> Result<Kept, Fault> {
         let key = match (&self.cells, scan) {
             (Goal::Volume(_, Fineness { edge: None, .. }), _) => "distance",
             (Goal::Volume(..) | Goal::Even(_), _) => "edge",
@@ -469,31 +529,31 @@ impl Recipe {
         let mut notes = Vec::new();
         let (mesh, doubts) = match (scan, &self.cells) {
             (Scan::Image(image, choice), goal) => {
-                let (anatomy, cleaned, voxel) = self.anatomy(image, choice, &mut notes)?;
+                let (anatomy, cleaned, voxel) = self.anatomy(image, choice, &mut notes, watch)?;
                 if self.cleaning != Cleaning::default() {
                     notes.push(cleaned.to_string());
                 }
                 match goal {
                     Goal::Volume(cells, fineness) => {
                         let edge = fineness.edge_in(anatomy.field().bounds().into());
-                        fill(&anatomy, *cells, &fineness.tets(edge), &mut notes)
+                        fill(&anatomy, *cells, &fineness.tets(edge), &mut notes, watch)
                     }
-                    goal => extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal)),
+                    goal => extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal, watch)),
                 }
             }
             (Scan::Surface(file), Goal::Volume(cells, fineness)) => {
                 let edge = fineness.edge_in(file.mesh.bounds().unwrap_or_default().into());
                 let request = fineness.tets(edge);
-                self.enclosed(&file.mesh, &request, &mut notes)
+                self.enclosed(&file.mesh, &request, &mut notes, watch)
                     .map_err(|error| Fault { key: "file", ..fault(error) })
-                    .map(|anatomy| fill(&anatomy, *cells, &request, &mut notes))?
+                    .map(|anatomy| fill(&anatomy, *cells, &request, &mut notes, watch))?
             }
             (Scan::Surface(file), goal) => {
                 TriangleMesh::from_mesh(&file.mesh).and_then(|(surface, repairs)| {
                     if repairs != SurfaceRepairs::default() {
                         notes.push(repairs.to_string());
                     }
-                    cover(surface, goal)
+                    cover(surface, goal, watch)
                 })
             }
         }
@@ -507,7 +567,9 @@ impl Recipe {
         mesh: &Mesh,
         request: &OrganTets,
         notes: &mut Vec<String>,
+        watch: Watch<'_>,
     ) -> Result<Anatomy<'static>, MeshingError> {
+        watch(0.0, "mending the surface");
         let edge = request.edge;
         let Cleaning { close_gaps, fill_holes, keep_largest } = self.cleaning;
         let closing = Closing { holes: close_gaps, fill_cavities: fill_holes, keep_largest };
@@ -518,7 +580,7 @@ impl Recipe {
         let kind =
             if matches!(self.cells, Goal::Volume(Cells::Tets, _)) { CellKind::Tet } else { CellKind::Hex };
         require_room_for(kind, edge, surface.volume(), DEFAULT_CELL_LIMIT)?;
-        surface.fine_anatomy(1, edge, request.finest(), &|_| {})
+        surface.fine_anatomy(1, edge, request.finest(), &|done| watch(DONE[2] * done, "finding the shape"))
     }
 
     /// The body cut out of an image, what its cleaning changed, and the least step of its voxels [m].
@@ -527,6 +589,7 @@ impl Recipe {
         image: &Image,
         choice: &Choice,
         notes: &mut Vec<String>,
+        watch: Watch<'_>,
     ) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned, f64), Fault> {
         let key = match choice {
             Choice::From(_) => "threshold",
@@ -540,11 +603,14 @@ impl Recipe {
             Goal::Even(edge) => (SURFACE_SMOOTHING, edge * COARSEST),
             _ => (SURFACE_SMOOTHING, f64::INFINITY),
         };
-        let cut = image.cut(choice, coarsest, &|_| {}).map_err(fault)?;
+        let [read, cut_out, found] = DONE;
+        let cutting = |done: f64| watch(read + (cut_out - read) * done, "cutting the body out");
+        let cut = image.cut(choice, coarsest, &cutting).map_err(fault)?;
         notes.extend(cut.note());
         let voxel = cut.labels.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let finding = |done: f64| watch(cut_out + (found - cut_out) * done, "finding the shape");
         let (anatomy, cleaned) =
-            Anatomy::from_image(&cut.labels, &cut.chosen, &self.cleaning, &smoothing, &|_| {})
+            Anatomy::from_image(&cut.labels, &cut.chosen, &self.cleaning, &smoothing, &finding)
                 .map_err(fault)?;
         Ok((anatomy, cleaned, voxel))
     }
@@ -556,11 +622,13 @@ fn fill(
     cells: Cells,
     request: &OrganTets,
     notes: &mut Vec<String>,
+    watch: Watch<'_>,
 ) -> Result<(Mesh, Vec<String>), MeshingError> {
+    watch(DONE[2], MAKING);
     let edge = request.edge;
     let mut doubts = Vec::new();
     let (mesh, dropped, pieces) = if cells == Cells::Tets {
-        let made = request.mesh(anatomy, &|_| {})?;
+        let made = request.mesh(anatomy, &|done| watch(DONE[2] + (1.0 - DONE[2]) * done, MAKING))?;
         doubts = made.report.doubts();
         (made.mesh, made.report.repairs.dropped_cells, made.report.repairs.dropped_pieces)
     } else {
@@ -587,10 +655,16 @@ fn extracted(anatomy: &Anatomy<'_>, voxel: f64) -> Result<TriangleMesh, MeshingE
 }
 
 /// A surface in the triangles or shells asked for, and what is doubtful about it.
-fn cover(mut surface: TriangleMesh, goal: &Goal) -> Result<(Mesh, Vec<String>), MeshingError> {
+fn cover(
+    mut surface: TriangleMesh,
+    goal: &Goal,
+    watch: Watch<'_>,
+) -> Result<(Mesh, Vec<String>), MeshingError> {
+    watch(DONE[2], MAKING);
     match goal {
         Goal::Shells(goal) => {
-            let FittedShells { mesh, report, .. } = FittedShells::new(&surface, *goal, &|_| {})?;
+            let fitting = |now: FitProgress| watch(DONE[2] + (1.0 - DONE[2]) * now.part, "fitting shells");
+            let FittedShells { mesh, report, .. } = FittedShells::new(&surface, *goal, &fitting)?;
             return Ok((mesh, report.warnings()));
         }
         Goal::Even(edge) => {

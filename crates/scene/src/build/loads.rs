@@ -4,7 +4,7 @@ use pliant_geometry::{Locator, Mesh, Selection, Surface, Vector3, boundary};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
-use super::{Builder, SCENE, Target, suggestion};
+use super::{Builder, SCENE, Target, labels_of, suggestion};
 use crate::format::{
     At, BodyModel, ColourBy, Component, CsvTable, FieldName, ForceTable, ProbeTable, Timing, Vectors,
     VtuTable,
@@ -202,6 +202,9 @@ impl Builder<'_> {
         {
             self.error(&["view", "range"], "the range must grow", "here", "as in [0, 5e3]");
         }
+        if !matches!(target, Some(None)) {
+            self.check_labels_of_view();
+        }
         let Some(ColourBy::Field(field)) = view.colour else { return };
         match target {
             Some(None) => return,
@@ -240,6 +243,40 @@ impl Builder<'_> {
             let at = if asked.is_some() { "component" } else { "colour" };
             let message = format!("`{}` needs another `component`", field.name());
             self.error(&["view", at], message, "here", help);
+        }
+    }
+
+    /// Refuses labels that nothing shown has, and a view that leaves nothing.
+    fn check_labels_of_view(&mut self) {
+        let view = &self.scene.view;
+        let mut left = labels_of(&self.model, &self.bodies, &self.surfaces, view.on.as_deref());
+        let key = if view.hide.is_empty() { "colour" } else { "hide" };
+        if left.is_empty() {
+            if view.shows_labels() || !view.hide.is_empty() {
+                let help =
+                    "meshes of images with several `labels` have them, and mesh files with cell data `label`";
+                let message = "the elements that are shown have no labels";
+                self.error(&["view", key], message, "no labels", help);
+            }
+            return;
+        }
+        let mut hidden = Vec::new();
+        for (index, label) in view.hide.iter().enumerate() {
+            match left.find_all(label) {
+                Ok(found) => hidden.extend(found),
+                Err(error) => {
+                    self.error(&["view", "hide", &index.to_string()], error.to_string(), "no such label", "");
+                }
+            }
+        }
+        left.retain(|label| !hidden.contains(&label));
+        if left.is_empty() {
+            self.error(
+                &["view", "hide"],
+                "all labels are hidden: nothing is left to be seen",
+                "all",
+                "hide fewer",
+            );
         }
     }
 

@@ -396,6 +396,8 @@ fn label_brain(mesh: &mut Mesh, scale: f64) {
         let labels = block.cells().map(label).collect();
         block.data.insert("label".into(), DataArray::scalar(labels));
     }
+    let names = [(1, "tissue"), (2, "ventricles"), (3, "tumour")];
+    mesh.label_names = names.map(|(label, name)| (label, name.to_owned())).into();
 }
 
 fn describe_shape(source: &str, table: &MeshTable) -> String {

@@ -16,7 +16,7 @@ mod surfaces;
 
 use std::sync::Arc;
 
-use pliant_geometry::{Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
+use pliant_geometry::{Labels, Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 
@@ -91,9 +91,33 @@ pub fn build(scene: &Scene) -> Result<Built, SceneErrors> {
 /// # Errors
 /// All mistakes that were found, with their places.
 pub fn build_with(scene: &Scene, cache: &MeshCache) -> Result<Built, SceneErrors> {
+    build_watched(scene, cache, &|_| {})
+}
+
+/// How far the mesh of an image or of what a surface encloses is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meshing<'a> {
+    /// The body.
+    pub body: &'a str,
+    /// Part of the work, from 0 to 1.
+    pub part: f64,
+    /// What is being done.
+    pub now: &'static str,
+}
+
+/// As [`build_with`]; `watch` hears how far meshes of images are.
+///
+/// # Errors
+/// All mistakes that were found, with their places.
+pub fn build_watched(
+    scene: &Scene,
+    cache: &MeshCache,
+    watch: &dyn Fn(Meshing<'_>),
+) -> Result<Built, SceneErrors> {
     let mut builder = Builder {
         scene,
         cache,
+        watch,
         model: Model::default(),
         corotational: None,
         bodies: Vec::new(),
@@ -126,9 +150,23 @@ pub fn build_with(scene: &Scene, cache: &MeshCache) -> Result<Built, SceneErrors
     Ok(Built { model, corotational, bodies, surfaces, warnings, notes })
 }
 
+/// The labels of a body or a surface by name, or of all bodies.
+pub(crate) fn labels_of(model: &Model, bodies: &[BuiltBody], surfaces: &[Mesh], on: Option<&str>) -> Labels {
+    let named = model.surfaces.iter().zip(surfaces).find(|(surface, _)| Some(surface.name.as_str()) == on);
+    if let Some((_, mesh)) = named {
+        return Labels::of(mesh);
+    }
+    let mut labels = Labels::default();
+    for body in bodies.iter().filter(|body| on.is_none_or(|on| body.name == on)) {
+        labels.join(Labels::of(&body.mesh));
+    }
+    labels
+}
+
 struct Builder<'s> {
     scene: &'s Scene,
     cache: &'s MeshCache,
+    watch: &'s dyn Fn(Meshing<'_>),
     model: Model,
     corotational: Option<Corotational>,
     bodies: Vec<BuiltBody>,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use pliant_geometry::Selection;
+use pliant_geometry::{CellLabel, Selection};
 use pliant_imaging::LabelChoice;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,12 +24,12 @@ pub struct BodyTable {
     /// `tet4-anp` to `tet4`.
     #[serde(default)]
     pub element: Option<Element>,
-    /// The name of its law, or a law for each cell label: `{ 1 = "parenchyma", 2 = "tumour" }`. Shells and co-rotational solids
+    /// The name of its law, or a law for each cell label, by number or by the name of the label: `{ 1 = "soft", tumour = "stiff" }`. Shells and co-rotational solids
     /// take Young's modulus and Poisson's ratio of an isotropic law at small strain; a shell whose `layers` all have their own elasticity
     /// needs none.
     #[serde(default = "no_law")]
     pub law: ByLabel<String>,
-    /// Mass per volume [kg/m³], or one for each cell label. Elements with averaged pressure average it apart on parts of
+    /// Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure average it apart on parts of
     /// different density.
     pub density: ByLabel<Density>,
     /// Thickness of a shell [m]: one, or one for each triangle.
@@ -177,7 +177,7 @@ pub enum Thickness {
 pub enum ThicknessRule {
     /// The name of a cell-data array of the mesh [m]: `{ cell-data = "thickness" }`.
     CellData(String),
-    /// One for each cell label [m]: `{ by-label = { 1 = 0.002, 2 = 0.001 } }`.
+    /// One for each cell label [m], by number or name: `{ by-label = { 1 = 0.002, wall = 0.001 } }`.
     ByLabel(BTreeMap<String, f64>),
 }
 
@@ -187,7 +187,7 @@ pub enum ThicknessRule {
 pub enum ByLabel<T> {
     /// One for the whole body.
     One(T),
-    /// One for each cell label.
+    /// One for each cell label, by number or name.
     Each(BTreeMap<String, T>),
 }
 
@@ -408,7 +408,7 @@ pub struct MeshTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub inner_edge: Option<f64>,
-    /// Labels with smaller tets: numbers, for half of `edge`, or tables with their edge, as `[4, { label = 5, edge = 0.002 }]`. Edges are
+    /// Labels with smaller tets: numbers or names, for half of `edge`, or tables with their edge, as `["tumour", { label = 5, edge = 0.002 }]`. Edges are
     /// rounded down to a half, a quarter, ... of `edge`.
     #[serde(default)]
     pub protect: Option<Vec<Protected>>,
@@ -481,21 +481,21 @@ impl Label {
 }
 
 /// A label with smaller tets.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Protected {
     /// A label with tets of half of `edge`.
-    Half(i32),
+    Half(CellLabel),
     /// A label with tets of an edge of its own.
     Own(ProtectedTable),
 }
 
 /// A label and the edge of its tets.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ProtectedTable {
-    /// The label.
-    pub label: i32,
+    /// The label, by number or name.
+    pub label: CellLabel,
     /// Edge of its tets [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: f64,
@@ -503,10 +503,10 @@ pub struct ProtectedTable {
 
 impl Protected {
     /// The label, and the edge of its tets if it is given [m].
-    pub fn label_and_edge(&self) -> (i32, Option<f64>) {
-        match *self {
+    pub fn label_and_edge(&self) -> (&CellLabel, Option<f64>) {
+        match self {
             Self::Half(label) => (label, None),
-            Self::Own(ProtectedTable { label, edge }) => (label, Some(edge)),
+            Self::Own(ProtectedTable { label, edge }) => (label, Some(*edge)),
         }
     }
 }
@@ -756,7 +756,7 @@ fn whole_turn() -> f64 {
 pub enum Organ {
     /// A liver of 0.77 l; about 1.5 l at scale 1.25.
     Liver,
-    /// A brain of 1.3 l with sulci and fissure.
+    /// A brain of 1.3 l with sulci and fissure; labels 1 (tissue), 2 (ventricles) and 3 (tumour).
     Brain,
 }
 

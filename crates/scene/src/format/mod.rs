@@ -24,8 +24,8 @@ pub use load::{
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use view::{
-    BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, MapName, Nothing, TextureName,
-    UpName, ViewTable,
+    BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, Labels, MapName, Nothing,
+    TextureName, UpName, ViewTable,
 };
 
 use pliant_gpu::Design;

@@ -1,5 +1,6 @@
 //! How a scene is looked at, in pictures and in the window.
 
+use pliant_geometry::CellLabel;
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -37,9 +38,13 @@ pub struct ViewTable {
     /// The body or the carried surface that is shown; if not given, all bodies together.
     #[serde(default)]
     pub on: Option<String>,
-    /// What the colours tell; `none`: the colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells or co-rotational solids carry.
+    /// What the colours tell; `label`: the labels of the elements, each in a colour of its own; `none`: the colour of tissue. If not given, `von-mises`, and
+    /// `displacement` on surfaces that shells or co-rotational solids carry.
     #[serde(default)]
     pub colour: Option<ColourBy>,
+    /// Labels whose elements are left out, so that what lies inside is seen: numbers, names or ranges, as `[2, "tumour", "5-8"]`.
+    #[serde(default)]
+    pub hide: Vec<CellLabel>,
     /// A component of a vector (`x`, `y`, `z`) or a tensor (`xx`, `xy`, …), instead of the size of a vector; a tensor needs one.
     #[serde(default)]
     pub component: Option<Component>,
@@ -100,8 +105,18 @@ fn four() -> u32 {
 pub enum ColourBy {
     /// Nothing.
     Nothing(Nothing),
+    /// The labels of elements.
+    Labels(Labels),
     /// A field.
     Field(FieldName),
+}
+
+/// The word `label`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Labels {
+    /// Cell data `label`.
+    Label,
 }
 
 /// The word `none`.

@@ -49,9 +49,15 @@ impl Curved {
                 nodes.push(*at);
             }
         }
+        let mut block = CellBlock::new(CellKind::Triangle, nodes);
+        if !built.labels(on).is_empty() {
+            let labels = labels_of_facets(built, part);
+            let labels = facets.iter().map(|&facet| labels[facet as usize]).collect();
+            block.data.insert("label".into(), DataArray::scalar(labels));
+        }
         let mesh = Mesh {
             points: points.iter().map(|&point| picture.rest[point as usize]).collect(),
-            blocks: vec![CellBlock::new(CellKind::Triangle, nodes)],
+            blocks: vec![block],
             ..Mesh::default()
         };
         let curved = Self {
@@ -103,4 +109,17 @@ impl Curved {
             mesh.point_data.insert(field.name().into(), array);
         }
     }
+}
+
+/// The label of each facet of the model; 0 in a body without labels.
+fn labels_of_facets(built: &Built, part: &Corotational) -> Vec<f64> {
+    let mut labels = vec![0.0; part.model.facets.len()];
+    for (body, cells) in built.bodies.iter().zip(&part.cells) {
+        let own = body.mesh.block(CellKind::Triangle).and_then(|block| block.data.get("label"));
+        if let (BodyCells::Facets(range), Some(own)) = (cells, own) {
+            let facets = labels[range.start as usize..range.end as usize].iter_mut();
+            facets.zip(&own.values).for_each(|(label, own)| *label = *own);
+        }
+    }
+    labels
 }

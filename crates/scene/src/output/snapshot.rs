@@ -47,6 +47,9 @@ impl<R: Real> Snapshot<R> {
                 }
             },
         };
+        let named = |(label, name): (i32, Option<&str>)| Some((label, name?.to_owned()));
+        let label_names = built.labels(on).iter().filter_map(named).collect();
+        let mesh = Mesh { label_names, ..mesh };
         Self { mesh, fields: fields.to_vec(), at, content, number: PhantomData }
     }
 
@@ -140,9 +143,15 @@ fn fill_surface<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldN
     }
 }
 
-/// Points and cells without data and sets.
+/// Points and cells without sets and data but labels.
 fn bare(mesh: &Mesh) -> Mesh {
-    let blocks = mesh.blocks.iter().map(|block| CellBlock::new(block.kind, block.nodes.clone())).collect();
+    let bare = |block: &CellBlock| {
+        let mut own = CellBlock::new(block.kind, block.nodes.clone());
+        own.data
+            .extend(block.data.get_key_value("label").map(|(name, labels)| (name.clone(), labels.clone())));
+        own
+    };
+    let blocks = mesh.blocks.iter().map(bare).collect();
     Mesh { points: mesh.points.clone(), blocks, ..Mesh::default() }
 }
 
@@ -157,8 +166,7 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
         mesh.points.extend_from_slice(&built.bodies[body].mesh.points);
         nodes.extend(built.model.bodies[body].nodes.clone());
     }
-    let labelled =
-        built.bodies.iter().any(|b| b.mesh.volume_blocks().any(|block| block.data.contains_key("label")));
+    let labelled = !built.labels(on).is_empty();
     let mut cells = Vec::new();
     for kind in [CellKind::Tet, CellKind::Hex] {
         let mut block = CellBlock::new(kind, Vec::new());
@@ -208,12 +216,14 @@ pub(super) fn carried_on_shell<R>(frame: &Frame<'_, R>, surface: usize) -> Optio
     Some(positions)
 }
 
-/// The cells of one shell or co-rotational solid or of all, with the number of the `body` for several.
+/// The cells of one shell or co-rotational solid or of all, with `label` and, for several bodies, the number of the `body`.
 fn merged_corotational(built: &Built, part: &Corotational, on: Option<&str>) -> (Mesh, Content) {
     let mut mesh = Mesh::default();
     let (mut nodes, mut cells) = (Vec::new(), Vec::new());
     let kinds = [CellKind::Triangle, CellKind::Tet];
     let mut blocks = kinds.map(|kind| (CellBlock::new(kind, Vec::new()), Vec::new(), Vec::new()));
+    let labelled = !built.labels(on).is_empty();
+    let mut labels = kinds.map(|_| Vec::new());
     for (number, body) in
         built.bodies.iter().enumerate().filter(|(_, body)| on.is_none_or(|on| body.name == on))
     {
@@ -226,14 +236,20 @@ fn merged_corotational(built: &Built, part: &Corotational, on: Option<&str>) -> 
         };
         let cell = [Cell::Facet, Cell::Tet][at];
         let (block, places, owners) = &mut blocks[at];
-        let own = body.mesh.block(kinds[at]).map_or(&[][..], |own| &own.nodes[..]);
-        block.nodes.extend(own.iter().map(|node| node + offset));
+        let own = body.mesh.block(kinds[at]);
+        block.nodes.extend(own.map_or(&[][..], |own| &own.nodes[..]).iter().map(|node| node + offset));
         places.extend(range.clone().map(cell));
+        labels[at].extend_from_slice(own.and_then(|own| own.data.get("label")).map_or(&[], |of| &of.values));
+        labels[at].resize(places.len(), 0.0);
         owners.resize(places.len(), number as f64);
     }
-    for (mut block, places, owners) in blocks.into_iter().filter(|(block, ..)| !block.is_empty()) {
+    let shown = blocks.into_iter().zip(labels).filter(|((block, ..), _)| !block.is_empty());
+    for ((mut block, places, owners), labels) in shown {
         if built.bodies.len() > 1 {
             block.data.insert("body".into(), DataArray::scalar(owners));
+        }
+        if labelled {
+            block.data.insert("label".into(), DataArray::scalar(labels));
         }
         mesh.blocks.push(block);
         cells.push(places);

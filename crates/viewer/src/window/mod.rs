@@ -16,7 +16,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use eframe::egui::{self, Key, Rect};
 use eframe::wgpu;
-use pliant_geometry::Vector3;
+use pliant_geometry::{Labels, Vector3};
 use pliant_gpu::Device;
 use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
 use pliant_scene::format::{FieldName, ViewTable};
@@ -117,6 +117,8 @@ struct App {
     locked: bool,
     /// What is shown of the scene.
     view: ViewTable,
+    /// The labels that this has.
+    labels: Labels,
     cut: Cut,
     /// Whether every frame comes to ordinary memory.
     in_memory: bool,
@@ -184,6 +186,7 @@ impl App {
             fresh: true,
             numbers: Numbers::of(&stage.scene),
             view: stage.scene.view.clone(),
+            labels: stage.built.labels(stage.scene.view.on.as_deref()),
             stage,
             home: camera,
             camera,
@@ -369,6 +372,7 @@ impl App {
         }
         self.numbers = Numbers::of(&stage.scene);
         self.forget_probes();
+        self.labels = stage.built.labels(self.view.on.as_deref());
         self.stage = stage;
         self.changed = modified(&path);
         self.file = path;

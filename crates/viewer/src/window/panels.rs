@@ -1,14 +1,18 @@
 //! The panels around the picture: what is played and shown, and plots.
 
 use eframe::egui;
-use pliant_geometry::Vector3;
-use pliant_picture::{ColourMap, Texture};
-use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Nothing};
+use pliant_geometry::{CellLabel, Vector3};
+use pliant_picture::{ColourMap, Texture, label_colour};
+use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing};
 
 use super::App;
 use crate::hand::Hand;
 use crate::replay::Surface;
 use crate::session::Order;
+
+/// The colours of labels, and those of tissue.
+const LABELS: ColourBy = ColourBy::Labels(Labels::Label);
+const NO_FIELD: ColourBy = ColourBy::Nothing(Nothing::None);
 
 /// Components of a tensor.
 const TENSOR: [Option<Component>; 6] = {
@@ -67,22 +71,27 @@ impl App {
 
     /// What colours tell; whether another field is asked for.
     fn colours(&mut self, ui: &mut egui::Ui) -> bool {
-        let before = (self.field(), self.view.component);
-        let mut field = before.0;
-        let name = |field: Option<FieldName>| field.map_or("tissue", FieldName::title);
-        egui::ComboBox::from_id_salt("field").selected_text(name(field)).width(180.0).show_ui(ui, |ui| {
-            ui.selectable_value(&mut field, None, name(None));
-            for other in self.fields() {
-                ui.selectable_value(&mut field, Some(other), name(Some(other)));
+        let before = (self.colour(), self.view.component);
+        let mut colour = before.0;
+        let name = |colour: ColourBy| match colour {
+            ColourBy::Nothing(_) => "tissue",
+            ColourBy::Labels(_) => "label",
+            ColourBy::Field(field) => field.title(),
+        };
+        egui::ComboBox::from_id_salt("field").selected_text(name(colour)).width(180.0).show_ui(ui, |ui| {
+            let plain = [NO_FIELD, LABELS].into_iter().take(if self.labels.is_empty() { 1 } else { 2 });
+            for other in plain.chain(self.fields().into_iter().map(ColourBy::Field)) {
+                ui.selectable_value(&mut colour, other, name(other));
             }
         });
+        let field = if let ColourBy::Field(field) = colour { Some(field) } else { None };
         let components: &[Option<Component>] = match field.map_or(1, FieldName::components) {
             3 => &[None, Some(Component::X), Some(Component::Y), Some(Component::Z)],
             9 => &TENSOR,
             _ => &[None],
         };
-        if before.0 != field {
-            self.view.colour = Some(field.map_or(ColourBy::Nothing(Nothing::None), ColourBy::Field));
+        if before.0 != colour {
+            self.view.colour = Some(colour);
             self.view.component = components[0];
             self.locked = false;
         }
@@ -103,7 +112,50 @@ impl App {
             },
         );
         ui.checkbox(&mut self.locked, "Lock the range").on_hover_text("L");
-        before != (self.field(), self.view.component)
+        let hidden = !self.labels.is_empty()
+            && (colour == LABELS || !self.view.hide.is_empty())
+            && self.labels_shown(ui);
+        hidden || before != (self.colour(), self.view.component)
+    }
+
+    /// What colours tell now.
+    fn colour(&self) -> ColourBy {
+        match self.field() {
+            _ if self.view.shows_labels() => LABELS,
+            Some(field) => ColourBy::Field(field),
+            None => NO_FIELD,
+        }
+    }
+
+    /// A tick and a swatch for each label; whether other ones are hidden than before.
+    fn labels_shown(&mut self, ui: &mut egui::Ui) -> bool {
+        let before = self.view.hidden(&self.labels);
+        let mut hidden = before.clone();
+        egui::ScrollArea::vertical().id_salt("labels").max_height(260.0).show(ui, |ui| {
+            for (label, name) in self.labels.iter() {
+                ui.horizontal(|ui| {
+                    let (place, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());
+                    let [r, g, b] = label_colour(label);
+                    ui.painter().rect_filled(place, 2.0, egui::Color32::from_rgb(r, g, b));
+                    let mut shown = !hidden.contains(&label);
+                    let text = format!("{label} {}", name.unwrap_or_default());
+                    if ui.checkbox(&mut shown, text.trim_end()).changed() {
+                        hidden.retain(|other| *other != label);
+                        hidden.extend((!shown).then_some(label));
+                    }
+                });
+            }
+        });
+        if !hidden.is_empty() && ui.button("Show all").clicked() {
+            hidden.clear();
+        }
+        // Something has to be left to be seen.
+        let left = self.labels.iter().any(|(label, _)| !hidden.contains(&label));
+        if hidden == before || !left {
+            return false;
+        }
+        self.view.hide = hidden.into_iter().map(CellLabel::Number).collect();
+        true
     }
 
     /// What is drawn beside colours; whether another surface is asked for.
@@ -120,6 +172,7 @@ impl App {
                     ui.selectable_value(&mut self.view.on, Some(name.clone()), name);
                 }
             });
+            self.labels = self.stage.built.labels(self.view.on.as_deref());
         }
         if scene.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell) {
             let parts = egui::Slider::new(&mut self.view.curved, 1..=12).text("parts of an edge");

@@ -5,7 +5,7 @@ use eframe::egui::{
 };
 use eframe::egui_wgpu::Callback;
 use pliant_geometry::Vector3;
-use pliant_picture::{Background, Camera, Plane, Subject, ticks};
+use pliant_picture::{Background, Camera, Plane, Style, Subject, ticks};
 
 use super::App;
 use super::paint::Paint;
@@ -86,7 +86,7 @@ impl App {
         let aspect = self.aspect();
         self.style.clip = self.cut.plane(&self.subject);
         self.mouse(ui.ctx(), &response, rect);
-        let mut style = self.style;
+        let mut style = Style { labels: self.view.shows_labels(), ..self.style };
         if self.values.is_empty() {
             style.range = None;
         }

@@ -159,7 +159,7 @@ impl Builder<'_> {
 
     /// The material of each cell of a block, or one for all.
     fn materials(&mut self, draft: &Draft<'_>, block: &CellBlock) -> Option<Vec<Material>> {
-        let &Draft { name, table, .. } = draft;
+        let &Draft { name, table, given, .. } = draft;
         let labels = block.data.get("label");
         let mut known: BTreeMap<Option<String>, Material> = BTreeMap::new();
         let mut all = Vec::with_capacity(block.len());
@@ -171,7 +171,7 @@ impl Builder<'_> {
                     // A label without a value has been told.
                     let law = table.law.of(label.as_deref())?;
                     let density = table.density.of(label.as_deref())?.0;
-                    let path = bodies::law_path(name, &table.law, law);
+                    let path = bodies::law_path(name, &given.law, law);
                     let material = Material { elastic: self.elasticity(name, table, law, &path)?, density };
                     *known.entry(label).or_insert(material)
                 }

@@ -1,0 +1,123 @@
+//! Colours of labels: each cell has that of its label and nothing between them, what is hidden shows what lies inside, and the legend
+//! has a swatch for each label that is left.
+
+use pliant_geometry::{CellKind, DataArray, Mesh, Vector3};
+use pliant_picture::{Graphics, Look, Picture, Plane, Style, label_colour};
+
+/// A cube of 6³ hexes: label 1 in one half and 2 in the other, around a core of 2³ with label 3.
+fn cube() -> Mesh {
+    let n = 6_u32;
+    let at = |i: u32, j: u32, k: u32| (k * (n + 1) + j) * (n + 1) + i;
+    let mut mesh = Mesh::default();
+    for k in 0..=n {
+        for (j, i) in (0..(n + 1) * (n + 1)).map(|p| (p / (n + 1), p % (n + 1))) {
+            mesh.points.push(Vector3::new(i.into(), j.into(), k.into()) * 0.01);
+        }
+    }
+    let (mut nodes, mut labels) = (Vec::new(), Vec::new());
+    for (i, j, k) in (0..n * n * n).map(|c| (c % n, c / n % n, c / n / n)) {
+        for k in [k, k + 1] {
+            nodes.extend([at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k)]);
+        }
+        let core = [i, j, k].iter().all(|place| (2..4).contains(place));
+        labels.push(if core { 3.0 } else { f64::from(1 + i / 3) });
+    }
+    let block = mesh.block_mut(CellKind::Hex);
+    block.nodes = nodes;
+    block.data.insert("label".into(), DataArray::scalar(labels));
+    mesh.label_names = [(1, "left".to_owned()), (2, "right".to_owned())].into();
+    mesh
+}
+
+/// `None` where nothing draws, which is a failure where the gate asks for it.
+fn graphics() -> Option<Graphics> {
+    match Graphics::open() {
+        Ok(graphics) => Some(graphics),
+        Err(error) => {
+            assert!(std::env::var_os("PLIANT_REQUIRE_GPU").is_none(), "{error}; {}", error.remedy());
+            eprintln!("skipped: {error}");
+            None
+        }
+    }
+}
+
+fn look() -> Look {
+    Look { style: Style { labels: true, ..Style::default() }, size: [480, 320], ..Look::default() }
+}
+
+/// The light of a byte of sRGB.
+fn light(byte: u8) -> f64 {
+    let s = f64::from(byte) / 255.0;
+    if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Pixels of the body in the light of each label from 1 to 3, and in no such light. Light changes how bright a colour is, and adds a
+/// little white: what is left without its white has the direction of the label's colour.
+fn counts(picture: &Picture) -> [usize; 4] {
+    let pure = |rgb: &[u8]| {
+        let rgb = Vector3::from_iterator(rgb[..3].iter().map(|&byte| light(byte)));
+        let white = rgb.min() * 0.9;
+        rgb.map(|x| x - white).normalize()
+    };
+    let own: Vec<Vector3> = (1..=3).map(|label| pure(&label_colour(label))).collect();
+    let mut counts = [0; 4];
+    for pixel in picture.rgba.chunks(4).filter(|pixel| pixel[3] > 250) {
+        let colour = pure(pixel);
+        let nearest = (0..3).max_by(|&a, &b| own[a].dot(&colour).total_cmp(&own[b].dot(&colour))).unwrap();
+        counts[if own[nearest].dot(&colour) > 0.96 { nearest } else { 3 }] += 1;
+    }
+    counts
+}
+
+fn swatches(picture: &Picture) -> Vec<i32> {
+    let exact = |label: &i32| {
+        let colour = label_colour(*label);
+        picture.rgba.chunks(4).filter(|pixel| pixel[..3] == colour).count() > 50
+    };
+    (1..=3).filter(exact).collect()
+}
+
+#[test]
+fn cells_have_the_colours_of_their_labels_and_none_between() {
+    let Some(graphics) = graphics() else { return };
+    let picture = look().picture(&graphics, &cube(), 0.0).unwrap();
+    let [left, right, core, other] = counts(&picture);
+    assert!(left > 3000 && right > 3000 && core == 0, "{left} {right} {core}");
+    // Where a pixel lies on the border, samples of both are in it.
+    assert!(other * 50 < left + right, "{other} of {}", left + right);
+    assert_eq!(swatches(&picture), [1, 2, 3]);
+}
+
+#[test]
+fn hidden_labels_show_what_lies_inside_and_leave_the_legend() {
+    let Some(graphics) = graphics() else { return };
+    let hiding = |hide: Vec<i32>| Look { hide, ..look() }.picture(&graphics, &cube(), 0.0);
+    let picture = hiding(vec![1, 2]).unwrap();
+    let [left, right, core, _] = counts(&picture);
+    assert!((left, right) == (0, 0) && core > 3000, "{left} {right} {core}");
+    assert_eq!(swatches(&picture), [3]);
+    let half = hiding(vec![2]).unwrap();
+    let [left, right, core, _] = counts(&half);
+    assert!(right == 0 && left > 3000 && core > 200, "{left} {right} {core}");
+    let told = hiding(vec![1, 2, 3]).unwrap_err().to_string();
+    assert!(told.contains("nothing is left"), "{told}");
+}
+
+#[test]
+fn a_section_has_the_colours_of_the_cells_it_cuts() {
+    let Some(graphics) = graphics() else { return };
+    let clip = Plane::through(&Vector3::new(0.0, 0.031, 0.0), &-Vector3::y());
+    let look = Look { style: Style { clip, ..look().style }, ..look() };
+    let [left, right, core, other] = counts(&look.picture(&graphics, &cube(), 0.0).unwrap());
+    assert!(left > 2000 && right > 2000 && core > 400, "{left} {right} {core}");
+    assert!(other * 50 < left + right, "{other}");
+}
+
+#[test]
+fn a_mesh_without_labels_is_refused() {
+    let Some(graphics) = graphics() else { return };
+    let mut mesh = cube();
+    mesh.blocks[0].data.clear();
+    let told = look().picture(&graphics, &mesh, 0.0).unwrap_err();
+    assert!(told.to_string().contains("have no labels") && !told.remedy().is_empty(), "{told}");
+}
