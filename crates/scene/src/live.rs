@@ -1,5 +1,6 @@
 //! A scene that is played: it goes on as long as someone looks, is pulled at, and shows what its `[view]` asks.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use pliant_geometry::Mesh;
@@ -17,7 +18,7 @@ use crate::scene::Scene;
 use crate::solver::{Memory, Solver, on_device, on_processor};
 
 /// A scene under way, in any numbers and with any solver. After a failure it stays at the last good instant.
-pub trait Live {
+pub trait Live: Send {
     /// Time [s].
     fn time(&self) -> f64;
 
@@ -125,11 +126,7 @@ impl Numeric for f64 {
 ///
 /// # Errors
 /// If its solver can't be made.
-pub fn live<'b>(
-    scene: &'b Scene,
-    built: &'b Built,
-    plan: &'b Plan,
-) -> Result<Box<dyn Live + 'b>, FailureSummary> {
+pub fn live(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Result<Box<dyn Live>, FailureSummary> {
     match begin(scene, built, plan, None)? {
         Some(live) => Ok(live),
         None => Err(FailureSummary::input(&"nothing to begin with")),
@@ -141,24 +138,19 @@ pub fn live<'b>(
 ///
 /// # Errors
 /// If its solver can't be made.
-pub fn go_on<'b>(
-    scene: &'b Scene,
-    built: &'b Built,
-    plan: &'b Plan,
+pub fn go_on(
+    scene: &Scene,
+    built: &Arc<Built>,
+    plan: &Plan,
     standing: Standing,
     before: &Built,
-) -> Result<Option<Box<dyn Live + 'b>>, FailureSummary> {
+) -> Result<Option<Box<dyn Live>>, FailureSummary> {
     begin(scene, built, plan, Some((standing, before)))
 }
 
-type Begun<'b> = Result<Option<Box<dyn Live + 'b>>, FailureSummary>;
+type Begun = Result<Option<Box<dyn Live>>, FailureSummary>;
 
-fn begin<'b>(
-    scene: &'b Scene,
-    built: &'b Built,
-    plan: &'b Plan,
-    from: Option<(Standing, &Built)>,
-) -> Begun<'b> {
+fn begin(scene: &Scene, built: &Arc<Built>, plan: &Plan, from: Option<(Standing, &Built)>) -> Begun {
     let run = &scene.run;
     match (&plan.target.device, plan.target.precision, &built.corotational) {
         (Some(device), ..) => {
@@ -186,10 +178,10 @@ fn same_mesh(a: &Built, b: &Built) -> bool {
     a.model.rest == b.model.rest && shells(a) == shells(b) && cells(a) == cells(b)
 }
 
-struct Played<'b, R> {
-    built: &'b Built,
+struct Played<R> {
+    built: Arc<Built>,
     state: State<R>,
-    solver: Box<dyn Solver<R> + 'b>,
+    solver: Box<dyn Solver<R>>,
     snapshot: Snapshot<R>,
     /// What finds the points of the snapshot where the state lies on a device.
     mapping: Option<DeviceMapping>,
@@ -200,14 +192,14 @@ struct Played<'b, R> {
     evaluated: Option<Wanted>,
 }
 
-impl<'b, R: Numeric> Played<'b, R> {
+impl<R: Numeric> Played<R> {
     fn begin(
         scene: &Scene,
-        built: &'b Built,
+        built: &Arc<Built>,
         plan: &Plan,
         from: Option<(Standing, &Built)>,
-        solver: impl FnOnce(&State<R>) -> Result<Box<dyn Solver<R> + 'b>, FailureSummary>,
-    ) -> Begun<'b> {
+        solver: impl FnOnce(&State<R>) -> Result<Box<dyn Solver<R>>, FailureSummary>,
+    ) -> Begun {
         let step = plan.step;
         let Some((Standing { numbers, clock, step: step_before }, before)) = from else {
             let state = State::at_rest(&built.model);
@@ -240,13 +232,14 @@ impl<'b, R: Numeric> Played<'b, R> {
 
     fn new(
         scene: &Scene,
-        built: &'b Built,
-        solver: Box<dyn Solver<R> + 'b>,
+        built: &Arc<Built>,
+        solver: Box<dyn Solver<R>>,
         state: State<R>,
         step: f64,
     ) -> Self {
         let snapshot = snapshot(built, &scene.shown(1.0));
         let samples = Samples::new(built, &scene.sampled());
+        let built = Arc::clone(built);
         Self { built, state, solver, snapshot, mapping: None, samples, step, evaluated: None }
     }
 
@@ -263,7 +256,7 @@ fn snapshot<R: Real>(built: &Built, shown: &VtuTable) -> Snapshot<R> {
     Snapshot::new(built, shown.on.as_deref(), &shown.data, shown.at, shown.curved)
 }
 
-impl<R: Numeric> Live for Played<'_, R> {
+impl<R: Numeric> Live for Played<R> {
     fn time(&self) -> f64 {
         self.state.time
     }
@@ -288,7 +281,7 @@ impl<R: Numeric> Live for Played<'_, R> {
         given: Option<&[f32]>,
     ) -> Option<Result<DevicePoints, FailureSummary>> {
         if self.mapping.is_none() {
-            let (built, snapshot) = (self.built, &self.snapshot);
+            let (built, snapshot) = (&self.built, &self.snapshot);
             let mut points = (0..)
                 .zip(&snapshot.mesh().points)
                 .map(|(point, place)| ([place.x, place.y, place.z], snapshot.nodes_of(built, point)));
@@ -327,18 +320,18 @@ impl<R: Numeric> Live for Played<'_, R> {
     }
 
     fn nodes_of(&self, point: u32) -> Vec<(u32, f64)> {
-        self.snapshot.nodes_of(self.built, point)
+        self.snapshot.nodes_of(&self.built, point)
     }
 
     fn show(&mut self, shown: &VtuTable) {
-        self.snapshot = snapshot(self.built, shown);
+        self.snapshot = snapshot(&self.built, shown);
         self.mapping = None;
     }
 
     fn mesh(&mut self) -> Result<&Mesh, FailureSummary> {
         self.evaluate(Wanted::Everything)?;
         self.snapshot.fill(&Frame {
-            built: self.built,
+            built: &self.built,
             state: &self.state,
             stepper: self.solver.observable(),
             corotational: self.solver.corotational(),
@@ -361,7 +354,7 @@ impl<R: Numeric> Live for Played<'_, R> {
     fn sample(&mut self, row: &mut Vec<f64>) {
         self.samples.read(
             &Frame {
-                built: self.built,
+                built: &self.built,
                 state: &self.state,
                 stepper: self.solver.observable(),
                 corotational: self.solver.corotational(),
@@ -384,7 +377,7 @@ mod tests {
     use crate::testing::{CUBE, read};
 
     /// The cube, damped so that it comes to rest.
-    fn damped() -> (Scene, Built, Plan) {
+    fn damped() -> (Scene, Arc<Built>, Plan) {
         other(&[])
     }
 
@@ -398,16 +391,16 @@ mod tests {
     }
 
     /// The damped cube with other numbers.
-    fn other(changes: &[(&str, &str)]) -> (Scene, Built, Plan) {
+    fn other(changes: &[(&str, &str)]) -> (Scene, Arc<Built>, Plan) {
         let mut text = CUBE.replace("density = 1000", "density = 1000\ndamping = 200");
         changes.iter().for_each(|(from, to)| text = text.replace(from, to));
         let scene = read(&text);
         let built = crate::build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
         let plan = crate::plan(&scene, &built).unwrap_or_else(|error| panic!("{}", error.plain()));
-        (scene, built, plan)
+        (scene, Arc::new(built), plan)
     }
 
-    fn pulled_for<'b>((scene, built, plan): &'b (Scene, Built, Plan), steps: u64) -> Box<dyn Live + 'b> {
+    fn pulled_for((scene, built, plan): &(Scene, Arc<Built>, Plan), steps: u64) -> Box<dyn Live> {
         let mut live = live(scene, built, plan).unwrap();
         let grip = Grip { stiffness: 20.0, ..corner(built, live.as_ref(), 0.5, plan.step, [0.0, 0.0, 5e-3]) };
         live.hold(&[grip]);

@@ -97,7 +97,7 @@ pub struct Equilibria {
 }
 
 /// Brings a state from instant to instant.
-pub(crate) trait Solver<R> {
+pub(crate) trait Solver<R>: Send {
     /// Makes what can be asked belong to the state's instant, and of the state what is wanted.
     fn evaluate(&mut self, state: &mut State<R>, wanted: Wanted) -> Result<(), FailureSummary>;
 

@@ -101,5 +101,5 @@ pub fn with_numbers(scene: &Scene, numbers: &[Number]) -> Result<Stage, String> 
     let scene = Scene::from_source(source, scene.folder.clone()).map_err(told)?;
     let built = pliant_scene::build_with(&scene, &MeshCache::of_user()).map_err(told)?;
     let plan = pliant_scene::plan(&scene, &built).map_err(told)?;
-    Ok(Stage { scene, built, plan })
+    Ok(Stage { scene, built: built.into(), plan })
 }

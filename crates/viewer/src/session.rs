@@ -119,7 +119,7 @@ pub struct Stage {
     /// The scene.
     pub scene: Scene,
     /// Its model.
-    pub built: Built,
+    pub built: Arc<Built>,
     /// Its step.
     pub plan: Plan,
 }
@@ -132,7 +132,7 @@ impl Stage {
     pub(crate) fn enter(
         &self,
         from: Option<(Self, Option<Standing>)>,
-    ) -> Result<(Box<dyn Live + '_>, bool), String> {
+    ) -> Result<(Box<dyn Live>, bool), String> {
         let told = |failure: pliant_scene::FailureSummary| failure.message;
         if let Some((before, Some(standing))) = from {
             let going = go_on(&self.scene, &self.built, &self.plan, standing, &before.built).map_err(told)?;
@@ -282,7 +282,7 @@ struct Player<'s> {
     subject: Arc<Subject>,
     /// Labels whose cells are not shown.
     hidden: Vec<i32>,
-    live: Box<dyn Live + 's>,
+    live: Box<dyn Live>,
     /// Whether the state lies on a device.
     on_device: bool,
     course: Course,

@@ -73,7 +73,7 @@ pub fn staged(source: Source, folder: PathBuf) -> Stage {
     let scene = Scene::from_source(source, folder).unwrap_or_else(|error| panic!("{}", error.plain()));
     let built = pliant_scene::build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
     let plan = pliant_scene::plan(&scene, &built).unwrap_or_else(|error| panic!("{}", error.plain()));
-    Stage { scene, built, plan }
+    Stage { scene, built: built.into(), plan }
 }
 
 pub fn subject(stage: &Stage) -> Subject {
