@@ -285,7 +285,7 @@ fn protected(
 ) -> Result<Vec<(i32, Option<f64>)>, Failure> {
     let known: CellLabels = labels.iter().map(|label| (*label, names.get(label).cloned())).collect();
     let number = |(label, edge): &(CellLabel, Option<f64>)| match label {
-        // What none of the cells has is told once they are made.
+        // The mesher refuses a number that no cell gets.
         CellLabel::Number(label) => Ok((*label, *edge)),
         CellLabel::Name(_) => Ok((known.find(label)?, *edge)),
     };

@@ -196,7 +196,7 @@ impl Labels {
         if found.is_empty() {
             found = of(&|known| known.eq_ignore_ascii_case(name));
         }
-        match (found[..].len(), name.parse()) {
+        match (found.len(), name.parse()) {
             (1, _) => Ok(found[0]),
             (0, Ok(number)) => self.find(&CellLabel::Number(number)),
             (0, Err(_)) => {

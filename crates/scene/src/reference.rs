@@ -115,7 +115,7 @@ fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<P
             let of_all = forms.iter().all(|form| form.required.contains(key));
             if parameters.iter().all(|known| known.key != *key) {
                 let mut found = parameter(schemas, key, schema, of_all, depth);
-                // It says more than what is said of the type of the value.
+                // The form says more of the value than its type does.
                 let said = schema.get("description").is_some();
                 if let Some(doc) = form.doc.filter(|_| !said && own == 1 && !common(key)) {
                     found.description = doc.to_owned();

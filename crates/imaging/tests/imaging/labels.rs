@@ -157,7 +157,7 @@ fn layers_of_segments_become_one_image() {
     assert_eq!(labels(&image), [1, 3, 2, 3], "the vein comes after the tumour");
     assert_eq!(image.names.get(3), Some("vein"));
     assert!(image.notes[0].contains("use a value again") && image.notes[1].contains("overlap in 1"));
-    // A number of no segment is background, and told.
+    // A number of no segment is background; a note counts it.
     let image = layered("9 0  5 0  0 0  0 3", &own).unwrap();
     assert_eq!(labels(&image), [0, 5, 0, 0]);
     assert_eq!(image.notes, ["2 numbers belong to no segment and were not used"]);

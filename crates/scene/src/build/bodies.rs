@@ -358,6 +358,8 @@ pub(super) fn nodes<const N: usize>(block: &CellBlock, cell: u32, first: u32) ->
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use pliant_geometry::DataArray;
 
     use super::*;
@@ -407,9 +409,9 @@ mod tests {
             let scene = labelled(folder.path(), more);
             build(&scene).map(|built| built.model).map_err(|errors| errors.plain().to_string())
         };
-        let shown = |model: Model| {
+        let shown = |model: Arc<Model>| {
             let part = |solid: &Solid| (format!("{:?}", solid.material), solid.cells.len());
-            (model.solids.iter().map(part).collect::<Vec<_>>(), model.mass)
+            (model.solids.iter().map(part).collect::<Vec<_>>(), model.mass.clone())
         };
         let rest = "\nhourglass = { 1 = 0.1, 2 = 0.3, 5 = 0.2 }";
         let numbers =

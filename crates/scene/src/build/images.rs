@@ -478,7 +478,7 @@ impl Recipe {
         for protected in table.protect.iter().flatten() {
             let (label, edge) = protected.label_and_edge();
             let number = match label {
-                // What none of the cells has is told once they are made.
+                // The mesher refuses a number that no cell gets.
                 CellLabel::Number(number) => *number,
                 CellLabel::Name(_) => known.find(label).map_err(|error| {
                     let help =

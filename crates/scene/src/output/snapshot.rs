@@ -378,3 +378,62 @@ impl Averages {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use pliant_geometry::io;
+
+    use super::*;
+    use crate::scene::Scene;
+    use crate::source::Source;
+
+    /// A square of two labels as a shell, and as a surface that it carries.
+    const WALL: &str = r#"
+[scene]
+until = 0.1
+[run]
+solver = "static"
+[law.wall]
+type = "neo-hookean"
+young-modulus = 1e6
+poisson-ratio = 0.3
+[body.wall]
+model = "shell"
+mesh = { file = "wall.vtu" }
+law = { left = "wall", 2 = "wall" }
+density = 1000
+thickness = { by-label = { left = 1e-3, Right = 2e-3 } }
+[surface.copy]
+on = "wall"
+mesh = { file = "wall.vtu" }
+[constraint.held]
+type = "fix"
+body = "wall"
+nodes = { label = "left" }
+"#;
+
+    #[test]
+    fn shells_their_curved_surface_and_what_they_carry_keep_labels_and_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let corners = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]];
+        let points = corners.map(|[x, y]| Vector3::new(x, y, 0.0)).to_vec();
+        let mut block = CellBlock::new(CellKind::Triangle, vec![0, 1, 2, 0, 2, 3]);
+        block.data.insert("label".into(), DataArray::scalar(vec![1.0, 2.0]));
+        let label_names = [(1, "left".to_owned()), (2, "right".to_owned())].into();
+        let wall = Mesh { points, blocks: vec![block], label_names, ..Mesh::default() };
+        io::write(&folder.path().join("wall.vtu"), &wall).unwrap();
+        let source = Source::parse("wall.toml", WALL).unwrap();
+        let scene = Scene::from_source(source, folder.path().to_owned()).unwrap();
+        let built = crate::build(&scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
+        let model = &built.corotational.as_ref().unwrap().model;
+        assert_eq!([0, 1].map(|facet| model.facets[facet].thickness), [1e-3, 2e-3]);
+        let labels = |on: Option<&str>, curved: Option<u32>| {
+            let snapshot = Snapshot::<f64>::new(&built, on, &[], At::Cells, curved);
+            assert_eq!(snapshot.mesh().label_names, wall.label_names);
+            snapshot.mesh().blocks[0].data["label"].values.clone()
+        };
+        assert_eq!(labels(None, None), [1.0, 2.0]);
+        assert_eq!(labels(Some("copy"), None), [1.0, 2.0]);
+        assert_eq!(labels(Some("wall"), Some(2)), [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
+    }
+}
