@@ -151,6 +151,11 @@ impl Law for FungOrthotropic {
     }
 
     /// The shear modulus is the largest over all shears at rest, the bulk modulus that of a pure dilation.
+    /// It has axes, though no fibres that differ from cell to cell.
+    fn is_isotropic(&self) -> bool {
+        false
+    }
+
     fn small_strain(&self) -> SmallStrainModuli {
         let [xx, yy, zz, xy, yz, xz] = self.normal.0;
         let sum = xx + yy + zz + 2.0 * (xy + yz + xz);

@@ -119,6 +119,11 @@ pub trait Law: Copy + Send + Sync + 'static {
         0
     }
 
+    /// Whether the law is the same in all directions.
+    fn is_isotropic(&self) -> bool {
+        self.families() == 0
+    }
+
     /// Moduli at rest, without the fibres; of a law without isotropic matrix the largest shear modulus.
     fn small_strain(&self) -> SmallStrainModuli;
 
@@ -251,9 +256,9 @@ impl AnyLaw {
         with_law!(self, law => Law::families(law))
     }
 
-    /// True if the law is the same in all directions.
+    /// Whether the law is the same in all directions.
     pub fn is_isotropic(&self) -> bool {
-        self.families() == 0 && self.name() != "fung-orthotropic"
+        with_law!(self, law => Law::is_isotropic(law))
     }
 
     /// Moduli at rest; see [`Law::small_strain`].
