@@ -4,7 +4,7 @@
 use pliant_mechanics::stability::OnUnstable;
 use pliant_mechanics::{Real, State};
 
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::format::{Precision, SolverName};
 use crate::output::{FailureSummary, number};
 use crate::plan::Plan;

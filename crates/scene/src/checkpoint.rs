@@ -12,7 +12,7 @@ use pliant_geometry::io::read_limited;
 use pliant_mechanics::{Real, State, fingerprint};
 use serde::{Deserialize, Serialize};
 
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::diagnostic::counted;
 use crate::format::{LoadSteps, Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, ShellStrains, Written, number, replace};

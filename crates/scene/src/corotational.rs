@@ -14,7 +14,7 @@ use pliant_gpu::Wanted;
 use pliant_mechanics::{Energies, Observable, State};
 use serde::{Deserialize, Serialize};
 
-use crate::build::{Built, Control, Corotational, Stop};
+use crate::assemble::{Built, Control, Corotational, Stop};
 use crate::diagnostic::counted;
 use crate::format::{
     IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName,

@@ -33,8 +33,8 @@
 //! ```
 
 mod advice;
+mod assemble;
 mod bound;
-mod build;
 mod cache;
 pub mod checker;
 mod checkpoint;
@@ -63,11 +63,11 @@ mod target;
 mod testing;
 mod view;
 
-pub use bound::element_bound;
-pub use build::{
+pub use assemble::{
     BodyCells, Built, BuiltBody, Control, Corotational, Meshing, SizeDoubt, Stop, build, build_watched,
     build_with,
 };
+pub use bound::element_bound;
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use live::{Live, Standing, go_on, live};

@@ -8,7 +8,7 @@ use pliant_gpu::{DeviceMapping, DevicePoints, PointValue, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::{Clock, Energies, Real, State};
 
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::checkpoint::Moment;
 use crate::corotational::Corotated;
 use crate::format::{Precision, VtuTable};

@@ -7,7 +7,7 @@ use pliant_geometry::QualityReport;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
 
-use crate::build::{BodyCells, Built, Corotational};
+use crate::assemble::{BodyCells, Built, Corotational};
 use crate::diagnostic::counted;
 use crate::output::{AddedMass, bodies, number, told_limit};
 use crate::plan::{Limits, Plan};

@@ -4,7 +4,7 @@ use pliant_corotational::Explicit;
 use pliant_mechanics::critical_step::{ElementBound, TrueLimit, element_bound, true_limit};
 use serde::Serialize;
 
-use crate::build::{Built, Corotational};
+use crate::assemble::{Built, Corotational};
 use crate::diagnostic::{Diagnostic, SceneErrors, counted};
 use crate::format::{SolverName, StepChoice};
 use crate::output::number;

@@ -10,7 +10,7 @@ use pliant_mechanics::{Energies, Observable, Real, State};
 use serde::{Deserialize, Serialize};
 
 use crate::advice::remedy;
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
 use crate::corotational::Corotated;
 use crate::format::{Precision, SolverName};

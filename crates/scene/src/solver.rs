@@ -13,7 +13,7 @@ use pliant_mechanics::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::corotational::Remembered;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;

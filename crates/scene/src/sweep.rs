@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex};
 
 use pliant_mechanics::Energies;
 
-use crate::build::{Built, build_with};
+use crate::assemble::{Built, build_with};
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
 use crate::output::{AXES, ENERGIES, OutputError, OutputFolder, Summary, check_own_folder, number};

@@ -2,7 +2,7 @@
 
 use pliant_gpu::{Device, GpuError, Kind};
 
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::diagnostic::Diagnostic;
 use crate::format::{DeviceName, Precision, RunTable, SolverName};
 use crate::scene::Scene;

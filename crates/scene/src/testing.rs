@@ -5,7 +5,7 @@ use std::path::Path;
 use pliant_geometry::DataArray;
 use pliant_meshing::{Block, Resolution, VolumeCell};
 
-use crate::build::{Built, build};
+use crate::assemble::{Built, build};
 use crate::diagnostic::SceneErrors;
 use crate::scene::Scene;
 use crate::source::Source;

@@ -5,7 +5,7 @@ use std::fmt;
 
 use pliant_geometry::{Labels, Mesh};
 
-use crate::build::{Built, labels_of};
+use crate::assemble::{Built, labels_of};
 use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, ViewTable, VtuTable};
 use crate::registry::OutputTable;
 use crate::scene::Scene;

@@ -12,7 +12,7 @@ use crc32fast::Hasher;
 
 use super::file::{create, reopen};
 use super::{Frame, Observer, OutputError, Written, fields};
-use crate::build::{BodyCells, Built};
+use crate::assemble::{BodyCells, Built};
 use crate::format::{CsvTable, FieldName, ProbeTable};
 
 pub(super) struct Rows {

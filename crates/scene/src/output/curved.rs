@@ -5,7 +5,7 @@ use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 use pliant_mechanics::Real;
 
 use super::{Frame, fields};
-use crate::build::{BodyCells, Built, Corotational};
+use crate::assemble::{BodyCells, Built, Corotational};
 use crate::format::FieldName;
 
 /// The curved surface of one shell or of all.

@@ -33,7 +33,7 @@ pub(crate) use plot::plot;
 pub(crate) use snapshot::Snapshot;
 pub(crate) use summary::{INTERRUPTED, bodies, markdown, summarise, told_limit};
 
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::registry::OutputTable;
 use crate::scene::Scene;
 

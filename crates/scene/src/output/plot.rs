@@ -3,7 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::run::History;
 
 const SIZE: (u32, u32) = (900, 760);

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::fields::Cell;
 use super::{Frame, fields};
-use crate::build::{BodyCells, Built, Corotational};
+use crate::assemble::{BodyCells, Built, Corotational};
 use crate::format::{At, FieldName};
 
 /// A mesh that takes the fields of instants.

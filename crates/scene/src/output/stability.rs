@@ -7,7 +7,7 @@ use pliant_mechanics::{BALANCE_LIMIT, Energies};
 use serde::Serialize;
 
 use super::number;
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::diagnostic::counted;
 use crate::plan::Plan;
 use crate::run::Outcome;

@@ -4,7 +4,7 @@ use pliant_corotational::State;
 use serde::{Deserialize, Serialize};
 
 use super::number;
-use crate::build::{BodyCells, Built};
+use crate::assemble::{BodyCells, Built};
 
 /// Strain from which on a run of shells is doubted.
 const MUCH: f64 = 0.1;

@@ -10,7 +10,7 @@ use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
 use super::{OutputError, StrainSummary};
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::plan::{LimitingElement, Limits, Plan};
 use crate::printable::printable;
 use crate::run::{History, Outcome};

@@ -11,7 +11,7 @@ use pliant_mechanics::Real;
 use super::file::{check_own_folder, replace};
 use super::snapshot::Snapshot;
 use super::{Frame, Observer, OutputError, Written};
-use crate::build::Built;
+use crate::assemble::Built;
 use crate::format::VtuTable;
 
 pub(super) struct Series<R> {

@@ -6,7 +6,7 @@ use pliant_geometry::Vector3;
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::model;
 
-use crate::build::Builder;
+use crate::assemble::Builder;
 use crate::diagnostic::Diagnostic;
 use crate::format::{Axis, MoveTable, SpringTable, Vectors};
 use crate::registry::ConstraintTable;
@@ -19,7 +19,7 @@ impl Builder<'_> {
 
     /// The components of a constraint: translations and rotations. By default all translations, and rotations if the body has
     /// some and `turns`.
-    pub(in crate::build) fn components(
+    pub(in crate::assemble) fn components(
         &mut self,
         axes: Option<&[Axis]>,
         body: Option<usize>,
@@ -48,7 +48,7 @@ impl Builder<'_> {
     }
 
     /// Adds a constraint of the nodes of a shell or a co-rotational solid, as the scene's own model has it in displacements.
-    pub(in crate::build) fn constrain_corotational(
+    pub(in crate::assemble) fn constrain_corotational(
         &mut self,
         name: &str,
         table: &ConstraintTable,
@@ -93,7 +93,7 @@ impl Builder<'_> {
     }
 
     /// How nodes of shells and co-rotational solids are moved, without their rotation.
-    pub(in crate::build) fn corotational_motion(
+    pub(in crate::assemble) fn corotational_motion(
         &mut self,
         name: &str,
         table: &MoveTable,
@@ -132,7 +132,7 @@ impl Builder<'_> {
     }
 
     /// Adds springs.
-    pub(in crate::build) fn add_springs(&mut self, name: &str, table: &SpringTable) {
+    pub(in crate::assemble) fn add_springs(&mut self, name: &str, table: &SpringTable) {
         let path = ["constraint", name];
         let Some(body) = self.find_body(&table.body, &[path[0], path[1], "body"]) else { return };
         let Some(nodes) = self.body_nodes(body, &table.nodes, &[path[0], path[1], "nodes"]) else { return };

@@ -453,7 +453,7 @@ fn select_faces(
 mod tests {
     use pliant_mechanics::load::LoadKind;
 
-    use crate::build::Built;
+    use crate::assemble::Built;
     use crate::testing::{built, mistakes};
 
     /// The sum of the forces of the only load [N], and how many nodes it acts on.

@@ -8,9 +8,9 @@ use pliant_corotational::{Material, ModelError, Motion, Shell};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 
 use super::{BodyCells, Corotational};
-use crate::build::bodies::{Draft, nodes};
-use crate::build::meshes::surface_of;
-use crate::build::{Builder, SCENE, bodies, suggestion};
+use crate::assemble::bodies::{Draft, nodes};
+use crate::assemble::meshes::surface_of;
+use crate::assemble::{Builder, SCENE, bodies, suggestion};
 use crate::diagnostic::{Diagnostic, counted};
 use crate::format::{BodyModel, BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
 
@@ -28,7 +28,7 @@ const STOUT: f64 = 0.05;
 
 impl Builder<'_> {
     /// The mesh of a shell as triangles only: quads cut in two, volume cells left for their boundary.
-    pub(in crate::build) fn triangles(&mut self, mesh: Mesh, path: &[&str]) -> Option<Mesh> {
+    pub(in crate::assemble) fn triangles(&mut self, mesh: Mesh, path: &[&str]) -> Option<Mesh> {
         let surface = surface_of(mesh);
         if surface.blocks.is_empty() {
             let help = "a shell needs triangles or quads";
@@ -72,7 +72,7 @@ impl Builder<'_> {
     }
 
     /// Adds the cells of a shell or a co-rotational solid whose nodes are the last of the model.
-    pub(in crate::build) fn add_corotational(&mut self, draft: &Draft<'_>, first: u32) {
+    pub(in crate::assemble) fn add_corotational(&mut self, draft: &Draft<'_>, first: u32) {
         let rest = &self.model.rest;
         let model = self.corotational.get_or_insert_with(Corotational::new).model_mut();
         model.rest.extend(rest[model.rest.len()..].iter().map(|&p| Vector3::from(p)));

@@ -53,7 +53,7 @@ impl Builder<'_> {
 mod tests {
     use pliant_geometry::io;
 
-    use crate::build::build;
+    use crate::assemble::build;
     use crate::scene::Scene;
     use crate::source::Source;
     use crate::testing::{CUBE, built_alone};

@@ -13,7 +13,7 @@ use pliant_corotational::{Carried, CurvedSurface, State};
 use pliant_geometry::Vector3;
 use pliant_mechanics::fingerprint;
 
-use crate::build::Builder;
+use crate::assemble::Builder;
 use crate::diagnostic::counted;
 use crate::format::{BodyModel, BodyTable, Element, SolverName};
 use crate::registry::OutputTable;
@@ -85,7 +85,7 @@ pub struct Stop {
 
 impl Builder<'_> {
     /// Refuses scenes of both kinds of bodies, and solvers that are not for them.
-    pub(in crate::build) fn check_models(&mut self) {
+    pub(in crate::assemble) fn check_models(&mut self) {
         let scene = self.scene;
         let other = |body: &&(String, BodyTable)| body.1.model != BodyModel::Solid;
         let Some((first, table)) = scene.bodies.iter().find(other) else {
@@ -228,7 +228,7 @@ impl Builder<'_> {
     }
 
     /// Refuses what a static solver cannot hold.
-    pub(in crate::build) fn check_held(&mut self) {
+    pub(in crate::assemble) fn check_held(&mut self) {
         if self.scene.run.solver != SolverName::Static {
             return;
         }
@@ -266,7 +266,7 @@ impl Builder<'_> {
     }
 
     /// Sets the state that a run starts from.
-    pub(in crate::build) fn start_corotational(&mut self) {
+    pub(in crate::assemble) fn start_corotational(&mut self) {
         let displacement = self.initial_displacement();
         let velocity = std::mem::take(&mut self.model.initial_velocity);
         let Some(part) = &mut self.corotational else {
@@ -357,7 +357,7 @@ mod tests {
     use pliant_corotational::Forces;
     use pliant_geometry::{DataArray, Vector3, io};
 
-    use crate::build::build;
+    use crate::assemble::build;
     use crate::scene::Scene;
     use crate::source::Source;
 

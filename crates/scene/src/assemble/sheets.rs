@@ -19,7 +19,7 @@ struct OnGrid<'t> {
 
 impl MeshTable {
     /// Whether it is a built-in shape of triangles.
-    pub(in crate::build) fn is_sheet(&self) -> bool {
+    pub(in crate::assemble) fn is_sheet(&self) -> bool {
         self.sphere.is_some() || self.sheet().is_some()
     }
 

@@ -280,7 +280,7 @@ mod tests {
     use pliant_geometry::Vector3;
 
     use super::unit;
-    use crate::build::{Built, build};
+    use crate::assemble::{Built, build};
     use crate::testing::read;
 
     fn scene(mesh: &str, fibre: &str) -> crate::Scene {

@@ -9,7 +9,7 @@ use pliant_geometry::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
 
 use super::{BodyCells, Control, Stop};
-use crate::build::{Builder, SCENE, Target, suggestion};
+use crate::assemble::{Builder, SCENE, Target, suggestion};
 use crate::diagnostic::{Diagnostic, counted};
 use crate::format::{
     Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SolverName, SpreadName,
@@ -19,7 +19,7 @@ use crate::output::number;
 use crate::registry::LoadTable;
 
 impl Builder<'_> {
-    pub(in crate::build) fn add_corotational_loads(&mut self) {
+    pub(in crate::assemble) fn add_corotational_loads(&mut self) {
         let scene = self.scene;
         if let Some(acceleration) = scene.scene.gravity {
             let kind = corotational::LoadKind::Gravity { acceleration: Vector3::from(acceleration) };
@@ -303,7 +303,7 @@ impl Builder<'_> {
     }
 
     /// The facets of a shell, numbered in the model; `None` for another body.
-    pub(in crate::build) fn shell_cells(&self, body: usize) -> Option<Vec<u32>> {
+    pub(in crate::assemble) fn shell_cells(&self, body: usize) -> Option<Vec<u32>> {
         match self.corotational.as_ref()?.cells.get(body)? {
             BodyCells::Facets(range) => Some(range.clone().collect()),
             BodyCells::Tets(_) => None,
