@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use pliant_geometry::io;
@@ -53,7 +54,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
 }
 
 /// Reads, builds and plans a scene; doubts go to standard error.
-pub fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Built, Plan), Failure> {
+pub fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Arc<Built>, Plan), Failure> {
     prepare_changed(path, overrides, |_| {})
 }
 
@@ -62,7 +63,7 @@ pub fn prepare_changed(
     path: &Path,
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
-) -> Result<(Scene, Built, Plan), Failure> {
+) -> Result<(Scene, Arc<Built>, Plan), Failure> {
     let Opened { mut source, folder, assumed, _translated } =
         open(path, overrides.sandbox, overrides.allow_partial)?;
     let mut mistakes: Vec<_> =
@@ -105,7 +106,7 @@ pub fn prepare_changed(
 }
 
 /// Builds a scene; a bar shows how far meshes of images are.
-fn build(scene: &Scene, cache: &MeshCache) -> Result<Built, Failure> {
+fn build(scene: &Scene, cache: &MeshCache) -> Result<Arc<Built>, Failure> {
     let bar: OnceCell<Bar> = OnceCell::new();
     let built = pliant_scene::build_watched(scene, cache, &|meshing| {
         let Meshing { body, part, now } = meshing;
@@ -114,7 +115,7 @@ fn build(scene: &Scene, cache: &MeshCache) -> Result<Built, Failure> {
     if let Some(bar) = bar.get() {
         bar.finish();
     }
-    Ok(built?)
+    Ok(Arc::new(built?))
 }
 
 /// A scene that was read.
@@ -274,7 +275,7 @@ const FEW_STEPS: f64 = 1e6;
 const A_DAY: f64 = 86_400.0;
 
 /// Refuses a run that would take more than a day, by the time of its first steps.
-fn refuse_very_long(scene: &Scene, built: &Built, plan: &Plan, before: f64) -> Result<(), Failure> {
+fn refuse_very_long(scene: &Scene, built: &Arc<Built>, plan: &Plan, before: f64) -> Result<(), Failure> {
     let steps = (scene.scene.until - before) / plan.step;
     if steps < FEW_STEPS {
         return Ok(());
@@ -303,7 +304,7 @@ fn days(seconds: f64) -> String {
 }
 
 /// Wall time [s] of a step, from the first ones; none of a scene whose first steps fail.
-fn seconds_of_a_step(scene: &Scene, built: &Built, plan: &Plan) -> Option<f64> {
+fn seconds_of_a_step(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Option<f64> {
     const ENOUGH: Duration = Duration::from_millis(100);
     let mut live = pliant_scene::live(scene, built, plan).ok()?;
     let (started, mut steps) = (Instant::now(), 0);

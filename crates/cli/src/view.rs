@@ -21,7 +21,7 @@ impl From<WindowError> for Failure {
 
 fn stage(path: &Path, overrides: &Overrides) -> Result<Stage, Failure> {
     let (scene, built, plan) = prepare(path, overrides)?;
-    Ok(Stage { scene, built: built.into(), plan })
+    Ok(Stage { scene, built, plan })
 }
 
 pub fn view(arguments: &View) -> Result<ExitCode, Failure> {

@@ -1,6 +1,7 @@
 //! Figure 6.8: tissue that is simulated as fast as it moves. A cube of 55,566 tetrahedra is stretched to and fro, and a liver is
 //! pulled by one thread, as `pliant view` plays them: steps, and frames sixty times a second of simulated time.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use pliant_geometry::Mesh;
@@ -54,7 +55,7 @@ fn play(text: &str, seconds: f64, set: &[(&[&str], Value)]) -> Result<Played, Ca
     }
     let mut scene = Scene::from_source(source, ".".into())?;
     scene.outputs.clear();
-    let built = pliant_scene::build(&scene)?;
+    let built = Arc::new(pliant_scene::build(&scene)?);
     let plan = pliant_scene::plan(&scene, &built)?;
     let threads = scene.run.threads as usize;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -63,7 +64,7 @@ fn play(text: &str, seconds: f64, set: &[(&[&str], Value)]) -> Result<Played, Ca
 }
 
 /// Goes on frame by frame; on a device points are placed there, without a look.
-fn go(scene: &Scene, built: &Built, plan: &Plan, seconds: f64) -> Result<Played, CaseError> {
+fn go(scene: &Scene, built: &Arc<Built>, plan: &Plan, seconds: f64) -> Result<Played, CaseError> {
     let failed = |failure: pliant_scene::FailureSummary| CaseError::Run(failure.message);
     let mut live = live(scene, built, plan).map_err(failed)?;
     let elements = built.model.solids.iter().map(|solid| solid.cells.len()).sum();
