@@ -102,11 +102,11 @@ pub fn prepare_changed(
         report::show(&scene.source.errors(built.warnings.clone()));
     }
     let plan = in_pool(&scene, || pliant_scene::plan(&scene, &built))?;
-    Ok((scene, built, plan))
+    Ok((scene, Arc::new(built), plan))
 }
 
 /// Builds a scene; a bar shows how far meshes of images are.
-fn build(scene: &Scene, cache: &MeshCache) -> Result<Arc<Built>, Failure> {
+fn build(scene: &Scene, cache: &MeshCache) -> Result<Built, Failure> {
     let bar: OnceCell<Bar> = OnceCell::new();
     let built = pliant_scene::build_watched(scene, cache, &|meshing| {
         let Meshing { body, part, now } = meshing;
@@ -115,7 +115,7 @@ fn build(scene: &Scene, cache: &MeshCache) -> Result<Arc<Built>, Failure> {
     if let Some(bar) = bar.get() {
         bar.finish();
     }
-    Ok(Arc::new(built?))
+    Ok(built?)
 }
 
 /// A scene that was read.
