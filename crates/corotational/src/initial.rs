@@ -148,7 +148,7 @@ mod tests {
         let normal = state.rotation[17] * Vector3::z();
         assert!((arm - 2.0 * normal).norm() < 1e-9, "{arm} {normal}");
         assert!(state.displacement(&model, 17).norm() > 0.5);
-        let mut system = crate::system::System::forces_only(&model);
+        let mut system = crate::system::System::forces_only(model.clone().into());
         system.evaluate(&state, 1.0, None).unwrap();
         let at = |of: &[f64], at: usize| Vector3::new(of[at], of[at + 1], of[at + 2]);
         let (nodal, moment) = (at(&system.external, 6 * 17), at(&system.external, 6 * 17 + 3));

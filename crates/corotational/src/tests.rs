@@ -226,7 +226,7 @@ fn a_singular_stiffness_names_its_node() {
 fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
     let mut model = balloon(2, 100.0);
     model.springs.push(Spring { node: 5, anchor: Vector3::new(0.0, 0.0, -2.0), stiffness: 30.0 });
-    let mut system = System::new(&model, LinearSolver::Unsymmetric).unwrap();
+    let mut system = System::new(model.clone().into(), LinearSolver::Unsymmetric).unwrap();
     let mut state = State::at_rest(&model);
     state.load_factor = 2.0;
     let none = vec![0.0; 6 * model.rest.len()];
@@ -706,7 +706,7 @@ fn pressure_on_the_curved_surface_acts_on_its_area() {
         });
         let cells = upper.collect();
         model.loads[0].kind = LoadKind::Pressure { cells, pressure: 1.0, spread };
-        let mut system = System::new(&model, LinearSolver::Direct).unwrap();
+        let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
         system.evaluate(&State::at_rest(&model), 0.0, None).unwrap();
         (0..3).map(|c| system.controlled.iter().skip(c).step_by(6).sum()).collect::<Vec<f64>>()
     };
