@@ -223,10 +223,12 @@ pub enum LabelError {
         range: [i32; 2],
     },
     /// A name that no label has.
-    #[error("no label is named `{name}`; {}", named(names))]
+    #[error("no label is named `{name}`; {}", instead(nearest, names))]
     NoSuchName {
         /// The name.
         name: String,
+        /// The most similar name, if one is similar.
+        nearest: Option<String>,
         /// The labels of the image that have names, each with its number.
         names: Vec<String>,
     },
@@ -335,6 +337,13 @@ pub enum LabelError {
         /// Voxels allowed.
         limit: u64,
     },
+}
+
+fn instead(nearest: &Option<String>, names: &[String]) -> String {
+    match nearest {
+        Some(nearest) => format!("did you mean `{nearest}`? ({})", named(names)),
+        None => named(names),
+    }
 }
 
 fn named(names: &[String]) -> String {

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use pliant_geometry::io::read_limited;
+use pliant_geometry::{CellLabel, Labels, UnknownLabel};
 use serde_json::Value;
 
 use crate::error::{Fault, ImageError, ImageProblem, LabelError};
@@ -79,6 +80,16 @@ impl LabelNames {
         self.get(label).map_or_else(|| label.to_string(), |name| format!("{label} ({name})"))
     }
 
+    /// The name of a label of the image that is most like one that was misspelt.
+    fn nearest(&self, name: &str, present: &[i32]) -> Option<String> {
+        let own = |&label: &i32| (label, self.get(label).map(str::to_owned));
+        let known: Labels = present.iter().map(own).collect();
+        match known.find(&CellLabel::Name(name.to_owned())) {
+            Err(UnknownLabel::Name { nearest, .. }) => nearest,
+            _ => None,
+        }
+    }
+
     /// The label of a name, in capitals or not.
     fn named(&self, name: &str, present: &[i32]) -> Result<i32, LabelError> {
         let of = |same: &dyn Fn(&str) -> bool| -> Vec<i32> {
@@ -98,6 +109,7 @@ impl LabelNames {
             [label] => Ok(label),
             [] => Err(LabelError::NoSuchName {
                 name: name.to_owned(),
+                nearest: self.nearest(name, present),
                 names: present
                     .iter()
                     .filter_map(|&label| Some(format!("{} ({label})", self.get(label)?)))
@@ -301,6 +313,11 @@ mod tests {
         assert_eq!(choose(&["tumour"], &[5, 8]), Ok(vec![8]));
         assert!(matches!(choose(&["tumour"], &all), Err(LabelError::AmbiguousName { .. })));
         assert!(matches!(choose(&["20-30"], &all), Err(LabelError::EmptyRange { .. })));
+        let told = choose(&["livr"], &all).unwrap_err().to_string();
+        assert!(
+            told.starts_with("no label is named `livr`; did you mean `Liver`? (the image has Liver (5)"),
+            "{told}"
+        );
         let told = choose(&["spleen"], &all).unwrap_err().to_string();
         assert!(told.contains("no label is named `spleen`") && told.contains("Liver (5)"), "{told}");
     }
