@@ -75,6 +75,18 @@ impl CurvedTriangle {
         &self.corners
     }
 
+    /// Its longest straight edge [m].
+    pub fn size(&self) -> f64 {
+        let [a, b, c] = self.corners;
+        (b - a).norm().max((c - b).norm()).max((a - c).norm())
+    }
+
+    /// The unit normal of the flat facet; zero without area.
+    pub fn facet_normal(&self) -> Vector3 {
+        let [a, b, c] = self.corners;
+        (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
+    }
+
     /// Its control points along edges, in the order of [`EDGES`] [m].
     pub fn edge_points(&self) -> &[Vector3; 6] {
         &self.edge

@@ -60,6 +60,12 @@ struct Triangle {
 }
 
 impl Triangle {
+    /// The normal times twice the area [m²].
+    fn area_vector(&self) -> Vector3 {
+        let [a, b, c] = self.corners;
+        (b - a).cross(&(c - a))
+    }
+
     fn at(&self, weights: [f64; 3]) -> SurfacePoint {
         let normal = on_triangle(&self.normals, weights).try_normalize(1e-12).unwrap_or_default();
         let position = on_triangle(&self.corners, weights);
@@ -112,10 +118,35 @@ impl SurfaceLocator {
 
     /// The closest point [m]; `None` without faces, or if `to` is not finite.
     pub fn closest(&self, to: &Vector3) -> Option<SurfacePoint> {
+        self.search(to, f64::INFINITY, |_| true)
+    }
+
+    /// The closest point, less than `within` [m] away, of the faces whose normals have a cosine above `least` with the unit vector
+    /// `facing`; `None` if there is none.
+    pub fn closest_facing(
+        &self,
+        to: &Vector3,
+        facing: &Vector3,
+        least: f64,
+        within: f64,
+    ) -> Option<SurfacePoint> {
+        let faces = |triangle: &Triangle| {
+            let across = triangle.area_vector();
+            across.dot(facing) > least * across.norm()
+        };
+        self.search(to, within * within, faces)
+    }
+
+    /// The closest point of the triangles that count, nearer than the root of `least` [m²].
+    fn search(
+        &self,
+        to: &Vector3,
+        mut least: f64,
+        counts: impl Fn(&Triangle) -> bool,
+    ) -> Option<SurfacePoint> {
         let mut best: Option<(usize, [f64; 3])> = None;
-        let mut least = f64::INFINITY;
         let mut ahead = [(0, 0.0); 64];
-        let mut count = usize::from(!self.parts.is_empty());
+        let mut count = usize::from(!self.parts.is_empty() && to.iter().all(|x| x.is_finite()));
         while count > 0 {
             count -= 1;
             let (number, distance) = ahead[count];
@@ -127,7 +158,7 @@ impl SurfaceLocator {
                 for at in part.first as usize..part.end as usize {
                     let weights = barycentric_of_closest(&self.triangles[at].corners, to);
                     let distance = (on_triangle(&self.triangles[at].corners, weights) - to).norm_squared();
-                    if distance < least {
+                    if distance < least && counts(&self.triangles[at]) {
                         (best, least) = (Some((at, weights)), distance);
                     }
                 }
@@ -168,6 +199,23 @@ mod tests {
                 assert!((found.normal - Vector3::z()).norm() < 1e-12, "{found:?}");
             }
         }
+    }
+
+    /// Over the top of a block 4 high, its bottom is the closest of what looks down, its sides of what looks aside.
+    #[test]
+    fn faces_that_look_the_other_way_do_not_count() {
+        let mesh = block_of_tets([4, 4, 4]);
+        let surface = boundary(&mesh);
+        let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
+        let locator = SurfaceLocator::new(&surface, &all, &mesh.points);
+        let over = Vector3::new(1.3, 2.1, 4.5);
+        let found = |facing: Vector3, within: f64| {
+            locator.closest_facing(&over, &facing, 0.0, within).map(|at| at.position)
+        };
+        assert!((found(Vector3::z(), 1.0).unwrap() - Vector3::new(1.3, 2.1, 4.0)).norm() < 1e-12);
+        assert!((found(-Vector3::z(), 5.0).unwrap() - Vector3::new(1.3, 2.1, 0.0)).norm() < 1e-12);
+        assert!((found(-Vector3::x(), 5.0).unwrap() - Vector3::new(0.0, 2.1, 4.0)).norm() < 1e-12);
+        assert_eq!(found(-Vector3::z(), 4.0), None);
     }
 
     #[test]

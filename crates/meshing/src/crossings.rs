@@ -5,6 +5,8 @@ use pliant_geometry::Vector3;
 use rayon::prelude::*;
 use rstar::{AABB, RTree, RTreeObject};
 
+use crate::triangles::TriangleMesh;
+
 struct Boxed {
     number: u32,
     low: Vector3,
@@ -39,6 +41,24 @@ pub(crate) fn crossings(points: &[Vector3], triangles: &[[u32; 3]]) -> (Vec<[u32
     let pairs: Vec<[u32; 2]> = (0..triangles.len()).into_par_iter().flat_map_iter(of).collect();
     let place = pairs.first().and_then(|&[s, t]| meet(points, triangles[s as usize], triangles[t as usize]));
     (pairs, place)
+}
+
+impl TriangleMesh {
+    /// Whether triangles would cross each other or those that there are, but for some that would be gone.
+    pub(crate) fn would_cross(&self, new: &[[u32; 3]], gone: &[u32]) -> bool {
+        let corners = || new.as_flattened().iter().map(|&n| self.points[n as usize]);
+        let Some(start) = corners().next() else { return false };
+        let (low, high) = corners().fold((start, start), |(low, high), x| (low.inf(&x), high.sup(&x)));
+        let near = |t: &u32| {
+            let [a, b, c] = self.corners(*t);
+            (0..3).all(|k| a[k].min(b[k]).min(c[k]) <= high[k] && a[k].max(b[k]).max(c[k]) >= low[k])
+                && !gone.contains(t)
+        };
+        let cross = |s: [u32; 3], t: [u32; 3]| meet(&self.points, s, t).is_some();
+        let others = self.alive().filter(near).map(|t| self.triangles[t as usize]);
+        others.into_iter().any(|other| new.iter().any(|&own| cross(own, other)))
+            || new.iter().enumerate().any(|(k, &s)| new[..k].iter().any(|&t| cross(s, t)))
+    }
 }
 
 /// A point where an edge of one of two triangles pierces the other.

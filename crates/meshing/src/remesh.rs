@@ -57,6 +57,17 @@ impl Reference {
         self.locator.closest(to).map_or((*to, Vector3::zeros()), |at| (at.position, at.normal))
     }
 
+    /// The same of what has a normal with a cosine above `least` with `facing`; `None` if nothing has less than `within` [m] away.
+    pub(crate) fn closest_facing(
+        &self,
+        to: &Vector3,
+        facing: &Vector3,
+        least: f64,
+        within: f64,
+    ) -> Option<(Vector3, Vector3)> {
+        self.locator.closest_facing(to, facing, least, within).map(|at| (at.position, at.normal))
+    }
+
     /// The nearest point of its marked lines.
     pub(crate) fn closest_on_lines(&self, to: &Vector3) -> Vector3 {
         self.lines.nearest_neighbor((*to).into()).map_or(*to, |line| line.closest(to))
@@ -169,7 +180,14 @@ impl TriangleMesh {
     }
 
     /// A place of a point on the surface among evener triangles.
-    pub(crate) fn evener(&self, point: u32, reference: &Reference) -> Option<Vector3> {
+    fn evener(&self, point: u32, reference: &Reference) -> Option<Vector3> {
+        let aim = self.even_place(point)?;
+        let free = self.marked(point).is_empty();
+        Some(if free { reference.closest(&aim).0 } else { reference.closest_on_lines(&aim) })
+    }
+
+    /// A place of a point beside the surface among evener triangles.
+    pub(crate) fn even_place(&self, point: u32) -> Option<Vector3> {
         if self.star[point as usize].is_empty() {
             return None;
         }
@@ -185,12 +203,12 @@ impl TriangleMesh {
                 });
                 let normal = self.point_normal(point);
                 let way = sum / area - here;
-                Some(reference.closest(&(here + way - way.dot(&normal) * normal)).0)
+                Some(here + way - way.dot(&normal) * normal)
             }
             [a, b] => {
                 let middle = (self.points[a as usize] + self.points[b as usize]) / 2.0;
                 let along = (self.points[b as usize] - self.points[a as usize]).try_normalize(0.0)?;
-                Some(reference.closest_on_lines(&(here + 0.5 * (middle - here).dot(&along) * along)))
+                Some(here + 0.5 * (middle - here).dot(&along) * along)
             }
             _ => None,
         }

@@ -1,21 +1,24 @@
 //! Where shells pass through themselves or each other: small flat pieces of the curved surface, of which an edge of one pierces the other.
-//! Such shells are halved while the fit goes on; what is left goes back towards the target and is
-//! flattened, as long as that helps.
+//! No step of the fit makes flat triangles cross, nor curved ones once normals stand. Curved shells that cross all the same are flattened
+//! and halved; at the end what is left is flattened as long as that helps.
 //! Leaves out: pieces that share an edge.
 
 use std::collections::BTreeMap;
 
 use pliant_geometry::{CurvedTriangle, Vector3};
+use rayon::prelude::*;
+use rstar::{AABB, RTree, primitives::Rectangle};
 
+use super::Shells;
 use super::measure::pieces;
-use super::{Shells, Target};
 use crate::crossings::crossings;
 use crate::hausdorff::lattice;
 
-/// Parts of an edge between the corners of pieces, with many shells and with few.
-const PARTS: [usize; 2] = [4, 8];
+/// Parts of an edge between the corners of pieces: while the fit goes on, and at its end if the shells are few.
+pub(super) const COARSE: usize = 4;
+const FINE: usize = 8;
 
-/// Pieces at most that are looked at with the more parts.
+/// Pieces at most that are looked at in [`FINE`] parts.
 const MOST_PIECES: usize = 200_000;
 
 /// Steps to undo crossings after the fit, from little to the whole way.
@@ -32,16 +35,48 @@ pub(super) struct Crossing {
 
 impl Shells {
     pub(super) fn crossing(&self) -> Crossing {
+        let few = self.mesh.len() * FINE * FINE <= MOST_PIECES;
+        self.crossing_of(self.mesh.alive().collect(), if few { FINE } else { COARSE })
+    }
+
+    /// Shells that cross among those that move and what is near them, looked at in pieces of so many parts of an edge.
+    pub(super) fn crossing_near_moving(&self, parts: usize) -> Vec<u32> {
         let alive: Vec<u32> = self.mesh.alive().collect();
-        let few = alive.len() * PARTS[1] * PARTS[1] <= MOST_PIECES;
-        let (points, triangles) = self.in_pieces(&alive, PARTS[usize::from(few)]);
-        let each = triangles.len() / alive.len().max(1);
+        let boxed = |&t: &u32| {
+            let patch = self.patch(t);
+            let controls = patch.corners().iter().chain(patch.edge_points());
+            let start = [patch.corners()[0]; 2];
+            controls.fold(start, |[low, high], x| [low.inf(x), high.sup(x)])
+        };
+        // The middle control point lies outside the box of the others by less than a quarter of its size.
+        let grown = |[low, high]: [Vector3; 2]| [low - 0.25 * (high - low), high + 0.25 * (high - low)];
+        let boxes: Vec<[Vector3; 2]> = alive.par_iter().map(boxed).map(grown).collect();
+        let moving: Vec<bool> = alive.iter().map(|&t| self.moves(t)).collect();
+        let tree = RTree::bulk_load(
+            boxes
+                .iter()
+                .zip(&moving)
+                .filter(|(_, moving)| **moving)
+                .map(|([low, high], _)| Rectangle::from_corners((*low).into(), (*high).into()))
+                .collect(),
+        );
+        let near = |[low, high]: &[Vector3; 2]| {
+            let own: AABB<[f64; 3]> = AABB::from_corners((*low).into(), (*high).into());
+            tree.locate_in_envelope_intersecting(own).next().is_some()
+        };
+        let kept = alive.iter().zip(&boxes).filter(|(_, own)| near(own)).map(|(&t, _)| t).collect();
+        self.crossing_of(kept, parts).shells
+    }
+
+    fn crossing_of(&self, shells: Vec<u32>, parts: usize) -> Crossing {
+        let (points, triangles) = self.in_pieces(&shells, parts);
+        let each = triangles.len() / shells.len().max(1);
         let (pairs, place) = crossings(&points, &triangles);
-        let mut shells: Vec<u32> =
-            pairs.as_flattened().iter().map(|&piece| alive[piece as usize / each]).collect();
-        shells.sort_unstable();
-        shells.dedup();
-        Crossing { shells, place }
+        let mut crossing: Vec<u32> =
+            pairs.as_flattened().iter().map(|&piece| shells[piece as usize / each]).collect();
+        crossing.sort_unstable();
+        crossing.dedup();
+        Crossing { shells: crossing, place }
     }
 
     /// The curved surface in flat pieces, those of a shell one after the other. Neighbours share the points of their edge.
@@ -60,9 +95,12 @@ impl Shells {
         (points, triangles)
     }
 
-    /// Moves vertices of shells that cross towards the target and their normals to the mean of their triangles, as far as it takes and as
-    /// long as fewer cross.
-    pub(super) fn uncross(&mut self, target: &Target) {
+    /// Turns normals of shells that cross towards the mean of their flat triangles, which do not cross, as far as it takes and as long as
+    /// fewer do.
+    pub(super) fn uncross(&mut self) {
+        if self.crossing_near_moving(COARSE).is_empty() {
+            return;
+        }
         let mut now = self.crossing();
         for step in 1..=STEPS {
             if now.shells.is_empty() {
@@ -75,16 +113,11 @@ impl Shells {
             nodes.dedup();
             let part = step as f64 / STEPS as f64;
             for &node in &nodes {
-                let (here, own) = (self.mesh.points[node as usize], self.normals[node as usize]);
-                tried.place(node, target);
-                if !self.on_border[node as usize] {
-                    tried.mesh.points[node as usize] = here.lerp(&tried.mesh.points[node as usize], part);
-                }
+                let own = self.normals[node as usize];
                 let mean = self.mesh.point_normal(node);
                 tried.normals[node as usize] = own.lerp(&mean, part).try_normalize(0.0).unwrap_or(own);
+                tried.stand(node);
             }
-            // Triangles have turned under the neighbours of what has moved, too.
-            tried.require_upright();
             let then = tried.crossing();
             if then.shells.len() < now.shells.len() {
                 (*self, now) = (tried, then);

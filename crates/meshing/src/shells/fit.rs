@@ -3,25 +3,29 @@
 //! the sum of the powers round it falls, its triangles keep their shape and the normals stand on them. Vertices of a border stay in place, only their normals turn.
 
 use nalgebra::Matrix3;
-use pliant_geometry::{CurvedTriangle, Vector3};
+use pliant_geometry::{ControlWeights, CurvedTriangle, EDGES, Vector3};
 use rayon::prelude::*;
 
+use super::crossing::COARSE;
 use super::effort::{Effort, ROW};
 use super::measure::Landing;
-use super::{LEAST_SHAPE, Shells, Target};
+use super::solve::{Block, Row, UNKNOWNS, solve};
+use super::target::Target;
+use super::{LEAST_SHAPE, Shells};
 use crate::hausdorff::lattice;
 
 /// Parts of an edge between the places of a shell at which it is fitted.
 const PARTS: usize = 5;
 
 /// The power of distances whose sum is made small.
-const POWER: i32 = 6;
+pub(super) const POWER: i32 = 6;
 
 /// Points of the target count from this part of the distance asked for.
 const CLOSE: f64 = 0.3;
 
-/// Unknowns of a vertex: ways along two tangents and the normal, two turns of the normal; all in lengths.
-const UNKNOWNS: usize = 5;
+/// Where more than so many points of the target count at one shell, of each of [`BINS`]² parts of it only the farthest does.
+const MOST_BACK: usize = 128;
+const BINS: f64 = 11.0;
 
 /// Largest turn of a normal in one step [rad], and way over the mean length of edges.
 const LARGEST_TURN: f64 = 0.3;
@@ -42,45 +46,56 @@ const TRIES: [(f64, bool); 8] = [
 /// Normals that need not stand on their triangles are not turned below this cosine, either.
 const LEAST_ALONG: f64 = 0.2;
 
-/// Where a distance is taken: at a place of a shell, from the target or from one point of it along a direction.
-struct Probe {
+/// A shell that moves, and the points of the target that count at it.
+struct Moving {
     shell: u32,
-    place: [f64; 3],
-    from: Option<(Vector3, Vector3)>,
+    back: Vec<Landing>,
 }
 
-/// One distance and its derivatives.
-struct Row {
-    nodes: [u32; 3],
-    slope: [[f64; UNKNOWNS]; 3],
-    off: f64,
+impl Moving {
+    fn new(shell: u32, mut back: Vec<Landing>) -> Self {
+        if back.len() > MOST_BACK {
+            let bin = |landing: &Landing| landing.place.map(|w| (BINS * w) as i32);
+            back.sort_by(|a, b| bin(a).cmp(&bin(b)).then(b.off.total_cmp(&a.off)));
+            back.dedup_by_key(|landing| bin(landing));
+        }
+        Self { shell, back }
+    }
 }
 
 impl Shells {
     /// One step for the active vertices; distances are compared with `scale` [m].
     pub(super) fn fit(&mut self, target: &Target, landings: &[Landing], scale: f64, effort: &mut Effort) {
         let sizes = self.sizes();
-        let probes = self.probes(landings, scale);
-        let rows: Vec<Row> = probes.par_iter().map(|probe| self.row(probe, target, &sizes)).collect();
-        let offs = rows.iter().map(|row| row.off).collect::<Vec<_>>();
-        let before = self.powers_round(&probes, &offs, scale);
-        effort.search(rows.len(), ROW);
-        let step = self.solve(&rows, scale);
+        let moving = self.moving_with(landings, scale);
+        let summed = |moving: &Moving| {
+            let patch = self.patch(moving.shell);
+            let rows = self.rows(moving, &patch, target, &sizes);
+            let power = rows.iter().map(|row| (row.off / scale).powi(POWER)).sum::<f64>();
+            let nodes = self.mesh.triangles[moving.shell as usize];
+            (Block::new(nodes, rows.into_iter(), scale), (patch, power))
+        };
+        let (blocks, mut sums): (Vec<_>, Vec<_>) = moving.par_iter().map(summed).unzip();
+        let count: usize = moving.iter().map(probes).sum();
+        effort.search(count, ROW);
+        let before = self.powers_round(&moving, &sums);
+        let step = solve(&blocks, self.mesh.points.len());
         let (worth, upright) = (self.worth_of_all(), self.upright_of_all());
         let mut parts: Vec<f64> = self.active.iter().map(|&active| f64::from(u8::from(active))).collect();
         for (reduction, is_last) in TRIES {
             let tried = self.stepped(&step, &sizes, &parts);
-            let offs: Vec<f64> = probes.par_iter().map(|probe| tried.off(probe, target).1).collect();
-            let after = tried.powers_round(&probes, &offs, scale);
-            effort.search(probes.len(), 1);
+            sums = tried.sums_again(&moving, sums, target, scale, effort);
+            let after = tried.powers_round(&moving, &sums);
             let (now, stands) = (tried.worth_of_all(), tried.upright_of_all());
             let is_worse = |v: &usize| {
-                parts[*v] > 0.0 && (after[*v] > before[*v] || now[*v] < worth[*v].min(LEAST_SHAPE))
+                parts[*v] > 0.0
+                    && (after[*v].total_cmp(&before[*v]).is_gt() || now[*v] < worth[*v].min(LEAST_SHAPE))
             };
             let mut worse: Vec<usize> = (0..parts.len()).filter(is_worse).collect();
             let tilts =
                 |v: &usize| self.tilts(upright[*v], stands[*v]) || tried.creased[*v] && !self.creased[*v];
-            let tilted: Vec<usize> = (0..parts.len()).filter(tilts).collect();
+            let mut tilted: Vec<usize> = (0..parts.len()).filter(tilts).collect();
+            tilted.extend(tried.newly_crossed(self));
             let falls = || after.iter().sum::<f64>() < before.iter().sum::<f64>();
             if tilted.is_empty() && (worse.is_empty() || is_last && falls()) {
                 *self = tried;
@@ -102,66 +117,89 @@ impl Shells {
         (0..).zip(&self.mesh.points).map(|(v, x)| self.upright_round(v, x)).collect()
     }
 
+    /// Corners that move of shells that cross others and did not before: of flat triangles, and once normals stand of curved ones.
+    fn newly_crossed(&self, before: &Self) -> Vec<usize> {
+        let mut nodes = Vec::new();
+        for parts in [1, COARSE].into_iter().take(if self.strict { 2 } else { 1 }) {
+            let now = self.crossing_near_moving(parts);
+            if !now.is_empty() {
+                let old = before.crossing_near_moving(parts);
+                let fresh = now.into_iter().filter(|shell| old.binary_search(shell).is_err());
+                nodes.extend(fresh.flat_map(|t| self.mesh.triangles[t as usize]).map(|n| n as usize));
+            }
+        }
+        nodes.retain(|&n| self.active[n]);
+        nodes
+    }
+
     /// Sums of the powers of the distances of the shells round each vertex.
-    fn powers_round(&self, probes: &[Probe], offs: &[f64], scale: f64) -> Vec<f64> {
-        let mut sums = vec![0.0; self.mesh.triangles.len()];
-        for (probe, off) in probes.iter().zip(offs) {
-            sums[probe.shell as usize] += (off / scale).powi(POWER);
+    fn powers_round(&self, moving: &[Moving], sums: &[(CurvedTriangle, f64)]) -> Vec<f64> {
+        let mut round = vec![0.0; self.mesh.points.len()];
+        for (moving, (_, sum)) in moving.iter().zip(sums) {
+            self.mesh.triangles[moving.shell as usize].iter().for_each(|&n| round[n as usize] += sum);
         }
-        self.mesh.star.iter().map(|star| star.iter().map(|&t| sums[t as usize]).sum()).collect()
+        round
     }
 
-    /// Places of the shells that move, and of those that are not close to points of the target already.
-    fn probes(&self, landings: &[Landing], scale: f64) -> Vec<Probe> {
-        let places = lattice(PARTS);
-        let moving: Vec<u32> = self.mesh.alive().filter(|&t| self.moves(t)).collect();
-        let there = moving
-            .iter()
-            .flat_map(|&shell| places.iter().map(move |&place| Probe { shell, place, from: None }));
-        let far = landings.iter().filter(|landing| landing.off > CLOSE * scale && self.moves(landing.shell));
-        let back = far.map(|landing| Probe {
-            shell: landing.shell,
-            place: landing.place,
-            from: Some((landing.point, landing.along)),
-        });
+    /// The shells that move, with the points of the target that are not close to them already.
+    fn moving_with(&self, landings: &[Landing], scale: f64) -> Vec<Moving> {
+        let shells: Vec<u32> = self.mesh.alive().filter(|&t| self.moves(t)).collect();
+        let mut back = vec![Vec::new(); self.mesh.triangles.len()];
+        for landing in landings.iter().filter(|landing| landing.off > CLOSE * scale) {
+            back[landing.shell as usize].push(*landing);
+        }
+        let of = |shell: u32| Moving::new(shell, std::mem::take(&mut back[shell as usize]));
+        shells.into_iter().map(of).collect()
+    }
+
+    /// The sums of the powers of distances after a step. Those of shells that have not changed since they were summed stay.
+    fn sums_again(
+        &self,
+        moving: &[Moving],
+        before: Vec<(CurvedTriangle, f64)>,
+        target: &Target,
+        scale: f64,
+        effort: &mut Effort,
+    ) -> Vec<(CurvedTriangle, f64)> {
+        let again = |(moving, (old, sum)): (&Moving, (CurvedTriangle, f64))| {
+            let patch = self.patch(moving.shell);
+            if patch.corners() == old.corners() && patch.edge_points() == old.edge_points() {
+                return ((patch, sum), 0);
+            }
+            let there = lattice(PARTS).into_iter().map(|place| off(&patch, place, target).1);
+            let back = moving.back.iter().map(|landing| off_along(&patch, landing).1);
+            let sum = there.chain(back).map(|off| (off / scale).powi(POWER)).sum::<f64>();
+            ((patch, sum), probes(moving))
+        };
+        let (sums, counts): (Vec<_>, Vec<usize>) =
+            moving.par_iter().zip(before.into_par_iter()).map(again).unzip();
+        effort.search(counts.into_iter().sum(), 1);
+        sums
+    }
+
+    /// The distances of a shell and their derivatives.
+    fn rows(&self, moving: &Moving, patch: &CurvedTriangle, target: &Target, sizes: &[f64]) -> Vec<Row> {
+        let edges: [[Matrix3<f64>; 2]; 6] = std::array::from_fn(|k| patch.edge_derivative(k).into());
+        let nodes = self.mesh.triangles[moving.shell as usize].map(|n| n as usize);
+        let row = |place: [f64; 3], (along, off): (Vector3, f64)| {
+            let by = slopes(&edges, CurvedTriangle::weights(place), &along);
+            let mut slope = [0.0; 3 * UNKNOWNS];
+            let corners = slope.chunks_exact_mut(UNKNOWNS).zip(nodes).zip(by);
+            for ((slope, node), [by_place, by_normal]) in corners.filter(|((_, node), _)| self.active[*node])
+            {
+                let [u, v, n] = frame(&self.normals[node]);
+                if !self.on_border[node] {
+                    slope[..3].copy_from_slice(&[u, v, n].map(|way| by_place.dot(&way)));
+                }
+                if !self.creased[node] {
+                    slope[3..].copy_from_slice(&[u, v].map(|way| by_normal.dot(&way) / sizes[node]));
+                }
+            }
+            Row { slope, off }
+        };
+        let there = lattice(PARTS).into_iter().map(|place| row(place, off(patch, place, target)));
+        let back = moving.back.iter().map(|landing| row(landing.place, off_along(patch, landing)));
         there.chain(back).collect()
-    }
-
-    /// The direction of the distance at a probe, and the distance [m].
-    fn off(&self, probe: &Probe, target: &Target) -> (Vector3, f64) {
-        let x = self.patch(probe.shell).point(probe.place);
-        match probe.from {
-            Some((point, along)) => {
-                let off = (x - point).dot(&along);
-                (off.signum() * along, off.abs())
-            }
-            None => {
-                let (foot, normal) = target.reference.closest(&x);
-                let off = (x - foot).norm();
-                (if off > 1e-9 * target.diagonal { (x - foot) / off } else { normal }, off)
-            }
-        }
-    }
-
-    fn row(&self, probe: &Probe, target: &Target, sizes: &[f64]) -> Row {
-        let (along, off) = self.off(probe, target);
-        let nodes = self.mesh.triangles[probe.shell as usize];
-        let by = self.patch(probe.shell).derivatives(CurvedTriangle::weights(probe.place));
-        let mut slope = [[0.0; UNKNOWNS]; 3];
-        for (corner, node) in
-            nodes.into_iter().map(|n| n as usize).enumerate().filter(|(_, n)| self.active[*n])
-        {
-            let [by_place, by_normal] = by[corner].map(|by: Matrix3<f64>| by.tr_mul(&along));
-            let [u, v, n] = frame(&self.normals[node]);
-            let ways = if self.on_border[node] { [0.0; 3] } else { [u, v, n].map(|way| by_place.dot(&way)) };
-            slope[corner][..3].copy_from_slice(&ways);
-            if self.creased[node] {
-                continue;
-            }
-            slope[corner][3] = by_normal.dot(&u) / sizes[node];
-            slope[corner][4] = by_normal.dot(&v) / sizes[node];
-        }
-        Row { nodes, slope, off }
     }
 
     /// Mean length of the edges at each point [m].
@@ -176,13 +214,13 @@ impl Shells {
 
     fn stepped(&self, step: &[[f64; UNKNOWNS]], sizes: &[f64], parts: &[f64]) -> Self {
         let mut next = self.clone();
-        let moved = |point: &usize| parts[*point] > 0.0;
+        let moved = |point: &usize| parts[*point] > 0.0 && step[*point].iter().all(|x| x.is_finite());
         for (point, (x, size)) in step.iter().zip(sizes).enumerate().filter(|(point, _)| moved(point)) {
             let [u, v, n] = frame(&self.normals[point]);
             let way = (x[0] * u + x[1] * v + x[2] * n) * parts[point];
             let turn = (x[3] * u + x[4] * v) * (parts[point] / size);
             next.mesh.points[point] += way * (LARGEST_WAY * size / way.norm()).min(1.0);
-            let turned = (n + turn * (LARGEST_TURN / turn.norm()).min(1.0)).normalize();
+            let turned = (n + turn * (LARGEST_TURN / turn.norm()).min(1.0)).try_normalize(0.0).unwrap_or(n);
             let along = self.mesh.star[point].iter().all(|&t| self.mesh.normal(t).dot(&turned) > LEAST_ALONG);
             if !self.creased[point] && (self.strict || along) {
                 next.normals[point] = turned;
@@ -191,77 +229,41 @@ impl Shells {
         next.stand_all();
         next
     }
+}
 
-    /// The damped least-squares step (Jᵀ W J + D) δ = −Jᵀ W r by conjugate gradients, with weights that make the sum of squares one of
-    /// powers.
-    fn solve(&self, rows: &[Row], scale: f64) -> Vec<[f64; UNKNOWNS]> {
-        const STEPS: usize = 60;
-        let points = self.mesh.points.len();
-        let weights: Vec<f64> =
-            rows.iter().map(|row| (row.off / scale).clamp(0.2, 3.0).powi(POWER - 2)).collect();
-        let transposed = |values: &[f64]| {
-            let mut sum = vec![0.0; UNKNOWNS * points];
-            for (row, value) in rows.iter().zip(values) {
-                for (node, slope) in row.nodes.iter().zip(&row.slope) {
-                    let first = UNKNOWNS * *node as usize;
-                    sum[first..first + UNKNOWNS]
-                        .iter_mut()
-                        .zip(slope)
-                        .for_each(|(s, slope)| *s += slope * value);
-                }
-            }
-            sum
-        };
-        let mut diagonal = vec![[0.0; UNKNOWNS]; points];
-        for (row, weight) in rows.iter().zip(&weights) {
-            for (node, slope) in row.nodes.iter().zip(&row.slope) {
-                diagonal[*node as usize].iter_mut().zip(slope).for_each(|(d, s)| *d += weight * s * s);
-            }
-        }
-        let damping: Vec<f64> = diagonal
-            .iter()
-            .flat_map(|d| {
-                let whole = d.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-                [0.1 * whole, 0.1 * whole, 0.01 * whole, 0.01 * whole, 0.01 * whole]
-            })
-            .collect();
-        let diagonal: Vec<f64> =
-            diagonal.into_iter().flatten().zip(&damping).map(|(d, more)| d + more).collect();
-        let apply = |x: &[f64]| {
-            let along = |(row, weight): (&Row, &f64)| {
-                let of = |(node, slope): (&u32, &[f64; UNKNOWNS])| {
-                    let first = UNKNOWNS * *node as usize;
-                    slope.iter().zip(&x[first..first + UNKNOWNS]).map(|(s, x)| s * x).sum::<f64>()
-                };
-                weight * row.nodes.iter().zip(&row.slope).map(of).sum::<f64>()
-            };
-            let mut y = transposed(&rows.iter().zip(&weights).map(along).collect::<Vec<_>>());
-            y.iter_mut().zip(x).zip(&damping).for_each(|((y, x), d)| *y += d * x);
-            y
-        };
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let scaled = |r: &[f64]| r.iter().zip(&diagonal).map(|(r, d)| r / d).collect::<Vec<_>>();
-        let mut x = vec![0.0; UNKNOWNS * points];
-        let mut r = transposed(&rows.iter().zip(&weights).map(|(row, w)| -w * row.off).collect::<Vec<_>>());
-        let mut z = scaled(&r);
-        let mut p = z.clone();
-        let mut rz = dot(&r, &z);
-        let first = rz;
-        for _ in 0..STEPS {
-            if rz <= 1e-6 * first {
-                break;
-            }
-            let y = apply(&p);
-            let part = rz / dot(&p, &y);
-            x.iter_mut().zip(&p).for_each(|(x, p)| *x += part * p);
-            r.iter_mut().zip(&y).for_each(|(r, y)| *r -= part * y);
-            z = scaled(&r);
-            let next = dot(&r, &z);
-            p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + next / rz * *p);
-            rz = next;
-        }
-        x.chunks_exact(UNKNOWNS).map(|x| std::array::from_fn(|k| x[k])).collect()
+/// Distances that count at a shell.
+fn probes(moving: &Moving) -> usize {
+    (PARTS + 1) * (PARTS + 2) / 2 + moving.back.len()
+}
+
+/// The direction of the distance of a place of a shell from the target, and the distance [m].
+fn off(patch: &CurvedTriangle, place: [f64; 3], target: &Target) -> (Vector3, f64) {
+    let x = patch.point(place);
+    let (foot, normal) = target.foot(&x, &patch.facet_normal(), patch.size());
+    let off = (x - foot).norm();
+    (if off > 1e-9 * target.diagonal { (x - foot) / off } else { normal }, off)
+}
+
+/// The same from one point of the target along a direction that stays.
+fn off_along(patch: &CurvedTriangle, landing: &Landing) -> (Vector3, f64) {
+    let off = (patch.point(landing.place) - landing.point).dot(&landing.along);
+    (off.signum() * landing.along, off.abs())
+}
+
+/// Derivatives of the place with some weights along a direction by each corner and by each normal, from those of the edges' control points.
+fn slopes(
+    edges: &[[Matrix3<f64>; 2]; 6],
+    (corner, edge): ControlWeights,
+    along: &Vector3,
+) -> [[Vector3; 2]; 3] {
+    let mut by = corner.map(|w| [w * along, Vector3::zeros()]);
+    for (([start, end], [by_edge, by_normal]), w) in EDGES.into_iter().zip(edges).zip(edge) {
+        let forth = w * by_edge.tr_mul(along);
+        by[start][0] += w * along - forth;
+        by[end][0] += forth;
+        by[start][1] += w * by_normal.tr_mul(along);
     }
+    by
 }
 
 /// Two unit tangents and the normal itself.

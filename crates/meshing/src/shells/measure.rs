@@ -1,13 +1,14 @@
 //! Distances between shells and their target, both ways.
 
 use pliant_geometry::{
-    CellKind, CurvedTriangle, DataArray, Mesh, Surface, SurfaceLocator, Vector3, boundary,
+    CellKind, CurvedTriangle, DataArray, Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3, boundary,
 };
 use rayon::prelude::*;
 
 use super::effort::{Effort, LANDING};
 use super::report::{Flaw, ShellReport};
-use super::{Detail, FittedShells, ShellGoal, Shells, Target};
+use super::target::{Detail, FACING, Target};
+use super::{FittedShells, ShellGoal, Shells};
 use crate::hausdorff::{Hausdorff, Sample, distance, lattice, locator, samples, spread};
 use crate::triangles::shape;
 
@@ -25,6 +26,8 @@ const STEPS: usize = 10;
 #[derive(Clone, Copy)]
 pub(super) struct Landing {
     pub(super) point: Vector3,
+    /// The normal of the target there.
+    normal: Vector3,
     pub(super) shell: u32,
     pub(super) place: [f64; 3],
     pub(super) off: f64,
@@ -60,10 +63,14 @@ impl Shells {
         let shells: Vec<u32> = self.mesh.alive().collect();
         let mut there = vec![0.0; self.mesh.triangles.len()];
         self.measure(&shells, detail.parts, target, &mut there);
+        Distances { there, parts: detail.parts, landings: self.landings(shells, detail) }
+    }
+
+    /// Where points of the target are nearest to shells.
+    fn landings(&self, shells: Vec<u32>, detail: &Detail) -> Vec<Landing> {
         let nearest = Nearest::new(self, shells);
-        let landings =
-            detail.samples.par_iter().filter_map(|sample| nearest.landing(&sample.point)).collect();
-        Distances { there, parts: detail.parts, landings }
+        let spots = detail.samples.par_iter().zip(&detail.normals);
+        spots.filter_map(|(sample, normal)| nearest.landing(&sample.point, normal)).collect()
     }
 
     /// Distances after some shells have moved. Points of the target that were nearest to these are looked for on them and their
@@ -92,7 +99,7 @@ impl Shells {
         );
         let again = |landing: &Landing| {
             if self.moves(landing.shell) {
-                nearest.landing(&landing.point).unwrap_or(*landing)
+                nearest.landing(&landing.point, &landing.normal).unwrap_or(*landing)
             } else {
                 *landing
             }
@@ -123,14 +130,22 @@ impl Shells {
         goal: ShellGoal,
         stopped: bool,
     ) -> FittedShells {
+        let Picture { error_map, forward, mut far, mut farthest } = self.picture(target);
+        let shells: Vec<u32> = self.mesh.alive().collect();
+        let nearest = Nearest::new(&self, shells);
         let samples = &target.fine.samples;
-        let measured = self.distances(&target.fine, target);
-        let (error_map, forward, farthest) = self.picture(target);
-        let back: Vec<f64> = measured.landings.iter().map(|landing| landing.off).collect();
-        let distances = Hausdorff::of(forward, spread(samples, &back));
-        let missed = measured.landings.iter().max_by(|a, b| a.off.total_cmp(&b.off));
-        let farthest =
-            missed.filter(|landing| landing.off > forward.0).map_or(farthest, |landing| landing.point);
+        let back = samples.par_iter().filter_map(|sample| nearest.nearest(&sample.point));
+        let back: Vec<(usize, f64)> = back.map(|(shell, _, off)| (shell, off)).collect();
+        let backward = spread(samples, &back.iter().map(|(_, off)| *off).collect::<Vec<_>>());
+        let distances = Hausdorff::of(forward, backward);
+        if let Some((at, (_, off))) = back.iter().enumerate().max_by(|a, b| a.1.1.total_cmp(&b.1.1))
+            && *off > forward.0
+        {
+            farthest = samples[at].point;
+        }
+        for (shell, off) in back {
+            far[shell] = far[shell].max(off);
+        }
         let shapes: Vec<f64> = self.mesh.alive().map(|t| shape(self.mesh.corners(t))).collect();
         let creased = |n: &usize| self.creased[*n];
         let creases = (0..self.creased.len()).filter(creased).collect::<Vec<_>>();
@@ -139,8 +154,7 @@ impl Shells {
         let normal = |(n, normal): (usize, &Vector3)| if creased(&n) { [0.0; 3] } else { (*normal).into() };
         let normals = self.normals.iter().enumerate().flat_map(normal).collect();
         mesh.point_data.insert("normal".into(), DataArray { components: 3, values: normals });
-        let far = DataArray::scalar(self.mesh.alive().map(|t| measured.far()[t as usize]).collect());
-        mesh.block_mut(CellKind::Triangle).data.insert("distance".into(), far);
+        mesh.block_mut(CellKind::Triangle).data.insert("distance".into(), DataArray::scalar(far));
         let asked = match goal {
             ShellGoal::Error(error) => Some(error),
             ShellGoal::Shells(_) => None,
@@ -180,8 +194,8 @@ impl Shells {
         Hausdorff::of(spread(&own, &there), spread(&target.fine.samples, &back))
     }
 
-    /// The curved surface in small triangles with its distances, the spread of these, and where it is farthest off [m].
-    fn picture(&self, target: &Target) -> (Mesh, (f64, f64), Vector3) {
+    /// The curved surface in small triangles with its distances.
+    fn picture(&self, target: &Target) -> Picture {
         let (places, pieces) = (lattice(target.fine.parts), pieces(target.fine.parts));
         let triangles: Vec<u32> = self.mesh.alive().collect();
         let of = |&t: &u32| {
@@ -194,19 +208,32 @@ impl Shells {
             places.iter().map(place).collect::<Vec<_>>()
         };
         let all: Vec<(Sample, f64)> = triangles.par_iter().flat_map_iter(of).collect();
-        let (samples, far): (Vec<Sample>, Vec<f64>) = all.into_iter().unzip();
-        let mut mesh = Mesh { points: samples.iter().map(|s| s.point).collect(), ..Mesh::default() };
+        let (samples, off): (Vec<Sample>, Vec<f64>) = all.into_iter().unzip();
+        let mut error_map = Mesh { points: samples.iter().map(|s| s.point).collect(), ..Mesh::default() };
         let corners = (0..triangles.len()).flat_map(|t| {
             let places = places.len();
             pieces.iter().flatten().map(move |&k| (t * places) as u32 + k)
         });
-        mesh.block_mut(CellKind::Triangle).nodes = corners.collect();
-        let found = spread(&samples, &far);
-        let farthest = samples.iter().zip(&far).max_by(|a, b| a.1.total_cmp(b.1));
+        error_map.block_mut(CellKind::Triangle).nodes = corners.collect();
+        let farthest = samples.iter().zip(&off).max_by(|a, b| a.1.total_cmp(b.1));
         let farthest = farthest.map(|(sample, _)| sample.point).unwrap_or_default();
-        mesh.point_data.insert("distance".into(), DataArray::scalar(far));
-        (mesh, found, farthest)
+        let far = off.chunks(places.len()).map(|off| off.iter().copied().fold(0.0, f64::max)).collect();
+        let forward = spread(&samples, &off);
+        error_map.point_data.insert("distance".into(), DataArray::scalar(off));
+        Picture { error_map, forward, far, farthest }
     }
+}
+
+/// The curved surface in small triangles.
+struct Picture {
+    /// With its distances from the target.
+    error_map: Mesh,
+    /// The largest of these and their root mean square [m].
+    forward: (f64, f64),
+    /// The largest of each shell [m].
+    far: Vec<f64>,
+    /// Where it is farthest off [m].
+    farthest: Vector3,
 }
 
 /// The small triangles between the places of a lattice.
@@ -252,14 +279,31 @@ impl Nearest {
     }
 
     /// The nearest place of the shells.
-    fn landing(&self, point: &Vector3) -> Option<Landing> {
-        let at = self.locator.closest(point)?;
+    /// The shell, the place on it and the distance [m] that are nearest to a point.
+    fn nearest(&self, point: &Vector3) -> Option<(usize, [f64; 3], f64)> {
+        Some(self.from_facet(point, self.locator.closest(point)?))
+    }
+
+    /// The same, of what looks the same way as the target. What looks the other way counts if nothing else is near, as measured by the
+    /// size of a shell.
+    fn landing(&self, point: &Vector3, normal: &Vector3) -> Option<Landing> {
+        let (mut shell, mut place, mut off) = self.nearest(point)?;
+        let patch = &self.patches[shell];
+        if patch.facet_normal().dot(normal) < FACING
+            && let Some(at) = self.locator.closest_facing(point, normal, FACING, off + patch.size())
+        {
+            (shell, place, off) = self.from_facet(point, at);
+        }
+        let along = (self.patches[shell].point(place) - point).try_normalize(0.0).unwrap_or_default();
+        Some(Landing { point: *point, normal: *normal, shell: self.triangles[shell], place, off, along })
+    }
+
+    fn from_facet(&self, point: &Vector3, at: SurfacePoint) -> (usize, [f64; 3], f64) {
         let count = self.places.len();
         let shell = at.nodes[0] as usize / count;
         let corners = at.nodes.map(|node| self.places[node as usize % count]);
         let start = [0, 1, 2].map(|k| (0..3).map(|c| at.weights[c] * corners[c][k]).sum());
         let (place, off) = self.patches[shell].closest_in(STEPS, point, start);
-        let along = (self.patches[shell].point(place) - point).try_normalize(0.0).unwrap_or_default();
-        Some(Landing { point: *point, shell: self.triangles[shell], place, off, along })
+        (shell, place, off)
     }
 }

@@ -11,20 +11,19 @@ mod fit;
 mod measure;
 mod refine;
 mod report;
+mod solve;
+mod target;
 mod upright;
-
-use std::collections::BTreeSet;
 
 use pliant_geometry::{CurvedTriangle, EdgeRule, Mesh, Vector3};
 
 use crate::decimate::Fewer;
 use crate::error::{MeshingError, require_positive};
-use crate::hausdorff::{Sample, samples};
-use crate::remesh::Reference;
 use crate::triangles::TriangleMesh;
 use effort::Effort;
 use measure::Distances;
 pub use report::{Flaw, ShellReport};
+use target::Target;
 
 /// Shells to start from where an error is asked for.
 const START: usize = 100;
@@ -59,9 +58,6 @@ const LARGE: usize = 50_000;
 /// So many shells are fitted once a round, fewer up to four times.
 const MANY: usize = 3000;
 
-/// Points of the target at most that are looked at in each round.
-const MOST_COARSE: usize = 20_000;
-
 /// When the shells are good enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShellGoal {
@@ -81,24 +77,6 @@ pub struct FittedShells {
     pub error_map: Mesh,
     /// What was measured.
     pub report: ShellReport,
-}
-
-/// The surface to be fitted.
-struct Target {
-    reference: Reference,
-    /// Looked at in each round.
-    coarse: Detail,
-    /// Looked at when all seems well.
-    fine: Detail,
-    diagonal: f64,
-}
-
-/// How closely distances are looked at.
-struct Detail {
-    /// Points of the target.
-    samples: Vec<Sample>,
-    /// Parts of an edge between places of the shells.
-    parts: usize,
 }
 
 /// Shells in the making.
@@ -225,6 +203,7 @@ impl<'t> Fit<'t> {
             progress(self.progress(&far, part));
             if !self.shells.strict && part >= UPRIGHT_FROM {
                 self.shells.require_upright();
+                self.shells.uncross();
                 now = self.shells.distances(&target.coarse, target);
                 self.effort.search(target.coarse.samples.len(), effort::LANDING);
                 self.shells.activate(self.shells.corners_of(&now.far(), bound));
@@ -237,12 +216,12 @@ impl<'t> Fit<'t> {
                 self.shells.activate(self.shells.corners_of(&now.far(), bound));
                 continue;
             }
-            let [creased, crossing] = if part >= 1.0 { self.flaws() } else { Default::default() };
+            let [creased, crossing] = if self.shells.strict { self.flaws() } else { Default::default() };
             let standing = self.standing(&far, part, creased.len() + crossing.len());
             // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is sharp.
             let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || standing.1 < best.1);
             let mut flawed = crossing;
-            flawed.extend(creased.into_iter().filter(|_| fewer));
+            flawed.extend(creased.into_iter().filter(|_| fewer && part >= 1.0));
             if self.best.as_ref().is_none_or(|(best, _)| standing < *best) {
                 self.best = Some((standing, self.shells.clone()));
             }
@@ -256,16 +235,26 @@ impl<'t> Fit<'t> {
                 *(if mends { &mut mending } else { &mut left }) -= 1;
             }
             let mut wanted = far;
-            for shell in flawed.into_iter().filter(|&shell| self.is_long(shell)) {
+            for shell in flawed {
                 wanted[shell as usize] = 2.0 * wanted[shell as usize].max(bound);
             }
-            self.shells.refine(&wanted, bound, room, target);
+            for shell in self.shells.mesh.alive().filter(|&shell| !self.is_long(shell)) {
+                wanted[shell as usize] = 0.0;
+            }
+            if self.shells.refine(&wanted, bound, room, target) == 0 && part < 1.0 {
+                ended = true;
+                break;
+            }
             self.shells.even_out(target, 3, &mut self.effort);
+            if self.shells.strict {
+                self.shells.uncross();
+            }
             now = self.shells.distances_after(&now, target, &mut self.effort);
         }
         let mut shells = self.best.map_or(self.shells, |(_, best)| best);
         shells.require_upright();
-        shells.uncross(target);
+        shells.activate((0..shells.mesh.points.len() as u32).collect());
+        shells.uncross();
         shells.finished(target, self.rounds, self.goal, !ended)
     }
 
@@ -325,48 +314,17 @@ fn share(far: &[f64]) -> f64 {
     sorted[far.len() / 20].min(0.6 * sorted[0])
 }
 
-impl Target {
-    fn new(mesh: &TriangleMesh) -> Self {
-        let diagonal = mesh.diagonal();
-        Self {
-            reference: Reference::new(mesh),
-            coarse: Detail { samples: thinned(distinct(samples(mesh, diagonal / 60.0)), diagonal), parts: 8 },
-            fine: Detail { samples: distinct(samples(mesh, diagonal / 300.0)), parts: 16 },
-            diagonal,
-        }
-    }
-}
-
-/// Samples at the same place made one.
-fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
-    let place = |sample: &Sample| <[f64; 3]>::from(sample.point).map(f64::to_bits);
-    samples.sort_by_key(place);
-    samples.dedup_by(|next, kept| {
-        let same = place(next) == place(kept);
-        kept.area += if same { next.area } else { 0.0 };
-        same
-    });
-    samples
-}
-
-/// So few samples that no cube of a grid holds two, of cubes that are doubled until there are no more than [`MOST_COARSE`].
-fn thinned(mut samples: Vec<Sample>, diagonal: f64) -> Vec<Sample> {
-    let mut size = diagonal / 400.0;
-    while samples.len() > MOST_COARSE {
-        let mut taken = BTreeSet::new();
-        samples
-            .retain(|sample| taken.insert(<[f64; 3]>::from(sample.point).map(|x| (x / size).floor() as i64)));
-        size *= 2.0;
-    }
-    samples
-}
-
 impl Shells {
     fn new(mesh: &TriangleMesh, target: &Target) -> Self {
         let (points, triangles) = mesh.compact();
         let mesh = TriangleMesh::new(points, triangles);
+        let normal = |(point, x): (u32, &Vector3)| {
+            let facing = mesh.point_normal(point);
+            let (_, normal) = target.foot(x, &facing, 0.1 * target.diagonal);
+            if normal == Vector3::zeros() { facing } else { normal }
+        };
         Self {
-            normals: mesh.points.iter().map(|x| target.reference.closest(x).1).collect(),
+            normals: (0..).zip(&mesh.points).map(normal).collect(),
             on_border: (0..mesh.points.len() as u32).map(|n| !mesh.marked(n).is_empty()).collect(),
             active: vec![true; mesh.points.len()],
             strict: false,

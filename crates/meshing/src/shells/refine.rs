@@ -4,7 +4,8 @@ use pliant_geometry::Vector3;
 
 use super::effort::Effort;
 use super::fit::frame;
-use super::{LEAST_SHAPE, Shells, Target};
+use super::target::Target;
+use super::{LEAST_SHAPE, Shells};
 use crate::triangles::{cross, shape};
 
 /// Triangles of a better shape than this are left alone by moves that would make them worse.
@@ -22,18 +23,28 @@ const BEND: f64 = 2.0;
 impl Shells {
     /// Puts a point on the target, or on its border, with the normal there.
     pub(super) fn place(&mut self, point: u32, target: &Target) {
-        let here = self.mesh.points[point as usize];
-        let place = if self.on_border[point as usize] {
-            target.reference.closest_on_lines(&here)
-        } else {
-            target.reference.closest(&here).0
-        };
+        let facing = self.mesh.point_normal(point);
+        let place = self.projected(point, &self.mesh.points[point as usize], &facing, target);
         self.mesh.points[point as usize] = place;
-        let normal = target.reference.closest(&place).1;
-        if normal != Vector3::zeros() {
-            self.normals[point as usize] = normal;
-        }
+        let normal = target.foot(&place, &facing, self.reach(point)).1;
+        self.normals[point as usize] = if normal == Vector3::zeros() { facing } else { normal };
         self.stand(point);
+    }
+
+    /// The nearest place of the target for a point that moves, on the side where its triangles look.
+    fn projected(&self, point: u32, to: &Vector3, facing: &Vector3, target: &Target) -> Vector3 {
+        if self.on_border[point as usize] {
+            target.reference.closest_on_lines(to)
+        } else {
+            target.foot(to, facing, self.reach(point)).0
+        }
+    }
+
+    /// The shortest edge at a point [m].
+    fn reach(&self, point: u32) -> f64 {
+        let here = self.mesh.points[point as usize];
+        let around = self.mesh.neighbours(point);
+        around.iter().map(|&n| (self.mesh.points[n as usize] - here).norm()).fold(f64::INFINITY, f64::min)
     }
 
     /// Puts the points of borders on those of the target. Decimation leaves them beside it, and neither evening out nor the fit need move
@@ -61,7 +72,11 @@ impl Shells {
                 };
                 let active = new.as_flattened().iter().all(|&n| self.active[n as usize]);
                 let old = [s, t].map(|t| self.mesh.triangles[t as usize]);
-                if active && worst(new) > 1.1 * worst(old) && !self.tilts(stands(old), stands(new)) {
+                if active
+                    && worst(new) > 1.1 * worst(old)
+                    && !self.tilts(stands(old), stands(new))
+                    && (!self.mesh.would_cross(&new, &[s, t]) || self.mesh.would_cross(&old, &[s, t]))
+                {
                     self.mesh.flip(a, b, new);
                 }
             }
@@ -120,21 +135,15 @@ impl Shells {
         {
             return;
         }
-        let Some(aim) = self.mesh.evener(point, &target.reference) else { return };
+        let Some(aim) = self.mesh.even_place(point) else { return };
+        let facing = self.mesh.point_normal(point);
+        let project = |x: Vector3| self.projected(point, &x, &facing, target);
+        let aim = project(aim);
         let own = self.worth_round(point, &here);
         let upright = self.upright_round(point, &here);
-        let project = |x: Vector3| {
-            if self.on_border[point as usize] {
-                target.reference.closest_on_lines(&x)
-            } else {
-                target.reference.closest(&x).0
-            }
-        };
         let mut aims = vec![project(here + 0.4 * (aim - here)), aim];
         if own < GOOD_SHAPE {
-            let around = self.mesh.neighbours(point);
-            let lengths = around.iter().map(|&n| (self.mesh.points[n as usize] - here).norm());
-            let size = 0.15 * lengths.fold(f64::INFINITY, f64::min);
+            let size = 0.15 * self.reach(point);
             let [first, second, _] = frame(&self.normals[point as usize]);
             let way = |k: usize| (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
             aims.extend((0..8).map(|k| project(here + size * (way(k).1 * first + way(k).0 * second))));
@@ -147,14 +156,31 @@ impl Shells {
         if let Some((worth, aim)) = best
             && worth >= own.min(GOOD_SHAPE)
         {
+            let normal = self.normals[point as usize];
             self.mesh.points[point as usize] = aim;
             self.place(point, target);
+            if self.is_crossed_round(point) {
+                let moved = std::mem::replace(&mut self.mesh.points[point as usize], here);
+                if self.is_crossed_round(point) {
+                    self.mesh.points[point as usize] = moved;
+                } else {
+                    self.normals[point as usize] = normal;
+                    self.stand(point);
+                }
+            }
         }
     }
 
+    /// Whether flat triangles round a point cross any.
+    fn is_crossed_round(&self, point: u32) -> bool {
+        let star = &self.mesh.star[point as usize];
+        let nodes: Vec<[u32; 3]> = star.iter().map(|&t| self.mesh.triangles[t as usize]).collect();
+        self.mesh.would_cross(&nodes, star)
+    }
+
     /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a number. They, their
-    /// neighbours and poor triangles may move from then on.
-    pub(super) fn refine(&mut self, far: &[f64], bound: f64, room: usize, target: &Target) {
+    /// neighbours and poor triangles may move from then on. Returns how many edges were halved.
+    pub(super) fn refine(&mut self, far: &[f64], bound: f64, room: usize, target: &Target) -> usize {
         let mut order: Vec<u32> = self.mesh.alive().filter(|&t| far[t as usize] > bound).collect();
         order.sort_by(|&a, &b| far[b as usize].total_cmp(&far[a as usize]));
         let mut touched = vec![false; far.len()];
@@ -181,7 +207,13 @@ impl Shells {
             self.on_border.push(sides[1].is_none());
             self.creased.push(false);
             touched.resize(self.mesh.triangles.len(), true);
+            let middle = 0.5 * (self.mesh.points[a as usize] + self.mesh.points[b as usize]);
             self.place(fresh, target);
+            if self.is_crossed_round(fresh) {
+                // As it was, which crosses nothing new.
+                self.mesh.points[fresh as usize] = middle;
+                self.stand(fresh);
+            }
             changed.push(fresh);
             halved += 1;
         }
@@ -192,5 +224,6 @@ impl Shells {
         changed.extend(self.mesh.alive().filter(poor).flat_map(|t| self.mesh.triangles[t as usize]));
         self.activate(changed);
         self.stand_all();
+        halved
     }
 }

@@ -68,9 +68,11 @@ impl Shells {
         (0..self.mesh.points.len() as u32).for_each(|point| self.stand(point));
     }
 
-    /// Whether a change of the least cosine round a vertex is one that must not be: from upright to not.
+    /// Whether a change of the least cosine round a vertex is one that must not be: from upright to not, on the way to the goal from
+    /// along the surface to against it.
     pub(super) fn tilts(&self, before: f64, after: f64) -> bool {
-        self.strict && before >= UPRIGHT && after < UPRIGHT
+        let least = if self.strict { UPRIGHT } else { 0.0 };
+        before >= least && after < least
     }
 
     /// Turns the normal of a vertex as far as it must to stand on all triangles round it; a crease where none does.

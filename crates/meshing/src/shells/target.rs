@@ -1,0 +1,102 @@
+//! The surface to be fitted, and the points of it that are looked at. Where a surface folds, its other side may be nearer than the side
+//! that a shell stands for: what looks the other way is passed over, as far as the shell is large.
+
+use std::collections::BTreeMap;
+
+use pliant_geometry::Vector3;
+use rayon::prelude::*;
+
+use crate::hausdorff::{Sample, samples};
+use crate::remesh::Reference;
+use crate::triangles::TriangleMesh;
+
+/// Points of the target at most that are looked at in each round, and when all seems well.
+const MOST_COARSE: usize = 20_000;
+const MOST_FINE: usize = 80_000;
+
+/// What has a normal with a smaller cosine to a shell's looks the other way.
+pub(super) const FACING: f64 = -0.3;
+
+/// The surface to be fitted.
+pub(super) struct Target {
+    pub(super) reference: Reference,
+    /// Looked at in each round.
+    pub(super) coarse: Detail,
+    /// Looked at when all seems well.
+    pub(super) fine: Detail,
+    pub(super) diagonal: f64,
+}
+
+/// How closely distances are looked at.
+pub(super) struct Detail {
+    /// Points of the target.
+    pub(super) samples: Vec<Sample>,
+    /// The normals there.
+    pub(super) normals: Vec<Vector3>,
+    /// Parts of an edge between places of the shells.
+    pub(super) parts: usize,
+}
+
+impl Target {
+    pub(super) fn new(mesh: &TriangleMesh) -> Self {
+        let diagonal = mesh.diagonal();
+        let reference = Reference::new(mesh);
+        let area: f64 = mesh.alive().map(|t| mesh.area(t)).sum();
+        let detail = |part: f64, most: usize, parts: usize| {
+            // Points so far apart that the whole area takes the most.
+            let spacing = (diagonal * part).max((area / most as f64).sqrt());
+            let samples = thinned(distinct(samples(mesh, spacing)), spacing, most);
+            let normals = samples.par_iter().map(|sample| reference.closest(&sample.point).1).collect();
+            Detail { samples, normals, parts }
+        };
+        let coarse = detail(1.0 / 60.0, MOST_COARSE, 8);
+        let fine = detail(1.0 / 300.0, MOST_FINE, 16);
+        Self { coarse, fine, diagonal, reference }
+    }
+
+    /// The nearest point that looks the same way as `facing`, and the normal there. One that looks the other way counts if there is none
+    /// that is farther off by less than `reach` [m].
+    pub(super) fn foot(&self, x: &Vector3, facing: &Vector3, reach: f64) -> (Vector3, Vector3) {
+        let nearest = self.reference.closest(x);
+        if nearest.1.dot(facing) < FACING {
+            let within = (nearest.0 - x).norm() + reach;
+            return self.reference.closest_facing(x, facing, FACING, within).unwrap_or(nearest);
+        }
+        nearest
+    }
+}
+
+/// Samples at the same place made one.
+fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
+    let place = |sample: &Sample| <[f64; 3]>::from(sample.point).map(f64::to_bits);
+    samples.sort_by_key(place);
+    samples.dedup_by(|next, kept| {
+        let same = place(next) == place(kept);
+        kept.area += if same { next.area } else { 0.0 };
+        same
+    });
+    samples
+}
+
+/// So few samples that no cube of a grid holds two, of cubes that grow until there are no more than `most`. One stands for the area of all
+/// in its cube.
+fn thinned(mut samples: Vec<Sample>, spacing: f64, most: usize) -> Vec<Sample> {
+    let mut size = 0.5 * spacing;
+    while samples.len() > most {
+        let mut taken: BTreeMap<[i64; 3], usize> = BTreeMap::new();
+        let mut kept: Vec<Sample> = Vec::new();
+        for sample in samples {
+            let cube = <[f64; 3]>::from(sample.point).map(|x| (x / size).floor() as i64);
+            match taken.get(&cube) {
+                Some(&at) => kept[at].area += sample.area,
+                None => {
+                    taken.insert(cube, kept.len());
+                    kept.push(sample);
+                }
+            }
+        }
+        samples = kept;
+        size *= 1.3;
+    }
+    samples
+}
