@@ -39,7 +39,7 @@ fn step<R: Real>(bencher: Bencher<'_, '_>, element: &str) {
     let pool =
         rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap_or_else(|error| panic!("{error}"));
     let cells = ItemsCount::new(model.cell_count());
-    let clocked = Clocked::<R>::new(model, step, State::at_rest(model));
+    let clocked = Clocked::<R>::new(model.clone(), step, State::at_rest(model));
     let mut clocked = clocked.unwrap_or_else(|error| panic!("{error}"));
     bencher.counter(cells).bench_local(|| pool.install(|| clocked.seconds_per_step(1)));
 }

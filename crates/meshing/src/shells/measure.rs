@@ -281,7 +281,7 @@ impl Nearest {
     /// The nearest place of the shells.
     /// The shell, the place on it and the distance [m] that are nearest to a point.
     fn nearest(&self, point: &Vector3) -> Option<(usize, [f64; 3], f64)> {
-        Some(self.from_facet(point, self.locator.closest(point)?))
+        Some(self.refined_from(point, self.locator.closest(point)?))
     }
 
     /// The same, of what looks the same way as the target. What looks the other way counts if nothing else is near, as measured by the
@@ -292,13 +292,13 @@ impl Nearest {
         if patch.facet_normal().dot(normal) < FACING
             && let Some(at) = self.locator.closest_facing(point, normal, FACING, off + patch.size())
         {
-            (shell, place, off) = self.from_facet(point, at);
+            (shell, place, off) = self.refined_from(point, at);
         }
         let along = (self.patches[shell].point(place) - point).try_normalize(0.0).unwrap_or_default();
         Some(Landing { point: *point, normal: *normal, shell: self.triangles[shell], place, off, along })
     }
 
-    fn from_facet(&self, point: &Vector3, at: SurfacePoint) -> (usize, [f64; 3], f64) {
+    fn refined_from(&self, point: &Vector3, at: SurfacePoint) -> (usize, [f64; 3], f64) {
         let count = self.places.len();
         let shell = at.nodes[0] as usize / count;
         let corners = at.nodes.map(|node| self.places[node as usize % count]);
