@@ -152,6 +152,7 @@ const ORGANS: [(&str, &str); 11] = [
 
 /// Few shells, so that thin folds are as hard as they can be.
 #[test]
+#[ignore = "minutes: eleven organs"]
 fn shells_of_organs_run_under_pressure() {
     let Some(data) = std::env::var_os("PLIANT_DATA") else {
         println!("skipped: PLIANT_DATA is not set");
