@@ -15,8 +15,11 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// Searches of a fit: 20 to 35 s of one core.
-    pub(super) const MOST: usize = 20_000_000;
+    /// Searches of a fit to a distance: 15 to 30 s of one core.
+    pub(super) const MOST: usize = 17_000_000;
+
+    /// The same to a number of shells, whose last round needs its time to settle.
+    pub(super) const MOST_TO_A_NUMBER: usize = 25_000_000;
 
     pub(super) fn new(most: usize) -> Self {
         Self { done: 0, most }

@@ -115,7 +115,11 @@ impl FittedShells {
         goal: ShellGoal,
         progress: &dyn Fn(FitProgress),
     ) -> Result<Self, MeshingError> {
-        Self::within(target, goal, Effort::MOST, progress)
+        let most = match goal {
+            ShellGoal::Error(_) => Effort::MOST,
+            ShellGoal::Shells(_) => Effort::MOST_TO_A_NUMBER,
+        };
+        Self::within(target, goal, most, progress)
     }
 
     /// The same with some work at most, counted in searches for nearest points.
