@@ -197,7 +197,7 @@ fn standard_error_that_cannot_be_written_stops_no_run() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn standard_output_that_cannot_be_written_is_told_and_a_closed_pipe_is_not() {
+fn standard_output_that_cannot_be_written_is_reported() {
     let full = || Stdio::from(File::options().write(true).open("/dev/full").unwrap());
     let workshop = Workshop::new(BLOCK);
     for arguments in [&["schema"][..], &["run", "case"], &["run", "case", "--json", "--force"]] {
@@ -207,11 +207,6 @@ fn standard_output_that_cannot_be_written_is_told_and_a_closed_pipe_is_not() {
         assert!(told.err.contains("error: standard output cannot be written"), "{}", told.err);
     }
     assert!(workshop.read("out/case/summary.md").contains("Done: "));
-    let mut child =
-        workshop.command(&["schema"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    drop(child.stdout.take());
-    let told = Told::from(child.wait_with_output().unwrap());
-    assert_eq!((told.code, told.err.as_str()), (0, ""));
 }
 
 #[test]

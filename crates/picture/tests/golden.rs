@@ -1,5 +1,7 @@
 //! Pictures are what they were: held to stored ones, drawn by Mesa's software Vulkan. `PLIANT_RENEW_GOLDEN=1` stores them anew.
 
+mod support;
+
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +10,7 @@ use pliant_picture::{
     Background, Camera, ColourMap, Difference, Graphics, Legend, Look, Picture, Plane, Projection, Style,
     Texture,
 };
+use support::graphics;
 
 /// Hexes of a grid whose corners from [0, 1]³ are put anywhere.
 fn hexes(mesh: &mut Mesh, [nx, ny, nz]: [u32; 3], place: impl Fn(Vector3) -> Vector3) {
@@ -127,18 +130,6 @@ fn skin_under_colours() -> Look {
 
 fn wireframe() -> Look {
     Look { style: Style { wireframe: true, ..look().style }, ..look() }
-}
-
-/// `None` where nothing draws, which is a failure where the gate asks for it.
-fn graphics() -> Option<Graphics> {
-    match Graphics::open() {
-        Ok(graphics) => Some(graphics),
-        Err(error) => {
-            assert!(std::env::var_os("PLIANT_REQUIRE_GPU").is_none(), "{error}; {}", error.remedy());
-            eprintln!("skipped: {error}");
-            None
-        }
-    }
 }
 
 fn file(name: &str) -> PathBuf {

@@ -1,8 +1,11 @@
 //! Colours of labels: each cell has that of its label and nothing between them, what is hidden shows what lies inside, and the legend
 //! has a swatch for each label that is left.
 
+mod support;
+
 use pliant_geometry::{CellKind, DataArray, Mesh, Vector3};
-use pliant_picture::{Graphics, Look, Picture, Plane, Style, label_colour};
+use pliant_picture::{Look, Picture, Plane, Style, label_colour};
+use support::graphics;
 
 /// A cube of 6³ hexes: label 1 in one half and 2 in the other, around a core of 2³ with label 3.
 fn cube() -> Mesh {
@@ -27,18 +30,6 @@ fn cube() -> Mesh {
     block.data.insert("label".into(), DataArray::scalar(labels));
     mesh.label_names = [(1, "left".to_owned()), (2, "right".to_owned())].into();
     mesh
-}
-
-/// `None` where nothing draws, which is a failure where the gate asks for it.
-fn graphics() -> Option<Graphics> {
-    match Graphics::open() {
-        Ok(graphics) => Some(graphics),
-        Err(error) => {
-            assert!(std::env::var_os("PLIANT_REQUIRE_GPU").is_none(), "{error}; {}", error.remedy());
-            eprintln!("skipped: {error}");
-            None
-        }
-    }
 }
 
 fn look() -> Look {

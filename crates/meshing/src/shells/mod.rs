@@ -115,36 +115,22 @@ impl FittedShells {
         goal: ShellGoal,
         progress: &dyn Fn(FitProgress),
     ) -> Result<Self, MeshingError> {
-        let most = match goal {
-            ShellGoal::Error(_) => Effort::MOST,
-            ShellGoal::Shells(_) => Effort::MOST_TO_A_NUMBER,
-        };
-        Self::within(target, goal, most, progress)
-    }
-
-    /// The same with some work at most, counted in searches for nearest points.
-    fn within(
-        target: &TriangleMesh,
-        goal: ShellGoal,
-        most: usize,
-        progress: &dyn Fn(FitProgress),
-    ) -> Result<Self, MeshingError> {
         let mut mesh = target.clone();
-        let start = match goal {
+        let (start, most) = match goal {
             ShellGoal::Error(error) => {
                 require_positive("the error", error)?;
-                if mesh.len() > LARGE {
+                let start = if mesh.len() > LARGE {
                     mesh.decimate(Fewer::Distance(error * target.diagonal()))? / 2
                 } else {
                     0
-                }
+                };
+                (start.max(START), Effort::MOST)
             }
             ShellGoal::Shells(number) => {
                 require_positive("the number of shells", number as f64)?;
-                number.div_ceil(2)
+                (number.div_ceil(2), Effort::MOST_TO_A_NUMBER)
             }
         };
-        let start = if matches!(goal, ShellGoal::Error(_)) { start.max(START) } else { start };
         mesh.decimate(Fewer::Triangles(start))?;
         Ok(Fit::new(&Target::new(target), &mesh, goal, most).run(progress))
     }

@@ -1,0 +1,15 @@
+//! What several tests of pictures use.
+
+use pliant_picture::Graphics;
+
+/// `None` where nothing draws, which is a failure where the gate asks for it.
+pub fn graphics() -> Option<Graphics> {
+    match Graphics::open() {
+        Ok(graphics) => Some(graphics),
+        Err(error) => {
+            assert!(std::env::var_os("PLIANT_REQUIRE_GPU").is_none(), "{error}; {}", error.remedy());
+            eprintln!("skipped: {error}");
+            None
+        }
+    }
+}
