@@ -138,13 +138,11 @@ mod tests {
     use super::*;
     use crate::rotation::exponential;
     use crate::surface::EdgeRule;
-    use crate::testing::Random;
+    use crate::testing::{Pose, Random, moved};
     use crate::tests::{ball, model};
     use crate::{CurvedSurface, State};
 
     const STRAIGHT: [[bool; 6]; 2] = [[false; 6], [true, true, false, false, false, true]];
-
-    type Pose = ([Vector3<f64>; 3], [Vector3<f64>; 3]);
 
     fn vector(random: &mut Random) -> Vector3<f64> {
         Vector3::from_fn(|_, _| random.number())
@@ -156,18 +154,6 @@ mod tests {
             .map(|p| Vector3::from(p) + 0.2 * vector(random));
         let normal = (p[1] - p[0]).cross(&(p[2] - p[0])).normalize();
         (p, [(); 3].map(|()| exponential(&(0.3 * vector(random))) * normal))
-    }
-
-    fn moved((p, n): &Pose, place: usize, by: f64) -> Pose {
-        let (mut p, mut n) = (*p, *n);
-        let mut change = Vector3::zeros();
-        change[place % 3] = by;
-        if place % 6 < 3 {
-            p[place / 6] += change;
-        } else {
-            n[place / 6] = exponential(&change) * n[place / 6];
-        }
-        (p, n)
     }
 
     /// Central differences with steps of 1e-5: 1e-8 of the largest.

@@ -240,7 +240,7 @@ impl Patch {
 mod tests {
     use super::*;
     use crate::rotation::exponential;
-    use crate::testing::Random;
+    use crate::testing::{Random, moved};
 
     fn clamped(weights: [f64; 3]) -> [f64; 3] {
         let positive = weights.map(|w| w.max(0.0));
@@ -273,14 +273,7 @@ mod tests {
     ) -> Vector3<f64> {
         let h = 1e-6;
         let at = |by: f64| {
-            let (mut p, mut n) = (p, n);
-            let mut change = Vector3::zeros();
-            change[place % 3] = by;
-            if place % 6 < 3 {
-                p[place / 6] += change;
-            } else {
-                n[place / 6] = exponential(&change) * n[place / 6];
-            }
+            let (p, n) = moved(&(p, n), place, by);
             point(p, n)
         };
         (at(h) - at(-h)) / (2.0 * h)

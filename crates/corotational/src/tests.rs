@@ -16,11 +16,20 @@ pub(crate) const MATERIAL: Material =
 
 /// Points and triangles of an octahedron of radius 1 facing outwards, each triangle cut in four some times.
 pub(crate) fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
-    let mut points: Vec<Vector3<f64>> = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+    let points: Vec<Vector3<f64>> = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
         .map(|p: [i32; 3]| Vector3::from(p.map(f64::from)))
         .to_vec();
-    let mut cells: Vec<[u32; 3]> =
+    let cells: Vec<[u32; 3]> =
         vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    quartered(points, cells, cuts)
+}
+
+/// Triangles of a unit sphere, each cut in four some times.
+fn quartered(
+    mut points: Vec<Vector3<f64>>,
+    mut cells: Vec<[u32; 3]>,
+    cuts: usize,
+) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
     for _ in 0..cuts {
         let mut finer = Vec::new();
         for [a, b, c] in cells {
@@ -720,7 +729,7 @@ fn pressure_on_the_curved_surface_acts_on_its_area() {
 /// Points and triangles of an icosahedron of radius 1 facing outwards, each triangle cut in four twice.
 fn icosphere() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
     let golden = 0.5 * (1.0 + 5_f64.sqrt());
-    let mut points: Vec<Vector3<f64>> = (0..12)
+    let points: Vec<Vector3<f64>> = (0..12)
         .map(|i: usize| {
             let sign = |bit: usize| if i & bit == 0 { 1.0 } else { -1.0 };
             let mut p = Vector3::zeros();
@@ -740,23 +749,7 @@ fn icosphere() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
             }
         }
     }
-    for _ in 0..2 {
-        let mut finer = Vec::new();
-        for [a, b, c] in cells {
-            let mut middle = |p: u32, q: u32| {
-                let at = (points[p as usize] + points[q as usize]).normalize();
-                let known = points.iter().position(|x| (x - at).norm() < 1e-9);
-                known.unwrap_or_else(|| {
-                    points.push(at);
-                    points.len() - 1
-                }) as u32
-            };
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        cells = finer;
-    }
-    (points, cells)
+    quartered(points, cells, 2)
 }
 
 /// The balloon of 320 shells of the formulas' prototype, R/t = 50, which 500 Pa blow up by 10 %, with the sphere's own normals.
