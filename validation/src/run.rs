@@ -1,8 +1,9 @@
 //! Running a model, as a test does it: what fails, panics.
 
-use pliant_mechanics::critical_step::true_limit;
-use pliant_mechanics::stability::{Monitor, OnUnstable};
-use pliant_mechanics::{CentralDifference, DynamicRelaxation, Model, Real, State, StepError};
+use pliant_explicit::critical_step::true_limit;
+use pliant_explicit::stability::{Monitor, OnUnstable};
+use pliant_explicit::{CentralDifference, DynamicRelaxation, Scalar, State, StepError};
+use pliant_mechanics::Model;
 use pliant_reproduce::{CaseError, Equilibrium, run_on};
 
 /// See [`pliant_reproduce::run`].
@@ -12,7 +13,7 @@ use pliant_reproduce::{CaseError, Equilibrium, run_on};
 ///
 /// # Panics
 /// If constraints contradict each other.
-pub fn run<R: Real>(
+pub fn run<R: Scalar>(
     model: &Model,
     step: f64,
     until: f64,
@@ -31,7 +32,7 @@ pub fn run<R: Real>(
 ///
 /// # Panics
 /// If constraints contradict each other.
-pub fn run_watched<R: Real>(
+pub fn run_watched<R: Scalar>(
     model: &Model,
     step: f64,
     on_unstable: OnUnstable,
@@ -45,7 +46,7 @@ pub fn run_watched<R: Real>(
 ///
 /// # Panics
 /// If constraints contradict each other.
-pub fn watched<R: Real>(model: &Model, step: f64, on_unstable: OnUnstable) -> CentralDifference<R> {
+pub fn watched<R: Scalar>(model: &Model, step: f64, on_unstable: OnUnstable) -> CentralDifference<R> {
     let limit = true_limit(model).unwrap_or_else(|error| panic!("{error}")).step;
     let stepper = CentralDifference::new(model.clone(), step).unwrap_or_else(|error| panic!("{error}"));
     stepper.watched(Monitor::new(model, limit, on_unstable))

@@ -1,7 +1,7 @@
 //! The largest stable step: the element bound is safe, the true limit is sharp.
 
+use pliant_explicit::critical_step::{cell_bound, true_limit};
 use pliant_mechanics::Model;
-use pliant_mechanics::critical_step::{cell_bound, true_limit};
 use pliant_mechanics::model::{Body, Cells, Solid};
 use pliant_mechanics::prony::PronyUpdate;
 use pliant_meshing::VolumeCell;

@@ -2,8 +2,8 @@
 //! unless said otherwise. At 20 % the answer converges with the mesh; at 30 % it does not (the glued edge is singular
 //! and folds over the platen), so that only solutions on one and the same mesh compare.
 
+use pliant_explicit::Observable;
 use pliant_geometry::io;
-use pliant_mechanics::Observable;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::tensor::{dot, sub};
 use pliant_reproduce::cases::cube;

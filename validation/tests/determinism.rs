@@ -1,10 +1,10 @@
 //! The same bits on any number of threads and in every run, and how far single precision stands from double.
 
+use pliant_explicit::{Scalar, State};
 use pliant_geometry::{CellBlock, Mesh, Vector3};
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::tensor::Vector;
-use pliant_mechanics::{Real, State};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 use pliant_validation::{Specimen, claim, liver, run, smooth_step};
 
@@ -45,7 +45,7 @@ fn specimen() -> Specimen {
         .damped(5.0)
 }
 
-fn state_after_200_steps<R: Real>(threads: usize) -> State<R> {
+fn state_after_200_steps<R: Scalar>(threads: usize) -> State<R> {
     let specimen = specimen();
     let step = 0.9 * specimen.element_bound();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -57,12 +57,12 @@ fn state_after_200_steps<R: Real>(threads: usize) -> State<R> {
 }
 
 /// Bits of all displacements and increments; `==` alone takes 0 for −0.
-fn bits<R: Real>(state: &State<R>) -> Vec<u64> {
+fn bits<R: Scalar>(state: &State<R>) -> Vec<u64> {
     let fields = state.displacement.iter().chain(&state.increment);
     fields.flatten().map(|x| x.to_f64().to_bits()).collect()
 }
 
-fn same_bits<R: Real>() {
+fn same_bits<R: Scalar>() {
     let alone = state_after_200_steps::<R>(1);
     for (what, threads) in [("again on 1 thread", 1), ("on 2 threads", 2), ("on 8 threads", 8)] {
         let other = state_after_200_steps::<R>(threads);

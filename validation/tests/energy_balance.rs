@@ -3,7 +3,7 @@
 //! soft tissue (E = 3 kPa) stretches so far, by 38 % on the whole, that the limit falls below 0.9 of its value at rest
 //! and the run diverges; it goes by 0.9 of the element bound. `stability.rs` has it with cut steps.
 
-use pliant_mechanics::Observable;
+use pliant_explicit::Observable;
 use pliant_mechanics::law::AnyLaw;
 use pliant_meshing::VolumeCell;
 use pliant_validation::{Specimen, claim, elastic, largest, law, run, soft_tissue};

@@ -1,8 +1,8 @@
 //! A run that cannot go on says what happened.
 
+use pliant_explicit::{CentralDifference, State, StepError};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::model::{Constraint, Motion};
-use pliant_mechanics::{CentralDifference, State, StepError};
 use pliant_meshing::VolumeCell;
 use pliant_validation::{Hexes, Specimen, Tets, elastic, run, smooth_step, soft_tissue};
 

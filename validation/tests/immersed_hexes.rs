@@ -60,7 +60,7 @@ impl Hanging {
     fn tau(&self) -> f64 {
         let mut free = self.specimen.model.clone();
         free.constraints.clear();
-        let limit = pliant_mechanics::critical_step::true_limit(&free).expect("nothing contradicts").step;
+        let limit = pliant_explicit::critical_step::true_limit(&free).expect("nothing contradicts").step;
         let modulus = YOUNG * (1.0 - POISSON) / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON));
         limit * (modulus / DENSITY).sqrt() / (self.volume() / free.node_count() as f64).cbrt()
     }

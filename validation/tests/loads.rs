@@ -1,6 +1,6 @@
 //! Loads and prescribed motions do what they say.
 
-use pliant_mechanics::Observable;
+use pliant_explicit::Observable;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{LoadKind, face_areas};
 use pliant_mechanics::model::{Constraint, Motion};

@@ -1,9 +1,9 @@
 //! Momentum, angular momentum and free fall of a free body: exact in the central difference method, to round-off.
 
-use pliant_mechanics::State;
+use pliant_explicit::State;
+use pliant_explicit::recover::Recovery;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::LoadKind;
-use pliant_mechanics::recover::Recovery;
 use pliant_mechanics::tensor::{Vector, add, cross, dot, scale, sub};
 use pliant_meshing::VolumeCell;
 use pliant_validation::{Specimen, claim, elastic, largest, run, soft_tissue};

@@ -4,9 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
+use pliant_explicit::{CentralDifference, State};
 use pliant_geometry::io;
 use pliant_mechanics::tensor::{Vector, dot, sub};
-use pliant_mechanics::{CentralDifference, State};
 use pliant_scene::format::StepChoice;
 use pliant_scene::source::Source;
 use pliant_scene::{Scene, niftysim};

@@ -1,12 +1,12 @@
 //! Quasi-static equilibria by dynamic relaxation, held to other codes on the same meshes: the thesis's cube
 //! [0, 0.1 m]³ compressed by 30 %.
 
+use pliant_explicit::{DynamicRelaxation, Observable, RelaxationError, RelaxationSettings, State};
 use pliant_geometry::{Mesh, io};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{Averaging, Material};
 use pliant_mechanics::prony::PronyUpdate;
 use pliant_mechanics::tensor::{dot, sub};
-use pliant_mechanics::{DynamicRelaxation, Observable, RelaxationError, RelaxationSettings, State};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 use pliant_validation::{
     Hexes, Specimen, Tets, claim, data_file, elastic, largest, liver, liver_relaxation, numbers, reference,

@@ -5,9 +5,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use pliant_corotational::element::{Formulation, Membrane};
-use pliant_corotational::{Control, LoadKind, Spread, State, StaticSettings, Statics};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use pliant_implicit::element::{Formulation, Membrane};
+use pliant_implicit::{Control, LoadKind, Spread, State, StaticSettings, Statics};
 use pliant_validation::claim;
 use pliant_validation::shells::{FLAT, Specimen};
 

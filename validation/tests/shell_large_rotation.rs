@@ -3,9 +3,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use pliant_corotational::element::{Formulation, Membrane};
-use pliant_corotational::{Control, LinearSolver, LoadKind, State, StaticSettings, Statics, Step};
 use pliant_geometry::Mesh;
+use pliant_implicit::element::{Formulation, Membrane};
+use pliant_implicit::{Control, LinearSolver, LoadKind, State, StaticSettings, Statics, Step};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 use pliant_reproduce::cases::plate::{LARGE, deflections};
 use pliant_validation::shells::{CLAMPED, FLAT, Specimen, symmetry};

@@ -2,9 +2,9 @@
 //! and Belytschko et al. (1985). Each number is the displacement over the reference of the literature; the expected ones are those
 //! that a prototype of the same formulas found (`data/shell/`).
 
-use pliant_corotational::element::{Bending, Formulation, Membrane};
-use pliant_corotational::{LoadKind, Spread};
 use pliant_geometry::Mesh;
+use pliant_implicit::element::{Bending, Formulation, Membrane};
+use pliant_implicit::{LoadKind, Spread};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Pattern, Sheet};
 use pliant_reproduce::CaseError;
 use pliant_reproduce::cases::obstacle_course::{self as course, CantileverCells};

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use pliant_corotational::element::{Elasticity, Formulation, Membrane};
-use pliant_corotational::{
+use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
+use pliant_implicit::element::{Elasticity, Formulation, Membrane};
+use pliant_implicit::{
     BackwardEuler, Constraint, DynamicSettings, LinearSolver, Load, LoadKind, Material, Model, Motion,
     Preconditioner, Shell, Spread, State, StaticSettings, Statics,
 };
-use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_validation::claim;
 use pliant_validation::shells::{FLAT, ramp, renumbered, triangles};

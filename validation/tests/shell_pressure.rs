@@ -4,9 +4,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use pliant_corotational::element::{Bending, Formulation, Membrane};
-use pliant_corotational::{Explicit, LoadKind, Spread, State, StaticSettings, Statics};
 use pliant_geometry::{Mesh, Vector3};
+use pliant_implicit::element::{Bending, Formulation, Membrane};
+use pliant_implicit::{Explicit, LoadKind, Spread, State, StaticSettings, Statics};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 use pliant_validation::shells::{FLAT, Specimen, symmetry};
 use pliant_validation::{Random, claim};

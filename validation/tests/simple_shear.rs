@@ -2,9 +2,10 @@
 //! right (Taylor et al. 2009). Reference: closed forms with fifty digits.
 //! *A*: F = I + γ e₂⊗e₁, which stretches fibres along e₁; *B*: F = I + γ e₁⊗e₂, which does not.
 
-use pliant_mechanics::Pack;
+use pliant_explicit::Pack;
+use pliant_explicit::Relaxation;
 use pliant_mechanics::law::Split;
-use pliant_mechanics::prony::{PronyUpdate, Relaxation};
+use pliant_mechanics::prony::PronyUpdate;
 use pliant_mechanics::tensor::Symmetric;
 use pliant_reproduce::cases::shear::{RATES, STEP, curves, data, deviation, law_of, rate_name};
 use pliant_validation::{claim, deformation, largest, liver_relaxation, numbers};

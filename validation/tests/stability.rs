@@ -1,13 +1,14 @@
 //! The largest stable step of deformed states, and runs whose steps are cut when it falls below them.
 
-use pliant_mechanics::critical_step::true_limit_at;
+use pliant_explicit::critical_step::true_limit_at;
+use pliant_explicit::stability::{KEEP, Monitor, OnUnstable};
+use pliant_explicit::{CentralDifference, Observable, State, StepError};
+use pliant_mechanics::Model;
 use pliant_mechanics::element::HEX_CORNERS;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Motion, Solid};
 use pliant_mechanics::prony::PronyUpdate;
-use pliant_mechanics::stability::{KEEP, Monitor, OnUnstable};
 use pliant_mechanics::tensor::{Tensor, Vector};
-use pliant_mechanics::{CentralDifference, Model, Observable, State, StepError};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 use pliant_validation::{
     HOURGLASS, Hexes, Random, Specimen, Tets, claim, elastic, largest, law, liver, liver_relaxation, run,

@@ -1,8 +1,8 @@
 //! Frictionless uniaxial stress along x: the lateral stretches are those at which the lateral stress vanishes.
 //! Reference: exact homogeneous solutions at forty stretches from 0.6 to 1.4, three tissues.
 
+use pliant_explicit::Observable;
 use pliant_geometry::Mesh;
-use pliant_mechanics::Observable;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::load::{LoadKind, face_areas};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};

@@ -5,9 +5,9 @@ use divan::{Bencher, counter::ItemsCount};
 use pliant_bench::{
     Clocked, HOURGLASS, Hexes, Specimen, Tets, Timed, deformation, elastic, liver, soft_tissue,
 };
+use pliant_explicit::{Scalar, State};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Averaging;
-use pliant_mechanics::{Real, State};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 
 fn main() {
@@ -28,7 +28,7 @@ fn stress(bencher: Bencher<'_, '_>, law: &str) {
 const EDGE: usize = 8;
 
 #[divan::bench(args = ["tet4", "tet4-anp", "hex8", "hex8-full"], types = [f32, f64])]
-fn step<R: Real>(bencher: Bencher<'_, '_>, element: &str) {
+fn step<R: Scalar>(bencher: Bencher<'_, '_>, element: &str) {
     let kind = if element.starts_with("tet4") { VolumeCell::Tet } else { VolumeCell::Hex };
     let mesh = Block::new([0.1; 3]).mesh(Resolution::Counts([EDGE; 3]), kind, DEFAULT_CELL_LIMIT);
     let mesh = mesh.unwrap_or_else(|error| panic!("{error}"));

@@ -5,8 +5,8 @@
 use std::error::Error;
 
 use pliant_bench::{Clocked, Specimen, Spread, Timed, elastic, soft_tissue};
+use pliant_explicit::State;
 use pliant_geometry::Mesh;
-use pliant_mechanics::State;
 use pliant_meshing::{Organ, Phantom, Stuffing, VolumeCell};
 
 /// Turns of all meshes.

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use pliant_explicit::{CentralDifference, Instructions, MissingInstructions, Scalar, State, StepError};
 use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure};
+use pliant_mechanics::Model;
 use pliant_mechanics::model::Contradiction;
-use pliant_mechanics::{CentralDifference, Instructions, MissingInstructions, Model, Real, State, StepError};
 
 /// What can be stepped against the clock.
 pub trait Timed {
@@ -42,7 +43,7 @@ pub struct Clocked<R> {
     state: State<R>,
 }
 
-impl<R: Real> Clocked<R> {
+impl<R: Scalar> Clocked<R> {
     /// A state of a model, to be advanced by steps of `step` seconds.
     ///
     /// # Errors
@@ -61,7 +62,7 @@ impl<R: Real> Clocked<R> {
 }
 
 /// On the current rayon pool.
-impl<R: Real> Timed for Clocked<R> {
+impl<R: Scalar> Timed for Clocked<R> {
     type Error = StepError;
 
     fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepError> {

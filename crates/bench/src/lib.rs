@@ -19,7 +19,7 @@ pub use case::{Case, Element, LawKind, Place, Precision, Threads, cases, find};
 pub use clock::{Clocked, ClockedOnDevice, Spread, Timed};
 pub use count::Count;
 pub use machine::Machine;
-pub use pliant_mechanics::Instructions;
+pub use pliant_explicit::Instructions;
 pub use rates::Rates;
 pub use report::{Cube, Fit, Limit, Report, Row};
 pub use specimen::{HOURGLASS, Hexes, Specimen, Tets};

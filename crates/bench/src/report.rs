@@ -1,7 +1,7 @@
 //! What was measured, as a table and as JSON.
 
+use pliant_explicit::Instructions;
 use pliant_gpu::{Adapter, DeviceRates};
-use pliant_mechanics::Instructions;
 use serde::Serialize;
 use serde_json::{Value, json};
 

@@ -1,8 +1,8 @@
 //! A specimen: a mesh of one material, held, moved and loaded by its faces. The faces of its bounding box are called
 //! `x-min`, `x-max`, `y-min`, `y-max`, `z-min` and `z-max`.
 
+use pliant_explicit::critical_step;
 use pliant_geometry::{CellKind, Mesh, Selection, boundary};
-use pliant_mechanics::critical_step;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};

@@ -6,10 +6,11 @@
 
 use std::sync::Arc;
 
+use pliant_explicit::{Instructions, MissingInstructions, Scalar, State, StepError};
 use pliant_gpu::{Device, DeviceRates, GpuError, StepFailure};
+use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::model::Contradiction;
-use pliant_mechanics::{Instructions, MissingInstructions, Model, Real, State, StepError};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::case::{Case, EDGE, Element, LawKind, Place, Precision, Threads};
@@ -248,13 +249,13 @@ fn squeezed(specimen: Specimen) -> Specimen {
 }
 
 /// Every cell squeezed alike.
-fn start<R: Real>(model: &Model) -> State<R> {
+fn start<R: Scalar>(model: &Model) -> State<R> {
     let displacement = model.rest.iter().map(|x| SQUEEZE.map(|by| R::of(by * x[0] / EDGE))).collect();
     State { displacement, ..State::at_rest(model) }
 }
 
 /// Wall times of a step on the current pool [s].
-fn on_processor<R: Real>(
+fn on_processor<R: Scalar>(
     case: &Case,
     model: &Arc<Model>,
     step: f64,

@@ -1,9 +1,9 @@
 //! Instants of a run as the device sees them, and their submission.
 
 use bytemuck::{Pod, Zeroable};
+use pliant_explicit::{Lengths, StepError};
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::Model;
-use pliant_mechanics::{Lengths, StepError};
 
 use crate::kernel::{Binding, Bound, Memory};
 use crate::solids::Four;

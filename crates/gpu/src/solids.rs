@@ -1,9 +1,9 @@
 //! Cells on the device: constants at rest, histories, and the kernels that find their forces.
 
+use pliant_explicit::Relaxation;
+use pliant_explicit::{History, PACK};
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, LocalNodes, Solid};
-use pliant_mechanics::prony::Relaxation;
 use pliant_mechanics::tensor::Vector;
-use pliant_mechanics::{History, PACK};
 
 use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory};
 use crate::paths::{CORNERS, EACH_CELL, Paths};

@@ -3,14 +3,15 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
 
-use pliant_mechanics::grip::Grip;
-use pliant_mechanics::model::{FREE, Model};
-use pliant_mechanics::stability::{Monitor, Stability};
-use pliant_mechanics::tensor::Vector;
-use pliant_mechanics::{
-    CentralDifference, Deformed, Energies, Lengths, Observable, State, StepControl, StepError, Sums,
+use pliant_explicit::stability::{Monitor, Stability};
+use pliant_explicit::{
+    CentralDifference, Deformed, Lengths, Observable, State, StepControl, StepError, Sums,
     model_balance_floor,
 };
+use pliant_mechanics::Energies;
+use pliant_mechanics::grip::Grip;
+use pliant_mechanics::model::{FREE, Model};
+use pliant_mechanics::tensor::Vector;
 
 use crate::blocks::NodeBlocks;
 use crate::grips::DeviceGrips;
@@ -228,12 +229,12 @@ impl GpuStepper {
     }
 
     /// How another stepper goes on from a state of this one.
-    pub fn clock(&self, state: &State<f32>) -> pliant_mechanics::Clock {
+    pub fn clock(&self, state: &State<f32>) -> pliant_explicit::Clock {
         self.control.clock(state)
     }
 
     /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the velocities there.
-    pub fn go_on(&mut self, clock: &pliant_mechanics::Clock, step: f64, state: &State<f32>) {
+    pub fn go_on(&mut self, clock: &pliant_explicit::Clock, step: f64, state: &State<f32>) {
         self.control.go_on(clock, step, state);
     }
 

@@ -8,16 +8,13 @@
 mod compute;
 mod support;
 
-#[path = "../../mechanics/src/law/samples.rs"]
-mod samples;
-
 use compute::compute;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use pliant_gpu::Device;
 use pliant_mechanics::Number;
+use pliant_mechanics::law::samples::{every_law, law, merged, term};
 use pliant_mechanics::law::{AnyLaw, Deformation};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, cross, dot, scale, sub};
-use samples::{every_law, law, merged, term};
 use serde_json::json;
 
 const EPSILON: f64 = f32::EPSILON as f64;

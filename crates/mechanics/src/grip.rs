@@ -43,12 +43,7 @@ impl Grip {
     }
 
     /// Adds its forces on the nodes [N].
-    pub(crate) fn add_forces<R: Real>(
-        &self,
-        model: &Model,
-        displacement: &[Vector<R>],
-        to: &mut [Vector<f64>],
-    ) {
+    pub fn add_forces<R: Real>(&self, model: &Model, displacement: &[Vector<R>], to: &mut [Vector<f64>]) {
         let force = self.force(model, displacement);
         for &(node, weight) in &self.nodes {
             to[node as usize] = add(to[node as usize], scale(force, weight));

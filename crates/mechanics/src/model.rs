@@ -3,7 +3,6 @@
 
 use std::ops::Range;
 
-use crate::critical_step::cell_bound;
 use crate::curve::Curve;
 use crate::element::{GaussPoints, HEX_EDGES, Hex8, Rest, gauss_points, hex8, tet4};
 use crate::law::AnyLaw;
@@ -36,7 +35,8 @@ pub struct Model {
     pub initial_velocity: Vec<Vector<f64>>,
 }
 
-/// Mass that is added to the fastest cells so that none has an element bound below a step; see [`Model::scale_mass`].
+/// Mass that is added to the fastest cells so that none has an element bound below a step; `pliant-explicit` finds it
+/// (`critical_step::scale_mass`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MassScaling {
     /// The smallest element bound with it [s].
@@ -148,6 +148,8 @@ pub enum Averaging {
 }
 
 /// Runs `$body` with `$bound` the concrete [`CellBlock`].
+#[doc(hidden)]
+#[macro_export]
 macro_rules! with_cells {
     ($cells:expr, $bound:ident => $body:expr) => {
         match $cells {
@@ -156,7 +158,7 @@ macro_rules! with_cells {
         }
     };
 }
-pub(crate) use with_cells;
+pub use with_cells;
 
 /// Cells of `N` nodes at rest, struct of arrays.
 #[derive(Clone, Debug)]
@@ -290,7 +292,7 @@ impl Cells {
     }
 
     /// Number of averaged pressures.
-    pub(crate) fn averaged_pressures(&self) -> usize {
+    pub fn averaged_pressures(&self) -> usize {
         match self {
             Self::AveragedTet4(block, Averaging::Nodal) => LocalNodes::new(block).len(),
             Self::AveragedTet4(..) | Self::FullHex8(..) if self.averages_pressure() => self.len(),
@@ -327,11 +329,7 @@ impl Cells {
     }
 
     /// The corner of a hexahedron at which det F is least, as its node and that determinant; `None` of tetrahedra.
-    pub(crate) fn worst_corner(
-        &self,
-        cell: usize,
-        displacement: impl Fn(u32) -> Vector<f64>,
-    ) -> Option<(u32, f64)> {
+    pub fn worst_corner(&self, cell: usize, displacement: impl Fn(u32) -> Vector<f64>) -> Option<(u32, f64)> {
         let (Self::Hex8(block) | Self::FullHex8(block, _)) = self else { return None };
         let (nodes, rest) = (&block.nodes[cell], &block.offsets[cell]);
         let volume = |x: &[Vector<f64>; 8], corner: usize| {
@@ -350,7 +348,7 @@ impl Cells {
     }
 
     /// c μ [Pa] of a cell's hourglass control; 0 without.
-    pub(crate) fn hourglass_modulus(&self, cell: usize) -> f64 {
+    pub fn hourglass_modulus(&self, cell: usize) -> f64 {
         let of_block = |block: &CellBlock<8>| {
             let stiffness = block.hourglass.as_ref().map_or(0.0, |control| control.stiffness[cell]);
             8.0 * stiffness / (block.rest[cell].volume * block.rest[cell].gradient_square_sum())
@@ -547,13 +545,13 @@ impl Motion {
 
 /// The amplitudes of a component.
 #[inline(always)]
-pub(crate) fn component([first, second]: &Amplitudes, c: usize) -> [f64; 2] {
+pub fn component([first, second]: &Amplitudes, c: usize) -> [f64; 2] {
     [first[c], second[c]]
 }
 
 /// A component of a displacement [m] from its amplitudes and factors.
 #[inline(always)]
-pub(crate) fn placed(amplitudes: [f64; 2], factors: [f64; 2]) -> f64 {
+pub fn placed(amplitudes: [f64; 2], factors: [f64; 2]) -> f64 {
     amplitudes[0] * factors[0] + amplitudes[1] * factors[1]
 }
 
@@ -586,10 +584,6 @@ pub struct Contradiction {
     pub component: usize,
 }
 
-fn mass_factor(solid: &Solid, cell: usize, target_step: f64) -> f64 {
-    (target_step / cell_bound(solid, cell)).powi(2).max(1.0)
-}
-
 /// No constraint on a component of a node.
 pub const FREE: u32 = u32::MAX;
 
@@ -611,31 +605,6 @@ impl Model {
             }
         }
         self.solids.push(solid);
-    }
-
-    /// Makes every cell whose element bound lies below `target_step` [s] so much heavier that its bound equals it, once
-    /// all solids are there. What is added counts for inertia (and with it for mass-proportional damping) only: loads and
-    /// gravity act on the mass of the material, so that equilibria and their reactions stay what they are.
-    pub fn scale_mass(&mut self, target_step: f64) {
-        let mut added = vec![0.0; self.node_count()];
-        let mut cells = 0;
-        for solid in &self.solids {
-            for cell in 0..solid.cells.len() {
-                let factor = mass_factor(solid, cell, target_step);
-                if factor > 1.0 {
-                    let nodes = solid.cells.nodes(cell);
-                    let share = solid.material.density * solid.cells.volume(cell) / nodes.len() as f64;
-                    nodes.iter().for_each(|&node| added[node as usize] += (factor - 1.0) * share);
-                    cells += 1;
-                }
-            }
-        }
-        self.mass_scaling = Some(MassScaling { target_step, added, cells });
-    }
-
-    /// The factor by which mass scaling makes a cell heavier.
-    pub(crate) fn mass_factor(&self, solid: &Solid, cell: usize) -> f64 {
-        self.mass_scaling.as_ref().map_or(1.0, |scaling| mass_factor(solid, cell, scaling.target_step))
     }
 
     /// The mass [kg] with which a node resists acceleration: that of the material and what mass scaling adds.

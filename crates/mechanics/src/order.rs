@@ -3,17 +3,21 @@
 //! the order in the user's mesh. Within a block each lane of the packs walks through a corner of its own, so that cells
 //! side by side rarely share a node: of a row of tets around one edge each sum would wait for the one before.
 
-use crate::forces::BLOCK;
-use crate::lanes::PACK;
 use crate::tensor::Vector;
 
+/// Cells whose forces are computed side by side: a pack of kernels.
+pub const LANES: usize = 16;
+
+/// Cells of a block.
+pub const BLOCK_CELLS: usize = 64 * LANES;
+
 /// The cells in order, from their centres [m].
-pub(crate) fn order(centres: &[Vector<f64>]) -> Vec<u32> {
+pub fn order(centres: &[Vector<f64>]) -> Vec<u32> {
     let mut cells: Vec<u32> = (0..centres.len() as u32).collect();
-    bisect(&mut cells, centres, BLOCK * PACK);
+    bisect(&mut cells, centres, BLOCK_CELLS);
     let mut ordered = Vec::with_capacity(cells.len());
-    for block in cells.chunks_mut(BLOCK * PACK) {
-        let corner = block.len().div_ceil(PACK);
+    for block in cells.chunks_mut(BLOCK_CELLS) {
+        let corner = block.len().div_ceil(LANES);
         bisect(block, centres, corner);
         block.chunks_mut(corner).for_each(<[u32]>::sort_unstable);
         for k in 0..corner {
@@ -78,10 +82,10 @@ mod tests {
         let largest = |cells: &[u32]| (0..3).map(|axis| extent(cells, axis)).fold(0.0, f64::max);
         // A block fills its box.
         let volume = |cells: &[u32]| (0..3).map(|axis| extent(cells, axis)).product::<f64>();
-        assert!(ordered.chunks(BLOCK * PACK).all(|block| volume(block) == (BLOCK * PACK) as f64));
+        assert!(ordered.chunks(BLOCK_CELLS).all(|block| volume(block) == (BLOCK_CELLS) as f64));
         // Cells that share no node are two apart.
         let sharing =
-            ordered.chunks(PACK).flat_map(|pack| pack.windows(2)).filter(|pair| largest(pair) < 3.0);
+            ordered.chunks(LANES).flat_map(|pack| pack.windows(2)).filter(|pair| largest(pair) < 3.0);
         assert!(sharing.count() * 10 < centres.len());
     }
 }

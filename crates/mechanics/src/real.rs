@@ -5,13 +5,8 @@ use std::fmt::Debug;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use pulp::Simd;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-
-use crate::forces::ForceField;
-use crate::lanes::{Lanes, WideF32, WideF64};
-use crate::model::Solid;
 
 /// What laws, tensors and elements compute with: a real number, or a lane's worth of them side by side.
 pub trait Number:
@@ -58,40 +53,29 @@ pub trait Number:
     fn copysign(self, sign: Self) -> Self;
 }
 
-/// A real number that the kernels can run in; by itself the narrowest of lanes.
-pub trait Real: Number + Lanes<Self> + Default + PartialOrd + Serialize + DeserializeOwned + Sum {
+/// A real number: single or double precision.
+pub trait Real: Number + Default + PartialOrd + Serialize + DeserializeOwned + Sum {
     /// Relative spacing of the numbers near one.
     const EPSILON: f64;
     /// The word for it in reports: `single` or `double`.
     const PRECISION: &'static str;
-    /// As many of them as a register of the processor holds.
-    #[doc(hidden)]
-    type Wide<S: Simd>: Lanes<Self>;
     /// As `f64`, exactly.
     fn to_f64(self) -> f64;
-    /// The forces of a solid in this number type. A method, so that the kernels of all laws and elements are compiled
-    /// once, here, and not again in every crate that steps a model.
-    #[doc(hidden)]
-    fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>>;
 }
 
 /// A step of Householder's method of third order: with r = 1 − x y³, y ← y (1 + r/3 + 2r²/9), which leaves 14/3 of the
 /// third power of the relative error.
 #[inline(always)]
-pub(crate) fn closer_to_inverse_cbrt<N: Number>(x: N, y: N) -> N {
+pub fn closer_to_inverse_cbrt<N: Number>(x: N, y: N) -> N {
     let r = (x * y).mul_add(-(y * y), N::ONE);
     (y * r).mul_add(r.mul_add(N::of(2.0 / 9.0), N::of(1.0 / 3.0)), y)
 }
 
 macro_rules! real {
-    ($type:ty, $wide:ident, $precision:literal, $guess:expr, $iterations:literal) => {
+    ($type:ty, $precision:literal, $guess:expr, $iterations:literal) => {
         impl Real for $type {
             const EPSILON: f64 = <$type>::EPSILON as f64;
             const PRECISION: &'static str = $precision;
-            type Wide<S: Simd> = $wide<S>;
-            fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>> {
-                crate::forces::force_field(solid, step)
-            }
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 f64::from(self)
@@ -147,8 +131,8 @@ macro_rules! real {
     };
 }
 
-real!(f32, WideF32, "single", 1_419_916_000, 2);
-real!(f64, WideF64, "double", 1_430_188_294 << 32, 3);
+real!(f32, "single", 1_419_916_000, 2);
+real!(f64, "double", 1_430_188_294 << 32, 3);
 
 #[cfg(test)]
 mod tests {

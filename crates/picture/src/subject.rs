@@ -4,9 +4,10 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
+use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, cell_label, vector_area, volume};
+
 use crate::colour::label_colour;
 use crate::lines::{Fibres, Line, outline};
-use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, cell_label, vector_area, volume};
 
 /// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
 const SHARP: f64 = 0.26;

@@ -1,9 +1,9 @@
 //! One result of the literature: what it shows, what was corrected in it, and what comes out here.
 
-use pliant_corotational::{ModelError, SolveError};
+use pliant_explicit::{RelaxationError, StepError};
 use pliant_gpu::{GpuError, StepFailure};
+use pliant_implicit::{ModelError, SolveError};
 use pliant_mechanics::model::Contradiction;
-use pliant_mechanics::{RelaxationError, StepError};
 use pliant_meshing::MeshingError;
 use pliant_scene::diagnostic::SceneErrors;
 use serde::Serialize;

@@ -1,10 +1,11 @@
 //! Running a model from rest, through its history or to its equilibrium.
 
+use pliant_explicit::{
+    CentralDifference, DynamicRelaxation, Observable, RelaxationSettings, Scalar, State, StepError,
+};
+use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::tensor::{Vector, dot};
-use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Model, Observable, Real, RelaxationSettings, State, StepError,
-};
 
 use crate::CaseError;
 
@@ -13,7 +14,7 @@ use crate::CaseError;
 ///
 /// # Errors
 /// If a step fails or constraints contradict each other.
-pub fn run<R: Real>(
+pub fn run<R: Scalar>(
     model: &Model,
     step: f64,
     until: f64,
@@ -26,7 +27,7 @@ pub fn run<R: Real>(
 ///
 /// # Errors
 /// If a step fails.
-pub fn run_on<R: Real>(
+pub fn run_on<R: Scalar>(
     mut stepper: CentralDifference<R>,
     mut state: State<R>,
     until: f64,

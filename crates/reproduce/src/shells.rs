@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use pliant_corotational::element::{Bending, Elasticity, Formulation, Membrane};
-use pliant_corotational::{
+use pliant_geometry::{Mesh, Vector3};
+use pliant_implicit::element::{Bending, Elasticity, Formulation, Membrane};
+use pliant_implicit::{
     Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
 };
-use pliant_geometry::{Mesh, Vector3};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 

@@ -1,8 +1,8 @@
 //! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what is on, to take a
 //! smaller step where steps are kept below the limit, or to damp more where damping is the trouble.
 
-use pliant_mechanics::stability::OnUnstable;
-use pliant_mechanics::{Real, State};
+use pliant_explicit::stability::OnUnstable;
+use pliant_explicit::{Scalar, State};
 
 use crate::assemble::Built;
 use crate::format::{Precision, SolverName};
@@ -15,7 +15,7 @@ use crate::scene::Scene;
 const RESOLVED: f64 = 1.0;
 
 /// The remedy of a failed explicit step, where the run's state says more than the failure itself.
-pub(crate) fn remedy<R: Real>(
+pub(crate) fn remedy<R: Scalar>(
     failure: &FailureSummary,
     scene: &Scene,
     built: &Built,

@@ -1,7 +1,7 @@
 //! The stable step of a mesh by itself, for a material that it might be of.
 
+use pliant_explicit::critical_step::cell_bound;
 use pliant_geometry::{CellBlock, CellKind, Mesh};
-use pliant_mechanics::critical_step::cell_bound;
 use pliant_mechanics::model::{Cells, Material, Solid};
 
 /// The smallest element bound [s] over the tets and hexes of a mesh, all of one material; `None` without any.

@@ -8,8 +8,9 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use pliant_explicit::{Scalar, State};
 use pliant_geometry::io::read_limited;
-use pliant_mechanics::{Real, State, fingerprint};
+use pliant_mechanics::fingerprint;
 use serde::{Deserialize, Serialize};
 
 use crate::assemble::Built;
@@ -420,7 +421,7 @@ impl Checkpoint {
     }
 
     /// The state, if it has the sizes of the model's.
-    pub(crate) fn moment<R: Real>(&self, built: &Built) -> Option<Moment<R>> {
+    pub(crate) fn moment<R: Scalar>(&self, built: &Built) -> Option<Moment<R>> {
         let moment: Moment<R> = postcard::from_bytes(&self.moment).ok()?;
         let rest = State::<R>::at_rest(&built.model);
         let sizes = |state: &State<R>| {
@@ -469,7 +470,7 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// Writes one, and removes those before the last two.
-    pub fn write<R: Real>(
+    pub fn write<R: Scalar>(
         &self,
         progressed: &Progressed,
         state: &State<R>,
@@ -489,7 +490,7 @@ impl<'a> Checkpoints<'a> {
     }
 }
 
-fn encode<R: Real>(
+fn encode<R: Scalar>(
     origin: &Origin,
     progressed: &Progressed,
     state: &State<R>,
@@ -527,7 +528,7 @@ fn checkpoints_in(folder: &Path) -> std::io::Result<Vec<(u64, PathBuf)>> {
 
 #[cfg(test)]
 mod tests {
-    use pliant_mechanics::Equilibrium;
+    use pliant_explicit::Equilibrium;
 
     use super::*;
     use crate::plan::plan;

@@ -5,13 +5,14 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
-use pliant_corotational as corotational;
-use pliant_corotational::{
+use pliant_explicit::{Observable, State};
+use pliant_gpu::Wanted;
+use pliant_implicit as corotational;
+use pliant_implicit::{
     BackwardEuler, DynamicSettings, Explicit, Forces, Integrator, LinearSolver, Phases, Preconditioner,
     SolveError, StaticSettings, Statics,
 };
-use pliant_gpu::Wanted;
-use pliant_mechanics::{Energies, Observable, State};
+use pliant_mechanics::Energies;
 use serde::{Deserialize, Serialize};
 
 use crate::assemble::{Built, Control, Corotational, Stop};

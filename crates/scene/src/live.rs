@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use pliant_explicit::{Clock, Scalar, State};
 use pliant_geometry::Mesh;
 use pliant_gpu::{DeviceMapping, DevicePoints, PointValue, Wanted};
+use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
-use pliant_mechanics::{Clock, Energies, Real, State};
 
 use crate::assemble::Built;
 use crate::checkpoint::Moment;
@@ -97,7 +98,7 @@ enum Numbers {
 }
 
 /// The number types that runs compute in.
-trait Numeric: Real {
+trait Numeric: Scalar {
     fn kept(moment: Moment<Self>) -> Numbers;
     fn taken(numbers: Numbers) -> Option<Moment<Self>>;
 }
@@ -252,7 +253,7 @@ impl<R: Numeric> Played<R> {
     }
 }
 
-fn snapshot<R: Real>(built: &Built, shown: &VtuTable) -> Snapshot<R> {
+fn snapshot<R: Scalar>(built: &Built, shown: &VtuTable) -> Snapshot<R> {
     Snapshot::new(built, shown.on.as_deref(), &shown.data, shown.at, shown.curved)
 }
 

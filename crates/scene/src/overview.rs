@@ -2,8 +2,8 @@
 
 use std::fmt::{self, Write};
 
-use pliant_corotational::Facet;
 use pliant_geometry::QualityReport;
+use pliant_implicit::Facet;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
 
@@ -168,8 +168,8 @@ fn write_corotational(page: &mut String, part: &Corotational, name: &str, built:
 }
 
 /// What a load does at its full size.
-fn describe_corotational_load(kind: &pliant_corotational::LoadKind) -> String {
-    use pliant_corotational::LoadKind;
+fn describe_corotational_load(kind: &pliant_implicit::LoadKind) -> String {
+    use pliant_implicit::LoadKind;
     let vector = |v: &nalgebra::Vector3<f64>| format!("({})", [v.x, v.y, v.z].map(number).join(", "));
     match kind {
         LoadKind::Force { nodes, force } => {

@@ -1,7 +1,7 @@
 //! Which time step a run takes: from the mesh and the laws, or as the user asks, held against the true limit.
 
-use pliant_corotational::Explicit;
-use pliant_mechanics::critical_step::{ElementBound, TrueLimit, element_bound, true_limit};
+use pliant_explicit::critical_step::{ElementBound, TrueLimit, element_bound, true_limit};
+use pliant_implicit::Explicit;
 use serde::Serialize;
 
 use crate::assemble::{Built, Corotational};

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use pliant_explicit::stability::Stability;
+use pliant_explicit::{Observable, Scalar, State};
 use pliant_gpu::Wanted;
-use pliant_mechanics::stability::Stability;
-use pliant_mechanics::{Energies, Observable, Real, State};
+use pliant_mechanics::Energies;
 use serde::{Deserialize, Serialize};
 
 use crate::advice::remedy;
@@ -210,7 +211,7 @@ fn write_pages(
     written.map(|_| ())
 }
 
-fn go<'a, R: Real>(
+fn go<'a, R: Scalar>(
     scene: &'a Scene,
     built: &'a Built,
     plan: &'a Plan,
@@ -303,7 +304,7 @@ fn go<'a, R: Real>(
 }
 
 /// Where the run begins: at rest, or where a checkpoint was.
-fn beginning<R: Real>(
+fn beginning<R: Scalar>(
     built: &Built,
     folder: &OutputFolder,
     options: Options<'_>,
@@ -350,7 +351,7 @@ struct Course<'a, R> {
     kept: Option<PathBuf>,
 }
 
-impl<'a, R: Real> Course<'a, R> {
+impl<'a, R: Scalar> Course<'a, R> {
     /// At the start, or where a checkpoint was.
     fn new(
         scene: &'a Scene,
@@ -515,7 +516,7 @@ fn frame<'a, R>(built: &'a Built, state: &'a State<R>, solver: &'a dyn Solver<R>
     Frame { built, state, stepper: solver.observable(), corotational: solver.corotational() }
 }
 
-fn look<R: Real>(
+fn look<R: Scalar>(
     watching: &mut [Scheduled<R>],
     frame: &Frame<'_, R>,
     step: f64,
@@ -530,7 +531,7 @@ fn look<R: Real>(
 }
 
 impl History {
-    fn sample<R: Real>(&mut self, built: &Built, stepper: &dyn Observable<R>, state: &State<R>) {
+    fn sample<R: Scalar>(&mut self, built: &Built, stepper: &dyn Observable<R>, state: &State<R>) {
         self.times.push(state.time);
         self.energies.push(*stepper.energies());
         let size = |constraint| stepper.reaction(constraint).iter().map(|f| f * f).sum::<f64>().sqrt();

@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
+use pliant_explicit::stability::Monitor;
+use pliant_explicit::{
+    CentralDifference, Clock, DynamicRelaxation, Equilibrium, Iteration, Observable, RelaxationSettings,
+    Scalar, State,
+};
 use pliant_gpu::{Device, DeviceMapping, GpuStepper, PointValue, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
-use pliant_mechanics::stability::Monitor;
-use pliant_mechanics::{
-    CentralDifference, Clock, DynamicRelaxation, Equilibrium, Iteration, Observable, Real,
-    RelaxationSettings, State,
-};
 
 use serde::{Deserialize, Serialize};
 
@@ -172,7 +172,7 @@ pub(crate) trait Solver<R>: Send {
     fn go_on(&mut self, _clock: &Clock, _step: f64, _state: &State<R>) {}
 
     /// Of shells and co-rotational solids: their state, with rotations.
-    fn corotational(&self) -> Option<&pliant_corotational::State> {
+    fn corotational(&self) -> Option<&pliant_implicit::State> {
         None
     }
 
@@ -210,7 +210,7 @@ fn monitor(run: &RunTable, built: &Built, plan: &Plan) -> Option<Monitor> {
 }
 
 /// The solver that a scene asks for, on the processor.
-pub(crate) fn on_processor<R: Real>(
+pub(crate) fn on_processor<R: Scalar>(
     run: &RunTable,
     built: &Built,
     plan: &Plan,
@@ -329,7 +329,7 @@ impl Solver<f32> for GpuStepper {
     }
 }
 
-impl<R: Real> Solver<R> for CentralDifference<R> {
+impl<R: Scalar> Solver<R> for CentralDifference<R> {
     fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
         CentralDifference::evaluate(self, state).map_err(|error| FailureSummary::from(&error))
     }
@@ -380,7 +380,7 @@ struct LoadSteps<R> {
     tolerance: f64,
 }
 
-impl<R: Real> Solver<R> for LoadSteps<R> {
+impl<R: Scalar> Solver<R> for LoadSteps<R> {
     /// At the start the equilibrium of what acts there already; others are found when they are gone to.
     fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
         let begun = self.relaxation.begin(state);

@@ -1,11 +1,12 @@
 //! The stepper on a device against the one of the processor in double precision.
 
 use crate::cube::smooth;
+use pliant_explicit::{CentralDifference, Observable, State, critical_step};
 use pliant_gpu::{Design, Device, GpuStepper, Wanted};
+use pliant_mechanics::Energies;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::Vector;
-use pliant_mechanics::{CentralDifference, Energies, Observable, State, critical_step};
 
 /// Steps of a comparison.
 const STEPS: u64 = 200;

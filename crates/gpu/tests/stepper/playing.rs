@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use pliant_explicit::{CentralDifference, Observable, State};
 use pliant_gpu::{Design, PointValue, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Model;
-use pliant_mechanics::{CentralDifference, Observable, State};
 
 use crate::against::{designs, distance, double, step_of, stepper};
 use crate::cube::{elastic, moved_cube, neo_hookean};

@@ -32,8 +32,8 @@ mod yeoh;
 
 #[cfg(test)]
 mod battery;
-#[cfg(test)]
-pub(crate) mod samples;
+#[doc(hidden)]
+pub mod samples;
 
 pub use arruda_boyce::ArrudaBoyce;
 pub use coupled_neo_hookean::CoupledNeoHookean;
@@ -187,12 +187,14 @@ macro_rules! registry {
         }
 
         /// Runs `$body` with `$bound` the concrete law, so that a kernel is compiled for each.
+        #[doc(hidden)]
+        #[macro_export]
         macro_rules! with_law {
             ($any:expr, $bound:ident => $body:expr) => {
                 match $any { $($crate::law::AnyLaw::$law($bound) => $body,)* }
             };
         }
-        pub(crate) use with_law;
+        pub use with_law;
     };
 }
 

@@ -1,15 +1,22 @@
-//! The laws that tests run, here and in `pliant-gpu`, which takes this file too. A new law is one line in [`every_law`].
+//! The laws that tests run, here, in `pliant-explicit` and in `pliant-gpu`. A new law is one line in [`every_law`].
 
 use serde_json::{Value, json};
 
 use super::AnyLaw;
 
-pub(crate) fn law(name: &str, parameters: Value) -> AnyLaw {
-    AnyLaw::from_json(name, parameters).unwrap()
+/// The law of a name with its parameters.
+///
+/// # Panics
+/// If they do not fit.
+pub fn law(name: &str, parameters: Value) -> AnyLaw {
+    AnyLaw::from_json(name, parameters).unwrap_or_else(|error| panic!("`{name}`: {error}"))
 }
 
 /// Every law, and those with a choice of volumetric energies with each of them.
-pub(crate) fn every_law() -> Vec<AnyLaw> {
+///
+/// # Panics
+/// If a law of the registry is missing here.
+pub fn every_law() -> Vec<AnyLaw> {
     let with_moduli = |extra: Value| merged(json!({ "shear-modulus": 0.7, "bulk-modulus": 5.0 }), extra);
     let with_bulk = |extra: Value| merged(json!({ "bulk-modulus": 5.0 }), extra);
     let parameters = [
@@ -45,7 +52,8 @@ pub(crate) fn every_law() -> Vec<AnyLaw> {
         assert!(parameters.iter().any(|(known, _)| known == name), "`{name}` is missing from the samples");
     }
     let with_every_volume = |(name, parameters): &(&str, Value)| -> Vec<AnyLaw> {
-        let choice = AnyLaw::schema(name).unwrap().pointer("/properties/volumetric").is_some();
+        let choice =
+            AnyLaw::schema(name).is_some_and(|schema| schema.pointer("/properties/volumetric").is_some());
         let energies: &[&str] =
             if choice { &["quadratic", "quad-log", "ln-squared", "j-ln-j"] } else { &["quadratic"] };
         let with = |energy: &&str| merged(parameters.clone(), json!({ "volumetric": energy }));
@@ -54,12 +62,17 @@ pub(crate) fn every_law() -> Vec<AnyLaw> {
     parameters.iter().flat_map(with_every_volume).collect()
 }
 
-pub(crate) fn merged(mut parameters: Value, extra: Value) -> Value {
+/// Two tables in one.
+///
+/// # Panics
+/// If one of them is no table.
+pub fn merged(mut parameters: Value, extra: Value) -> Value {
     let (Value::Object(all), Value::Object(extra)) = (&mut parameters, extra) else { panic!("not a table") };
     all.extend(extra);
     parameters
 }
 
-pub(crate) fn term(modulus: f64, exponent: f64) -> Value {
+/// A term of Ogden's law: its shear modulus [Pa] and exponent.
+pub fn term(modulus: f64, exponent: f64) -> Value {
     json!({ "shear-modulus": modulus, "exponent": exponent })
 }

@@ -1,8 +1,8 @@
 //! Brain shift on an ellipsoid: half axes 80, 65 and 60 mm about the origin, held by the skull below z = −12 mm, pressed
 //! inwards where it is opened around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
 
+use pliant_explicit::Observable;
 use pliant_geometry::{CellKind, DataArray, Locator, Mesh, Vector3, boundary, relative_acoustic_length};
-use pliant_mechanics::Observable;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::model::{Averaging, Constraint, Motion};
 use pliant_mechanics::tensor::{Vector, dot, sub};

@@ -3,8 +3,8 @@
 //! meets all alike; the median counts.
 
 use pliant_bench::{Clocked, ClockedOnDevice, Spread, Timed};
+use pliant_explicit::State;
 use pliant_gpu::{Design, Device, GpuError};
-use pliant_mechanics::State;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::{Prony, PronyUpdate};

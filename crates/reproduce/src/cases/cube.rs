@@ -1,6 +1,6 @@
 //! The thesis's cube [0, 0.1 m]³ between glued platens, compressed along x: figure 6.5 and the converged answer at 20 %.
 
-use pliant_mechanics::Observable;
+use pliant_explicit::Observable;
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::tensor::Vector;

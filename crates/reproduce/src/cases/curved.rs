@@ -3,9 +3,9 @@
 //! normal of each facet, which leaves gaps between facets that are not coplanar.
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion};
-use pliant_corotational::element::Formulation;
-use pliant_corotational::{CurvedSurface, EdgeRule, Model, Patch, Picture, Place, State};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
+use pliant_implicit::element::Formulation;
+use pliant_implicit::{CurvedSurface, EdgeRule, Model, Patch, Picture, Place, State};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};

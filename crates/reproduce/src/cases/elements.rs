@@ -4,8 +4,8 @@
 //! Cantilever 0.08 × 0.03 × 0.03 m, half of it modelled, E = 20 kPa, ρ = 1000: tip (0.08, 0, 0.03) sinks by
 //! 34.85 ± 0.15 mm. Cube of 0.1 m, an eighth of it modelled, E = 3 kPa: F = 9.15 ± 0.15 N, bulge 7.57 ± 0.08 mm.
 
+use pliant_explicit::Observable;
 use pliant_geometry::Mesh;
-use pliant_mechanics::Observable;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Averaging;
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};

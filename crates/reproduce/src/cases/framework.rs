@@ -3,7 +3,7 @@
 //! interleaved, so that what else the machine does meets both alike.
 
 use pliant_bench::{Clocked, Spread, Timed};
-use pliant_mechanics::State;
+use pliant_explicit::State;
 use pliant_scene::source::Source;
 use pliant_scene::{Built, OutputFolder, Plan, SAFETY, Scene};
 use rayon::ThreadPoolBuilder;

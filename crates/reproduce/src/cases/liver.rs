@@ -4,11 +4,11 @@
 //! There are no numbers to compare with. What holds instead: once relaxed, the tissue stands where an elastic one of
 //! modulus (1 − α) μ, (1 − α) η and the same κ stands in equilibrium, which another solver finds.
 
+use pliant_explicit::recover::Recovery;
+use pliant_explicit::{DynamicRelaxation, Observable, RelaxationSettings, Scalar, State};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{Cells, Model};
 use pliant_mechanics::prony::Prony;
-use pliant_mechanics::recover::Recovery;
-use pliant_mechanics::{DynamicRelaxation, Observable, Real, RelaxationSettings, State};
 use pliant_scene::source::Source;
 use pliant_scene::{Built, Scene};
 use serde_json::json;
@@ -47,12 +47,12 @@ struct Stretched {
 }
 
 impl Stretched {
-    fn new<R: Real>(model: &Model, state: &State<R>, observable: &dyn Observable<R>) -> Self {
+    fn new<R: Scalar>(model: &Model, state: &State<R>, observable: &dyn Observable<R>) -> Self {
         let recovery = Recovery::new(model, state);
         let cells = model.solids[0].cells.len();
         let pull = model.constraints.iter().position(|constraint| constraint.name == "pull").unwrap_or(0);
         Self {
-            displacement: state.displacement.iter().map(|u| u.map(Real::to_f64)).collect(),
+            displacement: state.displacement.iter().map(|u| u.map(R::to_f64)).collect(),
             stress: (0..cells).map(|cell| recovery.cell(0, cell).von_mises()).collect(),
             force: observable.reaction(pull).iter().map(|f| f * f).sum::<f64>().sqrt(),
         }

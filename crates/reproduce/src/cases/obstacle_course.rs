@@ -3,8 +3,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use pliant_corotational::element::Formulation;
 use pliant_geometry::Mesh;
+use pliant_implicit::element::Formulation;
 use pliant_meshing::{Pattern, Sheet};
 
 use super::plate;

@@ -1,9 +1,9 @@
 //! Table 8.1: the thesis's clamped plate under uniform load. L = 10 m, h = 0.1 m, E = 1.092 MPa, ν = 0.3, so D = 100 N m; by linear theory
 //! its centre sinks by 0.126532 q.
 
-use pliant_corotational::element::{Bending, Formulation, Membrane};
-use pliant_corotational::{LoadKind, State, StaticSettings, Statics};
 use pliant_geometry::Mesh;
+use pliant_implicit::element::{Bending, Formulation, Membrane};
+use pliant_implicit::{LoadKind, State, StaticSettings, Statics};
 use pliant_meshing::{Pattern, Sheet};
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};

@@ -2,7 +2,7 @@
 //! relaxes with τ = 0.58 s. Reference: quasi-static, quadratic hexahedra, without inertia; so the shape of the decay
 //! compares, F(t)/F(5 s), once the waves of the ramp have gone.
 
-use pliant_mechanics::Observable;
+use pliant_explicit::Observable;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Material;

@@ -2,11 +2,11 @@
 //! *A*: F = I + γ e₂⊗e₁, which stretches the fibres; *B*: F = I + γ e₁⊗e₂, which does not.
 //! References: closed forms with fifty digits (Taylor et al. 2009 with the factor 2 put right).
 
+use pliant_explicit::recover::Recovery;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::{Prony, PronyUpdate};
-use pliant_mechanics::recover::Recovery;
 use pliant_mechanics::tensor::Symmetric;
 use pliant_meshing::VolumeCell;
 use serde_json::{Value, json};

@@ -5,12 +5,12 @@
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
-use pliant_corotational::element::Elasticity;
-use pliant_corotational::{
+use pliant_geometry::Vector3;
+use pliant_implicit::element::Elasticity;
+use pliant_implicit::{
     BackwardEuler, Constraint, DynamicSettings, LinearSolver, Load, LoadKind, Material, Model, Motion,
     Preconditioner, Shell, Spread, State, StaticSettings, Statics,
 };
-use pliant_geometry::Vector3;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 
 use crate::case::{Case, CaseError, Findings, Row};

@@ -1,5 +1,7 @@
 //! Mass scaling, and what of `[run]` is for dynamics only.
 
+use pliant_explicit::critical_step;
+
 use super::Builder;
 use crate::diagnostic::{Diagnostic, counted};
 use crate::format::{LoadSteps, LoadTimes, SolverName, StepChoice};
@@ -59,7 +61,7 @@ impl Builder<'_> {
 
     pub(super) fn scale_mass(&mut self) {
         let Some(table) = self.scene.run.mass_scaling else { return };
-        self.model.scale_mass(table.target_step);
+        critical_step::scale_mass(&mut self.model, table.target_step);
         let Some(scaling) = &self.model.mass_scaling else { return };
         let (added, mass) = (scaling.total(), self.model.mass.iter().sum::<f64>());
         let share = added / mass;

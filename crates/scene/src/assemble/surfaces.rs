@@ -1,7 +1,7 @@
 //! Surfaces carried by bodies: each point tied to the cell it lies in, or the nearest one.
 
-use pliant_corotational::{Carried, CurvedSurface, EdgeRule, State};
 use pliant_geometry::{Locator, Mesh};
+use pliant_implicit::{Carried, CurvedSurface, EdgeRule, State};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::model::Surface;
 

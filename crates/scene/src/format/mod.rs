@@ -28,9 +28,9 @@ pub use view::{
     TextureName, UpName, ViewTable,
 };
 
+use pliant_explicit::stability::OnUnstable;
 use pliant_gpu::Design;
 use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
-use pliant_mechanics::stability::OnUnstable;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -4,9 +4,9 @@ use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use pliant_corotational::Carried;
+use pliant_explicit::Scalar;
 use pliant_geometry::{Locator, Vector3};
-use pliant_mechanics::Real;
+use pliant_implicit::Carried;
 
 use crc32fast::Hasher;
 
@@ -122,7 +122,7 @@ impl Samples {
     }
 
     /// Adds the sample of an instant to a row.
-    pub(crate) fn read<R: Real>(&mut self, frame: &Frame<'_, R>, row: &mut Vec<f64>) {
+    pub(crate) fn read<R: Scalar>(&mut self, frame: &Frame<'_, R>, row: &mut Vec<f64>) {
         for &constraint in &self.reactions {
             row.extend(frame.stepper.reaction(constraint));
         }
@@ -186,7 +186,7 @@ fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
 
 impl Held {
     /// The moment [N m] of the forces and moments on the nodes about a point [m].
-    fn moment<R: Real>(&self, frame: &Frame<'_, R>, point: [f64; 3]) -> [f64; 3] {
+    fn moment<R: Scalar>(&self, frame: &Frame<'_, R>, point: [f64; 3]) -> [f64; 3] {
         let mut sum = Vector3::zeros();
         for &(node, own) in &self.0 {
             let node = node as usize;
@@ -308,7 +308,7 @@ pub(super) fn last_time(path: &Path) -> Option<f64> {
     text.strip_suffix('\n')?.lines().next_back()?.split(',').next()?.parse().ok()
 }
 
-impl<R: Real> Observer<R> for Rows {
+impl<R: Scalar> Observer<R> for Rows {
     fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
         self.row.clear();
         self.row.push(frame.time());
@@ -383,7 +383,7 @@ impl Probe {
         Self { weights, cell, fields }
     }
 
-    fn read<R: Real>(
+    fn read<R: Scalar>(
         &self,
         frame: &Frame<'_, R>,
         cells: Option<&fields::Cells<'_, R>>,

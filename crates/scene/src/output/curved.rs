@@ -1,8 +1,8 @@
 //! The curved surface of shells as a mesh of small triangles.
 
-use pliant_corotational::{CurvedSurface, EdgeRule, Picture, PictureFields};
+use pliant_explicit::Scalar;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
-use pliant_mechanics::Real;
+use pliant_implicit::{CurvedSurface, EdgeRule, Picture, PictureFields};
 
 use super::{Frame, fields};
 use crate::assemble::{BodyCells, Built, Corotational};
@@ -72,7 +72,7 @@ impl Curved {
     }
 
     /// Puts the wanted fields and the normals of an instant into the mesh.
-    pub(super) fn fill<R: Real>(&mut self, mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName]) {
+    pub(super) fn fill<R: Scalar>(&mut self, mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName]) {
         let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) else { return };
         let model = &part.model;
         self.found.fill(&self.picture, &self.surface, model, state);

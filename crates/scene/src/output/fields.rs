@@ -1,10 +1,10 @@
 //! Values of the fields a user can ask for, at nodes and cells.
 
 use nalgebra::Matrix3;
-use pliant_corotational::{Model, ShellFields, SolidFields, State};
-use pliant_mechanics::Real;
-use pliant_mechanics::recover::{CellFields, Recovery};
-use pliant_mechanics::stability::cell_limit;
+use pliant_explicit::Scalar;
+use pliant_explicit::recover::{CellFields, Recovery};
+use pliant_explicit::stability::cell_limit;
+use pliant_implicit::{Model, ShellFields, SolidFields, State};
 use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ use crate::format::FieldName;
 pub(super) type Value = [f64; 9];
 
 /// The value of a nodal field on a node of the model; the first `components` numbers count.
-pub(super) fn nodal<R: Real>(frame: &Frame<'_, R>, field: FieldName, node: usize) -> Value {
+pub(super) fn nodal<R: Scalar>(frame: &Frame<'_, R>, field: FieldName, node: usize) -> Value {
     let vector = match field {
         FieldName::Velocity => frame.stepper.velocity(frame.state, node),
         FieldName::Reaction => frame.stepper.nodal_reaction(node),
@@ -40,7 +40,7 @@ pub(super) struct Cells<'a, R> {
 /// Fields of a cell, and its stable step [s] if it was wanted.
 pub(super) struct Found(CellFields, Option<f64>);
 
-impl<'a, R: Real> Cells<'a, R> {
+impl<'a, R: Scalar> Cells<'a, R> {
     pub fn new(frame: &Frame<'a, R>, wanted: &[FieldName]) -> Self {
         let (model, displacement) = (&frame.built.model, &frame.state.displacement);
         let recovery = Recovery::new(model, frame.state);

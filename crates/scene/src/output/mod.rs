@@ -14,7 +14,7 @@ mod vtu;
 
 use std::path::{Path, PathBuf};
 
-use pliant_mechanics::{Observable, Real, State};
+use pliant_explicit::{Observable, Scalar, State};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use file::{check_own_folder, replace};
@@ -63,10 +63,10 @@ pub(crate) struct Frame<'a, R> {
     pub state: &'a State<R>,
     pub stepper: &'a dyn Observable<R>,
     /// Of shells and co-rotational solids: their state, with rotations.
-    pub corotational: Option<&'a pliant_corotational::State>,
+    pub corotational: Option<&'a pliant_implicit::State>,
 }
 
-impl<R: Real> Frame<'_, R> {
+impl<R: Scalar> Frame<'_, R> {
     pub fn time(&self) -> f64 {
         self.state.time
     }
@@ -155,7 +155,7 @@ pub(crate) type Scheduled<R> = (Schedule, Box<dyn Observer<R>>);
 
 /// The observers of a scene's outputs. Their files are opened here; all paths go to `files`. Those of a run that goes
 /// on take up what is `written`.
-pub(crate) fn observers<R: Real>(
+pub(crate) fn observers<R: Scalar>(
     scene: &Scene,
     built: &Built,
     folder: &Path,

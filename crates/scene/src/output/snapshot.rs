@@ -2,8 +2,8 @@
 
 use std::marker::PhantomData;
 
+use pliant_explicit::Scalar;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use pliant_mechanics::Real;
 use rayon::prelude::*;
 
 use super::fields::Cell;
@@ -32,7 +32,7 @@ enum Content {
     Curved(Box<super::curved::Curved>),
 }
 
-impl<R: Real> Snapshot<R> {
+impl<R: Scalar> Snapshot<R> {
     /// Of a body or surface by name, or of all bodies; with `curved`, of the curved surface of shells.
     pub fn new(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Self {
         let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
@@ -101,7 +101,7 @@ impl<R: Real> Snapshot<R> {
 }
 
 /// Fields on a carried surface; those of cells as means at the nodes.
-fn fill_surface<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], surface: usize) {
+fn fill_surface<R: Scalar>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], surface: usize) {
     let model = &frame.built.model;
     let mapping = &model.surfaces[surface].mapping;
     let (nodal, of_cells): (Vec<FieldName>, Vec<FieldName>) =
@@ -259,7 +259,7 @@ fn merged_corotational(built: &Built, part: &Corotational, on: Option<&str>) -> 
 
 fn fill_corotational(
     mesh: &mut Mesh,
-    model: &pliant_corotational::Model,
+    model: &pliant_implicit::Model,
     found: &fields::Corotated,
     wanted: &[FieldName],
     at: At,
@@ -290,7 +290,7 @@ fn fill_corotational(
     }
 }
 
-fn fill_nodal<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], nodes: &[u32]) {
+fn fill_nodal<R: Scalar>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], nodes: &[u32]) {
     for &field in wanted.iter().filter(|field| field.is_nodal()) {
         let value = |&node: &u32| {
             let value = fields::nodal(frame, field, node as usize);
@@ -301,7 +301,7 @@ fn fill_nodal<R: Real>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldNam
     }
 }
 
-fn fill_cells<R: Real>(
+fn fill_cells<R: Scalar>(
     mesh: &mut Mesh,
     frame: &Frame<'_, R>,
     wanted: &[FieldName],

@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use pliant_mechanics::stability::{Look, OnUnstable};
-use pliant_mechanics::{BALANCE_LIMIT, Energies};
+use pliant_explicit::BALANCE_LIMIT;
+use pliant_explicit::stability::{Look, OnUnstable};
+use pliant_mechanics::Energies;
 use serde::Serialize;
 
 use super::number;

@@ -1,6 +1,6 @@
 //! How far the shells of a run are strained, and what a run tells where that is more than small-strain elasticity holds for.
 
-use pliant_corotational::State;
+use pliant_implicit::State;
 use serde::{Deserialize, Serialize};
 
 use super::number;

@@ -3,8 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use pliant_explicit::{RelaxationError, StepError};
 use pliant_gpu::{GpuError, StepFailure};
-use pliant_mechanics::{Energies, RelaxationError, StepError};
+use pliant_mechanics::Energies;
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 

@@ -5,8 +5,8 @@ use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use pliant_explicit::Scalar;
 use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_vtu};
-use pliant_mechanics::Real;
 
 use super::file::{check_own_folder, replace};
 use super::snapshot::Snapshot;
@@ -24,7 +24,7 @@ pub(super) struct Series<R> {
     snapshot: Snapshot<R>,
 }
 
-impl<R: Real> Series<R> {
+impl<R: Scalar> Series<R> {
     pub(super) fn new(
         built: &Built,
         table: &VtuTable,
@@ -67,7 +67,7 @@ impl<R: Real> Series<R> {
     }
 }
 
-impl<R: Real> Observer<R> for Series<R> {
+impl<R: Scalar> Observer<R> for Series<R> {
     fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
         self.snapshot.fill(frame);
         let path = self.folder.join(frame_name(self.times.len()));

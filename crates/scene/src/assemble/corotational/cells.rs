@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use pliant_corotational as corotational;
-use pliant_corotational::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
-use pliant_corotational::{Material, ModelError, Motion, Shell};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use pliant_implicit as corotational;
+use pliant_implicit::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
+use pliant_implicit::{Material, ModelError, Motion, Shell};
 
 use super::{BodyCells, Corotational};
 use crate::assemble::bodies::{Draft, nodes};

@@ -1,8 +1,8 @@
 //! Constraints and springs of shells and co-rotational solids.
 
-use pliant_corotational as corotational;
-use pliant_corotational::{Motion, Spring};
 use pliant_geometry::Vector3;
+use pliant_implicit as corotational;
+use pliant_implicit::{Motion, Spring};
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::model;
 

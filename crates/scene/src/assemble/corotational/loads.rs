@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use pliant_corotational as corotational;
-use pliant_corotational::element::Membrane;
-use pliant_corotational::{Resolution, Spread};
 use pliant_geometry::Vector3;
+use pliant_implicit as corotational;
+use pliant_implicit::element::Membrane;
+use pliant_implicit::{Resolution, Spread};
 use pliant_mechanics::curve::{Curve, Shape};
 
 use super::{BodyCells, Control, Stop};

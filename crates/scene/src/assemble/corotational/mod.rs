@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use pliant_corotational as corotational;
-use pliant_corotational::{Carried, CurvedSurface, State};
 use pliant_geometry::Vector3;
+use pliant_implicit as corotational;
+use pliant_implicit::{Carried, CurvedSurface, State};
 use pliant_mechanics::fingerprint;
 
 use crate::assemble::Builder;
@@ -354,8 +354,8 @@ impl Corotational {
 
 #[cfg(test)]
 mod tests {
-    use pliant_corotational::Forces;
     use pliant_geometry::{DataArray, Vector3, io};
+    use pliant_implicit::Forces;
 
     use crate::assemble::build;
     use crate::scene::Scene;

@@ -18,20 +18,20 @@ mod tests;
 use averaged::AveragedTets;
 pub(crate) use batch::{pressure, volumetric_energy};
 pub(crate) use blocks::BLOCK;
+use std::ops::Range;
+
+use pliant_mechanics::Real;
+use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
+use pliant_mechanics::prony::Prony;
+use pliant_mechanics::tensor::{Tensor, Vector, add, cast, sub};
+use pulp::Simd;
+use serde::{Deserialize, Serialize};
+
+use crate::lanes::{Lanes, Local, PACK, Pack, Processor, WideF32, WideF64, load_vector};
+use crate::state::History;
 use blocks::{Blocks, Quad, Shares};
 use full_hex::FullHexes;
 use plain::SolidForces;
-
-use std::ops::Range;
-
-use serde::{Deserialize, Serialize};
-
-use crate::Real;
-use crate::lanes::{Lanes, Local, PACK, Pack, Processor, load_vector};
-use crate::model::{CellBlock, Cells, Model, Solid};
-use crate::prony::Prony;
-use crate::state::History;
-use crate::tensor::{Tensor, Vector, add, cast, sub};
 
 /// What a pass over some packs of cells found, lane by lane.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +48,7 @@ pub struct Findings<R> {
     largest_strain: Pack<R>,
 }
 
-impl<R: Real> Default for Findings<R> {
+impl<R: Scalar> Default for Findings<R> {
     fn default() -> Self {
         let least_volume_ratio = Pack([R::ONE; PACK]);
         Self {
@@ -138,7 +138,7 @@ struct PackedCells<R, const N: usize> {
     families: usize,
 }
 
-impl<R: Real, const N: usize> PackedCells<R, N> {
+impl<R: Scalar, const N: usize> PackedCells<R, N> {
     fn new(solid: &Solid, cells: &CellBlock<N>) -> (Self, Blocks) {
         let (blocks, local) = Blocks::new(&cells.nodes);
         let mut packed = Self {
@@ -194,7 +194,7 @@ struct PackedRest<R, const M: usize> {
     volume: Pack<R>,
 }
 
-impl<R: Real, const M: usize> PackedRest<R, M> {
+impl<R: Scalar, const M: usize> PackedRest<R, M> {
     fn of<const N: usize>(packed: &PackedCells<R, N>, cells: &CellBlock<N>) -> Vec<Self> {
         const { assert!(M + 1 == N) };
         let rest = |pack: usize| Self {
@@ -210,7 +210,7 @@ impl<R: Real, const M: usize> PackedRest<R, M> {
 /// u_a − u_0 of all nodes but the first: keeps the digits of small strains in cells that have moved far. Beside them what
 /// else the nodes carry, summed.
 #[inline(always)]
-fn relative<R: Real, L: Lanes<R>, const N: usize, const M: usize>(
+fn relative<R: Scalar, L: Lanes<R>, const N: usize, const M: usize>(
     local: &Local<'_, R, N>,
     pack: usize,
     at: usize,
@@ -227,7 +227,7 @@ fn relative<R: Real, L: Lanes<R>, const N: usize, const M: usize>(
 
 /// ∂u/∂X from the displacements relative to the first node.
 #[inline(always)]
-fn displacement_gradient<R: Real, L: Lanes<R>, const M: usize>(
+fn displacement_gradient<R: Scalar, L: Lanes<R>, const M: usize>(
     u: &[Vector<L>; M],
     gradient: &[Vector<Pack<R>>; M],
     at: usize,
@@ -241,7 +241,7 @@ fn displacement_gradient<R: Real, L: Lanes<R>, const M: usize>(
 
 /// V P B_a of all nodes but the first, from V P.
 #[inline(always)]
-fn nodal_forces<R: Real, L: Lanes<R>, const M: usize>(
+fn nodal_forces<R: Scalar, L: Lanes<R>, const M: usize>(
     piola: &Tensor<L>,
     gradient: &[Vector<Pack<R>>; M],
     at: usize,
@@ -255,7 +255,7 @@ fn nodal_forces<R: Real, L: Lanes<R>, const M: usize>(
 
 /// Writes the forces on all nodes as vectors, [`Lanes::row_of_lane`] by lane; the first node takes what makes the sum zero.
 #[inline(always)]
-fn by_cell<R: Real, L: Lanes<R>, const N: usize, const M: usize>(
+fn by_cell<R: Scalar, L: Lanes<R>, const N: usize, const M: usize>(
     forces: &[Vector<L>; M],
     to: &mut [Pack<Quad<R>>; N],
     at: usize,
@@ -268,8 +268,33 @@ fn by_cell<R: Real, L: Lanes<R>, const N: usize, const M: usize>(
     L::spread([-sum[0], -sum[1], -sum[2], L::ZERO], &mut to[0], at);
 }
 
+/// A number type in which steps run: kernels are compiled for it here, and not again in every crate that steps a model. By itself the
+/// narrowest of lanes.
+pub trait Scalar: Real + Lanes<Self> {
+    /// As many of them as a register of the CPU holds.
+    #[doc(hidden)]
+    type Wide<S: Simd>: Lanes<Self>;
+    /// The forces of a solid.
+    #[doc(hidden)]
+    fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>>;
+}
+
+impl Scalar for f32 {
+    type Wide<S: Simd> = WideF32<S>;
+    fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>> {
+        force_field(solid, step)
+    }
+}
+
+impl Scalar for f64 {
+    type Wide<S: Simd> = WideF64<S>;
+    fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>> {
+        force_field(solid, step)
+    }
+}
+
 /// The force field of a solid for steps of `step` seconds.
-pub(crate) fn force_field<R: Real>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
+fn force_field<R: Scalar>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
     match &solid.cells {
         Cells::Tet4(cells) => Box::new(SolidForces::<R, 4, 3>::new(solid, cells, step)),
         Cells::AveragedTet4(cells, averaging) => Box::new(AveragedTets::new(solid, cells, *averaging, step)),
@@ -291,7 +316,7 @@ pub(crate) struct InternalForces<R> {
     shares: Shares,
 }
 
-impl<R: Real> InternalForces<R> {
+impl<R: Scalar> InternalForces<R> {
     pub(crate) fn new(model: &Model, step: f64) -> Self {
         let fields: Vec<_> = model.solids.iter().map(|solid| R::force_field(solid, step)).collect();
         let mut field_offsets = vec![0];

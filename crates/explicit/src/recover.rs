@@ -1,13 +1,13 @@
 //! Fields recovered from a state: strains, stresses and energies of the cells, in double precision.
 
+use pliant_mechanics::law::{Deformation, Split};
+use pliant_mechanics::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale, sub};
 use rayon::prelude::*;
 
-use crate::Real;
+use crate::Scalar;
 use crate::forces::{pressure, volumetric_energy};
-use crate::law::{Deformation, Split};
-use crate::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
 use crate::state::{History, State};
-use crate::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale, sub};
 
 /// The state of one cell.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +76,7 @@ struct Dilatation {
     energy: f64,
 }
 
-impl<'a, R: Real> Recovery<'a, R> {
+impl<'a, R: Scalar> Recovery<'a, R> {
     /// Finds the averages that the elements take; the rest is found cell by cell.
     pub fn new(model: &'a Model, state: &'a State<R>) -> Self {
         let averages =
@@ -217,7 +217,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
     weighted.fold(nothing, add_up)
 }
 
-fn averages<R: Real>(solid: &Solid, history: &History<R>, displacement: &[Vector<R>]) -> Averages {
+fn averages<R: Scalar>(solid: &Solid, history: &History<R>, displacement: &[Vector<R>]) -> Averages {
     let Material { law, prony, .. } = &solid.material;
     let relaxed =
         |index: usize, change: f64| prony.pressure(pressure(law, change), &history.of_pressure(solid, index));
@@ -280,7 +280,7 @@ fn averages<R: Real>(solid: &Solid, history: &History<R>, displacement: &[Vector
 }
 
 /// The centre of a cell in its current place [m].
-pub fn cell_centre<R: Real>(model: &Model, state: &State<R>, solid: usize, cell: usize) -> Vector<f64> {
+pub fn cell_centre<R: Scalar>(model: &Model, state: &State<R>, solid: usize, cell: usize) -> Vector<f64> {
     let nodes = model.solids[solid].cells.nodes(cell);
     let place = |&node: &u32| add(model.rest[node as usize], cast(state.displacement[node as usize]));
     scale(nodes.iter().map(place).fold([0.0; 3], add), 1.0 / nodes.len() as f64)

@@ -17,20 +17,20 @@
 
 use std::sync::Arc;
 
+use pliant_mechanics::Energies;
+use pliant_mechanics::load::Load;
+use pliant_mechanics::model::{Contradiction, FREE, Model};
+use pliant_mechanics::tensor::{Vector, cast, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::Real;
+use crate::Scalar;
 use crate::applied::AppliedForces;
-use crate::energies::Energies;
 use crate::forces::InternalForces;
-use crate::load::Load;
-use crate::model::{Contradiction, FREE, Model};
 use crate::recover::Recovery;
 use crate::state::{History, State};
 use crate::step_error::at_corner;
 use crate::stepper::{Observable, owned_only, sum_owned};
-use crate::tensor::{Vector, cast, scale, sub};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -76,7 +76,7 @@ pub struct RelaxationSettings {
 
 impl RelaxationSettings {
     /// The usual ones for a number type.
-    pub fn usual<R: Real>() -> Self {
+    pub fn usual<R: Scalar>() -> Self {
         let precise = Self::default();
         match is_single::<R>() {
             true => Self { tolerance: 100.0 * precise.tolerance, displacement: 1e-3, ..precise },
@@ -85,7 +85,7 @@ impl RelaxationSettings {
     }
 }
 
-fn is_single<R: Real>() -> bool {
+fn is_single<R: Scalar>() -> bool {
     R::EPSILON > 1e-10
 }
 
@@ -260,7 +260,7 @@ impl<R> Way<R> {
     }
 }
 
-impl<R: Real> Way<R> {
+impl<R: Scalar> Way<R> {
     /// Goes on by motions [m] and changes of the forces from outside [N].
     fn go_on(&mut self, next: Vec<[Vector<R>; 2]>) {
         let square = |way: &[[Vector<R>; 2]]| -> f64 {
@@ -342,7 +342,7 @@ impl Course {
 }
 
 /// At the last equilibrium. Kinetic energy, damping and velocities are none.
-impl<R: Real> Observable<R> for DynamicRelaxation<R> {
+impl<R: Scalar> Observable<R> for DynamicRelaxation<R> {
     fn energies(&self) -> &Energies {
         &self.energies
     }
@@ -360,7 +360,7 @@ impl<R: Real> Observable<R> for DynamicRelaxation<R> {
     }
 }
 
-impl<R: Real> DynamicRelaxation<R> {
+impl<R: Scalar> DynamicRelaxation<R> {
     /// A solver for a model.
     ///
     /// # Errors

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::Real;
-use crate::grip::Grip;
-use crate::load::LoadKind;
-use crate::model::Model;
-use crate::tensor::{Vector, add, cast};
+use pliant_mechanics::grip::Grip;
+use pliant_mechanics::load::LoadKind;
+use pliant_mechanics::model::Model;
+use pliant_mechanics::tensor::{Vector, add, cast};
+
+use crate::Scalar;
 
 /// Forces applied to the nodes, found anew for each instant.
 pub(crate) struct AppliedForces {
@@ -43,7 +44,7 @@ impl AppliedForces {
     }
 
     /// Finds the forces at a time [s] and in a deformed place.
-    pub(crate) fn update<R: Real>(&mut self, time: f64, displacement: &[Vector<R>]) {
+    pub(crate) fn update<R: Scalar>(&mut self, time: f64, displacement: &[Vector<R>]) {
         if self.model.loads.is_empty() && self.grips.is_empty() {
             return;
         }
@@ -76,7 +77,7 @@ impl AppliedForces {
 
     /// The force [N] on a node.
     #[inline(always)]
-    pub(crate) fn at<R: Real>(&self, node: usize) -> Vector<R> {
+    pub(crate) fn at<R: Scalar>(&self, node: usize) -> Vector<R> {
         let gravity = self.gravity[self.body_of[node] as usize];
         let mass = self.model.mass[node];
         let force = |c: usize| R::of(self.nodal[node][c] + mass * gravity[c]);

@@ -1,19 +1,21 @@
 //! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation, W = Σ w W_iso(F_g) + V U(v/V):
 //! no hourglass patterns, no locking, eight stresses a cell. The in-house reference for `hex8`.
 
+use pliant_mechanics::element::GaussPoints;
+use pliant_mechanics::law::AnyLaw;
+use pliant_mechanics::model::{CellBlock, Solid};
+use pliant_mechanics::prony::Prony;
+use pliant_mechanics::tensor::{Vector, add, cast};
+
 use super::averaged::{relaxed_pressures, volume_change};
 use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
 use super::corners::{Look, PackedCorners, is_flat};
 use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
-use crate::Real;
-use crate::element::GaussPoints;
+use crate::Scalar;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector, store_vector};
-use crate::law::AnyLaw;
-use crate::model::{CellBlock, Solid};
-use crate::prony::{Prony, Relaxation};
+use crate::relaxation::Relaxation;
 use crate::state::History;
-use crate::tensor::{Vector, add, cast};
 
 pub(super) struct FullHexes<R> {
     processor: Processor,
@@ -42,7 +44,7 @@ struct Point<R> {
     weight: Pack<R>,
 }
 
-impl<R: Real> FullHexes<R> {
+impl<R: Scalar> FullHexes<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<8>, points: &[GaussPoints], step: f64) -> Self {
         let prony = &solid.material.prony;
         let (packed, blocks) = PackedCells::new(solid, cells);
@@ -78,7 +80,7 @@ struct Pass<'a, R> {
     task: Task<'a, R>,
 }
 
-impl<R: Real> Work<R> for Pass<'_, R> {
+impl<R: Scalar> Work<R> for Pass<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -172,7 +174,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
     }
 }
 
-impl<R: Real> ForceField<R> for FullHexes<R> {
+impl<R: Scalar> ForceField<R> for FullHexes<R> {
     fn blocks(&self) -> &Blocks {
         &self.moved.blocks
     }

@@ -1,13 +1,14 @@
 //! Steps against the largest stable one: watches the limit, cuts steps into parts, and keeps the clock.
 
-use crate::Real;
+use pliant_mechanics::model::Model;
+use pliant_mechanics::tensor::{Vector, cast};
+
+use crate::Scalar;
 use crate::critical_step::limit_about;
 use crate::forces::Deformed;
-use crate::model::Model;
 use crate::stability::{CHANGE, Look, Monitor, OnUnstable, substeps};
 use crate::state::State;
 use crate::step_error::StepError;
-use crate::tensor::{Vector, cast};
 
 /// Lengths of the (sub)steps at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,7 +100,7 @@ impl StepControl {
     }
 
     /// The time [s] over which relaxing laws come to the state's instant: what acts at the start came at once.
-    pub fn relaxing<R: Real>(&self, state: &State<R>) -> f64 {
+    pub fn relaxing<R: Scalar>(&self, state: &State<R>) -> f64 {
         if state.is_at_start() { 0.0 } else { self.lengths(state).before }
     }
 
@@ -113,7 +114,7 @@ impl StepControl {
     }
 
     /// Looks at the limit of a state.
-    pub fn look<R: Real>(
+    pub fn look<R: Scalar>(
         &mut self,
         model: &Model,
         owners: &[[u32; 3]],
@@ -173,7 +174,7 @@ impl StepControl {
 }
 
 /// Finds the true limit [s] of a state and makes it the reference of what follows.
-fn take_as_reference<R: Real>(model: &Model, owners: &[[u32; 3]], state: &mut State<R>) -> f64 {
+fn take_as_reference<R: Scalar>(model: &Model, owners: &[[u32; 3]], state: &mut State<R>) -> f64 {
     let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
     let limit = limit_about(model, owners, &displacement).step;
     state.reference.clone_from(&state.displacement);

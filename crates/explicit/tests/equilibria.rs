@@ -2,15 +2,14 @@
 
 #![allow(clippy::unwrap_used)]
 
+use pliant_explicit::recover::Recovery;
+use pliant_explicit::{CentralDifference, DynamicRelaxation, Observable, RelaxationSettings, Scalar, State};
+use pliant_mechanics::Energies;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
-use pliant_mechanics::recover::Recovery;
-use pliant_mechanics::{
-    CentralDifference, DynamicRelaxation, Energies, Observable, Real, RelaxationSettings, State,
-};
 use serde_json::json;
 
 fn claim(what: &str, found: f64, limit: f64) {
@@ -193,7 +192,7 @@ fn what_relaxing_laws_store_and_dissipate_hardly_depends_on_the_load_steps() {
 /// Relaxation times far below the step: what counts is that the jump comes in no time.
 #[test]
 fn an_explicit_run_begins_with_the_instantaneous_law() {
-    fn begins<R: Real>(element: &str) {
+    fn begins<R: Scalar>(element: &str) {
         let term = |part| PronyTerm { part, weight: 0.5, time: 1e-7 };
         let prony = Prony::new(&[Part::Isochoric, Part::Volumetric].map(term), PronyUpdate::Exact).unwrap();
         let stress = |prony: Prony| {
@@ -221,7 +220,7 @@ fn single_precision_bends_a_slender_beam_as_far() {
         at(&beam, 0.5).into_iter().map(|node| (node, [0.0, 0.0, 4e-3 / 9.0])).collect();
     let kind = LoadKind::Forces(end);
     beam.loads.push(Load { name: "end".into(), kind, curve: ramp(), surface: None });
-    fn bent<R: Real>(beam: &Model) -> (f64, f64) {
+    fn bent<R: Scalar>(beam: &Model) -> (f64, f64) {
         let mut solver = DynamicRelaxation::<R>::new(beam.clone(), RelaxationSettings::usual::<R>()).unwrap();
         let mut state = State::at_rest(beam);
         solver.solve(&mut state, 1.0).unwrap();

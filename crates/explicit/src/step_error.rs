@@ -1,10 +1,11 @@
 //! Why a step could not be taken, with place, time and remedy.
 
-use crate::Real;
-use crate::model::Model;
+use pliant_mechanics::model::Model;
+use pliant_mechanics::tensor::cast;
+
+use crate::Scalar;
 use crate::stability::Look;
 use crate::state::State;
-use crate::tensor::cast;
 
 /// The name of a node's body and the node's number in it.
 fn located(model: &Model, node: u32) -> (String, u32) {
@@ -98,7 +99,7 @@ impl StepError {
     }
 
     /// Of a hexahedron with a corner turned inside out.
-    pub(crate) fn folded<R: Real>(model: &Model, (solid, cell): (usize, usize), state: &State<R>) -> Self {
+    pub(crate) fn folded<R: Scalar>(model: &Model, (solid, cell): (usize, usize), state: &State<R>) -> Self {
         let solid = &model.solids[solid];
         let worst = solid.cells.worst_corner(cell, |node| cast(state.displacement[node as usize]));
         let (node, determinant) = worst.unwrap_or((solid.cells.nodes(cell)[0], 0.0));

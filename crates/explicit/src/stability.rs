@@ -18,17 +18,17 @@
 //! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control
 //! does not change with deformation. Loads that follow the surface do not count.
 
+use pliant_mechanics::model::{Model, Solid, with_cells};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, cast, dot, sub};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Real;
+use crate::Scalar;
 use crate::critical_step::{limit_alone, scaled_bound};
 use crate::forces::Deformed;
-use crate::model::{Model, Solid, with_cells};
 use crate::state::State;
 use crate::tangent::{Stiffness, gradient_square, stiffness};
-use crate::tensor::{Symmetric, Tensor, Vector, cast, dot, sub};
 
 /// Steps between two looks at the limit.
 pub const CHECK_EVERY: u64 = 50;
@@ -248,7 +248,7 @@ impl Monitor {
 
     /// The limit of a deformed state: the estimate [s], the solid and the cell that set it; `None` without cells or
     /// where no cell's stiffness is a number. `reference` is the state whose true limit is known.
-    pub fn limit<R: Real>(
+    pub fn limit<R: Scalar>(
         &mut self,
         model: &Model,
         displacement: &[Vector<R>],
@@ -266,7 +266,7 @@ impl Monitor {
     }
 
     /// The same with every cell looked at closely, as a measure of what [`limit`](Self::limit) leaves out.
-    pub fn limit_of_all<R: Real>(
+    pub fn limit_of_all<R: Scalar>(
         &self,
         model: &Model,
         displacement: &[Vector<R>],
@@ -304,7 +304,7 @@ impl Watch {
     }
 
     /// Finds both ranks of every cell: the squared speed by an isotropic guess, and the squared stretch.
-    fn rank<R: Real>(&mut self, solid: &Solid, displacement: &[Vector<R>]) {
+    fn rank<R: Scalar>(&mut self, solid: &Solid, displacement: &[Vector<R>]) {
         let bulk = solid.material.law.small_strain().bulk;
         let rest = solid.material.law.longitudinal_modulus();
         let weight = &self.weight;
@@ -341,7 +341,7 @@ impl Watch {
     }
 
     /// The smallest limit [s] of the cells that stand first in an order, and its cell.
-    fn smallest<R: Real>(
+    fn smallest<R: Scalar>(
         &mut self,
         model: &Model,
         solid: &Solid,
@@ -363,7 +363,7 @@ impl Watch {
     }
 
     /// The limit [s] that a cell sets, and its stiffness in the reference state.
-    fn look<R: Real>(
+    fn look<R: Scalar>(
         &self,
         model: &Model,
         solid: &Solid,
@@ -387,7 +387,7 @@ impl Watch {
 
 /// The limit [s] of a cell alone in a deformed state, Δt_e above: no assembly is unstable at the smallest one. Displacements
 /// [m], one per node.
-pub fn cell_limit<R: Real>(model: &Model, solid: usize, cell: usize, displacement: &[Vector<R>]) -> f64 {
+pub fn cell_limit<R: Scalar>(model: &Model, solid: usize, cell: usize, displacement: &[Vector<R>]) -> f64 {
     let solid = &model.solids[solid];
     let h = displacement_gradient(solid, cell, displacement);
     let square = gradient_square_of(solid, cell);
@@ -424,7 +424,7 @@ fn gradient_square_of(solid: &Solid, cell: usize) -> Symmetric<f64> {
 }
 
 /// ∂u/∂X, the mean over the cell.
-fn displacement_gradient<R: Real>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
+fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
     let mut h = Tensor::ZERO;
     with_cells!(&solid.cells, block => {
         let (nodes, gradient) = (&block.nodes[cell], &block.rest[cell].gradient);

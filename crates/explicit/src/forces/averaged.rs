@@ -9,6 +9,10 @@
 //!
 //! Averages are those of one solid: a node on an interface has a J_n for each material.
 
+use pliant_mechanics::law::{AnyLaw, Split};
+use pliant_mechanics::model::{Averaging, CellBlock, LocalNodes, Solid};
+use pliant_mechanics::prony::Prony;
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector};
 use rayon::prelude::*;
 
 use super::batch::{Batch, PACKS, pressures};
@@ -16,13 +20,10 @@ use super::blocks::{Blocks, Moved, Quad, Shares, Task};
 use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
-use crate::Real;
+use crate::Scalar;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, entry, load_tensor};
-use crate::law::{AnyLaw, Split};
-use crate::model::{Averaging, CellBlock, LocalNodes, Solid};
-use crate::prony::{Prony, Relaxation};
+use crate::relaxation::Relaxation;
 use crate::state::History;
-use crate::tensor::{Symmetric, Tensor, Vector};
 
 pub(super) struct AveragedTets<R> {
     processor: Processor,
@@ -50,7 +51,7 @@ struct Constants<R> {
     volumetric_slots: usize,
 }
 
-impl<R: Real> AveragedTets<R> {
+impl<R: Scalar> AveragedTets<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<4>, averaging: Averaging, step: f64) -> Self {
         let local = LocalNodes::new(cells);
         let volume_at = |node| local.cells_at(node).map(|cell| 0.25 * cells.rest[cell].volume).sum::<f64>();
@@ -112,7 +113,7 @@ impl<R: Real> AveragedTets<R> {
     }
 }
 
-impl<R: Real> Constants<R> {
+impl<R: Scalar> Constants<R> {
     /// Tensors of history per cell.
     fn cell_slots(&self) -> usize {
         self.isochoric_slots + if self.averaging == Averaging::NiftySim { self.volumetric_slots } else { 0 }
@@ -134,7 +135,7 @@ struct VolumeChanges<'a, R> {
     task: Task<'a, R>,
 }
 
-impl<R: Real> Work<R> for VolumeChanges<'_, R> {
+impl<R: Scalar> Work<R> for VolumeChanges<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -163,7 +164,7 @@ struct CellPressures<'a, R> {
     task: Task<'a, R>,
 }
 
-impl<R: Real> Work<R> for CellPressures<'_, R> {
+impl<R: Scalar> Work<R> for CellPressures<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -199,7 +200,7 @@ impl<R: Real> Work<R> for CellPressures<'_, R> {
 
 /// The means of what the four nodes of cells carry beside their displacements.
 #[inline(always)]
-fn average<R: Real, L: Lanes<R>>(local: &Local<'_, R, 4>, pack: usize, at: usize) -> L {
+fn average<R: Scalar, L: Lanes<R>>(local: &Local<'_, R, 4>, pack: usize, at: usize) -> L {
     let mut sum = L::ZERO;
     for node in 0..4 {
         sum += local.gather::<L>(pack, node, at)[3];
@@ -209,7 +210,7 @@ fn average<R: Real, L: Lanes<R>>(local: &Local<'_, R, 4>, pack: usize, at: usize
 
 /// J − 1, without cancellation.
 #[inline(always)]
-pub(super) fn volume_change<L: crate::Number>(h: &Tensor<L>) -> L {
+pub(super) fn volume_change<L: pliant_mechanics::Number>(h: &Tensor<L>) -> L {
     h.trace() + h.second_invariant() + h.determinant()
 }
 
@@ -220,7 +221,7 @@ struct NodePressures<'a, R> {
     history: &'a mut [Pack<R>],
 }
 
-impl<R: Real> Work<R> for NodePressures<'_, R> {
+impl<R: Scalar> Work<R> for NodePressures<'_, R> {
     type Output = ();
 
     #[inline(always)]
@@ -232,7 +233,7 @@ impl<R: Real> Work<R> for NodePressures<'_, R> {
 
 /// Up to [`PACKS`] packs of J − 1 become pressures [Pa], which relax where there is a history.
 #[inline(always)]
-pub(super) fn relaxed_pressures<R: Real, L: Lanes<R>>(
+pub(super) fn relaxed_pressures<R: Scalar, L: Lanes<R>>(
     law: &AnyLaw,
     relaxation: &Relaxation<R>,
     slots: usize,
@@ -257,7 +258,7 @@ struct Pass<'a, R> {
     task: Task<'a, R>,
 }
 
-impl<R: Real> Work<R> for Pass<'_, R> {
+impl<R: Scalar> Work<R> for Pass<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -321,7 +322,7 @@ impl<R: Real> Work<R> for Pass<'_, R> {
 
 /// ∂ū/∂X of F̄ = (J̄/J)^(1/3) F, with J̄ − 1 in `change`.
 #[inline(always)]
-fn dilated<L: crate::Number>(h: &Tensor<L>, volume_ratio: L, change: L) -> Tensor<L> {
+fn dilated<L: pliant_mechanics::Number>(h: &Tensor<L>, volume_ratio: L, change: L) -> Tensor<L> {
     let ratio = ((L::ONE + change) / volume_ratio).cbrt();
     let mut scaled = *h;
     for i in 0..3 {
@@ -333,7 +334,7 @@ fn dilated<L: crate::Number>(h: &Tensor<L>, volume_ratio: L, change: L) -> Tenso
     scaled
 }
 
-impl<R: Real> Constants<R> {
+impl<R: Scalar> Constants<R> {
     /// The first Piola–Kirchhoff stress: of the law where the deformation is averaged, else of its isochoric part and the
     /// pressure of the nodes, F S_iso + p cof F.
     #[inline(always)]
@@ -353,7 +354,7 @@ impl<R: Real> Constants<R> {
     }
 }
 
-impl<R: Real> ForceField<R> for AveragedTets<R> {
+impl<R: Scalar> ForceField<R> for AveragedTets<R> {
     fn blocks(&self) -> &Blocks {
         &self.moved.blocks
     }

@@ -1,5 +1,10 @@
 //! One evaluation point a cell: linear tetrahedra, and uniform-strain hexahedra with hourglass control.
 
+use pliant_mechanics::law::AnyLaw;
+use pliant_mechanics::model::{CellBlock, Solid};
+use pliant_mechanics::prony::Prony;
+use pliant_mechanics::tensor::Vector;
+
 use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
 use super::corners::{Look, PackedCorners, flatness, may_fold};
@@ -7,13 +12,10 @@ use super::hourglass::{PackedHourglass, Resistance};
 use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
-use crate::Real;
+use crate::Scalar;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work};
-use crate::law::AnyLaw;
-use crate::model::{CellBlock, Solid};
-use crate::prony::{Prony, Relaxation};
+use crate::relaxation::Relaxation;
 use crate::state::History;
-use crate::tensor::Vector;
 
 /// Cells of `N` nodes with one evaluation point; `M` is one less.
 pub(super) struct SolidForces<R, const N: usize, const M: usize> {
@@ -35,7 +37,7 @@ struct Constants<R, const N: usize, const M: usize> {
     history: usize,
 }
 
-impl<R: Real, const N: usize, const M: usize> SolidForces<R, N, M> {
+impl<R: Scalar, const N: usize, const M: usize> SolidForces<R, N, M> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<N>, step: f64) -> Self {
         let (packed, blocks) = PackedCells::new(solid, cells);
         let hourglass = cells.hourglass.as_ref().map(|control| PackedHourglass::of(&packed, control));
@@ -66,7 +68,7 @@ struct Pass<'a, R, const N: usize, const M: usize> {
     task: Task<'a, R>,
 }
 
-impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
+impl<R: Scalar, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -137,7 +139,7 @@ impl<R: Real, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
     }
 }
 
-impl<R: Real, const N: usize, const M: usize> ForceField<R> for SolidForces<R, N, M> {
+impl<R: Scalar, const N: usize, const M: usize> ForceField<R> for SolidForces<R, N, M> {
     fn blocks(&self) -> &Blocks {
         &self.moved.blocks
     }

@@ -3,11 +3,12 @@
 //! q_c = Σ_b Γ_cb u_b − H Y_c and f_a = Σ_c Γ_ca k q_c − (k Σ_c q_c ⊗ Y_c) B_a: thirteen numbers a cell, and the second term
 //! of the force goes along with the stress.
 
+use pliant_mechanics::model::Hourglass;
+use pliant_mechanics::tensor::{Tensor, Vector, add, cast, dot, scale, sub};
+
 use super::PackedCells;
-use crate::Real;
+use crate::Scalar;
 use crate::lanes::{Lanes, Pack, load_vector, store_vector};
-use crate::model::Hourglass;
-use crate::tensor::{Tensor, Vector, add, cast, dot, scale, sub};
 
 /// Hourglass control of packs of cells; see [`Hourglass`].
 pub(super) struct PackedHourglass<R> {
@@ -19,7 +20,7 @@ pub(super) struct PackedHourglass<R> {
     reach: Pack<R>,
 }
 
-impl<R: Real> PackedHourglass<R> {
+impl<R: Scalar> PackedHourglass<R> {
     pub(super) fn of<const N: usize>(packed: &PackedCells<R, N>, control: &Hourglass<f64, N>) -> Vec<Self> {
         let of_pack = |pack: usize| Self {
             moments: [0, 1, 2, 3].map(|c| packed.vector(pack, |cell| cast(control.moments[cell][c]))),
@@ -34,7 +35,7 @@ impl<R: Real> PackedHourglass<R> {
 #[derive(Clone, Copy)]
 pub(super) struct Resistance<R>([Vector<Pack<R>>; 4]);
 
-impl<R: Real> Resistance<R> {
+impl<R: Scalar> Resistance<R> {
     pub(super) fn new() -> Self {
         Self([[Pack::ZERO; 3]; 4])
     }
@@ -90,7 +91,7 @@ impl<R: Real> Resistance<R> {
 
 /// Σ_b Γ_cb u_b of the nodes 1 to 7, with u_0 = 0: sums and differences of opposite nodes first.
 #[inline(always)]
-fn signed_sums<R: crate::Number, const M: usize>(u: &[Vector<R>; M]) -> [Vector<R>; 4] {
+fn signed_sums<R: pliant_mechanics::Number, const M: usize>(u: &[Vector<R>; M]) -> [Vector<R>; 4] {
     let (s0, s1, s2, s3) = (u[5], add(u[0], u[6]), add(u[1], u[3]), add(u[2], u[4]));
     let odd = add(add(u[5], sub(u[0], u[6])), add(sub(u[3], u[1]), sub(u[2], u[4])));
     let (a, b) = (sub(s0, s1), sub(s2, s3));

@@ -2,14 +2,16 @@
 //! compiled once for each kind of lanes and a law once for each, not every law again in every element; the choice of the
 //! law costs one branch per batch.
 
+use pliant_mechanics::Number;
+use pliant_mechanics::law::{AnyLaw, Deformation, Law, Split, with_law};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot};
+
 use super::Findings;
 use super::averaged::volume_change;
+use crate::Scalar;
 use crate::lanes::{
     Lanes, PACK, Pack, Processor, Work, load_symmetric, load_tensor, load_vector, store_vector,
 };
-use crate::law::{AnyLaw, Deformation, Law, Split, with_law};
-use crate::tensor::{Symmetric, Tensor, Vector, dot};
-use crate::{Number, Real};
 
 /// Packs of points in a batch: few enough for the first cache.
 pub(super) const PACKS: usize = 4;
@@ -29,7 +31,7 @@ pub(super) struct Batch<R> {
     pub strain: [Pack<R>; PACKS],
 }
 
-impl<R: Real> Batch<R> {
+impl<R: Scalar> Batch<R> {
     pub(super) fn new() -> Self {
         let stress = Symmetric([Pack::ZERO; 6]);
         Self {
@@ -129,7 +131,7 @@ struct Stresses<'a, R, T> {
     fibres: &'a [Vector<Pack<R>>],
 }
 
-impl<R: Real, T: Law> Work<R> for Stresses<'_, R, T> {
+impl<R: Scalar, T: Law> Work<R> for Stresses<'_, R, T> {
     type Output = ();
 
     #[inline(always)]
@@ -160,7 +162,7 @@ impl<R: Real, T: Law> Work<R> for Stresses<'_, R, T> {
 /// U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, at up to [`PACKS`] packs of J − 1, from its stress in a pure
 /// dilation F = J^(1/3) I.
 #[inline(always)]
-pub(super) fn pressures<R: Real, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack<R>], batch: &mut Batch<R>) {
+pub(super) fn pressures<R: Scalar, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack<R>], batch: &mut Batch<R>) {
     for (pack, change) in values.iter().enumerate() {
         for at in (0..PACK).step_by(L::WIDTH) {
             let x = L::load(change, at);

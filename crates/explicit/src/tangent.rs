@@ -5,8 +5,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::law::{AnyLaw, Deformation};
-use crate::tensor::{Symmetric, Tensor, Vector, add, scale};
+use pliant_mechanics::law::{AnyLaw, Deformation};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, scale};
 
 /// Size of the differences of F: truncation and round-off both near 1e-10.
 const DIFFERENCE: f64 = 1e-5;

@@ -1,12 +1,12 @@
 //! The state: everything that changes in a run. `Clone` is a snapshot.
 
+use pliant_mechanics::model::{self, FREE, Model, Solid, placed};
+use pliant_mechanics::tensor::{Symmetric, Vector};
 use serde::{Deserialize, Serialize};
 
-use crate::Real;
+use crate::Scalar;
 use crate::lanes::{PACK, Pack};
-use crate::model::{self, FREE, Model, Solid, placed};
 use crate::stability::Stability;
-use crate::tensor::{Symmetric, Vector};
 
 /// What a stepper advances.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,7 +38,7 @@ pub struct History<R> {
     pub pressures: Vec<Pack<R>>,
 }
 
-impl<R: Real> History<R> {
+impl<R: Scalar> History<R> {
     /// At rest.
     fn at_rest(solid: &Solid) -> Self {
         let packs = |count: usize, slots: usize| vec![Pack::ZERO; count.div_ceil(PACK) * slots];
@@ -95,7 +95,7 @@ pub struct Work {
     pub(crate) damping_power: f64,
 }
 
-impl<R: Real> State<R> {
+impl<R: Scalar> State<R> {
     /// At rest at time 0, prescribed nodes where their motion starts.
     pub fn at_rest(model: &Model) -> Self {
         let mut displacement = vec![[R::ZERO; 3]; model.node_count()];

@@ -1,16 +1,17 @@
 //! The battery every element runs through: patch test, rigid motion, f = dE/du, Σf = 0, Στ = 0. A new element is one
 //! line in [`ELEMENTS`] and its energy in [`energy`].
 
+use pliant_mechanics::law::samples::every_law;
+use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
+use pliant_mechanics::model::{Averaging, Body, Cells, LocalNodes, Material};
+use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::tensor::{cross, dot, scale};
+
 use super::*;
 use crate::State;
 use crate::critical_step;
 use crate::lanes::Instructions;
-use crate::law::samples::every_law;
-use crate::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
-use crate::model::{Averaging, Body, Cells, LocalNodes, Material};
-use crate::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use crate::recover::{CellFields, Recovery};
-use crate::tensor::{cross, dot, scale};
 
 /// Every element whose force is the gradient of an energy.
 const ELEMENTS: [&str; 5] = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"];
@@ -162,7 +163,7 @@ fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
         }
         cells => {
             let stored = |cell: usize| {
-                let h = crate::model::with_cells!(cells, block => gradient(cell, &block.rest[cell].gradient));
+                let h = pliant_mechanics::model::with_cells!(cells, block => gradient(cell, &block.rest[cell].gradient));
                 let Split { isochoric, volumetric } = split(&h);
                 cells.volume(cell) * (isochoric + volumetric)
             };
@@ -370,7 +371,7 @@ fn an_inverted_cell_is_found() {
 }
 
 /// Forces on the nodes and how far the cells are deformed, on some processor, after a motion of three steps.
-fn moved_on<R: Real>(processor: Processor, model: &Model) -> (Vec<Vector<f64>>, Deformed) {
+fn moved_on<R: Scalar>(processor: Processor, model: &Model) -> (Vec<Vector<f64>>, Deformed) {
     let mut internal = InternalForces::<R>::new(model, 0.1);
     internal.set_processor(processor);
     let mut history = State::<R>::at_rest(model).history;
@@ -513,7 +514,7 @@ fn corners_follow_the_hourglass_patterns_within_their_reach() {
             // The edges at a corner go where F takes them.
             let at_corner = |corner: usize| {
                 let edges = |x: &[Vector<f64>]| {
-                    let edge = crate::element::HEX_EDGES[corner]
+                    let edge = pliant_mechanics::element::HEX_EDGES[corner]
                         .map(|node| nalgebra::Vector3::from(sub(x[node], x[corner])));
                     nalgebra::Matrix3::from_columns(&edge)
                 };

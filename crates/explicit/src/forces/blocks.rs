@@ -4,13 +4,13 @@
 
 use std::ops::Range;
 
+use pliant_mechanics::tensor::Vector;
 use rayon::iter::{Either, repeat_n};
 use rayon::prelude::*;
 
 use super::Findings;
-use crate::Real;
+use crate::Scalar;
 use crate::lanes::{PACK, Pack};
-use crate::tensor::Vector;
 
 /// Packs of cells in a block. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
 pub(crate) const BLOCK: usize = 64;
@@ -160,7 +160,7 @@ pub(super) struct Task<'a, R> {
     pub pressures: &'a mut [Pack<R>],
 }
 
-impl<R: Real> Task<'_, R> {
+impl<R: Scalar> Task<'_, R> {
     /// Copies the displacements of its nodes in.
     #[inline(always)]
     pub(super) fn copy_in(&mut self, displacement: &[Vector<R>]) {
@@ -171,7 +171,7 @@ impl<R: Real> Task<'_, R> {
     }
 }
 
-impl<R: Real> Moved<R> {
+impl<R: Scalar> Moved<R> {
     pub(super) fn new(blocks: Blocks) -> Self {
         Self { vectors: vec![[R::ZERO; 4]; blocks.room()], blocks }
     }
@@ -201,7 +201,7 @@ impl<R: Real> Moved<R> {
 }
 
 /// The history of each block; where there is none, none for each.
-fn in_blocks<R: Real>(
+fn in_blocks<R: Scalar>(
     (history, per_pack): (&mut [Pack<R>], usize),
     blocks: usize,
 ) -> impl IndexedParallelIterator<Item = &mut [Pack<R>]> {

@@ -11,20 +11,21 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use pliant_mechanics::Energies;
+use pliant_mechanics::grip::Grip;
+use pliant_mechanics::model::{Amplitudes, Contradiction, FREE, Model, component, placed};
+use pliant_mechanics::tensor::Vector;
 use rayon::prelude::*;
 
-use crate::Real;
+use crate::Scalar;
 use crate::applied::AppliedForces;
-use crate::energies::{Energies, Sums, model_balance_floor};
+use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
-use crate::grip::Grip;
 use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
-use crate::model::{Amplitudes, Contradiction, FREE, Model, component, placed};
 use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
-use crate::tensor::Vector;
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -94,7 +95,7 @@ struct Pace<R> {
     per_two_steps: R,
 }
 
-impl<R: Real> Pace<R> {
+impl<R: Scalar> Pace<R> {
     fn new(lengths: Lengths) -> Self {
         let step_squared = lengths.next * lengths.mean();
         Self {
@@ -137,7 +138,7 @@ pub struct CentralDifference<R> {
 }
 
 /// At the last evaluation.
-impl<R: Real> Observable<R> for CentralDifference<R> {
+impl<R: Scalar> Observable<R> for CentralDifference<R> {
     fn energies(&self) -> &Energies {
         &self.energies
     }
@@ -159,12 +160,12 @@ impl<R: Real> Observable<R> for CentralDifference<R> {
 }
 
 /// A force [N] on the components of a node that have an owner.
-pub(crate) fn owned_only<R: Real>(owner: &[u32; 3], force: Vector<R>) -> Vector<f64> {
+pub(crate) fn owned_only<R: Scalar>(owner: &[u32; 3], force: Vector<R>) -> Vector<f64> {
     [0, 1, 2].map(|c| if owner[c] == FREE { 0.0 } else { force[c].to_f64() })
 }
 
 /// The sum of forces over the components that a constraint owns.
-pub(crate) fn sum_owned<R: Real>(
+pub(crate) fn sum_owned<R: Scalar>(
     model: &Model,
     owners: &[[u32; 3]],
     constraint: usize,
@@ -193,7 +194,7 @@ struct NodePass<'a, R> {
     reaction: &'a mut [Vector<R>],
 }
 
-impl<R: Real> Work<R> for NodePass<'_, R> {
+impl<R: Scalar> Work<R> for NodePass<'_, R> {
     type Output = Sums;
 
     /// Plain loops over a block of components, which the compiler makes wide.
@@ -249,7 +250,7 @@ struct Add<'a, R> {
     to: &'a mut [Vector<R>],
 }
 
-impl<R: Real> Work<R> for Add<'_, R> {
+impl<R: Scalar> Work<R> for Add<'_, R> {
     type Output = ();
 
     #[inline(always)]
@@ -271,7 +272,7 @@ struct Block<R> {
     damping: [Vector<R>; BLOCK],
 }
 
-impl<R: Real> Block<R> {
+impl<R: Scalar> Block<R> {
     #[inline(always)]
     fn at_rest() -> Self {
         let zero = [[R::ZERO; 3]; BLOCK];
@@ -347,7 +348,7 @@ impl<R: Real> Block<R> {
     }
 }
 
-impl<R: Real> CentralDifference<R> {
+impl<R: Scalar> CentralDifference<R> {
     /// A stepper for steps of `step` seconds.
     ///
     /// # Errors

@@ -8,8 +8,8 @@
 //!
 //! ```
 //! use nalgebra::Vector3;
-//! use pliant_corotational::element::Elasticity;
-//! use pliant_corotational::{
+//! use pliant_implicit::element::Elasticity;
+//! use pliant_implicit::{
 //!     Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
 //! };
 //! use pliant_mechanics::curve::{Curve, Shape};

@@ -11,9 +11,11 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use pulp::{Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
-use crate::real::closer_to_inverse_cbrt;
-use crate::tensor::{Symmetric, Tensor, Vector};
-use crate::{Number, Real};
+use pliant_mechanics::Number;
+use pliant_mechanics::closer_to_inverse_cbrt;
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector};
+
+use crate::Scalar;
 
 /// Numbers in a pack: the widest register in single precision.
 pub const PACK: usize = 16;
@@ -24,7 +26,7 @@ pub const PACK: usize = 16;
 #[repr(C, align(64))]
 pub struct Pack<R>(pub [R; PACK]);
 
-impl<R: Real> Pack<R> {
+impl<R: Scalar> Pack<R> {
     /// All zeros.
     pub(crate) const ZERO: Self = Self([R::ZERO; PACK]);
 
@@ -36,7 +38,7 @@ impl<R: Real> Pack<R> {
 
 /// The number of an entry in a row of packs.
 #[inline(always)]
-pub(crate) fn entry<R: Real>(packs: &[Pack<R>], index: usize) -> R {
+pub(crate) fn entry<R: Scalar>(packs: &[Pack<R>], index: usize) -> R {
     packs[index / PACK].0[index % PACK]
 }
 
@@ -65,13 +67,13 @@ pub trait Lanes<R>: Number {
 
 /// The lanes' part of a vector of packs.
 #[inline(always)]
-pub(crate) fn load_vector<R: Real, L: Lanes<R>>(from: &Vector<Pack<R>>, at: usize) -> Vector<L> {
+pub(crate) fn load_vector<R: Scalar, L: Lanes<R>>(from: &Vector<Pack<R>>, at: usize) -> Vector<L> {
     [L::load(&from[0], at), L::load(&from[1], at), L::load(&from[2], at)]
 }
 
 /// Writes a vector into packs.
 #[inline(always)]
-pub(crate) fn store_vector<R: Real, L: Lanes<R>>(vector: Vector<L>, to: &mut Vector<Pack<R>>, at: usize) {
+pub(crate) fn store_vector<R: Scalar, L: Lanes<R>>(vector: Vector<L>, to: &mut Vector<Pack<R>>, at: usize) {
     for (number, pack) in vector.into_iter().zip(to) {
         number.store(pack, at);
     }
@@ -79,14 +81,14 @@ pub(crate) fn store_vector<R: Real, L: Lanes<R>>(vector: Vector<L>, to: &mut Vec
 
 /// The lanes' part of a tensor of packs.
 #[inline(always)]
-pub(crate) fn load_tensor<R: Real, L: Lanes<R>>(from: &Tensor<Pack<R>>, at: usize) -> Tensor<L> {
+pub(crate) fn load_tensor<R: Scalar, L: Lanes<R>>(from: &Tensor<Pack<R>>, at: usize) -> Tensor<L> {
     let rows = &from.0;
     Tensor([load_vector(&rows[0], at), load_vector(&rows[1], at), load_vector(&rows[2], at)])
 }
 
 /// The lanes' part of a symmetric tensor of packs.
 #[inline(always)]
-pub(crate) fn load_symmetric<R: Real, L: Lanes<R>>(from: &Symmetric<Pack<R>>, at: usize) -> Symmetric<L> {
+pub(crate) fn load_symmetric<R: Scalar, L: Lanes<R>>(from: &Symmetric<Pack<R>>, at: usize) -> Symmetric<L> {
     let mut symmetric = Symmetric::ZERO;
     for (number, pack) in symmetric.0.iter_mut().zip(&from.0) {
         *number = L::load(pack, at);
@@ -199,7 +201,7 @@ impl Processor {
 
     /// Does the work in these lanes.
     #[inline]
-    pub(crate) fn run<R: Real, W: Work<R>>(self, work: W) -> W::Output {
+    pub(crate) fn run<R: Scalar, W: Work<R>>(self, work: W) -> W::Output {
         match self {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Self::Avx512(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
@@ -217,7 +219,7 @@ impl Processor {
 /// Work on its way into a function compiled for `S`.
 struct InLanes<R, W>(W, std::marker::PhantomData<R>);
 
-impl<R: Real, W: Work<R>> WithSimd for InLanes<R, W> {
+impl<R: Scalar, W: Work<R>> WithSimd for InLanes<R, W> {
     type Output = W::Output;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> W::Output {
@@ -229,7 +231,7 @@ impl<R: Real, W: Work<R>> WithSimd for InLanes<R, W> {
 ///
 /// # Safety
 /// Only where `S` has been detected. All uses are in methods of the wide types below. Their values and functions are
-/// reached through [`Real::Wide`] alone, which nothing but [`InLanes`] names, and `InLanes` is handed the proof.
+/// reached through [`Scalar::Wide`] alone, which nothing but [`InLanes`] names, and `InLanes` is handed the proof.
 #[inline(always)]
 unsafe fn proof<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0) };
@@ -245,7 +247,7 @@ pub(crate) struct Local<'a, R, const N: usize> {
     places: &'a [[[u16; PACK]; N]],
 }
 
-impl<'a, R: Real, const N: usize> Local<'a, R, N> {
+impl<'a, R: Scalar, const N: usize> Local<'a, R, N> {
     /// # Panics
     /// If there are not as many sums as vectors, or a place lies beyond.
     #[inline(always)]
@@ -293,7 +295,7 @@ impl<'a, R: Real, const N: usize> Local<'a, R, N> {
 
 /// a + b. Both are read before anything is written, or the compiler takes number by number.
 #[inline(always)]
-fn plus<R: Real>(a: [R; 4], b: [R; 4]) -> [R; 4] {
+fn plus<R: Scalar>(a: [R; 4], b: [R; 4]) -> [R; 4] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 
