@@ -296,12 +296,12 @@ impl Report {
         let mut parts = vec![
             format!("{processor}, {cores} cores, {system}; pliant {}, {}.", env!("CARGO_PKG_VERSION"), today()),
             format!(
-                "Whole steps; median of {} repeats of {} s or more, least and most beside it; lanes `{}`.",
+                "Whole steps: median of {} repeats of at least {} s, with the least and the most; lanes `{}`.",
                 self.settings.repeats, self.settings.seconds, self.settings.lanes
             ),
             self.rates_table(),
-            "Bytes and operations are counted per element and step; \"copy\" and \"mul-add\" are the parts of the rates \
-             above that they make up. Δt is 0.9 × the true limit (* element bound)."
+            "Bytes and operations are counted per element and step; \"copy\" and \"mul-add\" are their shares of the rates \
+             above. Δt is 0.9 × the critical time step of the assembled model (* of the element bound)."
                 .to_owned(),
             rows_table(&self.rows),
         ];
@@ -315,7 +315,7 @@ impl Report {
         if !self.cubes.is_empty() {
             parts.push(
                 "Largest cube in real time (0.1 m; brain-like NH, E = 3 kPa, ν = 0.45; liver-like TI+Prony), predicted from \
-                 the linear cost and Δt ∝ 1/n, measured, and again at the size that the measurement tells."
+                 the linear cost and Δt ∝ 1/n, measured, and measured again at the size estimated from that."
                     .to_owned(),
             );
             parts.push(self.cubes_table());
