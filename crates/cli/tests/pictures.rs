@@ -114,7 +114,7 @@ mod with_pictures {
         }
         let mut without = workshop.command(&[&arguments[..], &["--force"]].concat());
         let told: Told = without.env("PATH", "").output().unwrap().into();
-        assert!(done(&told).err.contains("there is no ffmpeg here"), "{}", told.err);
+        assert!(done(&told).err.contains("ffmpeg was not found"), "{}", told.err);
         assert_eq!(png(&workshop, "film.png"), ([81, 61], Some(6)));
     }
 

@@ -114,7 +114,7 @@ fn all_combinations_are_checked_before_the_first_is_run() {
     let told = sweep(&workshop, &set);
     assert_eq!(told.code, 2, "{}", told.err);
     assert!(told.underlines("--set law.tissue.poisson-ratio=0.7"), "{}", told.err);
-    assert!(told.words().contains("2 of 4 combinations are wrong; nothing was run"), "{}", told.err);
+    assert!(told.words().contains("2 of 4 combinations are invalid; nothing was run"), "{}", told.err);
     assert_eq!(told.err.matches("found 0.7").count(), 1, "told once: {}", told.err);
     assert!(!workshop.path("out").exists());
     for (set, says) in [
@@ -191,7 +191,7 @@ fn ctrl_c_ends_a_sweep_with_what_it_has() {
     assert!(killed.unwrap().success());
     let told = Told::from(child.wait_with_output().unwrap());
     assert_eq!(told.code, 130, "{}", told.err);
-    assert!(told.words().contains("the runs that had ended are in the table"), "{}", told.err);
+    assert!(told.words().contains("the table contains the finished runs"), "{}", told.err);
     let rows = table(&workshop, "out/case-sweep/sweep.csv");
     let states: Vec<&str> = rows[1..].iter().map(|row| row[2].as_str()).collect();
     assert_eq!(states, ["done", "interrupted"]);

@@ -140,5 +140,5 @@ fn without_a_screen_it_says_what_it_needs() {
     workshop.write("drag", "no recording");
     let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
     assert_eq!(told.code, 2);
-    assert!(told.err.contains("is no recording"), "{}", told.err);
+    assert!(told.err.contains("is not a recording"), "{}", told.err);
 }
