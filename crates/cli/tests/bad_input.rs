@@ -217,14 +217,14 @@ fn unreadable_and_truncated_meshes_tell_the_line() {
     let whole = vtk(&CUBE, &TETS, "");
     bad_mesh("", &["cannot read `case/organ.vtk`, line 1"]);
     bad_mesh("hello world\n", &["line 1", "`hello world`", "# vtk DataFile"]);
-    bad_mesh(&whole[..whole.len() / 2], &["cut off", "export it again"]);
+    bad_mesh(&whole[..whole.len() / 2], &["truncated", "export it again"]);
     bad_mesh(whole.replace("3 7\n", "3 99\n"), &["uses node 99", "export it again"]);
     bad_mesh(whole.replace("0.1 0 0\n", "0.1 zero 0\n"), &["`zero` is not"]);
     let scene = FROM_FILE.replace("organ.vtk", "organ.docx");
     let workshop = Workshop::new(&scene);
     workshop.write("case/organ.docx", "PK");
     let line = MESH_LINE.replace("organ.vtk", "organ.docx");
-    assert_refused(&workshop, &[&line], &["not in a mesh format known here", "Gmsh (.msh)"]);
+    assert_refused(&workshop, &[&line], &["not in a supported mesh format", "Gmsh (.msh)"]);
 }
 
 #[test]
@@ -594,7 +594,7 @@ fn empty_selections_say_what_is_near() {
     spoilt(
         "faces = { set = \"x-min\" }",
         &format!("faces = {one}"),
-        &["no boundary faces", "no whole boundary face"],
+        &["no boundary faces", "no boundary face lies completely within"],
     );
 }
 
@@ -785,7 +785,7 @@ fn check_and_info_refuse_like_run() {
     workshop.write("broken.off", "OFF\n3 1 0\n0 0 0\n");
     let told = workshop.pliant(&["info", "broken.off"]);
     assert_eq!(told.code, 2);
-    assert!(told.err.contains("cut off"), "{}", told.err);
+    assert!(told.err.contains("truncated"), "{}", told.err);
 }
 
 #[test]

@@ -332,7 +332,7 @@ impl fmt::Display for Diagnosis {
         let crowded = |face: &CrowdedFace| format!("{:?} of {} cells", face.nodes, face.cells.len());
         let mut lines = Vec::new();
         if self.no_cells {
-            lines.push("no cells at all".to_owned());
+            lines.push("no cells".to_owned());
         }
         lines.extend([
             line("blocks with an incomplete last cell", &self.incomplete_blocks, |kind| kind.name().into()),
@@ -346,7 +346,7 @@ impl fmt::Display for Diagnosis {
             line("faces of more than two cells", &self.crowded_faces, crowded),
             line("non-manifold edges", &self.non_manifold_edges, edge),
             line("open edges", &self.open_edges, edge),
-            line("edges between faces turned to opposite sides", &self.inconsistent_edges, edge),
+            line("edges between faces of opposite orientation", &self.inconsistent_edges, edge),
         ]);
         if self.components > 1 {
             lines.push(format!("{} separate parts", self.components));
@@ -454,7 +454,7 @@ mod tests {
     fn nothing_at_all_is_a_fault() {
         let found = diagnose(&Mesh::default());
         assert!(found.no_cells && !found.is_usable());
-        assert_eq!(found.to_string(), "no cells at all");
+        assert_eq!(found.to_string(), "no cells");
     }
 
     #[test]

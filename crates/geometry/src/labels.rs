@@ -73,7 +73,7 @@ pub enum UnknownLabel {
         known: Vec<String>,
     },
     /// Several labels have the name.
-    #[error("`{name}` is the name of the labels {}; choose by number", list(.labels))]
+    #[error("`{name}` names the labels {}; choose by number", list(.labels))]
     Ambiguous {
         /// The name asked for.
         name: String,

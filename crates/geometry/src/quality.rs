@@ -260,7 +260,7 @@ impl fmt::Display for QualityReport {
             write!(f, "\n{:<16} {count}", format!("{} cells", kind.name()))?;
         }
         if self.unmeasured > 0 {
-            write!(f, "\nnot measured     {} (nodes missing or not finite)", self.unmeasured)?;
+            write!(f, "\nnot measured     {} (missing or non-finite nodes)", self.unmeasured)?;
         }
         if let Some(edge) = self.edge_length {
             let Spread { min, median, max } = edge;

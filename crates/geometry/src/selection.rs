@@ -117,7 +117,7 @@ pub enum SelectionError {
     },
     /// A set of the mesh names something beyond its end.
     #[error(
-        "set `{name}` of the mesh is broken: it names {of} {index}, but there are {count}, counted from 0"
+        "set `{name}` of the mesh is broken: it contains {of} {index}, but there are {count}, counted from 0"
     )]
     BrokenSet {
         /// Name of the set.
@@ -517,7 +517,7 @@ impl View<'_> {
         }
         let nodes = self.nodes(selection).map_or(0, |nodes| nodes.len());
         if wanted == Wanted::Faces && nodes > 0 {
-            return format!("it holds {nodes} nodes, but they make up no whole boundary face");
+            return format!("it has {nodes} nodes, but no boundary face lies completely within them");
         }
         match selection {
             Selection::Boundary => "the mesh has no boundary faces".to_owned(),
@@ -823,9 +823,12 @@ mod tests {
         let mesh = block();
         let surface = boundary(&mesh);
         let error = parse("{ ids = [0, 1] }").faces(&mesh, &surface).unwrap_err().to_string();
-        assert!(error.contains("it holds 2 nodes, but they make up no whole boundary face"), "{error}");
+        assert!(
+            error.contains("it has 2 nodes, but no boundary face lies completely within them"),
+            "{error}"
+        );
         let error = parse(r#"{ set = "inner" }"#).faces(&mesh, &surface).unwrap_err().to_string();
-        assert!(error.contains("no whole boundary face"), "{error}");
+        assert!(error.contains("no boundary face lies completely within"), "{error}");
         let error = Selection::All.nodes(&Mesh::default(), &Surface::default()).unwrap_err().to_string();
         assert!(error.contains("the mesh has no points"), "{error}");
     }

@@ -246,7 +246,7 @@ fn gmsh_1_has_labels_but_no_names() {
     let of_five = tets.data["label"].values.iter().filter(|&&label| label == 5.0).count();
     assert_eq!(of_five, 24);
     assert!(tets.sets.is_empty());
-    assert!(file.notes.iter().any(|note| note.contains("48 cells were given once per physical group")));
+    assert!(file.notes.iter().any(|note| note.contains("48 cells are listed once per physical group")));
 }
 
 #[test]
@@ -561,7 +561,7 @@ fn content_tells_the_format_before_the_ending_does() {
     fs::copy(data().join("v42.vtk"), &path).unwrap();
     let file = read(&path).unwrap();
     assert_eq!(file.mesh, mixed());
-    assert!(file.notes[0].contains("the ending says VTU, but the file is legacy VTK"), "{:?}", file.notes);
+    assert!(file.notes[0].contains("the extension says VTU, but the file is legacy VTK"), "{:?}", file.notes);
 }
 
 // --- errors -------------------------------------------------------------------------------------------------

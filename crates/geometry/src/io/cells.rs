@@ -160,10 +160,10 @@ impl Cells {
             }));
         }
         if !kinds.is_empty() {
-            notes.push(format!("left out, as their kind is not supported: {kinds} cells"));
+            notes.push(format!("skipped cells of unsupported kinds: {kinds}"));
         }
         if self.cut > 0 {
-            notes.push(format!("{} polygons with more than 4 corners were cut into triangles", self.cut));
+            notes.push(format!("{} polygons with more than 4 corners were split into triangles", self.cut));
         }
         let mut blocks = self.blocks;
         for set in blocks.iter_mut().flat_map(|block| block.sets.values_mut()) {
@@ -197,7 +197,7 @@ pub(super) fn check_filled(numbers: usize, file_size: usize) -> Result<(), Fault
     if numbers.saturating_mul(size_of::<f64>()) <= array_limit(file_size) {
         return Ok(());
     }
-    Err(Fault::malformed(Place::File, "the arrays would be far larger than the file"))
+    Err(Fault::malformed(Place::File, "the arrays are far larger than the file"))
 }
 
 /// A point of a file, which must be finite. `number` is its number in the file.

@@ -29,7 +29,7 @@ impl fmt::Display for Place {
 pub enum MeshFileError {
     /// Neither the ending nor the first bytes tell a format that can be read.
     #[error(
-        "`{}` is not in a mesh format known here; formats read: {}; convert it, e.g. with meshio",
+        "`{}` is not in a supported mesh format; formats read: {}; convert it, e.g. with meshio",
         path.display(),
         super::Format::list(super::Format::ALL)
     )]
@@ -39,7 +39,7 @@ pub enum MeshFileError {
     },
     /// The ending names no format that can be written.
     #[error(
-        "cannot write `{}`: formats written: {}; choose one of these endings",
+        "cannot write `{}`: formats written: {}; use one of these extensions",
         path.display(),
         super::Format::list(super::Format::WRITTEN)
     )]
@@ -88,7 +88,7 @@ pub enum MeshFileError {
 pub enum MeshFileProblem {
     /// The file ends too early, or announces more than it holds.
     #[error(
-        "the file ends while reading {reading}: it is cut off or its counts are wrong; copy or export it again"
+        "the file ends while reading {reading}: it is truncated or its counts are wrong; copy or export it again"
     )]
     Truncated {
         /// What was being read.
@@ -113,7 +113,7 @@ pub enum MeshFileProblem {
         cell: String,
     },
     /// A coordinate is NaN or infinite.
-    #[error("point {point} is not finite ({x}, {y}, {z}); repair the mesh where it was made")]
+    #[error("point {point} is not finite ({x}, {y}, {z}); repair the mesh in the program that made it")]
     NotFinite {
         /// The point, as numbered in the file.
         point: u64,
@@ -125,14 +125,14 @@ pub enum MeshFileProblem {
         z: f64,
     },
     /// The file holds no points.
-    #[error("the file has no points; check what was exported")]
+    #[error("the file has no points; check the export")]
     NoPoints,
     /// The file holds points, but no cells.
     #[error("the file has points but no cells; export the elements too")]
     NoCells,
     /// All cells are of kinds that are not supported.
     #[error(
-        "no cell can be used: {kinds} not supported; convert to linear tet, hex, triangle, quad, line or vertex \
+        "no supported cells: {kinds} not supported; convert to linear tet, hex, triangle, quad, line or vertex \
          cells (Gmsh: `gmsh FILE -order 1 -save`)"
     )]
     UnsupportedCells {

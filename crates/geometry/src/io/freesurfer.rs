@@ -30,7 +30,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
             "convert it with `mris_convert`",
         )),
         _ if bytes.starts_with(TEXT) => read_text(bytes),
-        _ => Err(Fault::malformed(Place::Byte(0), "the file does not begin as a surface of FreeSurfer does")),
+        _ => Err(Fault::malformed(
+            Place::Byte(0),
+            "the file does not start with the header of a FreeSurfer surface",
+        )),
     }
 }
 
@@ -108,7 +111,5 @@ fn shift(footer: &[u8]) -> Option<String> {
     let line = text.lines().find(|line| line.trim_start().starts_with("cras"))?;
     let numbers = line.split_once('=')?.1.split_whitespace().map(str::parse).collect::<Result<Vec<f64>, _>>();
     let [x, y, z] = numbers.ok()?.try_into().ok()?;
-    Some(format!(
-        "axes of FreeSurfer: in the scanner's the surface lies farther by ({x}, {y}, {z}) mm (c_ras)"
-    ))
+    Some(format!("axes of FreeSurfer: scanner coordinates add ({x}, {y}, {z}) mm (c_ras)"))
 }

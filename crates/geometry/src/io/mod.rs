@@ -192,7 +192,7 @@ pub fn read(path: &Path) -> Result<MeshFile, MeshFileError> {
     if let Some(ending) = by_ending
         && !file.format.starts_with(ending.name())
     {
-        file.notes.push(format!("the ending says {}, but the file is {}", ending.name(), file.format));
+        file.notes.push(format!("the extension says {}, but the file is {}", ending.name(), file.format));
     }
     Ok(file)
 }

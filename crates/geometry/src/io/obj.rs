@@ -110,7 +110,8 @@ impl Reader {
             self.corners.push(found);
         }
         if self.corners.len() < least {
-            let what = format!("cell {number} has {} corners, not {least} or more", self.corners.len());
+            let what =
+                format!("cell {number} has {} corners, at least {least} are needed", self.corners.len());
             return Err(words.malformed(what));
         }
         let source = self.cells.len();
@@ -155,7 +156,7 @@ impl Reader {
 
     fn finish(mut self) -> Result<MeshFile, Fault> {
         let mut notes: Vec<String> =
-            self.ignored.iter().map(|(key, count)| format!("{count} lines `{key}` were not used")).collect();
+            self.ignored.iter().map(|(key, count)| format!("{count} lines `{key}` were ignored")).collect();
         for (name, number) in &self.numbers {
             let members = std::mem::take(&mut self.sets[*number]);
             if !members.is_empty() {

@@ -17,7 +17,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     let what = if kind.is_dir() {
         "it is a folder"
     } else {
-        "it is not a regular file but a pipe, a socket or a device; write what it gives to a file first"
+        "it is not a regular file but a pipe, a socket or a device; write its data to a file first"
     };
     Err(io::Error::new(io::ErrorKind::InvalidInput, what))
 }
@@ -36,9 +36,9 @@ pub fn read_limited(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     }
     let length = announced.max(bytes.len() as u64);
     let what = if length >= 1 << 20 {
-        format!("it has {} MB, more than the {} MB that are read", length >> 20, limit >> 20)
+        format!("it has {} MB, more than the limit of {} MB", length >> 20, limit >> 20)
     } else {
-        format!("it has {length} bytes, more than the {limit} that are read")
+        format!("it has {length} bytes, more than the limit of {limit}")
     };
     Err(io::Error::new(io::ErrorKind::FileTooLarge, what))
 }
@@ -56,7 +56,7 @@ mod tests {
         assert!(read_limited(&path, 6).unwrap_err().to_string().contains("7 bytes, more than the 6"));
         fs::File::create(&path).unwrap().set_len(1 << 40).unwrap();
         let told = read_limited(&path, 1 << 30).unwrap_err().to_string();
-        assert_eq!(told, "it has 1048576 MB, more than the 1024 MB that are read");
+        assert_eq!(told, "it has 1048576 MB, more than the limit of 1024 MB");
         assert!(read_limited(folder.path(), 6).unwrap_err().to_string().contains("folder"));
         assert_eq!(read_limited(&folder.path().join("none"), 6).unwrap_err().kind(), io::ErrorKind::NotFound);
     }

@@ -301,7 +301,7 @@ impl Reader<'_> {
 
     /// Texts are passed over: lines, or in binary bytes after their length.
     fn skip_texts(&mut self, count: usize, title: &str) -> Result<(), Fault> {
-        self.notes.push(format!("array `{title}` holds texts and was not used"));
+        self.notes.push(format!("array `{title}` contains text and was ignored"));
         let what = format!("text array `{title}`");
         self.cursor.line();
         for _ in 0..count {
@@ -341,7 +341,7 @@ impl Reader<'_> {
             b"long" | b"long_long" | b"vtktypeint64" => Scalar::I64,
             b"float" | b"vtktypefloat32" => Scalar::F32,
             b"double" | b"vtktypefloat64" => Scalar::F64,
-            other => return Err(self.cursor.malformed(format!("`{}` is no type of numbers", shown(other)))),
+            other => return Err(self.cursor.malformed(format!("`{}` is not a number type", shown(other)))),
         }))
     }
 

@@ -48,7 +48,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         Err(_) => String::from_utf8_lossy(&xml),
     };
     let document = parse_xml(&text).map_err(|error| {
-        Fault::malformed(Place::Line(error.line), format!("the XML is broken or cut off: {error}"))
+        Fault::malformed(Place::Line(error.line), format!("the XML is broken or truncated: {error}"))
     })?;
     let root = document.root_element();
     if root.tag_name().name() != "VTKFile" {
@@ -149,7 +149,7 @@ impl<'a> Storage<'a> {
             Some("UInt64") => Scalar::U64,
             Some("UInt32") | None => Scalar::U32,
             Some(other) => {
-                return Err(Fault::malformed(Place::Line(1), format!("`{other}` is no type of a header")));
+                return Err(Fault::malformed(Place::Line(1), format!("`{other}` is not a header type")));
             }
         };
         let compressed = match root.attribute("compressor") {
@@ -358,7 +358,7 @@ impl<'a> Storage<'a> {
         for (i, array) in children(section, "DataArray").enumerate() {
             let name = array.attribute("Name").map_or_else(|| format!("array{i}"), str::to_owned);
             if array.attribute("type") == Some("String") {
-                notes.push(format!("array `{name}` holds texts and was not used"));
+                notes.push(format!("array `{name}` contains text and was ignored"));
                 continue;
             }
             let components = self.announced(array, "NumberOfComponents")?.unwrap_or(1).max(1);
@@ -388,7 +388,7 @@ impl<'a> Storage<'a> {
             "Float32" => Scalar::F32,
             "Float64" => Scalar::F64,
             other => {
-                let what = format!("`{other}` is no type of numbers");
+                let what = format!("`{other}` is not a number type");
                 return Err(Fault::malformed(self.line(array), what));
             }
         })
@@ -462,7 +462,7 @@ impl<'a> Storage<'a> {
             }
             other => {
                 let what = format!("the format `{}` of {what}", other.unwrap_or_default());
-                Err(Fault::malformed(self.line(array), format!("{what} is not known")))
+                Err(Fault::malformed(self.line(array), format!("{what} is unknown")))
             }
         }
     }

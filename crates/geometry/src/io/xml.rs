@@ -33,7 +33,7 @@ pub fn parse_xml(text: &str) -> Result<Document<'_>, XmlError> {
 fn within_bounds(text: &str) -> Result<(), XmlError> {
     let too_many = |at: usize, what: &str, most: usize| XmlError {
         line: text[..at].matches('\n').count() + 1,
-        reason: format!("more than {most} {what}; no mesh or model needs as many"),
+        reason: format!("more than {most} {what}; no mesh or model needs that many"),
     };
     let mut namespaces = 0;
     let mut at = 0;
