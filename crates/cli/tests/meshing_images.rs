@@ -282,7 +282,7 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
         (seg, &["--label", "6", "--edge", "0.006"], &["no voxel has label 6; the image has 5, 8, 9"]),
         (seg, &["--label", "0", "--edge", "0.006"], &["label 0 is the background; the image has 5, 8, 9"]),
         (seg, &["--label", "5", "--label", "5", "--edge", "0.006"], &["label 5 is named twice"]),
-        (seg, &["--edge", "0.006"], &["no label is chosen; the image has 5, 8, 9", "--label"]),
+        (seg, &["--edge", "0.006"], &["no label was chosen; the image has 5, 8, 9", "--label"]),
         (seg, &["--threshold", "50", "--edge", "0.006"], &["no voxel is 50 or more", "lower"]),
         (seg, &["--label", "5", "--edge", "-1"], &["edge is -1", "positive"]),
         (seg, &["--label", "5", "--edge", "nan"], &["edge is NaN", "positive"]),
@@ -479,7 +479,7 @@ fn mistakes_about_images_are_underlined_in_the_scene() {
     for (mesh, says) in [
         ("{ image = \"seg.nii.gz\", label = 6, edge = 0.006 }", "the image has 5, 8, 9"),
         ("{ image = \"seg.nii.gz\", labels = [5, 0], edge = 0.006 }", "label 0 is the background"),
-        ("{ image = \"seg.nii.gz\", labels = [], edge = 0.006 }", "no label is chosen"),
+        ("{ image = \"seg.nii.gz\", labels = [], edge = 0.006 }", "no label was chosen"),
         ("{ image = \"seg.nii.gz\", edge = 0.006 }", "add `label = 1`"),
         ("{ image = \"other.nii.gz\", label = 5, edge = 0.006 }", "relative to the scene file"),
         ("{ image = \"scene.toml\", label = 5, edge = 0.006 }", "not an image"),

@@ -40,7 +40,7 @@ impl Cut {
     pub fn note(&self) -> Option<String> {
         let [x, y, z] = self.labels.grid.spacing().map(|h| h * 1e3);
         (self.factors != [1; 3]).then(|| {
-            format!("resampled to voxels of {x:.3} × {y:.3} × {z:.3} mm, so that the box round the body has no more than 322³ of them")
+            format!("resampled to voxels of {x:.3} × {y:.3} × {z:.3} mm: the box of the body is limited to 322³ voxels")
         })
     }
 }

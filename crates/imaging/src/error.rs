@@ -1,4 +1,4 @@
-//! What can be wrong with an image, where, and what to try.
+//! Errors of images: the problem, its position and a remedy.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub enum ImageError {
     },
     /// Neither the first bytes nor the ending tell a format that can be read.
     #[error(
-        "`{}` is not an image known here; formats read: NIfTI (.nii, .nii.gz, .hdr + .img), NRRD (.nrrd, .nhdr), MetaImage \
+        "`{}` is not a supported image; formats read: NIfTI (.nii, .nii.gz, .hdr + .img), NRRD (.nrrd, .nhdr), MetaImage \
          (.mha, .mhd), GIPL (.gipl, .gipl.gz), DICOM (a folder of slices, or a segmentation); convert it, e.g. with ITK-SNAP or 3D Slicer",
         path.display()
     )]
@@ -43,7 +43,7 @@ pub enum ImageError {
 pub enum ImageProblem {
     /// The file ends too early, or announces more than it holds.
     #[error(
-        "the file ends while reading {reading}: {expected} bytes are needed and {found} are there; copy or export it again"
+        "the file ends while reading {reading}: {expected} bytes are needed, {found} exist; copy or export it again"
     )]
     Truncated {
         /// What was being read.
@@ -55,7 +55,7 @@ pub enum ImageProblem {
     },
     /// Compressed data that cannot be unpacked.
     #[error(
-        "{reading} cannot be unpacked after {found} bytes ({message}): the file is cut off or damaged; copy it again"
+        "{reading} cannot be decompressed after {found} bytes ({message}): the file is truncated or damaged; copy it again"
     )]
     Packed {
         /// What was being read.
@@ -66,7 +66,7 @@ pub enum ImageProblem {
         message: String,
     },
     /// The first bytes are not those of the format.
-    #[error("the file is not {format}: {found}; check the ending, or that the file arrived whole")]
+    #[error("the file is not {format}: {found}; check the extension, or that the file is complete")]
     NotThisFormat {
         /// The format expected.
         format: &'static str,
@@ -109,7 +109,7 @@ pub enum ImageProblem {
     },
     /// More bytes than allowed. Found before they are read.
     #[error(
-        "the voxels take {:.1} GB unpacked, more than the {:.1} GB allowed; crop the image, resample it, or save it with smaller numbers \
+        "the voxels take {:.1} GB uncompressed, more than the {:.1} GB allowed; crop the image, resample it, or save it with smaller numbers \
          (8 or 16 bits)",
         *bytes as f64 * 1e-9, *limit as f64 * 1e-9
     )]
@@ -129,7 +129,7 @@ pub enum ImageProblem {
         steps: [Vector3; 3],
     },
     /// A folder without any DICOM slice.
-    #[error("no DICOM slice among {files} files; give the folder that holds the slices themselves")]
+    #[error("no DICOM slice among {files} files; give the folder of the slices themselves")]
     NoSlices {
         /// Files looked at.
         files: usize,
@@ -149,9 +149,7 @@ pub enum ImageProblem {
         series: Vec<String>,
     },
     /// A slice differs from the first one where all must agree.
-    #[error(
-        "`{file}` has {what} {found}, the first slice {expected}; remove what does not belong to the series"
-    )]
+    #[error("`{file}` has {what} {found}, the first slice {expected}; remove files of other series")]
     SliceDiffers {
         /// File name of the slice.
         file: String,
@@ -178,7 +176,7 @@ pub enum ImageProblem {
         expected: f64,
     },
     /// Two slices at the same place.
-    #[error("`{first}` and `{second}` lie at the same place; keep one phase or echo in the folder")]
+    #[error("`{first}` and `{second}` lie at the same position; keep one phase or echo in the folder")]
     SamePlace {
         /// File name of one.
         first: String,
@@ -197,7 +195,7 @@ fn shown(step: &Vector3) -> String {
 pub enum LabelError {
     /// A value that is not a whole number.
     #[error(
-        "voxel {voxel:?} is {value}, which is no label (values from {} to {}); give a label image, or choose the region by a threshold",
+        "voxel {voxel:?} is {value}, which is not a label (values from {} to {}); give a label image, or choose the region by a threshold",
         range[0], range[1]
     )]
     NotWhole {
@@ -210,7 +208,7 @@ pub enum LabelError {
     },
     /// A scan instead of a segmentation: many values that change from voxel to voxel.
     #[error(
-        "this is no label image: {values}{} values from {} to {} that change from voxel to voxel, as in a CT or an MR scan; segment it \
+        "this is not a label image: {values}{} values from {} to {} change from voxel to voxel, as in a CT or MR scan; segment it \
          first, or choose the region by a threshold",
         if *more { " or more" } else { "" }, range[0], range[1]
     )]
@@ -233,7 +231,7 @@ pub enum LabelError {
         names: Vec<String>,
     },
     /// A name that several labels have.
-    #[error("`{name}` is the name of the labels {}; choose by number", list(labels))]
+    #[error("`{name}` names the labels {}; choose by number", list(labels))]
     AmbiguousName {
         /// The name.
         name: String,
@@ -241,7 +239,7 @@ pub enum LabelError {
         labels: Vec<i32>,
     },
     /// A range in which the image has no label.
-    #[error("no voxel has a label of {range}; the image has {}", list(present))]
+    #[error("no voxel has a label in {range}; the image has {}", list(present))]
     EmptyRange {
         /// The range.
         range: String,
@@ -250,7 +248,7 @@ pub enum LabelError {
     },
     /// An image that was to be a mask.
     #[error(
-        "`{name}` is no mask: it has the labels {}; give it as the only image, or say from which value on a voxel is inside",
+        "`{name}` is not a mask: it has the labels {}; give it as the only image, or give a threshold",
         list(labels)
     )]
     NoMask {
@@ -282,7 +280,7 @@ pub enum LabelError {
         present: Vec<i32>,
     },
     /// No label asked for.
-    #[error("no label is chosen; the image has {}", list(present))]
+    #[error("no label was chosen; the image has {}", list(present))]
     NoneChosen {
         /// Labels of the image, without 0.
         present: Vec<i32>,
@@ -313,7 +311,7 @@ pub enum LabelError {
     },
     /// Two images of which the sum was asked for.
     #[error(
-        "the images have not the same voxels ({first:?} and {second:?}, or they lie elsewhere); resample one of them"
+        "the images have different voxels ({first:?} and {second:?}, or other positions); resample one of them"
     )]
     OtherVoxels {
         /// Voxels along i, j, k of the first.
@@ -322,7 +320,7 @@ pub enum LabelError {
         second: [usize; 3],
     },
     /// More labels than a mesh can tell apart.
-    #[error("{labels} labels asked for in one mesh, more than {limit}; mesh them in parts")]
+    #[error("{labels} labels in one mesh, more than {limit}; mesh them in parts")]
     TooManyLabels {
         /// Labels asked for.
         labels: usize,

@@ -296,7 +296,7 @@ impl Image {
             notes.extend(mask.notes.iter().map(|note| format!("{name}: {note}")));
         }
         if shared > 0 {
-            notes.push(format!("the masks overlap in {shared} voxels, which count to the last one"));
+            notes.push(format!("the masks overlap in {shared} voxels, which belong to the last one"));
         }
         let bytes = labels.into_iter().flat_map(u16::to_le_bytes).collect();
         let numbers = Numbers { scalar: Scalar::U16, order: Order::Little, bytes };

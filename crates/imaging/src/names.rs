@@ -49,7 +49,7 @@ impl LabelNames {
     pub(crate) fn of_table(text: &str) -> Result<Self, Fault> {
         let text = text.trim_start_matches('\u{feff}');
         let names = if text.trim_start().starts_with('{') { of_json(text)? } else { of_lines(text)? };
-        if names.0.is_empty() { Err(no_table("it names no label").into()) } else { Ok(names) }
+        if names.0.is_empty() { Err(no_table("it contains no label name").into()) } else { Ok(names) }
     }
 
     /// Names a label. Control characters are left out; an empty name is none.
@@ -213,7 +213,7 @@ fn of_lines(text: &str) -> Result<LabelNames, Fault> {
         let end = line.find(|c: char| c.is_whitespace() || ",:;=".contains(c)).unwrap_or(line.len());
         let rest = line[end..].trim_start_matches(|c: char| c.is_whitespace() || ",:;=".contains(c));
         let Ok(label) = line[..end].parse() else {
-            return Err(no_table(format!("line {number} does not begin with a label")).at_line(number));
+            return Err(no_table(format!("line {number} does not start with a label")).at_line(number));
         };
         match rest.split_once('"').and_then(|(_, quoted)| quoted.rsplit_once('"')) {
             Some((name, _)) => names.insert(label, name),

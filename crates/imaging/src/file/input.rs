@@ -102,7 +102,7 @@ impl<'a> Input<'a> {
                 Ok(Input { within, limit, progress, ..Input::new(file, false, Some(path)) })
             }
             Err(error) => {
-                let expected = "that file must lie beside the header and be readable";
+                let expected = "that file must be readable and in the folder of the header";
                 Err(ImageProblem::bad(field, name, expected).with_cause(&error).into())
             }
         }
@@ -173,7 +173,7 @@ impl<'a> Input<'a> {
         if self.header_left == 0 {
             return Err(ImageProblem::Unsupported {
                 what: "a header of more than 4 MiB".to_owned(),
-                remedy: "check that this is an image at all",
+                remedy: "check that this is an image",
             }
             .into());
         }

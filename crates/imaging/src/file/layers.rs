@@ -68,13 +68,13 @@ pub(super) fn joined(
         bytes.extend(last.map_or(0, label).to_le_bytes());
     }
     if !own {
-        notes.push("segments use a value again: the labels are their numbers from 1 on".into());
+        notes.push("segments share values: labels are the segment numbers from 1".into());
     }
     if shared > 0 {
-        notes.push(format!("segments overlap in {shared} voxels, which count to the later one"));
+        notes.push(format!("segments overlap in {shared} voxels, which belong to the later one"));
     }
     if lost > 0 {
-        notes.push(format!("{lost} numbers belong to no segment and were not used"));
+        notes.push(format!("{lost} values belong to no segment and were ignored"));
     }
     let mut names = LabelNames::default();
     segments.iter().enumerate().for_each(|(number, segment)| names.insert(label(number), &segment.name));

@@ -149,8 +149,7 @@ impl Fault {
 fn check_within(path: &Path, folder: Option<&Path>) -> io::Result<()> {
     match folder {
         Some(folder) if !path.canonicalize()?.starts_with(folder) => {
-            let reason =
-                format!("it is outside the folder `{}`, and nothing else may be read", folder.display());
+            let reason = format!("it is outside the folder `{}`, the only readable one", folder.display());
             Err(io::Error::new(io::ErrorKind::PermissionDenied, reason))
         }
         _ => Ok(()),

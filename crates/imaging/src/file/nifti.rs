@@ -80,7 +80,7 @@ impl Header {
             b"ni1\0" | b"ni2\0" => false,
             [0, 0, 0, 0] if version == 1 => {
                 return Err(ImageProblem::Unsupported {
-                    what: "ANALYZE 7.5, which does not tell left from right".to_owned(),
+                    what: "ANALYZE 7.5, which does not distinguish left from right".to_owned(),
                     remedy: "convert it to NIfTI with the program that made it",
                 }
                 .at_byte(magic_at));
@@ -154,7 +154,7 @@ impl Header {
         if let Some(more) = dims[3..].iter().find(|&&n| n > 1) {
             return Err(ImageProblem::Unsupported {
                 what: format!("an image of {more} volumes (dim = {dims:?})"),
-                remedy: "take out one volume, e.g. with fslroi or nibabel",
+                remedy: "extract one volume, e.g. with fslroi or nibabel",
             });
         }
         checked_size([dims[0] as u64, dims[1] as u64, dims[2] as u64], "dim", options)
@@ -185,14 +185,14 @@ impl Header {
                 return Err(ImageProblem::bad(
                     "datatype",
                     code,
-                    "no such type is known; convert the image again",
+                    "this type does not exist; convert the image again",
                 )
                 .at_byte(at));
             }
         };
         let bits = self.integer(72, 14, 2);
         if bits != 8 * scalar.size() as i64 {
-            let expected = "it must be the bits of a number of `datatype`; convert the image again";
+            let expected = "it must match `datatype`; convert the image again";
             return Err(ImageProblem::bad("bitpix", bits, expected).at_byte(at + 2));
         }
         Ok(scalar)
@@ -221,7 +221,7 @@ impl Header {
         if offset.fract() == 0.0 && (least..=(1_u64 << 30) as f64).contains(&offset) {
             Ok(offset as u64)
         } else {
-            let expected = "it must be a whole number of bytes beyond the header; convert the image again";
+            let expected = "it must be a whole number of bytes, past the header; convert the image again";
             Err(ImageProblem::bad("vox_offset", offset, expected))
         }
     }
@@ -265,7 +265,7 @@ impl Header {
             return Grid::new(dims, offset.into(), self.rotation()? * mirror * spacing);
         }
         notes.push(
-            "no orientation (sform and qform codes are 0): axes taken along x, y and z from the origin"
+            "no orientation (sform and qform codes are 0): assuming axes x, y and z from the origin"
                 .to_owned(),
         );
         Grid::new(dims, Vector3::zeros(), spacing)

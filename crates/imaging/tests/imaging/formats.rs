@@ -178,7 +178,7 @@ fn slope_and_intercept_scale_values_and_labels_stay_whole() {
     let scaled = of_bytes(&file, ImageFormat::Nifti);
     assert_eq!(scaled.value(1), -863.0 * 0.5 + 10.0);
     let error = scaled.labels().unwrap_err().to_string();
-    assert!(error.starts_with("voxel [1, 0, 0] is -421.5, which is no label"), "{error}");
+    assert!(error.starts_with("voxel [1, 0, 0] is -421.5, which is not a label"), "{error}");
 }
 
 /// NIfTI-1, method 1: no orientation.
@@ -203,5 +203,5 @@ fn an_axis_of_one_layer_without_direction_is_dropped() {
     let two = layered.replace("sizes: 1 ", "sizes: 2 ");
     let error =
         read_bytes(two.as_bytes(), ImageFormat::Nrrd, &ReadOptions::default()).unwrap_err().to_string();
-    assert!(error.contains("several values a voxel"), "{error}");
+    assert!(error.contains("several values per voxel"), "{error}");
 }

@@ -159,7 +159,7 @@ impl<'a> Elements<'a> {
         let numbers: Option<Vec<f64>> =
             text.split('\\').map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
         numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| {
-            ImageProblem::bad(field, text, "it has the wrong number of values, or one is no number")
+            ImageProblem::bad(field, text, "it has the wrong number of values, or an invalid number")
         })
     }
 

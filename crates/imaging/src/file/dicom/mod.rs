@@ -55,8 +55,8 @@ impl Object {
 /// Contours instead of voxels.
 fn contours() -> ImageProblem {
     ImageProblem::Unsupported {
-        what: "an RT structure set (RTSTRUCT), which holds contours and no voxels,".to_owned(),
-        remedy: "turn it into a label image, e.g. with 3D Slicer (SlicerRT: export the segmentation as NRRD or NIfTI), plastimatch \
+        what: "an RT structure set (RTSTRUCT), which has contours instead of voxels,".to_owned(),
+        remedy: "convert it to a label image, e.g. with 3D Slicer (SlicerRT: export the segmentation as NRRD or NIfTI), plastimatch \
                  (`plastimatch convert --input rtss.dcm --referenced-ct FOLDER --output-labelmap seg.nrrd`) or dcmrtstruct2nii",
     }
 }
@@ -69,7 +69,7 @@ pub(super) fn read_file(bytes: &[u8], slice: bool, options: &ReadOptions) -> Res
         Object::Slices(slices) if slice || slices.len() > 1 => Ok(volume(slices, options)?),
         Object::Slices(_) => Err(ImageProblem::Unsupported {
             what: "a single DICOM slice".to_owned(),
-            remedy: "give the folder that holds the whole series",
+            remedy: "give the folder of the whole series",
         }
         .into()),
         Object::Segmentation => segmentation::read(&elements, options),
@@ -194,10 +194,10 @@ pub(super) fn read_folder(
         }
     };
     if found.files > used {
-        image.notes.push(format!("{} other files in the folder were passed over", found.files - used));
+        image.notes.push(format!("{} other files in the folder were ignored", found.files - used));
     }
     if found.contours > 0 {
-        image.notes.push(format!("RT structure sets (contours) among them: {}", found.contours));
+        image.notes.push(format!("of these, RT structure sets (contours): {}", found.contours));
     }
     Ok(image)
 }
@@ -316,7 +316,7 @@ impl<'a> Frames<'a> {
         }
         let steps = [Vector3::new(o[0], o[1], o[2]), Vector3::new(o[3], o[4], o[5])];
         if steps.iter().any(|unit| (unit.norm() - 1.0).abs() > 1e-2) || steps[0].dot(&steps[1]).abs() > 1e-2 {
-            let expected = "two unit vectors square to each other are needed; export the series again";
+            let expected = "two perpendicular unit vectors are needed; export the series again";
             return Err(ImageProblem::bad("ImageOrientationPatient", format!("{o:?}"), expected));
         }
         let length = |tag, field| measures.reals::<1>(tag, field).ok().map(|[h]| h).filter(|&h| h > 0.0);

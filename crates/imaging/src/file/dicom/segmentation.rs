@@ -70,14 +70,11 @@ pub(super) fn read(elements: &Elements<'_>, options: &ReadOptions) -> Result<Ima
             }
         }
     }
-    let mut notes = vec![
-        "the frames end where the segments do: whether the scan cuts them off along its slices is not known"
-            .to_owned(),
-    ];
+    let mut notes =
+        vec!["the frames end with the segments: the scan may cut them off along its slices".to_owned()];
     if shared > 0 {
-        notes.push(format!(
-            "segments overlap in {shared} voxels, which count to the segment of the highest number"
-        ));
+        notes
+            .push(format!("segments overlap in {shared} voxels, which belong to the highest segment number"));
     }
     let bytes = labels.into_iter().flat_map(u16::to_le_bytes).collect();
     let numbers = Numbers { scalar: Scalar::U16, order: Order::Little, bytes };
@@ -119,7 +116,7 @@ fn segment(frames: &Frames<'_>, frame: usize) -> Result<u16, ImageProblem> {
     const FIELD: &str = "ReferencedSegmentNumber";
     let group = frames.group(frame, 0x0062_000A).ok_or(ImageProblem::MissingField { field: FIELD })?;
     match group.short(0x0062_000B, FIELD)? {
-        0 => Err(ImageProblem::bad(FIELD, 0, "segments are counted from 1; export the segmentation again")),
+        0 => Err(ImageProblem::bad(FIELD, 0, "segment numbers start at 1; export the segmentation again")),
         number => Ok(number),
     }
 }
@@ -184,7 +181,7 @@ impl Stack {
         let most = MOST_MISSING + 16 * (gaps.len() as u64 + 1);
         if steps + 1.0 > most as f64 {
             let value = format!("spread over {steps} slices of {spacing:.3} mm");
-            let expected = "frames so far apart are none of one organ; export the segmentation again";
+            let expected = "frames this far apart cannot belong to one organ; export the segmentation again";
             return Err(ImageProblem::bad("frames", value, expected));
         }
         let step = (places[last].position - places[first].position) / steps;
