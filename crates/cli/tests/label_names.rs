@@ -200,7 +200,7 @@ mod with_pictures {
             ("case", "1-3", "all labels are hidden"),
             ("out/case", "tumor", "did you mean `tumour`?"),
             ("out/case", "7", "no cell has label 7: the mesh has 1 (liver)"),
-            ("out/case", "1-3", "nothing is left to be seen"),
+            ("out/case", "1-3", "nothing is visible"),
         ] {
             let told = workshop.pliant(&["render", what, "--force", "--colour", "label", "--hide", hide]);
             assert!(told.code == 2 && told.words().contains(piece), "{what} {hide}: {}", told.err);

@@ -325,7 +325,7 @@ fn a_part_thinner_than_the_cells_is_told_with_its_place() {
     assert_eq!(told.code, 0, "{}", told.err);
     let json = told.json();
     assert!(
-        told.words().contains("warning: the mesh leaves out a part of the body that is")
+        told.words().contains("warning: the mesh misses a part of the body")
             && told.err.contains("shorter edge"),
         "{}",
         told.err
@@ -467,7 +467,7 @@ fn a_kept_mesh_still_warns() {
     for kept in ["kept in the cache", "from the cache"] {
         let told = workshop.run(&["--force"]);
         assert!(
-            told.words().contains(kept) && told.words().contains("the mesh leaves out a part of the body"),
+            told.words().contains(kept) && told.words().contains("the mesh misses a part of the body"),
             "{}",
             told.err
         );

@@ -153,11 +153,11 @@ fn what_was_mended_is_told() {
         (ball(RADIUS, 0.0), &[], &["mended nothing"]),
         (inverted(ball(RADIUS, 0.0)), &[], &["5120 faces turned"]),
         (holed, &[], &["1 hole of up to", "mm closed"]),
-        (doubled, &[], &["2 faces without area or given twice dropped"]),
+        (doubled, &[], &["2 faces without area or duplicate dropped"]),
         (
             both(ball(RADIUS, 0.0), ball(RADIUS, 11.0)),
             &[],
-            &["pairs of triangles pass through each other, the first at (", "what overlaps was joined"],
+            &["pairs of triangles intersect, the first at (", "overlapping parts were joined"],
         ),
         (hollow.clone(), &[], &["surface 2 pieces, of which 1 cavity"]),
         (hollow, &["--fill-holes"], &["1 cavity filled"]),

@@ -103,13 +103,13 @@ impl fmt::Display for EnclosedReport {
             let [x, y, z] = place.map(|x| x * 1e3);
             let pairs = counted(self.crossings, "pair", "pairs");
             told.push(format!(
-                "{pairs} of triangles pass through each other, the first at ({x:.2}, {y:.2}, {z:.2}) mm: what overlaps \
-                 was joined"
+                "{pairs} of triangles intersect, the first at ({x:.2}, {y:.2}, {z:.2}) mm: overlapping parts \
+                 were joined"
             ));
         }
         if self.swallowed_shells > 0 {
             told.push(format!(
-                "{} inside another joined with it",
+                "{} joined with an enclosing piece",
                 counted(self.swallowed_shells, "piece", "pieces")
             ));
         }
@@ -117,10 +117,7 @@ impl fmt::Display for EnclosedReport {
             told.push(format!("{} filled", counted(self.filled_cavities, "cavity", "cavities")));
         }
         if self.dropped_pieces > 0 {
-            told.push(format!(
-                "{} left out",
-                counted(self.dropped_pieces, "smaller piece", "smaller pieces")
-            ));
+            told.push(format!("{} dropped", counted(self.dropped_pieces, "smaller piece", "smaller pieces")));
         }
         f.write_str(&if told.is_empty() { "nothing".to_owned() } else { told.join("; ") })
     }

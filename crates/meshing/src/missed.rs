@@ -149,32 +149,32 @@ impl fmt::Display for Missed {
         match self {
             Self::ThinPart { place, thickness, edge } => write!(
                 f,
-                "the mesh leaves out a part of the body that is {:.1} mm thick at {}, thinner than the cells of {:.1} mm",
+                "the mesh misses a part of the body {:.1} mm thick at {}, thinner than the cells of {:.1} mm",
                 thickness * 1e3,
                 at(place),
                 edge * 1e3
             ),
             Self::ThinGap { place, thickness, edge } => write!(
                 f,
-                "the mesh closes a gap that is {:.1} mm wide at {}, thinner than the cells of {:.1} mm: its banks are glued \
-                 together",
+                "the mesh closes a gap {:.1} mm wide at {}, thinner than the cells of {:.1} mm, and connects \
+                 its sides",
                 thickness * 1e3,
                 at(place),
                 edge * 1e3
             ),
             Self::Behind { place, distance } => write!(
                 f,
-                "the mesh stays {:.1} mm behind the body at {}: a sharp crest, or a small piece that was left out",
+                "the mesh stays {:.1} mm behind the body at {}: a sharp crest, or a dropped small piece",
                 distance * 1e3,
                 at(place)
             ),
             Self::Beyond { place, distance } => write!(
                 f,
-                "the boundary of the mesh is {:.1} mm off the surface of the body at {}",
+                "the mesh boundary is {:.1} mm from the surface of the body at {}",
                 distance * 1e3,
                 at(place)
             ),
-            Self::Label { label } => write!(f, "label {label} has no cell: it is smaller than the cells"),
+            Self::Label { label } => write!(f, "label {label} has no cell: it is smaller than a cell"),
             Self::LabelVolume { label, part } => write!(
                 f,
                 "label {label} has {:.1} % {} volume than the input",
@@ -182,7 +182,12 @@ impl fmt::Display for Missed {
                 if *part < 0.0 { "less" } else { "more" }
             ),
             Self::LabelAway { label, place, distance } => {
-                write!(f, "the surface of label {label} is {:.1} mm off at {}", distance * 1e3, at(place))
+                write!(
+                    f,
+                    "the surface of label {label} is {:.1} mm from the input at {}",
+                    distance * 1e3,
+                    at(place)
+                )
             }
         }
     }

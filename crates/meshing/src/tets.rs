@@ -410,19 +410,19 @@ impl TetReport {
         if let Some(DistanceReport { asked, reached, to, .. }) = self.distance.filter(|d| d.reached > d.asked)
         {
             doubts.push(format!(
-                "the distance of {:.3} mm to {to} was not reached: {:.3} mm is the best so far",
+                "the distance of {:.3} mm to {to} was not reached; the best mesh reaches {:.3} mm",
                 asked * 1e3,
                 reached * 1e3
             ));
         }
         if self.edges.longest_part > LONGEST + 1e-9 {
             let part = self.edges.longest_part;
-            doubts.push(format!("an edge is {part:.2} times as long as was asked for there"));
+            doubts.push(format!("an edge is {part:.2} times the requested length at its location"));
         }
         if let Some([x, y, z]) = self.pinched_points.first() {
             let number = self.pinched_points.len();
             doubts.push(format!(
-                "the boundary of the mesh meets itself in {number} points, the first at ({x:.4}, {y:.4}, {z:.4}) m"
+                "the mesh boundary touches itself in {number} points, the first at ({x:.4}, {y:.4}, {z:.4}) m"
             ));
         }
         doubts
@@ -504,7 +504,7 @@ impl fmt::Display for TetReport {
         let EdgeLengths { least, median, longest, longest_part } = self.edges;
         writeln!(
             f,
-            "edges            {:.2} to {:.2} mm, half of them up to {:.2} mm, none above {longest_part:.2} of what was asked for there",
+            "edges            {:.2} to {:.2} mm, median {:.2} mm, at most {longest_part:.2} times the requested length",
             least * 1e3,
             longest * 1e3,
             median * 1e3
@@ -532,7 +532,7 @@ impl fmt::Display for TetReport {
             )?;
         }
         if parted_points > 0 {
-            writeln!(f, "parted           {parted_points} points where the boundary met itself")?;
+            writeln!(f, "parted           {parted_points} points where the boundary touched itself")?;
         }
         if self.crowded_edges_left > 0 {
             writeln!(f, "still touching   {} edges", self.crowded_edges_left)?;
@@ -550,16 +550,16 @@ impl fmt::Display for TetReport {
         if let Some(DistanceReport { asked, reached, passes, to }) = self.distance {
             writeln!(
                 f,
-                "distance         {:.3} mm at most to {to}; {:.3} mm asked for, {} in {passes} passes",
+                "distance         {:.3} mm at most to {to}; requested {:.3} mm, {} in {passes} passes",
                 reached * 1e3,
                 asked * 1e3,
-                if reached <= asked { "held" } else { "not reached" }
+                if reached <= asked { "reached" } else { "not reached" }
             )?;
         }
         let Steps { rounds, peeled, given, collapsed, flipped, moved } = self.steps;
         write!(
             f,
-            "optimiser        {rounds} rounds: {peeled} tets peeled, {given} given to another label, {collapsed} edges collapsed, {flipped} flips, {moved} moves"
+            "optimiser        {rounds} rounds: {peeled} tets peeled, {given} moved to another label, {collapsed} edges collapsed, {flipped} flips, {moved} moves"
         )
     }
 }

@@ -52,7 +52,7 @@ impl Film {
             return Ok(());
         }
         self.input = None;
-        Err(self.end().err().unwrap_or_else(|| self.failed("it takes no more pictures".into())))
+        Err(self.end().err().unwrap_or_else(|| self.failed("it accepts no more pictures".into())))
     }
 
     /// Ends the film.
@@ -78,7 +78,7 @@ impl Film {
         if status.success() {
             return Ok(());
         }
-        let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it did not say why");
+        let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no error message");
         Err(self.failed(last.to_owned()))
     }
 }

@@ -20,10 +20,10 @@ use crate::subject::{Subject, critical_cell, nodal_values, visible};
 #[derive(Debug, thiserror::Error)]
 pub enum SeriesError {
     /// The folder holds no series.
-    #[error("`{0}` holds no series of frames (`*.pvd`)")]
+    #[error("`{0}` has no series of frames (`*.pvd`)")]
     NoSeries(PathBuf),
     /// The folder holds no series of that name.
-    #[error("`{folder}` holds no series `{name}`; there is {known}")]
+    #[error("`{folder}` has no series `{name}`; it has {known}")]
     UnknownSeries {
         /// The folder.
         folder: PathBuf,
@@ -56,10 +56,10 @@ pub enum SeriesError {
     #[error("the cells of the frames have no labels (the field `label`)")]
     NoLabels,
     /// All cells are hidden.
-    #[error("the labels that are hidden are all there are: nothing is left to be seen")]
+    #[error("all labels are hidden: nothing is visible")]
     AllHidden,
     /// A frame of another mesh than the first.
-    #[error("frame {0} has another mesh than the first one")]
+    #[error("the mesh of frame {0} differs from the first one")]
     OtherMesh(usize),
     /// A picture that can't be drawn.
     #[error(transparent)]
@@ -73,22 +73,22 @@ impl SeriesError {
             Self::NoSeries(_) => {
                 "give a scene, or the folder of a run whose scene has an output of type `vtu`"
             }
-            Self::UnknownSeries { .. } => "take one of these",
+            Self::UnknownSeries { .. } => "use one of these",
             Self::NoFrames(_) => "run the scene again",
             Self::File(_) => "",
             Self::NoField { .. } => {
-                "take one of these, a component as in `displacement:z` or `cauchy-stress:xx`, or `none`"
+                "use one of these, a component such as `displacement:z` or `cauchy-stress:xx`, or `none`"
             }
             Self::NoFibres => {
                 "show a body whose law has fibres; a finished run needs `fibre` in `data` of its output, `at = \"cells\"`"
             }
             Self::NoSteps => {
-                "show bodies and no carried surface; a finished run needs `element-step` in `data` of its output, `at = \"cells\"`"
+                "show bodies instead of carried surfaces; a finished run needs `element-step` in `data` of its output, `at = \"cells\"`"
             }
             Self::NoLabels => {
-                "show bodies whose mesh has cell data `label`, as those of images with several labels have"
+                "show bodies whose mesh has cell data `label`, such as meshes from images with several labels"
             }
-            Self::AllHidden => "hide fewer",
+            Self::AllHidden => "hide fewer labels",
             Self::OtherMesh(_) => "run the scene again into an empty folder",
             Self::Picture(error) => error.remedy(),
         }

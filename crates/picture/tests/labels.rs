@@ -91,7 +91,7 @@ fn hidden_labels_show_what_lies_inside_and_leave_the_legend() {
     let [left, right, core, _] = counts(&half);
     assert!(right == 0 && left > 3000 && core > 200, "{left} {right} {core}");
     let told = hiding(vec![1, 2, 3]).unwrap_err().to_string();
-    assert!(told.contains("nothing is left"), "{told}");
+    assert!(told.contains("nothing is visible"), "{told}");
 }
 
 #[test]
