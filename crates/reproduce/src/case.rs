@@ -193,7 +193,7 @@ impl Case {
             rows: vec![Row {
                 computed: None,
                 pass: Some(false),
-                ..Row::shown(format!("the case runs to its end; it did not: {error}"), "", 0.0, "")
+                ..Row::shown(format!("the case failed: {error}"), "", 0.0, "")
             }],
             figures: Vec::new(),
         });

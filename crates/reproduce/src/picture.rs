@@ -62,9 +62,9 @@ pub(crate) fn figure(
 
 /// What stands where a picture would be.
 pub(crate) const NO_PICTURE: &str = if cfg!(feature = "viewer") {
-    "Nothing draws pictures here: they need a driver for Vulkan, Metal or Direct3D 12, such as Mesa's software Vulkan."
+    "Pictures are missing: they need a driver for Vulkan, Metal or Direct3D 12, such as Mesa's software Vulkan."
 } else {
-    "Pictures need a build with them: `cargo build --release --features viewer`."
+    "Pictures need a build with `cargo build --release --features viewer`."
 };
 
 #[cfg(not(feature = "viewer"))]

@@ -56,10 +56,10 @@ const PROTOTYPE: [[f64; 2]; 5] =
 pub const CASE: Case = Case {
     id: "elements",
     title: "Elements for nearly incompressible tissue",
-    shows: "Not in the thesis, which knows plain tetrahedra and one-point hexahedra only. At ν = 0.49 plain \
-            tetrahedra lock: a cantilever sinks by a quarter too little, a compressed cube pushes back by a tenth too \
-            much. Averaged nodal pressure (`tet4-anp`, `tet4-ianp`) takes most of it away; hexahedra with hourglass \
-            control scaled with μ (`hex8`) or with mean dilatation (`hex8-full`) come within one per cent.",
+    shows: "The thesis has only plain tetrahedra and one-point hexahedra. At ν = 0.49 plain tetrahedra lock: a \
+            cantilever sinks a quarter too little, and the force of a compressed cube is a tenth too large. Averaged \
+            nodal pressure (`tet4-anp`, `tet4-ianp`) removes most of this error. Hexahedra with hourglass control \
+            scaled with μ (`hex8`) or with mean dilatation (`hex8-full`) come within one per cent.",
     corrections: &[
         crate::case::Correction {
             printed: "(6.2): 8 Bᵀ S J, one point, gradients at the centroid",
@@ -70,8 +70,8 @@ pub const CASE: Case = Case {
         crate::case::Correction {
             printed: "(5.33), (6.9): Δt = L/c with the shortest edge L",
             correct: "2/ωₘₐₓ, bounded element by element through Σ|B|².",
-            why: "The shortest edge is no bound: too large by 2.4 for a regular tetrahedron, by 40 for a sliver. A tetrahedral \
-                  block run at that step ends after 11 steps.",
+            why: "The shortest edge is not a bound: it is too large by 2.4 for a regular tetrahedron, by 40 for a sliver. A \
+                  tetrahedral block with that step fails after 11 steps.",
         },
     ],
     seconds: 20.0,
@@ -160,7 +160,7 @@ fn compute() -> Result<Findings, CaseError> {
         }
     }
     let caption = "Deviation from the limit of fine meshes.";
-    findings.figures.push(bars("Cantilever: tip", "off the converged −34.85 mm [%]", &tips, caption)?);
-    findings.figures.push(bars("Cube at 20 %: force", "off the converged 9.15 N [%]", &forces, caption)?);
+    findings.figures.push(bars("Cantilever: tip", "error against −34.85 mm [%]", &tips, caption)?);
+    findings.figures.push(bars("Cube at 20 %: force", "error against 9.15 N [%]", &forces, caption)?);
     Ok(findings)
 }

@@ -22,10 +22,10 @@ const ELEMENT_STEPS: usize = 2_000_000;
 pub const CASE: Case = Case {
     id: "fig-6.9",
     title: "Fig. 6.9: the bare step against the whole program",
-    shows: "Time of one step of a cube of hexahedra under gravity, with 1,331 to 29,791 nodes: by the solver alone, and \
-            inside of a framework (there SOFA), whose separate parts cost 8.4 % for large meshes. Here the whole program reads \
-            the scene, checks every instant, watches the largest stable step, samples energies and reactions and writes a \
-            table 25 times a second of simulated time.",
+    shows: "Time of one step of a cube of hexahedra under gravity, with 1,331 to 29,791 nodes: by the solver alone, \
+            and inside a framework (there SOFA), whose separate parts cost 8.4 % for large meshes. Here the whole \
+            program reads the scene, checks every step, monitors the critical time step, samples energies and \
+            reactions, and writes a table 25 times per second of simulated time.",
     corrections: &[],
     seconds: 12.0,
     compute,
@@ -115,7 +115,7 @@ fn compute() -> Result<Findings, CaseError> {
     for (which, (nodes, bare, whole, cost)) in points.iter().enumerate() {
         let last = which + 1 == points.len();
         let (reference, source) = if last { (Some(8.4), "thesis, for large meshes") } else { (None, "") };
-        let quantity = format!("what the framework adds to a step of {nodes} nodes");
+        let quantity = format!("cost of the framework per step, {nodes} nodes");
         findings.rows.push(Row::timed(quantity, "%", reference, *cost, source));
         if last {
             for (name, time) in [("the solver alone", bare), ("the whole program", whole)] {

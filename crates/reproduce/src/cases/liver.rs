@@ -22,9 +22,9 @@ use crate::{largest, law, run};
 pub const CASE: Case = Case {
     id: "fig-6.10",
     title: "Fig. 6.10: stress in a stretched liver, elastic and relaxed",
-    shows: "The von Mises stress in a liver pulled by one lobe, with fibres along one axis: without viscoelasticity (TI), \
-            and with it some seconds after the pull (TI + visco), when most of what can relax has relaxed. The stress \
-            is then about half.",
+    shows: "The von Mises stress in a liver pulled by one lobe, with fibres along one axis: without viscoelasticity \
+            (TI), and with it some seconds after the pull (TI + visco), after most of the relaxation. The stress is \
+            then about half.",
     corrections: &[super::RELAXATION_SIGN, FIBRE_FACTOR],
     seconds: 5.0,
     compute,
@@ -120,7 +120,7 @@ fn compute() -> Result<Findings, CaseError> {
         findings.rows.push(Row::shown(format!("TI: {name}"), unit, before, ""));
         findings.rows.push(Row::shown(format!("TI + visco at 5 s: {name}"), unit, after, ""));
         findings.rows.push(Row::shown(format!("{name}, TI + visco over TI"), "", after / before, ""));
-        let quantity = format!("TI + visco at 5 s: {name}, off the relaxed limit");
+        let quantity = format!("TI + visco at 5 s: {name}, deviation from the relaxed limit");
         findings.rows.push(Row::deviation(quantity, 0.01, (after / limit - 1.0).abs(), source));
     }
 

@@ -27,8 +27,8 @@ const SOURCE: &str = "quasi-static, quadratic hexahedra n = 4, felupe";
 pub const CASE: Case = Case {
     id: "fig-6.6",
     title: "Fig. 6.6: reaction of the compressed cube over time",
-    shows: "The force on the platens rises while the cube is compressed by 30 % in 0.5 s, and decays while it is held. \
-            Fibres across the compression, along y or along y = z, make it larger.",
+    shows: "The force on the platens rises during the compression by 30 % in 0.5 s, and decays afterwards. Fibres \
+            across the compression, along y or along y = z, increase it.",
     corrections: &[super::RELAXATION_SIGN, FIBRE_FACTOR],
     seconds: 7.0,
     compute,
@@ -154,9 +154,9 @@ fn compute() -> Result<Findings, CaseError> {
         let quantity = format!("{name}: F(t)/F(5 s) from {FROM} s on, largest deviation");
         findings.rows.push(Row::deviation(quantity, 0.01, relaxed.off(), SOURCE));
         let [found, expected] = relaxed.last();
-        let quantity = format!("{name}: F(5 s), beside the reference without its mesh error of 4 to 8 %");
+        let quantity = format!("{name}: F(5 s), against the reference minus its mesh error of 4 to 8 %");
         findings.rows.push(Row::judged(quantity, "N", of_fine_meshes(expected), found, SOURCE));
-        let quantity = format!("{name}: F(5 s) off the reference as it is, on its coarse mesh");
+        let quantity = format!("{name}: F(5 s), deviation from the uncorrected reference on its coarse mesh");
         findings.rows.push(Row::shown(quantity, "%", 100.0 * (found / expected - 1.0), SOURCE));
         if model == "iso" {
             isotropic = found;

@@ -33,8 +33,8 @@ const SOURCE: &str = "closed form, 50 digits (Taylor et al. 2009, corrected)";
 const DIRECTION: Correction = Correction {
     printed: "section 6.4.1: “pure shear”, no direction given",
     correct: "simple shear F = I + γ e₂⊗e₁: the face x = 1 moves along y.",
-    why: "Of all axis-aligned shears only this one has four stresses that do not vanish, S₁₁ = S₃₃ without fibres, and \
-          a sign of S₁₁ that changes with fibres along x, as the text says. J = 1, so that κ plays no part.",
+    why: "Among axis-aligned shears only this one has four nonzero stresses, S₁₁ = S₃₃ without fibres, and \
+          a sign of S₁₁ that changes with fibres along x, as in the text. J = 1, so κ has no effect.",
 };
 
 /// Figure 6.3.
