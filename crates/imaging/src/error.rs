@@ -13,7 +13,7 @@ pub enum ImageError {
     Open {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// Neither the first bytes nor the ending tell a format that can be read.
@@ -33,7 +33,7 @@ pub enum ImageError {
         path: PathBuf,
         /// Where in the file.
         place: Place,
-        /// What is wrong there.
+        /// The problem.
         problem: Box<ImageProblem>,
     },
 }
@@ -46,7 +46,7 @@ pub enum ImageProblem {
         "the file ends while reading {reading}: {expected} bytes are needed, {found} exist; copy or export it again"
     )]
     Truncated {
-        /// What was being read.
+        /// The item being read.
         reading: &'static str,
         /// Bytes needed.
         expected: u64,
@@ -58,11 +58,11 @@ pub enum ImageProblem {
         "{reading} cannot be decompressed after {found} bytes ({message}): the file is truncated or damaged; copy it again"
     )]
     Packed {
-        /// What was being read.
+        /// The item being read.
         reading: &'static str,
         /// Bytes unpacked before.
         found: u64,
-        /// What the decoder says.
+        /// Error of the decoder.
         message: String,
     },
     /// The first bytes are not those of the format.
@@ -70,7 +70,7 @@ pub enum ImageProblem {
     NotThisFormat {
         /// The format expected.
         format: &'static str,
-        /// What was found instead.
+        /// The content found.
         found: String,
     },
     /// A field of the header is missing.
@@ -92,9 +92,9 @@ pub enum ImageProblem {
     /// A variant of the format that is not read.
     #[error("{what} cannot be read here; {remedy}")]
     Unsupported {
-        /// What was found.
+        /// The item found.
         what: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// More voxels than allowed. Found before they are allocated.
@@ -268,7 +268,7 @@ pub enum LabelError {
     /// No voxel has the label.
     #[error("no voxel has label {label}; the image has {}", list(present))]
     Absent {
-        /// Label asked for.
+        /// Requested label.
         label: i32,
         /// Labels of the image, without 0.
         present: Vec<i32>,
@@ -322,7 +322,7 @@ pub enum LabelError {
     /// More labels than a mesh can tell apart.
     #[error("{labels} labels in one mesh, more than {limit}; mesh them in parts")]
     TooManyLabels {
-        /// Labels asked for.
+        /// Requested labels.
         labels: usize,
         /// Labels allowed.
         limit: usize,
@@ -366,7 +366,7 @@ fn list(labels: &[i32]) -> String {
     }
 }
 
-/// A problem and its place: what the readers of bytes return, before the path is known.
+/// A problem and its position, as returned by the readers of bytes, which do not know the path.
 #[derive(Debug)]
 pub(crate) struct Fault {
     pub(crate) place: Place,

@@ -28,11 +28,11 @@ pub enum MeshingError {
         "cells of {} m beside cells of {} m are too small; the limit is {} m", rounded(*asked), rounded(*edge), rounded(*smallest)
     )]
     TooFine {
-        /// Edge asked for [m].
+        /// Requested edge [m].
         edge: f64,
         /// Smallest edge that goes with it [m].
         smallest: f64,
-        /// Smallest edge asked for [m].
+        /// Smallest requested edge [m].
         asked: f64,
     },
     /// A label asked for that is not meshed.
@@ -112,7 +112,7 @@ pub enum MeshingError {
         rounded(size.x), rounded(size.y), rounded(size.z)
     )]
     NoCells {
-        /// Edge asked for [m].
+        /// Requested edge [m].
         edge: f64,
         /// Size of the box of the body [m].
         size: Vector3,

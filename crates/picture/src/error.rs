@@ -13,7 +13,7 @@ pub enum PictureError {
     Refused {
         /// Its name.
         adapter: String,
-        /// What the driver says.
+        /// Error of the driver.
         reason: String,
     },
     /// A picture of this size is more than the adapter draws.
@@ -23,9 +23,9 @@ pub enum PictureError {
     Size {
         /// Its name.
         adapter: String,
-        /// Width asked for.
+        /// Requested Width.
         width: u32,
-        /// Height asked for.
+        /// Requested Height.
         height: u32,
         /// Most pixels each way.
         largest: u32,
@@ -35,7 +35,7 @@ pub enum PictureError {
     Device {
         /// Its name.
         adapter: String,
-        /// What the driver says.
+        /// Error of the driver.
         reason: String,
     },
     /// Pixels that are no PNG file, or cannot become one.
@@ -46,7 +46,7 @@ pub enum PictureError {
     Write {
         /// Its path.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         reason: String,
     },
     /// ffmpeg ended with an error.
@@ -60,7 +60,7 @@ pub enum PictureError {
 }
 
 impl PictureError {
-    /// What to try.
+    /// The remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NoAdapter => {

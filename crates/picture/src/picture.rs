@@ -70,7 +70,7 @@ impl Picture {
     /// Reads what [`Self::png`] wrote; all of it counts as covered.
     ///
     /// # Errors
-    /// If it is no such file.
+    /// If the file is invalid.
     pub fn from_png(file: &[u8]) -> Result<Self, PictureError> {
         let (rgb, [width, height]) = decoded(file, png::ColorType::Rgb)?;
         let rgba = rgb.chunks_exact(3).flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
@@ -80,7 +80,7 @@ impl Picture {
     /// Reads what [`Self::png_with_coverage`] wrote.
     ///
     /// # Errors
-    /// If it is no such file.
+    /// If the file is invalid.
     pub fn from_png_with_coverage(file: &[u8]) -> Result<Self, PictureError> {
         let (rgba, [width, height]) = decoded(file, png::ColorType::Rgba)?;
         Ok(Self { width, height, rgba })

@@ -27,7 +27,7 @@ pub enum SeriesError {
     UnknownSeries {
         /// The folder.
         folder: PathBuf,
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The names there are.
         known: String,
@@ -41,7 +41,7 @@ pub enum SeriesError {
     /// The frames have no such field.
     #[error("the frames have no field `{field}` of single numbers; they have {known}")]
     NoField {
-        /// The field asked for.
+        /// The requested field.
         field: String,
         /// The fields there are.
         known: String,
@@ -67,7 +67,7 @@ pub enum SeriesError {
 }
 
 impl SeriesError {
-    /// What to try.
+    /// The remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NoSeries(_) => {
@@ -108,7 +108,7 @@ impl Series {
     /// The series of a name in the folder of a run; without a name the first one in the order of the alphabet.
     ///
     /// # Errors
-    /// If there is none.
+    /// If none exists.
     pub fn find(folder: &Path, name: Option<&str>) -> Result<Self, SeriesError> {
         let mut names: Vec<String> = fs::read_dir(folder)
             .map_err(|source| MeshFileError::Open { path: folder.to_owned(), source })?

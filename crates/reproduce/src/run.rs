@@ -75,7 +75,7 @@ pub fn settle(model: &Model, step: f64, until: f64) -> Result<Equilibrium, CaseE
 /// The equilibrium at 1 s, found in one load step by dynamic relaxation to a residual of 1e-8 of the largest force.
 ///
 /// # Errors
-/// If there is none.
+/// If none exists.
 pub fn relax(model: &Model) -> Result<(DynamicRelaxation<f64>, State<f64>), CaseError> {
     let settings = RelaxationSettings { tolerance: 1e-8, ..RelaxationSettings::default() };
     let mut solver = DynamicRelaxation::new(model.clone(), settings)?;

@@ -70,7 +70,7 @@ impl Specimen {
     /// A shell of a mesh, curved by its normals (point data `normal`) if it has some; density 1000 kg/m³.
     ///
     /// # Errors
-    /// If the mesh is no sound shell.
+    /// If the mesh is not a valid shell.
     pub fn new(
         mesh: Mesh,
         [young, poisson]: [f64; 2],
@@ -90,7 +90,7 @@ impl Specimen {
     /// The nodes of an edge, in order.
     ///
     /// # Panics
-    /// If there is no such edge.
+    /// If the edge does not exist.
     pub fn edge(&self, name: &str) -> Vec<u32> {
         self.mesh.point_sets.get(name).unwrap_or_else(|| panic!("no edge {name}")).clone()
     }

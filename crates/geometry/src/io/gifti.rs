@@ -64,7 +64,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     Ok(MeshFile { mesh, format: format!("{} {version}", Format::Gifti.name()), notes, time: None })
 }
 
-/// The text without the declaration of its type, which the parser refuses. One that declares entities of its own is refused here.
+/// The text without the declaration of its type, which the parser rejects. This function rejects declarations of entities.
 fn without_doctype(text: &str) -> Result<String, Fault> {
     let Some(start) = text.find("<!DOCTYPE") else { return Ok(text.to_owned()) };
     let length =

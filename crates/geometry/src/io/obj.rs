@@ -37,7 +37,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     loop {
         let place = cursor.place();
         let Some(mut line) = cursor.line() else { break };
-        // A backslash at the end goes on in the next line.
+        // A backslash at the end continues in the next line.
         if line.ends_with(b"\\") {
             joined.clear();
             while let [start @ .., b'\\'] = line {
@@ -140,7 +140,7 @@ impl Reader {
         Ok(())
     }
 
-    /// The number of a set, new if there is none of the name; `None` for an empty name.
+    /// The number of a set, added if its name is new; `None` for an empty name.
     fn set(&mut self, word: &[u8]) -> Option<usize> {
         let name = name(word);
         if name.is_empty() {

@@ -446,7 +446,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Data and sets of the faces; NaN where one of the kinds has no such data.
+/// Data and sets of the faces; NaN for kinds without these data.
 fn face_columns(surface: &SurfaceOut<'_>) -> Vec<Column> {
     let mut columns = Vec::new();
     let names: BTreeMap<&String, usize> = surface

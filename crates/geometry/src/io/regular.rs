@@ -1,14 +1,14 @@
-//! Files that may be read: regular ones, of a size that is bounded. A pipe would be waited for without end, a device such as
-//! `/dev/zero` read without end.
+//! Readable files: regular ones of limited size. Reading a pipe could wait forever, reading a device such as `/dev/zero`
+//! would not end.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Opens a regular file, or a link to one. Pipes, devices, sockets and folders are refused without being opened.
+/// Opens a regular file, or a link to one. Rejects pipes, devices, sockets and folders without opening them.
 ///
 /// # Errors
-/// What the operating system says, or that this is no regular file.
+/// An error of the operating system, or that this is not a regular file.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     if kind.is_file() {

@@ -1,5 +1,5 @@
 //! STL surfaces: reads text and binary, writes binary. Corners with exactly the same coordinates become one
-//! point. Normals are passed over: the order of the corners tells the outside.
+//! point. Normals are ignored: the order of the corners defines the outside.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Write};
@@ -25,7 +25,7 @@ struct Soup {
 }
 
 impl Soup {
-    /// The index of a point: that of an earlier one with the same coordinates, or a new one.
+    /// The index of a point: the existing one with the same coordinates, or a new one.
     fn point(&mut self, x: Vector3) -> u32 {
         // Adding 0 makes −0 into 0.
         let key = [x.x + 0.0, x.y + 0.0, x.z + 0.0].map(f64::to_bits);

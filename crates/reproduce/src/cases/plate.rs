@@ -68,7 +68,7 @@ pub fn mesh(cells: usize, pattern: Pattern) -> Result<Mesh, CaseError> {
 /// The whole plate with the same components held on all edges.
 ///
 /// # Errors
-/// If the mesh is no sound shell.
+/// If the mesh is not a valid shell.
 pub fn held(mesh: Mesh, formulation: Formulation, components: [bool; 6]) -> Result<Specimen, CaseError> {
     let plate = Specimen::new(mesh, ELASTIC, THICKNESS, formulation)?;
     Ok(["x-min", "x-max", "y-min", "y-max"]

@@ -53,7 +53,7 @@ struct Field {
     values: Vec<f64>,
 }
 
-/// What the sections said so far.
+/// The content of the sections so far.
 #[derive(Default)]
 struct Model {
     /// Names of physical groups by dimension and number.
@@ -218,7 +218,7 @@ fn unquoted(line: &[u8]) -> &[u8] {
     }
 }
 
-/// `$Entities` and `$PartitionedEntities` of version 4: only their physical groups are kept.
+/// `$Entities` and `$PartitionedEntities` of version 4; only their physical groups are used.
 fn read_entities(numbers: &mut Numbers<'_>, model: &mut Model, partitioned: bool) -> Result<(), Fault> {
     start_binary(numbers);
     if partitioned {
@@ -666,7 +666,7 @@ impl Model {
 }
 
 impl Field {
-    /// One item per node or cell; NaN where the file gives none.
+    /// One item per node or cell; NaN for items missing in the file.
     fn spread(self, numbering: &Numbering, count: usize) -> DataArray {
         let mut values = vec![f64::NAN; count * self.components];
         for (number, item) in self.numbers.iter().zip(self.values.chunks_exact(self.components)) {
