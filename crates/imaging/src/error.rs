@@ -16,7 +16,7 @@ pub enum ImageError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Neither the first bytes nor the ending tell a format that can be read.
+    /// Neither the first bytes nor the extension identify a readable format.
     #[error(
         "`{}` is not a supported image; formats read: NIfTI (.nii, .nii.gz, .hdr + .img), NRRD (.nrrd, .nhdr), MetaImage \
          (.mha, .mhd), GIPL (.gipl, .gipl.gz), DICOM (a folder of slices, or a segmentation); convert it, e.g. with ITK-SNAP or 3D Slicer",
@@ -26,7 +26,7 @@ pub enum ImageError {
         /// The file.
         path: PathBuf,
     },
-    /// The file was opened, but what it holds is no usable image.
+    /// The file was opened, but contains no usable image.
     #[error("cannot read `{}`{place}: {problem}", path.display())]
     Content {
         /// The file, or the folder of a series.
@@ -38,7 +38,7 @@ pub enum ImageError {
     },
 }
 
-/// What is wrong inside an image file, and what to try.
+/// The problem inside an image file, and a remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImageProblem {
     /// The file ends too early, or announces more than it holds.
@@ -53,7 +53,7 @@ pub enum ImageProblem {
         /// Bytes found.
         found: u64,
     },
-    /// Compressed data that cannot be unpacked.
+    /// Compressed data that cannot be decompressed.
     #[error(
         "{reading} cannot be decompressed after {found} bytes ({message}): the file is truncated or damaged; copy it again"
     )]
@@ -79,17 +79,17 @@ pub enum ImageProblem {
         /// The field.
         field: &'static str,
     },
-    /// A field of the header has a value that cannot be.
+    /// A field of the header has an invalid value.
     #[error("`{field}` is {value}; {expected}")]
     BadField {
         /// The field.
         field: &'static str,
-        /// What it holds.
+        /// Its value.
         value: String,
-        /// What it must be, and how to get there.
+        /// The valid values, and a remedy.
         expected: &'static str,
     },
-    /// A variant of the format that is not read.
+    /// An unsupported variant of the format.
     #[error("{what} cannot be read here; {remedy}")]
     Unsupported {
         /// The item found.
@@ -119,7 +119,7 @@ pub enum ImageProblem {
         /// Bytes allowed.
         limit: u64,
     },
-    /// The steps from voxel to voxel span no volume, or are no numbers.
+    /// The steps from voxel to voxel span no volume, or are not finite.
     #[error(
         "the steps from voxel to voxel ({}, {} and {} m) span no volume; correct the orientation in the header",
         shown(&steps[0]), shown(&steps[1]), shown(&steps[2])
@@ -131,7 +131,7 @@ pub enum ImageProblem {
     /// A folder without any DICOM slice.
     #[error("no DICOM slice among {files} files; give the folder of the slices themselves")]
     NoSlices {
-        /// Files looked at.
+        /// Files examined.
         files: usize,
     },
     /// A folder with slices of several series.
@@ -140,10 +140,10 @@ pub enum ImageProblem {
         /// Each series: UID, description and number of slices.
         series: Vec<String>,
     },
-    /// The series asked for is not in the folder.
+    /// The requested series is not in the folder.
     #[error("no slice belongs to series {asked}; the folder holds {}", series.join("; "))]
     NoSuchSeries {
-        /// The UID asked for.
+        /// The requested UID.
         asked: String,
         /// Each series: UID, description and number of slices.
         series: Vec<String>,
@@ -155,9 +155,9 @@ pub enum ImageProblem {
         file: String,
         /// What differs.
         what: &'static str,
-        /// What this slice has.
+        /// The value of this slice.
         found: String,
-        /// What the first slice has.
+        /// The value of the first slice.
         expected: String,
     },
     /// Slices are not evenly spaced.
@@ -190,7 +190,7 @@ fn shown(step: &Vector3) -> String {
     format!("({:.3e}, {:.3e}, {:.3e})", step.x, step.y, step.z)
 }
 
-/// Why there is no region to work on.
+/// The error of a region.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LabelError {
     /// A value that is not a whole number.
@@ -246,7 +246,7 @@ pub enum LabelError {
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
-    /// An image that was to be a mask.
+    /// An image with labels instead of a mask.
     #[error(
         "`{name}` is not a mask: it has the labels {}; give it as the only image, or give a threshold",
         list(labels)
@@ -273,19 +273,19 @@ pub enum LabelError {
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
-    /// The background is no region.
+    /// The background was chosen.
     #[error("label 0 is the background; the image has {}", list(present))]
     Background {
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
-    /// No label asked for.
+    /// No label was chosen.
     #[error("no label was chosen; the image has {}", list(present))]
     NoneChosen {
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
-    /// A label asked for twice.
+    /// A label was chosen twice.
     #[error("label {label} is named twice; name each once")]
     Repeated {
         /// The label.
@@ -309,7 +309,7 @@ pub enum LabelError {
         /// Its value [m].
         value: f64,
     },
-    /// Two images of which the sum was asked for.
+    /// Two images to add have different voxels.
     #[error(
         "the images have different voxels ({first:?} and {second:?}, or other positions); resample one of them"
     )]
@@ -388,7 +388,7 @@ impl ImageProblem {
         Fault { place: Place::Line(line), problem: self }
     }
 
-    /// A field with a value that cannot be; long values are cut.
+    /// A field with an invalid value; long values are shortened.
     pub(crate) fn bad(field: &'static str, value: impl ToString, expected: &'static str) -> Self {
         let value = value.to_string();
         let mut short: String = value.chars().take(60).filter(|c| !c.is_control()).collect();

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::image::{Numbers, Order, Scalar};
 use crate::names::LabelNames;
 
-/// A segment: where it stands in the file, and its name.
+/// A segment: its layer and value in the file, and its name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Segment {
     layer: usize,
@@ -34,8 +34,8 @@ pub(super) fn segments(pairs: &[(String, String)]) -> Vec<Segment> {
     found.into_values().filter(|(_, has_value)| *has_value).map(|(segment, _)| segment).collect()
 }
 
-/// The layers, each voxel's numbers side by side, as one image of labels with their names. Labels are the values of the segments, or their
-/// numbers from 1 on where a value is used again. Where segments overlap, the later one counts.
+/// The layers, with the values of each voxel side by side, as one image of labels with their names. Labels are the values of the segments,
+/// or the segment numbers from 1 if a value repeats. Where segments overlap, the later one wins.
 pub(super) fn joined(
     layers: usize,
     numbers: &Numbers,

@@ -74,7 +74,7 @@ struct Axes {
     steps: [Vector3; 3],
     /// Their places among the axes of the file.
     kept: [usize; 3],
-    /// Layers of segments, of which each voxel has a number.
+    /// Layers of segments; each voxel has one value per layer.
     layers: u64,
 }
 
@@ -164,7 +164,7 @@ impl Header {
         })
     }
 
-    /// The axes that have a direction, or all where the file gives none.
+    /// The axes with a direction, or all if the file has none.
     fn axes(&self) -> Result<Axes, Fault> {
         let sizes_field = self.need("sizes")?;
         let sizes: Vec<u64> = sizes_field.all("whole numbers are needed, one per axis")?;
@@ -340,7 +340,7 @@ fn vectors(field: &Field) -> Result<Vec<Option<Vector3>>, Fault> {
         let numbers: Result<Vec<f64>, _> = inner.split(',').map(|word| word.trim().parse()).collect();
         let numbers: [f64; 3] =
             numbers.ok().and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| field.bad(EXPECTED))?;
-        // A vector of NaNs says the same as `none`.
+        // A vector of NaNs means `none`.
         let none = numbers.iter().all(|x| x.is_nan());
         all.push((!none).then(|| numbers.into()));
         rest = after.trim_start();
@@ -348,7 +348,7 @@ fn vectors(field: &Field) -> Result<Vec<Option<Vector3>>, Fault> {
     Ok(all)
 }
 
-/// Numbers as text, kept in the type of the header.
+/// Numbers as text, stored in the type of the header.
 fn read_text(data: &mut Input<'_>, count: usize, scalar: Scalar) -> Result<Numbers, Fault> {
     // A voxel takes a digit and a space at least, so memory stays within a few times the file.
     data.within_limit(count, scalar)?;

@@ -1,16 +1,16 @@
-//! DICOM segmentations (PS3.3 C.8.20): frames of one segment each, a bit or a fraction a pixel, or frames of labels. They become a label image;
-//! the label is the number of the segment. Frames without any voxel may be missing: what lies beyond the first and the last one is taken as empty.
-//! Leaves out: compressed frames, segmentations of several orientations.
+//! DICOM segmentations (PS3.3 C.8.20): frames of one segment each, with a bit or a fraction per pixel, or frames of labels. They become a
+//! label image whose labels are the segment numbers. Frames without voxels may be missing: slices beyond the first and the last frame are
+//! assumed empty. Leaves out: compressed frames, segmentations of several orientations.
 
 use pliant_geometry::Vector3;
 
 use super::{Elements, Frames, Grid, Image, Numbers, Order, PIXELS, Placed, ReadOptions, Scalar, ToWorld};
 use super::{Fault, ImageProblem, LabelNames, checked_size};
 
-/// Slices that the whole may have beyond those that are there, plus 16 for each of these.
+/// Limit of missing slices, plus 16 for each existing one.
 const MOST_MISSING: u64 = 512;
 
-/// How the frames tell what is inside.
+/// The encoding of the inside in the frames.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     /// A bit a pixel.
