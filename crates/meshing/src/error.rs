@@ -4,7 +4,7 @@ use pliant_geometry::Vector3;
 
 use crate::triangles::counted;
 
-/// Why no mesh was made. Lengths in metres.
+/// The error of a mesh request. Lengths in metres.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshingError {
     /// A length or a factor is zero, negative, infinite or NaN.
@@ -20,7 +20,7 @@ pub enum MeshingError {
         "target is {target}; the least acoustic length can't reach that of ideal tets: 0.75 is usual, 0.9 the best"
     )]
     TargetTooHigh {
-        /// Part of the ideal asked for.
+        /// Requested fraction of the ideal.
         target: f64,
     },
     /// Cells that differ too much in size.
@@ -30,12 +30,12 @@ pub enum MeshingError {
     TooFine {
         /// Requested edge [m].
         edge: f64,
-        /// Smallest edge that goes with it [m].
+        /// Smallest allowed edge [m].
         smallest: f64,
         /// Smallest requested edge [m].
         asked: f64,
     },
-    /// A label asked for that is not meshed.
+    /// A requested label is not meshed.
     #[error("label {label} can't be protected; the mesh has the labels {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))]
     NoSuchLabel {
         /// The label.
