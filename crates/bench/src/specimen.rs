@@ -200,7 +200,7 @@ impl Specimen {
             .map_or_else(|| panic!("a model without cells"), |bound| bound.step)
     }
 
-    /// The true limit of the step at rest [s].
+    /// The critical time step of the model at rest [s].
     ///
     /// # Panics
     /// If constraints contradict each other.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 /// A picture or a film that could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// Nothing on this machine draws.
+    /// No adapter can draw.
     #[error("no GPU and no software driver was found")]
     NoAdapter,
     /// The adapter does not open.
@@ -38,7 +38,7 @@ pub enum PictureError {
         /// Error of the driver.
         reason: String,
     },
-    /// Pixels that are no PNG file, or cannot become one.
+    /// Pixels that are not a PNG file, or cannot become one.
     #[error("the picture cannot be encoded: {0}")]
     Coding(String),
     /// A file that can't be written.
@@ -54,7 +54,7 @@ pub enum PictureError {
     Ffmpeg {
         /// The film.
         path: PathBuf,
-        /// The last of what it said.
+        /// The last line of its output.
         reason: String,
     },
 }
