@@ -133,7 +133,7 @@ fn typeset(number: &str) -> String {
     }
 }
 
-/// A text with what stands between backticks as code.
+/// A text with the parts between backticks as code.
 fn prose(text: &str) -> String {
     let parts = text.split('`').enumerate();
     let set = |(at, part): (usize, &str)| {

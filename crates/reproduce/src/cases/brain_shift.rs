@@ -1,5 +1,5 @@
 //! Brain shift on an ellipsoid: half axes 80, 65 and 60 mm about the origin, held by the skull below z = −12 mm, pressed
-//! inwards where it is opened around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
+//! inwards at an opening around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
 
 use pliant_geometry::{CellKind, DataArray, Locator, Mesh, Vector3, boundary, relative_acoustic_length};
 use pliant_mechanics::Observable;
@@ -36,9 +36,9 @@ const AXIS: [f64; 3] = [0.3, 0.4, 0.866_025_403_784_438_6];
 const HEIGHT: f64 = 0.062_864_934_582_006_83;
 /// Depth [m] to which the middle of the opening is pressed.
 const DEPTH: f64 = 0.01;
-/// Height of the border of the opening over that of the ellipsoid.
+/// Height of the border of the opening over the height of the ellipsoid.
 const OPENING: f64 = 0.88;
-/// The skull holds what is below this z [m].
+/// The skull holds all nodes below this z [m].
 const SKULL: f64 = -0.012;
 /// Slack of the borders of both regions, as a part of the height: the mesh of the reference has its nodes on them.
 const SLACK: f64 = 1e-9;
@@ -156,7 +156,7 @@ pub fn data() -> Value {
     reference(include_str!("../../../../validation/data/ellipsoid.json"))
 }
 
-/// A list of vectors of the reference; what is none counts as not a number.
+/// A list of vectors of the reference; invalid entries become NaN.
 pub fn vectors(value: &Value) -> Vec<Vector<f64>> {
     let list = value.as_array().map(Vec::as_slice).unwrap_or_default();
     list.iter().map(|v| numbers(v).try_into().unwrap_or([f64::NAN; 3])).collect()

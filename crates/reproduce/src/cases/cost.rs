@@ -1,6 +1,6 @@
-//! Figure 6.7: what fibres and relaxation cost, on this machine: wall time of an explicit step of the thesis's cube of
-//! hexahedra, single precision, all cores. Repeats of all models are interleaved, so that what else the machine does
-//! meets all alike; the median counts.
+//! Figure 6.7: the cost of fibres and relaxation on this machine: wall time of an explicit step of the thesis's cube
+//! of hexahedra, single precision, all cores. Repeats of all models are interleaved, so other load affects them
+//! equally; the median counts.
 
 use pliant_bench::{Clocked, ClockedOnDevice, Spread, Timed};
 use pliant_gpu::{Design, Device, GpuError};
@@ -100,7 +100,7 @@ where
     Ok(times.split_off(1))
 }
 
-/// The median over the repeats of what is made of their times.
+/// The median over the repeats of a function of their times.
 fn median(repeats: &[[f64; 4]], of: impl Fn(&[f64; 4]) -> f64) -> f64 {
     Spread::of(repeats.iter().map(of)).median
 }
@@ -121,7 +121,7 @@ impl Series {
         Ok(Self { place, detail, times })
     }
 
-    /// For each mesh its elements and the median of what is made of the times.
+    /// For each mesh its elements and the median of a function of the times.
     fn points(&self, of: impl Fn(&[f64; 4]) -> f64) -> Vec<(f64, f64)> {
         let median = |(cells, times): (usize, &Vec<_>)| (cells.pow(3) as f64, median(times, &of));
         CELLS.into_iter().zip(&self.times).map(median).collect()
@@ -220,7 +220,7 @@ fn compute() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-/// How many times faster the graphics processor is, on the model with all there is.
+/// Speed-up of the GPU, for the most complete model.
 fn add_ratio(findings: &mut Findings, processor: &Series, on_device: &Series) -> Result<(), CaseError> {
     let (slow, fast) = (processor.points(|t| t[3]), on_device.points(|t| t[3]));
     let points: Vec<_> = slow.iter().zip(&fast).map(|(slow, fast)| (slow.0, slow.1 / fast.1)).collect();

@@ -1,6 +1,6 @@
-//! Figures 8.2 to 8.4: the curved surface of shells, what it carries, and how it looks. The surface here is a cubic Bézier triangle from
-//! positions and nodal normals (PN triangles of Vlachos et al. 2001 with arcs for edges), not the thesis's deflection (8.3) along the
-//! normal of each facet, which leaves gaps between facets that are not coplanar.
+//! Figures 8.2 to 8.4: the curved surface of shells, its carried surfaces, and its rendering. The surface here is a cubic Bézier
+//! triangle from positions and nodal normals (PN triangles of Vlachos et al. 2001 with arcs for edges), not the thesis's deflection
+//! (8.3) along the normal of each facet, which leaves gaps between facets that are not coplanar.
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion};
 use pliant_corotational::element::Formulation;
@@ -142,7 +142,7 @@ impl Deflected {
     }
 }
 
-/// How far force and moment of what comes to the nodes are off those of a force at a place, over the force and over force × mean edge.
+/// Errors of force and moment of the nodal loads against those of a force at a point, over the force and over force × mean edge.
 fn resultants_off(
     corners: [Vector3; 3],
     nodal: [[Vector3; 2]; 3],
@@ -329,7 +329,7 @@ fn layers() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-/// A sphere of shells under an affine motion of its nodes, whose normals turn as those of the ellipsoid do.
+/// A sphere of shells under an affine motion of its nodes; the normals rotate with those of the ellipsoid.
 struct Ellipsoid {
     model: Model,
     state: State,
@@ -451,7 +451,7 @@ fn rendering() -> Result<Findings, CaseError> {
         }
     }
     let gaping = triangle_mesh(points, cut);
-    // A sphere of 1,280 triangles turned so that nothing of it lies on the shells' edges.
+    // A sphere of 1,280 triangles, rotated so that no part of it lies on the edges of the shells.
     let mut irregular = sphere(1.0, 3, DEFAULT_CELL_LIMIT)?;
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.5, -0.2));
     irregular.points.iter_mut().for_each(|p| *p = turn * *p);

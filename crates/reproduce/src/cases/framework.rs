@@ -1,6 +1,6 @@
-//! Figure 6.9: what the framework costs: the bare step of a cube of hexahedra under gravity against the whole program, on
-//! this machine: single precision, all cores. Both begin at rest and take the same steps of the same model; repeats are
-//! interleaved, so that what else the machine does meets both alike.
+//! Figure 6.9: the cost of the framework. The bare step of a cube of hexahedra under gravity is compared with the whole
+//! program on this machine, in single precision on all cores. Both start at rest and take the same steps of the same
+//! model; repeats are interleaved, so other load affects both equally.
 
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_mechanics::State;
@@ -54,7 +54,7 @@ impl Program {
     fn new(cells: usize) -> Result<Self, CaseError> {
         let short = scene(cells, 1e-3)?;
         let built = pliant_scene::build(&short)?;
-        // The duration that takes as many steps as are to be timed.
+        // The duration for the timed number of steps.
         let limits = pliant_scene::plan(&short, &built)?.limits;
         let step = SAFETY * limits.map_or(1e-3, |limits| limits.limit.step);
         let scene = scene(cells, step * (ELEMENT_STEPS / cells.pow(3)) as f64)?;
@@ -63,7 +63,7 @@ impl Program {
         Ok(Self { scene, built, plan })
     }
 
-    /// Wall time of a step of the solver alone [s], on threads of its own as the whole program has.
+    /// Wall time of a step of the solver alone [s], on its own threads like the whole program.
     fn bare(&self) -> Result<f64, CaseError> {
         let model = &self.built.model;
         let mut clocked = Clocked::<f32>::new(model.clone(), self.plan.step, State::at_rest(model))?;

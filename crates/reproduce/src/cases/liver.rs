@@ -1,8 +1,8 @@
-//! Figure 6.10: von Mises stress in a stretched liver, transversely isotropic, without relaxation and some seconds after the
-//! stretch with it. The organ is the one of `scenes/liver`, not the thesis's mesh, which was never published.
+//! Figure 6.10: von Mises stress in a stretched liver, transversely isotropic, without relaxation and with it some seconds
+//! after the stretch. The organ is the one of `scenes/liver`, since the thesis's mesh was never published.
 //!
-//! There are no numbers to compare with. What holds instead: once relaxed, the tissue stands where an elastic one of
-//! modulus (1 − α) μ, (1 − α) η and the same κ stands in equilibrium, which another solver finds.
+//! The source has no numbers. Instead: after relaxation, the tissue must equal an elastic one of modulus (1 − α) μ,
+//! (1 − α) η and the same κ in equilibrium, which another solver computes.
 
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{Cells, Model};
@@ -30,7 +30,7 @@ pub const CASE: Case = Case {
     compute,
 };
 
-/// Parameters of the scene's law with a part of its shear and fibre moduli left.
+/// The scene's law with a fraction of its shear and fibre moduli.
 fn tissue(part: f64) -> AnyLaw {
     let parameters =
         json!({ "shear-modulus": 3e3 * part, "bulk-modulus": 29e3, "fibre-modulus": 6e3 * part });

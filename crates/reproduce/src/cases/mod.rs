@@ -48,7 +48,7 @@ fn told(adapter: &Adapter) -> String {
     format!("{}{software}", adapter.name)
 }
 
-/// The thesis's factor 2, which every case with fibres meets.
+/// The thesis's factor 2, relevant to every case with fibres.
 const FIBRE_FACTOR: Correction = Correction {
     printed: "(6.6): fibre stress η (Ī₄ − 1) …",
     correct: "2η (Ī₄ − 1) …",

@@ -65,7 +65,7 @@ pub fn mesh(cells: usize, pattern: Pattern) -> Result<Mesh, CaseError> {
     sheet(Sheet::Plate { size: [SIDE; 2] }, [cells; 2], pattern)
 }
 
-/// The whole plate with the same components held on all edges.
+/// The whole plate with the same components fixed on all edges.
 ///
 /// # Errors
 /// If the mesh is not a valid shell.

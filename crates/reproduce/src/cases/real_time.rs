@@ -1,5 +1,5 @@
-//! Figure 6.8: tissue that is simulated as fast as it moves. A cube of 55,566 tetrahedra is stretched to and fro, and a liver is
-//! pulled by one thread, as `pliant view` plays them: steps, and frames sixty times a second of simulated time.
+//! Figure 6.8: tissue in real time. A cube of 55,566 tetrahedra is stretched to and fro, and a liver is pulled on one thread, as
+//! `pliant view` plays them: steps, and sixty frames per second of simulated time.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -30,9 +30,9 @@ pub const CASE: Case = Case {
 
 const CUBE: &str = include_str!("../../../../scenes/stretched-cube/scene.toml");
 const LIVER: &str = include_str!("../../../../scenes/liver/scene.toml");
-/// Frames a simulated second.
+/// Frames per simulated second.
 const FRAMES: f64 = 60.0;
-/// When the cube is stretched most [s].
+/// Time of the largest stretch [s].
 const FARTHEST: f64 = 0.5;
 
 /// What playing a scene took.
@@ -43,7 +43,7 @@ struct Played {
     stepping: f64,
     preparing: f64,
     frames: u64,
-    /// What was shown at the farthest, with its displacements [m].
+    /// The frame with the largest stretch, with its displacements [m].
     farthest: (Mesh, Vec<[f64; 3]>),
 }
 
@@ -63,7 +63,7 @@ fn play(text: &str, seconds: f64, set: &[(&[&str], Value)]) -> Result<Played, Ca
     pool.install(|| go(&scene, &built, &plan, seconds))
 }
 
-/// Goes on frame by frame; on a device points are placed there, without a look.
+/// Continues frame by frame; a GPU places the points without a read-back.
 fn go(scene: &Scene, built: &Arc<Built>, plan: &Plan, seconds: f64) -> Result<Played, CaseError> {
     let failed = |failure: pliant_scene::FailureSummary| CaseError::Run(failure.message);
     let mut live = live(scene, built, plan).map_err(failed)?;

@@ -1,6 +1,6 @@
-//! Figures 9.1 to 9.3: fine surfaces by few curved shells. The thesis prints no numbers beside its maps of the distance from shells to
-//! surface; here both ways are measured, densely. The capsule and the aneurysm are analytic, as the thesis's are not published; where
-//! `PLIANT_DATA` names a folder of organs, those of patients are shown as well.
+//! Figures 9.1 to 9.3: fine surfaces as few curved shells. The thesis prints no numbers beside its maps of the distance from shells to
+//! surface; here both directions are measured, densely. The capsule and the aneurysm are analytic, since the thesis's are not
+//! published. If `PLIANT_DATA` names a folder of organs, those of patients are shown as well.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -60,7 +60,7 @@ const PLACEMENT: Correction = Correction {
 
 const SOURCE: &str = "required of this reconstruction";
 
-/// A body to be rebuilt, and how well it must be.
+/// A surface to fit, and the required accuracy.
 struct Study<'a> {
     name: &'a str,
     target: &'a TriangleMesh,

@@ -1,6 +1,6 @@
 //! Figure 9.4 and beyond: time of an implicit step of 40 ms for shells under pressure, by their number and by the linear solver, on this
-//! machine. A tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1 MPa, ν = 0.45, both ends held) under a pressure that
-//! pulses between 0 and 1 kPa twice a second; one linear solution a step.
+//! machine. A tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1 MPa, ν = 0.45, both ends fixed) under a pressure that
+//! pulses between 0 and 1 kPa twice a second; one linear solution per step.
 
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
@@ -40,7 +40,7 @@ pub const CASE: Case = Case {
     compute,
 };
 
-/// The tube, of about so many shells.
+/// The tube, with about this number of shells.
 fn tube(shells: usize) -> Result<Model, CaseError> {
     // Cells about as long as wide: 2 a n = shells with n/a = 200/(40 π).
     let around = ((shells as f64 / 2.0) * (0.02 * TAU) / 0.2).sqrt().round().max(3.0) as usize;
@@ -149,7 +149,7 @@ fn solvers() -> [(&'static str, LinearSolver); 4] {
     ]
 }
 
-/// Median time [s] of factors anew and a solution with them, for a hexagon of 469 nodes.
+/// Median time [s] of a factorisation and a solution, for a hexagon of 469 nodes.
 fn hexagon() -> Result<f64, CaseError> {
     const RINGS: i32 = 12;
     let inside = |(i, j): (i32, i32)| i.abs().max(j.abs()).max((i + j).abs()) <= RINGS;
