@@ -175,7 +175,7 @@ fn backward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
 /// A problem on finer and finer meshes.
 struct Problem {
     name: &'static str,
-    /// The two displacements of the ratio.
+    /// The ratio, in words.
     displacement: &'static str,
     cells: &'static [usize],
     /// Of the prototype: ours and the thesis's element.
