@@ -1,5 +1,5 @@
-//! Every bad input that the project promises to refuse, through the real binary: the exit code, the user's own line,
-//! the number that is wrong and what to try, nothing written, and one JSON object.
+//! Every bad input that the project promises to reject, through the real binary: the exit code, the user's own line,
+//! the wrong number and a remedy, nothing written, and one JSON object.
 
 mod support;
 
@@ -8,7 +8,8 @@ use std::path::Path;
 
 use support::{BLOCK, CUBE, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
 
-/// Asserts that a scene is refused: with these words and one of these lines underlined; the folder holds what it held.
+/// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the folder does
+/// not change.
 #[track_caller]
 fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
     let told = workshop.run(&[]);
@@ -34,7 +35,7 @@ fn assert_invalid(told: &Told, says: &[&str]) {
     }
 }
 
-/// [`BLOCK`] with one place spoilt is refused, and the lines that were spoilt are shown.
+/// [`BLOCK`] with one error is rejected, and the changed lines are shown.
 #[track_caller]
 fn spoilt(good: &str, bad: &str, says: &[&str]) {
     let scene = changed(BLOCK, good, bad);
@@ -56,13 +57,13 @@ fn with_mesh(mesh: impl AsRef<[u8]>, scene: &str) -> Workshop {
 
 const MESH_LINE: &str = r#"mesh = { file = "organ.vtk" }"#;
 
-/// A body from this file is refused.
+/// A body from this file is rejected.
 #[track_caller]
 fn bad_mesh(mesh: impl AsRef<[u8]>, says: &[&str]) {
     assert_refused(&with_mesh(mesh, FROM_FILE), &[MESH_LINE], says);
 }
 
-/// A body from this file runs with a repair, which is told.
+/// A body from this file runs with a repair, which is reported.
 #[track_caller]
 fn repaired(mesh: &str, fix: &str, note: &str) {
     let scene = changed(FROM_FILE, MESH_LINE, &format!("mesh = {{ file = \"organ.vtk\", fix = \"{fix}\" }}"));
@@ -733,7 +734,8 @@ fn halves(folder: &Path) -> Vec<String> {
     names.filter(|name| name.ends_with(".tmp")).collect()
 }
 
-/// Runs the scene where a file may have so many blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
+/// Runs the scene with a limit on the file size in blocks of 512 or 1024 bytes, so that writing fails as on a full
+/// disk.
 #[cfg(unix)]
 fn run_limited(workshop: &Workshop, blocks: u32) -> Told {
     let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run case --json");
@@ -1010,7 +1012,7 @@ fn a_run_of_more_than_a_day_asks_for_consent() {
     child.wait().unwrap();
 }
 
-/// What a failed run says.
+/// The output of a failed run.
 fn failure_of(changes: &[&str]) -> String {
     let workshop = Workshop::new(BLOCK);
     let set: Vec<&str> = changes.iter().flat_map(|change| ["--set", change]).collect();

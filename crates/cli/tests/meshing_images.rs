@@ -81,7 +81,7 @@ impl Picture {
     }
 }
 
-/// A scene that names the image itself; `MESH` stands for what its mesh is.
+/// A scene that names the image; `MESH` stands for the table of its mesh.
 const SCENE: &str = r#"[scene]
 until = 0.01
 gravity = [0, 0, -9.81]
@@ -421,7 +421,7 @@ fn shells_of_an_image_become_a_wall() {
     assert!(told.out.contains("label 5, 8, 80 shells"), "{}", told.out);
 }
 
-/// What a run says about the cache of meshes.
+/// The messages of a run about the cache of meshes.
 fn cached(workshop: &Workshop, more: &[&str]) -> Option<bool> {
     let told = workshop.run(&[&["--force"], more].concat());
     assert_eq!(told.code, 0, "{}", told.err);
@@ -445,7 +445,7 @@ fn the_mesh_of_an_image_is_kept_and_made_anew_where_anything_changes() {
         assert_eq!(cached(&workshop, &["--set", change]), Some(false), "{change}");
         assert_eq!(cached(&workshop, &["--set", change]), Some(true), "{change}");
     }
-    // What is kept gives the same bits.
+    // The cached mesh gives the same bits.
     assert_eq!(workshop.run(&["--force"]).done()["energies"], whole["energies"]);
     for entry in std::fs::read_dir(workshop.path("cache")).unwrap() {
         let path = entry.unwrap().path();

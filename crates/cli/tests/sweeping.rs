@@ -12,7 +12,7 @@ fn sweep(workshop: &Workshop, arguments: &[&str]) -> Told {
     workshop.pliant(&[&["sweep", "case"], arguments].concat())
 }
 
-/// The cells of a table; commas in quotes separate none.
+/// The cells of a table; commas in quotes do not separate.
 fn cells(line: &str) -> Vec<String> {
     let (mut all, mut quoted) = (vec![String::new()], false);
     for c in line.chars() {
@@ -52,7 +52,7 @@ fn a_sweep_runs_the_product_and_tells_what_each_run_came_to() {
     for (run, row) in rows[1..].iter().enumerate() {
         assert_eq!((row[0].as_str(), row[column("status")].as_str()), (&*run.to_string(), "done"));
         assert!((row[column("time")].parse::<f64>().unwrap() - 0.008).abs() < 1e-12);
-        // Every number is that of the run alone.
+        // Every number equals that of the single run.
         let own = workshop.table(&format!("out/case-sweep/run-{run:04}/history.csv"));
         let last = own.1.last().unwrap();
         for (name, value) in own.0.iter().zip(last).skip(1) {
@@ -74,7 +74,7 @@ fn a_sweep_runs_the_product_and_tells_what_each_run_came_to() {
     workshop.run(&by_hand).done();
     assert_eq!(workshop.read("out/case/history.csv"), workshop.read("out/case-sweep/run-0003/history.csv"));
 
-    // The same on any number of threads, but for the wall time in the last column.
+    // The same on any number of threads, except the wall time in the last column.
     let again =
         sweep(&workshop, &[&set[..], &["--threads", "3", "--out", "out/again", "--keep-fields"]].concat());
     assert_eq!(again.code, 0, "{}", again.err);

@@ -1,4 +1,4 @@
-//! What people say to `pliant labels`, `pliant mesh` and in a scene about scans: names, ranges, masks, units; and what is told back.
+//! Names, ranges, masks and units in `pliant labels`, `pliant mesh` and scenes of scans, and the replies.
 
 mod support;
 
@@ -183,7 +183,7 @@ fn a_surface_in_millimetres_is_not_taken_for_one_in_metres() {
     assert!(told.code == 0 && told.err.contains("larger than any organ"), "{}", told.err);
 }
 
-/// A scene of one body whose mesh is what stands here.
+/// A scene of one body with this mesh.
 fn scene(mesh: &str) -> Workshop {
     let text = format!(
         "[scene]\nuntil = 0.001\n[law.tissue]\ntype = \"neo-hookean\"\nyoung-modulus = 3e3\npoisson-ratio = 0.45\n\

@@ -11,8 +11,8 @@ use crate::surfaces::Surfaces;
 /// Threshold of the first round, in ideal acoustic lengths.
 const FIRST_THRESHOLD: f64 = 0.3;
 
-/// Rounds aim this much higher than the target: the true limit depends on how many tets are near the least length. With
-/// 1 it was 3 % lower for the brain phantom at 10 mm.
+/// Rounds aim this much higher than the target, because the critical time step depends on the number of tets near the
+/// smallest length. With 1 it was 3 % lower for the brain phantom at 10 mm.
 const AIM: f64 = 1.07;
 
 /// The threshold reaches its goal in this part of the rounds.

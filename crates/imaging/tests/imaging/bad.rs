@@ -1,4 +1,4 @@
-//! Bad images: each gives an error that says what is wrong, where, and what to try.
+//! Bad images: each gives an error with the problem, its position and a remedy.
 
 use std::fs;
 
@@ -56,7 +56,7 @@ fn truncated_files_say_how_much_is_missing() {
         &error(&packed[..packed.len() / 2], ImageFormat::Nifti),
         &["cannot be decompressed after", "truncated or damaged"],
     );
-    // Damaged in the middle: the checksum tells, or the unpacking.
+    // Damaged in the middle: the checksum or the decompression fails.
     let mut damaged = packed.clone();
     let middle = packed.len() - 20;
     damaged[middle] ^= 0x55;

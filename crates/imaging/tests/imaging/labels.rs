@@ -1,4 +1,4 @@
-//! Labels and their names: segmentations in DICOM, names in NRRD and NIfTI, masks, scans that are none of labels, files that are no files.
+//! Labels and their names: segmentations in DICOM, names in NRRD and NIfTI, masks, scans without labels, paths that are not files.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use pliant_imaging::{
 
 use crate::write::*;
 
-/// Labels 1 to 3 in slices 1, 2 and 4 of six, so that frames are missing at both ends and in between.
+/// Labels 1 to 3 in slices 1, 2 and 4 of six, so frames are missing at both ends and in between.
 fn labelled() -> Volume {
     let dims = [5, 4, 6];
     let label = |at: usize| match (at % 5, at / 5 % 4, at / 20) {
@@ -22,7 +22,7 @@ fn labelled() -> Volume {
     Volume { dims, values: (0..120).map(label).collect(), ..Volume::oblique() }
 }
 
-/// The voxels with labels are those of a volume, in their places.
+/// The voxels with labels equal those of a volume, in position.
 fn assert_same(image: &Image, volume: &Volume) {
     let inverse = volume.axes.try_inverse().unwrap();
     let mut found = 0;
@@ -144,7 +144,7 @@ fn layers_of_segments_become_one_image() {
         )
     };
     let labels = |image: &Image| image.labels().unwrap().labels;
-    // Values of their own stay; the tumour, which comes later, lies in the liver.
+    // Distinct values stay; the tumour, which comes later, lies in the liver.
     let own = segment(1, 1, 7, "tumour") + &segment(0, 0, 5, "liver");
     let image = layered("5 0  5 7  0 7  0 0", &own).unwrap();
     assert_eq!((image.grid.dims, labels(&image)), ([2, 2, 1], vec![5, 7, 7, 0]));
