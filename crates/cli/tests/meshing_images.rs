@@ -275,7 +275,7 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
     let chosen = ["--label", "5", "--edge", "0.006"];
     let cases: [(&str, &[&str], &[&str]); 16] = [
         ("missing.nii", &chosen, &["cannot open `missing.nii`", "check the path"]),
-        ("text.txt", &chosen, &["not an image", "NIfTI"]),
+        ("text.txt", &chosen, &["not a supported image", "NIfTI"]),
         ("cut.nii.gz", &chosen, &["cut.nii.gz", "copy it again"]),
         ("negative.nii", &chosen, &["pixdim"]),
         ("empty.nii", &chosen, &["no voxel has label 5", "only background (0)"]),
@@ -313,7 +313,7 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
     }
     let told = workshop.pliant(&["labels", "text.txt", "--json"]);
     assert_eq!(told.code, 2);
-    assert!(told.words().contains("not an image"), "{}", told.err);
+    assert!(told.words().contains("not a supported image"), "{}", told.err);
 }
 
 #[test]
@@ -482,7 +482,7 @@ fn mistakes_about_images_are_underlined_in_the_scene() {
         ("{ image = \"seg.nii.gz\", labels = [], edge = 0.006 }", "no label was chosen"),
         ("{ image = \"seg.nii.gz\", edge = 0.006 }", "add `label = 1`"),
         ("{ image = \"other.nii.gz\", label = 5, edge = 0.006 }", "relative to the scene file"),
-        ("{ image = \"scene.toml\", label = 5, edge = 0.006 }", "not an image"),
+        ("{ image = \"scene.toml\", label = 5, edge = 0.006 }", "not a supported image"),
         ("{ image = \"seg.nii.gz\", label = 5, edge = 5e-5 }", "exceed"),
         ("{ image = \"seg.nii.gz\", threshold = 50, edge = 0.006 }", "lower threshold"),
         ("{ image = \"seg.nii.gz\", label = 5, edge = 0.006, clean = { close-gaps = -1 } }", "close-gaps"),

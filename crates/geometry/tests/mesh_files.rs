@@ -294,7 +294,7 @@ fn gifti_says_what_it_leaves_out() {
     assert!(moved.notes[0].contains("was not applied"), "{:?}", moved.notes);
     for (from, to, says) in [
         ("Encoding=\"ASCII\"", "Encoding=\"ExternalFileBinary\"", "ExternalFileBinary"),
-        ("NIFTI_TYPE_FLOAT32", "NIFTI_TYPE_RGB24", "no type of points"),
+        ("NIFTI_TYPE_FLOAT32", "NIFTI_TYPE_RGB24", "not a type of points"),
         ("Dim1=\"3\"", "Dim1=\"2\"", "`Dim0` and `Dim1`"),
         ("Dim0=\"4\"", "Dim0=\"400000000\"", "far larger than the file"),
         ("SYSTEM \"http", "[<!ENTITY a \"b\">] \"http", "declarations of its own"),
