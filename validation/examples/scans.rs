@@ -279,7 +279,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         PathBuf::from(arguments.next().ok_or("a folder for the scenes and their results is missing")?);
     let chosen: Vec<String> = arguments.collect();
     println!(
-        "| body | cells | elements / nodes | volume | τ | off the voxels: most / rms [mm] | step: bound / true [ms] | \
+        "| body | cells | elements / nodes | volume | τ | distance to voxels: largest / rms [mm] | \
+         step: element bound / critical [ms] | \
          mesh [s] | 1 s | wall [s] |\n|---|---|---|---|---|---|---|---|---|---|"
     );
     for scan in SCANS.iter().filter(|scan| chosen.is_empty() || chosen.iter().any(|name| name == scan.name)) {

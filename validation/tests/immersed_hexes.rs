@@ -107,7 +107,7 @@ fn row(name: &str, hanging: &Hanging, found: &[Vector3], truth: &[Vector3]) {
 
 fn head() {
     println!(
-        "| mesh | elements | nodes | volume | τ true | deepest [mm] | displacements off |\n|---|---|---|---|---|---|---|"
+        "| mesh | elements | nodes | volume | τ | lowest point [mm] | displacement error |\n|---|---|---|---|---|---|---|"
     );
 }
 

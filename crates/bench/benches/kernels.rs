@@ -1,5 +1,5 @@
-//! Microbenchmarks of the kernels: stresses of laws, and whole steps of small cubes element by element. `pliant bench` measures
-//! what users wait for; these are for whoever changes a kernel: `cargo bench -p pliant-bench`.
+//! Microbenchmarks of the kernels: stresses of laws, and whole steps of small cubes for each element. `pliant bench` measures
+//! the user's wall time; these help when changing a kernel: `cargo bench -p pliant-bench`.
 
 use divan::{Bencher, counter::ItemsCount};
 use pliant_bench::{

@@ -1,8 +1,8 @@
-//! What can be measured: cubes of 0.1 m, each of one element, one law, one precision and one place: threads of the
-//! processor, or a design on a graphics processor.
+//! The cases: cubes of 0.1 m, each of one element, law, precision and place (threads of the CPU, or a design on a
+//! GPU).
 //!
-//! The edges 10, 16, 25 and 38 are those of thesis Fig. 6.7 (1,331 to 59,319 nodes); the larger ones lead on to 10⁶ cells.
-//! 21³ × 6 tets (55,566) and 30³ hexes (27,000) are the meshes on which all laws are compared.
+//! The edges 10, 16, 25 and 38 are those of thesis Fig. 6.7 (1,331 to 59,319 nodes); the larger ones extend to 10⁶ cells.
+//! All laws are compared on 21³ × 6 tets (55,566) and 30³ hexes (27,000).
 
 use std::thread;
 
@@ -17,13 +17,13 @@ use crate::{HOURGLASS, Hexes, Specimen, Tets, elastic, liver, liver_relaxation, 
 /// Edge of all cubes [m].
 pub(crate) const EDGE: f64 = 0.1;
 
-/// Cells along the edge of the cubes of the series: first the thesis's, then on to 10⁶ cells and more.
+/// Cells along the edge of the cubes of the series: first the thesis's, then up to 10⁶ cells and more.
 const SERIES: [usize; 8] = [10, 16, 25, 38, 56, 70, 100, 126];
 /// How many of them the default selection measures.
 const THESIS: usize = 4;
 /// The most tets of a cube, and the most hexes.
 const MOST: usize = 2_100_000;
-/// Cells along the edge of the large cubes on a graphics processor.
+/// Cells along the edge of the large cubes on a GPU.
 const ON_DEVICE: [usize; 2] = [60, 100];
 /// Cells along the edge of the cube of `hex8-full`.
 const FULL_EDGE: usize = 16;
@@ -171,9 +171,9 @@ impl Threads {
 /// Where a case runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// On the processor.
+    /// On the CPU.
     Processor(Threads),
-    /// On the best graphics processor, by a design.
+    /// On the best GPU, with a design.
     Device(Design),
 }
 
@@ -193,8 +193,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// What it is called on the command line: `tet4-nh-55566`, with `-double` and `-all` unless single on one thread, or
-    /// with the design on a graphics processor.
+    /// Its name on the command line: `tet4-nh-55566`, with `-double` and `-all` unless single on one thread, or with the
+    /// design on a GPU.
     pub fn id(&self) -> String {
         let law = self.law.name().to_lowercase().replace('+', "-");
         let precision = if self.precision == Precision::Double { "-double" } else { "" };
@@ -216,12 +216,12 @@ impl Case {
         (self.edge + 1).pow(3)
     }
 
-    /// Whether it runs on a graphics processor.
+    /// Whether it runs on a GPU.
     pub fn is_on_device(&self) -> bool {
         matches!(self.place, Place::Device(_))
     }
 
-    /// Whether the default selection has it: all laws on one mesh an element, and the thesis's series, on the processor.
+    /// Whether the default selection contains it: all laws on one mesh per element, and the thesis's series, on the CPU.
     pub fn is_default(&self) -> bool {
         let [simplest, richest] = [LawKind::NeoHookean, LawKind::FibresProny].map(|law| self.law == law);
         let reference = self.edge == self.element.reference_edge();
@@ -258,7 +258,7 @@ impl Case {
     }
 }
 
-/// All there is to measure, those of the same element, law, precision and place one after another.
+/// All cases, ordered by element, law, precision and place.
 pub fn cases() -> Vec<Case> {
     let mut cases = on_processor();
     cases.extend(on_device());
@@ -311,7 +311,7 @@ fn on_processor() -> Vec<Case> {
 /// The case of an id.
 ///
 /// # Errors
-/// If there is none: the id most like it.
+/// If it does not exist: the most similar id.
 pub fn find(id: &str) -> Result<Case, String> {
     let (typed, known) = (id.to_lowercase(), cases());
     let likeness = |case: &&Case| strsim::jaro_winkler(&case.id(), &typed);

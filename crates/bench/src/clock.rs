@@ -8,7 +8,7 @@ use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure};
 use pliant_mechanics::Model;
 use pliant_mechanics::model::Contradiction;
 
-/// What can be stepped against the clock.
+/// A model that can be timed.
 pub trait Timed {
     /// Why a step can fail.
     type Error;
@@ -19,7 +19,8 @@ pub trait Timed {
     /// If a step fails.
     fn seconds_per_step(&mut self, steps: usize) -> Result<f64, Self::Error>;
 
-    /// How many steps take `seconds` of wall time, found by taking some: this warms up, too.
+    /// The number of steps that take `seconds` of wall time, found by stepping, which also warms
+    /// up.
     ///
     /// # Errors
     /// If a step fails.
@@ -52,10 +53,10 @@ impl<R: Scalar> Clocked<R> {
         Ok(Self { stepper: CentralDifference::new(model, step)?, state })
     }
 
-    /// In the lanes of certain instructions instead of the widest.
+    /// With the lanes of given instructions instead of the widest.
     ///
     /// # Errors
-    /// If the processor does not have them.
+    /// If the CPU does not have them.
     pub fn in_lanes(self, instructions: Instructions) -> Result<Self, MissingInstructions> {
         Ok(Self { stepper: self.stepper.in_lanes(instructions)?, ..self })
     }
@@ -76,7 +77,7 @@ impl<R: Scalar> Timed for Clocked<R> {
     }
 }
 
-/// A model under the clock on a graphics processor.
+/// A timed model on a GPU.
 pub struct ClockedOnDevice {
     device: Device,
     stepper: GpuStepper,
@@ -101,7 +102,7 @@ impl ClockedOnDevice {
     }
 }
 
-/// The looks that the stepper takes now and then are steps' cost, too.
+/// The stepper's occasional read-backs are part of the cost of steps.
 impl Timed for ClockedOnDevice {
     type Error = StepFailure;
 

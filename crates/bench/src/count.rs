@@ -1,8 +1,8 @@
 //! Bytes and floating-point operations of a step, counted by hand from the formulas.
 //!
 //! **Operations**: every +, −, × and ÷ on real numbers in the formulas of `law/`, `forces/` and the node pass of
-//! `stepper.rs`, as they stand; a multiply-add is two. Not counted: index arithmetic, comparisons, and what a formula
-//! finds twice (the second time is free). With N nodes a cell and 3 numbers a node:
+//! `stepper.rs`; a multiply-add is two. Not counted: index arithmetic, comparisons, and repeated subexpressions. With
+//! N nodes per cell and 3 numbers per node:
 //!
 //! | part | operations | |
 //! |---|---|---|
@@ -21,18 +21,18 @@
 //! | sums of blocks | 3 N | |
 //! | a node's step | 79 | per component 24, of which 12 are energies; 7 once |
 //!
-//! `tet4-anp` finds J in a pass of its own and averages it (6 + 4 a cell, 1 a node); `hex8-full` finds J and the stress at
-//! eight points, where f_a = Σ w P B_a takes 18 (N−1) a point.
+//! `tet4-anp` computes J in a separate pass and averages it (6 + 4 per cell, 1 per node); `hex8-full` computes J and the
+//! stress at eight points, where f_a = Σ w P B_a takes 18 (N−1) per point.
 //!
-//! **Bytes**: what has to come from memory and go there in a step if all that is made and used up in between stays in the
-//! caches: a lower bound for any layout. Read: node numbers (2 bytes each), gradients of all nodes but the first and volume
-//! (3 N − 2 numbers), the fibre (3), hourglass moments, stiffness and reach (14). Read and written: the history (Φ and h, 6 numbers
-//! each), and of a node displacement and increment (12 numbers); mass and damping (2) read. `tet4-anp` goes through its
-//! cells twice. Not counted: what a block copies in and the sums that it leaves, each four numbers for a node of a block.
+//! **Bytes**: memory traffic of a step if all intermediate data stay in the caches: a lower bound for any layout. Read: node
+//! numbers (2 bytes each), gradients of all nodes but the first and volume (3 N − 2 numbers), the fibre (3), hourglass moments,
+//! stiffness and reach (14). Read and written: the history (Φ and h, 6 numbers each), and for a node displacement and increment (12
+//! numbers); mass and damping (2) are read. `tet4-anp` reads its cells twice. Not counted: the copies of a block and its sums, each
+//! four numbers per node of a block.
 
 use crate::case::{Case, Element, LawKind, Precision};
 
-/// What a step asks for, per cell, its share of the nodes included.
+/// Operations and bytes of a step per cell, including its share of the nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Count {
     /// Bytes to and from memory.
@@ -51,9 +51,9 @@ struct OfElement {
     indices: f64,
     /// Numbers read and written per node.
     node_numbers: f64,
-    /// Operations per cell but for those at the points.
+    /// Operations per cell except those at the points.
     flops: f64,
-    /// Operations per point but for the cube root and the isochoric stress.
+    /// Operations per point except the cube root and the isochoric stress.
     point_flops: f64,
     /// Operations per node.
     node_flops: f64,
@@ -91,7 +91,7 @@ const fn rest(nodes: f64) -> f64 {
 
 /// J − 1.
 const VOLUME_CHANGE: f64 = 29.0;
-/// The measures of a deformation from H but for the cube root, its extremes, and P.
+/// The measures of a deformation from H except the cube root, its extremes, and P.
 const POINT: f64 = VOLUME_CHANGE + 87.0 + 12.0 + 45.0;
 /// Of the law's own pressure.
 const VOLUMETRIC: f64 = 14.0;

@@ -1,9 +1,9 @@
-//! What a step costs on this machine: [`Case`]s (a cube of one element, law, precision and number of threads), stepped
-//! against the clock and set beside what the machine can do ([`Rates`]) and what the step asks for ([`Count`]). And the
-//! specimens and tissues that are measured here and tested elsewhere.
+//! Cost of a step on this machine. [`Case`]s (a cube of one element, law, precision and number of threads) are timed
+//! and compared with the limits of the machine ([`Rates`]) and the operations of a step ([`Count`]). The specimens and
+//! tissues also serve tests elsewhere.
 //!
-//! What is measured is whole steps through the public interface of `pliant-mechanics`, `evaluate` and `advance`. Leaves
-//! out: the watch over the stable step, observers and files, which a run has besides.
+//! Whole steps are measured through the public interface of `pliant-mechanics`, `evaluate` and `advance`. Leaves out:
+//! monitoring of the critical time step, observers and files, which a run also has.
 
 mod case;
 mod clock;

@@ -1,4 +1,4 @@
-//! What the numbers were made on.
+//! The machine of a measurement.
 
 use std::fs;
 use std::thread;
@@ -17,7 +17,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This machine, as far as its system tells.
+    /// This machine, as reported by its system.
     pub fn this() -> Self {
         let entry = |file: &str, key: &str, separator: char| {
             let text = fs::read_to_string(file).ok()?;

@@ -1,10 +1,10 @@
-//! What the machine itself can do: copy and multiply-add, measured here and now.
+//! Peak rates of the machine: copy and multiply-add, measured at run time.
 //!
-//! *Copy*: `copy_from_slice` of 128 MiB into another 128 MiB, each thread a part; bytes read and written are counted, not
-//! the lines that the processor fetches before it overwrites them. *Multiply-add*: x ← x a + b on twelve independent wide
-//! registers, which hides the latency of most processors; two operations each. The instructions are the widest that `pulp`
-//! finds at run time (AVX-512, AVX2 with FMA, NEON; elsewhere 128 bits or one number at a time), whatever the build was
-//! compiled for. The best of the repeats counts: a peak is what nothing else disturbed.
+//! *Copy*: `copy_from_slice` of 128 MiB into another 128 MiB, each thread a part. Bytes read and written are counted, not
+//! the cache lines that the CPU fetches before overwriting them. *Multiply-add*: x ← x a + b on twelve independent wide
+//! registers, which hides the latency of most CPUs; two operations each. `pulp` finds the widest instructions at run time
+//! (AVX-512, AVX2 with FMA, NEON; elsewhere 128 bits or scalar), whatever the target of the build. The best of the repeats
+//! counts, as the least disturbed one.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -20,10 +20,10 @@ use crate::case::Precision;
 const COPIED: usize = 128 << 20;
 /// Independent registers.
 const CHAINS: usize = 12;
-/// Multiply-adds of each between two looks at the clock.
+/// Multiply-adds of each between two readings of the clock.
 const ROUNDS: usize = 1_000_000;
 
-/// What some threads of the machine can do.
+/// Peak rates of a number of threads.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Rates {
     /// Threads.

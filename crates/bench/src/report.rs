@@ -1,4 +1,4 @@
-//! What was measured, as a table and as JSON.
+//! The measurements, as a table and as JSON.
 
 use pliant_explicit::Instructions;
 use pliant_gpu::{Adapter, DeviceRates};
@@ -10,13 +10,13 @@ use crate::clock::Spread;
 use crate::suite::Settings;
 use crate::{Count, Machine, Rates};
 
-/// What a critical step is taken from.
+/// The source of a critical step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Limit {
     /// The smallest element bound.
     ElementBound,
-    /// The true limit of the assembled operator.
+    /// The critical time step of the assembled model.
     #[serde(rename = "true-limit")]
     True,
 }
@@ -24,7 +24,7 @@ pub enum Limit {
 /// One measured case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// What it is called on the command line.
+    /// Its name on the command line.
     pub id: String,
     /// The mesh: `cube-21` has 21 grid cells along each edge.
     pub mesh: String,
@@ -36,13 +36,13 @@ pub struct Row {
     pub law: &'static str,
     /// The number type.
     pub precision: &'static str,
-    /// Threads; `null` on a graphics processor.
+    /// Threads; `null` on a GPU.
     pub threads: Option<usize>,
-    /// The processor, or the graphics processor.
+    /// The CPU or the GPU.
     pub adapter: String,
-    /// The path that ran: `cpu`, or the design on a graphics processor.
+    /// The path that ran: `cpu`, or the design on a GPU.
     pub design: String,
-    /// The instructions it ran in; `null` on a graphics processor.
+    /// The instructions it used; `null` on a GPU.
     pub lanes: Option<&'static str>,
     /// Wall time of a step per element [ns], the median of the repeats.
     pub ns_per_element_step: f64,
@@ -56,13 +56,13 @@ pub struct Row {
     pub bytes_per_element: f64,
     /// Operations per element and step, as counted.
     pub flops_per_element: f64,
-    /// Bytes a second over those that these threads copy.
+    /// Bytes per second over the copy rate of these threads.
     pub bandwidth_fraction: f64,
-    /// Operations a second over those that these threads reach in multiply-adds.
+    /// Operations per second over the multiply-add rate of these threads.
     pub flop_fraction: f64,
     /// The step [s] that a run would take: 0.9 × the limit at rest.
     pub critical_step: f64,
-    /// The limit that is meant: the true one, or for large meshes the element bound.
+    /// The limit: that of the assembled model, or for large meshes the element bound.
     pub critical_step_from: Limit,
     /// The critical step over the wall time of a step.
     pub real_time_factor: f64,
@@ -71,7 +71,7 @@ pub struct Row {
     pub case: Case,
 }
 
-/// Where a case ran, and what can be done there.
+/// The place of a case and its peak rates.
 #[derive(Clone, Debug)]
 pub(crate) struct Measured {
     pub adapter: String,
@@ -121,7 +121,7 @@ impl Row {
         }
     }
 
-    /// The threads, or the design on a graphics processor.
+    /// The threads, or the design on a GPU.
     fn place(&self) -> String {
         self.threads.map_or_else(|| self.design.clone(), |threads| threads.to_string())
     }
@@ -214,12 +214,12 @@ pub struct Cube {
     pub row: Row,
 }
 
-/// The graphics processor that cases ran on.
+/// The GPU of the cases.
 #[derive(Clone, Debug)]
 pub struct OnDevice {
-    /// What it is.
+    /// The adapter.
     pub adapter: Adapter,
-    /// What it can do.
+    /// Its peak rates.
     pub rates: DeviceRates,
 }
 
@@ -243,7 +243,7 @@ impl OnDevice {
     }
 }
 
-/// A case that the device can't take.
+/// A case that the device can't run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Refused {
     /// The case.
@@ -252,16 +252,16 @@ pub struct Refused {
     pub reason: String,
 }
 
-/// All that was measured.
+/// All measurements.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// The machine.
     pub machine: Machine,
     /// How it was measured.
     pub settings: Settings,
-    /// What the machine can do, for each number of threads.
+    /// Peak rates of the machine, for each number of threads.
     pub rates: Vec<Rates>,
-    /// The graphics processor, if any case ran there.
+    /// The GPU, if any case ran there.
     pub device: Option<OnDevice>,
     /// The cases.
     pub rows: Vec<Row>,
@@ -290,18 +290,18 @@ impl Report {
         })
     }
 
-    /// As tables in Markdown, aligned to be read as they are.
+    /// As aligned tables in Markdown.
     pub fn table(&self) -> String {
         let Machine { processor, cores, system } = &self.machine;
         let mut parts = vec![
             format!("{processor}, {cores} cores, {system}; pliant {}, {}.", env!("CARGO_PKG_VERSION"), today()),
             format!(
-                "Whole steps; median of {} repeats of {} s or more, least and most beside it; lanes `{}`.",
+                "Whole steps: median of {} repeats of at least {} s, with the least and the most; lanes `{}`.",
                 self.settings.repeats, self.settings.seconds, self.settings.lanes
             ),
             self.rates_table(),
-            "Bytes and operations are counted per element and step; \"copy\" and \"mul-add\" are the parts of the rates \
-             above that they make up. Δt is 0.9 × the true limit (* element bound)."
+            "Bytes and operations are counted per element and step; \"copy\" and \"mul-add\" are their shares of the rates \
+             above. Δt is 0.9 × the critical time step of the assembled model (* of the element bound)."
                 .to_owned(),
             rows_table(&self.rows),
         ];
@@ -315,7 +315,7 @@ impl Report {
         if !self.cubes.is_empty() {
             parts.push(
                 "Largest cube in real time (0.1 m; brain-like NH, E = 3 kPa, ν = 0.45; liver-like TI+Prony), predicted from \
-                 the linear cost and Δt ∝ 1/n, measured, and again at the size that the measurement tells."
+                 the linear cost and Δt ∝ 1/n, measured, and measured again at the size estimated from that."
                     .to_owned(),
             );
             parts.push(self.cubes_table());

@@ -109,7 +109,7 @@ impl Specimen {
     /// The nodes of a face of the bounding box.
     ///
     /// # Panics
-    /// If there is no such face.
+    /// If the face does not exist.
     pub fn face(&self, name: &str) -> Vec<u32> {
         let (low, high) = self.mesh.bounds().unwrap_or_else(|| panic!("a mesh without points"));
         let (axis, side) = name.split_once('-').unwrap_or_else(|| panic!("no face is called `{name}`"));
@@ -185,7 +185,7 @@ impl Specimen {
     /// The number of a constraint by its name.
     ///
     /// # Panics
-    /// If there is no such constraint.
+    /// If the constraint does not exist.
     pub fn constraint(&self, name: &str) -> usize {
         let found = self.model.constraints.iter().position(|constraint| constraint.name == name);
         found.unwrap_or_else(|| panic!("no constraint is called `{name}`"))
@@ -200,7 +200,7 @@ impl Specimen {
             .map_or_else(|| panic!("a model without cells"), |bound| bound.step)
     }
 
-    /// The true limit of the step at rest [s].
+    /// The critical time step of the model at rest [s].
     ///
     /// # Panics
     /// If constraints contradict each other.

@@ -1,8 +1,8 @@
 //! Measuring cases one after another.
 //!
-//! Each cube is held at `x-min` and begins squeezed and sheared, every cell alike, with `x-max` held where that brings it:
-//! so all cells are deformed from the first step on and go on to vibrate. It is warmed up, then stepped for so many steps
-//! that a repeat takes [`Settings::seconds`].
+//! Each cube is fixed at `x-min` and starts compressed and sheared uniformly, with `x-max` fixed in its displaced
+//! position: all cells are deformed from the first step and keep vibrating. After a warm-up, each repeat takes enough
+//! steps for [`Settings::seconds`].
 
 use std::sync::Arc;
 
@@ -18,15 +18,15 @@ use crate::clock::{Clocked, ClockedOnDevice, Spread, Timed};
 use crate::report::{Cube, Fit, Limit, Measured, OnDevice, Refused, Report, Row};
 use crate::{Machine, Rates, Specimen};
 
-/// Displacement of `x-max` [m]; that of a node at x is x/[`EDGE`] of it.
+/// Displacement of `x-max` [m]; a node at x has x/[`EDGE`] of it.
 const SQUEEZE: [f64; 3] = [-0.02 * EDGE, 0.01 * EDGE, 0.005 * EDGE];
-/// Up to this many cells the true limit of the step is found; it costs as much as some 100 steps in double precision. Of a
-/// cube in real time, whose steps take no longer than they simulate, it is always found.
+/// Up to this many cells the critical time step of the assembled model is computed, which costs as much as some 100 steps
+/// in double precision. For a cube in real time it is always computed.
 const CELLS_OF_TRUE_LIMIT: usize = 100_000;
-/// Part of the limit that a run takes as its step: the critical step of a row.
+/// Fraction of the limit that a run takes as its step: the critical step of a row.
 const PART_OF_LIMIT: f64 = 0.9;
-/// Part of the limit that is stepped under the clock. The length of a step does not change its cost, and the cubes vibrate
-/// for tens of thousands of steps without damping or a watch that would cut them where the limit falls.
+/// Fraction of the limit for timed steps. The length of a step does not change its cost. The cubes vibrate for tens of
+/// thousands of steps without damping and without step reduction.
 const PART_UNDER_THE_CLOCK: f64 = 0.5;
 
 /// How to measure.
@@ -36,7 +36,7 @@ pub struct Settings {
     pub repeats: usize,
     /// Wall time of a repeat [s].
     pub seconds: f64,
-    /// The instructions that the steps run in.
+    /// The instructions of the steps.
     pub lanes: Instructions,
 }
 
@@ -46,16 +46,16 @@ impl Default for Settings {
     }
 }
 
-/// How far a measurement is.
+/// The progress of a measurement.
 #[derive(Clone, Debug)]
 pub struct Progress {
     /// Part of the cases done.
     pub part: f64,
-    /// What is measured now.
+    /// The current case.
     pub now: String,
 }
 
-/// Why there is no measurement.
+/// The error of a measurement.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     /// A step failed.
@@ -69,7 +69,7 @@ pub enum BenchError {
     /// Constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
-    /// The processor has not the instructions asked for.
+    /// The CPU lacks the requested instructions.
     #[error(transparent)]
     Lanes(#[from] MissingInstructions),
     /// No threads.
@@ -84,8 +84,8 @@ pub enum BenchError {
     },
 }
 
-/// Measures cases in their order. Where the series of a cube has three meshes or more, its linear cost is found, and
-/// with it the largest cube in real time.
+/// Measures cases in their order. A series of three or more meshes also gives its linear cost and the largest cube
+/// in real time.
 ///
 /// # Errors
 /// If threads cannot be started or a step fails.
@@ -123,13 +123,14 @@ pub fn measure(
 }
 
 /// The cube of n³ grid cells whose step is predicted to take as long as it simulates: with T = b k n³ for k cells in a
-/// grid cell and Δt = d/n, n⁴ = d/(b k). Asked of the tissues of thesis Fig. 6.7 on all threads.
+/// grid cell and Δt = d/n, n⁴ = d/(b k). Computed for the tissues of thesis Fig. 6.7 on all threads.
 fn largest_in_real_time(fit: &Fit, rows: &[Row]) -> Option<Case> {
     let thesis = matches!(fit.case.element, Element::Tet4 | Element::Hex8)
         && matches!(fit.case.law, LawKind::NeoHookean | LawKind::FibresProny)
         && fit.case.precision == Precision::Single
         && fit.case.place != Place::Processor(Threads::One);
-    // Of the finest mesh whose true limit is known; else of the finest.
+    // From the finest mesh with a known critical time step of the assembled model; otherwise from
+    // the finest mesh.
     let known = rows.iter().filter(|row| fit.covers(&row.case));
     let finest = known.max_by_key(|row| (row.critical_step_from == Limit::True, row.cells))?;
     let d = finest.critical_step * finest.case.edge as f64;
@@ -138,7 +139,7 @@ fn largest_in_real_time(fit: &Fit, rows: &[Row]) -> Option<Case> {
     (thesis && edge > 0).then_some(Case { edge, ..fit.case })
 }
 
-/// What lasts from case to case.
+/// State shared by the cases.
 struct Bench {
     machine: Machine,
     settings: Settings,
@@ -149,7 +150,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// The threads and what they can do, measured when they are first needed.
+    /// The threads and their peak rates, measured at first use.
     fn pool(&mut self, threads: Threads) -> Result<&(ThreadPool, Rates), BenchError> {
         let count = threads.count();
         let known = self.pools.iter().position(|(_, rates)| rates.threads == count);
@@ -165,7 +166,7 @@ impl Bench {
         Ok(&self.pools[index])
     }
 
-    /// The device and what it can do, opened and measured when it is first needed.
+    /// The device and its peak rates, opened and measured at first use.
     fn device(&mut self) -> Result<&(Device, DeviceRates), BenchError> {
         if self.device.is_none() {
             let device = Device::open(None)?;
@@ -175,7 +176,8 @@ impl Bench {
         self.device.as_ref().ok_or(GpuError::NoAdapter.into())
     }
 
-    /// Measures a case; `most` is the number of cells up to which its true limit is found.
+    /// Measures a case; up to `most` cells it computes the critical time step of the assembled
+    /// model.
     fn row(&mut self, case: &Case, most: usize) -> Result<Row, BenchError> {
         let specimen = squeezed(case.specimen());
         let (limit, from) = self.limit(case, &specimen, most);
@@ -211,7 +213,8 @@ impl Bench {
         Ok(Row::new(*case, place, Spread::of(seconds), (PART_OF_LIMIT * limit, from)))
     }
 
-    /// Measures a cube of a predicted size, and of the size that its measurement tells, three at the most.
+    /// Measures a cube of the predicted size, then of the size estimated from the measurement, at most
+    /// three in all.
     fn cube(&mut self, mut case: Case) -> Result<Cube, BenchError> {
         let predicted = case.edge;
         let mut row = self.row(&case, usize::MAX)?;
@@ -226,7 +229,7 @@ impl Bench {
         Ok(Cube { predicted, row })
     }
 
-    /// The largest stable step at rest [s], and what it is.
+    /// The largest stable step at rest [s], and its source.
     fn limit(&mut self, case: &Case, specimen: &Specimen, most: usize) -> (f64, Limit) {
         if case.cells() > most {
             return (specimen.element_bound(), Limit::ElementBound);
@@ -242,13 +245,13 @@ impl Bench {
     }
 }
 
-/// With `x-min` held and `x-max` where [`SQUEEZE`] brings it.
+/// With `x-min` fixed and `x-max` displaced by [`SQUEEZE`].
 fn squeezed(specimen: Specimen) -> Specimen {
     let hold = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
     specimen.fix("x-min", [true; 3]).carry("x-max", SQUEEZE, hold)
 }
 
-/// Every cell squeezed alike.
+/// Every cell deformed equally.
 fn start<R: Scalar>(model: &Model) -> State<R> {
     let displacement = model.rest.iter().map(|x| SQUEEZE.map(|by| R::of(by * x[0] / EDGE))).collect();
     State { displacement, ..State::at_rest(model) }
@@ -266,9 +269,9 @@ fn on_processor<R: Scalar>(
     repeats(&mut clocked, settings).map_err(|source| BenchError::Step { id: case.id(), source })
 }
 
-/// Wall times of a step [s], once it is warm.
+/// Wall times of a step [s] after warm-up.
 fn repeats<T: Timed>(clocked: &mut T, settings: Settings) -> Result<Vec<f64>, T::Error> {
-    // A driver compiles kernels when they first run, which is no step's cost.
+    // A driver compiles kernels at their first run, which is not part of the cost of a step.
     clocked.seconds_per_step(1)?;
     let steps = clocked.steps_within(settings.seconds)?;
     (0..settings.repeats.max(1)).map(|_| clocked.seconds_per_step(steps)).collect()

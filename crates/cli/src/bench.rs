@@ -1,4 +1,4 @@
-//! `pliant bench`: what a step costs on this machine.
+//! `pliant bench`: the cost of a step on this machine.
 
 use std::process::ExitCode;
 
@@ -25,7 +25,7 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
     let report = match result {
         Ok(report) => report,
         Err(BenchError::Lanes(missing)) => {
-            let help = format!("leave `--lanes` out, or take `--lanes {}`", missing.widest);
+            let help = format!("omit `--lanes`, or use `--lanes {}`", missing.widest);
             return Err(Failure::plain(missing.to_string(), help));
         }
         Err(error) => {
@@ -47,10 +47,10 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The most cells on a graphics processor that are measured without being asked for.
+/// Largest number of cells that `--designs` measures without `--full`.
 const SMALL: usize = 100_000;
 
-/// The rows asked for, in the order of the table.
+/// The requested rows, in the order of the table.
 fn chosen(arguments: &Bench) -> Result<Vec<Case>, Failure> {
     let mut asked = Vec::new();
     for id in &arguments.only {

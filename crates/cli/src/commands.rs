@@ -1,4 +1,4 @@
-//! What each subcommand does.
+//! The subcommands.
 
 use std::cell::OnceCell;
 use std::fs;
@@ -53,12 +53,12 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Reads, builds and plans a scene; doubts go to standard error.
+/// Reads, builds and plans a scene; warnings go to standard error.
 pub fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Arc<Built>, Plan), Failure> {
     prepare_changed(path, overrides, |_| {})
 }
 
-/// As [`prepare`], of a scene that is changed once it is read.
+/// As [`prepare`], for a scene that is changed after reading.
 pub fn prepare_changed(
     path: &Path,
     overrides: &Overrides,
@@ -105,7 +105,7 @@ pub fn prepare_changed(
     Ok((scene, Arc::new(built), plan))
 }
 
-/// Builds a scene; a bar shows how far meshes of images are.
+/// Builds a scene; a bar shows the progress of meshes from images.
 fn build(scene: &Scene, cache: &MeshCache) -> Result<Built, Failure> {
     let bar: OnceCell<Bar> = OnceCell::new();
     let built = pliant_scene::build_watched(scene, cache, &|meshing| {
@@ -122,14 +122,14 @@ fn build(scene: &Scene, cache: &MeshCache) -> Result<Built, Failure> {
 struct Opened {
     source: Source,
     folder: PathBuf,
-    /// What was assumed of a mesh.
+    /// Assumptions about a mesh.
     assumed: Option<String>,
-    /// The folder of a translated model, which lasts as long as this.
+    /// The folder of a translated model, kept alive with this value.
     _translated: Option<TempDir>,
 }
 
-/// Reads the text of a scene. A NiftySim model is translated first; of a mesh a scene is made. In a sandbox it reads what lies
-/// in its own folder, and nothing else.
+/// Reads the text of a scene. A NiftySim model is translated first; a mesh gets a scene of its own. In a sandbox, the scene reads
+/// only files in its own folder.
 fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, Failure> {
     let reads = |folder: &Path| {
         let reads = if sandbox { Reads::within(folder) } else { Ok(Reads::anywhere()) };
@@ -150,7 +150,7 @@ fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, Failu
     }
     let folder = tempfile::tempdir().map_err(|error| {
         Failure::plain(
-            format!("no temporary folder can be made: {error}"),
+            format!("cannot make a temporary folder: {error}"),
             "check the free space, or set TMPDIR",
         )
     })?;
@@ -160,15 +160,15 @@ fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, Failu
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 
-/// Writes a NiftySim model as a scene file with its meshes beside it; returns what is worth knowing. A model of which parts
-/// are unknown is refused unless that is allowed.
+/// Writes a NiftySim model as a scene file with its meshes beside it; returns notes. A model with unsupported parts is rejected
+/// unless they may be omitted.
 fn translate(model: &Path, reads: &Reads, file: &Path, allow_partial: bool) -> Result<Vec<String>, Failure> {
     let imported = niftysim::import_within(model, reads).map_err(|error| Failure::plain(error, ""))?;
     if !imported.missing.is_empty() && !allow_partial {
         let missing = imported.missing.join("; ");
         let message = format!("`{}` has parts that Pliant does not support: {missing}", model.display());
-        let help = "`pliant run` and `pliant import` take `--allow-partial` and leave them out: the results are then those \
-                    of another model";
+        let help = "`--allow-partial` of `pliant run` and `pliant import` omits these parts: the results then belong to a \
+                    different model";
         return Err(Failure::plain(message, help));
     }
     let folder = file.parent().unwrap_or(Path::new(""));
@@ -192,12 +192,12 @@ fn translate(model: &Path, reads: &Reads, file: &Path, allow_partial: bool) -> R
     Ok(imported.notes)
 }
 
-/// The meshes of images that are kept for this user.
+/// This user's cache of meshes made from images.
 fn mesh_cache(off: bool) -> MeshCache {
     if off { MeshCache::off() } else { MeshCache::of_user() }
 }
 
-/// Runs something on the scene's number of threads.
+/// Runs `work` on the scene's number of threads.
 fn in_pool<T: Send>(
     scene: &Scene,
     work: impl FnOnce() -> Result<T, SceneErrors> + Send,
@@ -263,18 +263,18 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     };
     if let Some(message) = failure {
         eprintln!("error: {message}");
-        // It tells more than that standard output could not be written.
+        // This error matters more than failed standard output.
         return Ok(ExitCode::from(if interrupted { signals::exit_code() } else { 1 }));
     }
     told.map(|()| ExitCode::SUCCESS)
 }
 
-/// Steps that take no day on anything: fewer are not looked at.
+/// A run with fewer steps takes less than a day on any machine.
 const FEW_STEPS: f64 = 1e6;
-/// Longest run [s] that needs no consent.
+/// Longest run [s] without `--long`.
 const A_DAY: f64 = 86_400.0;
 
-/// Refuses a run that would take more than a day, by the time of its first steps.
+/// Rejects a run of more than a day, estimated from its first steps.
 fn refuse_very_long(scene: &Scene, built: &Arc<Built>, plan: &Plan, before: f64) -> Result<(), Failure> {
     let steps = (scene.scene.until - before) / plan.step;
     if steps < FEW_STEPS {
@@ -293,7 +293,7 @@ fn refuse_very_long(scene: &Scene, built: &Arc<Built>, plan: &Plan, before: f64)
     );
     let diagnostic = Diagnostic::error(message)
         .at(scene.source.span(&["scene", "until"]), "this long")
-        .help("let it end earlier (`until`), take a coarser mesh, or add `--long` to run it all the same");
+        .help("shorten it (`until`), use a coarser mesh, or add `--long` to run it anyway");
     Err(scene.source.errors(vec![diagnostic]).into())
 }
 
@@ -303,7 +303,7 @@ fn days(seconds: f64) -> String {
     if days < 1000.0 { format!("{days:.0} days") } else { format!("{} years", number(days / 365.25)) }
 }
 
-/// Wall time [s] of a step, from the first ones; none of a scene whose first steps fail.
+/// Wall time [s] of a step, from the first steps; `None` if they fail.
 fn seconds_of_a_step(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Option<f64> {
     const ENOUGH: Duration = Duration::from_millis(100);
     let mut live = pliant_scene::live(scene, built, plan).ok()?;
@@ -314,7 +314,7 @@ fn seconds_of_a_step(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Option<f
     Some(started.elapsed().as_secs_f64() / steps as f64)
 }
 
-/// Lists the graphics processors.
+/// Lists the GPUs.
 fn devices(json: bool) -> Result<ExitCode, Failure> {
     let found = pliant_gpu::adapters();
     if json {
@@ -367,7 +367,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
         eprintln!("error: run-{run:04} ({}): {message}", sweep.title(*run));
     }
     if summary.interrupted {
-        eprintln!("error: the sweep was interrupted; the runs that had ended are in the table");
+        eprintln!("error: the sweep was interrupted; the table contains the finished runs");
         return Ok(ExitCode::from(signals::exit_code()));
     }
     if summary.failures.is_empty() {
@@ -377,7 +377,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(1))
 }
 
-/// Refuses a sweep some of whose combinations are no scene; mistakes that several share are reported once.
+/// Rejects a sweep with invalid combinations; an error shared by several is reported once.
 fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
     let mistakes = sweep.check(threads);
     let mut told = Vec::<String>::new();
@@ -392,7 +392,7 @@ fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
     if mistakes.is_empty() {
         return Ok(());
     }
-    let message = format!("{} of {} combinations are wrong; nothing was run", mistakes.len(), sweep.runs());
+    let message = format!("{} of {} combinations are invalid; nothing was run", mistakes.len(), sweep.runs());
     Err(Failure::plain(message, "correct the values above, or sweep without them"))
 }
 

@@ -1,5 +1,4 @@
-//! `pliant info`: what a mesh file holds, how good it is, what is wrong with it, how its surface is shaped, and how far it is from
-//! another one.
+//! `pliant info`: contents, quality and defects of a mesh file, the shape of its surface, and its distance from another mesh.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -16,19 +15,19 @@ use crate::report::{Failure, say};
 /// Samples of distances along the diagonal.
 const SAMPLES: f64 = 800.0;
 
-/// The shape of the surface of a mesh, as far as it has one.
+/// The shape of the surface of a mesh, if it has one.
 struct Shape {
     curvature: Option<Curvature>,
-    /// Within the surface.
+    /// Of the body inside the surface.
     within: Option<Thickness>,
-    /// Of shells that have a field of it [m].
+    /// Of shells with data `thickness` [m].
     of_shells: Option<Percentiles>,
 }
 
-/// How far a mesh is from another one.
+/// Distances between a mesh and another one.
 struct Against {
     distances: Hausdorff,
-    /// The points that are farthest, of this mesh and of the other [m].
+    /// The farthest points of this mesh and of the other [m].
     farthest: [[f64; 3]; 2],
     /// Of the other's box [m].
     diagonal: f64,
@@ -73,7 +72,7 @@ fn read(path: &Path, scale: f64, option: &str) -> Result<MeshFile, Failure> {
 
 impl Shape {
     fn of(mesh: &Mesh) -> Self {
-        // A mesh without faces has no shape: that is no mistake here.
+        // A mesh without faces has no shape, which is valid here.
         let surface = TriangleMesh::from_mesh(mesh).ok().map(|(surface, _)| surface);
         Self {
             curvature: surface.as_ref().and_then(TriangleMesh::curvature),
@@ -102,7 +101,7 @@ impl Shape {
             format!("{median} mm (median), 5 % to 95 %: {p5} to {p95} mm, all: {least} to {most} mm")
         };
         if let Some(Thickness { thickness, thinnest }) = &self.within {
-            lines.push(format!("thickness straight through: {}", row(thickness)));
+            lines.push(format!("thickness inside the surface: {}", row(thickness)));
             lines.push(format!("  thinnest   at {}", millimetres(thinnest)));
         }
         lines.extend(self.of_shells.iter().map(|p| format!("thickness of the shells: {}", row(p))));

@@ -1,7 +1,7 @@
-//! `pliant`: real-time simulation of soft organs. Words and wiring only; the work is done by the libraries.
+//! `pliant`: real-time simulation of soft organs. This crate parses commands and prints results; the libraries compute.
 
-/// A line on standard error. One that can't be written, to a full disk or a reader that has gone, is no reason to end a
-/// run: unlike the standard library's, this never panics.
+/// A line on standard error. A full disk or a closed pipe must not end a run: unlike the standard library's macro, this one
+/// never panics.
 macro_rules! eprintln {
     ($($text:tt)*) => { $crate::report::tell(format_args!($($text)*)) };
 }
@@ -37,12 +37,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// What was typed cannot be read, or asks for help.
+/// An invalid command line, or a request for help.
 fn mistyped(error: &clap::Error) -> ExitCode {
     if error.use_stderr() && std::env::args().any(|argument| argument == "--json") {
         report::refused(error.to_string().trim_end());
     }
-    // A terminal that has gone away is no mistake.
+    // A closed terminal is not an error.
     let _ = error.print();
     ExitCode::from(error.exit_code() as u8)
 }

@@ -1,5 +1,5 @@
-//! `pliant labels` and `pliant mesh`: what a segmented image holds, and cells of it or of what a closed surface encloses. Surfaces and
-//! shells are in `skin.rs`.
+//! `pliant labels` and `pliant mesh`: the labels of a segmented image, and volume meshes of an image or a closed surface. `skin.rs`
+//! makes surfaces and shells.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// An image as it was asked for: a file or folder, or several masks.
+/// The requested image: a file or folder, or several masks.
 struct Source<'a> {
     files: Vec<&'a PathBuf>,
     names: Option<&'a Path>,
@@ -66,7 +66,7 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Reads it; the bar moves up to a part of the whole work.
+    /// Reads the image; the bar moves up to `share` of the whole work.
     fn read(&self, bar: &Bar, share: f64) -> Result<Image, Failure> {
         let table = self.names.map(LabelNames::read).transpose().map_err(|error| image_failure(&error))?;
         let each = share / self.files.len() as f64;
@@ -128,12 +128,12 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Whether the input is a mesh file, by the ending of its name or by its first bytes.
+/// Whether the input is a mesh file, by its extension or its first bytes.
 pub fn is_mesh_file(arguments: &MeshImage) -> bool {
     Format::of_file(&arguments.image).is_some()
 }
 
-/// Refuses options that would do nothing.
+/// Rejects options without effect.
 fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
     let skin = matches!(arguments.cells, MeshCells::Surface | MeshCells::Shells);
     let tets = matches!(arguments.cells, MeshCells::Tets);
@@ -146,14 +146,14 @@ fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
         (file && threshold, "`--threshold` is for images"),
         (file && arguments.series.is_some(), "`--series` is for images"),
         (file && arguments.names.is_some(), "`--names` is for images"),
-        (file && masks, "several inputs are masks, which are images"),
+        (file && masks, "several inputs must be masks, which are images"),
         (file && arguments.label.len() > 1, "`--label` more than once is for images"),
         (file && skin && labels, "`--label` is for images, and for tets and hexes"),
         (
             file && skin && cleans,
             "`--close-gaps`, `--fill-holes` and `--keep-largest` are for images, and for tets and hexes",
         ),
-        (!file && arguments.scale.is_some(), "`--scale` is for mesh files: images know their lengths"),
+        (!file && arguments.scale.is_some(), "`--scale` is for mesh files: images store their lengths"),
         (!tets && arguments.distance.is_some(), "`--distance` is for tets"),
         (!tets && arguments.inner_edge.is_some(), "`--inner-edge` is for tets"),
         (!tets && !arguments.protect.is_empty(), "`--protect` is for tets"),
@@ -161,9 +161,9 @@ fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
         (arguments.add.is_some() && file, "`--add` is for images"),
         (
             arguments.add.is_some() && !threshold,
-            "`--add` goes with `--threshold`: values are added up, labels are not (several masks are given one after the other)",
+            "`--add` goes with `--threshold`: it adds values, and labels are not values (list several masks one after the other)",
         ),
-        (arguments.add.is_some() && masks, "`--add` goes with one image, and several masks are given"),
+        (arguments.add.is_some() && masks, "`--add` goes with one image, not with several masks"),
         (labels && threshold && !masks, "`--label` and `--threshold` are two ways to choose voxels"),
     ];
     match idle.into_iter().find(|(idle, _)| *idle) {
@@ -172,7 +172,7 @@ fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
     }
 }
 
-/// The mesh of a file in metres; what is questionable about its size goes to the warnings.
+/// The mesh of a file in metres; doubts about its size become warnings.
 pub fn mesh_file(arguments: &MeshImage, warnings: &mut Vec<String>) -> Result<MeshFile, Failure> {
     let mut file = io::read(&arguments.image).map_err(|error| Failure::plain(error, ""))?;
     file.mesh.points.iter_mut().for_each(|point| *point *= arguments.scale.unwrap_or(1.0));
@@ -189,26 +189,26 @@ pub fn mesh_file(arguments: &MeshImage, warnings: &mut Vec<String>) -> Result<Me
     Ok(file)
 }
 
-/// What is segmented in an image, cut out of it.
+/// The chosen labels of an image, cropped to the body.
 pub struct Segmented {
     pub labels: LabelImage,
     pub chosen: Vec<i32>,
-    /// Names of the chosen labels, of those that have one.
+    /// Names of the chosen labels that have one.
     pub names: BTreeMap<i32, String>,
     /// Labels with smaller cells, and their edges [m].
     pub protect: Vec<(i32, Option<f64>)>,
     /// Least step from voxel to voxel [m].
     pub voxel: f64,
-    /// For people and for programs.
+    /// The source as text and as JSON.
     pub lines: Vec<String>,
     pub object: Json,
     pub warnings: Vec<String>,
 }
 
-/// Part of the work on an image that is reading it and cutting the body out, for the bar.
+/// Share of reading and of cropping in the work on an image, for the bar.
 const READING: f64 = 0.1;
 
-/// The labels chosen in an image, or all from a value on. Where there are very many voxels, coarser ones that suit the cells.
+/// The chosen labels of an image, or all voxels from a threshold. Very many voxels are resampled to suit the cells.
 pub fn regions(arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
     let refused = |error: LabelError| label_failure(&error);
     let masks = !arguments.masks.is_empty();
@@ -270,14 +270,14 @@ pub fn regions(arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
         } else {
             format!("label {}", image.names.shown(label))
         };
-        format!("{what} lies at the border of the image ({border}): it may be cut off there")
+        format!("{what} lies at the border of the image ({border}) and may be cut off there")
     };
     let warnings = image.border(&choice).into_iter().map(warning).collect();
     let voxel = cut.labels.grid.spacing().into_iter().fold(f64::INFINITY, f64::min);
     Ok(Segmented { labels: cut.labels, chosen: cut.chosen, names, protect, voxel, lines, object, warnings })
 }
 
-/// The labels with smaller cells that were typed, by their numbers, of those that the cells get.
+/// Labels with smaller cells from the command line, as numbers among those of the cells.
 fn protected(
     arguments: &MeshImage,
     labels: &[i32],
@@ -285,21 +285,21 @@ fn protected(
 ) -> Result<Vec<(i32, Option<f64>)>, Failure> {
     let known: CellLabels = labels.iter().map(|label| (*label, names.get(label).cloned())).collect();
     let number = |(label, edge): &(CellLabel, Option<f64>)| match label {
-        // The mesher refuses a number that no cell gets.
+        // The mesher rejects numbers without cells.
         CellLabel::Number(label) => Ok((*label, *edge)),
         CellLabel::Name(_) => Ok((known.find(label)?, *edge)),
     };
-    let help = "`--label` chooses the labels that are meshed; `pliant labels IMAGE` lists them, and `--names TABLE` names them";
+    let help = "`--label` selects the labels that are meshed; `pliant labels IMAGE` lists them, and `--names TABLE` names them";
     let found: Result<_, UnknownLabel> = arguments.protect.iter().map(number).collect();
     found.map_err(|error| Failure::plain(error, help))
 }
 
-/// Refuses a name whose ending no volume mesh can be written to, before any work.
+/// Rejects an output name without a volume mesh format, before any work.
 fn require_volume_format(arguments: &MeshImage) -> Result<(), Failure> {
     match Format::of_path(&arguments.out) {
         Some(Format::Vtu | Format::Gmsh) => Ok(()),
         _ => {
-            let message = format!("`{}` is no name for a mesh of volume cells", arguments.out.display());
+            let message = format!("`{}` is not a name for a mesh of volume cells", arguments.out.display());
             Err(Failure::plain(message, "choose a name that ends in .vtu or .msh"))
         }
     }
@@ -308,9 +308,9 @@ fn require_volume_format(arguments: &MeshImage) -> Result<(), Failure> {
 fn image_failure(error: &ImageError) -> Failure {
     let help = match error {
         ImageError::Content { problem, .. } => match **problem {
-            ImageProblem::MixedSeries { .. } => "`--series UID` chooses one",
+            ImageProblem::MixedSeries { .. } => "`--series UID` selects one",
             ImageProblem::TooManyBytes { .. } | ImageProblem::TooManyVoxels { .. } => {
-                "`--force` reads it all the same"
+                "`--force` reads it anyway"
             }
             _ => "",
         },
@@ -321,11 +321,13 @@ fn image_failure(error: &ImageError) -> Failure {
 
 fn label_failure(error: &LabelError) -> Failure {
     let help = match error {
-        LabelError::NotWhole { .. } => "`pliant mesh --threshold 0.5` takes a map of probabilities",
+        LabelError::NotWhole { .. } => "`pliant mesh --threshold 0.5` reads a probability map",
         LabelError::Grey { .. } => {
-            "`pliant mesh --threshold VALUE` takes all voxels from a value on, as 200 for bone in a CT"
+            "`pliant mesh --threshold VALUE` takes all voxels with at least this value, such as 200 for bone in a CT"
         }
-        LabelError::NoMask { .. } => "`--threshold 0.5` takes the voxels of each mask from this value on",
+        LabelError::NoMask { .. } => {
+            "`--threshold 0.5` takes the voxels of each mask with at least this value"
+        }
         LabelError::NoSuchName { .. } | LabelError::AmbiguousName { .. } => {
             "`pliant labels IMAGE` lists the labels with their names; `--names TABLE` gives them names"
         }
@@ -334,10 +336,10 @@ fn label_failure(error: &LabelError) -> Failure {
             "`pliant labels IMAGE` lists the labels with their sizes"
         }
         LabelError::BadLength { .. } => {
-            "`--close-gaps 3mm` closes gaps of 3 mm; without a unit it is in metres"
+            "`--close-gaps 3mm` closes gaps of 3 mm; a length without a unit is in metres"
         }
         LabelError::TooManyVoxels { .. } => {
-            "where gaps are closed, `--close-gaps 3mm` closes gaps of 3 mm; without a unit it is in metres"
+            "if `--close-gaps` is given: `--close-gaps 3mm` closes gaps of 3 mm; a length without a unit is in metres"
         }
         _ => "",
     };
@@ -347,13 +349,13 @@ fn label_failure(error: &LabelError) -> Failure {
 pub fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
     let help = match error {
         MeshingError::TooManyCells { .. } | MeshingError::LatticeTooLarge { .. } if !force => {
-            "lengths without a unit are in metres: `--edge 8mm` or 0.008; `--force` makes so many all the same"
+            "lengths without a unit are in metres: `--edge 8mm` or 0.008; `--force` makes that many anyway"
         }
         MeshingError::OpenSurface { .. } => {
             "`--close-gaps 20mm` closes holes of up to 20 mm; a file in millimetres needs `--scale 0.001`"
         }
-        MeshingError::NothingEnclosed => "`pliant info` tells what the file holds",
-        MeshingError::NoSuchLabel { .. } => "`--label` chooses the labels that are meshed",
+        MeshingError::NothingEnclosed => "`pliant info` lists the contents of the file",
+        MeshingError::NoSuchLabel { .. } => "`--label` selects the labels that are meshed",
         MeshingError::TooFine { .. } => "use a shorter `--edge` with it",
         MeshingError::NotPositive { .. } => "for example `--edge 8mm`, or 0.008 in metres",
         _ => "",
@@ -361,16 +363,16 @@ pub fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
     Failure::plain(error, help)
 }
 
-/// Voxels may be made coarser up to this part of the edge of the cells.
+/// Coarsest voxels, as a fraction of the edge of the cells.
 const COARSEST: f64 = 0.25;
 
-/// The parts of the whole work, for the bar: the field, the cells, the distances.
+/// Shares of the whole work, for the bar: the field, the cells, the distances.
 const PARTS: [f64; 3] = [0.3, 0.6, 0.1];
 
 fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
     if arguments.edge.is_none() && arguments.distance.is_none() {
-        let help = "for example `--edge 8mm`, or 0.008 in metres; of tets `--distance 1mm` chooses it";
-        return Err(Failure::plain("no edge for the cells", help));
+        let help = "for example `--edge 8mm`, or 0.008 in metres; for tets `--distance 1mm` selects it";
+        return Err(Failure::plain("the edge of the cells is missing", help));
     }
     let force = arguments.force;
     let found = if is_mesh_file(arguments) { enclosed(arguments, bar) } else { segmented(arguments, bar) }?;
@@ -413,19 +415,19 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
     })
 }
 
-/// The tets asked for; labels with smaller ones come with their edges [m].
+/// The requested tets, with labels of smaller tets and their edges [m].
 fn tets(arguments: &MeshImage, edge: f64, protect: &[(i32, Option<f64>)]) -> OrganTets {
     let MeshImage { inner_edge, distance, .. } = *arguments;
     OrganTets { inner_edge, distance, ..OrganTets::new(edge) }.protecting(protect)
 }
 
-/// The edge of the cells [m], or of the first ones where a distance is asked for, given the box of the body [m].
+/// The edge of the cells [m], or the first edge if a distance is given, from the box of the body [m].
 fn edge_of(arguments: &MeshImage, bounds: [Vector3; 2]) -> f64 {
     let chosen = arguments.distance.map_or(0.0, |distance| OrganTets::edge_for(distance, bounds));
     arguments.edge.unwrap_or(chosen)
 }
 
-/// What is missed, and what helps.
+/// The missed feature and a remedy.
 fn warning(missed: &Missed) -> String {
     let remedy = match missed {
         Missed::Label { label } | Missed::LabelVolume { label, .. } | Missed::LabelAway { label, .. } => {
@@ -440,7 +442,7 @@ pub fn cell_limit(arguments: &MeshImage) -> usize {
     if arguments.force { usize::MAX } else { DEFAULT_CELL_LIMIT }
 }
 
-/// The smallest element bound [s] for the tissue asked for, or for two by name.
+/// The smallest element bound [s] for the requested tissue, or for two by name.
 fn steps(arguments: &MeshImage, mesh: &Mesh) -> Vec<(String, f64)> {
     let brain = ("brain-like".to_owned(), soft_tissue());
     let liver = ("liver-like".to_owned(), liver_matrix());
@@ -462,7 +464,7 @@ fn steps(arguments: &MeshImage, mesh: &Mesh) -> Vec<(String, f64)> {
     laws.into_iter().map(bound).collect()
 }
 
-/// A body to fill, and what there is to say of where it comes from.
+/// A body to fill, with notes on its source.
 struct Found {
     anatomy: Anatomy<'static>,
     names: BTreeMap<i32, String>,
@@ -474,7 +476,7 @@ struct Found {
     warnings: Vec<String>,
 }
 
-/// The body of regions of an image.
+/// The body of the chosen labels of an image.
 fn segmented(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     let found = regions(arguments, bar)?;
     if let Some(edge) = arguments.edge {
@@ -489,7 +491,7 @@ fn segmented(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     Ok(Found { anatomy, names, protect, edge, lines, object, warnings })
 }
 
-/// The body that a closed surface encloses.
+/// The body inside a closed surface.
 fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     let refused = |error| meshing_failure(&error, arguments.force);
     let closing = Closing {
@@ -502,7 +504,7 @@ fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     }
     let mut warnings = Vec::new();
     let file = mesh_file(arguments, &mut warnings)?;
-    bar.update_mesh(0.0, "mending the surface");
+    bar.update_mesh(0.0, "repairing the surface");
     let edge = edge_of(arguments, file.mesh.bounds().unwrap_or_default().into());
     let surface = Enclosed::new(&file.mesh, edge, &closing).map_err(refused)?;
     require_few(arguments, edge, surface.volume())?;
@@ -511,10 +513,10 @@ fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
         None => 1,
         Some(LabelChoice::One(label)) => *label,
         Some(other) => {
-            let message = format!("`--label {other}` is no number");
+            let message = format!("`--label {other}` is not a number");
             return Err(Failure::plain(
                 message,
-                "the cells of a surface get a label by its number, as `--label 5`",
+                "give the label of the cells of a surface as a number, such as `--label 5`",
             ));
         }
     };
@@ -536,7 +538,7 @@ fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     Ok(Found { anatomy, names, protect, edge, lines, object, warnings })
 }
 
-/// Refuses cells that would be too many for a volume [m³], before they are made.
+/// Rejects too many cells for a volume [m³], before meshing.
 fn require_few(arguments: &MeshImage, edge: f64, volume: f64) -> Result<(), Failure> {
     let kind = if matches!(arguments.cells, MeshCells::Tets) { CellKind::Tet } else { CellKind::Hex };
     require_room_for(kind, edge, volume, cell_limit(arguments))
@@ -561,21 +563,21 @@ pub fn anatomy(
         .map_err(|error| label_failure(&error))
 }
 
-/// What is known of the cells of each kind.
+/// The cells of each kind with their report.
 enum Cells {
     Tets(Box<TetReport>),
-    /// Whether they are weighted by fractions; loose parts left out, and the cells in them.
+    /// Whether fractions weight them; loose parts dropped, and their cells.
     Hexes {
         immersed: bool,
         dropped: [usize; 2],
     },
 }
 
-/// A mesh of an image, and what there is to know about it.
+/// A mesh with its report.
 struct Made {
     mesh: Mesh,
     cells: Cells,
-    /// Where the body comes from, for people and for programs.
+    /// The source of the body, as text and as JSON.
     lines: Vec<String>,
     object: Json,
     quality: QualityReport,
@@ -670,7 +672,7 @@ impl Made {
     }
 }
 
-/// Distances both ways, the largest with its place.
+/// Distances in both directions, the largest with its location.
 fn both_ways(found: &Deviation) -> [String; 2] {
     let line = |way: &str, [rms, median, p95, most]: [f64; 4], [x, y, z]: [f64; 3]| {
         let [rms, median, p95, most] = [rms, median, p95, most].map(|length| length * 1e3);
@@ -689,13 +691,13 @@ fn both_ways(found: &Deviation) -> [String; 2] {
     ]
 }
 
-/// The larger of both ways for the surface of a label or an interface.
+/// The larger distance of both directions for the surface of a label or an interface.
 fn largest_line(name: &str, found: &Deviation) -> String {
     let (most, [x, y, z]) = found.largest();
     let median = found.median_from_mesh.max(found.median_from_body);
     let p95 = found.p95_from_mesh.max(found.p95_from_body);
     format!(
-        "{name:<16} off by {:.3} mm at half of it, {:.3} mm at 95 %, {:.3} mm at most, at ({:.1}, {:.1}, {:.1}) mm",
+        "{name:<16} off by {:.3} mm (median), {:.3} mm at 95 %, {:.3} mm at most, at ({:.1}, {:.1}, {:.1}) mm",
         median * 1e3,
         p95 * 1e3,
         most * 1e3,

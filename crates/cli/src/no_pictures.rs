@@ -1,4 +1,4 @@
-//! What stands in for pictures in a build without the feature `viewer`.
+//! Replaces pictures in a build without the feature `viewer`.
 
 use std::process::ExitCode;
 
@@ -24,7 +24,7 @@ pub fn view(_arguments: &View) -> Result<ExitCode, Failure> {
     Err(missing())
 }
 
-/// Draws nothing, and is never made.
+/// Draws nothing and is never constructed.
 #[derive(Debug)]
 pub enum Photographer {}
 

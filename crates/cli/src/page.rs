@@ -1,4 +1,4 @@
-//! Tables in Markdown pages, renewed between two marks: `<!-- pliant COMMAND: start -->` and `<!-- pliant COMMAND: end -->`.
+//! Tables in Markdown pages, updated between two marks: `<!-- pliant COMMAND: start -->` and `<!-- pliant COMMAND: end -->`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,25 +27,25 @@ impl Page {
             let [start, end] = &marks;
             Failure::plain(
                 format!("`{}` has no place for the table", path.display()),
-                format!("put the lines {start} and {end} where it should stand"),
+                format!("add the lines {start} and {end} at its place"),
             )
         })?;
         Ok(Self { path: path.to_owned(), before: before.into(), after: after.into() })
     }
 
-    /// Writes the page with another table, which ends its last line.
+    /// Writes the page with a new table, which ends with a newline.
     pub fn renew(&self, table: &str) -> Result<(), Failure> {
         let Self { path, before, after } = self;
         fs::write(path, format!("{before}\n{table}{after}")).map_err(|error| {
             let message = format!("`{}` cannot be written: {error}", path.display());
             Failure::plain(message, "check the file and its permissions")
         })?;
-        eprintln!("renewed the table in {}", path.display());
+        eprintln!("updated the table in {}", path.display());
         Ok(())
     }
 }
 
-/// What stands before the end of the first mark and from the second one on.
+/// The text up to the end of the first mark, and from the second mark on.
 fn around<'t>(text: &'t str, [start, end]: &[String; 2]) -> Option<(&'t str, &'t str)> {
     let from = text.find(start)? + start.len();
     let to = from + text[from..].find(end)?;

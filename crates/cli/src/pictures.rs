@@ -30,7 +30,7 @@ impl From<SeriesError> for Failure {
     }
 }
 
-/// How a scene asks to be seen.
+/// The view that a scene requests.
 pub fn look_of(scene: &Scene) -> Look {
     let view = &scene.view;
     let camera = &view.camera;
@@ -94,7 +94,7 @@ fn texture_of(name: TextureName) -> Texture {
     }
 }
 
-/// What is up: as the scene says, or against gravity.
+/// The up direction: from the scene, or against gravity.
 fn up(scene: &Scene) -> Vector3 {
     let gravity = || scene.scene.gravity.map(|gravity| -Vector3::from(gravity));
     scene.view.camera.up.map(UpName::direction).map(Vector3::from).or_else(gravity).unwrap_or_default()
@@ -108,7 +108,7 @@ fn colour_by(look: &mut Look, field: FieldName, component: Option<&str>) {
     look.legend.unit = field.unit().into();
 }
 
-/// Colours by a field of any name, as files have them, or by labels.
+/// Colours by a field of any name, as in files, or by labels.
 fn colour_by_name(look: &mut Look, name: &str) {
     look.style.labels = name == "label";
     let (own, part) = name.split_once(':').map_or((name, None), |(own, part)| (own, Some(part)));
@@ -123,7 +123,7 @@ fn colour_by_name(look: &mut Look, name: &str) {
     }
 }
 
-/// What was typed comes before what the scene says.
+/// Command-line options override the scene.
 fn typed(look: &mut Look, arguments: &Render) {
     let style = &mut look.style;
     style.map = arguments.map.map_or(style.map, map_of);
@@ -156,7 +156,7 @@ fn typed(look: &mut Look, arguments: &Render) {
     look.zoom = arguments.zoom.unwrap_or(look.zoom);
     look.size = arguments.size.unwrap_or(look.size);
     if let Some(name) = &arguments.colour {
-        // Another field has another range.
+        // A different field has a different range.
         if look.field.as_ref() != Some(name) {
             look.style.range = arguments.range;
         }
@@ -164,7 +164,7 @@ fn typed(look: &mut Look, arguments: &Render) {
     }
 }
 
-/// Draws the last instant of a run.
+/// Draws the final state of a run.
 #[derive(Debug)]
 pub struct Photographer {
     look: Look,
@@ -217,18 +217,18 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::from(signals::exit_code()));
     };
     let code = shoot(arguments, &shown.look, &graphics, &shown.series, &folder, film)?;
-    // What a failed run came to is worth a look.
+    // The pictures of a failed run are still useful.
     Ok(if shown.failed { ExitCode::from(1) } else { code })
 }
 
-/// The labels that were typed, of those there are.
+/// The existing labels named on the command line.
 fn hidden(labels: &Labels, typed: &[CellLabel]) -> Result<Vec<i32>, Failure> {
     let found = typed.iter().map(|label| labels.find_all(label)).collect::<Result<Vec<_>, _>>();
-    let help = "`--hide` takes numbers, names and ranges, as 2,tumour,5-8";
+    let help = "`--hide` takes numbers, names and ranges, such as 2,tumour,5-8";
     Ok(found.map_err(|error| Failure::plain(error, help))?.concat())
 }
 
-/// The mesh of a file that is drawn as it is: one with labels, of which nothing is asked for that takes a run.
+/// The mesh of a file that is drawn without a run: it has labels, and no option needs a run.
 fn labelled_mesh(arguments: &Render) -> Result<Option<Mesh>, Failure> {
     let of_cells = matches!(arguments.colour.as_deref(), None | Some("label" | "none"));
     let runs = arguments.film.is_some() || arguments.frames.is_some() || changes_a_run(arguments);
@@ -267,17 +267,17 @@ fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Fail
         .map_err(|error| Failure::plain(&error, error.remedy))
 }
 
-/// A scene that has been run for its pictures.
+/// A scene after the run for its pictures.
 struct Shown {
     look: Look,
     series: Series,
     title: String,
     failed: bool,
-    /// Holds the frames until they are drawn.
+    /// Keeps the frames until they are drawn.
     _space: tempfile::TempDir,
 }
 
-/// Runs a scene with nothing but what is shown of it as its output; `None` if it was interrupted.
+/// Runs a scene with only the displayed series as its output; `None` if it was interrupted.
 fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> {
     let space = tempfile::tempdir().map_err(|error| {
         Failure::plain(
@@ -304,7 +304,7 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
         eprintln!("warning: {warning}");
     }
     if summary.status == "interrupted" {
-        eprintln!("error: the run was interrupted; no pictures were taken");
+        eprintln!("error: the run was interrupted; no pictures were made");
         return Ok(None);
     }
     if let Some(error) = &summary.error {
@@ -318,7 +318,7 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
 /// Width of a picture in a gallery [pixels].
 const GALLERY_WIDTH: u32 = 640;
 
-/// The scenes in a folder that is none itself, in the order of the alphabet.
+/// The scenes in a folder that is not a scene itself, in alphabetical order.
 fn scenes_in(folder: &Path) -> Vec<PathBuf> {
     if !is_folder_of_run(folder) {
         return Vec::new();
@@ -330,21 +330,18 @@ fn scenes_in(folder: &Path) -> Vec<PathBuf> {
     scenes
 }
 
-/// Runs scenes, and makes a page with the last picture of each.
+/// Runs scenes and makes a page with the last picture of each.
 fn gallery(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> {
     if arguments.film.is_some() || arguments.frames.is_some() || arguments.series.is_some() {
         let message = "a gallery has the last picture of each scene";
-        return Err(Failure::plain(
-            message,
-            "leave `--film`, `--frames` and `--series` out, or give one scene",
-        ));
+        return Err(Failure::plain(message, "omit `--film`, `--frames` and `--series`, or give one scene"));
     }
     let graphics = Graphics::open()?;
     let folder = claim(arguments, |name| name == "README.md" || name.ends_with(".png"))?;
     let until = arguments.overrides.until.map(|until| format!(" --until {until}")).unwrap_or_default();
     let (what, out) = (arguments.what.display(), arguments.out.display());
     let mut page = format!(
-        "# Gallery\n\nMade by `pliant render {what} -o {out}{until}`: the last instant of each scene.\n"
+        "# Gallery\n\nMade by `pliant render {what} -o {out}{until}`: the final state of each scene.\n"
     );
     let mut failed = false;
     for scene in scenes {
@@ -358,7 +355,7 @@ fn gallery(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> 
         if arguments.size.is_none() {
             shown.look.size = [GALLERY_WIDTH, (GALLERY_WIDTH * height / width).max(1)];
         }
-        // The page says it.
+        // The page has the title.
         shown.look.legend.title.clear();
         let file = folder.path().join(format!("{name}.png"));
         let last = shown.series.frames.len() - 1;
@@ -376,7 +373,7 @@ fn gallery(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> 
     Ok(ExitCode::from(u8::from(failed)))
 }
 
-/// Whether a path is the folder of a run, and not of a scene.
+/// Whether a path is the folder of a run, not of a scene.
 fn is_folder_of_run(path: &Path) -> bool {
     path.is_dir() && !path.join("scene.toml").exists()
 }
@@ -393,20 +390,19 @@ fn changes_a_run(arguments: &Render) -> bool {
 
 fn refuse_words_of_scenes(arguments: &Render) -> Result<(), Failure> {
     if changes_a_run(arguments) {
-        let message =
-            format!("`{}` is a finished run: its scene can't be changed any more", arguments.what.display());
-        return Err(Failure::plain(message, "give the scene, or leave these options out"));
+        let message = format!("`{}` is a finished run: its scene can't be changed", arguments.what.display());
+        return Err(Failure::plain(message, "give the scene, or omit these options"));
     }
     Ok(())
 }
 
-/// Takes the outputs away from a scene; simulated time between the frames that are shown instead [s].
+/// Removes the outputs of a scene; returns the simulated time between the displayed frames [s].
 fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
     let own = std::mem::take(&mut scene.outputs).into_iter().find_map(|(_, output)| match output {
         OutputTable::Vtu(VtuTable { every, .. }) => Some(every),
         OutputTable::Csv(_) => None,
     });
-    // Another field does without the component of the scene's.
+    // A different field does not use the scene's component.
     if arguments.colour.as_ref().is_some_and(|name| !name.contains(':')) {
         scene.view.component = None;
     }
@@ -415,7 +411,7 @@ fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
     arguments.every.or(own).unwrap_or(0.01 * scene.scene.until)
 }
 
-/// The colour and the hidden labels that were typed as values of the scene, so that they are checked with it.
+/// Adds colour and hidden labels of the command line to the scene's values, so that the scene checks them.
 fn with_view(arguments: &Render) -> Overrides {
     let mut all = arguments.overrides.clone();
     if let Some(name) = arguments.colour.as_deref() {
@@ -440,20 +436,20 @@ fn is_picture(name: &str) -> bool {
         .is_some_and(|n| n.parse::<usize>().is_ok())
 }
 
-/// What a film is made of.
+/// The format of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum FilmKind {
     Mp4,
     Png,
 }
 
-/// By the ending of its name.
+/// By the file extension.
 fn film_kind(path: &Path) -> Result<FilmKind, Failure> {
     match path.extension().and_then(|ending| ending.to_str()) {
         Some("mp4") => Ok(FilmKind::Mp4),
         Some("png" | "apng") => Ok(FilmKind::Png),
         _ => {
-            let message = format!("`{}` is the name of no film that can be made", path.display());
+            let message = format!("`{}` is not a name for a film", path.display());
             Err(Failure::plain(message, "end it in .mp4, or in .png for an animated PNG"))
         }
     }
@@ -483,7 +479,7 @@ impl Reel {
     }
 }
 
-/// Takes the pictures of a series.
+/// Draws the pictures of a series.
 fn shoot(
     arguments: &Render,
     look: &Look,
@@ -497,7 +493,7 @@ fn shoot(
     let bar = Bar::new();
     let done = look.pictures(graphics, series, &frames, |count, picture| {
         save(folder, &picture_name(frames[count]), &picture)?;
-        bar.update_mesh(count as f64 / frames.len() as f64, "taking pictures");
+        bar.update_mesh(count as f64 / frames.len() as f64, "drawing pictures");
         reel.add(&picture)
     });
     bar.finish();
@@ -521,7 +517,7 @@ fn save(folder: &OutputFolder, name: &str, picture: &Picture) -> Result<(), Pict
     written.map(|_| ()).map_err(|error| PictureError::Write { path: error.path, reason: error.reason })
 }
 
-/// The frames that were asked for: the last one, or all for a film.
+/// The requested frames; by default the last one, or all for a film.
 fn chosen(arguments: &Render, series: &Series) -> Result<Vec<usize>, Failure> {
     let count = series.frames.len();
     let usual = if arguments.film.is_some() { Frames::All } else { Frames::Last };
@@ -533,12 +529,12 @@ fn chosen(arguments: &Render, series: &Series) -> Result<Vec<usize>, Failure> {
     };
     if frames.is_empty() {
         let message = format!("series `{}` has {count} frames, from 0 to {}", series.name, count - 1);
-        return Err(Failure::plain(message, "choose among them"));
+        return Err(Failure::plain(message, "choose one of these"));
     }
     Ok(frames)
 }
 
-/// Starts the film that was asked for; where ffmpeg is missing, an animated PNG beside the name asked for.
+/// Starts the requested film; without ffmpeg, an animated PNG beside the requested name.
 fn start_film(
     arguments: &Render,
     look: &Look,
@@ -555,7 +551,7 @@ fn start_film(
         arguments.rate.unwrap_or_else(|| if frames.len() > 1 { real_time.clamp(5.0, 60.0) } else { 25.0 });
     if kind == FilmKind::Mp4 && !ffmpeg() {
         path.set_extension("png");
-        eprintln!("note: there is no ffmpeg here: the film is the animated PNG {}", path.display());
+        eprintln!("note: ffmpeg was not found: the film is the animated PNG {}", path.display());
         kind = FilmKind::Png;
     }
     let reel = match kind {

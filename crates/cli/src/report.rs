@@ -1,4 +1,4 @@
-//! What goes to the user: mistakes with the line they are in, progress, results.
+//! Output for the user: errors with their line, progress, results.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -17,14 +17,14 @@ use pliant_scene::{
 };
 use serde_json::json;
 
-/// The input is wrong (exit code 2).
+/// Invalid input (exit code 2), or failed output.
 #[derive(Debug)]
 pub enum Failure {
-    /// A scene with mistakes.
+    /// A scene with errors.
     Scene(SceneErrors),
-    /// Anything else, with a remedy.
+    /// Any other error, with a remedy.
     Plain { message: String, help: String },
-    /// Standard output can't be written, which is no mistake of the input (exit code 1).
+    /// Standard output can't be written; the input is valid (exit code 1).
     Output(io::Error),
 }
 
@@ -58,7 +58,7 @@ impl From<ResumeError> for Failure {
     }
 }
 
-/// Prints what is wrong; exit code 2 where it is the input.
+/// Prints the error; exit code 2 for invalid input.
 pub fn failure(failure: &Failure, json: bool) -> ExitCode {
     let text = match failure {
         Failure::Scene(errors) => {
@@ -83,13 +83,13 @@ pub fn failure(failure: &Failure, json: bool) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Prints the JSON object of an input that is wrong.
+/// Prints the JSON object of invalid input.
 pub fn refused(message: &str) {
-    // Where standard output can't be written, the exit code still tells.
+    // If standard output can't be written, the exit code still reports the error.
     let _ = say(failed_input(message));
 }
 
-/// Prints that a mesh could not be written, which is no mistake of the input; exit code 1.
+/// Prints that a mesh could not be written; exit code 1.
 pub fn failed_output(error: &MeshFileError, json: bool) -> Result<ExitCode, Failure> {
     eprintln!("error: {error}");
     if json {
@@ -98,13 +98,13 @@ pub fn failed_output(error: &MeshFileError, json: bool) -> Result<ExitCode, Fail
     Ok(ExitCode::from(1))
 }
 
-/// Prints mistakes or doubts with the user's own lines underlined.
+/// Prints errors or warnings with the user's own lines underlined.
 pub fn show(errors: &SceneErrors) {
     let handler = miette::GraphicalReportHandler::new_themed(theme());
     let mut text = String::new();
     let drawn = handler.render_report(&mut text, errors as &dyn Diagnostic);
     match drawn {
-        // Its colours are codes for the terminal; what comes from the scene was made printable before.
+        // Its colours are terminal codes; text from the scene is already printable.
         Ok(()) => drop(writeln!(io::stderr(), "{}", text.trim_end_matches('\n'))),
         Err(_) => eprintln!("{}", errors.plain().to_string().trim_end_matches('\n')),
     }
@@ -115,7 +115,7 @@ fn theme() -> miette::GraphicalTheme {
     if colours { miette::GraphicalTheme::unicode() } else { miette::GraphicalTheme::unicode_nocolor() }
 }
 
-/// A bar with the time left and the real-time factor; nothing where nobody looks.
+/// A progress bar with the time left and the real-time factor; hidden without a terminal.
 pub struct Bar(ProgressBar);
 
 impl Bar {
@@ -152,7 +152,7 @@ impl Bar {
         self.0.set_message(progress.now.clone());
     }
 
-    /// A part of the work from 0 to 1, and what is being done.
+    /// A fraction of the work from 0 to 1, and the current task.
     pub fn update_mesh(&self, part: f64, now: impl Into<Cow<'static, str>>) {
         self.0.set_position((1000.0 * part) as u64);
         self.0.set_message(now);
@@ -163,7 +163,7 @@ impl Bar {
     }
 }
 
-/// The result of a run in a few lines; of a failed one, whose energies and forces mean nothing, what was written.
+/// The result of a run in a few lines; for a failed run, without valid energies and forces, only its files.
 pub fn result(summary: &Summary) -> String {
     let Summary { nodes, elements, step, steps, wall_seconds, real_time_factor, energy_balance, .. } =
         summary;
@@ -184,12 +184,12 @@ pub fn result(summary: &Summary) -> String {
     lines.join("\n")
 }
 
-/// The graphics processors as a list, the best first.
+/// The GPUs as a list, the best first.
 pub fn adapters(found: &[Adapter]) -> String {
     let of = |a: &Adapter| {
-        let atomics = if a.float_atomics { "adds floats atomically" } else { "no atomic floats" };
+        let atomics = if a.float_atomics { "atomic float addition" } else { "no atomic float addition" };
         format!(
-            "{}\n  {}, {}, {}\n  arrays to {} MiB, {} KiB shared by a group of up to {} invocations, {atomics}",
+            "{}\n  {}, {}, {}\n  buffers up to {} MiB, {} KiB shared memory, workgroups up to {} invocations, {atomics}",
             a.name,
             a.kind,
             a.backend,
@@ -202,7 +202,7 @@ pub fn adapters(found: &[Adapter]) -> String {
     found.iter().map(of).collect::<Vec<_>>().join("\n")
 }
 
-/// Prints a line on standard output. A reader that has gone away (`pliant schema | head`) is no mistake.
+/// Prints a line on standard output. A closed pipe (`pliant schema | head`) is not an error.
 pub fn say(text: impl Display) -> Result<(), Failure> {
     let text = text.to_string();
     let written = writeln!(io::stdout(), "{}", printable(&text)).and_then(|()| io::stdout().flush());
@@ -212,7 +212,7 @@ pub fn say(text: impl Display) -> Result<(), Failure> {
     }
 }
 
-/// Prints a line on standard error, if it can be written. Names in it that come from files reach the terminal without codes.
+/// Prints a line on standard error, if possible. Names from files reach the terminal without control codes.
 pub fn tell(text: impl Display) {
     let _ = writeln!(io::stderr(), "{}", printable(&text.to_string()));
 }

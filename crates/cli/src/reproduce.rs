@@ -1,4 +1,4 @@
-//! `pliant reproduce`: the results of the literature, computed, judged and written down.
+//! `pliant reproduce`: results of the literature, computed, judged and written to a page.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -34,7 +34,7 @@ pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(u8::from(failed > 0)))
 }
 
-/// The cases asked for, in the order of the page; all if none is.
+/// The requested cases, in the order of the page; by default all.
 fn chosen(ids: &[String]) -> Result<Vec<&'static Case>, Failure> {
     let mut asked = Vec::new();
     for id in ids {
@@ -56,7 +56,7 @@ fn list() -> String {
     lines.join("\n")
 }
 
-/// Computes with a bar on standard error that counts expected seconds; nothing where nobody looks.
+/// Computes with a bar on standard error that counts expected seconds; hidden without a terminal.
 fn compute(cases: &[&'static Case]) -> Report {
     let all: f64 = cases.iter().map(|case| case.seconds).sum();
     let bar = ProgressBar::new((10.0 * all).max(1.0) as u64);
@@ -73,7 +73,7 @@ fn compute(cases: &[&'static Case]) -> Report {
     report
 }
 
-/// What failed, and how many passed.
+/// The failed rows and the number of passed ones.
 fn verdict(report: &Report) -> String {
     let mut lines: Vec<String> = (report.rows().filter(|row| row.pass == Some(false)))
         .map(|row| {

@@ -1,4 +1,4 @@
-//! What asks a run to end: Ctrl-C, and on Unix SIGTERM and SIGHUP. It ends after its step, with all that it writes at its end.
+//! Signals that stop a run: Ctrl-C, and on Unix SIGTERM and SIGHUP. The run stops after its step and writes its final outputs.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock};
@@ -14,7 +14,7 @@ struct Asked {
 static ASKED: LazyLock<Asked> = LazyLock::new(|| {
     let asked = Asked { stop: Arc::default(), signal: Arc::new(AtomicUsize::new(INTERRUPT)) };
     let stop = asked.stop.clone();
-    // Where no handler can be set, Ctrl-C ends the process as ever, and what was written stays readable.
+    // Without a handler, Ctrl-C ends the process as usual, and written files stay readable.
     let _ = ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {
             std::process::exit(128 + INTERRUPT as i32);
@@ -25,12 +25,12 @@ static ASKED: LazyLock<Asked> = LazyLock::new(|| {
     asked
 });
 
-/// Set when a signal asks for the end. Ctrl-C or SIGTERM once more ends the process at once.
+/// Set by a stop signal. A second Ctrl-C or SIGTERM ends the process immediately.
 pub fn stop() -> &'static AtomicBool {
     &ASKED.stop
 }
 
-/// The exit code of a process that was asked to end: 128 and the number of the signal, as shells count.
+/// The exit code of a stopped process: 128 + the signal number, as in shells.
 pub fn exit_code() -> u8 {
     128 + ASKED.signal.load(Ordering::Relaxed) as u8
 }
@@ -44,9 +44,9 @@ mod unix {
 
     use super::Asked;
 
-    /// Has SIGTERM and SIGHUP ask, too. Where no handler can be set, they end the process as ever.
+    /// Handles SIGTERM and SIGHUP in the same way. Without a handler, they end the process as usual.
     pub fn heed(asked: &Asked) {
-        // A terminal that closes may send SIGHUP twice; whoever sends SIGTERM twice means it.
+        // A closing terminal may send SIGHUP twice; a second SIGTERM is deliberate.
         let _ = flag::register_conditional_shutdown(SIGTERM, 128 + SIGTERM, asked.stop.clone());
         for signal in [SIGTERM, SIGHUP] {
             if signal == SIGHUP && !is_heeded(signal) {
@@ -57,7 +57,7 @@ mod unix {
         }
     }
 
-    /// Whether a signal is known not to be ignored: `nohup` has SIGHUP ignored, and that is to stay so.
+    /// Whether a signal is not ignored: `nohup` ignores SIGHUP, which must stay ignored.
     fn is_heeded(signal: i32) -> bool {
         let ignored = fs::read_to_string("/proc/self/status").ok().and_then(|status| {
             let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;

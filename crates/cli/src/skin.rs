@@ -15,13 +15,13 @@ use crate::arguments::{MeshCells, MeshImage};
 use crate::mesh::{Segmented, anatomy, cell_limit, is_mesh_file, mesh_file, meshing_failure, regions};
 use crate::report::{Bar, Failure, failed_output, say};
 
-/// Faces that meet at more than this angle meet at a crease, which a remeshed surface keeps [rad].
+/// Faces at more than this angle form a crease, which remeshing preserves [rad].
 const CREASE: f64 = std::f64::consts::FRAC_PI_3;
 
 /// Samples of distances along the diagonal.
 const SAMPLES: f64 = 400.0;
 
-/// A surface as it was found, and where.
+/// The input surface with notes on its source.
 struct Found {
     surface: TriangleMesh,
     lines: Vec<String>,
@@ -62,7 +62,7 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// How fine the result is to be.
+/// The requested resolution.
 #[derive(Clone, Copy)]
 enum Goal {
     Edge(f64),
@@ -78,12 +78,12 @@ fn goal(arguments: &MeshImage) -> Result<Goal, Failure> {
         (None, None, Some(number), None) if !surface => Ok(Goal::Shells(ShellGoal::Shells(number))),
         (None, None, None, Some(error)) if !surface => Ok(Goal::Shells(ShellGoal::Error(error))),
         _ if surface => Err(Failure::plain(
-            "how fine the surface is to be is not said",
-            "`--edge 5mm` makes even triangles of 5 mm, `--cells 8000` as many triangles",
+            "the resolution of the surface is missing",
+            "`--edge 5mm` makes even triangles of 5 mm, `--cells 8000` that many triangles",
         )),
         _ => Err(Failure::plain(
-            "how close the shells are to be is not said",
-            "`--error 0.5%` is a largest distance in parts of the diagonal, `--shells 800` a number of shells",
+            "the accuracy of the shells is missing",
+            "`--error 0.5%` sets the largest distance as a fraction of the diagonal, `--shells 800` the number of shells",
         )),
     }
 }
@@ -92,7 +92,7 @@ fn require_surface_format(path: &Path) -> Result<(), Failure> {
     match Format::of_path(path) {
         Some(format) if Format::WRITTEN.contains(&format) => Ok(()),
         _ => {
-            let message = format!("`{}` is no name for a mesh of triangles", path.display());
+            let message = format!("`{}` is not a name for a mesh of triangles", path.display());
             Err(Failure::plain(message, "choose a name that ends in .vtu, .msh, .ply, .obj or .stl"))
         }
     }
@@ -126,7 +126,7 @@ fn file_object(format: &str, repairs: &SurfaceRepairs) -> Json {
     json!({ "format": format, "repairs": repairs })
 }
 
-/// A surface made, and what there is to know about it.
+/// The resulting surface with its report.
 struct Made {
     mesh: Mesh,
     error_map: Option<Mesh>,
@@ -140,7 +140,7 @@ fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> R
     bar.update_mesh(0.5, "making triangles");
     match goal {
         Goal::Shells(goal) => {
-            bar.update_mesh(0.3, "making few triangles to start from");
+            bar.update_mesh(0.3, "making the initial triangles");
             let progress = |now: FitProgress| {
                 let words = format!(
                     "fitting: round {}, {} shells, {:.2} % off",
@@ -203,7 +203,7 @@ fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> Ma
     Made { mesh, error_map: None, lines, object }
 }
 
-/// The least angle of a triangle [rad].
+/// The smallest angle of a triangle [rad].
 fn least_angle(x: &[Vector3; 3]) -> f64 {
     (0..3).map(|k| (x[(k + 1) % 3] - x[k]).angle(&(x[(k + 2) % 3] - x[k]))).fold(f64::INFINITY, f64::min)
 }

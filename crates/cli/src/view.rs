@@ -1,4 +1,4 @@
-//! `pliant view`: what the window is given, and what it tells in the end.
+//! `pliant view`: input of the window, and its final message.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -56,7 +56,7 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the window does by itself.
+/// The automatic task of the window.
 fn errand(arguments: &View) -> Option<Errand> {
     let file = arguments.screenshot.clone();
     match file {
@@ -66,11 +66,11 @@ fn errand(arguments: &View) -> Option<Errand> {
     }
 }
 
-/// Repeats a recording without a window, and tells what it came to; in real time too, to measure how soon a mouse is felt.
+/// Replays a recording without a window and prints the result; optionally also in real time, to measure the input lag.
 fn repeat(stage: &Stage, file: &Path, real_time: bool) -> Result<ExitCode, Failure> {
     let wrong = |error: &dyn std::fmt::Display| {
         Failure::plain(
-            format!("`{}` is no recording: {error}", file.display()),
+            format!("`{}` is not a recording: {error}", file.display()),
             "`pliant view --record FILE` makes one",
         )
     };

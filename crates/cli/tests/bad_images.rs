@@ -51,7 +51,7 @@ fn malformed_images_are_refused() {
     assert!(count >= 20, "{count}");
 }
 
-/// A box of label 1 that fills the volume but for its rim.
+/// A box of label 1 that fills the volume except its rim.
 fn box_of_labels() -> Volume {
     let dims = [12, 12, 12];
     let inner = |i: usize| (2..10).contains(&i);

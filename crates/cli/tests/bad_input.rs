@@ -1,5 +1,5 @@
-//! Every bad input that the project promises to refuse, through the real binary: the exit code, the user's own line,
-//! the number that is wrong and what to try, nothing written, and one JSON object.
+//! Every bad input that the project promises to reject, through the real binary: the exit code, the user's own line,
+//! the wrong number and a remedy, nothing written, and one JSON object.
 
 mod support;
 
@@ -8,7 +8,8 @@ use std::path::Path;
 
 use support::{BLOCK, CUBE, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
 
-/// Asserts that a scene is refused: with these words and one of these lines underlined; the folder holds what it held.
+/// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the folder does
+/// not change.
 #[track_caller]
 fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
     let told = workshop.run(&[]);
@@ -34,7 +35,7 @@ fn assert_invalid(told: &Told, says: &[&str]) {
     }
 }
 
-/// [`BLOCK`] with one place spoilt is refused, and the lines that were spoilt are shown.
+/// [`BLOCK`] with one error is rejected, and the changed lines are shown.
 #[track_caller]
 fn spoilt(good: &str, bad: &str, says: &[&str]) {
     let scene = changed(BLOCK, good, bad);
@@ -56,13 +57,13 @@ fn with_mesh(mesh: impl AsRef<[u8]>, scene: &str) -> Workshop {
 
 const MESH_LINE: &str = r#"mesh = { file = "organ.vtk" }"#;
 
-/// A body from this file is refused.
+/// A body from this file is rejected.
 #[track_caller]
 fn bad_mesh(mesh: impl AsRef<[u8]>, says: &[&str]) {
     assert_refused(&with_mesh(mesh, FROM_FILE), &[MESH_LINE], says);
 }
 
-/// A body from this file runs with a repair, which is told.
+/// A body from this file runs with a repair, which is reported.
 #[track_caller]
 fn repaired(mesh: &str, fix: &str, note: &str) {
     let scene = changed(FROM_FILE, MESH_LINE, &format!("mesh = {{ file = \"organ.vtk\", fix = \"{fix}\" }}"));
@@ -217,14 +218,14 @@ fn unreadable_and_truncated_meshes_tell_the_line() {
     let whole = vtk(&CUBE, &TETS, "");
     bad_mesh("", &["cannot read `case/organ.vtk`, line 1"]);
     bad_mesh("hello world\n", &["line 1", "`hello world`", "# vtk DataFile"]);
-    bad_mesh(&whole[..whole.len() / 2], &["cut off", "export it again"]);
+    bad_mesh(&whole[..whole.len() / 2], &["truncated", "export it again"]);
     bad_mesh(whole.replace("3 7\n", "3 99\n"), &["uses node 99", "export it again"]);
     bad_mesh(whole.replace("0.1 0 0\n", "0.1 zero 0\n"), &["`zero` is not"]);
     let scene = FROM_FILE.replace("organ.vtk", "organ.docx");
     let workshop = Workshop::new(&scene);
     workshop.write("case/organ.docx", "PK");
     let line = MESH_LINE.replace("organ.vtk", "organ.docx");
-    assert_refused(&workshop, &[&line], &["not in a mesh format known here", "Gmsh (.msh)"]);
+    assert_refused(&workshop, &[&line], &["not in a supported mesh format", "Gmsh (.msh)"]);
 }
 
 #[test]
@@ -594,7 +595,7 @@ fn empty_selections_say_what_is_near() {
     spoilt(
         "faces = { set = \"x-min\" }",
         &format!("faces = {one}"),
-        &["no boundary faces", "no whole boundary face"],
+        &["no boundary faces", "no boundary face lies completely within"],
     );
 }
 
@@ -733,7 +734,8 @@ fn halves(folder: &Path) -> Vec<String> {
     names.filter(|name| name.ends_with(".tmp")).collect()
 }
 
-/// Runs the scene where a file may have so many blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
+/// Runs the scene with a limit on the file size in blocks of 512 or 1024 bytes, so that writing fails as on a full
+/// disk.
 #[cfg(unix)]
 fn run_limited(workshop: &Workshop, blocks: u32) -> Told {
     let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run case --json");
@@ -785,7 +787,7 @@ fn check_and_info_refuse_like_run() {
     workshop.write("broken.off", "OFF\n3 1 0\n0 0 0\n");
     let told = workshop.pliant(&["info", "broken.off"]);
     assert_eq!(told.code, 2);
-    assert!(told.err.contains("cut off"), "{}", told.err);
+    assert!(told.err.contains("truncated"), "{}", told.err);
 }
 
 #[test]
@@ -1010,7 +1012,7 @@ fn a_run_of_more_than_a_day_asks_for_consent() {
     child.wait().unwrap();
 }
 
-/// What a failed run says.
+/// The output of a failed run.
 fn failure_of(changes: &[&str]) -> String {
     let workshop = Workshop::new(BLOCK);
     let set: Vec<&str> = changes.iter().flat_map(|change| ["--set", change]).collect();

@@ -120,7 +120,7 @@ fn lanes_are_chosen_by_word_and_missing_ones_are_refused() {
         "{}",
         told.err
     );
-    assert!(told.words().contains("leave `--lanes` out"), "{}", told.err);
+    assert!(told.words().contains("omit `--lanes`"), "{}", told.err);
     let told = run("mmx");
     assert_eq!(told.code, 2);
     assert!(told.err.contains("avx2"), "{}", told.err);

@@ -1,5 +1,5 @@
-//! Scenes on a graphics processor, through the real binary: where they run, what is refused and what is told. Without an
-//! adapter the tests that need one are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
+//! Scenes on a GPU, through the real binary: their device, rejections and messages. Without an adapter, the tests that
+//! need one are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
 mod support;
 
@@ -10,7 +10,7 @@ fn on(device: &str) -> Workshop {
     Workshop::new(&changed(BLOCK, "precision = \"double\"", device))
 }
 
-/// What is told where no adapter is found: on Linux none answers to Direct3D.
+/// The message without an adapter: on Linux none answers to Direct3D.
 fn without_adapters(workshop: &Workshop, arguments: &[&str]) -> Told {
     let mut command = workshop.command(arguments);
     command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into()

@@ -7,7 +7,7 @@ use pliant_geometry::{Labels, io};
 use support::{Told, Workshop};
 
 /// A block of 24 × 12 × 12 voxels of 1 mm as 3D Slicer writes it: the left half is liver, the right one spleen, and a tumour lies in the
-/// middle in a layer of its own.
+/// middle on a separate layer.
 fn segmentation() -> Vec<u8> {
     let mut bytes =
         b"NRRD0004\ntype: unsigned char\ndimension: 4\nspace: left-posterior-superior\nsizes: 2 32 20 20\n\
@@ -145,7 +145,7 @@ mod with_pictures {
     use super::support::has_graphics_processor;
     use super::*;
 
-    /// Pixels that have the colour of a label as it is: those of its swatch.
+    /// Pixels with the exact colour of a label: those of its swatch.
     fn swatches(workshop: &Workshop, file: &str) -> [usize; 4] {
         let picture = Picture::from_png(&fs::read(workshop.path(file)).unwrap()).unwrap();
         [0, 1, 2, 3]
@@ -179,7 +179,7 @@ mod with_pictures {
         assert_eq!(shown(&workshop, "p/frame-00002.png"), [false, false, false, true]);
         render("out/case", &["--colour", "displacement"]);
         assert_eq!(shown(&workshop, "p/frame-00002.png"), [false; 4]);
-        // A mesh alone is drawn as it is.
+        // A mesh alone is drawn without a run.
         let mesh = ["mesh", "case/organs.seg.nrrd", "--label", "1-3", "--edge", "5mm", "-o", "organs.vtu"];
         done(workshop.pliant(&mesh));
         render("organs.vtu", &[]);
@@ -200,7 +200,7 @@ mod with_pictures {
             ("case", "1-3", "all labels are hidden"),
             ("out/case", "tumor", "did you mean `tumour`?"),
             ("out/case", "7", "no cell has label 7: the mesh has 1 (liver)"),
-            ("out/case", "1-3", "nothing is left to be seen"),
+            ("out/case", "1-3", "nothing is visible"),
         ] {
             let told = workshop.pliant(&["render", what, "--force", "--colour", "label", "--hide", hide]);
             assert!(told.code == 2 && told.words().contains(piece), "{what} {hide}: {}", told.err);

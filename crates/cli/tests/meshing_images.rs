@@ -81,7 +81,7 @@ impl Picture {
     }
 }
 
-/// A scene that names the image itself; `MESH` stands for what its mesh is.
+/// A scene that names the image; `MESH` stands for the table of its mesh.
 const SCENE: &str = r#"[scene]
 until = 0.01
 gravity = [0, 0, -9.81]
@@ -275,14 +275,14 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
     let chosen = ["--label", "5", "--edge", "0.006"];
     let cases: [(&str, &[&str], &[&str]); 16] = [
         ("missing.nii", &chosen, &["cannot open `missing.nii`", "check the path"]),
-        ("text.txt", &chosen, &["not an image", "NIfTI"]),
+        ("text.txt", &chosen, &["not a supported image", "NIfTI"]),
         ("cut.nii.gz", &chosen, &["cut.nii.gz", "copy it again"]),
         ("negative.nii", &chosen, &["pixdim"]),
         ("empty.nii", &chosen, &["no voxel has label 5", "only background (0)"]),
         (seg, &["--label", "6", "--edge", "0.006"], &["no voxel has label 6; the image has 5, 8, 9"]),
         (seg, &["--label", "0", "--edge", "0.006"], &["label 0 is the background; the image has 5, 8, 9"]),
         (seg, &["--label", "5", "--label", "5", "--edge", "0.006"], &["label 5 is named twice"]),
-        (seg, &["--edge", "0.006"], &["no label is chosen; the image has 5, 8, 9", "--label"]),
+        (seg, &["--edge", "0.006"], &["no label was chosen; the image has 5, 8, 9", "--label"]),
         (seg, &["--threshold", "50", "--edge", "0.006"], &["no voxel is 50 or more", "lower"]),
         (seg, &["--label", "5", "--edge", "-1"], &["edge is -1", "positive"]),
         (seg, &["--label", "5", "--edge", "nan"], &["edge is NaN", "positive"]),
@@ -313,7 +313,7 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
     }
     let told = workshop.pliant(&["labels", "text.txt", "--json"]);
     assert_eq!(told.code, 2);
-    assert!(told.words().contains("not an image"), "{}", told.err);
+    assert!(told.words().contains("not a supported image"), "{}", told.err);
 }
 
 #[test]
@@ -325,7 +325,7 @@ fn a_part_thinner_than_the_cells_is_told_with_its_place() {
     assert_eq!(told.code, 0, "{}", told.err);
     let json = told.json();
     assert!(
-        told.words().contains("warning: the mesh leaves out a part of the body that is")
+        told.words().contains("warning: the mesh misses a part of the body")
             && told.err.contains("shorter edge"),
         "{}",
         told.err
@@ -421,7 +421,7 @@ fn shells_of_an_image_become_a_wall() {
     assert!(told.out.contains("label 5, 8, 80 shells"), "{}", told.out);
 }
 
-/// What a run says about the cache of meshes.
+/// The messages of a run about the cache of meshes.
 fn cached(workshop: &Workshop, more: &[&str]) -> Option<bool> {
     let told = workshop.run(&[&["--force"], more].concat());
     assert_eq!(told.code, 0, "{}", told.err);
@@ -445,7 +445,7 @@ fn the_mesh_of_an_image_is_kept_and_made_anew_where_anything_changes() {
         assert_eq!(cached(&workshop, &["--set", change]), Some(false), "{change}");
         assert_eq!(cached(&workshop, &["--set", change]), Some(true), "{change}");
     }
-    // What is kept gives the same bits.
+    // The cached mesh gives the same bits.
     assert_eq!(workshop.run(&["--force"]).done()["energies"], whole["energies"]);
     for entry in std::fs::read_dir(workshop.path("cache")).unwrap() {
         let path = entry.unwrap().path();
@@ -467,7 +467,7 @@ fn a_kept_mesh_still_warns() {
     for kept in ["kept in the cache", "from the cache"] {
         let told = workshop.run(&["--force"]);
         assert!(
-            told.words().contains(kept) && told.words().contains("the mesh leaves out a part of the body"),
+            told.words().contains(kept) && told.words().contains("the mesh misses a part of the body"),
             "{}",
             told.err
         );
@@ -479,10 +479,10 @@ fn mistakes_about_images_are_underlined_in_the_scene() {
     for (mesh, says) in [
         ("{ image = \"seg.nii.gz\", label = 6, edge = 0.006 }", "the image has 5, 8, 9"),
         ("{ image = \"seg.nii.gz\", labels = [5, 0], edge = 0.006 }", "label 0 is the background"),
-        ("{ image = \"seg.nii.gz\", labels = [], edge = 0.006 }", "no label is chosen"),
+        ("{ image = \"seg.nii.gz\", labels = [], edge = 0.006 }", "no label was chosen"),
         ("{ image = \"seg.nii.gz\", edge = 0.006 }", "add `label = 1`"),
         ("{ image = \"other.nii.gz\", label = 5, edge = 0.006 }", "relative to the scene file"),
-        ("{ image = \"scene.toml\", label = 5, edge = 0.006 }", "not an image"),
+        ("{ image = \"scene.toml\", label = 5, edge = 0.006 }", "not a supported image"),
         ("{ image = \"seg.nii.gz\", label = 5, edge = 5e-5 }", "exceed"),
         ("{ image = \"seg.nii.gz\", threshold = 50, edge = 0.006 }", "lower threshold"),
         ("{ image = \"seg.nii.gz\", label = 5, edge = 0.006, clean = { close-gaps = -1 } }", "close-gaps"),

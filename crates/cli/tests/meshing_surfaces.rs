@@ -15,7 +15,7 @@ const RADIUS: f64 = 15.0;
 fn ball(radius: f64, x: f64) -> Mesh {
     let mut mesh = sphere(radius, 4, 100_000).expect("a sphere");
     mesh.points.iter_mut().for_each(|point| point.x += x);
-    // What is made of it is another surface.
+    // The result is a different surface.
     mesh.point_data.clear();
     mesh
 }
@@ -134,7 +134,7 @@ fn hexes_of_a_surface_and_of_the_boundary_of_cells() {
     let json = done(&mesh(&workshop, "ball.ply", &["--as", "hexes", "--edge", "2mm"]));
     // Cubes whose middle is inside: of 1767 in the mean, as points of a lattice in a ball.
     assert!(close(&json["materials"][0]["volume"], ball_volume(RADIUS), 0.06), "{json}");
-    // What was made is a mesh file as well, now in metres.
+    // The result is a mesh file as well, now in metres.
     let again = ["mesh", "out.vtu", "--edge", "4mm", "-o", "again.vtu", "--json"];
     let again = done(&workshop.pliant(&again));
     assert!(close(&again["materials"][0]["volume"], ball_volume(RADIUS), 0.06), "{again}");
@@ -153,11 +153,11 @@ fn what_was_mended_is_told() {
         (ball(RADIUS, 0.0), &[], &["mended nothing"]),
         (inverted(ball(RADIUS, 0.0)), &[], &["5120 faces turned"]),
         (holed, &[], &["1 hole of up to", "mm closed"]),
-        (doubled, &[], &["2 faces without area or given twice dropped"]),
+        (doubled, &[], &["2 faces without area or duplicate dropped"]),
         (
             both(ball(RADIUS, 0.0), ball(RADIUS, 11.0)),
             &[],
-            &["pairs of triangles pass through each other, the first at (", "what overlaps was joined"],
+            &["pairs of triangles intersect, the first at (", "overlapping parts were joined"],
         ),
         (hollow.clone(), &[], &["surface 2 pieces, of which 1 cavity"]),
         (hollow, &["--fill-holes"], &["1 cavity filled"]),
@@ -234,10 +234,10 @@ fn what_cannot_be_filled_is_refused_with_a_remedy() {
         }
         assert!(!workshop.path("out.vtu").exists());
     }
-    // The wide hole is closed where that is asked for.
+    // The wide hole is closed on request.
     let closed = done(&mesh(&workshop, "open.ply", &["--close-gaps", "45mm"]));
     assert_eq!(closed["mended"]["closed_holes"], 1);
-    // What is left ends between z = -2 mm and 0: 0.6 of the ball is above the one, half above the other.
+    // The rest ends between z = -2 mm and 0: 0.6 of the ball is above the one, half above the other.
     let volume = closed["materials"][0]["volume"].as_f64().unwrap() / ball_volume(RADIUS);
     assert!((0.5..0.6).contains(&volume), "{volume}");
 }
@@ -286,7 +286,7 @@ fn lengths_take_units_and_a_tissue_its_step() {
     assert_eq!(mesh(&workshop, "ball.ply", &["--young", "1e3", "--poisson", "0.5"]).code, 2);
 }
 
-/// The old mesh stays where the new one cannot be written whole.
+/// The old mesh stays if the new one cannot be written completely.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_leaves_the_old_mesh() {
@@ -316,7 +316,7 @@ fn a_full_disk_leaves_the_old_mesh() {
     }
 }
 
-/// Balls of 15 and 16.5 mm, the second one in metres: 1.5 mm apart but for the sagitta of their facets.
+/// Balls of 15 and 16.5 mm, the second one in metres: 1.5 mm apart up to the sagitta of their facets.
 #[test]
 fn info_measures_a_mesh_against_another() {
     let workshop = with("ball.ply", &ball(RADIUS, 0.0));
@@ -350,7 +350,7 @@ fn info_measures_a_mesh_against_another() {
     ] {
         assert!(page.out.contains(piece), "no `{piece}` in:\n{}", page.out);
     }
-    // The scale of the mesh counts for the other one where none is given.
+    // The scale of the mesh is the default for the other one.
     let same = ["info", "ball.ply", "--scale", "0.001", "--against", "ball.ply", "--json"];
     assert!(done(&workshop.pliant(&same))["against"]["hausdorff"].as_f64().unwrap() < 1e-15);
     for (other, scale, says) in [
@@ -378,7 +378,7 @@ fn info_tells_curvature_and_thickness() {
     assert!(close(&tets["curvature"]["mean"]["median"], 1e3 / RADIUS, 0.2), "{tets}");
     assert!(close(&tets["thickness"]["thickness"]["median"], 2e-3 * RADIUS, 0.05), "{tets}");
 
-    // Shells with a thickness of their own: an open plate, twice as thick on the right.
+    // Shells with their own thickness: an open plate, twice as thick on the right.
     let mut plate =
         Sheet::Plate { size: [0.2, 0.1] }.mesh([8, 4], Pattern::Diagonal, None, 1000).expect("a plate");
     let thick: Vec<f64> = plate.blocks[0]

@@ -1,6 +1,5 @@
-//! Pictures and films through the real binary: what is taken of scenes and of finished runs, what is refused, and what a build
-//! without pictures tells. Without anything that draws, tests that need it are skipped with a notice; with `PLIANT_REQUIRE_GPU=1`
-//! they fail.
+//! Pictures and films through the real binary: pictures of scenes and of finished runs, rejections, and the message of a build
+//! without pictures. Without an adapter, tests that need one are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
 mod support;
 
@@ -63,7 +62,7 @@ mod with_pictures {
         assert!(workshop.read("out/case/summary.md").contains("![the last instant](picture.png)"));
         let files = &told.done()["files"];
         assert!(files.as_array().unwrap().iter().any(|file| file.as_str().unwrap().ends_with("picture.png")));
-        // Without the option the one of the last run goes.
+        // Without the option the picture of the last run is removed.
         workshop.run(&["--force", "--step", "1e-3"]).done();
         assert!(!workshop.path("out/case/picture.png").exists());
         assert!(!workshop.read("out/case/summary.md").contains("picture.png"));
@@ -114,7 +113,7 @@ mod with_pictures {
         }
         let mut without = workshop.command(&[&arguments[..], &["--force"]].concat());
         let told: Told = without.env("PATH", "").output().unwrap().into();
-        assert!(done(&told).err.contains("there is no ffmpeg here"), "{}", told.err);
+        assert!(done(&told).err.contains("ffmpeg was not found"), "{}", told.err);
         assert_eq!(png(&workshop, "film.png"), ([81, 61], Some(6)));
     }
 
@@ -229,7 +228,7 @@ mod with_pictures {
             (&["render", "out/case", "--fibres"], "needs `fibre` in `data`"),
             (&["render", "out/case", "--critical"], "needs `element-step` in `data`"),
             (&["render", "case", "--texture", "wood"], "possible values: none, skin"),
-            (&["render", "empty"], "holds no series of frames"),
+            (&["render", "empty"], "has no series of frames"),
             (&["render", "out/case", "--series", "skin"], "there is `fields`"),
             (&["render", "out/case", "--colour", "pressure"], "`displacement`, `von-mises`"),
             (&["render", "out/case", "--frames", "9"], "has 6 frames, from 0 to 5"),

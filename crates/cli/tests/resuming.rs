@@ -1,5 +1,5 @@
-//! Runs that are interrupted and go on, through the real binary: the same bits and files as without the interruption,
-//! and clear words where a checkpoint does not fit.
+//! Interrupted and resumed runs, through the real binary: the same bits and files as an uninterrupted run, and clear
+//! messages for checkpoints that do not fit.
 
 mod support;
 
@@ -65,7 +65,8 @@ fn checkpoints(folder: &Path) -> Vec<PathBuf> {
     all
 }
 
-/// All files under a folder but checkpoints and the page with the wall time, with what is in them.
+/// All files under a folder except checkpoints and the page with the wall time, with their
+/// contents.
 fn files(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut all = Vec::new();
     let mut open = vec![folder.to_owned()];
@@ -106,8 +107,8 @@ fn kill_at_second_checkpoint(mut child: Child, folder: &Path) {
     child.wait().unwrap();
 }
 
-/// Runs a scene as a whole into `out/whole`, and as one that stopped short of its end and went on into `out/parts`.
-/// Files and final state are the same, bit for bit.
+/// Runs a scene completely into `out/whole`, and in two parts into `out/parts`. Files and final state are the same,
+/// bit for bit.
 #[track_caller]
 fn assert_resumes(scene: &str, threads: [&str; 3], what: &str) {
     let workshop = Workshop::new(scene);
@@ -129,7 +130,7 @@ fn assert_resumes(scene: &str, threads: [&str; 3], what: &str) {
     let again = checkpoints(&workshop.path("out/parts"));
     assert_eq!(again, written, "{what}");
     assert!(fs::read(&again[0]).unwrap() == before);
-    // All but the wall times that stand in them is the same to the bit: the state, the samples, the schedules.
+    // Everything except the wall times in them has the same bits: the state, the samples, the schedules.
     let differ = fs::read(&again[1]).unwrap().iter().zip(&last).filter(|(a, b)| a != b).count();
     // Solvers with equations tell the times of their three phases, too.
     let times = if scene.contains("model = ") { 4 } else { 1 };
@@ -352,7 +353,7 @@ fn a_longer_until_goes_on_from_the_end() {
     refused(&told, &["the checkpoint is at t = 0.1000 s, after the end of the scene at 0.0500", "`--until`"]);
     workshop.run(&["--resume", "out/parts", "--until", "0.2"]).done();
     workshop.run(&["--out", "out/whole", "--until", "0.2"]).done();
-    // The last instant of the first part is a row of its own, and a frame.
+    // The final time of the first part has its own row and frame.
     let (_, parts) = workshop.table("out/parts/history.csv");
     let (_, whole) = workshop.table("out/whole/history.csv");
     assert_eq!(parts.last(), whole.last());
@@ -399,7 +400,7 @@ fn a_failing_resumed_run_loses_nothing() {
     assert_eq!(before.len(), after.len());
 }
 
-/// Asserts that a run was refused with exit code 2 and these words.
+/// Asserts that a run was rejected with exit code 2 and these words.
 #[track_caller]
 fn refused(told: &Told, pieces: &[&str]) {
     assert_eq!(told.code, 2, "{}", told.err);
@@ -451,7 +452,7 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
     refused(&told, &["constraint `hand` differs", "write `to = 0.1`"]);
     workshop.write("case/scene.toml", &scene);
 
-    // What is wrong with the file.
+    // Problems of the file.
     let bytes = fs::read(&all[0]).unwrap();
     let file = |content: &[u8]| {
         workshop.write("x.pliant", content);
@@ -470,7 +471,7 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
     refused(&workshop.run(&["--resume", "none.pliant"]), &["`none.pliant` cannot be read"]);
     refused(&workshop.run(&["--resume", "case"]), &["there is no checkpoint in `case`", "every = 1.0"]);
 
-    // What is wrong with the folder.
+    // Problems of the folder.
     let outputs = "does not hold what the checkpoint continues";
     let told = workshop.run(&["--resume", "out/case", "--out", "elsewhere"]);
     refused(&told, &[outputs, "there is no such folder", "`--out DIR`"]);
@@ -486,7 +487,7 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
     fs::remove_file(&frame).unwrap();
     refused(&workshop.run(&["--resume", "out/case"]), &[outputs, "`fields/000001.vtu` is missing"]);
     fs::write(&frame, content).unwrap();
-    // None of it changed what was written.
+    // The existing files did not change.
     assert!(files(&workshop.path("out/case")) == before);
     workshop.run(&["--resume", "out/case"]).done();
     assert!(files(&workshop.path("out/case")) == before);

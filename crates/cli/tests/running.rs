@@ -1,4 +1,4 @@
-//! What a run leaves and tells, through the real binary: files, names and numbers as the project promises them.
+//! Outputs and messages of a run, through the real binary: files, names and numbers as promised.
 
 mod support;
 
@@ -113,7 +113,7 @@ fn csv_columns_are_named_as_promised() {
     assert_eq!(header, ["time", "reaction.hand.x", "reaction.hand.y", "reaction.hand.z"]);
 }
 
-/// Numbers per item of every field that can be asked for.
+/// Numbers per item of every available field.
 const FIELDS: [(&str, usize); 10] = [
     ("displacement", 3),
     ("velocity", 3),
@@ -360,7 +360,7 @@ fn steps_are_cut_where_the_stable_one_falls_below_them_and_it_is_told() {
     );
     let told = workshop.pliant(&["run", "case", "--force"]);
     assert!(told.out.contains("into 2 parts at the most"), "{}", told.out);
-    // `substep` is the default, and the answer that of a small step.
+    // `substep` is the default, and gives the result of a small step.
     let tip = |workshop: &Workshop| workshop.table("out/case/history.csv").1;
     let fine = Workshop::new(&changed(SOFT, "on-unstable = \"substep\"\n", ""));
     fine.run(&["--step", "3e-4"]).done();
@@ -1137,7 +1137,7 @@ fn schema() -> Value {
     told.json()
 }
 
-/// What a part of the schema refers to, and its alternatives.
+/// The target of a schema reference, and its alternatives.
 fn alternatives<'s>(schema: &'s Value, root: &'s Value) -> Vec<&'s Value> {
     let target = schema["$ref"].as_str().and_then(|path| root.pointer(path.strip_prefix('#')?));
     let parts = ["anyOf", "oneOf"].into_iter().filter_map(|key| schema[key].as_array()).flatten();
@@ -1145,7 +1145,7 @@ fn alternatives<'s>(schema: &'s Value, root: &'s Value) -> Vec<&'s Value> {
     std::iter::once(schema).chain(deeper).collect()
 }
 
-/// Asserts that a schema knows every key of a value and of what is in it.
+/// Asserts that a schema has every key of a value, recursively.
 fn assert_known(value: &toml::Value, schemas: &[&Value], root: &Value, path: &str) {
     let all: Vec<&Value> = schemas.iter().flat_map(|schema| alternatives(schema, root)).collect();
     match value {
@@ -1277,7 +1277,7 @@ fn every_node_goes_its_own_way_from_point_data_or_a_table_with_every_solver() {
                 for node in 4..8 {
                     for c in 0..3 {
                         let expected = factor * by(node)[c];
-                        // The explicit run looks at the instant nearest to 5 ms.
+                        // The explicit run samples the time nearest to 5 ms.
                         let slack = if frame == 1 && solver == "explicit" { 1e-3 } else { 1e-12 };
                         assert_close(u.item(node)[c], expected, slack, &format!("node {node} at {time} s"));
                     }
@@ -1287,7 +1287,7 @@ fn every_node_goes_its_own_way_from_point_data_or_a_table_with_every_solver() {
     }
 }
 
-/// A node keeps the number it has in the file where a repair has moved it up.
+/// A node keeps its number of the file after a repair has moved it up.
 #[test]
 fn a_table_of_motions_names_nodes_as_the_mesh_file_does() {
     let mut points = vec![[9.0; 3]];
@@ -1318,7 +1318,7 @@ fn the_brain_below_an_opening_shifts_as_the_reference_says() {
     told.done();
     let (header, rows) = workshop.table("shift/targets.csv");
     let last = rows.last().unwrap();
-    // CalculiX with quadratic tets of 9 mm; its mesh is right to 0.1 mm, 0.15 mm is what this mesh adds.
+    // CalculiX with quadratic tets of 9 mm; its mesh is accurate to 0.1 mm, this mesh adds 0.15 mm.
     for (probe, reference) in [
         ("middle", [-1.09e-03, -1.03e-03, -5.75e-04]),
         ("below-the-opening", [-2.98e-03, -5.53e-04, -2.36e-03]),
@@ -1376,7 +1376,7 @@ probes.middle = {{ on = "block", at = [0.05, 0.05, 0.05], data = ["displacement"
     }
 }
 
-/// Under gravity and damping α: v' = g − α v, so that the first steps are right to second order.
+/// Under gravity and damping α: v' = g − α v, so the first steps are accurate to second order.
 #[test]
 fn damping_slows_what_started_with_a_velocity() {
     let scene = changed(BLOCK, "damping = 5", "damping = 5\nvelocity = [2, 0, 0]");
@@ -1533,7 +1533,7 @@ fn a_flattened_cube_ends_with_the_corner_that_turns_inside_out() {
     }
 }
 
-/// Where every node is held there is no limit, which is said in words.
+/// If every node is fixed, the model has no critical time step, and the output says so.
 #[test]
 fn a_body_whose_nodes_are_all_prescribed_has_no_limit_and_a_page_without_inf() {
     let scene = squeezed("hex8", "", "by = [0, 0, 0.001]")
@@ -1579,7 +1579,7 @@ fn moments_of_reactions_balance_and_a_rotation_twists() {
         // Along the axis a twist pulls at the plates, across it nothing does.
         assert!(c == 2 || above.abs() < 1e-5 * top[2] / 0.1, "{row:?}");
     }
-    // The corner goes round by 0.3 rad.
+    // The corner rotates by 0.3 rad.
     let arm = [0.05, 0.05];
     let [x, y, z] = vector("probe.corner.displacement");
     let (sin, cos) = 0.3_f64.sin_cos();

@@ -1,5 +1,5 @@
-//! What surrounds a run, through the real binary: signals, locked folders, links in them, standard streams that can't be
-//! written, left-over files, files that are none.
+//! The environment of a run, through the real binary: signals, locked folders, links in them, standard streams that
+//! can't be written, stale files, paths that are not files.
 #![cfg(unix)]
 
 mod support;
@@ -189,7 +189,7 @@ fn standard_error_that_cannot_be_written_stops_no_run() {
     let mut command = Command::new("sh");
     command.args(["-c", shell, env!("CARGO_BIN_EXE_pliant")]).current_dir(workshop.path(""));
     Told::from(command.output().unwrap()).done();
-    // What is wrong is told by the exit code alone.
+    // Only the exit code reports the error.
     workshop.write("case/scene.toml", "until = ");
     let output = workshop.command(&["check", "case"]).stderr(full()).output().unwrap();
     assert_eq!(Told::from(output).code, 2);

@@ -12,7 +12,7 @@ fn sweep(workshop: &Workshop, arguments: &[&str]) -> Told {
     workshop.pliant(&[&["sweep", "case"], arguments].concat())
 }
 
-/// The cells of a table; commas in quotes separate none.
+/// The cells of a table; commas in quotes do not separate.
 fn cells(line: &str) -> Vec<String> {
     let (mut all, mut quoted) = (vec![String::new()], false);
     for c in line.chars() {
@@ -52,7 +52,7 @@ fn a_sweep_runs_the_product_and_tells_what_each_run_came_to() {
     for (run, row) in rows[1..].iter().enumerate() {
         assert_eq!((row[0].as_str(), row[column("status")].as_str()), (&*run.to_string(), "done"));
         assert!((row[column("time")].parse::<f64>().unwrap() - 0.008).abs() < 1e-12);
-        // Every number is that of the run alone.
+        // Every number equals that of the single run.
         let own = workshop.table(&format!("out/case-sweep/run-{run:04}/history.csv"));
         let last = own.1.last().unwrap();
         for (name, value) in own.0.iter().zip(last).skip(1) {
@@ -74,7 +74,7 @@ fn a_sweep_runs_the_product_and_tells_what_each_run_came_to() {
     workshop.run(&by_hand).done();
     assert_eq!(workshop.read("out/case/history.csv"), workshop.read("out/case-sweep/run-0003/history.csv"));
 
-    // The same on any number of threads, but for the wall time in the last column.
+    // The same on any number of threads, except the wall time in the last column.
     let again =
         sweep(&workshop, &[&set[..], &["--threads", "3", "--out", "out/again", "--keep-fields"]].concat());
     assert_eq!(again.code, 0, "{}", again.err);
@@ -114,7 +114,7 @@ fn all_combinations_are_checked_before_the_first_is_run() {
     let told = sweep(&workshop, &set);
     assert_eq!(told.code, 2, "{}", told.err);
     assert!(told.underlines("--set law.tissue.poisson-ratio=0.7"), "{}", told.err);
-    assert!(told.words().contains("2 of 4 combinations are wrong; nothing was run"), "{}", told.err);
+    assert!(told.words().contains("2 of 4 combinations are invalid; nothing was run"), "{}", told.err);
     assert_eq!(told.err.matches("found 0.7").count(), 1, "told once: {}", told.err);
     assert!(!workshop.path("out").exists());
     for (set, says) in [
@@ -191,7 +191,7 @@ fn ctrl_c_ends_a_sweep_with_what_it_has() {
     assert!(killed.unwrap().success());
     let told = Told::from(child.wait_with_output().unwrap());
     assert_eq!(told.code, 130, "{}", told.err);
-    assert!(told.words().contains("the runs that had ended are in the table"), "{}", told.err);
+    assert!(told.words().contains("the table contains the finished runs"), "{}", told.err);
     let rows = table(&workshop, "out/case-sweep/sweep.csv");
     let states: Vec<&str> = rows[1..].iter().map(|row| row[2].as_str()).collect();
     assert_eq!(states, ["done", "interrupted"]);

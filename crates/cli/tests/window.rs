@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
 
-/// A screen; it goes when this does.
+/// A screen, closed on drop.
 struct Screen {
     server: Child,
     display: String,
@@ -46,7 +46,7 @@ fn view(workshop: &Workshop, screen: &Screen, more: &[&str]) -> Told {
     command.output().expect("the binary starts").into()
 }
 
-/// A ball that is held at one end and damped, so that it comes to rest where it is pulled.
+/// A ball that is fixed at one end and damped, so that it comes to rest when pulled.
 const BALL: &str = include_str!("../../viewer/tests/support/ball.toml");
 
 #[test]
@@ -112,7 +112,7 @@ fn the_window_takes_a_picture_of_itself_and_reads_a_scene_that_changed_while_it_
     assert!(told.out.starts_with("A ball at t = "), "{}", told.out);
     assert!(std::fs::read(workshop.path("window.png")).unwrap().starts_with(b"\x89PNG"));
 
-    // Simulated time begins anew with the scene that was read.
+    // Simulated time restarts with the reloaded scene.
     let window = start("8");
     std::thread::sleep(Duration::from_secs(5));
     workshop.write("case/scene.toml", changed(BALL, "A ball", "Another ball"));
@@ -140,5 +140,5 @@ fn without_a_screen_it_says_what_it_needs() {
     workshop.write("drag", "no recording");
     let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
     assert_eq!(told.code, 2);
-    assert!(told.err.contains("is no recording"), "{}", told.err);
+    assert!(told.err.contains("is not a recording"), "{}", told.err);
 }

@@ -1,4 +1,4 @@
-//! What people say to `pliant labels`, `pliant mesh` and in a scene about scans: names, ranges, masks, units; and what is told back.
+//! Names, ranges, masks and units in `pliant labels`, `pliant mesh` and scenes of scans, and the replies.
 
 mod support;
 
@@ -107,7 +107,7 @@ fn a_label_is_chosen_by_name_and_range() {
     refused(&mesh(&workshop, &["seg.nii", "--label", "liver"]), &["have no names", "--names TABLE"]);
     refused(
         &mesh(&workshop, &["seg.nii", "--label", "7-9"]),
-        &["no voxel has a label of 7-9; the image has 1, 2, 3"],
+        &["no voxel has a label in 7-9; the image has 1, 2, 3"],
     );
 }
 
@@ -142,7 +142,7 @@ fn masks_are_one_image_of_labels() {
     assert!(told.out.contains("label 2 (tumour): 64 voxels"), "{}", told.out);
     refused(
         &mesh(&workshop, &["liver.nii", "seg.nii"]),
-        &["`seg.nii` is no mask: it has the labels 1, 2, 3"],
+        &["`seg.nii` is not a mask: it has the labels 1, 2, 3"],
     );
 }
 
@@ -159,7 +159,7 @@ fn what_would_be_ignored_or_is_no_label_image_is_refused() {
     );
     workshop.write("ct.mha", metaimage(&scan, false, false, "LOCAL"));
     for told in [workshop.pliant(&["labels", "ct.mha"]), mesh(&workshop, &["ct.mha", "--label", "7"])] {
-        refused(&told, &["this is no label image", "values from -1024 to 900", "--threshold VALUE"]);
+        refused(&told, &["this is not a label image", "values from -1024 to 900", "--threshold VALUE"]);
     }
     workshop.write("rtss.dcm", structure_set());
     refused(&workshop.pliant(&["labels", "rtss.dcm"]), &["RTSTRUCT", "contours", "SlicerRT"]);
@@ -183,7 +183,7 @@ fn a_surface_in_millimetres_is_not_taken_for_one_in_metres() {
     assert!(told.code == 0 && told.err.contains("larger than any organ"), "{}", told.err);
 }
 
-/// A scene of one body whose mesh is what stands here.
+/// A scene of one body with this mesh.
 fn scene(mesh: &str) -> Workshop {
     let text = format!(
         "[scene]\nuntil = 0.001\n[law.tissue]\ntype = \"neo-hookean\"\nyoung-modulus = 3e3\npoisson-ratio = 0.45\n\

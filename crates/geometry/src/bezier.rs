@@ -160,13 +160,14 @@ impl CurvedTriangle {
         along.cross(&across).normalize()
     }
 
-    /// The nearest place of the patch and its distance [m]: Gauss–Newton, in which each step goes to the nearest point of the tangent
+    /// The nearest point of the patch and its distance [m], by Gauss–Newton: each step moves to the nearest point of the tangent
     /// triangle, and is halved until it comes closer.
     pub fn closest(&self, point: &Vector3, start: [f64; 3]) -> ([f64; 3], f64) {
         self.closest_in(40, point, start)
     }
 
-    /// The same in a number of steps at most. Stopped early, the distance is that of a place nearby, never too small.
+    /// The same with a limited number of steps. An early stop returns the distance of a nearby point, which is never
+    /// too small.
     pub fn closest_in(&self, steps: usize, point: &Vector3, start: [f64; 3]) -> ([f64; 3], f64) {
         let mut at = start;
         let mut distance = (self.point(at) - point).norm();
@@ -283,7 +284,8 @@ impl CurvedTriangle {
 mod tests {
     use super::*;
 
-    /// Arcs: an edge whose end normals are those of a circle lies on it to 1e-3 of its sagitta at 40°.
+    /// Arcs: an edge with the end normals of a circle lies on the circle to 1e-3 of its sagitta at
+    /// 40°.
     #[test]
     fn an_edge_of_a_circle_is_an_arc() {
         let at = |angle: f64| Vector3::new(angle.cos(), angle.sin(), 0.0);

@@ -1,8 +1,7 @@
-//! The point of a surface that is closest to a point, and the direction in which the surface looks there. Normals are
-//! means at the nodes, weighted by area, linear in between: on a curved surface they turn smoothly, on a flat one they
-//! are exact. Leaves out: which side a point is on.
-//! Triangles are halved at the median of their centres until few are left; the nearer half is searched first and a box farther off than
-//! what was found is skipped. Of equally close triangles the first found counts.
+//! The point of a surface that is closest to a given point, and the normal there. Normals are area-weighted means at the nodes, linear
+//! in between: they turn smoothly on a curved surface and are exact on a flat one. Leaves out: which side a point is on.
+//! Triangles are halved at the median of their centres until few are left. The nearer half is searched first; a box farther away than
+//! the best result is skipped. Among equally close triangles, the first found wins.
 
 use crate::locate::{barycentric_of_closest, on_triangle};
 use crate::{Surface, Vector3};
@@ -25,7 +24,7 @@ struct Part {
     high: Vector3,
     first: u32,
     end: u32,
-    /// The second of its two halves, the first stands next to it; 0 of a part that is not halved.
+    /// The second of its two halves (the first is the next entry); 0 for a part that is not halved.
     second: u32,
 }
 
@@ -45,7 +44,7 @@ pub struct SurfacePoint {
     pub normal: Vector3,
     /// The face it lies on, as an index into the surface's faces.
     pub face: u32,
-    /// Three nodes of it between which it lies (of a quad those of one half).
+    /// The three nodes around it (for a quad, those of one half).
     pub nodes: [u32; 3],
     /// Their weights, which add up to 1.
     pub weights: [f64; 3],
@@ -121,8 +120,8 @@ impl SurfaceLocator {
         self.search(to, f64::INFINITY, |_| true)
     }
 
-    /// The closest point, less than `within` [m] away, of the faces whose normals have a cosine above `least` with the unit vector
-    /// `facing`; `None` if there is none.
+    /// The closest point, less than `within` [m] away, among the faces whose normals have a cosine above `least` with the unit
+    /// vector `facing`; `None` if none is near enough.
     pub fn closest_facing(
         &self,
         to: &Vector3,
@@ -201,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Over the top of a block 4 high, its bottom is the closest of what looks down, its sides of what looks aside.
+    /// Over the top of a block 4 high: its bottom is closest among downward faces, its sides among lateral ones.
     #[test]
     fn faces_that_look_the_other_way_do_not_count() {
         let mesh = block_of_tets([4, 4, 4]);

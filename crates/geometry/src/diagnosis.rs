@@ -25,10 +25,10 @@ pub struct CrowdedFace {
     pub cells: Vec<CellId>,
 }
 
-/// What is wrong with a mesh. Indices are counted from 0, lists are complete and in increasing order.
+/// The defects of a mesh. Indices are counted from 0, lists are complete and in increasing order.
 ///
-/// A cell stands in one list of cells at most: without valid nodes its volume isn't asked for, and a
-/// degenerate cell isn't called inverted as well.
+/// A cell appears in at most one list of cells: without valid nodes its volume isn't computed, and a
+/// degenerate cell isn't also inverted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Diagnosis {
     /// The mesh has no cells at all.
@@ -44,11 +44,11 @@ pub struct Diagnosis {
     /// Cells that name a node twice, or whose volume is below 1e-12 of the cube of their longest edge (area:
     /// the square).
     pub degenerate_cells: Vec<CellId>,
-    /// Pairs of cells with the same nodes: the first one and the one that repeats it.
+    /// Pairs of cells with the same nodes: the first one and its duplicate.
     pub duplicate_cells: Vec<[CellId; 2]>,
-    /// Nodes that no cell uses; in a mesh with volume cells: that none of these uses.
+    /// Nodes that no cell uses; in a mesh with volume cells, nodes that no volume cell uses.
     pub unused_nodes: Vec<u32>,
-    /// Pairs of nodes closer than 1e-9 of the bounding box's diagonal: the first and the one that repeats it.
+    /// Pairs of nodes closer than 1e-9 of the bounding box's diagonal: the first one and its duplicate.
     pub duplicate_nodes: Vec<[u32; 2]>,
     /// Faces that belong to more than two volume cells.
     pub crowded_faces: Vec<CrowdedFace>,
@@ -77,8 +77,8 @@ pub fn diagnose(mesh: &Mesh) -> Diagnosis {
     found
 }
 
-/// Renumbers inverted tets (two nodes swapped) and hexes (bottom and top swapped) where that makes them
-/// valid; returns how many it has repaired. Every other cell stays as it is.
+/// Renumbers inverted tets (two nodes swapped) and hexes (bottom and top swapped) if that makes them
+/// valid; returns the number of repaired cells. Other cells do not change.
 pub fn reorder(mesh: &mut Mesh) -> usize {
     let mut repaired = 0;
     for block in mesh.blocks.iter_mut().filter(|block| block.kind.dimension() == 3) {
@@ -152,7 +152,7 @@ fn duplicate_nodes(points: &[Vector3]) -> Vec<[u32; 2]> {
     let mut repeats = vec![false; points.len()];
     let mut pairs = Vec::new();
     for (node, p) in (0u32..).zip(points).filter(|(_, p)| is_finite(p)) {
-        // A node that repeats another isn't asked: with all nodes in one place that would be n² pairs.
+        // Duplicates of a node are skipped: with all nodes at one position they would give n² pairs.
         if !repeats[node as usize] {
             for near in tree.locate_within_distance([p.x, p.y, p.z], reach * reach) {
                 if near.data > node && !repeats[near.data as usize] {
@@ -313,8 +313,8 @@ impl Diagnosis {
         *self == meant
     }
 
-    /// True if a simulation can compute with every cell: there are cells, none is inverted or degenerate, and
-    /// all name nodes that exist and are finite. Other faults may still be a mistake.
+    /// True if a simulation can use every cell: cells exist, none is inverted or degenerate, and all their
+    /// nodes exist and are finite. Other defects may still be mistakes.
     pub fn is_usable(&self) -> bool {
         !self.no_cells
             && self.incomplete_blocks.is_empty()
@@ -332,7 +332,7 @@ impl fmt::Display for Diagnosis {
         let crowded = |face: &CrowdedFace| format!("{:?} of {} cells", face.nodes, face.cells.len());
         let mut lines = Vec::new();
         if self.no_cells {
-            lines.push("no cells at all".to_owned());
+            lines.push("no cells".to_owned());
         }
         lines.extend([
             line("blocks with an incomplete last cell", &self.incomplete_blocks, |kind| kind.name().into()),
@@ -346,7 +346,7 @@ impl fmt::Display for Diagnosis {
             line("faces of more than two cells", &self.crowded_faces, crowded),
             line("non-manifold edges", &self.non_manifold_edges, edge),
             line("open edges", &self.open_edges, edge),
-            line("edges between faces turned to opposite sides", &self.inconsistent_edges, edge),
+            line("edges between faces of opposite orientation", &self.inconsistent_edges, edge),
         ]);
         if self.components > 1 {
             lines.push(format!("{} separate parts", self.components));
@@ -454,7 +454,7 @@ mod tests {
     fn nothing_at_all_is_a_fault() {
         let found = diagnose(&Mesh::default());
         assert!(found.no_cells && !found.is_usable());
-        assert_eq!(found.to_string(), "no cells at all");
+        assert_eq!(found.to_string(), "no cells");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Labels of cells and their names: the words by which people choose regions of a mesh.
+//! Labels of cells and their names, by which users select regions of a mesh.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -13,7 +13,7 @@ use crate::surface::labels;
 
 /// Longest name [characters]; the rest is cut.
 const LONGEST_NAME: usize = 120;
-/// Likeness (Jaro and Winkler) from which on a name is taken for another one that was misspelt.
+/// Similarity (Jaro and Winkler) above which a name counts as a misspelling of another.
 const ALIKE: f64 = 0.7;
 
 /// A label of cells: its number or its name.
@@ -57,7 +57,7 @@ pub enum UnknownLabel {
     /// No cell has the number, or a number of the range.
     #[error("no cell has label {label}{}", instead(&None, .known))]
     Number {
-        /// What was asked for.
+        /// The requested label.
         label: String,
         /// All labels with their names, increasing.
         known: Vec<String>,
@@ -65,7 +65,7 @@ pub enum UnknownLabel {
     /// No label has the name.
     #[error("no label is named `{name}`{}", instead(.nearest, .known))]
     Name {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The most similar name, if one is similar.
         nearest: Option<String>,
@@ -73,9 +73,9 @@ pub enum UnknownLabel {
         known: Vec<String>,
     },
     /// Several labels have the name.
-    #[error("`{name}` is the name of the labels {}; choose by number", list(.labels))]
+    #[error("`{name}` names the labels {}; choose by number", list(.labels))]
     Ambiguous {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// Its labels, increasing.
         labels: Vec<i32>,
@@ -94,7 +94,7 @@ fn instead(nearest: &Option<String>, known: &[String]) -> String {
     }
 }
 
-/// The labels of some cells, with the names of those that have one.
+/// The labels of some cells, with their names, if any.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Labels(BTreeMap<i32, Option<String>>);
 
@@ -110,7 +110,7 @@ impl Labels {
         labels(mesh).into_iter().map(|label| (label, mesh.label_names.get(&label).cloned())).collect()
     }
 
-    /// Takes those of another mesh too. A label that has another name there keeps both.
+    /// Adds the labels of another mesh. A label with different names keeps both.
     pub fn join(&mut self, other: Self) {
         for (label, name) in other.0 {
             let own = self.0.entry(label).or_default();
@@ -124,7 +124,7 @@ impl Labels {
         }
     }
 
-    /// Leaves those that `keep` refuses out.
+    /// Removes labels for which `keep` is false.
     pub fn retain(&mut self, keep: impl Fn(i32) -> bool) {
         self.0.retain(|&label, _| keep(label));
     }
@@ -171,7 +171,8 @@ impl Labels {
         }
     }
 
-    /// The same, where a text may also be a range of numbers such as `5-8`: all labels in it.
+    /// The same, but a text may also be a range of numbers such as `5-8`: all existing labels in
+    /// it.
     ///
     /// # Errors
     /// If no cell has such a label, or several labels have the name.
@@ -211,7 +212,7 @@ impl Labels {
     }
 }
 
-/// Two numbers with a dash between them; the first sign may be that of a negative number.
+/// Two numbers with a dash between them; a first sign may belong to a negative number.
 fn range(text: &str) -> Option<[i32; 2]> {
     let dash = text.char_indices().skip(1).find(|(_, c)| *c == '-').map(|(at, _)| at)?;
     Some([text[..dash].trim().parse().ok()?, text[dash + 1..].trim().parse().ok()?])

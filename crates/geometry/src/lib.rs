@@ -1,6 +1,6 @@
-//! Meshes and what can be asked of their geometry. Knows nothing of physics.
+//! Meshes and their geometry. Knows nothing of physics.
 //!
-//! A block of two tets, from the first look to a weight:
+//! A block of two tets, from diagnosis to interpolation weights:
 //!
 //! ```
 //! use pliant_geometry::{

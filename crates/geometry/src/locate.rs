@@ -1,8 +1,8 @@
-//! Which cell a point lies in, and with which weights its nodes make up the point: p = Σ w_a X_a.
-//! Outside of all cells: the closest cell, extrapolated. A tet extrapolates with its own (barycentric)
-//! coordinates. A hex inverts its trilinear map by Newton's method; outside it takes the weights N_a(ξ) of its
-//! closest point and adds B_a · (p − X(ξ)) with its mean gradients B_a, which stays bounded where the trilinear
-//! map itself folds over and is as exact: Σ_a X_a ⊗ B_a = I, so that linear fields are reproduced everywhere.
+//! Finds the cell that contains a point and the weights of its nodes: p = Σ w_a X_a. A point outside all cells
+//! uses the closest cell, extrapolated. A tet extrapolates with its own (barycentric) coordinates. A hex
+//! inverts its trilinear map by Newton's method. Outside, it takes the weights N_a(ξ) of its closest point and
+//! adds B_a · (p − X(ξ)) with its mean gradients B_a. This stays bounded where the trilinear map itself folds
+//! over, and is as exact: Σ_a X_a ⊗ B_a = I, so linear fields are reproduced everywhere.
 
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
@@ -25,8 +25,8 @@ pub struct Location {
     pub kind: CellKind,
     /// The cell's index within the block of its kind.
     pub cell: u32,
-    /// Weights of the cell's nodes, the first `kind.node_count()` of eight: their sum is 1 and the weighted sum of
-    /// the nodes' positions is the point. All from 0 to 1 inside of the cell (but for rounding), not outside.
+    /// Weights of the cell's nodes, the first `kind.node_count()` of eight. Their sum is 1 and the weighted sum of
+    /// the node positions is the point. Inside the cell all are from 0 to 1 (up to rounding), outside not.
     pub weights: [f64; 8],
     /// Distance to the cell [m], 0 inside.
     pub distance: f64,
@@ -44,10 +44,10 @@ impl Location {
     }
 }
 
-/// A search tree over the tets and hexes of a mesh, of which it holds its own copy. Outside of the mesh the weights
-/// of the closest cell go on linearly: a tet's barycentric coordinates; a hex's weights at its closest point, plus
-/// its mean gradients times the way from there. Cells with nodes that do not
-/// exist or are not finite, and cells without volume, are left out.
+/// A search tree over the tets and hexes of a mesh, with its own copy of them. Outside the mesh, the weights of the
+/// closest cell continue linearly: for a tet its barycentric coordinates; for a hex the weights at its closest
+/// point, plus its mean gradients times the offset from there. Cells with missing or non-finite nodes and cells
+/// without volume are skipped.
 #[derive(Clone, Debug)]
 pub struct Locator {
     tree: RTree<Entry>,
@@ -97,15 +97,16 @@ impl Locator {
         Self { tree: RTree::bulk_load(entries) }
     }
 
-    /// The cell that contains `point` [m], else the closest one; `None` if there are no cells or the point is not
-    /// finite. On a face between cells it is the first of them; among equally close cells the one that has to
-    /// extrapolate least, then the first. Tets come before hexes.
+    /// The cell that contains `point` [m], otherwise the closest one; `None` without cells or if the point is not
+    /// finite. On a face between cells it is the first of them. Among equally close cells it is the one with the
+    /// smallest extrapolation, then the first. Tets come before hexes.
     pub fn locate(&self, point: Vector3) -> Option<Location> {
         if !is_finite(&point) {
             return None;
         }
         let mut best: Option<Candidate> = None;
-        // By distance of the box, never more than that of the cell: once a box is too far, so is the rest.
+        // Ordered by the distance of the box, a lower bound for that of the cell: after the first box that
+        // is too far, all others are.
         for (entry, box_distance_2) in self.tree.nearest_neighbor_iter_with_distance_2(point.into()) {
             if best.as_ref().is_some_and(|b| box_distance_2.sqrt() > b.distance + b.tolerance) {
                 break;
@@ -120,7 +121,7 @@ impl Locator {
     }
 }
 
-/// What one cell says of a point.
+/// The result of one cell for a point.
 struct Candidate {
     id: CellId,
     weights: [f64; 8],
@@ -445,7 +446,7 @@ mod tests {
         }
     }
 
-    /// Every cell asked for its distance, without the tree: slow and simple.
+    /// The distance of every cell, without the tree: slow and simple.
     #[test]
     fn closest_cell_outside_is_the_one_of_brute_force() {
         for mesh in meshes() {

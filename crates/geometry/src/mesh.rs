@@ -125,7 +125,7 @@ impl CellBlock {
         &self.nodes[index * n..(index + 1) * n]
     }
 
-    /// Removes the cells that are not kept, with their data and places in sets.
+    /// Removes cells that are not kept, with their data and set entries.
     fn retain(&mut self, kept: &[bool]) {
         if kept.iter().all(|&kept| kept) {
             return;
@@ -166,12 +166,12 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The block of a kind, if the mesh has such cells.
+    /// The block of a kind, if the mesh has these cells.
     pub fn block(&self, kind: CellKind) -> Option<&CellBlock> {
         self.blocks.iter().find(|block| block.kind == kind)
     }
 
-    /// The block of a kind, made empty if there is none.
+    /// The block of a kind, added empty if it is missing.
     pub fn block_mut(&mut self, kind: CellKind) -> &mut CellBlock {
         let at = self.blocks.iter().position(|block| block.kind == kind).unwrap_or_else(|| {
             self.blocks.push(CellBlock::new(kind, Vec::new()));
@@ -204,8 +204,8 @@ impl Mesh {
         names
     }
 
-    /// The points of a named set: those of the point set and the nodes of the cell sets of that name,
-    /// increasing, each once; `None` if no set has the name.
+    /// The points of a named set: its point set and the nodes of its cell sets, increasing, each
+    /// once; `None` if no set has the name.
     pub fn set_points(&self, name: &str) -> Option<Vec<u32>> {
         let mut found = false;
         let mut points = Vec::new();
@@ -224,7 +224,7 @@ impl Mesh {
         found.then_some(points)
     }
 
-    /// Whether each point is used: by a volume cell, or by any cell where the mesh has no volume cells.
+    /// Whether a volume cell uses each point, or any cell if the mesh has no volume cells.
     pub(crate) fn used_points(&self) -> Vec<bool> {
         let mut used = vec![false; self.points.len()];
         let solid = self.volume_blocks().any(|block| !block.is_empty());
@@ -237,8 +237,8 @@ impl Mesh {
         used
     }
 
-    /// Removes the points that no cell uses (where there are volume cells: none of these), with their data and the
-    /// surface cells that hang on them; returns how many points.
+    /// Removes points that no cell uses (with volume cells: that no volume cell uses), with their data and their
+    /// surface cells; returns the number of points.
     pub fn drop_unused_points(&mut self) -> usize {
         let used = self.used_points();
         for block in &mut self.blocks {
@@ -269,7 +269,7 @@ impl Mesh {
         self.renumber(&target, &kept)
     }
 
-    /// Moves every reference to a point to its target, then removes the points that are not kept.
+    /// Redirects every reference to a point to its target, then removes points that are not kept.
     fn renumber(&mut self, target: &[u32], kept: &[bool]) -> usize {
         let numbers = numbers_of(kept);
         for node in self.blocks.iter_mut().flat_map(|block| &mut block.nodes) {
@@ -296,7 +296,7 @@ impl Mesh {
     }
 }
 
-/// The new number of each item once those that are not kept are gone.
+/// The new number of each item after removing those that are not kept.
 fn numbers_of(kept: &[bool]) -> Vec<u32> {
     let mut next = 0_u32;
     let number = |&kept: &bool| {
@@ -306,7 +306,7 @@ fn numbers_of(kept: &[bool]) -> Vec<u32> {
     kept.iter().map(number).collect()
 }
 
-/// The values of the items that are kept, `size` values an item.
+/// The values of the kept items, `size` values per item.
 fn kept_items<T: Copy>(values: &[T], size: usize, kept: &[bool]) -> Vec<T> {
     let items = values.chunks(size.max(1)).zip(kept);
     items.filter(|(_, kept)| **kept).flat_map(|(item, _)| item.iter().copied()).collect()

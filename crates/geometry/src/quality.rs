@@ -1,8 +1,8 @@
 //! Size and shape of cells. The acoustic length l = V / ‖∫∇N‖ = (Σ_a |B_a|²)^(−1/2), with B_a the mean
-//! gradient of shape function a, is the length in the explicit time step: a step of l / c is stable, c being
-//! the speed of pressure waves. For a tet B_a = ∇N_a and |B_a| = 1/h_a with the heights h_a, so that
-//! l = 6 V / (Σ (2 A_a)²)^(1/2); for a hex the mean is taken exactly, by 2×2×2 Gauss points.
-//! Leaves out: materials, and with them the step itself.
+//! gradient of shape function a, is the characteristic length of the explicit time step: a step of l / c is
+//! stable, with the speed c of pressure waves. For a tet B_a = ∇N_a and |B_a| = 1/h_a with the heights h_a,
+//! so l = 6 V / (Σ (2 A_a)²)^(1/2); for a hex 2×2×2 Gauss points give the exact mean.
+//! Leaves out: materials, and with them the time step itself.
 
 use std::fmt;
 
@@ -73,9 +73,9 @@ pub fn acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
     if norm > 0.0 { volume / norm } else { 0.0 }
 }
 
-/// Acoustic length relative to that of the ideal cell of the same volume, a regular tet or a cube: 1 ideal,
-/// 0 flat, negative inverted. Without unit. No tet has more than 1; a hex may, a little (1.007 where the corners
-/// of a cube move by up to 0.4 of its side), because mean gradients don't see every distortion: ask
+/// Acoustic length relative to the ideal cell of the same volume, a regular tet or a cube: 1 ideal, 0 flat,
+/// negative inverted. Dimensionless. No tet exceeds 1. A hex may exceed it slightly (1.007 where the corners of
+/// a cube move by up to 0.4 of its side), because mean gradients don't detect every distortion: check
 /// [`scaled_jacobian`] too.
 pub fn relative_acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
     let volume = volume(kind, points);
@@ -140,7 +140,7 @@ impl Spread {
 pub struct QualityReport {
     /// Number of points.
     pub nodes: usize,
-    /// Number of cells by kind, in the order of `CellKind`, without the kinds that the mesh has none of.
+    /// Number of cells by kind, in the order of `CellKind`, without absent kinds.
     pub cells: Vec<(CellKind, usize)>,
     /// Cells left out of everything below: a node does not exist or is not finite.
     pub unmeasured: usize,
@@ -148,7 +148,7 @@ pub struct QualityReport {
     pub volume: f64,
     /// Acoustic length of tets and hexes [m].
     pub acoustic_length: Option<Spread>,
-    /// The cell of the smallest acoustic length: the one that sets the time step (the first, of equals).
+    /// The cell of the smallest acoustic length, which sets the time step (the first among equals).
     pub shortest: Option<CellId>,
     /// Smallest and largest dihedral angle of tets [°].
     pub dihedral: Option<[f64; 2]>,
@@ -260,7 +260,7 @@ impl fmt::Display for QualityReport {
             write!(f, "\n{:<16} {count}", format!("{} cells", kind.name()))?;
         }
         if self.unmeasured > 0 {
-            write!(f, "\nnot measured     {} (nodes missing or not finite)", self.unmeasured)?;
+            write!(f, "\nnot measured     {} (missing or non-finite nodes)", self.unmeasured)?;
         }
         if let Some(edge) = self.edge_length {
             let Spread { min, median, max } = edge;

@@ -1,5 +1,5 @@
-//! Which nodes or boundary faces of a mesh are meant, as a scene file says it: a box, a plane, a named set, a
-//! label, what lies between two labels, and unions, intersections and differences of these.
+//! Selects nodes or boundary faces of a mesh, as a scene file does: by a box, a plane, a named set, a label,
+//! the interface of two labels, and unions, intersections and differences of these.
 //! Leaves out: cells inside; selections of the moving body (positions are those of the mesh).
 
 use std::fmt;
@@ -102,13 +102,13 @@ fn one() -> u32 {
     1
 }
 
-/// Why a selection has no result.
+/// The error of a selection.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SelectionError {
     /// No set has the name.
     #[error("no set is named `{name}`{}", sets_instead(.nearest, .known))]
     UnknownSet {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The most similar name, if one is similar.
         nearest: Option<String>,
@@ -117,7 +117,7 @@ pub enum SelectionError {
     },
     /// A set of the mesh names something beyond its end.
     #[error(
-        "set `{name}` of the mesh is broken: it names {of} {index}, but there are {count}, counted from 0"
+        "set `{name}` of the mesh is broken: it contains {of} {index}, but there are {count}, counted from 0"
     )]
     BrokenSet {
         /// Name of the set.
@@ -132,7 +132,7 @@ pub enum SelectionError {
     /// A node index is beyond the last node.
     #[error("there is no node {id}: the mesh has {count} nodes, counted from 0")]
     NoSuchNode {
-        /// The index asked for.
+        /// The requested index.
         id: u32,
         /// Number of nodes.
         count: usize,
@@ -171,7 +171,7 @@ pub enum SelectionError {
         what: &'static str,
         /// The number.
         value: f64,
-        /// What it has to be.
+        /// The valid range.
         range: &'static str,
     },
     /// Too few operands.
@@ -191,7 +191,7 @@ pub enum SelectionError {
         selection: String,
         /// `nodes` or `boundary faces`.
         wanted: &'static str,
-        /// Why, as far as can be said, and where the mesh is.
+        /// The likely reason, and the position of the mesh.
         hint: String,
     },
 }
@@ -208,15 +208,16 @@ fn sets_instead(nearest: &Option<String>, known: &[String]) -> String {
 type Indices = Result<Vec<u32>, SelectionError>;
 
 impl Selection {
-    /// The selected nodes of `mesh`, increasing, each once, never none. `surface` is the boundary of `mesh`.
+    /// The selected nodes of `mesh`, increasing, each once, at least one. `surface` is the boundary of
+    /// `mesh`.
     pub fn nodes(&self, mesh: &Mesh, surface: &Surface) -> Indices {
         let view = View { mesh, surface };
         let nodes = self.evaluate(&|leaf| view.nodes(leaf))?;
         if nodes.is_empty() { Err(view.empty(self, Wanted::Nodes)) } else { Ok(nodes) }
     }
 
-    /// The selected faces of `surface`, which is the boundary of `mesh`, as indices into `surface.faces`,
-    /// increasing, each once, never none.
+    /// The selected faces of `surface`, the boundary of `mesh`, as indices into `surface.faces`,
+    /// increasing, each once, at least one.
     pub fn faces(&self, mesh: &Mesh, surface: &Surface) -> Indices {
         let view = View { mesh, surface };
         let faces = self.evaluate(&|leaf| view.faces(leaf))?;
@@ -311,7 +312,7 @@ impl Selection {
     }
 }
 
-/// What is selected from.
+/// The mesh to select from.
 struct View<'m> {
     mesh: &'m Mesh,
     surface: &'m Surface,
@@ -333,7 +334,7 @@ impl Wanted {
 }
 
 impl View<'_> {
-    /// Nodes of a selection that is no union, intersection or difference.
+    /// Nodes of a selection other than union, intersection and difference.
     fn nodes(&self, leaf: &Selection) -> Indices {
         match leaf {
             Selection::All => Ok((0..self.mesh.points.len() as u32).collect()),
@@ -362,7 +363,7 @@ impl View<'_> {
         }
     }
 
-    /// Boundary faces of a selection that is no union, intersection or difference.
+    /// Boundary faces of a selection other than union, intersection and difference.
     fn faces(&self, leaf: &Selection) -> Indices {
         match leaf {
             Selection::All | Selection::Boundary => Ok(self.faces_where(|_| true)),
@@ -517,7 +518,7 @@ impl View<'_> {
         }
         let nodes = self.nodes(selection).map_or(0, |nodes| nodes.len());
         if wanted == Wanted::Faces && nodes > 0 {
-            return format!("it holds {nodes} nodes, but they make up no whole boundary face");
+            return format!("it has {nodes} nodes, but no boundary face lies completely within them");
         }
         match selection {
             Selection::Boundary => "the mesh has no boundary faces".to_owned(),
@@ -823,9 +824,12 @@ mod tests {
         let mesh = block();
         let surface = boundary(&mesh);
         let error = parse("{ ids = [0, 1] }").faces(&mesh, &surface).unwrap_err().to_string();
-        assert!(error.contains("it holds 2 nodes, but they make up no whole boundary face"), "{error}");
+        assert!(
+            error.contains("it has 2 nodes, but no boundary face lies completely within them"),
+            "{error}"
+        );
         let error = parse(r#"{ set = "inner" }"#).faces(&mesh, &surface).unwrap_err().to_string();
-        assert!(error.contains("no whole boundary face"), "{error}");
+        assert!(error.contains("no boundary face lies completely within"), "{error}");
         let error = Selection::All.nodes(&Mesh::default(), &Surface::default()).unwrap_err().to_string();
         assert!(error.contains("the mesh has no points"), "{error}");
     }

@@ -43,8 +43,8 @@ impl Face {
         self.nodes().iter().map(|&n| points[n as usize]).sum::<Vector3>() / self.nodes().len() as f64
     }
 
-    /// From the nodes around it, of which neighbours that repeat are taken once (a side of a hex may be
-    /// collapsed); `None` if fewer than three differ.
+    /// From the nodes around it, without repeated neighbours (a side of a hex may be collapsed); `None`
+    /// if fewer than three differ.
     fn new(parent: CellId, around: impl Iterator<Item = u32>) -> Option<Self> {
         let mut corners = [0; 4];
         let mut count = 0;
@@ -113,16 +113,16 @@ pub(crate) fn valid_cells<'m>(
         .map(|(index, nodes)| (CellId { kind: block.kind, index: index as u32 }, nodes))
 }
 
-/// The boundary of a mesh. Faces stand in the order of their cells, tets before hexes, so that the same mesh
-/// always gives the same order.
+/// The boundary of a mesh. Faces follow the order of their cells, tets before hexes, so the same mesh always
+/// gives the same order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Surface {
     /// Its faces.
     pub faces: Vec<Face>,
 }
 
-/// The boundary of the volume cells of `mesh`: the faces that belong to one cell only. A mesh without volume
-/// cells is a surface itself: its triangles and quads are the faces, turned as they are in the mesh.
+/// The boundary of the volume cells of `mesh`: faces of one cell only. A mesh without volume cells is its
+/// own surface: its triangles and quads are the faces, with their orientation in the mesh.
 pub fn boundary(mesh: &Mesh) -> Surface {
     let mut faces: Vec<Face> = if mesh.volume_blocks().any(|block| !block.is_empty()) {
         let groups = FaceGroups::new(mesh);
@@ -163,8 +163,8 @@ impl Surface {
         normals.into_iter().map(|normal| normal.try_normalize(0.0).unwrap_or_default()).collect()
     }
 
-    /// The surface as a mesh of its own, with triangles and quads in the order of the faces, and for each of
-    /// its points the point of `points` that it was.
+    /// The surface as a separate mesh, with triangles and quads in the order of the faces, and for each of
+    /// its points the original index in `points`.
     pub fn to_mesh(&self, points: &[Vector3]) -> (Mesh, Vec<u32>) {
         let parents = self.nodes();
         let mut own = vec![0; points.len()];

@@ -1,5 +1,6 @@
-//! A corpus of malformed mesh files, and the files of `data/` cut off and changed at random, the same every time: an error or a mesh,
-//! never a panic, and no memory beyond what the file justifies. In a process of its own, whose largest memory is measured.
+//! A corpus of malformed mesh files, and the files of `data/` truncated and changed at random with a fixed seed. Each gives an error
+//! or a mesh, never a panic, and uses no more memory than the file justifies. The test runs in its own process, whose peak memory is
+//! measured.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -76,7 +77,7 @@ fn broken_meshes_give_errors_in_little_memory() {
     }
 }
 
-/// Writes the corpus anew: `cargo test -p pliant-geometry --test corpus write_the_corpus -- --ignored`.
+/// Regenerates the corpus: `cargo test -p pliant-geometry --test corpus write_the_corpus -- --ignored`.
 #[test]
 #[ignore = "writes files"]
 fn write_the_corpus() {

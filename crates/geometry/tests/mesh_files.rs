@@ -1,4 +1,4 @@
-//! Mesh files in and out: files of other programs (see `data/README.md`), round trips of our own, and broken
+//! Mesh files in and out: files of other programs (see `data/README.md`), our own round trips, and broken
 //! files, which must give errors and never a panic.
 
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ fn read_data(name: &str) -> MeshFile {
     read(&data().join(name)).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A folder of its own for a test, under Cargo's folder for them.
+/// A separate folder for a test, under Cargo's folder for tests.
 fn scratch(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
     fs::create_dir_all(&folder).unwrap();
@@ -100,7 +100,7 @@ fn names_of_labels_come_back_from_vtu_files() {
         write_vtu(&mut bytes, &mesh, &options).unwrap();
         let back = read_bytes(&bytes, Format::Vtu).unwrap();
         assert_eq!((&back.mesh.label_names, back.time), (&mesh.label_names, options.time));
-        // What names nothing is passed over; what are no codes is refused.
+        // Texts without a name are ignored; invalid codes are rejected.
         let text = String::from_utf8(bytes).unwrap();
         let odd = text.replace("\"ascii\">45 51 32", "\"ascii\">32 300 0 7 0 45 51 32");
         assert_eq!(read_bytes(odd.as_bytes(), Format::Vtu).unwrap().mesh.label_names.len(), 3);
@@ -246,7 +246,7 @@ fn gmsh_1_has_labels_but_no_names() {
     let of_five = tets.data["label"].values.iter().filter(|&&label| label == 5.0).count();
     assert_eq!(of_five, 24);
     assert!(tets.sets.is_empty());
-    assert!(file.notes.iter().any(|note| note.contains("48 cells were given once per physical group")));
+    assert!(file.notes.iter().any(|note| note.contains("48 cells are listed once per physical group")));
 }
 
 #[test]
@@ -294,7 +294,7 @@ fn gifti_says_what_it_leaves_out() {
     assert!(moved.notes[0].contains("was not applied"), "{:?}", moved.notes);
     for (from, to, says) in [
         ("Encoding=\"ASCII\"", "Encoding=\"ExternalFileBinary\"", "ExternalFileBinary"),
-        ("NIFTI_TYPE_FLOAT32", "NIFTI_TYPE_RGB24", "no type of points"),
+        ("NIFTI_TYPE_FLOAT32", "NIFTI_TYPE_RGB24", "not a type of points"),
         ("Dim1=\"3\"", "Dim1=\"2\"", "`Dim0` and `Dim1`"),
         ("Dim0=\"4\"", "Dim0=\"400000000\"", "far larger than the file"),
         ("SYSTEM \"http", "[<!ENTITY a \"b\">] \"http", "declarations of its own"),
@@ -561,7 +561,7 @@ fn content_tells_the_format_before_the_ending_does() {
     fs::copy(data().join("v42.vtk"), &path).unwrap();
     let file = read(&path).unwrap();
     assert_eq!(file.mesh, mixed());
-    assert!(file.notes[0].contains("the ending says VTU, but the file is legacy VTK"), "{:?}", file.notes);
+    assert!(file.notes[0].contains("the extension says VTU, but the file is legacy VTK"), "{:?}", file.notes);
 }
 
 // --- errors -------------------------------------------------------------------------------------------------
@@ -674,7 +674,8 @@ fn deep_xml_is_an_error_or_a_mesh_but_no_crash() {
     assert!(read_bytes(content.as_bytes(), Format::Vtu).is_err());
 }
 
-/// Cuts every file at many places and turns bytes: whatever comes, it is a mesh or an error, and soon.
+/// Truncates every file at many positions and changes bytes: the result is a mesh or an error, and
+/// quickly.
 #[test]
 fn broken_files_never_panic() {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
@@ -706,7 +707,7 @@ fn broken_files_never_panic() {
             let start = Instant::now();
             match read_bytes(bytes, *format) {
                 Ok(file) => {
-                    // What is read can be used: all nodes are there.
+                    // The result is usable: all nodes exist.
                     let points = file.mesh.points.len();
                     assert!(file.mesh.blocks.iter().flat_map(|b| &b.nodes).all(|&n| (n as usize) < points));
                     ok += 1;
@@ -879,7 +880,7 @@ fn gmsh_round_trip_keeps_everything_but_quotes() {
     assert_eq!(nodes, [0, 1, 4, 5, 8]);
     let mut expected = with_sets();
     expected.blocks.pop();
-    // Names stand in quotes and cannot hold any.
+    // Names are quoted and cannot contain quotes.
     let tets = expected.block_mut(CellKind::Tet);
     let set = tets.sets.remove("tumour \"2\"").unwrap();
     tets.sets.insert("tumour '2'".to_owned(), set);
@@ -907,7 +908,7 @@ fn gmsh_keeps_cell_order_labels_and_overlapping_sets() {
     let content = fs::read_to_string(&path).unwrap();
     assert!(content.contains("3 1 \"one\"") && content.contains("3 3 \"end\""), "{content}");
 
-    // Labels that cannot be numbers of groups are kept as data.
+    // Labels that cannot be group numbers become data.
     for labels in [vec![0.0, -1.0, 2.5, 1.0], vec![0.0; 4]] {
         mesh.block_mut(CellKind::Tet).data.insert("label".to_owned(), DataArray::scalar(labels));
         write(&path, &mesh).unwrap();

@@ -16,7 +16,7 @@ use crate::labels::Components;
 /// Voxels of a region with its margin: what 32-bit numbers of voxels bear, with room.
 const LARGEST: u64 = 1 << 30;
 
-/// What to do with a region before it is meshed; by default nothing. In this order: gaps, holes, pieces.
+/// Cleaning of a region before meshing; by default none. The order is: gaps, holes, pieces.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cleaning {
     /// Width of gaps and channels to close [m]; 0 closes none.
@@ -27,7 +27,7 @@ pub struct Cleaning {
     pub keep_largest: bool,
 }
 
-/// What a cleaning changed.
+/// The changes of a cleaning.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Cleaned {
     /// Voxels added in gaps.
@@ -118,7 +118,7 @@ impl LabelImage {
 }
 
 impl Region {
-    /// What of the region has this label in the image that it was cut from, in the same box.
+    /// The part of the region with this label in its source image, in the same box.
     pub fn part(&self, image: &LabelImage, label: i32) -> Result<Self, LabelError> {
         let first = image.grid.index(&self.grid.origin).map(f64::round);
         let dims = image.grid.dims;
@@ -155,7 +155,7 @@ impl Region {
             .map_or(0, |(_, count)| count)
     }
 
-    /// Cleans the region and tells what changed. The box grows where gaps are closed.
+    /// Cleans the region and returns the changes. Closing gaps enlarges the box.
     pub fn clean(mut self, cleaning: &Cleaning) -> Result<(Self, Cleaned), LabelError> {
         let mut done = Cleaned::default();
         let width = cleaning.close_gaps;
@@ -246,7 +246,7 @@ impl Region {
     }
 }
 
-/// Squared distance [m²] of each voxel to the nearest one that is (not) inside; infinite if there is none.
+/// Squared distance [m²] of each voxel to the nearest one that is (not) inside; infinite if none exists.
 fn distances(region: &Region, inside: bool) -> Vec<f64> {
     let spacing = Vector3::from(region.grid.spacing());
     let sites = nearest_sites(&region.grid, |at| region.inside[at] == inside);

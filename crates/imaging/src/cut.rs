@@ -1,5 +1,5 @@
-//! The part of an image that is a body, cut out of it: only the box round it is kept, and where that has too many voxels it is resampled to coarser
-//! ones, by majority. What lies at the border of the image may be cut off there, which is reported.
+//! Crops an image to the box of a body, and resamples it by majority if the box has too many voxels. Voxels at the border of the image are
+//! reported, because the body may be cut off there.
 
 use std::fmt;
 
@@ -15,7 +15,7 @@ use crate::names::LabelChoice;
 /// Voxels of a box from which on it is resampled, 322³. Fields of it take some 20 bytes a voxel.
 const MOST_VOXELS: usize = 1 << 25;
 
-/// What of an image is a body.
+/// The part of an image that is the body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Choice {
     /// These labels.
@@ -36,11 +36,11 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// What was done to the voxels, if anything.
+    /// The resampling, if any.
     pub fn note(&self) -> Option<String> {
         let [x, y, z] = self.labels.grid.spacing().map(|h| h * 1e3);
         (self.factors != [1; 3]).then(|| {
-            format!("resampled to voxels of {x:.3} × {y:.3} × {z:.3} mm, so that the box round the body has no more than 322³ of them")
+            format!("resampled to voxels of {x:.3} × {y:.3} × {z:.3} mm: the box of the body is limited to 322³ voxels")
         })
     }
 }
@@ -58,7 +58,7 @@ impl Border {
         const WORDS: [[&str; 2]; 3] = [["left", "right"], ["back", "front"], ["foot", "head"]];
         let along = |world: usize, axis: usize| grid.axes[(world, axis)] / grid.axes.column(axis).norm();
         let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-        // The world axes that those of the image follow best, each once.
+        // The world axes nearest to the axes of the image, each once.
         let fit = |order: &[usize; 3]| (0..3).map(|axis| along(order[axis], axis).abs()).sum::<f64>();
         let order = orders.into_iter().max_by(|a, b| fit(a).total_cmp(&fit(b))).unwrap_or([0, 1, 2]);
         let sides = [0, 1, 2].map(|axis| {
@@ -98,7 +98,7 @@ impl fmt::Display for Border {
 }
 
 impl Image {
-    /// The labels that words stand for; an error if the image is none of labels, or has not all of them.
+    /// The labels selected by words; an error if the image has no labels, or lacks some of them.
     pub fn choose(&self, choices: &[LabelChoice]) -> Result<Choice, LabelError> {
         let present = self.survey()?;
         let chosen = LabelChoice::resolve(choices, &self.names, &present)?;
@@ -230,7 +230,7 @@ impl Image {
                         }
                     }
                 }
-                // Of equals the inner or the outer one in turn, so that no volume is lost or won on the whole.
+                // Ties alternate between inner and outer, so the total volume is unbiased.
                 let turn = (i + j + k) % 2 == 0;
                 let best = votes.iter().max_by_key(|(label, count)| (*count, (*label != 0) == turn, *label));
                 *label = best.map_or(0, |(label, _)| *label);
@@ -240,7 +240,7 @@ impl Image {
     }
 }
 
-/// How many voxels along each axis become one: none until the box is too large, then those along the finest axis first.
+/// How many voxels along each axis become one: 1 unless the box is too large, first along the finest axes.
 fn factors(dims: [usize; 3], spacing: [f64; 3], coarsest: f64) -> [usize; 3] {
     let mut factors = [1; 3];
     let size = |factors: [usize; 3]| (0..3).map(|axis| dims[axis].div_ceil(factors[axis])).product::<usize>();

@@ -1,8 +1,8 @@
 //! A smooth field of a region: the signed distance to its surface, clipped, smoothed by a Gaussian, shifted so that its
 //! zero surface encloses the volume of the voxels, and linear in each cell of eight voxel centres. Nearest voxels are
-//! exact (Felzenszwalb, Huttenlocher 2012, row by row along each axis); the surface lies half a voxel before the nearest
-//! voxel of the other side, half a voxel being measured along the way to it.
-//! Distances use the lengths of the steps alone: in a sheared grid they are distances before shearing.
+//! exact (Felzenszwalb, Huttenlocher 2012, row by row along each axis). The surface is half a voxel before the nearest
+//! voxel of the other side, measured along the way to it.
+//! Distances use only the step lengths: in a sheared grid they are distances before shearing.
 
 use pliant_geometry::Vector3;
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ const NONE: u32 = u32::MAX;
 /// How a field is smoothed, in voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothing {
-    /// Standard deviation of the Gaussian along each axis [voxels]; 0 leaves the distance as it is.
+    /// Standard deviation of the Gaussian along each axis [voxels]; 0 does not smooth.
     pub sigma: f64,
     /// Distances beyond this are cut [voxels].
     pub clip: f64,
@@ -54,7 +54,7 @@ impl DistanceField {
     }
 
     /// Of a part of a whole in the same box: positive where the part is nearer than the rest of the whole, also outside
-    /// of both. Its zero surface goes on where the part meets the surface of the whole.
+    /// both. Its zero surface continues beyond the surface of the whole.
     pub fn within(
         part: &Region,
         whole: &Region,
@@ -66,20 +66,20 @@ impl DistanceField {
         Self::between(part, &rest, smoothing, progress)
     }
 
-    /// Of values at the points of a grid, positive inside [m], i fastest; `None` if none is, or their number is not that of the
-    /// grid, or the grid has less than two points along an axis.
+    /// Of values [m] at the points of a grid, positive inside, i fastest. `None` if no value is positive, their number does not
+    /// match the grid, or the grid has fewer than two points along an axis.
     pub fn of_values(grid: Grid, values: Vec<f32>) -> Option<Self> {
         let fits = values.len() == grid.len() && grid.dims.iter().all(|&n| n > 1);
         let bounds = fits.then(|| positive_box(&grid, &values)).flatten()?;
         Some(Self { grid, values, bounds })
     }
 
-    /// Volume of what is inside [m³]. A voxel counts by the part of it, one mean step thick, on the inner side of a plane at
-    /// the distance of its centre.
+    /// Volume of the inside [m³]. Each voxel counts with its part, one mean step thick, on the inner side of a plane at the
+    /// distance of its centre.
     pub fn volume(&self) -> f64 {
         let step = self.grid.voxel_volume().cbrt();
         let parts = self.values.par_iter().map(|&f| (0.5 + f64::from(f) / step).clamp(0.0, 1.0));
-        // In chunks of a fixed length, so that the sum does not depend on threads.
+        // In chunks of a fixed length, so the sum does not depend on threads.
         let sums: Vec<f64> = parts.chunks(1 << 16).map(|chunk| chunk.iter().sum()).collect();
         sums.iter().sum::<f64>() * self.grid.voxel_volume()
     }
@@ -125,7 +125,7 @@ impl DistanceField {
         if index == within { inner } else { inner - (self.grid.position(&within) - point).norm() }
     }
 
-    /// Gradient of the field at a point, without unit; 1 long but for smoothing.
+    /// Gradient of the field at a point, dimensionless; of length 1 except for smoothing.
     pub fn gradient(&self, point: &Vector3) -> Vector3 {
         let [first, part] = self.cell(&self.clamped(&self.grid.index(point)));
         let mut gradient = Vector3::zeros();
@@ -206,7 +206,7 @@ fn signed_distances(region: &Region, other: &[bool], clip: f64, progress: &dyn F
     (0..grid.len()).into_par_iter().map(distance).collect()
 }
 
-/// For each voxel the nearest one (by lengths of steps) of which `is_site` is true, or `u32::MAX`.
+/// For each voxel the nearest one (by step lengths) with `is_site` true, or `u32::MAX`.
 pub(crate) fn nearest_sites(grid: &Grid, is_site: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
     let spacing = grid.spacing();
     let mut sites: Vec<u32> = (0..grid.len() as u32)
@@ -254,7 +254,8 @@ fn rotated(values: &[u32], [nx, ny, nz]: [usize; 3]) -> Vec<u32> {
     out
 }
 
-/// The lower envelope of parabolas along a line: those that are lowest somewhere, and from where on.
+/// The lower envelope of parabolas along a line: the parabolas that are lowest somewhere, and their
+/// starts.
 #[derive(Default)]
 struct Envelope {
     /// Place, height and site.

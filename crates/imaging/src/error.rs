@@ -1,4 +1,4 @@
-//! What can be wrong with an image, where, and what to try.
+//! Errors of images: the problem, its position and a remedy.
 
 use std::path::PathBuf;
 
@@ -13,12 +13,12 @@ pub enum ImageError {
     Open {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Neither the first bytes nor the ending tell a format that can be read.
+    /// Neither the first bytes nor the extension identify a readable format.
     #[error(
-        "`{}` is not an image known here; formats read: NIfTI (.nii, .nii.gz, .hdr + .img), NRRD (.nrrd, .nhdr), MetaImage \
+        "`{}` is not a supported image; formats read: NIfTI (.nii, .nii.gz, .hdr + .img), NRRD (.nrrd, .nhdr), MetaImage \
          (.mha, .mhd), GIPL (.gipl, .gipl.gz), DICOM (a folder of slices, or a segmentation); convert it, e.g. with ITK-SNAP or 3D Slicer",
         path.display()
     )]
@@ -26,51 +26,51 @@ pub enum ImageError {
         /// The file.
         path: PathBuf,
     },
-    /// The file was opened, but what it holds is no usable image.
+    /// The file was opened, but contains no usable image.
     #[error("cannot read `{}`{place}: {problem}", path.display())]
     Content {
         /// The file, or the folder of a series.
         path: PathBuf,
         /// Where in the file.
         place: Place,
-        /// What is wrong there.
+        /// The problem.
         problem: Box<ImageProblem>,
     },
 }
 
-/// What is wrong inside an image file, and what to try.
+/// The problem inside an image file, and a remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImageProblem {
     /// The file ends too early, or announces more than it holds.
     #[error(
-        "the file ends while reading {reading}: {expected} bytes are needed and {found} are there; copy or export it again"
+        "the file ends while reading {reading}: {expected} bytes are needed, {found} exist; copy or export it again"
     )]
     Truncated {
-        /// What was being read.
+        /// The item being read.
         reading: &'static str,
         /// Bytes needed.
         expected: u64,
         /// Bytes found.
         found: u64,
     },
-    /// Compressed data that cannot be unpacked.
+    /// Compressed data that cannot be decompressed.
     #[error(
-        "{reading} cannot be unpacked after {found} bytes ({message}): the file is cut off or damaged; copy it again"
+        "{reading} cannot be decompressed after {found} bytes ({message}): the file is truncated or damaged; copy it again"
     )]
     Packed {
-        /// What was being read.
+        /// The item being read.
         reading: &'static str,
         /// Bytes unpacked before.
         found: u64,
-        /// What the decoder says.
+        /// Error of the decoder.
         message: String,
     },
     /// The first bytes are not those of the format.
-    #[error("the file is not {format}: {found}; check the ending, or that the file arrived whole")]
+    #[error("the file is not {format}: {found}; check the extension, or that the file is complete")]
     NotThisFormat {
         /// The format expected.
         format: &'static str,
-        /// What was found instead.
+        /// The content found.
         found: String,
     },
     /// A field of the header is missing.
@@ -79,22 +79,22 @@ pub enum ImageProblem {
         /// The field.
         field: &'static str,
     },
-    /// A field of the header has a value that cannot be.
+    /// A field of the header has an invalid value.
     #[error("`{field}` is {value}; {expected}")]
     BadField {
         /// The field.
         field: &'static str,
-        /// What it holds.
+        /// Its value.
         value: String,
-        /// What it must be, and how to get there.
+        /// The valid values, and a remedy.
         expected: &'static str,
     },
-    /// A variant of the format that is not read.
+    /// An unsupported variant of the format.
     #[error("{what} cannot be read here; {remedy}")]
     Unsupported {
-        /// What was found.
+        /// The item found.
         what: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// More voxels than allowed. Found before they are allocated.
@@ -109,7 +109,7 @@ pub enum ImageProblem {
     },
     /// More bytes than allowed. Found before they are read.
     #[error(
-        "the voxels take {:.1} GB unpacked, more than the {:.1} GB allowed; crop the image, resample it, or save it with smaller numbers \
+        "the voxels take {:.1} GB uncompressed, more than the {:.1} GB allowed; crop the image, resample it, or save it with smaller numbers \
          (8 or 16 bits)",
         *bytes as f64 * 1e-9, *limit as f64 * 1e-9
     )]
@@ -119,7 +119,7 @@ pub enum ImageProblem {
         /// Bytes allowed.
         limit: u64,
     },
-    /// The steps from voxel to voxel span no volume, or are no numbers.
+    /// The steps from voxel to voxel span no volume, or are not finite.
     #[error(
         "the steps from voxel to voxel ({}, {} and {} m) span no volume; correct the orientation in the header",
         shown(&steps[0]), shown(&steps[1]), shown(&steps[2])
@@ -129,9 +129,9 @@ pub enum ImageProblem {
         steps: [Vector3; 3],
     },
     /// A folder without any DICOM slice.
-    #[error("no DICOM slice among {files} files; give the folder that holds the slices themselves")]
+    #[error("no DICOM slice among {files} files; give the folder of the slices themselves")]
     NoSlices {
-        /// Files looked at.
+        /// Files examined.
         files: usize,
     },
     /// A folder with slices of several series.
@@ -140,26 +140,24 @@ pub enum ImageProblem {
         /// Each series: UID, description and number of slices.
         series: Vec<String>,
     },
-    /// The series asked for is not in the folder.
+    /// The requested series is not in the folder.
     #[error("no slice belongs to series {asked}; the folder holds {}", series.join("; "))]
     NoSuchSeries {
-        /// The UID asked for.
+        /// The requested UID.
         asked: String,
         /// Each series: UID, description and number of slices.
         series: Vec<String>,
     },
     /// A slice differs from the first one where all must agree.
-    #[error(
-        "`{file}` has {what} {found}, the first slice {expected}; remove what does not belong to the series"
-    )]
+    #[error("`{file}` has {what} {found}, the first slice {expected}; remove files of other series")]
     SliceDiffers {
         /// File name of the slice.
         file: String,
         /// What differs.
         what: &'static str,
-        /// What this slice has.
+        /// The value of this slice.
         found: String,
-        /// What the first slice has.
+        /// The value of the first slice.
         expected: String,
     },
     /// Slices are not evenly spaced.
@@ -178,7 +176,7 @@ pub enum ImageProblem {
         expected: f64,
     },
     /// Two slices at the same place.
-    #[error("`{first}` and `{second}` lie at the same place; keep one phase or echo in the folder")]
+    #[error("`{first}` and `{second}` lie at the same position; keep one phase or echo in the folder")]
     SamePlace {
         /// File name of one.
         first: String,
@@ -192,12 +190,12 @@ fn shown(step: &Vector3) -> String {
     format!("({:.3e}, {:.3e}, {:.3e})", step.x, step.y, step.z)
 }
 
-/// Why there is no region to work on.
+/// The error of a region.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LabelError {
     /// A value that is not a whole number.
     #[error(
-        "voxel {voxel:?} is {value}, which is no label (values from {} to {}); give a label image, or choose the region by a threshold",
+        "voxel {voxel:?} is {value}, which is not a label (values from {} to {}); give a label image, or choose the region by a threshold",
         range[0], range[1]
     )]
     NotWhole {
@@ -210,7 +208,7 @@ pub enum LabelError {
     },
     /// A scan instead of a segmentation: many values that change from voxel to voxel.
     #[error(
-        "this is no label image: {values}{} values from {} to {} that change from voxel to voxel, as in a CT or an MR scan; segment it \
+        "this is not a label image: {values}{} values from {} to {} change from voxel to voxel, as in a CT or MR scan; segment it \
          first, or choose the region by a threshold",
         if *more { " or more" } else { "" }, range[0], range[1]
     )]
@@ -233,7 +231,7 @@ pub enum LabelError {
         names: Vec<String>,
     },
     /// A name that several labels have.
-    #[error("`{name}` is the name of the labels {}; choose by number", list(labels))]
+    #[error("`{name}` names the labels {}; choose by number", list(labels))]
     AmbiguousName {
         /// The name.
         name: String,
@@ -241,16 +239,16 @@ pub enum LabelError {
         labels: Vec<i32>,
     },
     /// A range in which the image has no label.
-    #[error("no voxel has a label of {range}; the image has {}", list(present))]
+    #[error("no voxel has a label in {range}; the image has {}", list(present))]
     EmptyRange {
         /// The range.
         range: String,
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
-    /// An image that was to be a mask.
+    /// An image with labels instead of a mask.
     #[error(
-        "`{name}` is no mask: it has the labels {}; give it as the only image, or say from which value on a voxel is inside",
+        "`{name}` is not a mask: it has the labels {}; give it as the only image, or give a threshold",
         list(labels)
     )]
     NoMask {
@@ -270,24 +268,24 @@ pub enum LabelError {
     /// No voxel has the label.
     #[error("no voxel has label {label}; the image has {}", list(present))]
     Absent {
-        /// Label asked for.
+        /// Requested label.
         label: i32,
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
-    /// The background is no region.
+    /// The background was chosen.
     #[error("label 0 is the background; the image has {}", list(present))]
     Background {
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
-    /// No label asked for.
-    #[error("no label is chosen; the image has {}", list(present))]
+    /// No label was chosen.
+    #[error("no label was chosen; the image has {}", list(present))]
     NoneChosen {
         /// Labels of the image, without 0.
         present: Vec<i32>,
     },
-    /// A label asked for twice.
+    /// A label was chosen twice.
     #[error("label {label} is named twice; name each once")]
     Repeated {
         /// The label.
@@ -311,9 +309,9 @@ pub enum LabelError {
         /// Its value [m].
         value: f64,
     },
-    /// Two images of which the sum was asked for.
+    /// Two images to add have different voxels.
     #[error(
-        "the images have not the same voxels ({first:?} and {second:?}, or they lie elsewhere); resample one of them"
+        "the images have different voxels ({first:?} and {second:?}, or other positions); resample one of them"
     )]
     OtherVoxels {
         /// Voxels along i, j, k of the first.
@@ -322,9 +320,9 @@ pub enum LabelError {
         second: [usize; 3],
     },
     /// More labels than a mesh can tell apart.
-    #[error("{labels} labels asked for in one mesh, more than {limit}; mesh them in parts")]
+    #[error("{labels} labels in one mesh, more than {limit}; mesh them in parts")]
     TooManyLabels {
-        /// Labels asked for.
+        /// Requested labels.
         labels: usize,
         /// Labels allowed.
         limit: usize,
@@ -368,7 +366,7 @@ fn list(labels: &[i32]) -> String {
     }
 }
 
-/// A problem and its place: what the readers of bytes return, before the path is known.
+/// A problem and its position, as returned by the readers of bytes, which do not know the path.
 #[derive(Debug)]
 pub(crate) struct Fault {
     pub(crate) place: Place,
@@ -390,7 +388,7 @@ impl ImageProblem {
         Fault { place: Place::Line(line), problem: self }
     }
 
-    /// A field with a value that cannot be; long values are cut.
+    /// A field with an invalid value; long values are shortened.
     pub(crate) fn bad(field: &'static str, value: impl ToString, expected: &'static str) -> Self {
         let value = value.to_string();
         let mut short: String = value.chars().take(60).filter(|c| !c.is_control()).collect();

@@ -26,7 +26,7 @@ impl Grid {
         let finite = origin.iter().chain(axes.iter()).all(|x| x.is_finite());
         let lengths = [0, 1, 2].map(|a| axes.column(a).norm());
         let volume = axes.determinant();
-        // 1e-4: steps within 0.006° of a plane. No scanner tilts so far; such a matrix is damaged.
+        // 1e-4: steps within 0.006° of a plane. No scanner tilts this far; the matrix is damaged.
         let flat = volume.abs() <= 1e-4 * lengths.iter().product::<f64>();
         match axes.try_inverse() {
             Some(inverse) if finite && !flat && inverse.iter().all(|x| x.is_finite()) => {

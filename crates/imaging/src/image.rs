@@ -62,7 +62,7 @@ impl Order {
     }
 }
 
-/// The numbers of an image, as they stand in the file.
+/// The numbers of an image, as stored in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Numbers {
     pub(crate) scalar: Scalar,
@@ -114,7 +114,7 @@ impl Numbers {
 /// Different values that are counted; a scan may have more.
 const MOST_VALUES: usize = 1 << 16;
 
-/// What the values of an image are like: voxels and runs along i of each.
+/// Statistics of the values of an image: voxels and runs along i of each value.
 #[derive(Default)]
 struct Counts {
     values: BTreeMap<i32, [u64; 2]>,
@@ -142,8 +142,8 @@ impl Counts {
         self
     }
 
-    /// The labels without 0; an error where the values change from voxel to voxel, as in a scan. Of labels, a run along i is several voxels
-    /// long; of scans hardly more than one, but for what is around the patient.
+    /// The labels without 0; an error if the values change from voxel to voxel, as in a scan. A run of a label along i is several voxels
+    /// long, a run in a scan hardly more than one, except around the patient.
     fn labels(self) -> Result<Vec<i32>, LabelError> {
         let around = self.values.values().max().copied().unwrap_or_default();
         let [voxels, runs] =
@@ -165,7 +165,7 @@ pub struct Image {
     pub grid: Grid,
     /// The format found, e.g. `NIfTI-1`.
     pub format: String,
-    /// What was left out or assumed, one sentence each.
+    /// Skipped items and assumptions, one sentence each.
     pub notes: Vec<String>,
     /// Names of the labels that the file gives.
     pub names: LabelNames,
@@ -206,7 +206,7 @@ impl Image {
         Ok(regions)
     }
 
-    /// The label of a voxel of an image whose values are labels, which a survey tells.
+    /// The label of a voxel of a label image, as confirmed by a survey.
     pub(crate) fn label(&self, at: usize) -> i32 {
         match self.numbers.at(at) {
             Number::Integer(number) if self.scale == [1.0, 0.0] => number as i32,
@@ -214,7 +214,7 @@ impl Image {
         }
     }
 
-    /// The labels that there are, without 0, increasing; an error if the values are no labels.
+    /// The existing labels without 0, increasing; an error if the values are not labels.
     pub(crate) fn survey(&self) -> Result<Vec<i32>, LabelError> {
         let whole = |at: usize| match self.numbers.at(at) {
             Number::Integer(number) if self.scale == [1.0, 0.0] => i32::try_from(number)
@@ -267,8 +267,8 @@ impl Image {
         values.map(|x| [x, x]).reduce(|| [f64::INFINITY, f64::NEG_INFINITY], wider)
     }
 
-    /// Several masks of the same voxels as one label image: the first has label 1, the second 2, and so on, named after their files. Where they
-    /// overlap, the last one counts. A voxel is in a mask where its value is at least `least`, or where it is not 0.
+    /// Several masks on the same voxels as one label image: the first has label 1, the second 2, and so on, named after their files. Where
+    /// they overlap, the last one wins. A voxel is in a mask if its value is at least `least`, or, without `least`, not 0.
     pub fn of_masks(masks: &[(PathBuf, Self)], least: Option<f64>) -> Result<Self, LabelError> {
         let Some((_, first)) = masks.first() else {
             return Err(LabelError::NoneChosen { present: Vec::new() });
@@ -296,7 +296,7 @@ impl Image {
             notes.extend(mask.notes.iter().map(|note| format!("{name}: {note}")));
         }
         if shared > 0 {
-            notes.push(format!("the masks overlap in {shared} voxels, which count to the last one"));
+            notes.push(format!("the masks overlap in {shared} voxels, which belong to the last one"));
         }
         let bytes = labels.into_iter().flat_map(u16::to_le_bytes).collect();
         let numbers = Numbers { scalar: Scalar::U16, order: Order::Little, bytes };
@@ -314,14 +314,14 @@ impl Image {
         Ok(())
     }
 
-    /// All that makes the image what it is, piece by piece, for a hash of its content.
+    /// All data of the image, piece by piece, for a hash of its content.
     pub fn content(&self, mut hear: impl FnMut(&[u8])) {
         let Numbers { scalar, order, bytes } = &self.numbers;
         hear(format!("{:?} {scalar:?} {order:?} {:?}", self.grid, self.scale).as_bytes());
         hear(bytes);
     }
 
-    /// The sum of the values of two images of the same voxels, such as maps of the probability of grey and white matter.
+    /// The sum of two images on the same voxels, such as probability maps of grey and white matter.
     pub fn plus(&self, other: &Self) -> Result<Self, LabelError> {
         self.require_same_voxels(other)?;
         let sums: Vec<[u8; 8]> = (0..self.grid.len())
@@ -334,7 +334,7 @@ impl Image {
         Ok(Self { grid: self.grid, format, notes, names, numbers, scale: [1.0, 0.0] })
     }
 
-    /// Label 1 where the value lies in a range, 0 elsewhere: a region of a probability map or a level set.
+    /// Label 1 if the value is in a range, otherwise 0: a region of a probability map or a level set.
     pub fn threshold(&self, range: RangeInclusive<f64>) -> LabelImage {
         let label = |at| i32::from(range.contains(&self.value(at)));
         LabelImage { grid: self.grid, labels: (0..self.grid.len()).into_par_iter().map(label).collect() }

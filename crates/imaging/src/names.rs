@@ -34,8 +34,8 @@ impl LabelNames {
         names
     }
 
-    /// Reads a table of names, or takes the one that the word `totalsegmentator` stands for: label descriptions of ITK-SNAP, colour tables of
-    /// FreeSurfer or 3D Slicer, lines like `5 liver`, or JSON like `{"5": "liver"}` or `{"labels": {"liver": 5}}`.
+    /// Reads a table of names, or loads the one named `totalsegmentator`: label descriptions of ITK-SNAP, colour tables of FreeSurfer or 3D
+    /// Slicer, lines like `5 liver`, or JSON like `{"5": "liver"}` or `{"labels": {"liver": 5}}`.
     pub fn read(table: &Path) -> Result<Self, ImageError> {
         if table == Path::new("totalsegmentator") {
             return Ok(Self::total_segmentator());
@@ -49,10 +49,10 @@ impl LabelNames {
     pub(crate) fn of_table(text: &str) -> Result<Self, Fault> {
         let text = text.trim_start_matches('\u{feff}');
         let names = if text.trim_start().starts_with('{') { of_json(text)? } else { of_lines(text)? };
-        if names.0.is_empty() { Err(no_table("it names no label").into()) } else { Ok(names) }
+        if names.0.is_empty() { Err(no_table("it contains no label name").into()) } else { Ok(names) }
     }
 
-    /// Names a label. Control characters are left out; an empty name is none.
+    /// Names a label. Control characters are removed; an empty name is ignored.
     pub fn insert(&mut self, label: i32, name: &str) {
         let clean: String = name.trim().chars().filter(|c| !c.is_control()).take(LONGEST).collect();
         if !clean.is_empty() {
@@ -65,12 +65,12 @@ impl LabelNames {
         self.0.get(&label).map(String::as_str)
     }
 
-    /// The names of some labels, of those that have one.
+    /// The names of some labels, if they have one.
     pub fn of(&self, labels: &[i32]) -> BTreeMap<i32, String> {
         labels.iter().filter_map(|&label| Some((label, self.get(label)?.to_owned()))).collect()
     }
 
-    /// Takes names over those that are there.
+    /// Adds names; they override existing ones.
     pub fn extend(&mut self, others: &Self) {
         self.0.extend(others.0.iter().map(|(label, name)| (*label, name.clone())));
     }
@@ -80,7 +80,7 @@ impl LabelNames {
         self.get(label).map_or_else(|| label.to_string(), |name| format!("{label} ({name})"))
     }
 
-    /// The name of a label of the image that is most like one that was misspelt.
+    /// The label name of the image most similar to a misspelt one.
     fn nearest(&self, name: &str, present: &[i32]) -> Option<String> {
         let own = |&label: &i32| (label, self.get(label).map(str::to_owned));
         let known: Labels = present.iter().map(own).collect();
@@ -100,7 +100,7 @@ impl LabelNames {
         if labels.is_empty() {
             labels = of(&|known| known.eq_ignore_ascii_case(name));
         }
-        // A table may name several labels alike of which the image has one.
+        // A table may give one name to several labels, one of them in the image.
         if labels.len() > 1 {
             let there: Vec<i32> = labels.iter().copied().filter(|label| present.contains(label)).collect();
             labels = if there.is_empty() { labels } else { there };
@@ -139,7 +139,7 @@ impl FromStr for LabelChoice {
         if let Ok(label) = typed.parse() {
             return Ok(Self::One(label));
         }
-        // The first sign may be that of a negative number.
+        // The first sign may belong to a negative number.
         let dash = typed.char_indices().skip(1).find(|(_, c)| *c == '-').map(|(at, _)| at);
         let range = dash
             .and_then(|at| Some((typed[..at].trim().parse().ok()?, typed[at + 1..].trim().parse().ok()?)));
@@ -158,7 +158,7 @@ impl fmt::Display for LabelChoice {
 }
 
 impl LabelChoice {
-    /// The labels that choices stand for, of an image that has those of `present`.
+    /// The labels selected by choices, among the labels `present` in an image.
     pub fn resolve(choices: &[Self], names: &LabelNames, present: &[i32]) -> Result<Vec<i32>, LabelError> {
         let mut chosen = Vec::new();
         for choice in choices {
@@ -213,7 +213,7 @@ fn of_lines(text: &str) -> Result<LabelNames, Fault> {
         let end = line.find(|c: char| c.is_whitespace() || ",:;=".contains(c)).unwrap_or(line.len());
         let rest = line[end..].trim_start_matches(|c: char| c.is_whitespace() || ",:;=".contains(c));
         let Ok(label) = line[..end].parse() else {
-            return Err(no_table(format!("line {number} does not begin with a label")).at_line(number));
+            return Err(no_table(format!("line {number} does not start with a label")).at_line(number));
         };
         match rest.split_once('"').and_then(|(_, quoted)| quoted.rsplit_once('"')) {
             Some((name, _)) => names.insert(label, name),

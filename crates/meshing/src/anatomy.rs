@@ -1,5 +1,5 @@
-//! What a mesher of organs is given: the field of the whole body, and of each of its materials where there are several.
-//! A point is of the material whose field is largest. Fields come from the regions of an image, or from functions.
+//! Input of an organ mesher: the field of the whole body, and fields of its materials if there are several. A point
+//! belongs to the material with the largest field. Fields come from the regions of an image, or from functions.
 
 use pliant_geometry::{DataArray, Mesh, Vector3};
 use pliant_imaging::{Cleaned, Cleaning, DistanceField, LabelError, LabelImage, Smoothing};
@@ -29,7 +29,7 @@ pub struct Anatomy<'a> {
     whole: Box<dyn ImplicitField + 'a>,
     /// Labels and fields of the materials; one material has the field of the whole body.
     materials: Vec<(i32, Option<Box<dyn ImplicitField + 'a>>)>,
-    /// Volume of each material in the image [m³], where it comes from one.
+    /// Volume of each material in the image [m³], if it comes from an image.
     volumes: Vec<Option<f64>>,
     /// What its fields were made of, if they were.
     given: Option<Given>,
@@ -48,7 +48,7 @@ impl<'a> Anatomy<'a> {
         self
     }
 
-    /// Adds a material: what of the body is inside `field` and not deeper inside that of another material. The rest is of
+    /// Adds a material: the part of the body inside `field` and not deeper inside another material. The rest belongs to
     /// the first material.
     pub fn with_inner(mut self, label: i32, field: impl ImplicitField + 'a) -> Self {
         self.materials.push((label, Some(Box::new(field))));
@@ -83,7 +83,8 @@ impl<'a> Anatomy<'a> {
         }
         volumes[0] = Some(whole.volume() - others);
         if labels.len() > 2 {
-            // What several others leave is no good measure of the first one: where two of them meet, it is as near as they are.
+            // The remainder of several others is a poor measure of the first one: where two of them meet, it is as near as they
+            // are.
             let first = DistanceField::within(
                 &whole.part(image, labels[0])?,
                 &whole,
@@ -101,7 +102,7 @@ impl<'a> Anatomy<'a> {
         self.materials[material - 1].1.as_deref().unwrap_or(&*self.whole)
     }
 
-    /// Field of the first material, if it is more than what the others leave.
+    /// Field of the first material, if it is larger than the remainder of the others.
     pub(crate) fn first(&self) -> Option<&dyn ImplicitField> {
         self.materials[0].1.as_deref().map(|field| field as &dyn ImplicitField)
     }
@@ -138,17 +139,17 @@ impl<'a> Anatomy<'a> {
         self.materials.iter().map(|(label, _)| *label).collect()
     }
 
-    /// What it was made of.
+    /// The source of the body.
     pub(crate) fn given(&self) -> Option<&Given> {
         self.given.as_ref()
     }
 
-    /// The faces of what it was made of.
+    /// The faces of its source.
     pub(crate) fn patches(&self) -> Patches {
         self.given.as_ref().map_or_else(Patches::default, |given| given.patches(&self.labels()))
     }
 
-    /// How far the surface of a mesh may be from what was given without being wrong [m]: the diagonal of a voxel of an image, else 0.
+    /// Tolerated distance of a mesh from its input [m]: the diagonal of a voxel for an image, otherwise 0.
     pub fn resolution(&self) -> f64 {
         self.given.as_ref().map_or(0.0, Given::resolution)
     }
@@ -159,7 +160,8 @@ impl<'a> Anatomy<'a> {
     }
 }
 
-/// Whether labels can be meshed together: at least one, each once, none the background, not too many.
+/// Checks that labels can be meshed together: at least one, each once, without the background, not
+/// too many.
 fn require_choice(image: &LabelImage, labels: &[i32]) -> Result<(), LabelError> {
     let repeated = (1..labels.len()).find(|&at| labels[..at].contains(&labels[at]));
     match repeated {

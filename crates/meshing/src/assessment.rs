@@ -1,4 +1,4 @@
-//! How a mesh differs from what it was made of: distances, labels, and what it misses.
+//! Differences between a mesh and its input: distances, labels, missed features.
 
 use pliant_geometry::Mesh;
 use serde::Serialize;
@@ -16,7 +16,7 @@ pub struct Assessment {
     pub deviation: Deviation,
     /// Its labels and interfaces.
     pub regions: Regions,
-    /// What is missed, too far off, or too small or large.
+    /// Features that are missed, too far away, or of wrong size.
     pub missed: Vec<Missed>,
 }
 

@@ -1,10 +1,10 @@
-//! A tetrahedral mesh that changes: points move, edges collapse or are halved, tets go. Each point knows its tets and
-//! the *sides* that meet there: the materials of its tets, and the outside if it lies on the boundary. A point with two
-//! sides lies on a surface, with three on a line, with four it is a corner.
+//! A tetrahedral mesh under modification: points move, edges collapse or are halved, tets are removed. Each point
+//! stores its tets and its *sides*: the materials of its tets, and the outside if it is on the boundary. A point with
+//! two sides lies on a surface, with three on a line, with four it is a corner.
 
 use pliant_geometry::Vector3;
 
-/// A tet that is no more.
+/// A removed tet.
 const GONE: [u32; 4] = [u32::MAX; 4];
 
 /// Stands for the outside in links: every boundary face is joined with it to a tet.
@@ -66,7 +66,7 @@ impl Complex {
         complex
     }
 
-    /// Finds the sides of all points anew.
+    /// Recomputes the sides of all points.
     pub(crate) fn find_sides(&mut self) {
         self.sides = (0..self.points.len() as u32).map(|point| self.sides_of(point)).collect();
     }
@@ -77,7 +77,7 @@ impl Complex {
         materials | if self.rim_of(point, |_| true).is_empty() { 0 } else { OUTSIDE }
     }
 
-    /// Tets that there are, in order.
+    /// The existing tets, in order.
     pub(crate) fn alive(&self) -> impl Iterator<Item = u32> {
         (0_u32..).zip(&self.tets).filter(|(_, nodes)| **nodes != GONE).map(|(tet, _)| tet)
     }
@@ -101,7 +101,7 @@ impl Complex {
         a.min(b).min(c.min(d)) / 8_f64.sqrt()
     }
 
-    /// Acoustic length of a tet as a part of that of the ideal one.
+    /// Acoustic length of a tet over that of the ideal one.
     pub(crate) fn part(&self, tet: u32) -> f64 {
         self.length(tet) / self.ideal(self.tets[tet as usize])
     }
@@ -116,7 +116,7 @@ impl Complex {
         (self.points[p as usize] - self.points[q as usize]).norm() > self.longest(p, q)
     }
 
-    /// Whether a move of a point to `place` makes an edge of it too long, that to `without` left out, or lengthens one that is too long.
+    /// Whether moving a point to `place` makes one of its edges too long (except that to `without`), or lengthens one that already is.
     pub(crate) fn stretches(&self, point: u32, place: &Vector3, without: u32) -> bool {
         let from = &self.points[point as usize];
         let stretched = |&node: &u32| {
@@ -127,7 +127,7 @@ impl Complex {
         self.star[point as usize].iter().flat_map(|&tet| &self.tets[tet as usize]).any(stretched)
     }
 
-    /// Whether an edge gets too long where `gone` is joined into `kept` at `place`.
+    /// Whether an edge becomes too long when `gone` is joined into `kept` at `place`.
     pub(crate) fn overstretches(&self, gone: u32, kept: u32, place: &Vector3) -> bool {
         let too_long = |&node: &u32| {
             let length = (place - self.points[node as usize]).norm();
@@ -163,9 +163,9 @@ impl Complex {
         self.alive().map(|tet| self.part(tet)).fold(f64::INFINITY, f64::min)
     }
 
-    /// What a point would bear on its own if it were at `place` [m]: 1 / √(K / m) with its stiffness K = Σ V |∇N|² and its mass m = Σ V / 4
-    /// over its tets, of material with a wave speed of 1. A step above twice that is unstable, since K c² / m is a Rayleigh quotient of
-    /// M⁻¹ K. In the ideal lattice it is the acoustic length; points with few tets can fall to half of theirs.
+    /// Acoustic length of a single point if it were at `place` [m]: 1 / √(K / m) with its stiffness K = Σ V |∇N|² and its mass m = Σ V / 4
+    /// over its tets, of material with a wave speed of 1. A step above twice that is unstable, since K c² / m is a Rayleigh quotient of M⁻¹
+    /// K. In the ideal lattice it equals the acoustic length; points with few tets can have half of their tets' length.
     pub(crate) fn nodal_length(&self, point: u32, place: &Vector3) -> f64 {
         let (mut stiffness, mut mass) = (0.0, 0.0);
         for &tet in &self.star[point as usize] {
@@ -262,7 +262,8 @@ impl Complex {
         }
     }
 
-    /// Joins `gone` into `kept`, which moves to `position`. The caller has asked [`Self::may_collapse`].
+    /// Joins `gone` into `kept`, which moves to `position`. The caller has checked
+    /// [`Self::may_collapse`].
     pub(crate) fn collapse(&mut self, gone: u32, kept: u32, position: Vector3) {
         for tet in std::mem::take(&mut self.star[gone as usize]) {
             if self.tets[tet as usize].contains(&kept) {
@@ -365,7 +366,7 @@ fn distinct<T: Ord>(mut all: Vec<T>) -> Vec<T> {
     all
 }
 
-/// What is in both of two sorted lists.
+/// The intersection of two sorted lists.
 fn common<T: Ord + Copy>(a: &[T], b: &[T]) -> Vec<T> {
     a.iter().copied().filter(|item| b.binary_search(item).is_ok()).collect()
 }

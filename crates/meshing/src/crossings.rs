@@ -1,4 +1,4 @@
-//! Where a surface passes through itself: pairs of triangles of which an edge of one pierces the other.
+//! Self-intersections of a surface: pairs of triangles in which an edge of one pierces the other.
 //! Leaves out: triangles that only touch, or lie in one plane.
 
 use pliant_geometry::Vector3;
@@ -21,7 +21,8 @@ impl RTreeObject for Boxed {
     }
 }
 
-/// Pairs of triangles that cross, smaller number first, increasing, and a point where the first pair does [m].
+/// Pairs of intersecting triangles, smaller number first, increasing, and a point of the first intersection
+/// [m].
 pub(crate) fn crossings(points: &[Vector3], triangles: &[[u32; 3]]) -> (Vec<[u32; 2]>, Option<Vector3>) {
     let boxed = |(number, nodes): (u32, &[u32; 3])| {
         let [a, b, c] = nodes.map(|n| points[n as usize]);
@@ -44,7 +45,8 @@ pub(crate) fn crossings(points: &[Vector3], triangles: &[[u32; 3]]) -> (Vec<[u32
 }
 
 impl TriangleMesh {
-    /// Whether triangles would cross each other or those that there are, but for some that would be gone.
+    /// Whether new triangles would intersect each other or existing ones, except some that would be
+    /// removed.
     pub(crate) fn would_cross(&self, new: &[[u32; 3]], gone: &[u32]) -> bool {
         let corners = || new.as_flattened().iter().map(|&n| self.points[n as usize]);
         let Some(start) = corners().next() else { return false };
@@ -77,9 +79,9 @@ fn meet(points: &[Vector3], s: [u32; 3], t: [u32; 3]) -> Option<Vector3> {
     })
 }
 
-/// Where a segment passes through a triangle, its edges included: where a body and its mirror image meet, edges cross edges.
+/// Where a segment pierces a triangle, edges included: where a body meets its mirror image, edges cross edges.
 fn pierced([p, q]: [Vector3; 2], [a, b, c]: [Vector3; 3]) -> Option<Vector3> {
-    // Six times signed volumes; what is below round-off touches.
+    // Six times signed volumes; values below round-off count as touching.
     let volume = |u: &Vector3, v: &Vector3, w: &Vector3, x: &Vector3| (v - u).cross(&(w - u)).dot(&(x - u));
     let size = [b - a, c - a, p - a, q - a].iter().map(|x| x.amax()).fold(0.0, f64::max);
     let least = 1e-12 * size.powi(3);

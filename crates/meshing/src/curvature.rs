@@ -1,6 +1,6 @@
-//! Curvature of a surface at its points: a linear change of the points' normals over each triangle, turned into the points' tangent planes
-//! and averaged by area (Rusinkiewicz 2004). Positive where the surface is convex seen from outside: 1/R on a ball.
-//! Leaves out: points at borders, where normals know one side only.
+//! Curvature of a surface at its points: a linear change of the points' normals over each triangle, rotated into the points' tangent
+//! planes and averaged by area (Rusinkiewicz 2004). Positive where the surface is convex seen from outside: 1/R on a ball. Leaves out:
+//! points at borders, whose normals are one-sided.
 
 use nalgebra::{Matrix3, Rotation3};
 use pliant_geometry::Vector3;
@@ -26,7 +26,7 @@ pub struct Curvature {
 }
 
 impl TriangleMesh {
-    /// Curvature at all points but those of borders; `None` if there are no others.
+    /// Curvature at all points except border points; `None` if no others exist.
     pub fn curvature(&self) -> Option<Curvature> {
         let normals: Vec<Vector3> =
             (0..self.points.len() as u32).into_par_iter().map(|p| self.round_normal(p)).collect();
@@ -37,7 +37,7 @@ impl TriangleMesh {
         for (t, tensor) in found {
             let (normal, weight) = (self.normal(t), self.area(t) / 3.0);
             for node in self.triangles[t as usize] {
-                // Opposite normals have no shortest turn: such a point is no part of a smooth surface.
+                // Opposite normals have no shortest rotation: the surface is not smooth at this point.
                 let Some(turn) = Rotation3::rotation_between(&normal, &normals[node as usize]) else {
                     continue;
                 };
@@ -69,7 +69,7 @@ impl TriangleMesh {
         })
     }
 
-    /// The normal at a point, exact where it and its neighbours lie on a ball (Max 1999).
+    /// The normal at a point, exact if the point and its neighbours lie on a ball (Max 1999).
     fn round_normal(&self, point: u32) -> Vector3 {
         let of = |&t: &u32| {
             let at = self.triangles[t as usize].iter().position(|&n| n == point).unwrap_or(0);

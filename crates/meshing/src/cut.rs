@@ -1,7 +1,6 @@
-//! Cuts a mesh along a surface: inner materials out of the whole body, and gaps that edges bridge unseen, both ends being
-//! inside. Points near the surface move
-//! onto it first, then every edge that it still crosses is halved there, the longest first; whatever the order, the mesh
-//! stays conforming, and no edge is crossed any more.
+//! Cuts a mesh along a surface: separates inner materials from the whole body, and opens gaps bridged by edges with both
+//! ends inside. Points near the surface first move onto it. Then every edge that still crosses it is halved there, the
+//! longest first. The mesh stays conforming in any order, and no edge crosses the surface afterwards.
 
 use pliant_geometry::Vector3;
 
@@ -9,7 +8,7 @@ use crate::complex::{Complex, OUTSIDE};
 use crate::field::ImplicitField;
 use crate::surfaces::Surfaces;
 
-/// Halvings of an edge to find where a surface cuts it.
+/// Bisections of an edge to find its intersection with a surface.
 const BISECTIONS: u32 = 24;
 
 /// A cut nearer to an end than this part of its edge moves that end, if it may move.
@@ -21,7 +20,8 @@ const AT_END: f64 = 0.1;
 /// Moving a point onto the surface must leave its tets this part of the ideal acoustic length.
 const LEAST_AFTER_MOVE: f64 = 0.2;
 
-/// An edge bridges a gap where the field falls below minus this part of the lattice constant along it.
+/// An edge bridges a gap if the field falls below minus this fraction of the lattice constant along
+/// it.
 const GAP: f64 = 0.1;
 
 /// Where a surface crosses an edge.
@@ -32,7 +32,7 @@ struct Crossing {
     length: f64,
 }
 
-/// Cuts out all materials but the first.
+/// Separates all materials except the first.
 pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>) {
     for material in 2..=surfaces.materials() {
         let inside = |point: &Vector3| surfaces.inside(material, point);
@@ -47,7 +47,7 @@ pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>) {
     }
 }
 
-/// Cuts off what is outside a body.
+/// Removes the part outside a body.
 pub(crate) fn cut_outside(complex: &mut Complex, field: &dyn ImplicitField) {
     let inside = |point: &Vector3| field.value(point);
     let values = complex.points.iter().map(inside).collect();
@@ -65,7 +65,7 @@ pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField) -> usiz
     let mut values: Vec<f64> = complex.points.iter().map(inside).collect();
     let deepest = |[p, q]: [u32; 2]| {
         let [p, q] = [p, q].map(|point| complex.points[point as usize]);
-        // From the middle outwards, so that of equal depths the one nearest to it counts.
+        // From the middle outwards, so the one nearest to it wins among equal depths.
         let samples = [4, 3, 5, 2, 6, 1, 7].map(|eighths| p.lerp(&q, f64::from(eighths) / 8.0));
         let depths = samples.map(|point| (inside(&point), point));
         depths.into_iter().fold(depths[0], |least, other| if other.0 < least.0 { other } else { least })
@@ -87,7 +87,7 @@ pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField) -> usiz
         complex.bisect(ends, point);
         values.push(value);
     }
-    // Points of the boundary lie on the surface but for round-off.
+    // Boundary points lie on the surface up to round-off.
     for ((value, sides), size) in values.iter_mut().zip(&complex.sides).zip(&complex.size) {
         if sides & OUTSIDE != 0 && value.abs() < 1e-6 * size {
             *value = 0.0;
@@ -102,7 +102,7 @@ pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField) -> usiz
     count
 }
 
-/// The surface where a function is zero.
+/// The zero surface of a function.
 struct Surface<'a> {
     inside: &'a dyn Fn(&Vector3) -> f64,
 }
@@ -136,7 +136,7 @@ impl Surface<'_> {
         complex.alive().map(|tet| (tet, side(tet))).collect()
     }
 
-    /// Edges with ends on both sides, and where the surface crosses them.
+    /// Edges that cross the surface, and their intersections.
     fn crossings(&self, complex: &Complex, values: &[f64]) -> Vec<Crossing> {
         let crossed = |[p, q]: &[u32; 2]| values[*p as usize] * values[*q as usize] < 0.0;
         let edges = complex.edges().into_iter().filter(crossed);

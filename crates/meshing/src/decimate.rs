@@ -1,6 +1,6 @@
-//! Fewer triangles for the same surface: edges collapse, cheapest first, where cheap is the sum of squared distances from the planes
-//! around (Garland and Heckbert 1997), each weighted by its area, with planes through borders and creases so that these stay.
-//! A collapse must keep the topology, the side on which faces look and some of their shape.
+//! Fewer triangles for the same surface: edges collapse in the order of their cost. The cost is the sum of squared distances from
+//! the surrounding planes (Garland and Heckbert 1997), each weighted by its area, with planes through borders and creases to
+//! preserve these. A collapse must keep the topology, the orientation of faces and some of their shape.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -25,7 +25,7 @@ const LEAST_SHAPE: f64 = 0.1;
 pub enum Fewer {
     /// At this many triangles.
     Triangles(usize),
-    /// Before the root mean square distance from the planes that a point stands for exceeds this [m].
+    /// Until the root mean square distance from the planes of a point exceeds this [m].
     Distance(f64),
 }
 
@@ -104,13 +104,12 @@ struct Decimation<'m> {
     quadrics: Vec<[Quadric; 2]>,
     changes: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
-    /// Points are measured from here, so that sums of squares keep their digits [m].
+    /// Origin of the points, so that sums of squares keep their digits [m].
     origin: Vector3,
 }
 
 impl TriangleMesh {
-    /// Makes the surface one of fewer triangles. Returns their number, which stays above the one asked for where nothing more can
-    /// collapse.
+    /// Reduces the number of triangles and returns it. It exceeds the requested number if nothing more can collapse.
     pub fn decimate(&mut self, until: Fewer) -> Result<usize, MeshingError> {
         let (least, limit) = match until {
             Fewer::Triangles(number) => {

@@ -1,5 +1,5 @@
-//! How far the boundary of a mesh and the surface of the body it was made of are apart, both ways: the surface as it was given, or
-//! where a field is zero.
+//! Distance between the boundary of a mesh and the surface of its body in both directions. The surface is given, or the zero
+//! surface of a field.
 
 use std::collections::HashMap;
 
@@ -29,7 +29,7 @@ pub(crate) const SAMPLES_PER_EDGE: f64 = 4.0;
 /// Distances between the boundary of a mesh and the surface of its body, both ways [m].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Deviation {
-    /// What the surface of the body is.
+    /// The reference surface of the body.
     pub to: MeasuredTo,
     /// Largest distance from the mesh's boundary to the surface.
     pub largest_from_mesh: f64,
@@ -64,7 +64,7 @@ pub(crate) struct Measured {
 type Samples = (Vec<Sample>, Vec<f64>);
 
 impl Measured {
-    /// Distances of a mesh that is to be held within one [m]: to triangles where the body is given by them, else to its field.
+    /// Distances of a mesh with a distance bound [m]: to triangles if they define the body, otherwise to its field.
     pub(crate) fn of(mesh: &Mesh, anatomy: &Anatomy<'_>, distance: f64) -> Result<Self, MeshingError> {
         if let Some(given) = anatomy.given().filter(|given| given.measured_to() == MeasuredTo::Triangles) {
             let (made, patches) = (faces_between_labels(mesh), anatomy.patches());
@@ -116,7 +116,7 @@ impl Measured {
         })
     }
 
-    /// The largest distance of both ways [m].
+    /// The largest distance of both directions [m].
     pub(crate) fn largest(&self) -> f64 {
         self.from_mesh.1.iter().chain(&self.from_body.1).copied().fold(0.0, f64::max)
     }
@@ -149,8 +149,8 @@ impl Measured {
 }
 
 impl Deviation {
-    /// Measures a mesh with cells of `edge` [m] against its body as it was given: the triangles of a file, the faces of the voxels of an
-    /// image; against its field where it is a function. Samples lie no more than a quarter of an edge apart.
+    /// Measures a mesh with cells of `edge` [m] against its input: the triangles of a file, the voxel faces of an image, or the field of
+    /// a function. Samples are at most a quarter of an edge apart.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -163,8 +163,8 @@ impl Deviation {
         given.map_or_else(|| Self::new(mesh, anatomy.field(), edge), Ok)
     }
 
-    /// Measures a mesh against a field. The surface is sampled where it crosses the edges of a grid of a quarter of `edge`
-    /// [m], of a 160th of the box at least: parts thinner than that may be overlooked.
+    /// Measures a mesh against a field. The surface is sampled at its intersections with a grid of a quarter of `edge`
+    /// [m], at least a 160th of the box: thinner parts may be missed.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -172,8 +172,8 @@ impl Deviation {
         Ok(Measured::to_field(mesh, field, edge)?.deviation())
     }
 
-    /// Between the triangles of a mesh and of its input whose sides are chosen, with samples no more than `spacing` [m] apart; `None`
-    /// where one of them has none.
+    /// Between the triangles of a mesh and of its input with chosen sides, with samples at most `spacing` [m] apart; `None` if one of
+    /// them has none.
     pub(crate) fn between(
         mesh: &Patches,
         given: &Patches,
@@ -183,7 +183,7 @@ impl Deviation {
         Some(Measured::between(mesh, given, chosen, spacing)?.deviation())
     }
 
-    /// The largest distance of both ways, and where it is [m].
+    /// The largest distance of both directions, and its location [m].
     pub fn largest(&self) -> (f64, [f64; 3]) {
         if self.largest_from_mesh > self.largest_from_body {
             (self.largest_from_mesh, self.farthest_of_mesh)
@@ -247,7 +247,7 @@ impl Near {
         let near = (0..27).map(|at| [own[0] + at % 3 - 1, own[1] + at / 3 % 3 - 1, own[2] + at / 9 - 1]);
         let near = near.filter_map(|cube| self.cubes.get(&cube)).flatten();
         let nearest = near.map(|&at| (self.points[at as usize] - from).norm()).fold(f64::INFINITY, f64::min);
-        // What is farther than an edge may be nearer in other cubes.
+        // Points farther than an edge may be nearer in other cubes.
         if nearest <= self.edge {
             return nearest;
         }
@@ -259,7 +259,7 @@ fn cube(point: &Vector3, edge: f64) -> [i64; 3] {
     [0, 1, 2].map(|axis| (point[axis] / edge).floor() as i64)
 }
 
-/// Distance to the zero surface along the gradient [m], which is exact nearby; infinite where the way is lost.
+/// Distance to the zero surface along the gradient [m], which is exact nearby; infinite if the path fails.
 fn way_to_surface(field: &(impl ImplicitField + ?Sized), from: &Vector3, longest: f64) -> f64 {
     let mut point = *from;
     let mut value = field.value(&point);
@@ -278,7 +278,8 @@ fn way_to_surface(field: &(impl ImplicitField + ?Sized), from: &Vector3, longest
     if value.abs() < 1e-2 * longest { (point - from).norm() + value.abs() } else { f64::INFINITY }
 }
 
-/// Points of the surface: where it crosses the edges of a grid of a quarter of `edge` [m], of a 160th of the box at least.
+/// Points of the surface: its intersections with the edges of a grid of a quarter of `edge` [m], at least a 160th of the
+/// box.
 pub(crate) fn surface_points(
     field: &(impl ImplicitField + ?Sized),
     edge: f64,

@@ -1,8 +1,7 @@
-//! The body that a closed surface encloses, as a field of signed distances. The surface is mended as every surface from a file
-//! (`triangles.rs`); narrow holes are closed; where it passes through itself, or parts lie in each other and look the same way, the
-//! body is all that it winds round (`winding.rs`), and what lies within that is left out. Distances are exact on a grid and linear
-//! in between; beyond two edges of the cells to be made they are cut.
-//! Leaves out: open surfaces, several materials.
+//! The body inside a closed surface, as a field of signed distances. The surface is repaired like every surface from a file
+//! (`triangles.rs`); narrow holes are closed. Where it intersects itself, or parts with the same orientation lie inside each other,
+//! the body is all that it winds around (`winding.rs`), without the surface inside it. Distances are exact on a grid and linear in
+//! between; they are clipped beyond two edges of the cells. Leaves out: open surfaces, several materials.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -35,10 +34,10 @@ const BLOCK: usize = 8;
 /// Levels of halving of triangles that cross others, at most.
 const MOST_LEVELS: u32 = 6;
 
-/// What to do with a closed surface before it is filled; by default nothing but closing holes narrower than the cells.
+/// Repairs of a closed surface before filling; by default it only closes holes narrower than the cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Closing {
-    /// Width of holes to close [m], where it is more than the edge of the cells.
+    /// Width of holes to close [m], if larger than the edge of the cells.
     pub holes: f64,
     /// Whether to fill cavities.
     pub fill_cavities: bool,
@@ -46,10 +45,10 @@ pub struct Closing {
     pub keep_largest: bool,
 }
 
-/// What was found in a surface, and what was mended.
+/// Findings and repairs of a surface.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct EnclosedReport {
-    /// What was mended of its points and faces.
+    /// Repairs of its points and faces.
     pub repairs: SurfaceRepairs,
     /// Triangles of the surface as mended.
     pub triangles: usize,
@@ -67,7 +66,7 @@ pub struct EnclosedReport {
     pub crossings: usize,
     /// Where the first pair does [m].
     pub first_crossing: Option<[f64; 3]>,
-    /// Pieces within another one that look the same way: what overlaps was joined.
+    /// Pieces inside another one with the same orientation, joined with it.
     pub swallowed_shells: usize,
     /// Cavities filled on request.
     pub filled_cavities: usize,
@@ -103,13 +102,13 @@ impl fmt::Display for EnclosedReport {
             let [x, y, z] = place.map(|x| x * 1e3);
             let pairs = counted(self.crossings, "pair", "pairs");
             told.push(format!(
-                "{pairs} of triangles pass through each other, the first at ({x:.2}, {y:.2}, {z:.2}) mm: what overlaps \
-                 was joined"
+                "{pairs} of triangles intersect, the first at ({x:.2}, {y:.2}, {z:.2}) mm: overlapping parts \
+                 were joined"
             ));
         }
         if self.swallowed_shells > 0 {
             told.push(format!(
-                "{} inside another joined with it",
+                "{} joined with an enclosing piece",
                 counted(self.swallowed_shells, "piece", "pieces")
             ));
         }
@@ -117,10 +116,7 @@ impl fmt::Display for EnclosedReport {
             told.push(format!("{} filled", counted(self.filled_cavities, "cavity", "cavities")));
         }
         if self.dropped_pieces > 0 {
-            told.push(format!(
-                "{} left out",
-                counted(self.dropped_pieces, "smaller piece", "smaller pieces")
-            ));
+            told.push(format!("{} dropped", counted(self.dropped_pieces, "smaller piece", "smaller pieces")));
         }
         f.write_str(&if told.is_empty() { "nothing".to_owned() } else { told.join("; ") })
     }
@@ -133,7 +129,7 @@ pub struct Enclosed {
     triangles: Vec<[u32; 3]>,
     /// Pairs of triangles that cross.
     crossing: Vec<[u32; 2]>,
-    /// What was found and mended.
+    /// Findings and repairs.
     pub report: EnclosedReport,
 }
 
@@ -163,7 +159,7 @@ impl Enclosed {
         signed_volume(&self.points, &self.triangles)
     }
 
-    /// Whether no part lies within another and none passes through another.
+    /// Whether no part lies inside another and none intersects another.
     pub fn is_simple(&self) -> bool {
         self.crossing.is_empty() && self.report.swallowed_shells == 0
     }
@@ -243,8 +239,8 @@ impl Enclosed {
         Ok((field, hull))
     }
 
-    /// The part of the surface that bounds the body: all of it, or what has the body on one side only, with triangles that
-    /// cross others divided to below a step of the grid [m].
+    /// The part of the surface that bounds the body: all of it, or the triangles with the body on one side only.
+    /// Intersecting triangles are divided to below a step of the grid [m].
     fn hull(&self, winding: &Winding, step: f64) -> TriangleMesh {
         if self.is_simple() {
             return TriangleMesh::new(self.points.clone(), self.triangles.clone());
@@ -302,7 +298,7 @@ impl Enclosed {
         Ok(())
     }
 
-    /// Counts pieces and cavities, and leaves out those that are not wanted.
+    /// Counts pieces and cavities, and removes unwanted ones.
     fn choose(&mut self, closing: &Closing) -> Result<(), MeshingError> {
         let shells = shells(&self.points, &self.triangles);
         let containers = containers(&self.points, &self.triangles, &shells);
@@ -315,7 +311,7 @@ impl Enclosed {
         let is_other = |at: usize| at != largest && !containers[at].contains(&largest);
         let is_dropped = |at: usize| closing.keep_largest && is_other(at);
         let kept: Vec<usize> = (0..shells.len()).filter(|&at| !is_filled(at) && !is_dropped(at)).collect();
-        // How often the kept pieces wind round a piece: in a cavity of the body not at all.
+        // The winding number of the kept pieces at a piece: zero in a cavity of the body.
         let surroundings = |at: usize| {
             let around = containers[at].iter().filter(|container| kept.binary_search(container).is_ok());
             around.map(|&container| shells[container].volume.signum()).sum::<f64>()
@@ -335,7 +331,7 @@ impl Enclosed {
     }
 }
 
-/// Points and triangles of a surface, points at the very same place joined: where it was cut along edges it closes again.
+/// Points and triangles of a surface with coincident points joined: this closes it where it was split along edges.
 fn rejoined(surface: &TriangleMesh) -> (Vec<Vector3>, Vec<[u32; 3]>) {
     let (points, mut triangles) = surface.compact();
     let mut places: BTreeMap<[u64; 3], u32> = BTreeMap::new();
@@ -369,7 +365,7 @@ fn open_loops(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut loops = Vec::new();
     let starts: Vec<u32> = next.keys().copied().collect();
     for start in starts {
-        // As many edges leave a point as come to it, so that every way leads back; where it meets itself a loop is taken off.
+        // As many edges leave a point as arrive, so every path returns; where it meets itself, a loop is extracted.
         let mut way = vec![start];
         while let Some(to) = way.last().and_then(|at| next.get_mut(at)).and_then(Vec::pop) {
             match way.iter().position(|&n| n == to) {
@@ -422,7 +418,7 @@ fn sign(grid: &Grid, winding: &Winding, distances: &mut [f32]) {
         let (mut inside, mut before) = (false, 0.0);
         for (i, value) in line.iter_mut().enumerate() {
             let own = f64::from(*value);
-            // Half a step for what is missing where triangles that cross were divided.
+            // Half a step for the gaps where intersecting triangles were divided.
             if i > 0 && before + own <= 1.5 * step {
                 let point = grid.position(&Vector3::from(grid.triple(row * nx + i).map(|i| i as f64)));
                 inside = winding.at(&point) > 0.5;

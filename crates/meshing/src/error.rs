@@ -1,10 +1,10 @@
-//! What can be wrong with a request for a mesh.
+//! Errors of mesh requests.
 
 use pliant_geometry::Vector3;
 
 use crate::triangles::counted;
 
-/// Why no mesh was made. Lengths in metres.
+/// The error of a mesh request. Lengths in metres.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshingError {
     /// A length or a factor is zero, negative, infinite or NaN.
@@ -17,26 +17,26 @@ pub enum MeshingError {
     },
     /// No mesh of a curved body is made of ideal tets.
     #[error(
-        "target is {target}; the least acoustic length can't be that of ideal tets: 0.75 is reached as a rule, 0.9 at best"
+        "target is {target}; the least acoustic length can't reach that of ideal tets: 0.75 is usual, 0.9 the best"
     )]
     TargetTooHigh {
-        /// Part of the ideal asked for.
+        /// Requested fraction of the ideal.
         target: f64,
     },
     /// Cells that differ too much in size.
     #[error(
-        "cells of {} m beside cells of {} m: smaller than {} m can't be", rounded(*asked), rounded(*edge), rounded(*smallest)
+        "cells of {} m beside cells of {} m are too small; the limit is {} m", rounded(*asked), rounded(*edge), rounded(*smallest)
     )]
     TooFine {
-        /// Edge asked for [m].
+        /// Requested edge [m].
         edge: f64,
-        /// Smallest edge that goes with it [m].
+        /// Smallest allowed edge [m].
         smallest: f64,
-        /// Smallest edge asked for [m].
+        /// Smallest requested edge [m].
         asked: f64,
     },
-    /// A label asked for that is not meshed.
-    #[error("label {label} can't be protected: the labels of the mesh are {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))]
+    /// A requested label is not meshed.
+    #[error("label {label} can't be protected; the mesh has the labels {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))]
     NoSuchLabel {
         /// The label.
         label: i32,
@@ -58,7 +58,7 @@ pub enum MeshingError {
         axis: char,
     },
     /// Points moved so far that cells turn over.
-    #[error("points are moved by up to {amount} of a cell; below 0.5 cells stay sound")]
+    #[error("points move by up to {amount} of a cell; use less than 0.5 to keep cells valid")]
     Distortion {
         /// Largest shift as a part of a cell.
         amount: f64,
@@ -112,17 +112,17 @@ pub enum MeshingError {
         rounded(size.x), rounded(size.y), rounded(size.z)
     )]
     NoCells {
-        /// Edge asked for [m].
+        /// Requested edge [m].
         edge: f64,
         /// Size of the box of the body [m].
         size: Vector3,
     },
     /// A surface without triangles of any area.
-    #[error("there is no surface: no triangle or quad has an area")]
+    #[error("there is no surface: all triangles and quads have zero area")]
     NoSurface,
     /// A surface with holes too wide to close.
     #[error(
-        "the surface is open: {} with {edges} edges round them, the widest {:.2} mm wide, at ({:.2}, {:.2}, {:.2}) mm; \
+        "the surface is open: {} with {edges} border edges, the widest {:.2} mm wide, at ({:.2}, {:.2}, {:.2}) mm; \
          holes of up to {:.2} mm are closed",
         counted(*holes, "hole", "holes"), widest * 1e3, place.x * 1e3, place.y * 1e3, place.z * 1e3, closed * 1e3
     )]

@@ -6,7 +6,7 @@ use crate::error::{MeshingError, require_at_most, require_positive};
 use crate::field::ImplicitField;
 use crate::stuffing::TETS_PER_CUBE;
 
-/// Cells allowed at most, whatever the limit asked for: what 32-bit indices of lattice points bear.
+/// Largest possible number of cells, for 32-bit indices of lattice points.
 const MOST_CELLS: usize = 1 << 25;
 
 /// Cubes of the lattice over a box allowed per allowed cell, and always.

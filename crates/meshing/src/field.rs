@@ -1,5 +1,5 @@
-//! Bodies described by a function that is positive inside: what the meshers of fields ask of a shape.
-//! Fields of images are in `pliant-imaging`.
+//! Bodies described by a function that is positive inside: the input of meshers of fields. Fields of
+//! images are in `pliant-imaging`.
 
 use pliant_geometry::Vector3;
 

@@ -1,6 +1,6 @@
-//! Flips of a tetrahedral mesh: the tets round an edge become those over the best triangulation of its ring (Klincsek 1980;
-//! 3-2, 4-4 and longer rings alike, open rings on the boundary), or two tets with a common face become three round a new
-//! edge. A flip is taken where its worst tet gains, within one material; on the boundary also only where the new edge
+//! Flips of a tetrahedral mesh: the tets around an edge become those over the best triangulation of its ring (Klincsek
+//! 1980; 3-2, 4-4 and longer rings alike, open rings on the boundary), or two tets with a common face become three around a
+//! new edge. A flip is accepted if its worst tet improves, within one material; on the boundary also only if the new edge
 //! follows the surface.
 
 use pliant_geometry::Vector3;
@@ -88,8 +88,8 @@ impl Complex {
         star.copied().filter(|&tet| self.tets[tet as usize].contains(&q)).collect()
     }
 
-    /// The nodes opposite to an edge, right-handed about the way from p to q; `None` where the tets are not one fan of one
-    /// material that may be flipped.
+    /// The nodes opposite to an edge, right-handed about the direction from p to q; `None` unless the tets are one fan of
+    /// one material that may be flipped.
     fn ring(&self, around: &[u32], p: u32, q: u32) -> Option<Ring> {
         let first = *around.first()?;
         if around.len() > LONGEST_RING
@@ -98,7 +98,7 @@ impl Complex {
             return None;
         }
         let mut links: Vec<[u32; 2]> = around.iter().map(|&tet| self.opposite_edge(tet, p, q)).collect();
-        // An open fan starts where no link ends.
+        // An open fan starts at a node without an incoming link.
         let starts: Vec<u32> =
             links.iter().map(|link| link[0]).filter(|a| links.iter().all(|link| link[1] != *a)).collect();
         let open = !starts.is_empty();
@@ -113,7 +113,7 @@ impl Complex {
         (links.is_empty() && nodes.len() > 2).then_some(Ring { nodes, open })
     }
 
-    /// The other two nodes of a tet with an edge, such that (p, q, a, b) is its right-handed order.
+    /// The other two nodes of a tet with an edge, with (p, q, a, b) in right-handed order.
     fn opposite_edge(&self, tet: u32, p: u32, q: u32) -> [u32; 2] {
         let nodes = self.tets[tet as usize];
         let place = |node: u32| nodes.iter().position(|&n| n == node).unwrap_or(0);
@@ -209,7 +209,7 @@ mod tests {
         assert!(flat.alive().all(|tet| flat.length(tet) > 0.0));
     }
 
-    /// A boundary edge between two tets turns only where the surface may change.
+    /// A boundary edge between two tets flips only if the surface may change.
     #[test]
     fn an_edge_of_the_boundary_turns_where_it_may() {
         let corner = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);

@@ -14,7 +14,7 @@ use crate::triangles::TriangleMesh;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MeasuredTo {
-    /// The surface where a function is zero, as the smooth surface of an image.
+    /// The zero surface of a function, such as the smooth surface of an image.
     #[default]
     Field,
     /// The triangles of the input, as mended.
@@ -52,7 +52,7 @@ impl Given {
         }
     }
 
-    /// How far a smooth surface may be from what is given without being wrong [m]: the diagonal of a voxel.
+    /// Tolerated distance of a smooth surface from the input [m]: the diagonal of a voxel.
     pub(crate) fn resolution(&self) -> f64 {
         match self {
             Self::Triangles(..) => 0.0,

@@ -1,6 +1,6 @@
-//! Tets in the body of a field where cells differ in size: which cubes of the lattice (`octree.rs`) must be how small, and the lattice cut
-//! along the surface. Sizes are the edge asked for times powers of two: this edge along the surface, longer ones inside where that is
-//! wanted, shorter ones in labels and places that are to have them.
+//! Tets of several sizes in the body of a field: the required sizes of the lattice cubes (`octree.rs`), and the lattice cut along the
+//! surface. Sizes are the requested edge times powers of two: this edge along the surface, longer ones inside and shorter ones in labels
+//! and places on request.
 
 use std::collections::BTreeSet;
 
@@ -20,12 +20,12 @@ use crate::topology::in_large_components;
 /// Cubes outside the body may be this many doublings larger than the edge.
 const LARGEST_OUTSIDE: usize = 3;
 
-/// Cubes looked at for a size, at most.
+/// Limit of cubes examined for a size.
 const MOST_CUBES: f64 = (1 << 27) as f64;
 
 /// The levels of a lattice of several sizes. Level 0 has the smallest cubes.
 pub(crate) struct Levels {
-    /// Of the edge asked for.
+    /// Fraction of the requested edge.
     pub(crate) base: usize,
     /// Of the largest cubes inside.
     inner: usize,
@@ -61,7 +61,7 @@ impl Levels {
 /// Cubes that must not be larger than their level, as found by measuring a mesh made before.
 pub(crate) type Wanted = BTreeSet<(usize, Cube)>;
 
-/// A lattice over an anatomy, with cubes as small as is asked for.
+/// A lattice over an anatomy, with cubes of the requested sizes.
 pub(crate) fn tree(
     request: &OrganTets,
     anatomy: &Anatomy<'_>,
@@ -141,7 +141,7 @@ fn cubes_over(tree: &Octree, level: usize, low: &Vector3, high: &Vector3) -> Res
     Ok((0..along[2]).flat_map(of_layer).collect())
 }
 
-/// Demands cubes of a level wherever a label is, and round it.
+/// Requires cubes of a level in and around a label.
 fn protect(tree: &mut Octree, anatomy: &Anatomy<'_>, label: i32, level: usize) -> Result<(), MeshingError> {
     let labels = anatomy.labels();
     let Some(number) = labels.iter().position(|own| *own == label) else {

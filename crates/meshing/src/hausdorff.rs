@@ -1,6 +1,6 @@
-//! How far two surfaces are apart, both ways: the distance from each of many samples of one to the nearest point of the other.
-//! The largest of both ways is the Hausdorff distance. Samples lie no farther apart than asked for, so a peak narrower than that may be
-//! overlooked; distances from them are exact.
+//! Distance between two surfaces in both directions: from each of many samples of one to the nearest point of the other. The largest of
+//! both directions is the Hausdorff distance. Samples have at most the requested spacing, so narrower peaks may be missed; the
+//! distances of samples are exact.
 
 use std::fmt;
 
@@ -26,7 +26,7 @@ pub struct Hausdorff {
     pub rms_backward: f64,
 }
 
-/// A point of a surface, and the area for which it stands [m²].
+/// A point of a surface, and its area [m²].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
     pub(crate) point: Vector3,
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
     use crate::{DEFAULT_CELL_LIMIT, sphere};
 
-    /// Balls of radius 1 and 1.1: 0.1 apart but for the sagitta of their triangles, 0.003.
+    /// Balls of radius 1 and 1.1: 0.1 apart up to the sagitta of their triangles, 0.003.
     #[test]
     fn spheres_are_as_far_apart_as_their_radii() {
         let ball =

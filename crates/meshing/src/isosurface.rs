@@ -22,7 +22,7 @@ const CUBES_ALWAYS: usize = 50_000_000;
 const STEPS: usize = 10;
 
 impl TriangleMesh {
-    /// The surface where a field is zero, on a grid of `step` [m].
+    /// The zero surface of a field, on a grid of `step` [m].
     pub fn of_field(
         field: &(impl ImplicitField + ?Sized),
         step: f64,
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
     use crate::Ellipsoid;
 
-    /// Points lie on the sphere, faces look outwards, the surface is closed: V − E + F = 2.
+    /// Points lie on the sphere, faces point outwards, the surface is closed: V − E + F = 2.
     #[test]
     fn a_sphere_is_closed_and_looks_outwards() {
         let ball = Ellipsoid::sphere(Vector3::new(0.1, 0.0, -0.2), 0.05);

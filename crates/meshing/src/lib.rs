@@ -95,7 +95,7 @@ pub use voxels::Voxels;
 /// Cells allowed in a mesh unless the caller says otherwise. Limits above 2²⁵ (34 million) act as 2²⁵.
 pub const DEFAULT_CELL_LIMIT: usize = 5_000_000;
 
-/// The body of a field as a mesh, and what was left out of it.
+/// The body of a field as a mesh, with the dropped parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldMesh {
     /// One block of cells, the largest face-connected component.
@@ -104,7 +104,7 @@ pub struct FieldMesh {
     pub dropped_components: usize,
     /// Cells in them.
     pub dropped_cells: usize,
-    /// Edges of the boundary that more than two boundary faces share: there the body touches itself, where a
-    /// gap is thinner than the cells.
+    /// Boundary edges of more than two boundary faces: the body touches itself there, because a gap is
+    /// thinner than the cells.
     pub non_manifold_edges: usize,
 }

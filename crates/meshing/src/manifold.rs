@@ -1,8 +1,7 @@
-//! Mends a body that touches itself: where a gap is thinner than the cells, its two banks share points or edges. A point
-//! is doubled for every group of its tets that hang together through faces; an edge with more than two boundary faces is
-//! halved first, which gives its banks a point of their own each. Faces are kept, so no volume changes.
-//! Where two stretches of the boundary meet in a point whose tets do hang together (a sheet without thickness there), one of them gets
-//! a point of its own a little further out, with a tet on each of its faces.
+//! Repairs a body that touches itself: where a gap is thinner than the cells, its two sides share points or edges. A point is doubled
+//! for every group of its tets connected through faces. An edge with more than two boundary faces is halved first, which gives each
+//! side its own point. Faces do not change, so no volume does. Where two stretches of the boundary meet in a point whose tets are
+//! connected (a sheet without thickness), one of them gets its own point slightly further out, with a tet on each of its faces.
 
 use std::collections::BTreeMap;
 
@@ -13,14 +12,14 @@ use crate::complex::{Complex, OUTSIDE, acoustic_length};
 /// How far the new point of a pinch may lie from the old one, in lattice constants.
 const LIFTS: [f64; 5] = [0.5, 0.35, 0.25, 0.15, 0.08];
 
-/// What was mended.
+/// The repairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Mended {
     /// Points added by doubling.
     pub(crate) doubled: usize,
     /// Edges halved.
     pub(crate) halved: usize,
-    /// Points parted where the boundary met itself in a point.
+    /// Points doubled where the boundary met itself in a point.
     pub(crate) parted: usize,
 }
 
@@ -28,7 +27,7 @@ pub(crate) struct Mended {
 pub(crate) fn mend(complex: &mut Complex) -> Mended {
     let doubled = double_points(complex, 0..complex.points.len() as u32);
     let mut mended = Mended { doubled, ..Mended::default() };
-    // Halving leaves two edges that are fine, so once is enough but for edges made by doubling.
+    // Halving leaves two valid edges, so one pass suffices except for edges made by doubling.
     for _ in 0..4 {
         let edges = crowded_edges(complex);
         if edges.is_empty() {
@@ -49,7 +48,8 @@ pub(crate) fn mend(complex: &mut Complex) -> Mended {
     mended
 }
 
-/// Points where the boundary touches itself: its faces there are more than one fan. Increasing.
+/// Points where the boundary touches itself: their boundary faces form more than one fan.
+/// Increasing.
 pub(crate) fn pinched_points(complex: &Complex) -> Vec<u32> {
     let outer = |point: &u32| complex.sides[*point as usize] & OUTSIDE != 0;
     (0..complex.points.len() as u32).filter(outer).filter(|&point| fans(complex, point).len() > 1).collect()

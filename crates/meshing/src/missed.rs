@@ -1,7 +1,7 @@
-//! What a mesh misses of the body it was made of: parts and gaps thinner than the lattice that the mesh leaves out or closes, with
-//! their place and thickness, and whatever else of the surface lies far from it.
-//! A part is thin where the way straight through it, from one point of the surface to the wall that looks back at it, is
-//! shorter than the lattice constant; it is missed where the middle of that way is not in the mesh. A gap likewise, in the background.
+//! Features of a body that its mesh misses: parts and gaps thinner than the lattice, with their location and thickness, and other
+//! surface points far from the mesh.
+//! A part is thin if the straight line through it, from one point of the surface to the opposite wall, is shorter than the lattice
+//! constant. It is missed if the middle of this line is not in the mesh. Gaps are treated in the same way in the background.
 
 use std::fmt;
 
@@ -17,13 +17,14 @@ use crate::voxels::Voxels;
 /// Steps along the way through a thin part, per lattice constant.
 const STEPS: usize = 20;
 
-/// Walls look at each other where the cosine between their normals is below this: within 45°. Rims and notches do not count.
+/// Walls face each other if the cosine between their normals is below this: within 45°. Rims and notches do not count.
 const OPPOSITE: f64 = -0.7;
 
-/// The middle of a thin part is missed where it is this far from the mesh, in lattice constants; nearer, the mesh cuts a crest.
+/// The middle of a thin part is missed if it is this far from the mesh, in lattice constants; if nearer, the mesh only cuts a
+/// crest.
 const MARGIN: f64 = 0.25;
 
-/// Something of a body that its mesh misses or shows in the wrong place. Places in metres, RAS where the body comes from an image.
+/// A feature of a body that its mesh misses or misplaces. Locations in metres, RAS if the body comes from an image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Missed {
@@ -57,7 +58,7 @@ pub enum Missed {
         /// The label.
         label: i32,
     },
-    /// A label whose volume is not that of the input.
+    /// A label whose volume differs from that of the input.
     LabelVolume {
         /// The label.
         label: i32,
@@ -93,8 +94,9 @@ impl Missed {
         }
     }
 
-    /// What a mesh with cells of `edge` [m] misses of the body of a field: the worst thin part, the worst thin gap, and the farthest
-    /// point of the surface if it is farther than `allowed` [m] and no thin part explains it, or else of the mesh's boundary.
+    /// Features of the body of a field that a mesh with cells of `edge` [m] misses: the worst thin part, the worst thin gap, and the
+    /// farthest point of the surface if it is farther than `allowed` [m] and no thin part explains it, otherwise that of the mesh
+    /// boundary.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -149,32 +151,32 @@ impl fmt::Display for Missed {
         match self {
             Self::ThinPart { place, thickness, edge } => write!(
                 f,
-                "the mesh leaves out a part of the body that is {:.1} mm thick at {}, thinner than the cells of {:.1} mm",
+                "the mesh misses a part of the body {:.1} mm thick at {}, thinner than the cells of {:.1} mm",
                 thickness * 1e3,
                 at(place),
                 edge * 1e3
             ),
             Self::ThinGap { place, thickness, edge } => write!(
                 f,
-                "the mesh closes a gap that is {:.1} mm wide at {}, thinner than the cells of {:.1} mm: its banks are glued \
-                 together",
+                "the mesh closes a gap {:.1} mm wide at {}, thinner than the cells of {:.1} mm, and connects \
+                 its sides",
                 thickness * 1e3,
                 at(place),
                 edge * 1e3
             ),
             Self::Behind { place, distance } => write!(
                 f,
-                "the mesh stays {:.1} mm behind the body at {}: a sharp crest, or a small piece that was left out",
+                "the mesh stays {:.1} mm behind the body at {}: a sharp crest, or a dropped small piece",
                 distance * 1e3,
                 at(place)
             ),
             Self::Beyond { place, distance } => write!(
                 f,
-                "the boundary of the mesh is {:.1} mm off the surface of the body at {}",
+                "the mesh boundary is {:.1} mm from the surface of the body at {}",
                 distance * 1e3,
                 at(place)
             ),
-            Self::Label { label } => write!(f, "label {label} has no cell: it is smaller than the cells"),
+            Self::Label { label } => write!(f, "label {label} has no cell: it is smaller than a cell"),
             Self::LabelVolume { label, part } => write!(
                 f,
                 "label {label} has {:.1} % {} volume than the input",
@@ -182,7 +184,12 @@ impl fmt::Display for Missed {
                 if *part < 0.0 { "less" } else { "more" }
             ),
             Self::LabelAway { label, place, distance } => {
-                write!(f, "the surface of label {label} is {:.1} mm off at {}", distance * 1e3, at(place))
+                write!(
+                    f,
+                    "the surface of label {label} is {:.1} mm from the input at {}",
+                    distance * 1e3,
+                    at(place)
+                )
             }
         }
     }
@@ -206,7 +213,7 @@ impl ThinWay {
     }
 }
 
-/// Ways shorter than the lattice constant between walls that look at each other, in the order of the points of the surface.
+/// Lines shorter than the lattice constant between facing walls, in the order of the surface points.
 fn thin_ways(field: &(impl ImplicitField + ?Sized), edge: f64) -> Result<Vec<ThinWay>, MeshingError> {
     let points = surface_points(field, edge)?;
     let ways = points
@@ -222,14 +229,14 @@ fn thin_way(
     edge: f64,
     inside: bool,
 ) -> Option<ThinWay> {
-    // Towards larger values it goes into the body.
+    // Larger values are towards the inside.
     let uphill = |point: &Vector3| field.gradient(point).try_normalize(0.0);
     let sign = if inside { 1.0 } else { -1.0 };
     let inward = uphill(start)?;
     let at = |length: f64| start + inward * (sign * length);
     let beyond = |length: f64| sign * field.value(&at(length)) <= 0.0;
     let step = edge / STEPS as f64;
-    // The start lies on the surface but for the error of a linear interpolation: one step is left out.
+    // The start lies on the surface up to the error of a linear interpolation, so one step is skipped.
     let wall = (2..STEPS).map(|steps| steps as f64 * step).find(|&length| beyond(length))?;
     let (mut low, mut high) = (wall - step, wall);
     for _ in 0..10 {

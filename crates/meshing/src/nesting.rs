@@ -11,7 +11,7 @@ use crate::winding::Winding;
 pub(crate) struct Shell {
     /// Its triangles, by number, increasing.
     pub(crate) triangles: Vec<u32>,
-    /// The volume that it encloses [m³]; negative where it looks inwards.
+    /// The enclosed volume [m³]; negative if it is oriented inwards.
     pub(crate) volume: f64,
 }
 
@@ -45,7 +45,7 @@ fn find(root: &mut [u32], mut at: u32) -> u32 {
     at
 }
 
-/// For each piece the pieces in which it lies. Pieces that pass through each other are judged by one of their points.
+/// For each piece the pieces around it. Intersecting pieces are judged by one of their points.
 pub(crate) fn containers(points: &[Vector3], triangles: &[[u32; 3]], shells: &[Shell]) -> Vec<Vec<usize>> {
     let of = |shell: &Shell| shell.triangles.iter().map(|&t| triangles[t as usize]).collect::<Vec<_>>();
     let boxes: Vec<(Vector3, Vector3)> = shells
@@ -74,9 +74,10 @@ pub(crate) fn containers(points: &[Vector3], triangles: &[[u32; 3]], shells: &[S
     found
 }
 
-/// The volume that triangles enclose [m³] (Gauss: a third of the flux of x), negative where they look inwards.
+/// The volume enclosed by triangles [m³] (Gauss: a third of the flux of x), negative if they are oriented
+/// inwards.
 pub(crate) fn signed_volume(points: &[Vector3], triangles: &[[u32; 3]]) -> f64 {
-    // About a point nearby, so that a place far from the origin costs no digits.
+    // About a nearby point, so that positions far from the origin lose no digits.
     let Some(about) = triangles.first().map(|nodes| points[nodes[0] as usize]) else { return 0.0 };
     let volume = |[a, b, c]: [Vector3; 3]| (a - about).dot(&(b - about).cross(&(c - about))) / 6.0;
     corners_of(points, triangles).into_iter().map(volume).sum()

@@ -1,8 +1,8 @@
-//! A body-centred cubic lattice of cubes of several sizes, after Labelle and Shewchuk (2007): cubes are halved where cells are to be smaller,
-//! neighbours, also across edges and corners, differ by one halving at most. Between equal cubes lie the tets of the uniform lattice,
-//! halved where an edge of theirs is; between a cube and four smaller ones, pyramids from the centres over the four squares, each halved
-//! along the diagonal that starts in the middle of the larger square.
-//! Cubes of level 0 are the smallest; those of level n are 2ⁿ as long.
+//! A body-centred cubic lattice of cubes of several sizes, after Labelle and Shewchuk (2007). Cubes are halved where cells must be smaller;
+//! neighbours, also across edges and corners, differ by at most one halving. Equal cubes have the tets of the uniform lattice between them,
+//! halved where one of their edges is. A cube and four smaller ones have pyramids from the centres over the four squares between them, each
+//! halved along the diagonal that starts in the middle of the larger square. Cubes of level 0 are the smallest; those of level n are 2ⁿ as
+//! long.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -32,8 +32,8 @@ pub(crate) struct Lattice {
 }
 
 impl Octree {
-    /// Cubes of level `top` over a box and at least one more on every side, of which those of level 0 have the edge `finest` [m]. A corner
-    /// of a cube lies at `through`, were there cubes everywhere.
+    /// Cubes of level `top` over a box and at least one more on every side; level 0 has the edge `finest` [m]. Some corner of the regular
+    /// lattice lies at `through`.
     pub(crate) fn over(low: &Vector3, high: &Vector3, finest: f64, top: usize, through: &Vector3) -> Self {
         let largest = finest * f64::from(1 << top);
         let centre = (low + high) / 2.0;

@@ -1,8 +1,7 @@
-//! Improves a tetrahedral mesh for explicit dynamics, where the least acoustic length sets the time step: tets below a
-//! rising threshold lose an edge, are flipped or change their material, then points move to where their worst tet is best. Points between
-//! sides stay between them. No edge gets longer than 1.6 lattice constants. Lengths are measured in those of the lattice round the points,
-//! which may be graded. Deterministic: everything goes in the order of numbers, and the directions of trial moves
-//! are turned by a fixed sequence.
+//! Improves a tetrahedral mesh for explicit dynamics, where the smallest acoustic length sets the time step. Tets below a rising threshold
+//! lose an edge, are flipped or change their material. Then points move to improve their worst tet. Points between sides stay between
+//! them. No edge exceeds 1.6 lattice constants. Lengths are measured in the local lattice constant, which may be graded. Deterministic:
+//! work follows the order of numbers, and a fixed sequence rotates the directions of trial moves.
 
 use pliant_geometry::{CellKind, Vector3};
 
@@ -12,8 +11,8 @@ use crate::surfaces::Surfaces;
 /// Threshold of the first round, in ideal acoustic lengths.
 const FIRST_THRESHOLD: f64 = 0.3;
 
-/// Rounds aim this much higher than the target: the true limit depends on how many tets are near the least length. With
-/// 1 it was 3 % lower for the brain phantom at 10 mm.
+/// Rounds aim this much higher than the target, because the critical time step depends on the number of tets near the
+/// smallest length. With 1 it was 3 % lower for the brain phantom at 10 mm.
 const AIM: f64 = 1.07;
 
 /// The threshold reaches its goal in this part of the rounds.
@@ -36,21 +35,21 @@ const FIT_REACH: f64 = 0.25;
 /// Faces that follow their surface this well (root mean square, in lattice constants) stay.
 const FIT_ENOUGH: f64 = 0.01;
 
-/// Where the aim is still not reached, points round bad tets may leave their surfaces by this, in lattice constants; by the
-/// last only where the target itself is not reached.
+/// If the target is not reached, points around bad tets may leave their surfaces by this, in lattice constants; the last
+/// value applies only if the target itself is not reached.
 const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
 
-/// Edges of the boundary may turn where the new one is no farther from the surface than this, in lattice constants.
+/// Boundary edges may flip if the new one is at most this far from the surface, in lattice constants.
 const FLIP_OFF: f64 = 0.03;
 
 /// Inner points are moved at last where their worst tet is below this, in ideal acoustic lengths: it raised τ of the liver phantom
 /// at 10 mm from 0.63 to 0.66 on average.
 const POLISH: f64 = 0.9;
 
-/// Volumes nearer than this part to what they must be are left alone.
+/// Volumes within this fraction of their target are not adjusted.
 const VOLUME_TOLERANCE: f64 = 2e-3;
 
-/// What the optimiser did.
+/// The steps of the optimiser.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Optimised {
     pub(crate) rounds: usize,
@@ -65,7 +64,7 @@ pub(crate) struct Optimised {
 pub(crate) struct Optimiser<'a> {
     complex: &'a mut Complex,
     surfaces: Surfaces<'a>,
-    /// How far a point may be from the sides that it lies between, in lattice constants.
+    /// Tolerated distance of a point from the sides it lies between, in lattice constants.
     slack: f64,
     /// Whether points where three materials meet, or two and the outside, only keep to the outside.
     lines_are_free: bool,
@@ -107,7 +106,7 @@ impl<'a> Optimiser<'a> {
             self.lines_are_free = true;
             self.improve(target, rounds.div_ceil(2), 0.0, &|_| {});
         }
-        // Inner points move freely, so that no surface pays for it.
+        // Inner points move freely, at no cost for a surface.
         for sweep in 0..SWEEPS {
             let reach = REACH * SHRINK.powi(sweep as i32);
             self.relocate(POLISH, reach, &|sides| sides.count_ones() == 1);
@@ -232,7 +231,7 @@ impl<'a> Optimiser<'a> {
             both.next().is_some() && both.next().is_none()
         };
         let open: Vec<usize> = (0..4).filter(|&corner| is_open(corner)).collect();
-        // The material of the boundary must not change where it is peeled off.
+        // Peeling must not change the material of the boundary.
         let one_material =
             nodes.iter().all(|&node| (self.complex.sides[node as usize] & !OUTSIDE).count_ones() == 1);
         match open.as_slice() {
@@ -247,7 +246,7 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Gives tets below half the threshold, flat ones between materials, to the material that looks at more of their surface.
+    /// Moves tets below half the threshold, flat ones between materials, to the material with more of their surface.
     fn hand_over(&mut self, threshold: f64) {
         let mut given = 0;
         for tet in self.below(threshold / 2.0) {
@@ -395,12 +394,12 @@ impl<'a> Optimiser<'a> {
         least
     }
 
-    /// The place nearest to `place` between the sides of a node, if it is on the same bank of the body: where its surface
-    /// looks the same way, within 90°. The other bank of a gap or of a thin lobe may be nearer.
+    /// The position nearest to `place` between the sides of a node, if it is on the same side of the body: the normals
+    /// differ by less than 90°. The other side of a gap or of a thin lobe may be nearer.
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
         let mut sides = self.complex.sides[node as usize];
         if self.lines_are_free && sides.count_ones() > 2 {
-            // The outside and the lowest material: what one of these says about the other is left out.
+            // The outside and the lowest material: their statements about each other are redundant.
             let materials = sides & !OUTSIDE;
             sides = sides & OUTSIDE | materials & materials.wrapping_neg();
         }
@@ -442,7 +441,7 @@ impl<'a> Optimiser<'a> {
         if misfit < area * (FIT_ENOUGH * size).powi(2) {
             return;
         }
-        // What a move must not lower.
+        // The quality that a move must not lower.
         let floors = self.parts_round(node, &here).map(|part| part.min(least));
         let bears = |trial: &Vector3| {
             let parts = self.parts_round(node, trial);
@@ -506,7 +505,7 @@ impl<'a> Optimiser<'a> {
         self.complex.star[node as usize] = star;
         let (mut best, mut place) = (now, here);
         for trial in std::iter::once(half_way).chain(directions().map(|direction| here + direction * reach)) {
-            // Free trials that are no better are not worth projecting: their tets change little.
+            // Free trials without improvement are not worth projecting: their tets change little.
             if let Some(trial) = self.project(node, trial) {
                 let part = self.star_min(node, &trial, u32::MAX, best);
                 if part > best && !self.complex.stretches(node, &trial, u32::MAX) {
@@ -534,8 +533,8 @@ fn directions() -> impl Iterator<Item = Vector3> {
     grid.filter(|direction| *direction != Vector3::zeros()).map(|direction| direction.normalize())
 }
 
-/// Volume [m³] and area [m²] of the whole and of each inner material; the area of a material without what lies on the
-/// boundary of the whole.
+/// Volume [m³] and area [m²] of the whole and of each inner material; the area of a material excludes the boundary of
+/// the whole.
 fn measure(complex: &Complex, materials: usize) -> Vec<[f64; 2]> {
     let mut measured = vec![[0.0; 2]; materials];
     let mut faces: Vec<([u32; 3], u8)> = Vec::new();

@@ -1,7 +1,6 @@
-//! The analytic organs that stand in for segmented images: liver, brain, and the ventricles and the tumour in
-//! it.
-//! Smooth unions and cuts of ellipsoids with a band of sines on top, as defined in the phantom specification
-//! of the project; the numbers below are its millimetres, the public interface speaks metres.
+//! Analytic organs in place of segmented images: liver, brain, and the ventricles and the tumour in it. They
+//! are smooth unions and cuts of ellipsoids with a band of sines on top, as defined in the phantom
+//! specification of the project. The numbers below are its millimetres; the public interface uses metres.
 //! Leaves out the label images (see `voxels.rs` for cells on a grid).
 
 use pliant_geometry::Vector3;
@@ -13,7 +12,7 @@ use crate::field::{ImplicitField, ellipsoid_value};
 /// Millimetres in a metre.
 const MILLIMETRES: f64 = 1000.0;
 
-/// The organs that there are.
+/// The available organs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Organ {
     /// Two lobes, the left one thin; 774 ml at scale 1.

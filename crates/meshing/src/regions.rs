@@ -26,12 +26,12 @@ pub struct LabelReport {
     pub volume: f64,
     /// Volume of its voxels after cleaning, or within the surface [m³], where known.
     pub input_volume: Option<f64>,
-    /// Distances between its whole surface in the mesh and in the input, where there are several labels in both.
+    /// Distances between its whole surface in the mesh and in the input, if both have several labels.
     pub distances: Option<Deviation>,
 }
 
 impl LabelReport {
-    /// By which part its volume is off, where it is known.
+    /// Relative error of its volume, if known.
     pub fn volume_error(&self) -> Option<f64> {
         self.input_volume.map(|input| self.volume / input - 1.0)
     }
@@ -53,7 +53,7 @@ pub struct InterfaceReport {
 pub struct Regions {
     /// Its labels.
     pub labels: Vec<LabelReport>,
-    /// Its interfaces, where there are several labels and the input knows where they are.
+    /// Its interfaces, if there are several labels with known interfaces in the input.
     pub interfaces: Vec<InterfaceReport>,
 }
 
@@ -61,7 +61,7 @@ impl Regions {
     /// Of a mesh with cells of `edge` [m] of an anatomy.
     pub fn of(mesh: &Mesh, anatomy: &Anatomy<'_>, edge: f64) -> Self {
         let mut found = Self { labels: volumes(mesh, anatomy), interfaces: Vec::new() };
-        // Cubes that are filled in part have no surface of their own.
+        // Partly filled cubes have no surface of their own.
         let is_filled = mesh.blocks.iter().all(|block| !block.data.contains_key(Voxels::FRACTION));
         if let Some(given) = anatomy.given().filter(|_| found.labels.len() > 1 && is_filled) {
             let (made, given, to) = (faces_between_labels(mesh), anatomy.patches(), given.measured_to());

@@ -57,7 +57,7 @@ impl Reference {
         self.locator.closest(to).map_or((*to, Vector3::zeros()), |at| (at.position, at.normal))
     }
 
-    /// The same of what has a normal with a cosine above `least` with `facing`; `None` if nothing has less than `within` [m] away.
+    /// The same among normals with a cosine above `least` with `facing`; `None` if none is less than `within` [m] away.
     pub(crate) fn closest_facing(
         &self,
         to: &Vector3,
@@ -130,7 +130,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Flips edges where that brings points nearer to six neighbours, four on a border.
+    /// Flips edges to bring points nearer to six neighbours, four on a border.
     fn flip_for_valence(&mut self) {
         let off = |mesh: &Self, point: u32, change: i64| {
             let border = mesh.neighbours(point).iter().any(|&n| mesh.is_border(point, n));
@@ -148,7 +148,8 @@ impl TriangleMesh {
         }
     }
 
-    /// Whether two new triangles look the same way as the old, and the worse is of a shape better than `factor` times the old.
+    /// Whether two new triangles have the orientation of the old ones, and the worse shape is better than `factor` times the
+    /// old.
     pub(crate) fn flip_is_sound(&self, old: [u32; 2], new: [[u32; 3]; 2], factor: f64) -> bool {
         let mean = self.normal(old[0]) + self.normal(old[1]);
         let x = new.map(|nodes| nodes.map(|n| self.points[n as usize]));

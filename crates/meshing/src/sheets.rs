@@ -43,8 +43,8 @@ pub enum Sheet {
         /// Lengths along x and y.
         size: [f64; 2],
     },
-    /// A part of a cylinder round the z axis from z = 0 on, facing outwards. Edges: `z-min`, `z-max`, and where it is open
-    /// `start` and `end`; grid axes are round and along.
+    /// A part of a cylinder around the z axis from z = 0, facing outwards. Edges: `z-min`, `z-max`, and on an open
+    /// cylinder `start` and `end`; the grid axes run around and along.
     Cylinder {
         /// Radius.
         radius: f64,
@@ -158,7 +158,7 @@ impl Sheet {
         }
     }
 
-    /// Whether the first grid axis ends where it starts.
+    /// Whether the first grid axis is closed.
     fn closes(&self) -> bool {
         match *self {
             Self::Cylinder { span, .. } | Self::Hemisphere { span, .. } => span > TAU * (1.0 - 1e-12),

@@ -1,7 +1,7 @@
-//! Step 4 of isosurface stuffing: the part of one lattice tetrahedron inside the body, as tetrahedra.
-//! Quads that two tetrahedra share get the diagonal that both choose from the face alone, so the pieces fit.
-//! Of two such rules on faces with a long cut edge, this one gave the organs the larger least acoustic length
-//! at 10 and 8 mm; the opposite one bounds dihedral angles better.
+//! Step 4 of isosurface stuffing: the part of one lattice tetrahedron inside the body, as tetrahedra. Quads
+//! shared by two tetrahedra get a diagonal that depends on the face alone, so the pieces fit. Of two rules
+//! for faces with a long cut edge, this one gave the organs the larger smallest acoustic length at 10 and 8
+//! mm; the opposite one bounds dihedral angles better.
 
 use crate::lattice::{Triple, is_long};
 
@@ -16,7 +16,7 @@ pub(crate) struct Corner {
     pub(crate) sign: i8,
 }
 
-/// Tetrahedra of nodes, of either orientation, inside the body. `cut` gives the node where the surface
+/// Tetrahedra of nodes inside the body, of either orientation. `cut` gives the node where the surface
 /// crosses the edge from an inner to an outer corner.
 pub(crate) fn stencil(mut corners: [Corner; 4], cut: impl Fn(Corner, Corner) -> u32) -> Pieces {
     corners.sort_by_key(|corner| -corner.sign);

@@ -1,7 +1,7 @@
-//! Blocks and tubes on a structured grid, as hexahedra or as six tetrahedra for each of them.
-//! The split is Todd's triangulation J1: Kuhn's six paths from corner to opposite corner, mirrored from cell
-//! to cell, so that the diagonals of neighbours meet and no direction is preferred.
-//! Leaves out: grading, and blocks or tubes that are not straight (move the points afterwards).
+//! Blocks and tubes on a structured grid, as hexahedra or six tetrahedra each. The split is Todd's
+//! triangulation J1: Kuhn's six paths from corner to opposite corner, mirrored from cell to cell, so
+//! neighbouring diagonals meet and no direction is preferred. Leaves out: grading, and blocks or tubes that
+//! are not straight (move the points afterwards).
 
 use std::f64::consts::TAU;
 

@@ -1,11 +1,10 @@
-//! Tetrahedra in the body of a field by isosurface stuffing, after Labelle and Shewchuk (2007): a
-//! body-centred cubic lattice, warped so that no cut comes too near a lattice point, then cut along the
-//! surface. Five steps: lattice, cut points, warp, stencils (`stencil.rs`), largest component
-//! (`topology.rs`).
-//! Two things differ from the paper: all points are warped at once, so that their order does not matter, and
-//! the diagonals of `stencil.rs` favour the time step. The paper's bound of 10.8° on dihedral angles does not
-//! hold then: down to 8.2° was seen (brain at 5 mm; example `measure`).
-//! Leaves out: grading; what `tets.rs` does afterwards (optimisation, materials, mending of non-manifold edges).
+//! Tetrahedra in the body of a field by isosurface stuffing, after Labelle and Shewchuk (2007): a body-centred
+//! cubic lattice, warped so that no cut is too near a lattice point, then cut along the surface. Five steps:
+//! lattice, cut points, warp, stencils (`stencil.rs`), largest component (`topology.rs`). Two things differ from
+//! the paper. All points are warped at once, so their order does not matter. The diagonals of `stencil.rs`
+//! favour the time step, so the paper's bound of 10.8° on dihedral angles does not hold: the smallest observed
+//! is 8.2° (brain at 5 mm; example `measure`). Leaves out: grading; the later steps of `tets.rs` (optimisation,
+//! materials, repair of non-manifold edges).
 
 use pliant_geometry::{CellKind, Vector3};
 use rayon::prelude::*;
@@ -24,7 +23,7 @@ const ALPHA_LONG: f64 = 0.24999;
 /// The same for short edges.
 const ALPHA_SHORT: f64 = 0.41189;
 
-/// Halvings of an edge to find where the surface cuts it: to 6e-8 of its length.
+/// Bisections of an edge to find its cut: to 6e-8 of its length.
 const BISECTIONS: u32 = 24;
 
 /// Tetrahedra in a cube of the lattice.
@@ -176,20 +175,20 @@ fn find_cuts(lattice: &Lattice, sign: &[i8], field: &(impl ImplicitField + ?Size
         .collect()
 }
 
-/// The lattice with points too near a cut moved onto their nearest such cut.
+/// The lattice after moving points too near a cut onto the nearest cut.
 struct Warped {
     lattice: Lattice,
     /// Sign class of each lattice point; 0 for moved ones.
     sign: Vec<i8>,
-    /// All cuts, by increasing edge. Those of edges with a moved end are no nodes any more.
+    /// All cuts, by increasing edge. Cuts of edges with a moved end are no longer nodes.
     cuts: Vec<Cut>,
     /// The cut that each lattice point was moved to, or `UNMOVED`.
     moved_to: Vec<u32>,
 }
 
 impl Warped {
-    /// Each cut is too near to at most one end (α < ½) and a point goes to its nearest one, the first of
-    /// equals: the order of the points does not matter.
+    /// Each cut is too near to at most one end (α < ½) and a point moves to its nearest cut, the first
+    /// among equals: the order of the points does not matter.
     fn new(lattice: Lattice, mut sign: Vec<i8>, field: &(impl ImplicitField + ?Sized)) -> Self {
         let cuts = find_cuts(&lattice, &sign, field);
         let mut moved_to = vec![UNMOVED; sign.len()];

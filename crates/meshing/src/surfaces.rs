@@ -1,4 +1,4 @@
-//! The surfaces of an anatomy: which points lie between which sides, and the way there. Each surface may be shifted a little
+//! The surfaces of an anatomy: the sides of points, and projection onto surfaces. Each surface may be shifted slightly
 //! outwards, so that facets between points of a curved surface enclose the right volume.
 
 use pliant_geometry::Vector3;
@@ -45,8 +45,8 @@ impl<'a> Surfaces<'a> {
         own - others.map(|other| self.depth(other, point)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Field of a material [m]. The first one has none of its own and is what the others leave: minus the deepest of
-    /// them.
+    /// Field of a material [m]. The first one has no field of its own; it is the remainder of the others, minus the
+    /// deepest of them.
     fn depth(&self, material: usize, point: &Vector3) -> f64 {
         match (material, self.anatomy.first()) {
             (1, Some(first)) => first.value(point),
@@ -55,7 +55,7 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// The materials with a field of their own.
+    /// The materials with their own field.
     fn inner(&self) -> impl Iterator<Item = usize> {
         2..=self.levels.len()
     }

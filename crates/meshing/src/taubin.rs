@@ -1,5 +1,5 @@
-//! Smoothing of a surface without shrinking it (Taubin 1995): each point moves towards the mean of its neighbours by the part λ, then
-//! away from it by a slightly larger part μ. Together they damp what changes from point to point and leave what is longer.
+//! Smoothing of a surface without shrinking it (Taubin 1995): each point moves towards the mean of its neighbours by the fraction λ,
+//! then away from it by a slightly larger fraction μ. Together they damp changes from point to point and preserve longer ones.
 
 use pliant_geometry::Vector3;
 use pliant_imaging::Smoothing;
@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use crate::triangles::TriangleMesh;
 
-/// How the field of an image is best smoothed where its surface is smoothed after that by [`SURFACE_PAIRS`]. Of what was tried on
-/// labels of the analytic liver and brain this stays closest to them: with sigma 1 and no pairs, which suits tetrahedra, the
+/// Best smoothing of the field of an image if [`SURFACE_PAIRS`] smooth its surface afterwards. Of the settings tested on labels
+/// of the analytic liver and brain, this one stays closest to them. With sigma 1 and no pairs, which suits tetrahedra, the
 /// largest distance is half as large again on the liver and twice on the brain; without sigma the steps of the voxels remain.
 pub const SURFACE_SMOOTHING: Smoothing = Smoothing { sigma: 0.55, clip: 6.0 };
 

@@ -20,16 +20,16 @@ use crate::optimise::Optimiser;
 use crate::surfaces::Surfaces;
 use crate::{DEFAULT_CELL_LIMIT, Stuffing};
 
-/// The smallest edge anywhere, as a part of the edge asked for.
+/// The smallest edge anywhere, as a fraction of the requested edge.
 pub(crate) const SMALLEST_PART: f64 = 1.0 / 64.0;
 
 /// Meshes made at most until a distance is held.
 const MOST_PASSES: usize = 8;
 
-/// Cells are made smaller where the distance is above this part of what is asked for.
+/// Cells become smaller where the distance exceeds this fraction of the requested one.
 const BEYOND: f64 = 0.85;
 
-/// A mesh that is not optimised yet is made finer where it is off by more than this much of the distance asked for.
+/// An unoptimised mesh is refined where its distance exceeds the requested one by this factor.
 const RAW_BEYOND: f64 = 1.2;
 
 /// A request for tetrahedra of an anatomy.
@@ -37,17 +37,17 @@ const RAW_BEYOND: f64 = 1.2;
 pub struct OrganTets {
     /// Lattice constant [m]: the long edges of the inner tetrahedra; the short ones are √3/2 of it.
     pub edge: f64,
-    /// Lattice constant inside, away from the surface [m], if it is to be larger: the largest `edge` × 2ⁿ that is not above it.
+    /// Lattice constant inside, away from the surface [m], if larger: the largest `edge` × 2ⁿ up to this value.
     pub inner_edge: Option<f64>,
     /// Labels with smaller cells, and their lattice constant [m]: the largest `edge` / 2ⁿ that is not above it.
     pub protect: Vec<(i32, f64)>,
-    /// Largest distance between the boundary of the mesh and the surface of the body [m], both ways: cells are halved where it is not
-    /// held. Of an image it is the smooth surface, of triangles these.
+    /// Largest distance between mesh boundary and body surface [m] in both directions: cells are halved where it is exceeded. The
+    /// reference is the smooth surface of an image, or the triangles of a file.
     pub distance: Option<f64>,
     /// A lattice point [m]; the centre of the box of the body if `None`.
     pub origin: Option<Vector3>,
-    /// Least acoustic length to reach, as a part of that of the ideal tet: 0.75 is reached as a rule, 0.9 is as good as it
-    /// gets, 0 leaves the mesh as stuffed.
+    /// Target for the smallest acoustic length, as a fraction of the ideal tet: 0.75 is usual, 0.9 the best, 0 skips
+    /// optimisation.
     pub target: f64,
     /// Most rounds of the optimiser.
     pub rounds: usize,
@@ -73,7 +73,7 @@ impl OrganTets {
         }
     }
 
-    /// The edge [m] to start from where only a distance [m] is asked for, given the box of the body [m].
+    /// The initial edge [m] if only a distance [m] is given, from the box of the body [m].
     pub fn edge_for(distance: f64, [low, high]: [Vector3; 2]) -> f64 {
         (12.0 * distance).min((high - low).norm() / 15.0)
     }
@@ -84,7 +84,7 @@ impl OrganTets {
         Self { protect: labels.iter().map(own).collect(), ..self }
     }
 
-    /// For cells of which edge [m] the field of a body must be good enough: the shortest one, or the distance that is to be held.
+    /// The edge [m] that the field of a body must resolve: the shortest edge, or the requested distance.
     pub fn finest(&self) -> f64 {
         let protected = self.protect.iter().map(|(_, edge)| *edge).fold(self.edge, f64::min);
         self.distance.map_or(protected, |distance| protected.min(distance.max(SMALLEST_PART * self.edge)))
@@ -114,7 +114,7 @@ impl OrganTets {
         self.finished(filled, anatomy, &|done| progress(0.1 + 0.9 * done))
     }
 
-    /// Makes cells smaller until a distance is held; the best mesh if it never is.
+    /// Refines cells until a distance is reached; otherwise returns the best mesh.
     fn within(
         &self,
         distance: f64,
@@ -233,7 +233,7 @@ fn finest_for(distance: f64, edge: f64) -> f64 {
     (distance / 2.0).clamp(SMALLEST_PART * edge, edge)
 }
 
-/// Halves the cubes where a mesh is too far off; whether any is left to be halved.
+/// Halves the cubes where a mesh is too far away; returns whether any can be halved.
 fn finer(wanted: &mut Wanted, tree: &Octree, measured: &Measured, distance: f64) -> bool {
     let before = wanted.len();
     for place in measured.beyond(BEYOND * distance) {
@@ -269,7 +269,7 @@ pub struct OrganMesh {
     pub report: TetReport,
 }
 
-/// What was repaired.
+/// The repairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Repairs {
     /// Small pieces left out.
@@ -284,11 +284,11 @@ pub struct Repairs {
     pub doubled_points: usize,
     /// Edges halved to that end.
     pub halved_edges: usize,
-    /// Points where the boundary met itself, each given a second one.
+    /// Points where the boundary met itself, each doubled.
     pub parted_points: usize,
 }
 
-/// What the optimiser did.
+/// The steps of the optimiser.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Steps {
     /// Rounds run.
@@ -314,7 +314,7 @@ pub struct EdgeLengths {
     pub median: f64,
     /// The longest.
     pub longest: f64,
-    /// The longest one as a part of the lattice constant where it lies.
+    /// The longest one over the local lattice constant.
     pub longest_part: f64,
 }
 
@@ -333,7 +333,7 @@ impl EdgeLengths {
     }
 }
 
-/// What is known before points and tets are numbered anew.
+/// Data from before the renumbering of points and tets.
 struct OfComplex {
     raw: f64,
     acoustic_part: f64,
@@ -342,16 +342,16 @@ struct OfComplex {
     pinched_points: Vec<[f64; 3]>,
 }
 
-/// How far a mesh is from the surface of its body, where that was asked for.
+/// Distance between a mesh and its body, if requested.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DistanceReport {
-    /// Largest distance asked for [m].
+    /// Largest requested distance [m].
     pub asked: f64,
     /// Largest distance both ways [m].
     pub reached: f64,
     /// How often cells were made until then.
     pub passes: usize,
-    /// What it is measured to.
+    /// The reference of the distance.
     pub to: MeasuredTo,
 }
 
@@ -379,7 +379,7 @@ pub struct TetReport {
     pub materials: Vec<MaterialReport>,
     /// Least acoustic length [m]: a step of this over the speed of pressure waves is stable.
     pub acoustic_length: f64,
-    /// The least one as a part of that of the ideal tet of the lattice where it lies.
+    /// The smallest one over that of the local ideal tet.
     pub acoustic_part: f64,
     /// That part before the optimiser.
     pub raw_acoustic_part: f64,
@@ -395,34 +395,34 @@ pub struct TetReport {
     pub crowded_edges_left: usize,
     /// Points where the boundary still meets itself [m].
     pub pinched_points: Vec<[f64; 3]>,
-    /// What was repaired.
+    /// The repairs.
     pub repairs: Repairs,
-    /// What the optimiser did.
+    /// The steps of the optimiser.
     pub steps: Steps,
-    /// The distance, where one was asked for.
+    /// The distance, if requested.
     pub distance: Option<DistanceReport>,
 }
 
 impl TetReport {
-    /// What is not as it was asked for.
+    /// Deviations from the request.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         if let Some(DistanceReport { asked, reached, to, .. }) = self.distance.filter(|d| d.reached > d.asked)
         {
             doubts.push(format!(
-                "the distance of {:.3} mm to {to} was not reached: {:.3} mm is the best so far",
+                "the distance of {:.3} mm to {to} was not reached; the best mesh reaches {:.3} mm",
                 asked * 1e3,
                 reached * 1e3
             ));
         }
         if self.edges.longest_part > LONGEST + 1e-9 {
             let part = self.edges.longest_part;
-            doubts.push(format!("an edge is {part:.2} times as long as was asked for there"));
+            doubts.push(format!("an edge is {part:.2} times the requested length at its location"));
         }
         if let Some([x, y, z]) = self.pinched_points.first() {
             let number = self.pinched_points.len();
             doubts.push(format!(
-                "the boundary of the mesh meets itself in {number} points, the first at ({x:.4}, {y:.4}, {z:.4}) m"
+                "the mesh boundary touches itself in {number} points, the first at ({x:.4}, {y:.4}, {z:.4}) m"
             ));
         }
         doubts
@@ -504,7 +504,7 @@ impl fmt::Display for TetReport {
         let EdgeLengths { least, median, longest, longest_part } = self.edges;
         writeln!(
             f,
-            "edges            {:.2} to {:.2} mm, half of them up to {:.2} mm, none above {longest_part:.2} of what was asked for there",
+            "edges            {:.2} to {:.2} mm, median {:.2} mm, at most {longest_part:.2} times the requested length",
             least * 1e3,
             longest * 1e3,
             median * 1e3
@@ -532,7 +532,7 @@ impl fmt::Display for TetReport {
             )?;
         }
         if parted_points > 0 {
-            writeln!(f, "parted           {parted_points} points where the boundary met itself")?;
+            writeln!(f, "parted           {parted_points} points where the boundary touched itself")?;
         }
         if self.crowded_edges_left > 0 {
             writeln!(f, "still touching   {} edges", self.crowded_edges_left)?;
@@ -550,16 +550,16 @@ impl fmt::Display for TetReport {
         if let Some(DistanceReport { asked, reached, passes, to }) = self.distance {
             writeln!(
                 f,
-                "distance         {:.3} mm at most to {to}; {:.3} mm asked for, {} in {passes} passes",
+                "distance         {:.3} mm at most to {to}; requested {:.3} mm, {} in {passes} passes",
                 reached * 1e3,
                 asked * 1e3,
-                if reached <= asked { "held" } else { "not reached" }
+                if reached <= asked { "reached" } else { "not reached" }
             )?;
         }
         let Steps { rounds, peeled, given, collapsed, flipped, moved } = self.steps;
         write!(
             f,
-            "optimiser        {rounds} rounds: {peeled} tets peeled, {given} given to another label, {collapsed} edges collapsed, {flipped} flips, {moved} moves"
+            "optimiser        {rounds} rounds: {peeled} tets peeled, {given} moved to another label, {collapsed} edges collapsed, {flipped} flips, {moved} moves"
         )
     }
 }

@@ -1,6 +1,6 @@
-//! Thickness of the body within a closed surface: from places spread over its faces straight inwards to the other side. A slab, a ball
-//! and a cylinder have their thickness and diameters; towards a sharp edge it goes to zero.
-//! Leaves out: inscribed balls, which are thinner than this where the two sides are not parallel.
+//! Thickness of the body inside a closed surface: from points spread over its faces straight inwards to the opposite side. A slab has
+//! its thickness, a ball and a cylinder their diameters; towards a sharp edge the thickness goes to zero. Leaves out: inscribed balls,
+//! which are thinner where the two sides are not parallel.
 
 use pliant_geometry::Vector3;
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ const MOST_PARTS: f64 = 16.0;
 pub struct Thickness {
     /// Thickness [m].
     pub thickness: Percentiles,
-    /// A place of the surface where it is least [m].
+    /// A point of the surface where it is smallest [m].
     pub thinnest: [f64; 3],
 }
 

@@ -21,7 +21,7 @@ pub(crate) fn largest_component(
     cells: &[u32],
     position: impl Fn(u32) -> Vector3 + Sync + Send,
 ) -> FieldMesh {
-    // Of equal components only the first is kept.
+    // Among equal components only the first is kept.
     large_components(kind, cells, f64::INFINITY, position)
 }
 
@@ -58,7 +58,7 @@ pub(crate) fn faces_between_labels(mesh: &Mesh) -> Patches {
     let mut all: Vec<([u32; 4], Vec<u32>, i32)> = Vec::new();
     for block in mesh.volume_blocks() {
         let labels = block.data.get("label").map_or(&[][..], |labels| &labels.values);
-        // Without labels all cells are of one that is not the outside.
+        // Without labels, all cells have one label that is not the outside.
         let labels = labels.iter().map(|&label| label as i32).chain(std::iter::repeat(OUTSIDE_LABEL + 1));
         for (cell, label) in block.cells().zip(labels) {
             for face in local_faces(block.kind) {
@@ -194,7 +194,7 @@ fn find(root: &mut [u32], mut cell: u32) -> u32 {
     cell
 }
 
-/// Edges of the boundary of the kept cells that are not shared by exactly two boundary faces.
+/// Boundary edges of the kept cells with other than two boundary faces.
 fn non_manifold_edges(kind: CellKind, cells: &[u32], faces: &[u128], kept: impl Fn(usize) -> bool) -> usize {
     let local = local_faces(kind);
     let n = kind.node_count();

@@ -15,7 +15,7 @@ use crate::nesting::{Shell, containers, signed_volume};
 /// Triangles of a worse shape have a normal by round-off only.
 const LEAST_SIDED: f64 = 1e-6;
 
-/// A triangle that is no more.
+/// A removed triangle.
 const GONE: [u32; 3] = [u32::MAX; 3];
 
 /// Points closer than this part of the box's diagonal are one.
@@ -34,7 +34,7 @@ pub struct TriangleMesh {
     open: bool,
 }
 
-/// What was mended in a surface from a file.
+/// Repairs of a surface from a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SurfaceRepairs {
     /// Points joined to another at the same place.
@@ -43,7 +43,7 @@ pub struct SurfaceRepairs {
     pub dropped_faces: usize,
     /// Edges of more than two faces, along which the surface was cut.
     pub cut_edges: usize,
-    /// Faces turned to look the same way as their neighbours, and outwards where the surface is closed.
+    /// Faces turned to the orientation of their neighbours, and outwards on closed surfaces.
     pub turned_faces: usize,
 }
 
@@ -51,8 +51,8 @@ impl fmt::Display for SurfaceRepairs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let parts = [
             (self.joined_points, ["point", "points"], "joined"),
-            (self.dropped_faces, ["face", "faces"], "without area or given twice dropped"),
-            (self.cut_edges, ["edge", "edges"], "of more than two faces cut"),
+            (self.dropped_faces, ["face", "faces"], "without area or duplicate dropped"),
+            (self.cut_edges, ["edge", "edges"], "of more than two faces split"),
             (self.turned_faces, ["face", "faces"], "turned"),
         ];
         let told: Vec<String> = parts
@@ -100,7 +100,7 @@ impl TriangleMesh {
     pub fn from_mesh(mesh: &Mesh) -> Result<(Self, SurfaceRepairs), MeshingError> {
         let (surface, mut repairs) = Self::from_surface(&boundary(mesh), &mesh.points)?;
         if mesh.volume_blocks().all(|block| block.is_empty()) {
-            // Faces with a point twice are none from the start.
+            // Faces with a repeated point are dropped from the start.
             let blocks = mesh.blocks.iter().filter(|block| block.kind.dimension() == 2);
             let lines = |nodes: &&[u32]| {
                 nodes.iter().enumerate().filter(|(k, n)| !nodes[..*k].contains(n)).count() < 3
@@ -182,7 +182,7 @@ impl TriangleMesh {
         self.len() == 0
     }
 
-    /// Triangles that there are, in order.
+    /// The existing triangles, in order.
     pub(crate) fn alive(&self) -> impl Iterator<Item = u32> + '_ {
         (0_u32..).zip(&self.triangles).filter(|(_, nodes)| **nodes != GONE).map(|(triangle, _)| triangle)
     }
@@ -212,7 +212,7 @@ impl TriangleMesh {
         edges
     }
 
-    /// The triangles at an edge: two, one at a border, none if there is no such edge.
+    /// The triangles at an edge: two, one at a border, none if the edge does not exist.
     pub(crate) fn sides(&self, a: u32, b: u32) -> [Option<u32>; 2] {
         let mut at = self.star[a as usize].iter().filter(|&&t| self.triangles[t as usize].contains(&b));
         [at.next().copied(), at.next().copied()]
@@ -350,7 +350,7 @@ impl TriangleMesh {
         middle
     }
 
-    /// The two triangles that would stand in place of those at an edge, had it been flipped; `None` where it can't be.
+    /// The two triangles after flipping an edge; `None` if it cannot be flipped.
     pub(crate) fn flipped(&self, a: u32, b: u32) -> Option<[[u32; 3]; 2]> {
         let [Some(s), Some(t)] = self.sides(a, b) else { return None };
         let (c, d) = (self.opposite(s, a, b), self.opposite(t, a, b));
@@ -361,7 +361,7 @@ impl TriangleMesh {
         Some([swap(self.triangles[s as usize], b, d), swap(self.triangles[t as usize], a, c)])
     }
 
-    /// Flips an edge. It must be one that can be flipped.
+    /// Flips an edge, which must be flippable.
     pub(crate) fn flip(&mut self, a: u32, b: u32, new: [[u32; 3]; 2]) {
         let [Some(s), Some(t)] = self.sides(a, b) else { return };
         let (c, d) = (self.opposite(s, a, b), self.opposite(t, a, b));
@@ -424,8 +424,8 @@ fn sides_of(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], Vec<(u32, bool)>> {
     sides
 }
 
-/// Turns triangles to look the same way as their neighbours, the most of each piece as they are; closed pieces outwards, and with them
-/// what lies inside: a cavity looks into itself. Returns how many were turned.
+/// Orients triangles consistently with the majority of each piece; closed pieces outwards together with the pieces inside, where a
+/// cavity is oriented towards itself. Returns the number of turned triangles.
 fn turn_alike(triangles: &mut [[u32; 3]], points: &[Vector3]) -> usize {
     let before = triangles.to_vec();
     let (pieces, closed) = turn_pieces(triangles);
@@ -445,7 +445,8 @@ fn turn_alike(triangles: &mut [[u32; 3]], points: &[Vector3]) -> usize {
     (0..before.len()).filter(|&t| before[t] != triangles[t]).count()
 }
 
-/// Turns the triangles of each piece alike, the most as they are. Returns the pieces, and whether each is closed.
+/// Orients the triangles of each piece consistently with their majority. Returns the pieces, and whether each is
+/// closed.
 fn turn_pieces(triangles: &mut [[u32; 3]]) -> (Vec<Vec<u32>>, Vec<bool>) {
     let sides = sides_of(triangles);
     let mut turn: Vec<Option<bool>> = vec![None; triangles.len()];
@@ -489,7 +490,8 @@ fn turn_pieces(triangles: &mut [[u32; 3]]) -> (Vec<Vec<u32>>, Vec<bool>) {
     (pieces, closed)
 }
 
-/// Gives each fan of triangles round a point, joined by edges of two triangles that look the same way, a point of its own.
+/// Gives each fan of triangles around a point its own point. A fan is joined by edges of two triangles with the same
+/// orientation.
 fn cut(
     mut points: Vec<Vector3>,
     mut triangles: Vec<[u32; 3]>,

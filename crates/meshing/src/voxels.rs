@@ -1,6 +1,6 @@
-//! Cubes in the body of a field, on a regular grid, the largest face-connected part: every cube whose centre is inside, or every
-//! cube that the body fills by more than a little, with the fraction that it fills. These immersed cubes are to be
-//! weighted with their fractions and to carry the body's own surface (de Visser and Comas 2008).
+//! Cubes in the body of a field, on a regular grid, the largest face-connected part: every cube with its centre inside, or every
+//! cube that the body fills by more than a small fraction, with this fraction. Immersed cubes are weighted by their fractions
+//! and carry the surface of the body (de Visser and Comas 2008).
 
 use pliant_geometry::{CellKind, DataArray, Vector3};
 use rayon::prelude::*;
@@ -42,7 +42,7 @@ impl Voxels {
         Ok(mesh)
     }
 
-    /// The cubes of the same grid of which the body fills more than 2 %, with the fraction that it fills as the cell data
+    /// The cubes of the same grid that the body fills by more than 2 %, with the fraction as cell data
     /// [`Self::FRACTION`], from 512 samples in each cube near the surface.
     pub fn immersed(&self, field: &(impl ImplicitField + ?Sized)) -> Result<FieldMesh, MeshingError> {
         let (mut made, fractions) =
@@ -53,7 +53,7 @@ impl Voxels {
         Ok(made)
     }
 
-    /// The cubes with more than `least` of a measure that is asked at their centres, and what each has of it.
+    /// The cubes with more than `least` of a measure at their centres, and its values.
     fn fill(
         &self,
         field: &(impl ImplicitField + ?Sized),
@@ -82,7 +82,7 @@ impl Voxels {
         }
         let nodes: Vec<u32> = inside.iter().flat_map(|&number| grid.hex(grid.cell(number))).collect();
         let made = largest_component(CellKind::Hex, &nodes, |node| at(grid.point(node), 0.0));
-        // Cells are told apart by their first corners; those kept stay in order.
+        // The first corner identifies a cell; the kept cells stay in order.
         let mut kept = made.mesh.blocks[0].cells().map(|cell| made.mesh.points[cell[0] as usize]).peekable();
         let is_kept = |number: &usize| kept.next_if(|first| *first == at(grid.cell(*number), 0.0)).is_some();
         let values = inside.into_iter().filter(is_kept).map(|number| measured[number]).collect();
@@ -91,7 +91,8 @@ impl Voxels {
 
     /// The part of a cube that the body fills, by samples at the centres of smaller cubes.
     fn fraction(&self, field: &(impl ImplicitField + ?Sized), centre: &Vector3) -> Result<f64, MeshingError> {
-        // A value is about the distance to the surface: twice the half diagonal away there is no surface in the cube.
+        // A value approximates the distance to the surface: beyond twice the half diagonal, the cube contains no
+        // surface.
         let value = finite(field, centre)?;
         if value.abs() > 3.0_f64.sqrt() * self.edge {
             return Ok(if value > 0.0 { 1.0 } else { 0.0 });

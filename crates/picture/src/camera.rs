@@ -22,7 +22,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// The axis nearest to a direction; z for none.
+    /// The axis nearest to a direction; z for a zero vector.
     pub fn nearest(direction: &Vector3) -> Self {
         let largest = direction.iamax();
         let negative = direction[largest] < 0.0;
@@ -53,7 +53,7 @@ impl Axis {
 /// How depth becomes size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Projection {
-    /// What is near looks larger; 30° from top to bottom.
+    /// Perspective: near objects are larger; 30° from top to bottom.
     #[default]
     Perspective,
     /// Parallel lines stay parallel.
@@ -62,7 +62,7 @@ pub enum Projection {
 
 /// Tangent of half the angle from top to bottom in perspective.
 const SPREAD: f64 = 0.267_949_192_431_122_7;
-/// Largest elevation [°]: at the pole itself there is no right and left.
+/// Largest elevation [°]: at the pole itself left and right are undefined.
 const STEEPEST: f64 = 89.9;
 /// Room around a body that fits the picture.
 const MARGIN: f64 = 1.10;
@@ -70,17 +70,17 @@ const MARGIN: f64 = 1.10;
 /// A camera on a sphere around its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// What it looks at [m].
+    /// The target [m].
     pub target: Vector3,
     /// Angle around the axis that points up [°], from the front axis on.
     pub azimuth: f64,
     /// Angle above the horizon [°].
     pub elevation: f64,
-    /// What is seen from top to bottom at the target [m].
+    /// Height of the view at the target [m].
     pub height: f64,
     /// How depth becomes size.
     pub projection: Projection,
-    /// What is up.
+    /// The up axis.
     pub up: Axis,
 }
 
@@ -131,13 +131,13 @@ impl Camera {
         self.elevation = (self.elevation + elevation).clamp(-STEEPEST, STEEPEST);
     }
 
-    /// Moves what is seen by parts of the picture's height to the right and up.
+    /// Moves the view by fractions of the picture height to the right and up.
     pub fn pan(&mut self, right: f64, up: f64) {
         let [x, y, _] = self.axes();
         self.target -= (x * right + y * up) * self.height;
     }
 
-    /// Shows a part of what was seen: below 1 is nearer.
+    /// Zooms: a factor below 1 moves nearer.
     pub fn zoom(&mut self, factor: f64) {
         self.height = (self.height * factor).clamp(1e-9, 1e9);
     }
@@ -152,7 +152,7 @@ impl Camera {
         let Some(first) = seen.first() else { return };
         let (low, high) = seen.iter().fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
         let mut centre = 0.5 * (low + high);
-        // In perspective the middle of what is seen is found by a few rounds: what is near reaches further out.
+        // In perspective a few iterations find the middle of the view: near objects reach further out.
         for _ in 0..8 {
             let height = self.needed(&seen, &centre, aspect);
             self.height = height * MARGIN;
@@ -191,8 +191,8 @@ impl Camera {
         2.0 * half.fold(0.0, f64::max)
     }
 
-    /// From space to clip space of a picture of so many widths a height, for things within a distance of the target [m];
-    /// depth goes from 0 near to 1 far.
+    /// From space to clip space of a picture with this ratio of width to height, for objects within a distance of the
+    /// target [m]; depth increases from 0 near to 1 far.
     pub fn projection_view(&self, aspect: f64, reach: f64) -> Matrix4<f32> {
         let [x, y, z] = self.axes();
         let eye = self.eye();
@@ -200,7 +200,7 @@ impl Camera {
         let view = Matrix4::from_rows(&[row(x), row(y), row(z), Vector4::w().transpose()]);
         let distance = self.distance();
         let far = distance + reach;
-        // The camera may stand within what it looks at.
+        // The camera may be inside the objects.
         let (near, scale) = match self.projection {
             Projection::Perspective => ((distance - reach).max(0.01 * distance), 1.0 / SPREAD),
             Projection::Orthographic => (distance - reach, 2.0 / self.height),

@@ -63,7 +63,7 @@ impl ColourMap {
     }
 }
 
-/// Colours of the labels from 0 on: grey, then those that Okabe and Ito (2008) chose so that the colour-blind tell them apart.
+/// Colours of the labels from 0: grey, then the colours of Okabe and Ito (2008), which colour-blind people can distinguish.
 const FIRST: [[u8; 3]; 8] = [
     [153, 153, 153],
     [230, 159, 0],
@@ -76,8 +76,8 @@ const FIRST: [[u8; 3]; 8] = [
 ];
 /// Turn of the hue from one label to the next, the golden section: any number of labels spread evenly.
 const TURN: f64 = 0.618_033_988_749_894_9;
-/// Lightness and chroma (OKLab) that follow each other. Hues come close after a Fibonacci number of labels; the first one that nine
-/// divides is 144, so that near hues differ in lightness before.
+/// Cycle of lightness and chroma (OKLab). Hues repeat nearly after a Fibonacci number of labels; the first one divisible by nine is
+/// 144, so similar hues differ in lightness before.
 const TONES: [[f64; 2]; 9] = [
     [0.69, 0.11],
     [0.55, 0.16],
@@ -90,7 +90,8 @@ const TONES: [[f64; 2]; 9] = [
     [0.49, 0.11],
 ];
 
-/// The colour (sRGB) of a label, the same in every picture. The first two dozen are easily told apart; of hundreds some are alike.
+/// The colour (sRGB) of a label, the same in every picture. The first two dozen are easy to distinguish; among hundreds some look
+/// alike.
 pub fn label_colour(label: i32) -> [u8; 3] {
     if let Some(&colour) = usize::try_from(label).ok().and_then(|label| FIRST.get(label)) {
         return colour;
@@ -134,13 +135,13 @@ pub struct Extremes {
 const LEFT_OUT: f64 = 0.005;
 
 impl Extremes {
-    /// Takes values of a frame; those that are not finite don't count.
+    /// Adds values of a frame; non-finite ones are ignored.
     pub fn add(&mut self, values: impl IntoIterator<Item = f64>) {
         self.values.extend(values.into_iter().filter(|value| value.is_finite()).map(|value| value as f32));
     }
 
-    /// The range: from zero where no value is negative, around zero where many of either sign are; without the outermost
-    /// values. `None` without any value.
+    /// The range without the outermost values: from zero if no value is negative, around zero if many values have either
+    /// sign. `None` without values.
     pub fn range(mut self) -> Option<[f64; 2]> {
         if self.values.is_empty() {
             return None;

@@ -1,52 +1,52 @@
-//! What can go wrong with a picture.
+//! Errors of pictures and films.
 
 use std::path::PathBuf;
 
 /// A picture or a film that could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// Nothing on this machine draws.
-    #[error("no graphics processor was found, nor a software driver that stands in for one")]
+    /// No adapter can draw.
+    #[error("no GPU and no software driver was found")]
     NoAdapter,
     /// The adapter does not open.
-    #[error("the graphics processor `{adapter}` cannot be opened: {reason}")]
+    #[error("the GPU `{adapter}` cannot be opened: {reason}")]
     Refused {
         /// Its name.
         adapter: String,
-        /// What the driver says.
+        /// Error of the driver.
         reason: String,
     },
     /// A picture of this size is more than the adapter draws.
     #[error(
-        "a picture of {width} × {height} pixels cannot be drawn by `{adapter}`: it takes 1 to {largest} each way"
+        "`{adapter}` cannot draw a picture of {width} × {height} pixels: the limits are 1 to {largest} in each direction"
     )]
     Size {
         /// Its name.
         adapter: String,
-        /// Width asked for.
+        /// Requested Width.
         width: u32,
-        /// Height asked for.
+        /// Requested Height.
         height: u32,
         /// Most pixels each way.
         largest: u32,
     },
     /// The device failed while it drew.
-    #[error("the graphics processor `{adapter}` failed: {reason}")]
+    #[error("the GPU `{adapter}` failed: {reason}")]
     Device {
         /// Its name.
         adapter: String,
-        /// What the driver says.
+        /// Error of the driver.
         reason: String,
     },
-    /// Pixels that are no PNG file, or cannot become one.
-    #[error("the picture cannot be coded: {0}")]
+    /// Pixels that are not a PNG file, or cannot become one.
+    #[error("the picture cannot be encoded: {0}")]
     Coding(String),
     /// A file that can't be written.
     #[error("`{path}` cannot be written: {reason}")]
     Write {
         /// Its path.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         reason: String,
     },
     /// ffmpeg ended with an error.
@@ -54,13 +54,13 @@ pub enum PictureError {
     Ffmpeg {
         /// The film.
         path: PathBuf,
-        /// The last of what it said.
+        /// The last line of its output.
         reason: String,
     },
 }
 
 impl PictureError {
-    /// What to try.
+    /// The remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NoAdapter => {
@@ -68,10 +68,10 @@ impl PictureError {
                  mesa-vulkan-drivers libvulkan1`; Fedora: `dnf install mesa-vulkan-drivers vulkan-loader`)"
             }
             Self::Refused { .. } | Self::Device { .. } => {
-                "renew its driver, or take Mesa's software Vulkan by the variable VK_DRIVER_FILES"
+                "update its driver, or select Mesa's software Vulkan with the variable VK_DRIVER_FILES"
             }
             Self::Size { .. } => "choose another size",
-            Self::Coding(_) => "check that the file is a PNG picture of red, green, blue and coverage",
+            Self::Coding(_) => "check that the file is a PNG picture with red, green, blue and alpha",
             Self::Write { .. } => "check the folder, its permissions and the free space",
             Self::Ffmpeg { .. } => "try a film whose name ends in .png, an animated PNG that needs no ffmpeg",
         }

@@ -1,4 +1,4 @@
-//! Films: through ffmpeg where there is one, else as an animated PNG.
+//! Films: through ffmpeg if available, otherwise as animated PNG.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -52,7 +52,7 @@ impl Film {
             return Ok(());
         }
         self.input = None;
-        Err(self.end().err().unwrap_or_else(|| self.failed("it takes no more pictures".into())))
+        Err(self.end().err().unwrap_or_else(|| self.failed("it accepts no more pictures".into())))
     }
 
     /// Ends the film.
@@ -71,14 +71,14 @@ impl Film {
     fn end(&mut self) -> Result<(), PictureError> {
         let mut said = String::new();
         if let Some(mut errors) = self.child.stderr.take() {
-            // What it said is lost only where it said no text.
+            // Its output is lost only if it is not text.
             let _ = std::io::Read::read_to_string(&mut errors, &mut said);
         }
         let status = self.child.wait().map_err(|error| self.failed(error.to_string()))?;
         if status.success() {
             return Ok(());
         }
-        let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it did not say why");
+        let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no error message");
         Err(self.failed(last.to_owned()))
     }
 }
@@ -90,7 +90,7 @@ pub struct AnimatedPng {
 }
 
 impl AnimatedPng {
-    /// Starts one of so many pictures in all and a second, all of one size.
+    /// Starts a film with a number of pictures and a frame rate, all of one size.
     ///
     /// # Errors
     /// If the file can't be written, or there are no pictures.

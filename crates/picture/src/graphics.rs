@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::PictureError;
 
-/// An open graphics processor.
+/// An open GPU.
 #[derive(Clone, Debug)]
 pub struct Graphics {
     /// Its handle.
@@ -16,11 +16,11 @@ pub struct Graphics {
 }
 
 impl Graphics {
-    /// Opens the best one that draws: cards first, software drivers last. The variables `WGPU_BACKEND` and `VK_DRIVER_FILES` narrow
-    /// the choice.
+    /// Opens the best adapter that draws: GPUs first, software drivers last. The variables `WGPU_BACKEND` and `VK_DRIVER_FILES`
+    /// restrict the choice.
     ///
     /// # Errors
-    /// If there is none, or it does not open.
+    /// If none exists, or it does not open.
     pub fn open() -> Result<Self, PictureError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         descriptor.backends &= wgpu::Backends::PRIMARY;
@@ -56,7 +56,7 @@ impl Graphics {
         Self { device, queue, adapter, fault }
     }
 
-    /// The name of the graphics processor.
+    /// The name of the GPU.
     pub fn adapter(&self) -> &str {
         &self.adapter
     }

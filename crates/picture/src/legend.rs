@@ -1,15 +1,14 @@
-//! What is written into a picture: the scale of its colours with ticks and unit or the colours of labels with their names, a title
-//! and the time.
+//! Text in a picture: the colour scale with ticks and unit or the colours of labels with their names, a title and the time.
 
 use crate::colour::label_colour;
 use crate::picture::Picture;
 use crate::style::Style;
 use crate::text::{Align, Pen};
 
-/// What is written into a picture.
+/// Text in a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Legend {
-    /// What the colours tell.
+    /// The quantity shown by colours.
     pub quantity: String,
     /// Its unit; empty for none.
     pub unit: String,
@@ -17,7 +16,7 @@ pub struct Legend {
     pub title: String,
     /// At the bottom left.
     pub note: String,
-    /// Labels with their names, empty for none: each has a swatch where colours are those of labels.
+    /// Labels with their names, or empty: each has a swatch if colours show labels.
     pub labels: Vec<(i32, String)>,
 }
 
@@ -28,12 +27,12 @@ const SWATCHES: [f32; 2] = [0.12, 0.92];
 /// Distance from swatch to swatch over the height of letters.
 const ROW: f32 = 1.45;
 
-/// What stands below the swatches where not all fit.
+/// The text below the swatches if not all fit.
 fn told_of(more: usize) -> String {
     format!("+ {more} more")
 }
 
-/// The lines of swatches that fit into so many: the label of each and what stands beside it; and how many labels do not fit.
+/// The lines of swatches that fit: the label and its text; and the number of labels that do not fit.
 pub fn swatches(labels: &[(i32, String)], most: usize) -> (Vec<(i32, String)>, usize) {
     let shown = if labels.len() > most { most.saturating_sub(1) } else { labels.len() };
     let line = |(label, name): &(i32, String)| (*label, format!("{label} {name}").trim_end().to_owned());
@@ -45,7 +44,7 @@ const PREFIXES: [(&str, i32); 7] = [("G", 9), ("M", 6), ("k", 3), ("", 0), ("m",
 /// Units that take a prefix.
 const SCALED: [&str; 6] = ["Pa", "m", "N", "J", "m/s", "s"];
 
-/// About as many round values in a range as asked for, and the step between them.
+/// About the requested number of round values in a range, and the step between them.
 pub fn ticks([low, high]: [f64; 2], about: usize) -> (Vec<f64>, f64) {
     let rough = (high - low) / about.max(1) as f64;
     if !(rough > 0.0 && rough.is_finite()) {

@@ -1,6 +1,6 @@
-//! Lines that follow a body: fibres, and the edges of a cell that is marked. Each stands between two combinations of points, the
-//! middle ± half of it, so that the shader draws it in any deformed state from the points alone. A fibre is h F·a₀ with
-//! F = Σ x_a ⊗ ∇N_a of its cell, hence h Σ x_a (∇N_a·a₀).
+//! Lines that follow a body: fibres, and the edges of a marked cell. Each connects two combinations of points, the middle ± half
+//! of it, so the shader draws it in any deformed state from the points alone. A fibre is h F·a₀ with F = Σ x_a ⊗ ∇N_a of its
+//! cell, hence h Σ x_a (∇N_a·a₀).
 
 use std::collections::BTreeSet;
 
@@ -141,7 +141,7 @@ impl Fibres {
         [0, 1, 2].map(|c| (place[c] / self.cube).floor() as i64)
     }
 
-    /// The fibre of a cell, through a place in it given as parts of its nodes. `None` where it has none.
+    /// The fibre of a cell, through a position in it given by node weights. `None` if the cell has none.
     pub fn line(
         &self,
         cell: usize,

@@ -67,20 +67,20 @@ impl Picture {
         Ok(file)
     }
 
-    /// Reads what [`Self::png`] wrote; all of it counts as covered.
+    /// Reads the output of [`Self::png`]; all pixels count as covered.
     ///
     /// # Errors
-    /// If it is no such file.
+    /// If the file is invalid.
     pub fn from_png(file: &[u8]) -> Result<Self, PictureError> {
         let (rgb, [width, height]) = decoded(file, png::ColorType::Rgb)?;
         let rgba = rgb.chunks_exact(3).flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
         Ok(Self { width, height, rgba })
     }
 
-    /// Reads what [`Self::png_with_coverage`] wrote.
+    /// Reads the output of [`Self::png_with_coverage`].
     ///
     /// # Errors
-    /// If it is no such file.
+    /// If the file is invalid.
     pub fn from_png_with_coverage(file: &[u8]) -> Result<Self, PictureError> {
         let (rgba, [width, height]) = decoded(file, png::ColorType::Rgba)?;
         Ok(Self { width, height, rgba })
@@ -108,7 +108,7 @@ impl Picture {
         Some(Difference { everywhere: mean(everywhere), on_bodies: mean(on_bodies), overlap })
     }
 
-    /// Mixes a colour (sRGB) into a pixel; what lies outside is left out.
+    /// Mixes a colour (sRGB) into a pixel; pixels outside are ignored.
     pub(crate) fn mix(&mut self, x: i64, y: i64, colour: [u8; 3], cover: f32) {
         if !(0..i64::from(self.width)).contains(&x) || !(0..i64::from(self.height)).contains(&y) {
             return;

@@ -11,7 +11,7 @@ use crate::section::{Corner, Section};
 use crate::style::{PLAIN, Style, Texture};
 use crate::subject::Subject;
 
-/// What is drawn into.
+/// The render target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Target {
     /// Format of its colours.
@@ -61,7 +61,7 @@ struct View {
 
 /// Cover of the edges of cells.
 const EDGES: f32 = 0.55;
-/// Cover of the shape at rest where it turns away.
+/// Coverage of the shape at rest where it faces away.
 const GHOST: f32 = 0.85;
 /// Half the width of a fibre and of an edge of the marked cell, over the height of the picture.
 const WIDTHS: [f32; 2] = [0.0026, 0.0034];
@@ -342,7 +342,7 @@ impl Drawn {
         }
     }
 
-    /// Takes points [m] and a value at each; without values, or where one is not finite, the colour is that of tissue.
+    /// Sets points [m] and a value at each; without values, or for non-finite ones, the colour is that of tissue.
     pub fn set(&mut self, queue: &wgpu::Queue, points: &[Vector3], values: &[f64]) {
         let mut reach = 0.0_f64;
         for (index, (own, point)) in self.staged.iter_mut().zip(points).enumerate() {
@@ -359,7 +359,7 @@ impl Drawn {
         self.size = self.size.max(reach.sqrt());
     }
 
-    /// Draws from a buffer of someone else's, four numbers a point (position [m], value), such as a solver's on the same device.
+    /// Draws from an external buffer with four numbers per point (position [m], value), such as a solver's on the same device.
     pub fn bind_positions(&mut self, device: &wgpu::Device, renderer: &Renderer, points: &wgpu::Buffer) {
         let Self { triangles, vertices, offsets, around, .. } = &*self;
         let normals = &self.poses[0].normals;
@@ -370,7 +370,7 @@ impl Drawn {
         self.bind_shape(device, renderer);
     }
 
-    /// Binds what is drawn anew, after one of its buffers is another.
+    /// Updates the bindings after one of the buffers changes.
     fn bind_shape(&mut self, device: &wgpu::Device, renderer: &Renderer) {
         let rest = self.poses[1].points.clone();
         let Self { triangles, vertices, section, lines, .. } = &*self;
@@ -394,7 +394,7 @@ impl Drawn {
         (self.marked, self.mark_lines) = (cell, edges.len() as u32);
     }
 
-    /// Takes the triangles and fibres of a section; none for no section.
+    /// Sets the triangles and fibres of a section; none for no section.
     pub fn set_section(
         &mut self,
         device: &wgpu::Device,
@@ -418,7 +418,7 @@ impl Drawn {
         self.bind_shape(device, renderer);
     }
 
-    /// Finds normals and writes how the subject is looked at, in a picture of so many widths a height.
+    /// Computes normals and writes the view, for a picture with this ratio of width to height.
     pub fn prepare(
         &mut self,
         renderer: &Renderer,
@@ -484,11 +484,11 @@ impl Drawn {
     }
 }
 
-/// Stands for no value, so that neither it nor anything interpolated with it takes a colour of the map: shaders may take NaN for
+/// Marks a missing value, so that neither it nor an interpolation with it takes a colour of the map: shaders may replace NaN by
 /// any number.
 const NO_VALUE: f32 = 1e38;
 
-/// A value as the shader takes it; where it is not finite, the colour is that of tissue.
+/// A value for the shader; for a non-finite one the colour is that of tissue.
 pub fn drawn_value(value: f64) -> f32 {
     if value.is_finite() { value.clamp(-1e29, 1e29) as f32 } else { NO_VALUE }
 }
@@ -507,7 +507,7 @@ fn colour(bytes: [u8; 3], alpha: f32) -> [f32; 4] {
     [r, g, b, alpha]
 }
 
-/// What the shader knows of a picture.
+/// The uniforms of a picture.
 fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> View {
     let [right, up, towards] = camera.axes();
     let perspective = if camera.projection == Projection::Perspective { 1.0 } else { 0.0 };

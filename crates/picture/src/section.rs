@@ -1,5 +1,5 @@
-//! Sections: what a plane cuts of volume cells. A cell's edges are cut where linear interpolation meets the plane; the
-//! points, turned around their middle, make a convex polygon. Leaves out: cells that are so bent that their section is not convex.
+//! Sections of volume cells by a plane. Linear interpolation gives the intersections of the plane and the cell edges; sorted
+//! around their middle, these points form a convex polygon. Leaves out: cells so distorted that their section is not convex.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use crate::lines::{Line, edges};
 use crate::renderer::staged;
 use crate::subject::Subject;
 
-/// A plane: what lies on the side of its normal is taken away.
+/// A plane: removes the part on the side of its normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// Unit normal.

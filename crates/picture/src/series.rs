@@ -1,4 +1,4 @@
-//! Pictures of a series: the frames that a run has written, seen alike in one range of colours.
+//! Pictures of a series: the frames written by a run, with one view and one range of colours.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,17 +19,17 @@ use crate::subject::{Subject, critical_cell, nodal_values, visible};
 /// A series of frames that can't be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum SeriesError {
-    /// The folder holds no series.
-    #[error("`{0}` holds no series of frames (`*.pvd`)")]
+    /// The folder has no series.
+    #[error("`{0}` has no series of frames (`*.pvd`)")]
     NoSeries(PathBuf),
-    /// The folder holds no series of that name.
-    #[error("`{folder}` holds no series `{name}`; there is {known}")]
+    /// The folder has no series of that name.
+    #[error("`{folder}` has no series `{name}`; it has {known}")]
     UnknownSeries {
         /// The folder.
         folder: PathBuf,
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The names there are.
+        /// The existing names.
         known: String,
     },
     /// A list without a frame.
@@ -38,28 +38,28 @@ pub enum SeriesError {
     /// A file that can't be read.
     #[error(transparent)]
     File(#[from] MeshFileError),
-    /// The frames have no such field.
+    /// The frames lack the field.
     #[error("the frames have no field `{field}` of single numbers; they have {known}")]
     NoField {
-        /// The field asked for.
+        /// The requested field.
         field: String,
-        /// The fields there are.
+        /// The existing fields.
         known: String,
     },
-    /// Fibres are to be drawn where there are none.
+    /// Fibres were requested, but the frames have none.
     #[error("the cells of the frames have no fibres (the field `fibre`)")]
     NoFibres,
-    /// The critical cell is to be marked where no steps are known.
+    /// The critical cell was requested, but the frames have no steps.
     #[error("the cells of the frames have no stable steps (the field `element-step`)")]
     NoSteps,
-    /// Colours of labels are asked for where there are none.
+    /// Colours of labels were requested, but the frames have none.
     #[error("the cells of the frames have no labels (the field `label`)")]
     NoLabels,
     /// All cells are hidden.
-    #[error("the labels that are hidden are all there are: nothing is left to be seen")]
+    #[error("all labels are hidden: nothing is visible")]
     AllHidden,
     /// A frame of another mesh than the first.
-    #[error("frame {0} has another mesh than the first one")]
+    #[error("the mesh of frame {0} differs from the first one")]
     OtherMesh(usize),
     /// A picture that can't be drawn.
     #[error(transparent)]
@@ -67,28 +67,28 @@ pub enum SeriesError {
 }
 
 impl SeriesError {
-    /// What to try.
+    /// The remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NoSeries(_) => {
                 "give a scene, or the folder of a run whose scene has an output of type `vtu`"
             }
-            Self::UnknownSeries { .. } => "take one of these",
+            Self::UnknownSeries { .. } => "use one of these",
             Self::NoFrames(_) => "run the scene again",
             Self::File(_) => "",
             Self::NoField { .. } => {
-                "take one of these, a component as in `displacement:z` or `cauchy-stress:xx`, or `none`"
+                "use one of these, a component such as `displacement:z` or `cauchy-stress:xx`, or `none`"
             }
             Self::NoFibres => {
                 "show a body whose law has fibres; a finished run needs `fibre` in `data` of its output, `at = \"cells\"`"
             }
             Self::NoSteps => {
-                "show bodies and no carried surface; a finished run needs `element-step` in `data` of its output, `at = \"cells\"`"
+                "show bodies instead of carried surfaces; a finished run needs `element-step` in `data` of its output, `at = \"cells\"`"
             }
             Self::NoLabels => {
-                "show bodies whose mesh has cell data `label`, as those of images with several labels have"
+                "show bodies whose mesh has cell data `label`, such as meshes from images with several labels"
             }
-            Self::AllHidden => "hide fewer",
+            Self::AllHidden => "hide fewer labels",
             Self::OtherMesh(_) => "run the scene again into an empty folder",
             Self::Picture(error) => error.remedy(),
         }
@@ -105,10 +105,10 @@ pub struct Series {
 }
 
 impl Series {
-    /// The series of a name in the folder of a run; without a name the first one in the order of the alphabet.
+    /// The series of a name in the folder of a run; without a name the first in alphabetical order.
     ///
     /// # Errors
-    /// If there is none.
+    /// If none exists.
     pub fn find(folder: &Path, name: Option<&str>) -> Result<Self, SeriesError> {
         let mut names: Vec<String> = fs::read_dir(folder)
             .map_err(|source| MeshFileError::Open { path: folder.to_owned(), source })?
@@ -162,24 +162,24 @@ fn quoted(names: &[String]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
-/// How meshes with fields are looked at.
+/// The view of meshes with fields.
 #[derive(Clone, Debug, Default)]
 pub struct Look {
     /// The field that colours tell (see [`nodal_values`]); `None` for the colour of tissue.
     pub field: Option<String>,
-    /// Labels whose cells are left out, so that what lies inside is seen.
+    /// Labels whose cells are hidden to show the inside.
     pub hide: Vec<i32>,
-    /// How bodies are shown; without a range, that of the values.
+    /// The style of bodies; without a range, that of the values.
     pub style: Style,
-    /// The camera; its target and height are those that fit, but for the two below.
+    /// The camera; its target and height fit the body, except for the two below.
     pub camera: Camera,
-    /// What is in the middle [m], if not what fits.
+    /// The target [m], unless fitted.
     pub target: Option<Vector3>,
     /// Magnification of what fits; 0 counts as 1.
     pub zoom: f64,
     /// Width and height of pictures [pixels].
     pub size: [u32; 2],
-    /// What is written into them; labels are those of the mesh.
+    /// Their text; labels come from the mesh.
     pub legend: Legend,
 }
 
@@ -199,7 +199,7 @@ impl Common {
         if ghost {
             self.points.extend(surface.iter().map(|&point| subject.points[point as usize]));
         }
-        // As many as can be far out: what lies within the others changes no camera.
+        // Enough to include the outermost points: inner points do not change a camera.
         if self.points.len() > MOST_POINTS {
             let directions = spread_directions();
             let outermost = directions.iter().filter_map(|direction| {
@@ -225,7 +225,7 @@ fn spread_directions() -> Vec<Vector3> {
 }
 
 impl Look {
-    /// An instant, and the smallest stable step of a cell [s] where that cell is to be marked.
+    /// A time, and the smallest stable step of a cell [s] if that cell is marked.
     fn frame(&self, mesh: &Mesh) -> Result<(Frame, Option<f64>), SeriesError> {
         let missing =
             |field: &str| SeriesError::NoField { field: field.to_owned(), known: quoted(&fields(mesh)) };
@@ -264,7 +264,7 @@ impl Look {
         Ok(look)
     }
 
-    /// What is drawn of a mesh.
+    /// The drawn parts of a mesh.
     fn subject(&self, mesh: &Mesh) -> Result<Subject, SeriesError> {
         let subject = Subject::new(&visible(mesh, &self.hide));
         if subject.triangle_count() == 0 && !self.hide.is_empty() {
@@ -281,7 +281,7 @@ impl Look {
         let mut style = self.style;
         style.range = self.field.as_ref().and_then(|_| self.style.range.or_else(|| common.extremes.range()));
         let [width, height] = self.size.map(f64::from);
-        // The scale of colours stands beside the body, not on it.
+        // The colour scale is beside the body, not on it.
         let taken = self.legend.width(&style, self.size);
         let mut camera = self.camera;
         camera.fit(&common.points, width * (1.0 - taken) / height);
@@ -309,7 +309,7 @@ impl Look {
     /// One picture of a mesh with fields at a time [s].
     ///
     /// # Errors
-    /// If it has no such field, or can't be drawn.
+    /// If the field is missing, or drawing fails.
     pub fn picture(&self, graphics: &Graphics, mesh: &Mesh, time: f64) -> Result<Picture, SeriesError> {
         let look = self.with_labels_of(mesh)?;
         let subject = look.subject(mesh)?;
@@ -321,7 +321,7 @@ impl Look {
         Ok(look.finished(picture, &style, time, step))
     }
 
-    /// Pictures of chosen frames of a series: each goes to `take`, with how many were taken before it.
+    /// Pictures of chosen frames of a series: `take` receives each with its index.
     ///
     /// # Errors
     /// If a frame can't be read or drawn, or `take` fails.

@@ -16,7 +16,7 @@ use crate::subject::Subject;
 pub struct Frame {
     /// Position of each point [m].
     pub points: Vec<Vector3>,
-    /// Value at each point; empty for none.
+    /// Value at each point, or empty.
     pub values: Vec<f64>,
     /// The cell that is marked, as [`critical_cell`](crate::critical_cell) counts.
     pub critical: Option<u32>,
@@ -51,7 +51,7 @@ impl<'s> Studio<'s> {
     /// For pictures of so many pixels.
     ///
     /// # Errors
-    /// If the graphics processor draws no such size, or fails.
+    /// If the GPU does not support this size, or fails.
     pub fn new(
         graphics: &Graphics,
         subject: &'s Subject,
@@ -105,7 +105,7 @@ impl<'s> Studio<'s> {
     /// Takes a picture.
     ///
     /// # Errors
-    /// If the graphics processor fails.
+    /// If the GPU fails.
     pub fn draw(&mut self, frame: &Frame, camera: &Camera, style: &Style) -> Result<Picture, PictureError> {
         let Graphics { device, queue, .. } = &self.graphics;
         let [width, height] = self.size;

@@ -3,7 +3,7 @@
 use crate::colour::ColourMap;
 use crate::section::Plane;
 
-/// What stands behind a body.
+/// The background of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Background {
     /// Pale grey, lighter towards the bottom.
@@ -25,7 +25,7 @@ impl Background {
         }
     }
 
-    /// Colour (sRGB) of what is written on it.
+    /// Colour (sRGB) of the text on it.
     pub const fn ink(self) -> [u8; 3] {
         match self {
             Self::Light | Self::White => [32, 36, 42],
@@ -42,7 +42,7 @@ impl Background {
     }
 }
 
-/// What a surface is like.
+/// The texture of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Texture {
     /// Smooth and dull.
@@ -52,7 +52,7 @@ pub enum Texture {
     Skin,
 }
 
-/// Colour (sRGB) of what has no value: soft tissue.
+/// Colour (sRGB) without a value: soft tissue.
 pub(crate) const PLAIN: [u8; 3] = [214, 148, 132];
 
 /// How a body is shown.
@@ -62,11 +62,11 @@ pub struct Style {
     pub map: ColourMap,
     /// The values of the first and the last colour; without, a body has the colour of tissue.
     pub range: Option<[f64; 2]>,
-    /// Whether cells have the colours of their labels, in place of those of values; cells without a label have that of tissue.
+    /// Whether colours show labels instead of values; cells without a label have that of tissue.
     pub labels: bool,
     /// Whether the edges of the cells are drawn.
     pub edges: bool,
-    /// Whether nothing of the surface but the edges of its cells is drawn.
+    /// Whether only the edges of the surface cells are drawn.
     pub wireframe: bool,
     /// Whether the shape at rest is drawn, as a ghost.
     pub ghost: bool,
@@ -74,11 +74,11 @@ pub struct Style {
     pub fibres: bool,
     /// Whether the cell with the smallest stable step is marked.
     pub critical: bool,
-    /// What the surface is like.
+    /// The texture of the surface.
     pub texture: Texture,
-    /// Shows only what lies behind a plane, and what it cuts.
+    /// Shows only the part behind a plane, and its section.
     pub clip: Option<Plane>,
-    /// What stands behind.
+    /// The background.
     pub background: Background,
 }
 

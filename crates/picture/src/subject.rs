@@ -1,5 +1,5 @@
-//! What is drawn of a mesh: its surface as triangles whose corners share normals where the surface is smooth, and its volume
-//! cells for sections.
+//! The drawn parts of a mesh: its surface as triangles whose corners share normals where the surface is smooth, and its
+//! volume cells for sections.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,7 +20,7 @@ pub struct Subject {
     /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a cell; beside these bits
     /// the paint of the cell.
     pub(crate) triangles: Vec<[u32; 4]>,
-    /// The point of each vertex. Points on sharp edges are several vertices, each with a normal of its own.
+    /// The point of each vertex. A point on a sharp edge has several vertices, each with its own normal.
     pub(crate) vertices: Vec<u32>,
     /// Where the triangles around each vertex begin in the next list; one more entry than vertices.
     pub(crate) offsets: Vec<u32>,
@@ -154,8 +154,8 @@ fn shown_blocks(mesh: &Mesh) -> impl Iterator<Item = &CellBlock> + Clone {
     mesh.blocks.iter().filter(known)
 }
 
-/// The cell with the smallest stable step (the field `element-step` of cells), counted over the cells that have a face; and its
-/// step [s]. `None` without such a field.
+/// The cell with the smallest stable step (the cell field `element-step`), counted over the cells that have a face; and its
+/// step [s]. `None` without this field.
 pub fn critical_cell(mesh: &Mesh) -> Option<(u32, f64)> {
     let mut first = 0;
     let mut least: Option<(u32, f64)> = None;
@@ -247,9 +247,9 @@ fn split_at_sharp_edges(faces: &[Patch], normals: &[Vector3], points: usize) -> 
     (corners, vertices)
 }
 
-/// The values of a field at the points of a mesh. Vectors count by their size, or by a component as in `displacement:z`; of
-/// tensors a component is named, as in `cauchy-stress:xx`. Values of cells are averaged, weighted by volume or area. `None` where
-/// there is no such field.
+/// The values of a field at the points of a mesh. Vectors count by their norm, or by a component as in `displacement:z`; tensors
+/// need a component, as in `cauchy-stress:xx`. Values of cells are averaged, weighted by volume or area. `None` without this
+/// field.
 pub fn nodal_values(mesh: &Mesh, field: &str) -> Option<Vec<f64>> {
     let (name, component) = field.split_once(':').map_or((field, None), |(name, part)| (name, Some(part)));
     let number = |item: &[f64]| -> Option<f64> {

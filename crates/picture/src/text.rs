@@ -4,7 +4,7 @@ use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont};
 
 use crate::picture::Picture;
 
-/// Where text stands beside its place.
+/// The alignment of text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Align {
     Left,
@@ -55,7 +55,7 @@ impl Pen {
             Align::Left => x,
             Align::Right => x - width,
         };
-        // The middle of capitals, not that of ascenders and descenders.
+        // The middle of capitals, without ascenders and descenders.
         let base = (y + 0.26 * self.scale.y).round();
         for (id, offset) in glyphs {
             let place = ab_glyph::point(start + offset, base);

@@ -1,4 +1,4 @@
-//! Pictures are what they were: held to stored ones, drawn by Mesa's software Vulkan. `PLIANT_RENEW_GOLDEN=1` stores them anew.
+//! Pictures equal the stored ones, drawn by Mesa's software Vulkan. `PLIANT_RENEW_GOLDEN=1` stores new ones.
 
 mod support;
 
@@ -92,7 +92,7 @@ fn ghost() -> Look {
     Look { field: None, style, camera, ..look() }
 }
 
-/// The organs with fibres that run around the x axis, and stable steps of their cells: that of one inside is the smallest.
+/// The organs with fibres around the x axis, and stable steps of their cells; an inner cell has the smallest.
 fn fibrous() -> Mesh {
     let mut mesh = organs(true);
     let block = &mut mesh.blocks[0];
@@ -175,7 +175,7 @@ fn a_missing_organ_and_wrong_colours_are_seen() {
         assert!(!difference.is_same(), "{difference:?}");
         difference
     };
-    // The camera of all organs, so that only the missing one differs.
+    // The camera of all organs, so only the missing one differs.
     assert!(seen(&look(), &organs(false)).overlap < 0.98, "a missing organ");
     let style = |style: Style| Look { style, ..look() };
     let usual = look().style;
@@ -207,7 +207,7 @@ fn the_marked_cell_is_seen_through_the_body_where_it_is_and_nowhere_else() {
         Look { style: Style { critical: true, range: None, ..Style::default() }, field: None, ..look() };
     let plain = Look { style: Style { critical: false, ..look.style }, ..look.clone() };
     let [with, without] = [&look, &plain].map(|look| look.picture(&graphics, &fibrous(), 0.25).unwrap());
-    // The note at the bottom tells its step.
+    // The note at the bottom shows its step.
     let above = (4 * with.width * (with.height - 40)) as usize;
     let changed: Vec<usize> = (0..above / 4)
         .filter(|&pixel| with.rgba[4 * pixel..][..3] != without.rgba[4 * pixel..][..3])
@@ -253,5 +253,5 @@ fn the_same_picture_has_the_same_pixels_and_any_size_is_drawn() {
     let most = graphics.device.limits().max_texture_dimension_2d;
     let refused =
         Look { size: [most + 1, 10], ..look() }.picture(&graphics, &mesh, 0.0).unwrap_err().to_string();
-    assert!(refused.contains("cannot be drawn"), "{refused}");
+    assert!(refused.contains("cannot draw"), "{refused}");
 }

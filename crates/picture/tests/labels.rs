@@ -1,5 +1,5 @@
-//! Colours of labels: each cell has that of its label and nothing between them, what is hidden shows what lies inside, and the legend
-//! has a swatch for each label that is left.
+//! Colours of labels: each cell has exactly the colour of its label, hidden cells show the inside, and the legend has a swatch for
+//! each visible label.
 
 mod support;
 
@@ -42,8 +42,8 @@ fn light(byte: u8) -> f64 {
     if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Pixels of the body in the light of each label from 1 to 3, and in no such light. Light changes how bright a colour is, and adds a
-/// little white: what is left without its white has the direction of the label's colour.
+/// Pixels of the body with the lit colour of each label from 1 to 3, and other pixels. Light changes the brightness of a colour and
+/// adds a little white; without its white, the rest has the direction of the label's colour.
 fn counts(picture: &Picture) -> [usize; 4] {
     let pure = |rgb: &[u8]| {
         let rgb = Vector3::from_iterator(rgb[..3].iter().map(|&byte| light(byte)));
@@ -91,7 +91,7 @@ fn hidden_labels_show_what_lies_inside_and_leave_the_legend() {
     let [left, right, core, _] = counts(&half);
     assert!(right == 0 && left > 3000 && core > 200, "{left} {right} {core}");
     let told = hiding(vec![1, 2, 3]).unwrap_err().to_string();
-    assert!(told.contains("nothing is left"), "{told}");
+    assert!(told.contains("nothing is visible"), "{told}");
 }
 
 #[test]

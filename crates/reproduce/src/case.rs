@@ -1,4 +1,4 @@
-//! One result of the literature: what it shows, what was corrected in it, and what comes out here.
+//! One result of the literature: its content, corrections to the source, and the result here.
 
 use pliant_explicit::{RelaxationError, StepError};
 use pliant_gpu::{GpuError, StepFailure};
@@ -13,32 +13,32 @@ use crate::cases::CASES;
 /// A result of the literature.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
-    /// What it is called on the command line: `fig-6.3`.
+    /// Its name on the command line: `fig-6.3`.
     pub id: &'static str,
-    /// What it is about, in a few words.
+    /// A short title.
     pub title: &'static str,
-    /// What the source shows, in own words.
+    /// A summary of the source.
     pub shows: &'static str,
-    /// What is wrong in the printed source.
+    /// Errors in the printed source.
     pub corrections: &'static [Correction],
-    /// About how long it takes on two cores [s].
+    /// Approximate time on two cores [s].
     pub seconds: f64,
     /// Computes it.
     pub(crate) compute: fn() -> Result<Findings, CaseError>,
 }
 
-/// A mistake of the printed source, put right.
+/// A correction of an error in the printed source.
 #[derive(Clone, Copy, Debug)]
 pub struct Correction {
-    /// The place, and what stands there.
+    /// The location and the printed text.
     pub printed: &'static str,
-    /// What it should be.
+    /// The correct text.
     pub correct: &'static str,
-    /// How one sees it.
+    /// The reason.
     pub why: &'static str,
 }
 
-/// What a case comes to.
+/// The results of a case.
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
     /// Numbers.
@@ -50,32 +50,32 @@ pub struct Findings {
 /// A plot or a picture.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// An SVG element; `None` for a picture where none is drawn.
+    /// An SVG element; `None` for a picture without a renderer.
     pub svg: Option<String>,
-    /// What one sees.
+    /// The caption.
     pub caption: String,
 }
 
-/// A number beside the one it should be.
+/// A number beside its reference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// The case it belongs to.
+    /// Its case.
     pub id: &'static str,
-    /// What it is.
+    /// The quantity.
     pub quantity: String,
     /// Its unit; empty for a plain number.
     pub unit: &'static str,
-    /// What it should be; for a deviation 0; `None` if nothing is known.
+    /// The reference; 0 for a deviation; `None` if unknown.
     pub reference: Option<f64>,
-    /// What it is here; `None` if the case failed.
+    /// The computed value; `None` if the case failed.
     pub computed: Option<f64>,
-    /// How far off it may be, in the row's unit.
+    /// The tolerance, in the unit of the row.
     pub tolerance: Option<f64>,
     /// Whether it is within the tolerance; `None` without one.
     pub pass: Option<bool>,
-    /// Where the reference comes from.
+    /// The source of the reference.
     pub source: &'static str,
-    /// Whether another machine gives another number.
+    /// Whether the number depends on the machine.
     #[serde(skip)]
     pub machine: bool,
 }
@@ -108,7 +108,7 @@ impl Row {
         Self::judged(quantity, "", [0.0, limit], computed, source)
     }
 
-    /// A number that is shown and not judged.
+    /// A number that is not judged.
     pub(crate) fn shown(
         quantity: impl Into<String>,
         unit: &'static str,
@@ -128,7 +128,7 @@ impl Row {
         }
     }
 
-    /// A measurement of this machine, beside one of another: shown and not judged.
+    /// A measurement of this machine, beside one of another machine; not judged.
     pub(crate) fn timed(
         quantity: impl Into<String>,
         unit: &'static str,
@@ -140,7 +140,7 @@ impl Row {
     }
 }
 
-/// Why a case has no result.
+/// The error of a case.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
     /// A step failed.
@@ -155,7 +155,7 @@ pub enum CaseError {
     /// A body could not be meshed.
     #[error(transparent)]
     Mesh(#[from] MeshingError),
-    /// A mesh is no sound shell.
+    /// A mesh is not a valid shell.
     #[error(transparent)]
     Shell(#[from] ModelError),
     /// No equilibrium of a shell, or a step of it failed.
@@ -164,7 +164,7 @@ pub enum CaseError {
     /// A scene is wrong.
     #[error("{}", .0.plain())]
     Scene(#[from] SceneErrors),
-    /// A model that should have come to rest has not.
+    /// A model did not come to rest.
     #[error("not at rest after {until} s: creeps by {creep:.1e} of its displacement in 0.1 s")]
     Moving {
         /// Time [s].
@@ -187,13 +187,13 @@ pub enum CaseError {
 }
 
 impl Case {
-    /// Computes the case. If it fails, its one row tells so.
+    /// Computes the case. If it fails, its only row reports the error.
     pub fn run(&self) -> Findings {
         let mut findings = (self.compute)().unwrap_or_else(|error| Findings {
             rows: vec![Row {
                 computed: None,
                 pass: Some(false),
-                ..Row::shown(format!("the case runs to its end; it did not: {error}"), "", 0.0, "")
+                ..Row::shown(format!("the case failed: {error}"), "", 0.0, "")
             }],
             figures: Vec::new(),
         });
@@ -207,7 +207,7 @@ impl Case {
 /// The case of an id.
 ///
 /// # Errors
-/// If there is none: the id most like it.
+/// If it does not exist: the most similar id.
 pub fn find(id: &str) -> Result<&'static Case, &'static str> {
     CASES.iter().find(|case| case.id.eq_ignore_ascii_case(id)).ok_or_else(|| {
         let likeness = |case: &&Case| strsim::jaro_winkler(case.id, &id.to_lowercase());

@@ -1,7 +1,7 @@
-//! The results of the thesis (Comas 2010, chapters 6, 8 and 9.2), run again and shown beside the printed ones: each a [`Case`] that
-//! gives rows of numbers and figures, all of them one page.
+//! The results of the thesis (Comas 2010, chapters 6, 8 and 9.2), computed and compared with the published ones. Each is a [`Case`]
+//! that gives rows of numbers and figures; one page shows all.
 //!
-//! Where the printed source is wrong, the case says what was corrected and why. References are embedded, so that a
+//! If the printed source is wrong, the case gives the correction and its reason. References are embedded, so a
 //! binary needs no repository. The validation tests call the same computations.
 
 mod case;

@@ -1,4 +1,4 @@
-//! The page of a reproduction: one HTML file that needs nothing else.
+//! The page of a reproduction: one self-contained HTML file.
 
 use crate::case::{Case, Correction, Figure, Findings, Row};
 use crate::picture::NO_PICTURE;
@@ -21,10 +21,10 @@ pub(crate) fn page(report: &Report) -> String {
     let machine = &report.machine;
     let built = commit().map_or_else(String::new, |commit| format!(" ({commit})"));
     let mut body = format!(
-        "<header><h1>The results of the thesis, run again</h1>\n\
+        "<header><h1>The results of the thesis, reproduced</h1>\n\
          <p class=\"lead\">O. Comas, <cite>Real-time soft tissue modelling on GPU for medical simulation</cite> (2010), \
          chapters 6, 8 and 9.2, computed by Pliant.</p>\n{verdict}\n\
-         <p class=\"meta\">{passed} of {judged} pass; {shown_only} more are shown without a judgement. \
+         <p class=\"meta\">{passed} of {judged} pass; {shown_only} more are not judged. \
          Pliant {}{built}, {}, {}, {} cores, {}; {:.0} s in all.</p></header>\n",
         env!("CARGO_PKG_VERSION"),
         report.date,
@@ -133,7 +133,7 @@ fn typeset(number: &str) -> String {
     }
 }
 
-/// A text with what stands between backticks as code.
+/// A text with the parts between backticks as code.
 fn prose(text: &str) -> String {
     let parts = text.split('`').enumerate();
     let set = |(at, part): (usize, &str)| {

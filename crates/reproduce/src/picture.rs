@@ -1,5 +1,5 @@
-//! Pictures of deformed bodies by the renderer that `pliant render` draws with: several bodies seen alike in one SVG, the shape at
-//! rest as a ghost, a bar of the colours. Without the feature `viewer`, or where nothing draws, the page says why there are none.
+//! Pictures of deformed bodies, drawn by the renderer of `pliant render`: several bodies in one SVG with a common view, the shape
+//! at rest as a ghost, a colour bar. Without the feature `viewer` or an adapter, the page explains their absence.
 
 use pliant_geometry::Mesh;
 use pliant_mechanics::tensor::Vector;
@@ -14,7 +14,7 @@ pub(crate) struct Body<'a> {
     pub label: String,
     pub mesh: &'a Mesh,
     pub displacement: Vec<Vector<f64>>,
-    /// What the colour tells, at the nodes; the colour of tissue without.
+    /// The quantity shown by colour, at the nodes; without it the colour is that of tissue.
     pub value: Option<Vec<f64>>,
     /// Whether the edges of the faces are drawn.
     pub edges: bool,
@@ -23,7 +23,7 @@ pub(crate) struct Body<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// A body where the points of its mesh are, with its edges.
+    /// A body at the points of its mesh, with its edges.
     pub fn still(label: impl Into<String>, mesh: &'a Mesh) -> Self {
         Self {
             label: label.into(),
@@ -36,14 +36,14 @@ impl<'a> Body<'a> {
     }
 }
 
-/// How bodies are looked at.
+/// The view of bodies.
 #[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "only pictures read it"))]
 pub(crate) struct View<'a> {
     /// Towards the camera.
     pub from: Vector<f64>,
     /// The direction that is up.
     pub up: Vector<f64>,
-    /// What the colour tells, with its unit.
+    /// The quantity shown by colour, with its unit.
     pub quantity: &'a str,
     /// Factor from the values to the unit.
     pub factor: f64,
@@ -60,11 +60,11 @@ pub(crate) fn figure(
     Ok(Figure { svg: drawn::svg(bodies, view)?, caption: caption.into() })
 }
 
-/// What stands where a picture would be.
+/// The text in place of a picture.
 pub(crate) const NO_PICTURE: &str = if cfg!(feature = "viewer") {
-    "Nothing draws pictures here: they need a driver for Vulkan, Metal or Direct3D 12, such as Mesa's software Vulkan."
+    "Pictures are missing: they need a driver for Vulkan, Metal or Direct3D 12, such as Mesa's software Vulkan."
 } else {
-    "Pictures need a build with them: `cargo build --release --features viewer`."
+    "Pictures need a build with `cargo build --release --features viewer`."
 };
 
 #[cfg(not(feature = "viewer"))]
@@ -91,7 +91,7 @@ mod drawn {
     use super::{Body, CaseError, View};
     use crate::report::significant;
 
-    /// Width of a picture in the SVG, and height of what stands under it.
+    /// Width of a picture in the SVG, and height of the text below it.
     const WIDTH: f64 = 340.0;
     const LABEL: f64 = 30.0;
     const BAR: f64 = 62.0;
@@ -100,7 +100,7 @@ mod drawn {
     /// Room around the bodies, over their size.
     const MARGIN: f64 = 0.05;
 
-    /// What draws, opened once; where there is none, that is reported once.
+    /// The adapter, opened once; its absence is reported once.
     fn graphics() -> Option<&'static Graphics> {
         use std::io::Write as _;
         static GRAPHICS: OnceLock<Option<Graphics>> = OnceLock::new();
@@ -132,7 +132,7 @@ mod drawn {
         let columns = view.columns.min(bodies.len());
         let cell = height + LABEL;
         let rows = bodies.len().div_ceil(columns);
-        // A place that no body takes is that of the bar, which nobody needs where nothing has a value.
+        // A free cell of the grid takes the bar, which is unnecessary if no body has values.
         let (free, coloured) = (rows * columns > bodies.len(), scale[0] <= scale[1]);
         let below = if coloured && !free { BAR } else { 0.0 };
         let (all_width, all_height) = (WIDTH * columns as f64, cell * rows as f64 + below);
@@ -221,7 +221,7 @@ mod drawn {
         Ok(uri.into_iter().map(char::from).collect())
     }
 
-    /// A bar of colours with its ends and its middle, from a corner on and as wide as told.
+    /// A colour bar with its ends and its middle, from a corner, with a given width.
     fn bar(view: &View<'_>, [low, high]: [f64; 2], [corner, top, width]: [f64; 3]) -> String {
         let (left, length) = (corner + 0.15 * width, 0.7 * width);
         let mut svg = String::from("<defs><linearGradient id=\"viridis\">");

@@ -12,7 +12,7 @@ use crate::case::Figure;
 
 /// Units of the drawing per unit on the page: the drawing library rounds to whole ones, which would make curves rough.
 const FINE: i32 = 8;
-/// Size of a plot. Two stand side by side on a page, one over the other on a telephone.
+/// Size of a plot. Two fit side by side on a page, and one above the other on a telephone.
 const SIZE: (u32, u32) = (560 * FINE as u32, 420 * FINE as u32);
 const FONT: (&str, i32) = ("sans-serif", 16 * FINE);
 /// Colours that colour-blind eyes tell apart (Okabe and Ito 2008).
@@ -49,7 +49,7 @@ impl Curve {
     }
 }
 
-/// Where the key stands.
+/// The position of the key.
 pub(crate) use plotters::prelude::SeriesLabelPosition as Key;
 
 /// A plot with its axes.
@@ -212,7 +212,7 @@ fn label(value: &f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
-/// From the least to the largest finite value; never empty.
+/// From the smallest to the largest finite value; never empty.
 fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
     let finite = values.filter(|value| value.is_finite());
     let (low, high) =

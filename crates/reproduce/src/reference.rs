@@ -1,4 +1,4 @@
-//! Reference numbers, embedded; `validation/data/README.md` says where each comes from.
+//! Embedded reference numbers; `validation/data/README.md` gives their sources.
 
 use pliant_geometry::Mesh;
 use pliant_geometry::io::{Format, read_bytes};
@@ -15,7 +15,7 @@ pub fn reference(text: &str) -> Value {
 /// A Gmsh mesh of `validation/data`, by its bytes.
 ///
 /// # Panics
-/// If it is none.
+/// If the bytes are not a mesh.
 pub fn mesh(bytes: &[u8]) -> Mesh {
     read_bytes(bytes, Format::Gmsh).unwrap_or_else(|error| panic!("reference data: {error}")).mesh
 }

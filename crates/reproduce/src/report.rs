@@ -1,4 +1,4 @@
-//! What a reproduction leaves: `results.json`, one page, and a table for `docs/validation.md`.
+//! The outputs of a reproduction: `results.json`, one page, and a table for `docs/validation.md`.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ use crate::page;
 /// The files of a report.
 const FILES: [&str; 2] = ["index.html", "results.json"];
 
-/// Cases and what they came to.
+/// Cases and their results.
 #[derive(Clone, Debug)]
 pub struct Report {
     pub(crate) cases: Vec<(&'static Case, Findings, Duration)>,
@@ -156,7 +156,7 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// Whether a file of this name is one that a report leaves.
+/// Whether a report writes a file of this name.
 pub fn is_own_file(name: &str) -> bool {
     FILES.contains(&name)
 }

@@ -53,9 +53,9 @@ pub struct Equilibrium {
     pub largest: f64,
 }
 
-/// Applies what a damped model asks for within `until` seconds and checks that it has come to rest: going on at its
-/// largest speed, no node would move by more than 1e-7 of the largest displacement in a tenth of a second, the time in
-/// which the slowest of the overdamped vibrations of these models decays by e at the least.
+/// Applies the loads and motions of a damped model within `until` seconds and checks that it has come to rest. At its
+/// largest final speed, no node may move by more than 1e-7 of the largest displacement in a tenth of a second. The
+/// slowest overdamped vibration of these models decays at least by e in this time.
 ///
 /// # Errors
 /// If a step fails or the model still moves.
@@ -73,10 +73,11 @@ pub fn settle(model: &Model, step: f64, until: f64) -> Result<Equilibrium, CaseE
     }
 }
 
-/// The equilibrium at 1 s, found in one load step by dynamic relaxation to a residual of 1e-8 of the largest force.
+/// The equilibrium at 1 s, computed in one load step by dynamic relaxation to a residual of 1e-8 of the largest
+/// force.
 ///
 /// # Errors
-/// If there is none.
+/// If none exists.
 pub fn relax(model: &Model) -> Result<(DynamicRelaxation<f64>, State<f64>), CaseError> {
     let settings = RelaxationSettings { tolerance: 1e-8, ..RelaxationSettings::default() };
     let mut solver = DynamicRelaxation::new(model.clone(), settings)?;

@@ -12,7 +12,7 @@ use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 
 use crate::CaseError;
 
-/// Components held where a shell is clamped.
+/// Components fixed at a clamped edge.
 pub const CLAMPED: [bool; 6] = [true; 6];
 
 /// The thesis's element, its typing errors put right: constant strain in the plane with hardly any resistance to drilling, and its
@@ -20,7 +20,7 @@ pub const CLAMPED: [bool; 6] = [true; 6];
 pub const THESIS: Formulation =
     Formulation { membrane: Membrane::Cst { drilling: 1e-3 }, bending: Bending::Comas2010 };
 
-/// The element with the flat ANDES membrane, of which the prototype's numbers are.
+/// The element with the flat ANDES membrane, as in the prototype.
 pub const FLAT: Formulation =
     Formulation { membrane: Membrane::Opt { adaptation: 10.0 }, bending: Bending::Dkt };
 
@@ -46,7 +46,7 @@ pub fn ramp() -> Curve {
 /// The triangles of a mesh.
 ///
 /// # Panics
-/// If it has none.
+/// If it has no triangles.
 pub fn triangles(mesh: &Mesh) -> Vec<[u32; 3]> {
     mesh.blocks[0].nodes.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
 }
@@ -67,10 +67,10 @@ pub fn sheet(sheet: Sheet, counts: [usize; 2], pattern: Pattern) -> Result<Mesh,
 }
 
 impl Specimen {
-    /// A shell of a mesh, curved by its normals (point data `normal`) if it has some; density 1000 kg/m³.
+    /// A shell of a mesh, curved by its normals (point data `normal`) if present; density 1000 kg/m³.
     ///
     /// # Errors
-    /// If the mesh is no sound shell.
+    /// If the mesh is not a valid shell.
     pub fn new(
         mesh: Mesh,
         [young, poisson]: [f64; 2],
@@ -90,7 +90,7 @@ impl Specimen {
     /// The nodes of an edge, in order.
     ///
     /// # Panics
-    /// If there is no such edge.
+    /// If the edge does not exist.
     pub fn edge(&self, name: &str) -> Vec<u32> {
         self.mesh.point_sets.get(name).unwrap_or_else(|| panic!("no edge {name}")).clone()
     }

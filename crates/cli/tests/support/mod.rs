@@ -1,4 +1,4 @@
-//! A folder with a scene, the real binary run in it, and what it told.
+//! A folder with a scene, the real binary run in it, and its output.
 
 // Each test binary uses its own part of this.
 #![allow(dead_code)]
@@ -162,7 +162,7 @@ pub fn labels(labels: &[i32]) -> String {
     format!("CELL_DATA {}\nSCALARS label int 1\nLOOKUP_TABLE default\n{lines}\n", labels.len())
 }
 
-/// A folder of its own with a scene in `case/scene.toml`.
+/// A separate folder with a scene in `case/scene.toml`.
 pub struct Workshop {
     folder: TempDir,
 }
@@ -234,14 +234,14 @@ pub fn changed(text: &str, good: &str, other: &str) -> String {
     text.replacen(good, other, 1)
 }
 
-/// Whether there is a graphics processor. Without any a notice is printed, or the test fails where `PLIANT_REQUIRE_GPU=1`.
+/// Whether a GPU exists. Without one, prints a notice, or fails the test with `PLIANT_REQUIRE_GPU=1`.
 pub fn has_graphics_processor() -> bool {
     let found = !pliant_gpu::adapters().is_empty();
     let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
-    assert!(found || !required, "no graphics processor was found, and PLIANT_REQUIRE_GPU=1 asks for one");
+    assert!(found || !required, "no GPU was found, but PLIANT_REQUIRE_GPU=1 requires one");
     if !found {
-        // Past the capture of what passing tests print. A notice that can't be written is none.
-        let _ = writeln!(std::io::stderr(), "skipped: no graphics processor was found");
+        // Bypasses the capture of passing tests. A notice that can't be written is dropped.
+        let _ = writeln!(std::io::stderr(), "skipped: no GPU was found");
     }
     found
 }
@@ -266,7 +266,7 @@ pub fn series(index: &Path) -> Vec<(f64, MeshFile)> {
         .collect()
 }
 
-/// What the binary told.
+/// The output of the binary.
 #[derive(Debug)]
 pub struct Told {
     /// The exit code; -1 if a signal ended it.

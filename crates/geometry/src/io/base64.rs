@@ -1,9 +1,9 @@
-//! Base64 in VTK's XML files, where several padded pieces may follow each other, with white space anywhere.
-//! (Decoders of crates take one piece whose end is known; here its length stands inside it.)
+//! Base64 in VTK's XML files, where padded pieces may follow each other, with white space anywhere. (Crates
+//! decode one piece with a known end; here each piece contains its own length.)
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Values of characters; 255 for those that have none.
+/// Values of characters; 255 for invalid ones.
 const VALUES: [u8; 256] = {
     let mut values = [255; 256];
     let mut value = 0;
@@ -17,7 +17,7 @@ const VALUES: [u8; 256] = {
 /// Reads bytes from base64 text, piece by piece.
 pub(super) struct Base64<'a> {
     text: std::slice::Iter<'a, u8>,
-    /// Up to three decoded bytes that were not asked for yet.
+    /// Up to three decoded bytes that are not read yet.
     pending: [u8; 3],
     pending_len: usize,
 }
@@ -27,7 +27,7 @@ impl<'a> Base64<'a> {
         Self { text: text.iter(), pending: [0; 3], pending_len: 0 }
     }
 
-    /// Goes on with the next padded piece: what is left of the last group is dropped.
+    /// Continues with the next padded piece; drops the rest of the last group.
     pub fn end_piece(&mut self) {
         self.pending_len = 0;
     }

@@ -1,5 +1,5 @@
-//! Cells as they come out of a file: sorted into one block per kind, with the way back from the cell of the
-//! file to the cells of the mesh, so that data and sets given per cell of the file find their place.
+//! Cells in the order of a file, sorted into one block per kind. A map from cells of the file to cells of
+//! the mesh places data and sets of the file.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ struct Span {
 #[derive(Default)]
 pub(super) struct Cells {
     blocks: Vec<CellBlock>,
-    /// For each cell of the file: its cells here (none if it was skipped, several if it was cut).
+    /// For each cell of the file: its cells here (none if skipped, several if split).
     spans: Vec<Span>,
     /// Cells of unsupported kinds, by name.
     skipped: BTreeMap<String, usize>,
@@ -138,7 +138,7 @@ impl Cells {
         }
     }
 
-    /// The mesh, or the reason why there is none; adds what was left out to the notes.
+    /// The mesh, or the reason for its absence; adds notes about skipped items.
     pub fn into_mesh(
         self,
         points: Vec<Vector3>,
@@ -150,7 +150,7 @@ impl Cells {
         }
         let kinds: Vec<String> = self.skipped.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
         let kinds = kinds.join(", ");
-        // Points beside cells of higher order are no mesh to simulate.
+        // Points without their cells of higher order are useless for a simulation.
         let only_vertices = self.blocks.iter().all(|block| block.kind == CellKind::Vertex);
         if self.blocks.is_empty() || only_vertices && !kinds.is_empty() {
             return Err(Fault::whole(if kinds.is_empty() {
@@ -160,10 +160,10 @@ impl Cells {
             }));
         }
         if !kinds.is_empty() {
-            notes.push(format!("left out, as their kind is not supported: {kinds} cells"));
+            notes.push(format!("skipped cells of unsupported kinds: {kinds}"));
         }
         if self.cut > 0 {
-            notes.push(format!("{} polygons with more than 4 corners were cut into triangles", self.cut));
+            notes.push(format!("{} polygons with more than 4 corners were split into triangles", self.cut));
         }
         let mut blocks = self.blocks;
         for set in blocks.iter_mut().flat_map(|block| block.sets.values_mut()) {
@@ -197,7 +197,7 @@ pub(super) fn check_filled(numbers: usize, file_size: usize) -> Result<(), Fault
     if numbers.saturating_mul(size_of::<f64>()) <= array_limit(file_size) {
         return Ok(());
     }
-    Err(Fault::malformed(Place::File, "the arrays would be far larger than the file"))
+    Err(Fault::malformed(Place::File, "the arrays are far larger than the file"))
 }
 
 /// A point of a file, which must be finite. `number` is its number in the file.

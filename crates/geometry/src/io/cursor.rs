@@ -106,7 +106,7 @@ impl<'a> Cursor<'a> {
         Self { bytes, at: 0, line: 1, binary: false, only_line: None }
     }
 
-    /// A cursor for the words of a line, which stands at `place` of the file.
+    /// A cursor for the words of a line, at `place` of the file.
     pub fn of_line(line: &'a [u8], place: Place) -> Self {
         Self { only_line: Some(place), ..Self::new(line) }
     }
@@ -136,8 +136,8 @@ impl<'a> Cursor<'a> {
         self.bytes.get(self.at..).unwrap_or_default()
     }
 
-    /// Whether `count` items of at least `each` bytes fit into what is left (the last one without its
-    /// separator); an error otherwise, so that nothing is ever allocated for items that cannot be there.
+    /// Checks that `count` items of at least `each` bytes fit into the rest (the last one without its
+    /// separator); otherwise returns an error, so nothing is allocated for missing items.
     pub fn room(&self, count: usize, each: usize, reading: impl Display) -> Result<(), Fault> {
         match count.checked_mul(each) {
             Some(needed) if needed <= self.rest().len() + 1 => Ok(()),
@@ -177,7 +177,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// What is left of this line, without its end; `None` at the end of the file.
+    /// The rest of this line, without its end; `None` at the end of the file.
     pub fn line(&mut self) -> Option<&'a [u8]> {
         let rest = self.rest();
         if rest.is_empty() {
@@ -190,7 +190,7 @@ impl<'a> Cursor<'a> {
         Some(line.strip_suffix(b"\r").unwrap_or(line))
     }
 
-    /// Goes back to where `earlier`, a copy of this cursor, stands.
+    /// Returns to the position of `earlier`, a copy of this cursor.
     pub fn rewind(&mut self, earlier: Self) {
         *self = earlier;
     }
@@ -207,7 +207,7 @@ impl<'a> Cursor<'a> {
         self.parse(word, "an integer", reading)
     }
 
-    /// A count of things of which each takes at least `each` bytes.
+    /// A count of items of at least `each` bytes.
     pub fn count(&mut self, each: usize, reading: fmt::Arguments<'_>) -> Result<usize, Fault> {
         let word = self.need_word(reading)?;
         let count = self.parse(word, "a count", reading)?;

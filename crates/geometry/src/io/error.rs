@@ -1,9 +1,9 @@
-//! What can be wrong with a mesh file, where, and what to try.
+//! Errors of mesh files: the problem, its position and a remedy.
 
 use std::fmt;
 use std::path::PathBuf;
 
-/// Where in a file something is wrong.
+/// The position of a problem in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The file as a whole.
@@ -27,9 +27,9 @@ impl fmt::Display for Place {
 /// A mesh file that could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileError {
-    /// Neither the ending nor the first bytes tell a format that can be read.
+    /// Neither the extension nor the first bytes identify a readable format.
     #[error(
-        "`{}` is not in a mesh format known here; formats read: {}; convert it, e.g. with meshio",
+        "`{}` is not in a supported mesh format; formats read: {}; convert it, e.g. with meshio",
         path.display(),
         super::Format::list(super::Format::ALL)
     )]
@@ -37,9 +37,9 @@ pub enum MeshFileError {
         /// The file.
         path: PathBuf,
     },
-    /// The ending names no format that can be written.
+    /// The extension names no writable format.
     #[error(
-        "cannot write `{}`: formats written: {}; choose one of these endings",
+        "cannot write `{}`: formats written: {}; use one of these extensions",
         path.display(),
         super::Format::list(super::Format::WRITTEN)
     )]
@@ -52,7 +52,7 @@ pub enum MeshFileError {
     Open {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file could not be written to disk.
@@ -60,17 +60,17 @@ pub enum MeshFileError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file was opened, but what it holds is no usable mesh.
+    /// The file was opened, but contains no usable mesh.
     #[error("cannot read `{}`{place}: {problem}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
         /// Where in the file.
         place: Place,
-        /// What is wrong there.
+        /// The problem.
         problem: MeshFileProblem,
     },
     /// The mesh cannot be put into a file of this format.
@@ -78,30 +78,30 @@ pub enum MeshFileError {
     Mesh {
         /// The file.
         path: PathBuf,
-        /// What is wrong with the mesh, and what to do.
+        /// The problem of the mesh, and a remedy.
         problem: String,
     },
 }
 
-/// What is wrong inside a mesh file, and what to try.
+/// The problem inside a mesh file, and a remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshFileProblem {
-    /// The file ends too early, or announces more than it holds.
+    /// The file ends too early, or announces more than it contains.
     #[error(
-        "the file ends while reading {reading}: it is cut off or its counts are wrong; copy or export it again"
+        "the file ends while reading {reading}: it is truncated or its counts are wrong; copy or export it again"
     )]
     Truncated {
-        /// What was being read.
+        /// The item being read.
         reading: String,
     },
-    /// Text where a number must be, or a number out of range.
+    /// Text instead of a number, or a number out of range.
     #[error("`{text}` is not {expected} (reading {reading}); correct it or export the file again")]
     BadNumber {
         /// The text found.
         text: String,
         /// The kind of number needed.
         expected: &'static str,
-        /// What was being read.
+        /// The item being read.
         reading: String,
     },
     /// A cell uses a node that the file does not define.
@@ -113,7 +113,7 @@ pub enum MeshFileProblem {
         cell: String,
     },
     /// A coordinate is NaN or infinite.
-    #[error("point {point} is not finite ({x}, {y}, {z}); repair the mesh where it was made")]
+    #[error("point {point} is not finite ({x}, {y}, {z}); repair the mesh in the program that made it")]
     NotFinite {
         /// The point, as numbered in the file.
         point: u64,
@@ -125,37 +125,37 @@ pub enum MeshFileProblem {
         z: f64,
     },
     /// The file holds no points.
-    #[error("the file has no points; check what was exported")]
+    #[error("the file has no points; check the export")]
     NoPoints,
     /// The file holds points, but no cells.
     #[error("the file has points but no cells; export the elements too")]
     NoCells,
     /// All cells are of kinds that are not supported.
     #[error(
-        "no cell can be used: {kinds} not supported; convert to linear tet, hex, triangle, quad, line or vertex \
+        "no supported cells: {kinds} not supported; convert to linear tet, hex, triangle, quad, line or vertex \
          cells (Gmsh: `gmsh FILE -order 1 -save`)"
     )]
     UnsupportedCells {
         /// The kinds found, with their counts.
         kinds: String,
     },
-    /// A variant of the format that is not read.
+    /// An unsupported variant of the format.
     #[error("{what} not supported; {remedy}")]
     UnsupportedVariant {
-        /// What was found.
+        /// The item found.
         what: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// The file breaks the rules of its format.
     #[error("{what}; correct it or export the file again")]
     Malformed {
-        /// What is wrong.
+        /// The problem.
         what: String,
     },
 }
 
-/// A problem and its place: what the readers of bytes return, before the path is known.
+/// A problem and its position, as returned by the readers of bytes, which do not know the path.
 #[derive(Debug)]
 pub(super) struct Fault {
     pub place: Place,

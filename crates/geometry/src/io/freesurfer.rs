@@ -1,5 +1,5 @@
 //! Reads FreeSurfer's surfaces: the binary format of triangles (`lh.pial`, big-endian) and the text that `mris_convert` writes
-//! (`lh.pial.asc`). Coordinates are millimetres in axes of FreeSurfer's own, whose shift from the scanner's stands in the footer.
+//! (`lh.pial.asc`). Coordinates are millimetres in FreeSurfer's own axes; the footer gives their offset from the scanner's.
 //! Leaves out: the older binary formats of quadrilaterals, patches.
 
 use std::collections::BTreeMap;
@@ -30,7 +30,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
             "convert it with `mris_convert`",
         )),
         _ if bytes.starts_with(TEXT) => read_text(bytes),
-        _ => Err(Fault::malformed(Place::Byte(0), "the file does not begin as a surface of FreeSurfer does")),
+        _ => Err(Fault::malformed(
+            Place::Byte(0),
+            "the file does not start with the header of a FreeSurfer surface",
+        )),
     }
 }
 
@@ -102,13 +105,11 @@ fn push(cells: &mut Cells, corners: &[i64], points: usize, number: usize, place:
     Ok(())
 }
 
-/// The place of FreeSurfer's origin in the scanner's axes, as the footer tells it.
+/// The position of FreeSurfer's origin in the scanner's axes, from the footer.
 fn shift(footer: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(&footer[..footer.len().min(1 << 16)]);
     let line = text.lines().find(|line| line.trim_start().starts_with("cras"))?;
     let numbers = line.split_once('=')?.1.split_whitespace().map(str::parse).collect::<Result<Vec<f64>, _>>();
     let [x, y, z] = numbers.ok()?.try_into().ok()?;
-    Some(format!(
-        "axes of FreeSurfer: in the scanner's the surface lies farther by ({x}, {y}, {z}) mm (c_ras)"
-    ))
+    Some(format!("axes of FreeSurfer: scanner coordinates add ({x}, {y}, {z}) mm (c_ras)"))
 }

@@ -19,7 +19,7 @@ use crate::CellKind;
 pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     let text = without_doctype(&String::from_utf8_lossy(bytes))?;
     let document = parse_xml(&text).map_err(|error| {
-        Fault::malformed(Place::Line(error.line), format!("the XML is broken or cut off: {error}"))
+        Fault::malformed(Place::Line(error.line), format!("the XML is broken or truncated: {error}"))
     })?;
     let root = document.root_element();
     if root.tag_name().name() != "GIFTI" {
@@ -45,7 +45,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         }
     }
     if others > 0 {
-        notes.push(format!("arrays other than the points and the triangles were left out: {others}"));
+        notes.push(format!("skipped arrays other than points and triangles: {others}"));
     }
     let points = points.unwrap_or_default();
     let mut cells = Cells::default();
@@ -64,7 +64,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     Ok(MeshFile { mesh, format: format!("{} {version}", Format::Gifti.name()), notes, time: None })
 }
 
-/// The text without the declaration of its type, which the parser refuses. One that declares entities of its own is refused here.
+/// The text without the declaration of its type, which the parser rejects. This function rejects declarations of entities.
 fn without_doctype(text: &str) -> Result<String, Fault> {
     let Some(start) = text.find("<!DOCTYPE") else { return Ok(text.to_owned()) };
     let length =
@@ -74,7 +74,7 @@ fn without_doctype(text: &str) -> Result<String, Fault> {
         return Err(Fault::unsupported(
             Place::Line(1),
             "a document type with declarations of its own is",
-            "take it out",
+            "remove it",
         ));
     }
     // Spaces keep the places of what follows.
@@ -107,19 +107,21 @@ impl<'a> Array<'a, '_> {
             "NIFTI_TYPE_INT64" => Scalar::I64,
             "NIFTI_TYPE_UINT8" => Scalar::U8,
             other => {
-                return Err(self
-                    .malformed(format!("`{}` is no type of points or triangles", shown(other.as_bytes()))));
+                return Err(self.malformed(format!(
+                    "`{}` is not a type of points or triangles",
+                    shown(other.as_bytes())
+                )));
             }
         };
         let dim = |name| self.attribute(name).trim().parse::<usize>();
         let (Ok(items), Ok(3)) = (dim("Dim0"), dim("Dim1")) else {
-            return Err(self.malformed("`Dim0` and `Dim1` of points and triangles are a count and 3"));
+            return Err(self.malformed("`Dim0` and `Dim1` of points and triangles must be a count and 3"));
         };
         let count = items.saturating_mul(3);
         let bytes = count.saturating_mul(scalar.size().max(size_of::<f64>()));
         *budget = budget
             .checked_sub(bytes)
-            .ok_or_else(|| self.malformed("the arrays would be far larger than the file"))?;
+            .ok_or_else(|| self.malformed("the arrays are far larger than the file"))?;
         let data = self.node.children().find(|child| child.has_tag_name("Data"));
         let text = data.and_then(|data| data.text()).unwrap_or_default();
         let values = match self.attribute("Encoding") {
@@ -163,7 +165,7 @@ impl<'a> Array<'a, '_> {
         match read {
             Ok(_) if found.len() == count => Ok(found),
             Ok(_) => Err(cut()),
-            Err(error) => Err(self.malformed(format!("the numbers cannot be unpacked ({error})"))),
+            Err(error) => Err(self.malformed(format!("the numbers cannot be decompressed ({error})"))),
         }
     }
 
@@ -184,6 +186,6 @@ impl<'a> Array<'a, '_> {
         let unit =
             numbers.len() == 16 && numbers.iter().enumerate().all(|(at, &x)| x == f64::from(at % 5 == 0));
         let to = shown(within(system, "TransformedSpace").unwrap_or_default().trim().as_bytes());
-        (!unit).then(|| format!("points are taken as they stand; the transform to `{to}` was not applied"))
+        (!unit).then(|| format!("points keep their coordinates; the transform to `{to}` was not applied"))
     }
 }

@@ -1,9 +1,9 @@
 //! Mesh files in and out.
 //!
-//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL,
-//! PLY, GIfTI (`.gii`) and FreeSurfer surfaces (`lh.pial`), text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The reader goes by the first bytes
-//! where they tell the format, otherwise by the ending. Cells are linear: vertex, line, triangle, quad, tet,
-//! hex; others are left out and noted, and an error only if nothing is left.
+//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL, PLY, GIfTI (`.gii`) and
+//! FreeSurfer surfaces (`lh.pial`), text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The first bytes select the reader if they
+//! identify a format, otherwise the extension. Cells are linear: vertex, line, triangle, quad, tet, hex. Other cells are skipped with a
+//! note; it is an error if none remain.
 
 mod base64;
 mod cells;
@@ -131,7 +131,7 @@ impl Format {
         })
     }
 
-    /// The format that the first bytes of a file tell, for formats that begin with a word of their own.
+    /// The format identified by the first bytes of a file, for formats that start with a keyword.
     fn of_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
         if bytes.starts_with(b"<?xml")
@@ -165,14 +165,14 @@ impl Format {
 /// Largest mesh file read [bytes].
 const LIMIT: u64 = 1 << 32;
 
-/// What a mesh file held.
+/// The content of a mesh file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshFile {
     /// The mesh, its points and cells in the order of the file.
     pub mesh: Mesh,
     /// The format found, e.g. `Gmsh 2.2 ASCII`.
     pub format: String,
-    /// What was left out or changed, one sentence each.
+    /// Skipped or changed items, one sentence each.
     pub notes: Vec<String>,
     /// The time that the file gives for its data [s].
     pub time: Option<f64>,
@@ -192,7 +192,7 @@ pub fn read(path: &Path) -> Result<MeshFile, MeshFileError> {
     if let Some(ending) = by_ending
         && !file.format.starts_with(ending.name())
     {
-        file.notes.push(format!("the ending says {}, but the file is {}", ending.name(), file.format));
+        file.notes.push(format!("the extension says {}, but the file is {}", ending.name(), file.format));
     }
     Ok(file)
 }
@@ -253,8 +253,8 @@ pub fn write(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
     }
 }
 
-/// Writes a file under another name beside it, then gives it its name: whoever reads it finds the old file or
-/// the new one, never a part.
+/// Writes a file under a temporary name beside it, then renames it: readers find the old file or the new one,
+/// never a part.
 fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), MeshFileError> {
     let failed = |source| MeshFileError::Write { path: path.to_owned(), source };
     let Some(name) = path.file_name() else {
@@ -281,8 +281,8 @@ fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Re
 /// The ending of a file that is not whole yet.
 const UNFINISHED: &str = ".tmp";
 
-/// Makes a file that is locked as long as it is written, so that nobody takes it for left over. It is new: a link of its
-/// name is not followed.
+/// Makes a file that is locked while it is written, so no other process removes it as stale. The file is new: a link of
+/// its name is not followed.
 fn unfinished(path: &Path) -> io::Result<fs::File> {
     loop {
         let file = match fs::File::create_new(path) {
@@ -328,7 +328,7 @@ fn check(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
     }
 }
 
-/// What is wrong with a mesh, if anything.
+/// The problem of a mesh, if any.
 fn problem(mesh: &Mesh) -> Option<String> {
     let points = mesh.points.len();
     if points == 0 || mesh.blocks.iter().all(|block| block.is_empty()) {

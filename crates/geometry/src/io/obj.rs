@@ -37,7 +37,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     loop {
         let place = cursor.place();
         let Some(mut line) = cursor.line() else { break };
-        // A backslash at the end goes on in the next line.
+        // A backslash at the end continues in the next line.
         if line.ends_with(b"\\") {
             joined.clear();
             while let [start @ .., b'\\'] = line {
@@ -110,7 +110,8 @@ impl Reader {
             self.corners.push(found);
         }
         if self.corners.len() < least {
-            let what = format!("cell {number} has {} corners, not {least} or more", self.corners.len());
+            let what =
+                format!("cell {number} has {} corners, at least {least} are needed", self.corners.len());
             return Err(words.malformed(what));
         }
         let source = self.cells.len();
@@ -139,7 +140,7 @@ impl Reader {
         Ok(())
     }
 
-    /// The number of a set, new if there is none of the name; `None` for an empty name.
+    /// The number of a set, added if its name is new; `None` for an empty name.
     fn set(&mut self, word: &[u8]) -> Option<usize> {
         let name = name(word);
         if name.is_empty() {
@@ -155,7 +156,7 @@ impl Reader {
 
     fn finish(mut self) -> Result<MeshFile, Fault> {
         let mut notes: Vec<String> =
-            self.ignored.iter().map(|(key, count)| format!("{count} lines `{key}` were not used")).collect();
+            self.ignored.iter().map(|(key, count)| format!("{count} lines `{key}` were ignored")).collect();
         for (name, number) in &self.numbers {
             let members = std::mem::take(&mut self.sets[*number]);
             if !members.is_empty() {

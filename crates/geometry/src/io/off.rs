@@ -32,7 +32,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
             return Err(words.malformed(format!("the first word is `{kind}`, not OFF")));
         }
         if kind.contains(['4', 'n']) {
-            let what = format!("OFF of other than 3 dimensions (`{kind}`) is");
+            let what = format!("OFF with other than 3 dimensions (`{kind}`) is");
             return Err(Fault::unsupported(words.place(), what, "save it in 3 dimensions"));
         }
         if words.peek().is_some_and(|word| word.eq_ignore_ascii_case(b"BINARY")) {

@@ -90,7 +90,7 @@ fn read_head(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault>
     }
     loop {
         let place = cursor.place();
-        let Some(line) = cursor.line() else { return Err(cursor.truncated("the head of the file")) };
+        let Some(line) = cursor.line() else { return Err(cursor.truncated("the header of the file")) };
         let mut words = Cursor::of_line(line, place);
         match words.word() {
             Some(b"format") => {
@@ -98,7 +98,7 @@ fn read_head(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault>
                     b"ascii" => Encoding::Text,
                     b"binary_little_endian" => Encoding::Binary(Order::Little),
                     b"binary_big_endian" => Encoding::Binary(Order::Big),
-                    other => return Err(words.malformed(format!("`{}` is no format of PLY", shown(other)))),
+                    other => return Err(words.malformed(format!("`{}` is not a PLY format", shown(other)))),
                 });
             }
             Some(b"element") => {
@@ -113,7 +113,7 @@ fn read_head(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault>
             Some(b"property") => {
                 let property = read_property(&mut words)?;
                 let Some(element) = elements.last_mut() else {
-                    return Err(words.malformed("a property stands before any element"));
+                    return Err(words.malformed("a property comes before the first element"));
                 };
                 element.properties.push(property);
             }
@@ -124,7 +124,7 @@ fn read_head(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault>
     }
     match encoding {
         Some(encoding) => Ok((encoding, elements)),
-        None => Err(cursor.malformed("the head has no line `format …`")),
+        None => Err(cursor.malformed("the header has no line `format …`")),
     }
 }
 
@@ -140,13 +140,14 @@ fn read_property(words: &mut Cursor<'_>) -> Result<Property, Fault> {
         length = Some(kind);
         word = words.need_word(what)?;
     }
-    let scalar = scalar_of(word).ok_or_else(|| words.malformed(format!("`{}` is no type", shown(word))))?;
+    let scalar =
+        scalar_of(word).ok_or_else(|| words.malformed(format!("`{}` is not a number type", shown(word))))?;
     Ok(Property { name: name(words.need_word(what)?), scalar, length })
 }
 
 fn scalar(words: &mut Cursor<'_>) -> Result<Scalar, Fault> {
     let word = words.need_word("a type")?;
-    scalar_of(word).ok_or_else(|| words.malformed(format!("`{}` is no type", shown(word))))
+    scalar_of(word).ok_or_else(|| words.malformed(format!("`{}` is not a number type", shown(word))))
 }
 
 fn scalar_of(word: &[u8]) -> Option<Scalar> {
@@ -269,7 +270,7 @@ impl Reader<'_> {
     }
 
     fn note_list(&mut self, element: &Element, property: &Property) {
-        self.notes.push(format!("the list `{}` of `{}` was not used", property.name, element.name));
+        self.notes.push(format!("the list `{}` of `{}` was ignored", property.name, element.name));
     }
 
     /// Faces, by their list of corners, or edges, by two vertices.
@@ -336,7 +337,7 @@ impl Reader<'_> {
 
     /// Passes over an element that is not used.
     fn skip(&mut self, element: &Element) -> Result<(), Fault> {
-        self.notes.push(format!("{} `{}` were not used", element.count, element.name));
+        self.notes.push(format!("{} `{}` were ignored", element.count, element.name));
         if element.properties.is_empty() {
             return Ok(());
         }
@@ -445,7 +446,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Data and sets of the faces; NaN where one of the kinds has no such data.
+/// Data and sets of the faces; NaN for kinds without these data.
 fn face_columns(surface: &SurfaceOut<'_>) -> Vec<Column> {
     let mut columns = Vec::new();
     let names: BTreeMap<&String, usize> = surface

@@ -7,7 +7,8 @@ use roxmltree::Node;
 
 use super::{MeshFileError, MeshFileProblem, Place, parse_xml};
 
-/// Reads the list of the files of a series: time [s] and file of each frame. Files are relative to where the list is.
+/// Reads the list of the files of a series: time [s] and file of each frame. Files are relative to the folder of the
+/// list.
 pub fn read_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
     let text =
         fs::read_to_string(path).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;

@@ -1,14 +1,14 @@
-//! Files that may be read: regular ones, of a size that is bounded. A pipe would be waited for without end, a device such as
-//! `/dev/zero` read without end.
+//! Readable files: regular ones of limited size. Reading a pipe could wait forever, reading a device such as `/dev/zero`
+//! would not end.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Opens a regular file, or a link to one. Pipes, devices, sockets and folders are refused without being opened.
+/// Opens a regular file, or a link to one. Rejects pipes, devices, sockets and folders without opening them.
 ///
 /// # Errors
-/// What the operating system says, or that this is no regular file.
+/// An error of the operating system, or that this is not a regular file.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     if kind.is_file() {
@@ -17,7 +17,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     let what = if kind.is_dir() {
         "it is a folder"
     } else {
-        "it is not a regular file but a pipe, a socket or a device; write what it gives to a file first"
+        "it is not a regular file but a pipe, a socket or a device; write its data to a file first"
     };
     Err(io::Error::new(io::ErrorKind::InvalidInput, what))
 }
@@ -36,9 +36,9 @@ pub fn read_limited(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     }
     let length = announced.max(bytes.len() as u64);
     let what = if length >= 1 << 20 {
-        format!("it has {} MB, more than the {} MB that are read", length >> 20, limit >> 20)
+        format!("it has {} MB, more than the limit of {} MB", length >> 20, limit >> 20)
     } else {
-        format!("it has {length} bytes, more than the {limit} that are read")
+        format!("it has {length} bytes, more than the limit of {limit}")
     };
     Err(io::Error::new(io::ErrorKind::FileTooLarge, what))
 }
@@ -56,7 +56,7 @@ mod tests {
         assert!(read_limited(&path, 6).unwrap_err().to_string().contains("7 bytes, more than the 6"));
         fs::File::create(&path).unwrap().set_len(1 << 40).unwrap();
         let told = read_limited(&path, 1 << 30).unwrap_err().to_string();
-        assert_eq!(told, "it has 1048576 MB, more than the 1024 MB that are read");
+        assert_eq!(told, "it has 1048576 MB, more than the limit of 1024 MB");
         assert!(read_limited(folder.path(), 6).unwrap_err().to_string().contains("folder"));
         assert_eq!(read_limited(&folder.path().join("none"), 6).unwrap_err().kind(), io::ErrorKind::NotFound);
     }

@@ -1,5 +1,5 @@
 //! STL surfaces: reads text and binary, writes binary. Corners with exactly the same coordinates become one
-//! point. Normals are passed over: the order of the corners tells the outside.
+//! point. Normals are ignored: the order of the corners defines the outside.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Write};
@@ -25,7 +25,7 @@ struct Soup {
 }
 
 impl Soup {
-    /// The index of a point: that of an earlier one with the same coordinates, or a new one.
+    /// The index of a point: the existing one with the same coordinates, or a new one.
     fn point(&mut self, x: Vector3) -> u32 {
         // Adding 0 makes −0 into 0.
         let key = [x.x + 0.0, x.y + 0.0, x.z + 0.0].map(f64::to_bits);
@@ -49,7 +49,7 @@ impl Soup {
 
     fn finish(self, kind: &str, mut notes: Vec<String>) -> Result<MeshFile, Fault> {
         if self.degenerate > 0 {
-            notes.push(format!("{} triangles with two equal corners were left out", self.degenerate));
+            notes.push(format!("{} triangles with two equal corners were dropped", self.degenerate));
         }
         let mesh = self.cells.into_mesh(self.points, BTreeMap::new(), &mut notes)?;
         Ok(MeshFile { mesh, format: format!("{} {kind}", Format::Stl.name()), notes, time: None })
@@ -68,7 +68,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
 
 fn read_binary(bytes: &[u8]) -> Result<MeshFile, Fault> {
     let mut cursor = Cursor::new(bytes);
-    cursor.take(80, "the head of a binary STL file")?;
+    cursor.take(80, "the header of a binary STL file")?;
     let count = Scalar::U32.decode_integers(cursor.take(4, "the number of triangles")?, Order::Little)[0];
     let count = usize::try_from(count).unwrap_or_default();
     let place = cursor.place();
@@ -77,7 +77,7 @@ fn read_binary(bytes: &[u8]) -> Result<MeshFile, Fault> {
     index_limit(count.saturating_mul(3), place)?;
     let mut notes = Vec::new();
     if !cursor.rest().is_empty() {
-        notes.push(format!("{} bytes after the last triangle were not used", cursor.rest().len()));
+        notes.push(format!("{} bytes after the last triangle were ignored", cursor.rest().len()));
     }
     let mut soup = Soup::default();
     let mut attributes = Vec::with_capacity(count);

@@ -127,7 +127,7 @@ impl Reader<'_> {
         grid + self.model.lists.iter().map(|(_, connectivity, _)| connectivity.len()).sum::<usize>()
     }
 
-    /// The count of a data section, which must be that of the points or cells.
+    /// The count of a data section, which must equal the number of points or cells.
     fn items(&mut self, section: &str, expected: usize) -> Result<usize, Fault> {
         let count = self.cursor.count(0, format_args!("the count of {section}"))?;
         if count == expected {
@@ -301,7 +301,7 @@ impl Reader<'_> {
 
     /// Texts are passed over: lines, or in binary bytes after their length.
     fn skip_texts(&mut self, count: usize, title: &str) -> Result<(), Fault> {
-        self.notes.push(format!("array `{title}` holds texts and was not used"));
+        self.notes.push(format!("array `{title}` contains text and was ignored"));
         let what = format!("text array `{title}`");
         self.cursor.line();
         for _ in 0..count {
@@ -341,7 +341,7 @@ impl Reader<'_> {
             b"long" | b"long_long" | b"vtktypeint64" => Scalar::I64,
             b"float" | b"vtktypefloat32" => Scalar::F32,
             b"double" | b"vtktypefloat64" => Scalar::F64,
-            other => return Err(self.cursor.malformed(format!("`{}` is no type of numbers", shown(other)))),
+            other => return Err(self.cursor.malformed(format!("`{}` is not a number type", shown(other)))),
         }))
     }
 
@@ -398,7 +398,7 @@ impl Reader<'_> {
             let types = types.unwrap_or_default();
             add_grid(&mut cells, &types, &connectivity, 0, points.len(), place)?;
         }
-        // Cell data of poly-data count the lists in this order, whatever the order in the file.
+        // Cell data of poly-data follow the lists in this order, whatever the order in the file.
         lists.sort_by_key(|(list, ..)| match list {
             PolyList::Vertices => 0,
             PolyList::Lines => 1,

@@ -20,7 +20,7 @@ use crate::{DataArray, Vector3};
 /// Zlib makes at most 1032 bytes of one; more is announced by no honest file.
 const MOST_INFLATION: usize = 1040;
 
-/// What the whole file says about its arrays.
+/// Properties of all arrays of the file.
 struct Storage<'a> {
     /// Where the lines of the XML end.
     line_ends: Vec<usize>,
@@ -33,7 +33,7 @@ struct Storage<'a> {
     budget: usize,
 }
 
-/// The bytes of an array: in the file as they are, or decoded.
+/// The bytes of an array: raw in the file, or decoded.
 type Bytes<'a> = Cow<'a, [u8]>;
 
 /// Appended bytes after the underscore, and where they begin in the file.
@@ -48,7 +48,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         Err(_) => String::from_utf8_lossy(&xml),
     };
     let document = parse_xml(&text).map_err(|error| {
-        Fault::malformed(Place::Line(error.line), format!("the XML is broken or cut off: {error}"))
+        Fault::malformed(Place::Line(error.line), format!("the XML is broken or truncated: {error}"))
     })?;
     let root = document.root_element();
     if root.tag_name().name() != "VTKFile" {
@@ -149,7 +149,7 @@ impl<'a> Storage<'a> {
             Some("UInt64") => Scalar::U64,
             Some("UInt32") | None => Scalar::U32,
             Some(other) => {
-                return Err(Fault::malformed(Place::Line(1), format!("`{other}` is no type of a header")));
+                return Err(Fault::malformed(Place::Line(1), format!("`{other}` is not a header type")));
             }
         };
         let compressed = match root.attribute("compressor") {
@@ -226,7 +226,7 @@ impl<'a> Storage<'a> {
         Ok(MeshFile { mesh, format: String::new(), notes, time })
     }
 
-    /// The names in texts such as `5 liver`, a 0 behind each. Other texts name nothing.
+    /// The names in texts such as `5 liver`, each ended by a 0. Other texts contain no names.
     fn label_names(&mut self, array: Node<'a, 'a>) -> Result<BTreeMap<i32, String>, Fault> {
         let bytes: Bytes<'a> = if is_text(array) {
             let codes = self.words(array, |cursor, what| cursor.integer(format_args!("{what}")))?;
@@ -284,7 +284,7 @@ impl<'a> Storage<'a> {
         finite_points(&coordinates, place)
     }
 
-    /// The connectivity of `Cells`, `Polys`, …; empty if there is none.
+    /// The connectivity of `Cells`, `Polys`, …; empty if missing.
     fn read_connectivity(&mut self, list: Node<'a, 'a>) -> Result<Connectivity, Fault> {
         let mut connectivity = Connectivity::default();
         for array in children(list, "DataArray") {
@@ -358,7 +358,7 @@ impl<'a> Storage<'a> {
         for (i, array) in children(section, "DataArray").enumerate() {
             let name = array.attribute("Name").map_or_else(|| format!("array{i}"), str::to_owned);
             if array.attribute("type") == Some("String") {
-                notes.push(format!("array `{name}` holds texts and was not used"));
+                notes.push(format!("array `{name}` contains text and was ignored"));
                 continue;
             }
             let components = self.announced(array, "NumberOfComponents")?.unwrap_or(1).max(1);
@@ -388,7 +388,7 @@ impl<'a> Storage<'a> {
             "Float32" => Scalar::F32,
             "Float64" => Scalar::F64,
             other => {
-                let what = format!("`{other}` is no type of numbers");
+                let what = format!("`{other}` is not a number type");
                 return Err(Fault::malformed(self.line(array), what));
             }
         })
@@ -462,7 +462,7 @@ impl<'a> Storage<'a> {
             }
             other => {
                 let what = format!("the format `{}` of {what}", other.unwrap_or_default());
-                Err(Fault::malformed(self.line(array), format!("{what} is not known")))
+                Err(Fault::malformed(self.line(array), format!("{what} is unknown")))
             }
         }
     }
@@ -484,7 +484,7 @@ impl<'a> Storage<'a> {
         headers.into_iter().map(|header| usize::try_from(header).unwrap_or(usize::MAX)).collect()
     }
 
-    /// Bytes as they are: a header with their number, then they; or compressed blocks.
+    /// Raw bytes: a header with their number, then the bytes; or compressed blocks.
     fn decode_raw(&mut self, bytes: &'a [u8], place: Place, what: &str) -> Result<Bytes<'a>, Fault> {
         let mut cursor = Cursor::new(bytes);
         let size = self.header.size();
@@ -513,7 +513,7 @@ impl<'a> Storage<'a> {
         Ok(Cow::Owned(inflated))
     }
 
-    /// The same in base64, where the header of compressed blocks is a piece of its own.
+    /// The same in base64, where the header of compressed blocks is a separate piece.
     fn decode_base64(&mut self, text: &[u8], place: Place, what: &str) -> Result<Bytes<'a>, Fault> {
         let size = self.header.size();
         let mut text = Base64::new(text);
@@ -571,7 +571,7 @@ fn block_size(head: &[usize], index: usize) -> usize {
     if index + 1 == head[0] && head[2] != 0 { head[2] } else { head[1] }
 }
 
-/// The text of an array, which may stand before or after elements with information, and where it begins.
+/// The text of an array, before or after elements with information, and its start.
 fn content<'a>(array: Node<'a, '_>) -> (&'a str, usize) {
     let texts = array.children().filter(Node::is_text);
     let mut texts = texts.filter_map(|node| Some((node.text()?, node.range().start)));

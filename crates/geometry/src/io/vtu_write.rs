@@ -1,7 +1,7 @@
 //! Writes unstructured grids as VTK's XML (`.vtu`), and the list of the files of a series (`.pvd`).
 //!
-//! Arrays are base64 inside their elements: a quarter of the size could be saved by appended bytes, but those
-//! are no XML, and meshio 5.3.5 mixes up the arrays of some such files.
+//! Arrays are base64 inside their elements. Appended raw bytes would save a quarter of the size, but are not
+//! XML, and meshio 5.3.5 mixes up the arrays of some of these files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -90,7 +90,7 @@ impl Parts {
         }
         self.push(" format=\"binary\">");
         if self.compress {
-            // The head is a piece of its own: number and size of blocks, size of the last if it is smaller,
+            // The header is a separate piece: number and size of blocks, size of the last if it is smaller,
             // compressed sizes.
             let blocks = raw.len().div_ceil(BLOCK);
             let mut head = vec![blocks as u64, BLOCK as u64, (raw.len() % BLOCK) as u64];
@@ -179,7 +179,7 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions) -> i
     out.write_all(&parts.xml)
 }
 
-/// The time, and the names of labels: a text such as `5 liver` for each, in the codes of its bytes with a 0 behind it.
+/// The time, and the names of labels: a text such as `5 liver` for each, as byte codes ended by a 0.
 fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
     if options.time.is_none() && mesh.label_names.is_empty() {
         return Ok(());

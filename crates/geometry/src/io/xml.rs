@@ -1,12 +1,12 @@
-//! XML documents from files that nobody vouches for. The reader (roxmltree) takes a time with the square of the attributes of an
-//! element and of the namespaces; files with thousands of either are refused before they are read.
+//! XML documents from untrusted files. The time of the reader (roxmltree) grows with the square of the attributes of an element
+//! and of the namespaces, so files with thousands of either are rejected first.
 
 use roxmltree::Document;
 
-/// Attributes that an element may have; those of real files have ten.
+/// Limit of attributes per element; real files have ten.
 const MOST_ATTRIBUTES: usize = 1000;
 
-/// Namespaces that a document may declare; those of real files declare one.
+/// Limit of namespaces per document; real files declare one.
 const MOST_NAMESPACES: usize = 1000;
 
 /// XML that cannot be read.
@@ -15,14 +15,14 @@ const MOST_NAMESPACES: usize = 1000;
 pub struct XmlError {
     /// The line, from 1.
     pub line: usize,
-    /// What is wrong there.
+    /// The problem.
     pub reason: String,
 }
 
 /// Reads a document in a time linear in its length.
 ///
 /// # Errors
-/// If it is no XML, or has more than 1000 attributes in one element or 1000 namespaces.
+/// If it is not XML, or has more than 1000 attributes in one element or 1000 namespaces.
 pub fn parse_xml(text: &str) -> Result<Document<'_>, XmlError> {
     within_bounds(text)?;
     Document::parse(text)
@@ -33,7 +33,7 @@ pub fn parse_xml(text: &str) -> Result<Document<'_>, XmlError> {
 fn within_bounds(text: &str) -> Result<(), XmlError> {
     let too_many = |at: usize, what: &str, most: usize| XmlError {
         line: text[..at].matches('\n').count() + 1,
-        reason: format!("more than {most} {what}; no mesh or model needs as many"),
+        reason: format!("more than {most} {what}; no mesh or model needs that many"),
     };
     let mut namespaces = 0;
     let mut at = 0;
@@ -60,7 +60,7 @@ fn within_bounds(text: &str) -> Result<(), XmlError> {
     Ok(())
 }
 
-/// What is between a `<` and its `>`.
+/// The text between a `<` and its `>`.
 struct Tag {
     /// Bytes, with both.
     length: usize,
@@ -69,7 +69,7 @@ struct Tag {
 }
 
 impl Tag {
-    /// The tag at the beginning of a text; one that is not closed ends with the text.
+    /// The tag at the start of a text; an unclosed tag ends with the text.
     fn of(text: &str) -> Self {
         let (mut attributes, mut quote) = (0, None);
         let mut end = text.len();

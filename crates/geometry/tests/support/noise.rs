@@ -3,7 +3,7 @@
 
 use std::fs;
 
-/// Largest memory that this process has held [KiB], where Linux tells.
+/// Peak memory of this process [KiB], on Linux.
 pub fn peak() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?.parse().ok()

@@ -1,6 +1,6 @@
-//! GIPL (Guy's Image Processing Lab): 256 bytes of header, then the voxels, all big-endian. Fields as in ITK's
-//! GiplImageIO; like there, the axes are those of LPS world coordinates and `origin` is the centre of the first voxel.
-//! Leaves out: complex numbers, several volumes.
+//! GIPL (Guy's Image Processing Lab): 256 bytes of header, then the voxels, all big-endian. Fields follow ITK's
+//! GiplImageIO: the axes are LPS world coordinates and `origin` is the centre of the first voxel. Leaves out: complex
+//! numbers, several volumes.
 
 use nalgebra::Matrix3;
 
@@ -26,7 +26,7 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     if !has_magic(&header) {
         let little = MAGIC.iter().any(|magic| header[252..256] == magic.to_le_bytes());
         let found = if little {
-            "its numbers are little-endian, and GIPL's must be big-endian".to_owned()
+            "its numbers are little-endian, GIPL needs big-endian".to_owned()
         } else {
             format!("its magic is {:02x?}", &header[252..256])
         };
@@ -37,7 +37,7 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     if dims[3] > 1 {
         return Err(ImageProblem::Unsupported {
             what: format!("an image of {} volumes", dims[3]),
-            remedy: "take out one volume",
+            remedy: "extract one volume",
         }
         .at_byte(6));
     }

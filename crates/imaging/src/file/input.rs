@@ -1,4 +1,4 @@
-//! Bytes of a file, unpacked on the way. Memory grows with the bytes that arrive, never with what a header announces.
+//! Bytes of a file, decompressed while reading. Memory grows with the bytes that arrive, never with the header.
 
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -68,7 +68,7 @@ impl<'a> Input<'a> {
         self.within = folder;
     }
 
-    /// What follows, as an input of its own.
+    /// The remaining bytes, as a separate input.
     pub fn rest(&mut self) -> Input<'_> {
         let (path, within, progress) = (self.path.clone(), self.within.clone(), self.progress);
         Input { bytes: Box::new(&mut self.bytes), path, within, progress, ..*self }
@@ -84,7 +84,7 @@ impl<'a> Input<'a> {
         Self { bytes: Box::new(BufReader::new(ZlibDecoder::new(self.bytes))), packed: true, ..self }
     }
 
-    /// The file of this name beside this one, from its beginning, packed or not: it begins with voxels, which may look like
+    /// The file of this name beside this one, from its start, compressed or not. It starts with voxels, which may look like
     /// anything.
     pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'a>, Fault> {
         let Some(path) = &self.path else {
@@ -102,14 +102,13 @@ impl<'a> Input<'a> {
                 Ok(Input { within, limit, progress, ..Input::new(file, false, Some(path)) })
             }
             Err(error) => {
-                let expected = "that file must lie beside the header and be readable";
+                let expected = "that file must be readable and in the folder of the header";
                 Err(ImageProblem::bad(field, name, expected).with_cause(&error).into())
             }
         }
     }
 
-    /// The name of this file with another ending, as far as it goes: `scan.hdr.gz` and `img` give `scan.img` and
-    /// `scan.img.gz`.
+    /// The name of this file with another extension: `scan.hdr.gz` and `img` give `scan.img` and `scan.img.gz`.
     pub fn sibling_names(&self, ending: &str) -> Vec<String> {
         let name = self.path.as_deref().and_then(|path| path.file_name()?.to_str());
         let stem =
@@ -173,7 +172,7 @@ impl<'a> Input<'a> {
         if self.header_left == 0 {
             return Err(ImageProblem::Unsupported {
                 what: "a header of more than 4 MiB".to_owned(),
-                remedy: "check that this is an image at all",
+                remedy: "check that this is an image",
             }
             .into());
         }
@@ -213,7 +212,7 @@ impl<'a> Input<'a> {
 }
 
 impl ImageProblem {
-    /// Adds what the operating system says to the value of a bad field.
+    /// Adds the error of the operating system to the value of a bad field.
     fn with_cause(mut self, cause: &io::Error) -> Self {
         if let Self::BadField { value, .. } = &mut self {
             *value += &format!(" ({cause})");

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::image::{Numbers, Order, Scalar};
 use crate::names::LabelNames;
 
-/// A segment: where it stands in the file, and its name.
+/// A segment: its layer and value in the file, and its name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Segment {
     layer: usize,
@@ -34,8 +34,8 @@ pub(super) fn segments(pairs: &[(String, String)]) -> Vec<Segment> {
     found.into_values().filter(|(_, has_value)| *has_value).map(|(segment, _)| segment).collect()
 }
 
-/// The layers, each voxel's numbers side by side, as one image of labels with their names. Labels are the values of the segments, or their
-/// numbers from 1 on where a value is used again. Where segments overlap, the later one counts.
+/// The layers, with the values of each voxel side by side, as one image of labels with their names. Labels are the values of the segments,
+/// or the segment numbers from 1 if a value repeats. Where segments overlap, the later one wins.
 pub(super) fn joined(
     layers: usize,
     numbers: &Numbers,
@@ -68,13 +68,13 @@ pub(super) fn joined(
         bytes.extend(last.map_or(0, label).to_le_bytes());
     }
     if !own {
-        notes.push("segments use a value again: the labels are their numbers from 1 on".into());
+        notes.push("segments share values: labels are the segment numbers from 1".into());
     }
     if shared > 0 {
-        notes.push(format!("segments overlap in {shared} voxels, which count to the later one"));
+        notes.push(format!("segments overlap in {shared} voxels, which belong to the later one"));
     }
     if lost > 0 {
-        notes.push(format!("{lost} numbers belong to no segment and were not used"));
+        notes.push(format!("{lost} values belong to no segment and were ignored"));
     }
     let mut names = LabelNames::default();
     segments.iter().enumerate().for_each(|(number, segment)| names.insert(label(number), &segment.name));

@@ -39,12 +39,12 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     let header = Header::read(input)?;
     let rank: usize = header.need("NDims")?.one("it must be 2 or 3")?;
     if !(2..=3).contains(&rank) {
-        return Err(header.need("NDims")?.bad("it must be 2 or 3; take out one volume"));
+        return Err(header.need("NDims")?.bad("it must be 2 or 3; extract one volume"));
     }
     let channels =
         header.optional("ElementNumberOfChannels", |field| field.one::<u32>("it must be a number"))?;
     if channels.unwrap_or(1) != 1 {
-        return Err(header.need("ElementNumberOfChannels")?.bad("it must be 1; take out one channel"));
+        return Err(header.need("ElementNumberOfChannels")?.bad("it must be 1; extract one channel"));
     }
     let dims = header.dims(rank, options)?;
     let scalar = header.scalar()?;
@@ -114,9 +114,9 @@ impl Header {
 
     fn dims(&self, rank: usize, options: &ReadOptions) -> Result<[usize; 3], Fault> {
         let field = self.need("DimSize")?;
-        let sizes: Vec<u64> = field.all("whole numbers are needed, one an axis")?;
+        let sizes: Vec<u64> = field.all("whole numbers are needed, one per axis")?;
         if sizes.len() != rank {
-            return Err(field.bad("one whole number an axis is needed"));
+            return Err(field.bad("one whole number per axis is needed"));
         }
         let dims = [sizes[0], sizes[1], sizes.get(2).copied().unwrap_or(1)];
         checked_size(dims, "DimSize", options).map_err(|problem| problem.at_line(field.line))
@@ -135,7 +135,7 @@ impl Header {
             "MET_ULONG_LONG" => Scalar::U64,
             "MET_FLOAT" => Scalar::F32,
             "MET_DOUBLE" => Scalar::F64,
-            _ => return Err(field.bad("MET_CHAR to MET_DOUBLE are read; convert the image")),
+            _ => return Err(field.bad("only MET_CHAR to MET_DOUBLE are supported; convert the image")),
         })
     }
 
@@ -213,7 +213,7 @@ impl Header {
         let skip =
             self.optional("HeaderSize", |field| match field.one::<i64>("a whole number is needed")? {
                 bytes @ 0.. => Ok(bytes as u64),
-                _ => Err(field.bad("a size counted from the end is not read; write the image as .mha")),
+                _ => Err(field.bad("a size counted from the end is not supported; write the image as .mha")),
             })?;
         data.skip(skip.unwrap_or(0), "the bytes before the voxels")?;
         Ok(if self.flag("CompressedData")? { data.unpack_zlib() } else { data })

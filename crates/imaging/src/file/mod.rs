@@ -1,7 +1,7 @@
-//! Image files in: NIfTI-1 and -2, NRRD, MetaImage, GIPL, DICOM series and segmentations. The reader goes by the first bytes where
-//! they tell the format, otherwise by the ending; gzip is recognised by its own first bytes. Sizes are held against the
-//! limit and the bytes that are there before anything is allocated.
-//! Leaves out: more than one value a voxel but for layers of segments, time series, compressed DICOM slices, contours.
+//! Image files in: NIfTI-1 and -2, NRRD, MetaImage, GIPL, DICOM series and segmentations. The first bytes select the reader if
+//! they identify a format, otherwise the extension; gzip is recognised by its own first bytes. Sizes are compared with the limit
+//! and the existing bytes before allocation. Leaves out: more than one value per voxel except for layers of segments, time series,
+//! compressed DICOM slices, contours.
 
 mod dicom;
 mod gipl;
@@ -20,14 +20,14 @@ use crate::error::{Fault, ImageError, ImageProblem};
 use crate::image::Image;
 use input::Input;
 
-/// What a reader may do.
+/// Limits of a reader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadOptions {
     /// Most voxels allowed.
     pub voxel_limit: u64,
     /// Most bytes of voxels allowed, unpacked.
     pub byte_limit: u64,
-    /// UID of the DICOM series to read, where a folder holds several.
+    /// UID of the DICOM series to read, if a folder holds several.
     pub series: Option<String>,
     /// Folder, links resolved, that files named in headers and slices have to be in; anywhere if not given.
     pub within: Option<PathBuf>,
@@ -119,8 +119,8 @@ pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Fn(f64)) -> 
     }
 }
 
-/// Reads an image from the bytes of a file, packed with gzip or not. Errors name the file `bytes`. Data in a second file
-/// are refused. A DICOM slice counts as a volume of one slice.
+/// Reads an image from the bytes of a file, compressed with gzip or not. Errors name the file `bytes`. Data in a second
+/// file are rejected. A DICOM slice counts as a volume of one slice.
 pub fn read_bytes(bytes: &[u8], format: ImageFormat, options: &ReadOptions) -> Result<Image, ImageError> {
     let result = match format {
         ImageFormat::Dicom => dicom::read_file(bytes, true, options),
@@ -149,8 +149,7 @@ impl Fault {
 fn check_within(path: &Path, folder: Option<&Path>) -> io::Result<()> {
     match folder {
         Some(folder) if !path.canonicalize()?.starts_with(folder) => {
-            let reason =
-                format!("it is outside the folder `{}`, and nothing else may be read", folder.display());
+            let reason = format!("it is outside the folder `{}`, the only readable one", folder.display());
             Err(io::Error::new(io::ErrorKind::PermissionDenied, reason))
         }
         _ => Ok(()),

@@ -13,7 +13,7 @@ use crate::grid::Grid;
 use crate::image::{Image, Order, Scalar};
 use crate::names::{self, LabelNames};
 
-/// Bytes of the extensions in which names of labels are looked for.
+/// Bytes of the extensions that are searched for label names.
 const EXTENSIONS: u64 = 1 << 22;
 
 /// Bytes of the headers of version 1 and 2.
@@ -22,7 +22,7 @@ const HEADER: [usize; 2] = [348, 540];
 const POSITIVE: &str =
     "spacings must be positive and finite; correct pixdim (e.g. with fslorient or nibabel)";
 
-/// Whether the first bytes are those of NIfTI, in either byte order.
+/// Whether the first bytes belong to NIfTI, in either byte order.
 pub(super) fn has_magic(head: &[u8]) -> bool {
     let magic =
         |at: usize, words: [&[u8]; 2]| words.iter().any(|word| head.get(at..at + word.len()) == Some(word));
@@ -80,7 +80,7 @@ impl Header {
             b"ni1\0" | b"ni2\0" => false,
             [0, 0, 0, 0] if version == 1 => {
                 return Err(ImageProblem::Unsupported {
-                    what: "ANALYZE 7.5, which does not tell left from right".to_owned(),
+                    what: "ANALYZE 7.5, which does not distinguish left from right".to_owned(),
                     remedy: "convert it to NIfTI with the program that made it",
                 }
                 .at_byte(magic_at));
@@ -154,7 +154,7 @@ impl Header {
         if let Some(more) = dims[3..].iter().find(|&&n| n > 1) {
             return Err(ImageProblem::Unsupported {
                 what: format!("an image of {more} volumes (dim = {dims:?})"),
-                remedy: "take out one volume, e.g. with fslroi or nibabel",
+                remedy: "extract one volume, e.g. with fslroi or nibabel",
             });
         }
         checked_size([dims[0] as u64, dims[1] as u64, dims[2] as u64], "dim", options)
@@ -185,14 +185,14 @@ impl Header {
                 return Err(ImageProblem::bad(
                     "datatype",
                     code,
-                    "no such type is known; convert the image again",
+                    "this type does not exist; convert the image again",
                 )
                 .at_byte(at));
             }
         };
         let bits = self.integer(72, 14, 2);
         if bits != 8 * scalar.size() as i64 {
-            let expected = "it must be the bits of a number of `datatype`; convert the image again";
+            let expected = "it must match `datatype`; convert the image again";
             return Err(ImageProblem::bad("bitpix", bits, expected).at_byte(at + 2));
         }
         Ok(scalar)
@@ -217,11 +217,11 @@ impl Header {
     fn vox_offset(&self) -> Result<u64, ImageProblem> {
         let offset = if self.version == 1 { self.real(108, 0) } else { self.integer(0, 168, 8) as f64 };
         let least = if self.single { self.bytes.len() as f64 } else { 0.0 };
-        // 2³⁰: extensions of a gigabyte are none.
+        // 2³⁰: no extensions have a gigabyte.
         if offset.fract() == 0.0 && (least..=(1_u64 << 30) as f64).contains(&offset) {
             Ok(offset as u64)
         } else {
-            let expected = "it must be a whole number of bytes beyond the header; convert the image again";
+            let expected = "it must be a whole number of bytes, past the header; convert the image again";
             Err(ImageProblem::bad("vox_offset", offset, expected))
         }
     }
@@ -265,17 +265,17 @@ impl Header {
             return Grid::new(dims, offset.into(), self.rotation()? * mirror * spacing);
         }
         notes.push(
-            "no orientation (sform and qform codes are 0): axes taken along x, y and z from the origin"
+            "no orientation (sform and qform codes are 0): assuming axes x, y and z from the origin"
                 .to_owned(),
         );
         Grid::new(dims, Vector3::zeros(), spacing)
     }
 
-    /// Rotation of the quaternion (a, b, c, d), of which the file holds b, c and d.
+    /// Rotation of the quaternion (a, b, c, d); the file contains b, c and d.
     fn rotation(&self) -> Result<Matrix3<f64>, ImageProblem> {
         let [mut b, mut c, mut d] = [0, 1, 2].map(|at| self.real(256 + 4 * at, 352 + 8 * at));
         let square = b * b + c * c + d * d;
-        // 1e-3: single-precision round-off is 1e-6; anything beyond a thousandth is no rotation.
+        // 1e-3: single-precision round-off is 1e-6; a larger deviation is not a rotation.
         if !square.is_finite() || square > 1.0 + 1e-3 {
             let expected = "its square must be at most 1; correct the qform, or set an sform";
             return Err(ImageProblem::bad("quatern", format!("({b}, {c}, {d})"), expected));

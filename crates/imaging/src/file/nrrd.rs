@@ -74,7 +74,7 @@ struct Axes {
     steps: [Vector3; 3],
     /// Their places among the axes of the file.
     kept: [usize; 3],
-    /// Layers of segments, of which each voxel has a number.
+    /// Layers of segments; each voxel has one value per layer.
     layers: u64,
 }
 
@@ -157,17 +157,17 @@ impl Header {
             "float" => Scalar::F32,
             "double" => Scalar::F64,
             _ => {
-                return Err(
-                    field.bad("integers of 8 to 64 bits, float and double are read; convert the image")
-                );
+                return Err(field.bad(
+                    "only integers of 8 to 64 bits, float and double are supported; convert the image",
+                ));
             }
         })
     }
 
-    /// The axes that have a direction, or all where the file gives none.
+    /// The axes with a direction, or all if the file has none.
     fn axes(&self) -> Result<Axes, Fault> {
         let sizes_field = self.need("sizes")?;
-        let sizes: Vec<u64> = sizes_field.all("whole numbers are needed, one an axis")?;
+        let sizes: Vec<u64> = sizes_field.all("whole numbers are needed, one per axis")?;
         let rank: usize = self.need("dimension")?.one("a whole number is needed")?;
         if sizes.len() != rank || !(2..=16).contains(&rank) {
             return Err(sizes_field.bad("one size for each of 2 to 16 dimensions is needed"));
@@ -188,9 +188,9 @@ impl Header {
                 _ => {
                     return Err(ImageProblem::Unsupported {
                         what: format!(
-                            "an image with several values a voxel or several volumes (sizes {sizes:?})"
+                            "an image with several values per voxel or several volumes (sizes {sizes:?})"
                         ),
-                        remedy: "take out one of them (3D Slicer: save the segmentation as one label map)",
+                        remedy: "extract one of them (3D Slicer: save the segmentation as one label map)",
                     }
                     .at_line(sizes_field.line));
                 }
@@ -213,7 +213,7 @@ impl Header {
             return if vectors.len() == rank {
                 Ok(vectors)
             } else {
-                Err(field.bad("one vector an axis is needed"))
+                Err(field.bad("one vector per axis is needed"))
             };
         }
         let unit = |axis: usize, length: f64| {
@@ -223,9 +223,9 @@ impl Header {
         };
         let mut lengths = vec![1.0; rank];
         if let Some(field) = self.get("spacings") {
-            lengths = field.all("one number an axis is needed")?;
+            lengths = field.all("one number per axis is needed")?;
             if lengths.len() != rank || lengths.iter().take(3).any(|&h: &f64| h.is_nan() || h <= 0.0) {
-                return Err(field.bad("one positive number an axis is needed"));
+                return Err(field.bad("one positive number per axis is needed"));
             }
         }
         Ok(lengths.into_iter().enumerate().map(|(axis, length)| Some(unit(axis, length))).collect())
@@ -240,7 +240,7 @@ impl Header {
             };
         }
         let Some(field) = self.get("axis mins") else { return Ok(Vector3::zeros()) };
-        let mins: Vec<f64> = field.all("one number an axis is needed")?;
+        let mins: Vec<f64> = field.all("one number per axis is needed")?;
         let of_axis = |&axis: &usize| mins.get(axis).copied().filter(|x| x.is_finite()).unwrap_or(0.0);
         Ok(Vector3::from_iterator(axes.kept.iter().map(of_axis)))
     }
@@ -252,7 +252,7 @@ impl Header {
             Some((_, "left-anterior-superior" | "las")) => [-1.0, 1.0, 1.0],
             Some((_, "left-posterior-superior" | "lps")) => [-1.0, -1.0, 1.0],
             None | Some((_, "scanner-xyz" | "3d-right-handed" | "3d-left-handed")) => {
-                notes.push("no anatomical space: axes taken as right, front, head".to_owned());
+                notes.push("no anatomical space: assuming axes right, front, head".to_owned());
                 [1.0, 1.0, 1.0]
             }
             Some((field, _)) => {
@@ -310,7 +310,7 @@ impl Header {
                 data.numbers(count, scalar, self.order(scalar)?)
             }
             "ascii" | "text" | "txt" => read_text(&mut data, count, scalar),
-            _ => Err(encoding.bad("raw, gzip and ascii are read; write the image with gzip")),
+            _ => Err(encoding.bad("only raw, gzip and ascii are supported; write the image with gzip")),
         }
     }
 
@@ -319,7 +319,7 @@ impl Header {
         let Some(field) = self.get(name) else { return Ok(0) };
         match field.one::<i64>("a whole number is needed")? {
             count @ 0..=0x4000_0000 => Ok(count as u64),
-            _ => Err(field.bad("0 to 2³⁰ is read; write the image as a single .nrrd")),
+            _ => Err(field.bad("only 0 to 2³⁰ is supported; write the image as a single .nrrd")),
         }
     }
 }
@@ -340,7 +340,7 @@ fn vectors(field: &Field) -> Result<Vec<Option<Vector3>>, Fault> {
         let numbers: Result<Vec<f64>, _> = inner.split(',').map(|word| word.trim().parse()).collect();
         let numbers: [f64; 3] =
             numbers.ok().and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| field.bad(EXPECTED))?;
-        // A vector of NaNs says the same as `none`.
+        // A vector of NaNs means `none`.
         let none = numbers.iter().all(|x| x.is_nan());
         all.push((!none).then(|| numbers.into()));
         rest = after.trim_start();
@@ -348,7 +348,7 @@ fn vectors(field: &Field) -> Result<Vec<Option<Vector3>>, Fault> {
     Ok(all)
 }
 
-/// Numbers as text, kept in the type of the header.
+/// Numbers as text, stored in the type of the header.
 fn read_text(data: &mut Input<'_>, count: usize, scalar: Scalar) -> Result<Numbers, Fault> {
     // A voxel takes a digit and a space at least, so memory stays within a few times the file.
     data.within_limit(count, scalar)?;
@@ -357,9 +357,8 @@ fn read_text(data: &mut Input<'_>, count: usize, scalar: Scalar) -> Result<Numbe
     let mut found = 0;
     for word in text.split(|byte| byte.is_ascii_whitespace()).filter(|word| !word.is_empty()).take(count) {
         let word = String::from_utf8_lossy(word);
-        let bad = || {
-            ImageProblem::bad("a voxel", &word, "a number of the type of the header is needed").at_byte(found)
-        };
+        let bad =
+            || ImageProblem::bad("a voxel", &word, "a number of the header's type is needed").at_byte(found);
         macro_rules! push {
             ($number:ty) => {
                 bytes.extend_from_slice(&word.parse::<$number>().map_err(|_| bad())?.to_le_bytes())

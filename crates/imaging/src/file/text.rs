@@ -37,7 +37,7 @@ impl Field {
     }
 }
 
-/// Millimetres to metres, and from LPS (x to the left, y to the back) to RAS where asked.
+/// Millimetres to metres, and optionally from LPS (x to the left, y to the back) to RAS.
 pub(super) struct ToWorld {
     /// Metres a unit.
     pub unit: f64,

@@ -1,4 +1,4 @@
-//! Bad images: each gives an error that says what is wrong, where, and what to try.
+//! Bad images: each gives an error with the problem, its position and a remedy.
 
 use std::fs;
 
@@ -31,7 +31,7 @@ fn a_file_that_is_no_image_is_named_with_the_formats_that_are() {
     fs::write(&path, "dear reader").unwrap();
     says(
         &read(&path, &ReadOptions::default()).unwrap_err().to_string(),
-        &["notes.txt` is not an image known here", "DICOM"],
+        &["notes.txt` is not a supported image", "DICOM"],
     );
     let missing = read(&folder.path().join("none.nii"), &ReadOptions::default()).unwrap_err();
     assert!(matches!(missing, ImageError::Open { .. }));
@@ -50,13 +50,13 @@ fn a_file_that_is_no_image_is_named_with_the_formats_that_are() {
 #[test]
 fn truncated_files_say_how_much_is_missing() {
     let whole = nifti1(&Volume::oblique(), Form::Sform, false);
-    says(&error(&whole[..400], ImageFormat::Nifti), &["byte 352", "120 bytes are needed and 48 are there"]);
+    says(&error(&whole[..400], ImageFormat::Nifti), &["byte 352", "120 bytes are needed, 48 exist"]);
     let packed = gzip(&whole);
     says(
         &error(&packed[..packed.len() / 2], ImageFormat::Nifti),
-        &["cannot be unpacked after", "cut off or damaged"],
+        &["cannot be decompressed after", "truncated or damaged"],
     );
-    // Damaged in the middle: the checksum tells, or the unpacking.
+    // Damaged in the middle: the checksum or the decompression fails.
     let mut damaged = packed.clone();
     let middle = packed.len() - 20;
     damaged[middle] ^= 0x55;
@@ -64,15 +64,15 @@ fn truncated_files_say_how_much_is_missing() {
     let volume = Volume::oblique();
     for file in [nrrd(&volume, "raw", false), metaimage(&volume, false, false, "LOCAL")] {
         let format = if file.starts_with(b"NRRD") { ImageFormat::Nrrd } else { ImageFormat::MetaImage };
-        says(&error(&file[..file.len() - 7], format), &["120 bytes are needed and 113 are there"]);
+        says(&error(&file[..file.len() - 7], format), &["120 bytes are needed, 113 exist"]);
     }
-    says(&error(&gipl(&volume)[..256], ImageFormat::Gipl), &["120 bytes are needed and 0 are there"]);
+    says(&error(&gipl(&volume)[..256], ImageFormat::Gipl), &["120 bytes are needed, 0 exist"]);
     let ascii = nrrd(&volume, "ascii", false);
     says(&error(&ascii[..ascii.len() - 9], ImageFormat::Nrrd), &["60 bytes are needed"]);
     let slice = dicom(&volume, 0, Syntax::Explicit, "1");
     says(
         &error(&slice[..slice.len() - 3], ImageFormat::Dicom),
-        &["the pixels", "40 bytes are needed and 37 are there"],
+        &["the pixels", "40 bytes are needed, 37 exist"],
     );
 }
 
@@ -175,7 +175,7 @@ fn text_headers_name_the_line() {
     says(&changed("MET_SHORT", "MET_OTHER"), &["line 11", "MET_OTHER"]);
     says(&changed("LOCAL", "LIST"), &["line 12", "single .mha"]);
     says(&changed("LOCAL", "voxels.raw"), &["data in another file"]);
-    says(&changed("NDims = 3", "NDims = 4"), &["line 2", "take out one volume"]);
+    says(&changed("NDims = 3", "NDims = 4"), &["line 2", "extract one volume"]);
     says(
         &error(b"ObjectType = Image\nNDims = 3\n", ImageFormat::MetaImage),
         &["line 2", "no `ElementDataFile`"],
@@ -206,7 +206,7 @@ fn a_series_must_be_whole_and_one() {
     put("3", 3, &volume);
     assert!(read(folder.path(), &ReadOptions::default()).is_ok());
     put("3b", 3, &volume);
-    says(&fails().to_string(), &["`3` and `3b` lie at the same place"]);
+    says(&fails().to_string(), &["`3` and `3b` lie at the same position"]);
     fs::remove_file(folder.path().join("3b")).unwrap();
     put("5", 5, &Volume { dims: [2, 5, 6], ..volume.clone() });
     says(&fails().to_string(), &["`5` has size [2, 5], the first slice [5, 2]"]);

@@ -131,7 +131,7 @@ fn closing_adds_nothing_to_a_box() {
     assert!(matches!(error, LabelError::BadLength { .. }), "{error}");
 }
 
-/// A label all of which lay in a smaller piece is not said to be absent.
+/// A label only in a removed piece is not reported as absent.
 #[test]
 fn a_label_that_cleaning_removed_is_told_so() {
     let two = image([8, 1, 1], [1e-3; 3], |[i, ..]| [1, 1, 1, 1, 0, 2, 0, 0][i]);

@@ -7,8 +7,8 @@ use pliant_imaging::{Image, ImageFormat, ReadOptions, Scalar, read, read_bytes};
 
 use crate::write::*;
 
-/// The voxels of `image` are those of `volume`, each in its place to `tolerance` [m]. Axes may be reversed (slices are
-/// sorted), so voxels are found by where they are.
+/// The voxels of `image` equal those of `volume`, each at its position to `tolerance` [m]. Axes may be reversed
+/// (slices are sorted), so voxels are found by position.
 fn assert_same(image: &Image, volume: &Volume, tolerance: f64) {
     assert_eq!(image.grid.len(), volume.values.len());
     for at in 0..image.grid.len() {
@@ -178,7 +178,7 @@ fn slope_and_intercept_scale_values_and_labels_stay_whole() {
     let scaled = of_bytes(&file, ImageFormat::Nifti);
     assert_eq!(scaled.value(1), -863.0 * 0.5 + 10.0);
     let error = scaled.labels().unwrap_err().to_string();
-    assert!(error.starts_with("voxel [1, 0, 0] is -421.5, which is no label"), "{error}");
+    assert!(error.starts_with("voxel [1, 0, 0] is -421.5, which is not a label"), "{error}");
 }
 
 /// NIfTI-1, method 1: no orientation.
@@ -203,5 +203,5 @@ fn an_axis_of_one_layer_without_direction_is_dropped() {
     let two = layered.replace("sizes: 1 ", "sizes: 2 ");
     let error =
         read_bytes(two.as_bytes(), ImageFormat::Nrrd, &ReadOptions::default()).unwrap_err().to_string();
-    assert!(error.contains("several values a voxel"), "{error}");
+    assert!(error.contains("several values per voxel"), "{error}");
 }

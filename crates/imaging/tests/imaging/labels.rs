@@ -1,4 +1,4 @@
-//! Labels and their names: segmentations in DICOM, names in NRRD and NIfTI, masks, scans that are none of labels, files that are no files.
+//! Labels and their names: segmentations in DICOM, names in NRRD and NIfTI, masks, scans without labels, paths that are not files.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use pliant_imaging::{
 
 use crate::write::*;
 
-/// Labels 1 to 3 in slices 1, 2 and 4 of six, so that frames are missing at both ends and in between.
+/// Labels 1 to 3 in slices 1, 2 and 4 of six, so frames are missing at both ends and in between.
 fn labelled() -> Volume {
     let dims = [5, 4, 6];
     let label = |at: usize| match (at % 5, at / 5 % 4, at / 20) {
@@ -22,7 +22,7 @@ fn labelled() -> Volume {
     Volume { dims, values: (0..120).map(label).collect(), ..Volume::oblique() }
 }
 
-/// The voxels with labels are those of a volume, in their places.
+/// The voxels with labels equal those of a volume, in position.
 fn assert_same(image: &Image, volume: &Volume) {
     let inverse = volume.axes.try_inverse().unwrap();
     let mut found = 0;
@@ -144,29 +144,29 @@ fn layers_of_segments_become_one_image() {
         )
     };
     let labels = |image: &Image| image.labels().unwrap().labels;
-    // Values of their own stay; the tumour, which comes later, lies in the liver.
+    // Distinct values stay; the tumour, which comes later, lies in the liver.
     let own = segment(1, 1, 7, "tumour") + &segment(0, 0, 5, "liver");
     let image = layered("5 0  5 7  0 7  0 0", &own).unwrap();
     assert_eq!((image.grid.dims, labels(&image)), ([2, 2, 1], vec![5, 7, 7, 0]));
     assert_eq!((image.names.get(5), image.names.get(7)), (Some("liver"), Some("tumour")));
-    assert_eq!(image.notes, ["segments overlap in 1 voxels, which count to the later one"]);
+    assert_eq!(image.notes, ["segments overlap in 1 voxels, which belong to the later one"]);
     assert!((image.grid.spacing()[2] - 2e-3).abs() < 1e-12);
     // The same value in two layers: numbers from 1 on.
     let again = segment(0, 0, 1, "liver") + &segment(1, 1, 1, "tumour") + &segment(2, 0, 2, "vein");
     let image = layered("1 0  2 1  0 1  2 0", &again).unwrap();
     assert_eq!(labels(&image), [1, 3, 2, 3], "the vein comes after the tumour");
     assert_eq!(image.names.get(3), Some("vein"));
-    assert!(image.notes[0].contains("use a value again") && image.notes[1].contains("overlap in 1"));
+    assert!(image.notes[0].contains("share values") && image.notes[1].contains("overlap in 1"));
     // A number of no segment is background; a note counts it.
     let image = layered("9 0  5 0  0 0  0 3", &own).unwrap();
     assert_eq!(labels(&image), [0, 5, 0, 0]);
-    assert_eq!(image.notes, ["2 numbers belong to no segment and were not used"]);
+    assert_eq!(image.notes, ["2 values belong to no segment and were ignored"]);
 }
 
 #[test]
 fn layers_without_segments_or_with_too_few_numbers_are_refused() {
     let told = layered("5 0 5 7 0 7 0 0", "").unwrap_err();
-    assert!(told.contains("several values a voxel"), "{told}");
+    assert!(told.contains("several values per voxel"), "{told}");
     let odd = "Segment0_LabelValue:=5\nSegment0_Layer:=-1\nSegmentx_Layer:=1\nSegment1_LabelValue:=many\n";
     assert_eq!(layered("5 0 5 0 0 0 0 0", odd).unwrap().labels().unwrap().labels, [0; 4]);
     let told = layered("5 0 5", "Segment0_LabelValue:=5\n").unwrap_err();
@@ -189,7 +189,7 @@ fn a_scan_is_no_label_image() {
     let told = scan.labels().unwrap_err();
     assert!(matches!(told, LabelError::Grey { values: 500.., more: false, range: [-1024, _] }), "{told}");
     assert!(
-        told.to_string().contains("no label image") && told.to_string().contains("from -1024 to 69"),
+        told.to_string().contains("not a label image") && told.to_string().contains("from -1024 to 69"),
         "{told}"
     );
     // Many labels of a few voxels each are labels.
@@ -212,7 +212,7 @@ fn masks_become_one_image_in_which_the_last_counts() {
     let [mask, _] = masks;
     let masks = [mask, labels];
     let told = Image::of_masks(&masks, None).unwrap_err().to_string();
-    assert!(told.contains("`seg.nii` is no mask: it has the labels 1, 2, 3"), "{told}");
+    assert!(told.contains("`seg.nii` is not a mask: it has the labels 1, 2, 3"), "{told}");
     assert_eq!(Image::of_masks(&masks, Some(3.0)).unwrap().regions(&|_| {}).unwrap()[0].label, 2);
     let other = image(|_| 1, [4, 10, 3]);
     let masks = [masks.into_iter().next().unwrap(), (PathBuf::from("other.nii"), other)];
@@ -230,7 +230,7 @@ fn images_of_too_many_bytes_are_refused_before_they_are_read() {
         (gipl(&labelled()), ImageFormat::Gipl),
     ] {
         let told = read_bytes(&bytes, format, &options).unwrap_err().to_string();
-        assert!(told.contains("unpacked, more than") && told.contains("crop"), "{told}");
+        assert!(told.contains("uncompressed, more than") && told.contains("crop"), "{told}");
         assert!(read_bytes(&bytes, format, &ReadOptions { byte_limit: 240, ..options.clone() }).is_ok());
     }
 }

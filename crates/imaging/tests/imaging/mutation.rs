@@ -1,5 +1,5 @@
-//! Images with bytes changed, cut out, or cut off at random, the same every time, and a corpus of files that once mattered:
-//! an error or an image, but never a panic, and no memory beyond what the file holds.
+//! Images with bytes changed, removed, or truncated at random with a fixed seed, and a corpus of earlier problem files.
+//! Each gives an error or an image, never a panic, and no memory beyond the content of the file.
 
 use std::fs;
 use std::path::Path;
@@ -74,7 +74,7 @@ fn mutated(seed: &[u8], noise: &mut Noise) -> Vec<u8> {
     bytes
 }
 
-/// Largest memory that this process has held [KiB], where Linux tells.
+/// Peak memory of this process [KiB], on Linux.
 fn peak() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?.parse().ok()
@@ -138,7 +138,7 @@ fn the_corpus_gives_errors() {
     assert!(count >= 20, "{count}");
 }
 
-/// Writes the corpus anew: `cargo test -p pliant-imaging write_the_corpus -- --ignored`.
+/// Regenerates the corpus: `cargo test -p pliant-imaging write_the_corpus -- --ignored`.
 #[test]
 #[ignore = "writes files"]
 fn write_the_corpus() {

@@ -18,7 +18,7 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Small, oblique and left-handed, each voxel a number of its own.
+    /// Small, oblique and left-handed, each voxel with its own number.
     pub fn oblique() -> Self {
         let rotation = nalgebra::Rotation3::from_euler_angles(0.3, -0.4, 1.1);
         let mirrored = Matrix3::from_diagonal(&Vector3::new(0.9, 1.25, -2.5));
@@ -254,7 +254,7 @@ pub fn dicom(volume: &Volume, k: usize, syntax: Syntax, series: &str) -> Vec<u8>
     let mut set = Vec::new();
     let mut put = |tag, vr: &[u8; 2], value: &[u8]| element(&mut set, tag, vr, value, syntax);
     put(0x0008_103E, b"LO", b"a test ");
-    // A sequence with a place of its own, which is not that of the slice.
+    // A sequence with its own position, different from that of the slice.
     put(0x0008_1140, b"SQ", &nested(syntax));
     put(0x0020_000E, b"UI", series.as_bytes());
     put(0x0020_0032, b"DS", &text(&[-position.x, -position.y, position.z]));
@@ -280,7 +280,7 @@ pub fn dicom(volume: &Volume, k: usize, syntax: Syntax, series: &str) -> Vec<u8>
     file
 }
 
-/// How a segmentation tells what is inside.
+/// The encoding of the inside in a segmentation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segments {
     Bits,

@@ -1,4 +1,4 @@
-//! Surfaces of the mesh files that the readers are tested with, malformed and changed at random: a body or an error, never a panic.
+//! Surfaces of the test files of the readers, malformed and changed at random: each gives a body or an error, never a panic.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Bodies of closed surfaces: distances, volumes, what is mended, what is refused.
+//! Bodies of closed surfaces: distances, volumes, repairs, rejections.
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_meshing::{
@@ -16,7 +16,7 @@ fn triangles(mesh: &mut Mesh) -> &mut Vec<u32> {
     &mut mesh.block_mut(CellKind::Triangle).nodes
 }
 
-/// Two surfaces in one mesh; the second turned inside out if asked for.
+/// Two surfaces in one mesh; optionally the second is inverted.
 fn both(mut first: Mesh, mut second: Mesh, turned: bool) -> Mesh {
     let offset = first.points.len() as u32;
     let nodes = std::mem::take(triangles(&mut second));
@@ -34,7 +34,7 @@ fn ball_volume(radius: f64) -> f64 {
     4.0 / 3.0 * std::f64::consts::PI * radius.powi(3)
 }
 
-/// Distances of a ball are R − r, but for the sagitta of its triangles and the curvature between points of the grid
+/// Distances of a ball are R − r, up to the sagitta of its triangles and the curvature between points of the grid
 /// (h²/4R = 0.01 mm for h = 1 mm).
 #[test]
 fn the_field_of_a_ball_is_the_distance_to_it() {
@@ -95,7 +95,7 @@ fn overlapping_balls_are_joined() {
     let expected = 2.0 * ball_volume(radius) - lens;
     assert!((field.volume() / expected - 1.0).abs() < 0.01, "{} {expected}", field.volume());
 
-    // A ball within a ball that looks the same way adds nothing.
+    // A ball inside a ball with the same orientation adds nothing.
     let swallowed = enclosed(&both(ball(0.03, 0.0), ball(0.015, 0.0), false));
     assert_eq!((swallowed.report.swallowed_shells, swallowed.report.cavities), (1, 0));
     let field = swallowed.field(0.004, &|_| {}).expect("a field");

@@ -1,4 +1,4 @@
-//! What the meshes of this crate promise: volume, conformity, quality, determinism, errors.
+//! Promises of the meshes of this crate: volume, conformity, quality, determinism, errors.
 
 mod broken;
 mod checks;

@@ -21,13 +21,13 @@ fn meshed(anatomy: &Anatomy<'_>, edge: f64, origin: Vector3) -> OrganMesh {
     request.mesh(anatomy, &|_| {}).expect("the organ is meshed")
 }
 
-/// T4: every inner face has two cells, volumes are positive, no point is unused, no edge of the boundary has more than
-/// two faces; and the report tells what is there.
+/// T4: every inner face has two cells, volumes are positive, every point is used, no boundary edge has more than two
+/// faces; the report matches the mesh.
 pub fn check_sound(made: &OrganMesh) -> Vec<Vec<u32>> {
     check_sound_within(made, 1.6)
 }
 
-/// The same of a mesh whose edges are no longer than `longest` times what was asked for at their place.
+/// The same for a mesh with edges up to `longest` times the local request.
 pub fn check_sound_within(made: &OrganMesh, longest: f64) -> Vec<Vec<u32>> {
     let faces = conforming_boundary(&made.mesh);
     assert!(tet_volumes(&made.mesh).iter().all(|&volume| volume > 0.0));
@@ -41,7 +41,7 @@ pub fn check_sound_within(made: &OrganMesh, longest: f64) -> Vec<Vec<u32>> {
     faces
 }
 
-/// T1: a sphere of 50 mm at 8 to 20 mm, wherever the lattice lies.
+/// T1: a sphere of 50 mm at 8 to 20 mm, for any offset of the lattice.
 #[test]
 fn a_sphere_of_voxels_is_round_and_keeps_three_quarters_of_the_ideal_step() {
     sphere_at(2);
@@ -210,7 +210,7 @@ fn a_gap_thinner_than_the_lattice_stays_open() {
     check_sound(&made);
     assert!(made.report.repairs.bridges > 0);
     assert!(made.report.acoustic_part >= 0.75);
-    // In the middle plane of the gap there is no tet.
+    // The middle plane of the gap contains no tet.
     let locator = pliant_geometry::Locator::new(&made.mesh);
     for (x, y) in (10..40).step_by(5).flat_map(|x| (10..40).step_by(5).map(move |y| (x as f64, y as f64))) {
         let place = locator.locate(Vector3::new(x * h, y * h, 0.0205)).expect("the mesh has cells");
@@ -229,7 +229,8 @@ fn functions_mesh_like_images() {
     assert_eq!(body.labels(), [4, 9]);
     let nine = &made.report.materials[1];
     let exact = 4.0 / 3.0 * PI * 0.015_f64.powi(3);
-    // Chords of 8.7 mm in a sphere of 15 mm enclose a tenth less; no image tells the volume to make up for.
+    // Chords of 8.7 mm in a sphere of 15 mm enclose a tenth less; no image provides a volume to correct
+    // this.
     assert!(nine.label == 9 && (nine.volume / exact - 1.0).abs() < 0.15, "{nine:?}");
 }
 
@@ -252,7 +253,7 @@ fn impossible_requests_are_refused() {
     assert!(matches!(error, Err(LabelError::TooManyLabels { labels: 64, limit: 63 })));
 }
 
-/// A real organ, where PLIANT_DATA tells a folder with it.
+/// A real organ from the folder PLIANT_DATA.
 #[test]
 fn the_liver_of_a_scan_is_meshed_with_the_stomach() {
     let Some(data) = std::env::var_os("PLIANT_DATA") else {

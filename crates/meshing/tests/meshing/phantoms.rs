@@ -14,7 +14,8 @@ fn organ(organ: Organ) -> Phantom {
     Phantom::new(organ, 1.0).expect("a positive scale")
 }
 
-/// The cube of 205 mm round an organ, so that cubes of 205/128 mm are the voxels of its label image.
+/// The cube of 205 mm around an organ, so that cubes of 205/128 mm are the voxels of its label
+/// image.
 struct LabelImage(Phantom);
 
 impl ImplicitField for LabelImage {

@@ -1,4 +1,4 @@
-//! Distances to what the user gave, labels that are off, cells of several sizes, and distances that are held.
+//! Distances to the input, wrong labels, cells of several sizes, and distance bounds.
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_imaging::{Grid, LabelImage};
@@ -10,7 +10,8 @@ use pliant_meshing::{
 use crate::checks::{conforming_boundary, tet_volume};
 use crate::organs::{anatomy, check_sound, check_sound_within};
 
-/// A ball of 30 mm with a spike that ends 55 mm from its centre and stands on a cap of so many degrees.
+/// A ball of 30 mm with a spike that ends 55 mm from its centre; its base is a cap of this many
+/// degrees.
 fn spiked(cap: f64) -> Mesh {
     let mut mesh = sphere(0.03, 5, DEFAULT_CELL_LIMIT).expect("a sphere");
     for point in &mut mesh.points {
@@ -27,7 +28,8 @@ fn skin(mesh: &Mesh) -> TriangleMesh {
     TriangleMesh::from_mesh(&skin).expect("a surface").0
 }
 
-/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field: told was what it is off that.
+/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field. The report used to give its
+/// distance from the field.
 #[test]
 fn tets_of_a_surface_are_measured_to_its_triangles() {
     let edge = 0.008;
@@ -113,7 +115,7 @@ fn labels_that_are_off_are_told_and_better_where_they_are_protected() {
     assert!(off(&fine, 2) < 0.02 && off(&fine, 3) < 0.05, "{}", fine.report);
     assert!(between(&better).is_some_and(|better| better < between(&found).unwrap_or(f64::INFINITY)));
     assert!(fine.report.acoustic_part > 0.6, "{}", fine.report);
-    // Only where it is asked for: cells of 2 mm everywhere would be 64 times as many as those of 8 mm.
+    // Only on request: cells of 2 mm everywhere would be 64 times as many as those of 8 mm.
     assert!(fine.report.tets < 40 * coarse.report.tets);
     let error =
         OrganTets::new(edge).protecting(&[(4, None)]).mesh(&block, &|_| {}).expect_err("no such label");

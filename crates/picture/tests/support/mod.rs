@@ -2,7 +2,7 @@
 
 use pliant_picture::Graphics;
 
-/// `None` where nothing draws, which is a failure where the gate asks for it.
+/// `None` without an adapter, which is a failure if the gate requires one.
 pub fn graphics() -> Option<Graphics> {
     match Graphics::open() {
         Ok(graphics) => Some(graphics),

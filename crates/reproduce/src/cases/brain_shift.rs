@@ -1,5 +1,5 @@
 //! Brain shift on an ellipsoid: half axes 80, 65 and 60 mm about the origin, held by the skull below z = −12 mm, pressed
-//! inwards where it is opened around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
+//! inwards at an opening around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
 
 use pliant_explicit::Observable;
 use pliant_geometry::{CellKind, DataArray, Locator, Mesh, Vector3, boundary, relative_acoustic_length};
@@ -18,10 +18,11 @@ use crate::{Hexes, Specimen, Tets, elastic, largest, law, mesh as read_mesh, num
 pub const CASE: Case = Case {
     id: "brain-shift",
     title: "Brain shift on an ellipsoid",
-    shows: "Not in the thesis, which names it as what accuracy is needed for: when a skull is opened, the brain moves before \
-            the surgeon can reach the tumour. A brain-sized ellipsoid at ν = 0.49, held by the skull below, sinks by up to \
-            10 mm where it was opened; what comes out is where its inside has gone, at 52 points, against a converged \
-            solution of quadratic tetrahedra. Plain tetrahedra lock: they are three to six times further off.",
+    shows: "The thesis names brain shift as an application that needs accuracy: when a skull is opened, the brain \
+            moves before the surgeon reaches the tumour. A brain-sized ellipsoid at ν = 0.49 rests on the skull below \
+            and sinks by up to 10 mm at the opening. The result is the displacement of 52 points inside, compared \
+            with a converged solution of quadratic tetrahedra. Plain tetrahedra lock: their error is three to six \
+            times larger.",
     corrections: &[],
     seconds: 5.0,
     compute,
@@ -35,9 +36,9 @@ const AXIS: [f64; 3] = [0.3, 0.4, 0.866_025_403_784_438_6];
 const HEIGHT: f64 = 0.062_864_934_582_006_83;
 /// Depth [m] to which the middle of the opening is pressed.
 const DEPTH: f64 = 0.01;
-/// Height of the border of the opening over that of the ellipsoid.
+/// Height of the border of the opening over the height of the ellipsoid.
 const OPENING: f64 = 0.88;
-/// The skull holds what is below this z [m].
+/// The skull holds all nodes below this z [m].
 const SKULL: f64 = -0.012;
 /// Slack of the borders of both regions, as a part of the height: the mesh of the reference has its nodes on them.
 const SLACK: f64 = 1e-9;
@@ -155,7 +156,7 @@ pub fn data() -> Value {
     reference(include_str!("../../../../validation/data/ellipsoid.json"))
 }
 
-/// A list of vectors of the reference; what is none counts as not a number.
+/// A list of vectors of the reference; invalid entries become NaN.
 pub fn vectors(value: &Value) -> Vec<Vector<f64>> {
     let list = value.as_array().map(Vec::as_slice).unwrap_or_default();
     list.iter().map(|v| numbers(v).try_into().unwrap_or([f64::NAN; 3])).collect()

@@ -1,6 +1,6 @@
-//! Figure 6.7: what fibres and relaxation cost, on this machine: wall time of an explicit step of the thesis's cube of
-//! hexahedra, single precision, all cores. Repeats of all models are interleaved, so that what else the machine does
-//! meets all alike; the median counts.
+//! Figure 6.7: the cost of fibres and relaxation on this machine: wall time of an explicit step of the thesis's cube
+//! of hexahedra, single precision, all cores. Repeats of all models are interleaved, so other load affects them
+//! equally; the median counts.
 
 use pliant_bench::{Clocked, ClockedOnDevice, Spread, Timed};
 use pliant_explicit::State;
@@ -20,7 +20,7 @@ use crate::{Specimen, elastic, law, liver, liver_matrix, liver_relaxation};
 const CELLS: [usize; 4] = [10, 16, 25, 38];
 /// Repeats of every model.
 const REPEATS: usize = 21;
-/// Those on a graphics processor.
+/// The same on a GPU.
 const REPEATS_ON_DEVICE: usize = 5;
 /// Elements stepped in a repeat.
 const ELEMENT_STEPS: usize = 110_000;
@@ -32,10 +32,10 @@ const MODELS: [&str; 4] = ["NHE", "TIE", "NHV", "TIV"];
 pub const CASE: Case = Case {
     id: "fig-6.7",
     title: "Fig. 6.7: cost of anisotropy and viscoelasticity",
-    shows: "Time of one step of a cube of 1,000 to 54,872 hexahedra, for a neo-Hookean (NHE), a transversely isotropic \
-            (TIE) and a transversely isotropic viscoelastic model (TIV). On a GeForce 8800 GTX the ratios were at most \
-            1.013 (TIE to NHE), 1.043 (TIV to TIE) and 1.051 (TIV to NHE): memory decided there. Here they are measured on \
-            this machine's processor and not judged. The critical step shrinks with the elements.",
+    shows: "Time of one step of a cube of 1,000 to 54,872 hexahedra, for a neo-Hookean (NHE), a transversely \
+            isotropic (TIE) and a transversely isotropic viscoelastic model (TIV). On a GeForce 8800 GTX, \
+            memory-bound, the ratios were at most 1.013 (TIE to NHE), 1.043 (TIV to TIE) and 1.051 (TIV to NHE). Here \
+            they are measured on this machine's CPU and not judged. The critical time step shrinks with the elements.",
     corrections: &[Correction {
         printed: "section 6.4.3: brain-like μ = 1006.71 Pa with ν = 0.45",
         correct: "ν = 0.49.",
@@ -100,7 +100,7 @@ where
     Ok(times.split_off(1))
 }
 
-/// The median over the repeats of what is made of their times.
+/// The median over the repeats of a function of their times.
 fn median(repeats: &[[f64; 4]], of: impl Fn(&[f64; 4]) -> f64) -> f64 {
     Spread::of(repeats.iter().map(of)).median
 }
@@ -121,7 +121,7 @@ impl Series {
         Ok(Self { place, detail, times })
     }
 
-    /// For each mesh its elements and the median of what is made of the times.
+    /// For each mesh its elements and the median of a function of the times.
     fn points(&self, of: impl Fn(&[f64; 4]) -> f64) -> Vec<(f64, f64)> {
         let median = |(cells, times): (usize, &Vec<_>)| (cells.pow(3) as f64, median(times, &of));
         CELLS.into_iter().zip(&self.times).map(median).collect()
@@ -182,14 +182,14 @@ fn plot<'a>(title: &'a str, axis: &'a str, curves: &'a [Curve]) -> Plot<'a> {
 
 fn compute() -> Result<Findings, CaseError> {
     let mut findings = Findings::default();
-    let processor = Series::measure("processor", ", all cores".into(), None)?;
+    let processor = Series::measure("CPU", ", all cores".into(), None)?;
     processor.add_figures(&mut findings)?;
     processor.add_rows(&mut findings);
     match Device::open(None) {
         Ok(device) => {
             let adapter = device.adapter();
             let detail = format!(" ({})", told(adapter));
-            let on_device = Series::measure("graphics processor", detail, Some(&device))?;
+            let on_device = Series::measure("GPU", detail, Some(&device))?;
             on_device.add_figures(&mut findings)?;
             on_device.add_rows(&mut findings);
             add_ratio(&mut findings, &processor, &on_device)?;
@@ -220,17 +220,17 @@ fn compute() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-/// How many times faster the graphics processor is, on the model with all there is.
+/// Speed-up of the GPU, for the most complete model.
 fn add_ratio(findings: &mut Findings, processor: &Series, on_device: &Series) -> Result<(), CaseError> {
     let (slow, fast) = (processor.points(|t| t[3]), on_device.points(|t| t[3]));
     let points: Vec<_> = slow.iter().zip(&fast).map(|(slow, fast)| (slow.0, slow.1 / fast.1)).collect();
     let largest = points.iter().map(|point| point.1).fold(0.0, f64::max);
     let curves = [Curve::new("TIV", 3, Pen::Line, points.clone()), Curve::new("", 3, Pen::Markers, points)];
-    let figure = Plot { logarithmic: false, ..plot("Processor over graphics processor", "ratio", &curves) };
+    let figure = Plot { logarithmic: false, ..plot("CPU over GPU", "ratio", &curves) };
     let caption =
         format!("Time of a step on all cores over that on the {}{}.", on_device.place, on_device.detail);
     findings.figures.push(figure.figure(caption)?);
-    let quantity = format!("TIV, processor over {}, largest ratio", on_device.place);
+    let quantity = format!("TIV, CPU over {}, largest ratio", on_device.place);
     let source = "thesis, one core of 2006 over a GeForce 8800 GTX";
     findings.rows.push(Row::timed(quantity, "", Some(56.3), largest, source));
     Ok(())

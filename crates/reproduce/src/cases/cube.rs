@@ -21,9 +21,9 @@ const CELLS: usize = 20;
 pub const DEFORMED: Case = Case {
     id: "fig-6.5",
     title: "Fig. 6.5: a compressed cube without fibres, with fibres across and along a diagonal",
-    shows: "A cube compressed by 30 % along x between platens it is glued to. Without fibres it bulges alike to all \
-            sides; fibres along y hold it there, and it bulges along z instead; fibres along the diagonal y = z hold \
-            that diagonal, and it bulges along the other.",
+    shows: "A cube is compressed by 30 % along x between platens glued to it. Without fibres it bulges equally to all \
+            sides. Fibres along y resist there, and it bulges along z instead. Fibres along the diagonal y = z resist \
+            along that diagonal, and it bulges along the other.",
     corrections: &[
         FIBRE_FACTOR,
         Correction {

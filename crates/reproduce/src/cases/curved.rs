@@ -1,6 +1,6 @@
-//! Figures 8.2 to 8.4: the curved surface of shells, what it carries, and how it looks. The surface here is a cubic Bézier triangle from
-//! positions and nodal normals (PN triangles of Vlachos et al. 2001 with arcs for edges), not the thesis's deflection (8.3) along the
-//! normal of each facet, which leaves gaps between facets that are not coplanar.
+//! Figures 8.2 to 8.4: the curved surface of shells, its carried surfaces, and its rendering. The surface here is a cubic Bézier
+//! triangle from positions and nodal normals (PN triangles of Vlachos et al. 2001 with arcs for edges), not the thesis's deflection
+//! (8.3) along the normal of each facet, which leaves gaps between facets that are not coplanar.
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
@@ -17,8 +17,8 @@ use crate::shells::{Specimen, sheet};
 pub const PATCH: Case = Case {
     id: "fig-8.2",
     title: "Fig. 8.2: the curved surface of one shell, and a force on it",
-    shows: "A triangle whose nodes have turned: (a, b) subdivided three times, flat and curved; (c) a force on the curved surface brought \
-            to forces and moments on the three nodes.",
+    shows: "A triangle with rotated nodes: (a, b) subdivided three times, flat and curved; (c) a force on the curved \
+            surface, transferred to forces and moments on the three nodes.",
     corrections: &[
         Correction {
             printed: "(8.5): C(6,7) = −3 x₂, C(7,7) = x₃²",
@@ -28,8 +28,8 @@ pub const PATCH: Case = Case {
         Correction {
             printed: "(8.21), (8.22): moments from entries 2, 3, 5, 6, 8, 9 of C⁻ᵀ P, forces by barycentric weights",
             correct: "Forces and moments by the transpose of the surface's own derivative J.",
-            why: "Entries 1, 4 and 7 are the nodal forces of the same virtual work. Without them the nodal forces and moments have another \
-                  moment than the force: by the number below.",
+            why: "Entries 1, 4 and 7 are the nodal forces of the same virtual work. Without them the moment of the nodal forces and moments differs \
+                  from that of the force, by the number below.",
         },
     ],
     seconds: 1.0,
@@ -40,13 +40,14 @@ pub const PATCH: Case = Case {
 pub const LAYERS: Case = Case {
     id: "fig-8.3",
     title: "Fig. 8.3: from shells to a contact point and back",
-    shows: "Layers of one object: shells, their curved surface, a fine surface that it carries. Positions and velocities go down the \
-            layers, the force of a contact goes up to the shells, where it is forces and moments on three nodes.",
+    shows: "Layers of one object: shells, their curved surface, a fine surface that it carries. Positions and \
+            velocities pass down the layers. The force of a contact passes up to the shells, as forces and moments on \
+            three nodes.",
     corrections: &[Correction {
         printed: "section 8.3.6: applyJT is the transpose of applyJ",
-        correct: "True only if both are made of the same J.",
-        why: "In the author's published code points on edges take the mean deflection of two triangles in the frame of the last; \
-              forces come back otherwise. Here ⟨J v, f⟩ = ⟨v, Jᵀ f⟩ on every point.",
+        correct: "True only if both use the same J.",
+        why: "In the author's published code, points on edges take the mean deflection of two triangles in the frame of the last; \
+              forces return differently. Here ⟨J v, f⟩ = ⟨v, Jᵀ f⟩ on every point.",
     }],
     seconds: 1.0,
     compute: layers,
@@ -56,14 +57,14 @@ pub const LAYERS: Case = Case {
 pub const RENDERING: Case = Case {
     id: "fig-8.4",
     title: "Fig. 8.4: shells that are subdivided, and an irregular mesh carried by them",
-    shows: "Rendered by subdividing its triangles, a shell of few elements shows the edges between them; an irregular mesh that is carried \
-            hides that. With a surface that is watertight and nearly smooth either way looks good. A sphere of 20 shells, flattened and \
-            widened.",
+    shows: "A shell of few elements, rendered by subdividing its triangles, shows the edges between them; a carried \
+            irregular mesh hides them. A watertight, nearly smooth surface looks good either way. The example is a \
+            sphere of 20 shells, flattened and widened.",
     corrections: &[Correction {
         printed: "section 8.3.5: deflection (8.3) along the normal of each triangle",
         correct: "A Bézier triangle whose edges depend on the data of their own two nodes.",
-        why: "Two facets that are not coplanar deflect a common edge along different normals: it gapes, on a sphere of 20 shells by 3 % of \
-              the diagonal of its box.",
+        why: "Two facets that are not coplanar deflect a common edge along different normals. This opens a gap, on a sphere of 20 shells \
+              of 3 % of the diagonal of its box.",
     }],
     seconds: 2.0,
     compute: rendering,
@@ -141,7 +142,7 @@ impl Deflected {
     }
 }
 
-/// How far force and moment of what comes to the nodes are off those of a force at a place, over the force and over force × mean edge.
+/// Errors of force and moment of the nodal loads against those of a force at a point, over the force and over force × mean edge.
 fn resultants_off(
     corners: [Vector3; 3],
     nodal: [[Vector3; 2]; 3],
@@ -216,7 +217,7 @@ fn patch() -> Result<Findings, CaseError> {
     let bodies = [
         Body { value: height(&flat_mesh), ..Body::still("(a) flat, subdivided", &flat_mesh) },
         Body { value: height(&curved_mesh), ..Body::still("(b) curved", &curved_mesh) },
-        Body { value: Some(heights), ..Body::still("(c) a force, and what comes to the nodes", &loaded) },
+        Body { value: Some(heights), ..Body::still("(c) a force, and the nodal loads", &loaded) },
     ];
     let view = View {
         from: [0.25, -1.0, 0.75],
@@ -308,7 +309,7 @@ fn layers() -> Result<Findings, CaseError> {
     let skin = surface.carried(model, &state, &carried[top]);
     arrow(&mut touching, skin - force, skin, 0.022);
     let bodies = [
-        Body::still("shells, with what comes to them", &shells),
+        Body::still("shells, with their loads", &shells),
         Body::still("their curved surface", &curved),
         Body::still("a fine surface carried, touched", &touching),
     ];
@@ -328,7 +329,7 @@ fn layers() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-/// A sphere of shells under an affine motion of its nodes, whose normals turn as those of the ellipsoid do.
+/// A sphere of shells under an affine motion of its nodes; the normals rotate with those of the ellipsoid.
 struct Ellipsoid {
     model: Model,
     state: State,
@@ -450,7 +451,7 @@ fn rendering() -> Result<Findings, CaseError> {
         }
     }
     let gaping = triangle_mesh(points, cut);
-    // A sphere of 1,280 triangles turned so that nothing of it lies on the shells' edges.
+    // A sphere of 1,280 triangles, rotated so that no part of it lies on the edges of the shells.
     let mut irregular = sphere(1.0, 3, DEFAULT_CELL_LIMIT)?;
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.5, -0.2));
     irregular.points.iter_mut().for_each(|p| *p = turn * *p);
@@ -472,7 +473,7 @@ fn rendering() -> Result<Findings, CaseError> {
     let smooth = |label: &str, mesh| Body { edges: false, ..Body::still(label, mesh) };
     let bodies = [
         smooth("20 flat shells", &flat_mesh),
-        smooth("the thesis's surface: it gapes", &gaping),
+        smooth("the thesis's surface, with gaps", &gaping),
         smooth("the surface here, subdivided", &curved),
         smooth("an irregular mesh, carried", &irregular),
     ];

@@ -1,4 +1,4 @@
-//! Which element to trust for nearly incompressible tissue, ν = 0.49: the cantilever under its own weight and the glued
+//! Accuracy of elements for nearly incompressible tissue, ν = 0.49: the cantilever under its own weight and the glued
 //! cube at 20 %.
 //!
 //! Cantilever 0.08 × 0.03 × 0.03 m, half of it modelled, E = 20 kPa, ρ = 1000: tip (0.08, 0, 0.03) sinks by
@@ -48,7 +48,8 @@ pub const ELEMENTS: [Element; 5] = [
     Element { name: "hex8-full", tets: Tets::Plain, hexes: Some([Hexes::Full; 2]) },
 ];
 
-/// What the prototype of the formulas gave on the same meshes, in the order of [`ELEMENTS`]: tip [mm] and F [N] as printed.
+/// Results of the prototype of the formulas on the same meshes, in the order of [`ELEMENTS`]: tip [mm] and F [N] as
+/// printed.
 const PROTOTYPE: [[f64; 2]; 5] =
     [[-26.6, 10.19], [-32.5, 9.57], [-33.0, 9.47], [-34.83, 9.10], [-34.5, 9.25]];
 
@@ -56,10 +57,10 @@ const PROTOTYPE: [[f64; 2]; 5] =
 pub const CASE: Case = Case {
     id: "elements",
     title: "Elements for nearly incompressible tissue",
-    shows: "Not in the thesis, which knows plain tetrahedra and one-point hexahedra only. At ν = 0.49 plain \
-            tetrahedra lock: a cantilever sinks by a quarter too little, a compressed cube pushes back by a tenth too \
-            much. Averaged nodal pressure (`tet4-anp`, `tet4-ianp`) takes most of it away; hexahedra with hourglass \
-            control scaled with μ (`hex8`) or with mean dilatation (`hex8-full`) come within one per cent.",
+    shows: "The thesis has only plain tetrahedra and one-point hexahedra. At ν = 0.49 plain tetrahedra lock: a \
+            cantilever sinks a quarter too little, and the force of a compressed cube is a tenth too large. Averaged \
+            nodal pressure (`tet4-anp`, `tet4-ianp`) removes most of this error. Hexahedra with hourglass control \
+            scaled with μ (`hex8`) or with mean dilatation (`hex8-full`) come within one per cent.",
     corrections: &[
         crate::case::Correction {
             printed: "(6.2): 8 Bᵀ S J, one point, gradients at the centroid",
@@ -70,8 +71,8 @@ pub const CASE: Case = Case {
         crate::case::Correction {
             printed: "(5.33), (6.9): Δt = L/c with the shortest edge L",
             correct: "2/ωₘₐₓ, bounded element by element through Σ|B|².",
-            why: "The shortest edge is no bound: too large by 2.4 for a regular tetrahedron, by 40 for a sliver. A tetrahedral \
-                  block run at that step ends after 11 steps.",
+            why: "The shortest edge is not a bound: it is too large by 2.4 for a regular tetrahedron, by 40 for a sliver. A \
+                  tetrahedral block with that step fails after 11 steps.",
         },
     ],
     seconds: 20.0,
@@ -160,7 +161,7 @@ fn compute() -> Result<Findings, CaseError> {
         }
     }
     let caption = "Deviation from the limit of fine meshes.";
-    findings.figures.push(bars("Cantilever: tip", "off the converged −34.85 mm [%]", &tips, caption)?);
-    findings.figures.push(bars("Cube at 20 %: force", "off the converged 9.15 N [%]", &forces, caption)?);
+    findings.figures.push(bars("Cantilever: tip", "error against −34.85 mm [%]", &tips, caption)?);
+    findings.figures.push(bars("Cube at 20 %: force", "error against 9.15 N [%]", &forces, caption)?);
     Ok(findings)
 }

@@ -1,6 +1,6 @@
-//! Figure 6.9: what the framework costs: the bare step of a cube of hexahedra under gravity against the whole program, on
-//! this machine: single precision, all cores. Both begin at rest and take the same steps of the same model; repeats are
-//! interleaved, so that what else the machine does meets both alike.
+//! Figure 6.9: the cost of the framework. The bare step of a cube of hexahedra under gravity is compared with the whole
+//! program on this machine, in single precision on all cores. Both start at rest and take the same steps of the same
+//! model; repeats are interleaved, so other load affects both equally.
 
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_explicit::State;
@@ -22,10 +22,10 @@ const ELEMENT_STEPS: usize = 2_000_000;
 pub const CASE: Case = Case {
     id: "fig-6.9",
     title: "Fig. 6.9: the bare step against the whole program",
-    shows: "Time of one step of a cube of hexahedra under gravity, with 1,331 to 29,791 nodes: by the solver alone, and \
-            inside of a framework (there SOFA), whose separate parts cost 8.4 % for large meshes. Here the whole program reads \
-            the scene, checks every instant, watches the largest stable step, samples energies and reactions and writes a \
-            table 25 times a second of simulated time.",
+    shows: "Time of one step of a cube of hexahedra under gravity, with 1,331 to 29,791 nodes: by the solver alone, \
+            and inside a framework (there SOFA), whose separate parts cost 8.4 % for large meshes. Here the whole \
+            program reads the scene, checks every step, monitors the critical time step, samples energies and \
+            reactions, and writes a table 25 times per second of simulated time.",
     corrections: &[],
     seconds: 12.0,
     compute,
@@ -54,7 +54,7 @@ impl Program {
     fn new(cells: usize) -> Result<Self, CaseError> {
         let short = scene(cells, 1e-3)?;
         let built = pliant_scene::build(&short)?;
-        // The duration that takes as many steps as are to be timed.
+        // The duration for the timed number of steps.
         let limits = pliant_scene::plan(&short, &built)?.limits;
         let step = SAFETY * limits.map_or(1e-3, |limits| limits.limit.step);
         let scene = scene(cells, step * (ELEMENT_STEPS / cells.pow(3)) as f64)?;
@@ -63,7 +63,7 @@ impl Program {
         Ok(Self { scene, built, plan })
     }
 
-    /// Wall time of a step of the solver alone [s], on threads of its own as the whole program has.
+    /// Wall time of a step of the solver alone [s], on its own threads like the whole program.
     fn bare(&self) -> Result<f64, CaseError> {
         let model = &self.built.model;
         let mut clocked = Clocked::<f32>::new(model.clone(), self.plan.step, State::at_rest(model))?;
@@ -115,7 +115,7 @@ fn compute() -> Result<Findings, CaseError> {
     for (which, (nodes, bare, whole, cost)) in points.iter().enumerate() {
         let last = which + 1 == points.len();
         let (reference, source) = if last { (Some(8.4), "thesis, for large meshes") } else { (None, "") };
-        let quantity = format!("what the framework adds to a step of {nodes} nodes");
+        let quantity = format!("cost of the framework per step, {nodes} nodes");
         findings.rows.push(Row::timed(quantity, "%", reference, *cost, source));
         if last {
             for (name, time) in [("the solver alone", bare), ("the whole program", whole)] {

@@ -1,8 +1,8 @@
-//! Figure 6.10: von Mises stress in a stretched liver, transversely isotropic, without relaxation and some seconds after the
-//! stretch with it. The organ is the one of `scenes/liver`, not the thesis's mesh, which was never published.
+//! Figure 6.10: von Mises stress in a stretched liver, transversely isotropic, without relaxation and with it some seconds
+//! after the stretch. The organ is the one of `scenes/liver`, since the thesis's mesh was never published.
 //!
-//! There are no numbers to compare with. What holds instead: once relaxed, the tissue stands where an elastic one of
-//! modulus (1 − α) μ, (1 − α) η and the same κ stands in equilibrium, which another solver finds.
+//! The source has no numbers. Instead: after relaxation, the tissue must equal an elastic one of modulus (1 − α) μ,
+//! (1 − α) η and the same κ in equilibrium, which another solver computes.
 
 use pliant_explicit::recover::Recovery;
 use pliant_explicit::{DynamicRelaxation, Observable, RelaxationSettings, Scalar, State};
@@ -22,15 +22,15 @@ use crate::{largest, law, run};
 pub const CASE: Case = Case {
     id: "fig-6.10",
     title: "Fig. 6.10: stress in a stretched liver, elastic and relaxed",
-    shows: "The von Mises stress in a liver pulled by one lobe, with fibres along one axis: without viscoelasticity (TI), \
-            and with it some seconds after the pull (TI + visco), when most of what can relax has relaxed. The stress \
-            is then about half.",
+    shows: "The von Mises stress in a liver pulled by one lobe, with fibres along one axis: without viscoelasticity \
+            (TI), and with it some seconds after the pull (TI + visco), after most of the relaxation. The stress is \
+            then about half.",
     corrections: &[super::RELAXATION_SIGN, FIBRE_FACTOR],
     seconds: 5.0,
     compute,
 };
 
-/// Parameters of the scene's law with a part of its shear and fibre moduli left.
+/// The scene's law with a fraction of its shear and fibre moduli.
 fn tissue(part: f64) -> AnyLaw {
     let parameters =
         json!({ "shear-modulus": 3e3 * part, "bulk-modulus": 29e3, "fibre-modulus": 6e3 * part });
@@ -120,7 +120,7 @@ fn compute() -> Result<Findings, CaseError> {
         findings.rows.push(Row::shown(format!("TI: {name}"), unit, before, ""));
         findings.rows.push(Row::shown(format!("TI + visco at 5 s: {name}"), unit, after, ""));
         findings.rows.push(Row::shown(format!("{name}, TI + visco over TI"), "", after / before, ""));
-        let quantity = format!("TI + visco at 5 s: {name}, off the relaxed limit");
+        let quantity = format!("TI + visco at 5 s: {name}, deviation from the relaxed limit");
         findings.rows.push(Row::deviation(quantity, 0.01, (after / limit - 1.0).abs(), source));
     }
 

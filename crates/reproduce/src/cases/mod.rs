@@ -42,19 +42,19 @@ pub const CASES: &[Case] = &[
     shell_times::CASE,
 ];
 
-/// The name of an adapter, and whether it is one at all.
+/// The name of an adapter, marked if it is software.
 fn told(adapter: &Adapter) -> String {
-    let software = if adapter.kind == Kind::Software { ", the processor in disguise" } else { "" };
+    let software = if adapter.kind == Kind::Software { ", run by the CPU" } else { "" };
     format!("{}{software}", adapter.name)
 }
 
-/// The thesis's factor 2, which every case with fibres meets.
+/// The thesis's factor 2, relevant to every case with fibres.
 const FIBRE_FACTOR: Correction = Correction {
     printed: "(6.6): fibre stress η (Ī₄ − 1) …",
     correct: "2η (Ī₄ − 1) …",
     why: "The energy η/2 (Ī₄ − 1)² of (6.4) has twice that stress (S = 2 ∂Ψ/∂C; the thesis's own (5.48) agrees). The \
-          thesis's code and NiftySim carry the same slip, so that a published η means half of it in the energy; \
-          scenes choose with `convention = \"taylor\"`.",
+          thesis's code and NiftySim have the same error, so a published η means half of it in the energy; \
+          scenes select this with `convention = \"taylor\"`.",
 };
 
 /// The growing memory of the thesis's relaxation integrals.

@@ -1,5 +1,6 @@
 //! The obstacle course of linear shell elements (MacNeal and Harder 1985; Belytschko et al. 1985; Cook), with the project's element and
-//! the thesis's. Each number is a displacement over the one of the literature, as are those that a prototype of the same formulas found.
+//! the thesis's. Each number, including the references from a prototype of the same formulas, is a displacement over that of the
+//! literature.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -16,17 +17,17 @@ use crate::shells::{CLAMPED, FLAT, Specimen, THESIS, sheet, symmetry};
 pub const CASE: Case = Case {
     id: "obstacle-course",
     title: "The obstacle course of shell elements",
-    shows: "Not in the thesis, which tests one plate on one mesh. Six problems that tell shell elements apart, on finer and finer \
-            meshes: bending (plate), membrane with bending (barrel roof, pinched cylinder), bending without stretch under large rigid \
-            rotations (hemisphere), in-plane bending (Cook's membrane), warped elements (twisted beam). The element here, a discrete \
-            Kirchhoff triangle with Felippa's flat membrane (`dkt-opt`), comes to 1 everywhere; the thesis's converges to a plate 23 % and a \
-            cylinder 11 % too soft.",
+    shows: "The thesis tests one plate on one mesh. Six problems distinguish shell elements on increasingly fine meshes: bending \
+            (plate), membrane with bending (barrel roof, pinched cylinder), bending without stretch under large rigid rotations \
+            (hemisphere), in-plane bending (Cook's membrane), warped elements (twisted beam). The element here, a discrete \
+            Kirchhoff triangle with Felippa's flat membrane (`dkt-opt`), converges to 1 everywhere. The thesis's element \
+            converges to a plate 23 % and a cylinder 11 % too soft.",
     corrections: &[Correction {
         printed: "section 8.1.2: deflection (8.3) \"solves an issue of symmetry\"",
         correct: "A discrete Kirchhoff triangle.",
         why: "(8.3) lacks x²y, so the stiffness depends on which corner is numbered first, by up to 97 % of its largest entry; it fails the \
-              bending patch test by 1.4 to 7.2 % and converges to plates 12 to 26 % too soft on all meshes but one kind: \
-              right triangles, each numbered from its right angle.",
+              bending patch test by 1.4 to 7.2 % and converges to plates 12 to 26 % too soft, except on right triangles \
+              each numbered from its right angle.",
     }],
     seconds: 15.0,
     compute,
@@ -139,8 +140,8 @@ pub fn cantilever(cells: CantileverCells, formulation: Formulation) -> Result<[f
     Ok([tip(1, 0.1081)?, tip(2, 0.4321)?])
 }
 
-/// MacNeal and Harder's twisted beam with `across` cells over its width: its tip in the plane of the load and out of it, over those of
-/// the literature.
+/// MacNeal and Harder's twisted beam with `across` cells over its width: tip displacement in the plane of the load and out of it, over
+/// those of the literature.
 ///
 /// # Errors
 /// If the stiffness is singular.
@@ -164,7 +165,7 @@ fn forward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
     sheet(shape, counts, Pattern::Diagonal)
 }
 
-/// Diagonals and first corners as in the prototype: they set what a coarse mesh answers, the corners with the thesis's element only.
+/// Diagonals and first corners as in the prototype: they affect coarse meshes, the corners only for the thesis's element.
 fn backward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
     let mut mesh = sheet(shape, counts, Pattern::Antidiagonal)?;
     mesh.blocks[0].nodes.chunks_exact_mut(3).for_each(|corners| corners.rotate_left(1));
@@ -174,7 +175,7 @@ fn backward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
 /// A problem on finer and finer meshes.
 struct Problem {
     name: &'static str,
-    /// What is divided by what.
+    /// The ratio, in words.
     displacement: &'static str,
     cells: &'static [usize],
     /// Of the prototype: ours and the thesis's element.

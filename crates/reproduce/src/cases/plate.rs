@@ -30,22 +30,22 @@ pub const LARGE: [f64; 5] = [0.0890, 0.1310, 0.1588, 0.1801, 0.1977];
 pub const CASE: Case = Case {
     id: "table-8.1",
     title: "Table 8.1: a clamped plate under uniform load",
-    shows: "The deflection in the middle of a square plate, clamped on all sides, under 1 to 5 Pa: 0.1218 to 0.6374 m, compared with \
-            z = 0.126 q and found to be off by 0.93 %. But that formula is linear theory, and deflections of 1.3 to 6.4 thicknesses are \
-            far outside it: a plate whose edges do not move in its plane carries such loads mostly as a membrane. It sinks by 0.089 to \
-            0.198 m. At q = 0.01 Pa, where linear theory holds, the two agree.",
+    shows: "The deflection in the middle of a square plate, clamped on all sides, under 1 to 5 Pa. The thesis prints 0.1218 to \
+            0.6374 m, an error of 0.93 % against z = 0.126 q. This formula is linear theory, and deflections of 1.3 to 6.4 \
+            thicknesses are far outside it: a plate whose edges do not move in its plane carries such loads mostly as a membrane. \
+            It sinks by 0.089 to 0.198 m. At q = 0.01 Pa, where linear theory holds, the two agree.",
     corrections: &[
         Correction {
             printed: "section 8.4: z = 0.126 q at q = 1 to 5 N/m²",
             correct: "Linear theory up to about q = 0.05; beyond it the membrane counts.",
-            why: "w/h is 1.3 to 6.4. The comment in the author's published scene says that Table 8.1 is of bending only.",
+            why: "w/h is 1.3 to 6.4. A comment in the author's published scene says that Table 8.1 contains bending only.",
         },
         Correction {
             printed: "section 8.4: error 0.93 %",
             correct: "−3.3, −1.8, −0.9, +0.2 and +1.2 % at q = 1 to 5.",
-            why: "0.93 % is that of the mean of the five, in which errors of opposite signs cancel. The agreement itself is two \
-                  errors that cancel: an element 21 % too soft on that mesh, and a load 21 % too small: shared alike by all 81 nodes, \
-                  32/81 of it rests on the clamped ones instead of 15/64.",
+            why: "0.93 % is the error of the mean of the five, in which errors of opposite signs cancel. The agreement itself comes from two \
+                  cancelling errors: an element 21 % too soft on that mesh, and a load 21 % too small. Equal shares on all 81 \
+                  nodes put 32/81 of the load on clamped nodes instead of 15/64.",
         },
         Correction {
             printed: "(8.2): E/(12 (1 − ν²)) for membrane and bending",
@@ -65,10 +65,10 @@ pub fn mesh(cells: usize, pattern: Pattern) -> Result<Mesh, CaseError> {
     sheet(Sheet::Plate { size: [SIDE; 2] }, [cells; 2], pattern)
 }
 
-/// The whole plate with the same components held on all edges.
+/// The whole plate with the same components fixed on all edges.
 ///
 /// # Errors
-/// If the mesh is no sound shell.
+/// If the mesh is not a valid shell.
 pub fn held(mesh: Mesh, formulation: Formulation, components: [bool; 6]) -> Result<Specimen, CaseError> {
     let plate = Specimen::new(mesh, ELASTIC, THICKNESS, formulation)?;
     Ok(["x-min", "x-max", "y-min", "y-max"]

@@ -1,5 +1,5 @@
-//! Figure 6.8: tissue that is simulated as fast as it moves. A cube of 55,566 tetrahedra is stretched to and fro, and a liver is
-//! pulled by one thread, as `pliant view` plays them: steps, and frames sixty times a second of simulated time.
+//! Figure 6.8: tissue in real time. A cube of 55,566 tetrahedra is stretched to and fro, and a liver is pulled on one thread, as
+//! `pliant view` plays them: steps, and sixty frames per second of simulated time.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -18,11 +18,11 @@ use crate::picture::{Body, View, figure};
 pub const CASE: Case = Case {
     id: "fig-6.8",
     title: "Fig. 6.8: tissue in real time",
-    shows: "A cube of 55,566 brain-like tetrahedra whose face is stretched by 0 to 40 % to and fro, in steps of 0.7 ms, drawn \
-            while it moves; on a GeForce 8800 GTX it kept real time. Here: simulated time over wall time on this machine's \
-            processor (1 is real time), and the same of a transversely isotropic viscoelastic liver of 2,516 tetrahedra (the thesis's \
-            has 2,428) over 10 s on one thread. A frame's forces, stresses and their means at the nodes are timed apart. \
-            `pliant view` shows both.",
+    shows: "A cube of 55,566 brain-like tetrahedra, one face stretched by 0 to 40 % to and fro, in steps of 0.7 ms, is drawn \
+            while it moves; on a GeForce 8800 GTX it ran in real time. Here: simulated time over wall time on this machine's CPU \
+            (1 is real time), and the same for a transversely isotropic viscoelastic liver of 2,516 tetrahedra (the thesis's has \
+            2,428) over 10 s on one thread. The forces, stresses and nodal means of a frame are timed separately. `pliant view` \
+            shows both.",
     corrections: &[],
     seconds: 20.0,
     compute,
@@ -30,9 +30,9 @@ pub const CASE: Case = Case {
 
 const CUBE: &str = include_str!("../../../../scenes/stretched-cube/scene.toml");
 const LIVER: &str = include_str!("../../../../scenes/liver/scene.toml");
-/// Frames a simulated second.
+/// Frames per simulated second.
 const FRAMES: f64 = 60.0;
-/// When the cube is stretched most [s].
+/// Time of the largest stretch [s].
 const FARTHEST: f64 = 0.5;
 
 /// What playing a scene took.
@@ -43,7 +43,7 @@ struct Played {
     stepping: f64,
     preparing: f64,
     frames: u64,
-    /// What was shown at the farthest, with its displacements [m].
+    /// The frame with the largest stretch, with its displacements [m].
     farthest: (Mesh, Vec<[f64; 3]>),
 }
 
@@ -63,7 +63,7 @@ fn play(text: &str, seconds: f64, set: &[(&[&str], Value)]) -> Result<Played, Ca
     pool.install(|| go(&scene, &built, &plan, seconds))
 }
 
-/// Goes on frame by frame; on a device points are placed there, without a look.
+/// Continues frame by frame; a GPU places the points without a read-back.
 fn go(scene: &Scene, built: &Arc<Built>, plan: &Plan, seconds: f64) -> Result<Played, CaseError> {
     let failed = |failure: pliant_scene::FailureSummary| CaseError::Run(failure.message);
     let mut live = live(scene, built, plan).map_err(failed)?;
@@ -109,7 +109,7 @@ impl Played {
         findings.rows.push(Row::timed(quantity, "", Some(1.0), factor, source));
         let quantity = format!("{name}: wall time to prepare a frame");
         let each = 1e3 * self.preparing / self.frames as f64;
-        findings.rows.push(Row::timed(quantity, "ms", Some(5.0), each, "5 ms or less leave time to draw"));
+        findings.rows.push(Row::timed(quantity, "ms", Some(5.0), each, "up to 5 ms leave time to draw"));
     }
 }
 
@@ -120,7 +120,7 @@ fn compute() -> Result<Findings, CaseError> {
     cube.add_rows(&mut findings, "cube, all cores", 1.0);
     match Device::open(None) {
         Ok(device) => {
-            let name = format!("cube, graphics processor ({})", told(device.adapter()));
+            let name = format!("cube, GPU ({})", told(device.adapter()));
             play(CUBE, 1.0, &[(&["run", "device"], "gpu".into())])?.add_rows(&mut findings, &name, 1.0);
         }
         Err(GpuError::NoAdapter) => {}
@@ -132,8 +132,8 @@ fn compute() -> Result<Findings, CaseError> {
     let still = Body { edges: false, skin: true, ..Body::still("at rest", &mesh) };
     let bodies = [Body { label: "stretched by 40 %".into(), displacement, ..still.clone() }, still];
     let view = View { from: [0.55, 0.45, 1.0], up: [0.0, 1.0, 0.0], quantity: "", factor: 1.0, columns: 2 };
-    let caption = "The cube in the light of its vertices' normals, with a texture that moves with it, as `pliant view \
-                   scenes/stretched-cube` shows it.";
+    let caption = "The cube, shaded by vertex normals, with a texture that moves with it, as in `pliant view \
+                   scenes/stretched-cube`.";
     findings.figures.push(figure(&bodies, &view, caption)?);
     Ok(findings)
 }

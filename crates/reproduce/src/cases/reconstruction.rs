@@ -1,6 +1,6 @@
-//! Figures 9.1 to 9.3: fine surfaces by few curved shells. The thesis prints no numbers beside its maps of the distance from shells to
-//! surface; here both ways are measured, densely. The capsule and the aneurysm are analytic, as the thesis's are not published; where
-//! `PLIANT_DATA` names a folder of organs, those of patients are shown as well.
+//! Figures 9.1 to 9.3: fine surfaces as few curved shells. The thesis prints no numbers beside its maps of the distance from shells to
+//! surface; here both directions are measured, densely. The capsule and the aneurysm are analytic, since the thesis's are not
+//! published. If `PLIANT_DATA` names a folder of organs, those of patients are shown as well.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -19,8 +19,8 @@ use crate::picture::{Body, View, figure};
 pub const CYLINDER: Case = Case {
     id: "fig-9.1",
     title: "Fig. 9.1: a cylinder by 12 and 48 shells",
-    shows: "A cylinder of 16,384 triangles (a), 12 flat triangles (b), the same as curved shells (c), and 48 shells (d), in colours of their \
-            distance from the cylinder.",
+    shows: "A cylinder of 16,384 triangles (a), 12 flat triangles (b), the same as curved shells (c), and 48 shells \
+            (d); colours show the distance from the cylinder.",
     corrections: &[ONE_WAY],
     seconds: 2.0,
     compute: cylinder,
@@ -30,7 +30,7 @@ pub const CYLINDER: Case = Case {
 pub const CAPSULE: Case = Case {
     id: "fig-9.2",
     title: "Fig. 9.2: Glisson's capsule by 1,200 shells",
-    shows: "The membrane round the liver, 8,000 triangles (a), and the distance of 1,200 shells from it (b).",
+    shows: "The membrane around the liver, 8,000 triangles (a), and the distance of 1,200 shells from it (b).",
     corrections: &[ONE_WAY, PLACEMENT],
     seconds: 20.0,
     compute: capsule,
@@ -48,19 +48,19 @@ pub const ANEURYSM: Case = Case {
 
 const ONE_WAY: Correction = Correction {
     printed: "section 9.2: one-sided distances, from the shells to the surface",
-    correct: "Both ways.",
-    why: "What shells leave out shows only on the way back: on a sphere of 80 shells of the thesis's polynomial it is 2.5 to 8 times as far.",
+    correct: "Distances in both directions.",
+    why: "Parts missed by the shells show only from surface to shells: on a sphere of 80 shells of the thesis's polynomial this distance is 2.5 to 8 times larger.",
 };
 
 const PLACEMENT: Correction = Correction {
     printed: "section 9.2.1: a node moves to the mean of the centres of its three closest triangles",
-    correct: "Vertices and normals are fitted to the signed distances all over the shells.",
-    why: "A mean of centres lies inside a curved surface, and its normal is left to chance.",
+    correct: "Vertices and normals are fitted to signed distances over the whole shells.",
+    why: "A mean of centres lies inside a curved surface, and its normal is arbitrary.",
 };
 
-const SOURCE: &str = "asked of this reconstruction";
+const SOURCE: &str = "required of this reconstruction";
 
-/// A body to be rebuilt, and how well it must be.
+/// A surface to fit, and the required accuracy.
 struct Study<'a> {
     name: &'a str,
     target: &'a TriangleMesh,
@@ -75,8 +75,12 @@ impl Study<'_> {
         let percent = |length: f64| 100.0 * length / report.diagonal;
         let of = |what: &str| format!("{}, {} shells: {what}", self.name, report.shells);
         let found = &report.distances;
-        let mut rows =
-            vec![Row::shown(of("were they flat: largest distance"), "%", percent(report.flat.largest()), "")];
+        let mut rows = vec![Row::shown(
+            of("flat triangles instead: largest distance"),
+            "%",
+            percent(report.flat.largest()),
+            "",
+        )];
         for (what, most, rms) in [
             ("shells to surface", found.largest_forward, found.rms_forward),
             ("surface to shells", found.largest_backward, found.rms_backward),
@@ -88,7 +92,7 @@ impl Study<'_> {
             });
             rows.push(Row::shown(of(&format!("{what}, rms")), "%", percent(rms), ""));
         }
-        rows.push(Row::shown(of("least shape of a triangle (1: equilateral)"), "", report.shape[0], ""));
+        rows.push(Row::shown(of("worst triangle shape (1: equilateral)"), "", report.shape[0], ""));
         rows.push(Row::timed(of("time"), "s", None, seconds, ""));
         rows
     }

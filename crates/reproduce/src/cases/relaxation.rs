@@ -1,6 +1,6 @@
 //! Figure 6.6: the liver-like cube compressed by 30 % in 0.5 s, linearly, then held to 5 s. Half of the isochoric stress
-//! relaxes with τ = 0.58 s. Reference: quasi-static, quadratic hexahedra, without inertia; so the shape of the decay
-//! compares, F(t)/F(5 s), once the waves of the ramp have gone.
+//! relaxes with τ = 0.58 s. The reference is quasi-static, of quadratic hexahedra without inertia, so the comparison
+//! uses the shape of the decay, F(t)/F(5 s), after the waves of the ramp.
 
 use pliant_explicit::Observable;
 use pliant_mechanics::curve::{Curve as Course, Shape};
@@ -18,7 +18,7 @@ use crate::{Specimen, largest, liver, liver_matrix, liver_relaxation, numbers, r
 /// Cells along half the edge of the cube.
 const CELLS: usize = 6;
 
-/// From when on [s] the waves of the ramp have gone.
+/// Time [s] after the waves of the ramp.
 pub const FROM: f64 = 0.7;
 
 const SOURCE: &str = "quasi-static, quadratic hexahedra n = 4, felupe";
@@ -27,8 +27,8 @@ const SOURCE: &str = "quasi-static, quadratic hexahedra n = 4, felupe";
 pub const CASE: Case = Case {
     id: "fig-6.6",
     title: "Fig. 6.6: reaction of the compressed cube over time",
-    shows: "The force on the platens rises while the cube is compressed by 30 % in 0.5 s, and decays while it is held. \
-            Fibres across the compression, along y or along y = z, make it larger.",
+    shows: "The force on the platens rises during the compression by 30 % in 0.5 s, and decays afterwards. Fibres \
+            across the compression, along y or along y = z, increase it.",
     corrections: &[super::RELAXATION_SIGN, FIBRE_FACTOR],
     seconds: 7.0,
     compute,
@@ -45,7 +45,7 @@ pub fn curve(model: &str) -> [Vec<f64>; 2] {
     ["t", "F"].map(|key| numbers(&data["models"][model][key]))
 }
 
-/// An eighth of the cube, for fibres along an axis or none.
+/// An eighth of the cube, with fibres along an axis or without fibres.
 fn eighth(material: &Material) -> (Specimen, f64) {
     let block = Specimen::block([0.05; 3], [CELLS; 3], VolumeCell::Hex, material, [0.0, 1.0, 0.0]);
     (cube::held_as_an_eighth(block, 0.3, ramp()), 4.0)
@@ -154,9 +154,9 @@ fn compute() -> Result<Findings, CaseError> {
         let quantity = format!("{name}: F(t)/F(5 s) from {FROM} s on, largest deviation");
         findings.rows.push(Row::deviation(quantity, 0.01, relaxed.off(), SOURCE));
         let [found, expected] = relaxed.last();
-        let quantity = format!("{name}: F(5 s), beside the reference without its mesh error of 4 to 8 %");
+        let quantity = format!("{name}: F(5 s), against the reference minus its mesh error of 4 to 8 %");
         findings.rows.push(Row::judged(quantity, "N", of_fine_meshes(expected), found, SOURCE));
-        let quantity = format!("{name}: F(5 s) off the reference as it is, on its coarse mesh");
+        let quantity = format!("{name}: F(5 s), deviation from the uncorrected reference on its coarse mesh");
         findings.rows.push(Row::shown(quantity, "%", 100.0 * (found / expected - 1.0), SOURCE));
         if model == "iso" {
             isotropic = found;

@@ -16,7 +16,7 @@ use crate::case::{Case, CaseError, Correction, Figure, Findings, Row};
 use crate::plot::{Curve, Key, Pen, Plot};
 use crate::{Specimen, largest, law, liver_matrix, liver_relaxation, numbers, reference, run};
 
-/// Components of S that do not vanish, in the order of [`Symmetric`].
+/// Nonzero components of S, in the order of [`Symmetric`].
 pub const COMPONENTS: [&str; 4] = ["S11", "S22", "S33", "S12"];
 
 /// Shear rates [1/s] of the curves.
@@ -33,8 +33,8 @@ const SOURCE: &str = "closed form, 50 digits (Taylor et al. 2009, corrected)";
 const DIRECTION: Correction = Correction {
     printed: "section 6.4.1: “pure shear”, no direction given",
     correct: "simple shear F = I + γ e₂⊗e₁: the face x = 1 moves along y.",
-    why: "Of all axis-aligned shears only this one has four stresses that do not vanish, S₁₁ = S₃₃ without fibres, and \
-          a sign of S₁₁ that changes with fibres along x, as the text says. J = 1, so that κ plays no part.",
+    why: "Among axis-aligned shears only this one has four nonzero stresses, S₁₁ = S₃₃ without fibres, and \
+          a sign of S₁₁ that changes with fibres along x, as in the text. J = 1, so κ has no effect.",
 };
 
 /// Figure 6.3.
@@ -88,7 +88,7 @@ pub fn curves(data: &Value, geometry: &str, fibres: &str, rate: &str) -> [Vec<f6
     COMPONENTS.map(|component| numbers(&data[geometry][fibres][rate][component]))
 }
 
-/// What the reference calls a rate [1/s].
+/// The name of a rate [1/s] in the reference.
 pub fn rate_name(rate: f64) -> String {
     format!("rate_{rate}")
 }
@@ -109,7 +109,7 @@ pub fn deviation(curves: &[Vec<f64>; 4], stresses: &[Symmetric<f64>]) -> f64 {
     largest((0..4).map(|component| off(&curves[component], stresses, component)))
 }
 
-/// The same of one component; infinite if there is not a stress for every value.
+/// The same for one component; infinite if the numbers of stresses and values differ.
 fn off(curve: &[f64], stresses: &[Symmetric<f64>], component: usize) -> f64 {
     if curve.len() != stresses.len() {
         return f64::INFINITY;
@@ -123,7 +123,7 @@ fn off(curve: &[f64], stresses: &[Symmetric<f64>], component: usize) -> f64 {
 enum Rate {
     /// At a rate [1/s], with steps of [`STEP`].
     At(f64),
-    /// So slowly that nothing but the equilibrium is left.
+    /// So slow that only the equilibrium remains.
     Vanishing,
 }
 

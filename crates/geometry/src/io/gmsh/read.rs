@@ -53,7 +53,7 @@ struct Field {
     values: Vec<f64>,
 }
 
-/// What the sections said so far.
+/// The content of the sections so far.
 #[derive(Default)]
 struct Model {
     /// Names of physical groups by dimension and number.
@@ -122,7 +122,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         }
         read_end(&mut numbers.cursor, section)?;
     }
-    notes.extend(unused.into_iter().map(|section| format!("section `${section}` was not used")));
+    notes.extend(unused.into_iter().map(|section| format!("section `${section}` was ignored")));
     let encoding = if numbers.is_binary() { "binary" } else { "ASCII" };
     let mut file = model.into_file(notes, bytes.len())?;
     file.format = format!("{} {version} {encoding}", Format::Gmsh.name());
@@ -162,7 +162,9 @@ fn read_format(numbers: &mut Numbers<'_>) -> Result<String, Fault> {
     let order = match one {
         [1, 0, 0, 0] => Order::Little,
         [0, 0, 0, 1] => Order::Big,
-        _ => return Err(cursor.malformed("the integer 1 that tells the byte order is neither way round")),
+        _ => {
+            return Err(cursor.malformed("the integer 1 that marks the byte order is invalid in both orders"));
+        }
     };
     numbers.encoding = Encoding::Binary { order, size };
     Ok(version)
@@ -216,7 +218,7 @@ fn unquoted(line: &[u8]) -> &[u8] {
     }
 }
 
-/// `$Entities` and `$PartitionedEntities` of version 4: only their physical groups are kept.
+/// `$Entities` and `$PartitionedEntities` of version 4; only their physical groups are used.
 fn read_entities(numbers: &mut Numbers<'_>, model: &mut Model, partitioned: bool) -> Result<(), Fault> {
     start_binary(numbers);
     if partitioned {
@@ -402,7 +404,7 @@ fn read_elements_2_binary(numbers: &mut Numbers<'_>, model: &mut Model) -> Resul
             return Err(unknown_type(numbers, element));
         };
         if follow == 0 {
-            return Err(numbers.cursor.malformed(format!("a run of no elements (reading {what})")));
+            return Err(numbers.cursor.malformed(format!("an empty run of elements (reading {what})")));
         }
         for _ in 0..follow {
             let number = numbers.int(what)?;
@@ -564,7 +566,8 @@ fn read_field(
         }
     }
     if fields.insert(title.clone(), field).is_some() {
-        notes.push(format!("{item} data `{title}` occur several times (time steps?): the last are kept"));
+        notes
+            .push(format!("{item} data `{title}` occur several times (time steps?): only the last are kept"));
     }
     Ok(())
 }
@@ -612,7 +615,7 @@ impl Model {
     fn into_file(mut self, mut notes: Vec<String>, file_size: usize) -> Result<MeshFile, Fault> {
         if self.repeated > 0 {
             notes.push(format!(
-                "{} cells were given once per physical group; each is kept once",
+                "{} cells are listed once per physical group; each is kept once",
                 self.repeated
             ));
         }
@@ -663,7 +666,7 @@ impl Model {
 }
 
 impl Field {
-    /// One item per node or cell; NaN where the file gives none.
+    /// One item per node or cell; NaN for items missing in the file.
     fn spread(self, numbering: &Numbering, count: usize) -> DataArray {
         let mut values = vec![f64::NAN; count * self.components];
         for (number, item) in self.numbers.iter().zip(self.values.chunks_exact(self.components)) {

@@ -10,7 +10,7 @@ use crate::{CellBlock, CellKind, Mesh};
 /// Physical groups of a cell: numbers, the label first.
 type Groups = Vec<i64>;
 
-/// What the file says about one cell.
+/// The entry of one cell.
 struct Element<'a> {
     kind: CellKind,
     nodes: &'a [u32],
@@ -270,9 +270,8 @@ fn write_point_data(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     Ok(())
 }
 
-/// Cell data; the `label` only where it says more than the physical groups. The items are those of all
-/// elements in the order of `$Elements`, NaN where there are none, because meshio goes by the order and
-/// not by the numbers.
+/// Cell data; the `label` only if it differs from the physical groups. Items cover all elements in the
+/// order of `$Elements`, NaN for missing ones, because meshio uses the order and not the numbers.
 fn write_cell_data(out: &mut dyn Write, mesh: &Mesh, entities: &Entities<'_>) -> io::Result<()> {
     let names: BTreeSet<&String> = mesh.blocks.iter().flat_map(|block| block.data.keys()).collect();
     let order: Vec<usize> =

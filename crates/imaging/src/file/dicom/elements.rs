@@ -15,7 +15,7 @@ const DEEPEST: usize = 64;
 /// Items of all sequences together. A frame has a few.
 const MOST_ITEMS: usize = 1 << 20;
 
-/// Length that stands for "until a delimiter".
+/// The length code for "until a delimiter".
 const UNDEFINED: u32 = u32::MAX;
 
 const ITEM: u32 = 0xFFFE_E000;
@@ -66,7 +66,7 @@ const SEQUENCES: [u32; 8] = [
     0x5200_9230, // PerFrameFunctionalGroupsSequence
 ];
 
-/// A DICOM file, unpacked where it was deflated.
+/// A DICOM file, decompressed if it was deflated.
 pub(super) struct DataSet<'a> {
     bytes: Cow<'a, [u8]>,
     /// Where the data set begins in the bytes.
@@ -135,7 +135,7 @@ impl<'a> Elements<'a> {
         self.values.get(&tag).copied()
     }
 
-    /// The items of a sequence; none where it is missing.
+    /// The items of a sequence; empty if it is missing.
     pub fn items(&self, sequence: u32) -> &[Self] {
         self.sequences.get(&sequence).map_or(&[], Vec::as_slice)
     }
@@ -159,7 +159,7 @@ impl<'a> Elements<'a> {
         let numbers: Option<Vec<f64>> =
             text.split('\\').map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
         numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| {
-            ImageProblem::bad(field, text, "it has the wrong number of values, or one is no number")
+            ImageProblem::bad(field, text, "it has the wrong number of values, or an invalid number")
         })
     }
 
@@ -216,7 +216,7 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// Pixels as little-endian numbers, with what stands in unused high bits replaced by the sign or by 0.
+    /// Pixels as little-endian numbers, with unused high bits replaced by the sign or by 0.
     pub fn pixels(&self, bytes: &[u8], scalar: Scalar) -> Vec<u8> {
         let size = scalar.size();
         let mut pixels = bytes.to_vec();
@@ -239,7 +239,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// Where elements stand.
+/// The nesting of elements.
 #[derive(Clone, Copy, PartialEq)]
 enum Level {
     /// The group 2 before the data set.
@@ -285,7 +285,7 @@ impl<'a> Walk<'a> {
             let (kind, length) = self.kind_and_length()?;
             let wanted = SEQUENCES.contains(&tag);
             if tag == PIXELS && level == Level::Top {
-                // Packed pixels come in pieces; the transfer syntax tells, and they are refused later.
+                // Compressed pixels come in pieces; they are rejected later by the transfer syntax.
                 let rest = &self.bytes[self.at..];
                 let count = if length == UNDEFINED { rest.len() } else { (length as usize).min(rest.len()) };
                 found.values.insert(tag, &rest[..count]);
@@ -306,7 +306,7 @@ impl<'a> Walk<'a> {
         Ok(found)
     }
 
-    /// The items of a sequence. Where the file ends early they are those that were there.
+    /// The items of a sequence; in a truncated file, those before its end.
     fn sequence(
         &mut self,
         kind: Option<[u8; 2]>,
@@ -318,7 +318,7 @@ impl<'a> Walk<'a> {
             let expected = "no more than 64 levels are read; the file is damaged: copy it again";
             return Err(ImageProblem::bad("sequences", "nested too deep", expected).at_byte(start));
         }
-        // What is of unknown kind is written as without kinds (PS3.5, 6.2.2).
+        // Elements of unknown kind are written without kinds (PS3.5, 6.2.2).
         if length != UNDEFINED {
             let bytes = self.take(length as usize)?;
             let explicit = self.explicit && kind != Some(*b"UN");
@@ -394,7 +394,7 @@ impl<'a> Walk<'a> {
         Ok(u32::from(self.word()?) << 16 | u32::from(self.word()?))
     }
 
-    /// The kind of an element, where the file tells it, and how long its value is.
+    /// The kind of an element, if the file states it, and the length of its value.
     fn kind_and_length(&mut self) -> Result<(Option<[u8; 2]>, u32), Fault> {
         if !self.explicit {
             return Ok((None, self.long()?));

@@ -29,7 +29,7 @@ const FILE_LIMIT: u64 = 1 << 29;
 const DECOMPRESS: &str = "decompress the series first, e.g. with `gdcmconv --raw` or `dcmdjpeg`";
 const EXPORT: &str = "export it as single-frame slices, or as NIfTI or NRRD";
 
-/// What a DICOM file is.
+/// The type of a DICOM file.
 enum Object {
     /// Slices of a series: one, or the frames of the file.
     Slices(Vec<Slice>),
@@ -37,7 +37,7 @@ enum Object {
     Segmentation,
     /// An RT structure set.
     Contours,
-    /// Something without pixels, such as a report.
+    /// A file without pixels, such as a report.
     Other,
 }
 
@@ -55,8 +55,8 @@ impl Object {
 /// Contours instead of voxels.
 fn contours() -> ImageProblem {
     ImageProblem::Unsupported {
-        what: "an RT structure set (RTSTRUCT), which holds contours and no voxels,".to_owned(),
-        remedy: "turn it into a label image, e.g. with 3D Slicer (SlicerRT: export the segmentation as NRRD or NIfTI), plastimatch \
+        what: "an RT structure set (RTSTRUCT), which has contours instead of voxels,".to_owned(),
+        remedy: "convert it to a label image, e.g. with 3D Slicer (SlicerRT: export the segmentation as NRRD or NIfTI), plastimatch \
                  (`plastimatch convert --input rtss.dcm --referenced-ct FOLDER --output-labelmap seg.nrrd`) or dcmrtstruct2nii",
     }
 }
@@ -69,7 +69,7 @@ pub(super) fn read_file(bytes: &[u8], slice: bool, options: &ReadOptions) -> Res
         Object::Slices(slices) if slice || slices.len() > 1 => Ok(volume(slices, options)?),
         Object::Slices(_) => Err(ImageProblem::Unsupported {
             what: "a single DICOM slice".to_owned(),
-            remedy: "give the folder that holds the whole series",
+            remedy: "give the folder of the whole series",
         }
         .into()),
         Object::Segmentation => segmentation::read(&elements, options),
@@ -84,7 +84,7 @@ pub(super) fn file_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
     pliant_geometry::io::read_limited(path, FILE_LIMIT).map_err(failed)
 }
 
-/// What a folder holds.
+/// The DICOM files of a folder.
 #[derive(Default)]
 struct Found {
     series: BTreeMap<String, Vec<Slice>>,
@@ -95,7 +95,7 @@ struct Found {
 }
 
 impl Found {
-    /// What can be chosen: the UID of each series and what it is.
+    /// The choices: UID and description of each series.
     fn list(&self) -> Vec<String> {
         let slices = self
             .series
@@ -108,7 +108,7 @@ impl Found {
         slices.chain(segmentations).collect()
     }
 
-    /// The UID asked for, or the only one.
+    /// The requested UID, or the only one.
     fn chosen(&self, options: &ReadOptions) -> Result<String, ImageProblem> {
         let mut uids = self.series.keys().chain(self.segmentations.keys());
         match (&options.series, uids.next()) {
@@ -126,7 +126,7 @@ impl Found {
     }
 }
 
-/// Reads the series in a folder. Files that are no slices are passed over and noted.
+/// Reads the series in a folder. Other files are ignored with a note.
 pub(super) fn read_folder(
     folder: &Path,
     options: &ReadOptions,
@@ -194,15 +194,15 @@ pub(super) fn read_folder(
         }
     };
     if found.files > used {
-        image.notes.push(format!("{} other files in the folder were passed over", found.files - used));
+        image.notes.push(format!("{} other files in the folder were ignored", found.files - used));
     }
     if found.contours > 0 {
-        image.notes.push(format!("RT structure sets (contours) among them: {}", found.contours));
+        image.notes.push(format!("of these, RT structure sets (contours): {}", found.contours));
     }
     Ok(image)
 }
 
-/// What a slice says of itself.
+/// The properties of a slice.
 struct Slice {
     name: String,
     description: String,
@@ -222,7 +222,7 @@ struct Slice {
 }
 
 impl Slice {
-    /// The slice of a file, or the frames of one that holds several, each as a slice.
+    /// The slice of a file, or its frames, each as a slice.
     fn all(elements: &Elements<'_>, name: &str, options: &ReadOptions) -> Result<Vec<Self>, Fault> {
         elements.require_plain()?;
         let frames = Frames::of(elements)?;
@@ -316,7 +316,7 @@ impl<'a> Frames<'a> {
         }
         let steps = [Vector3::new(o[0], o[1], o[2]), Vector3::new(o[3], o[4], o[5])];
         if steps.iter().any(|unit| (unit.norm() - 1.0).abs() > 1e-2) || steps[0].dot(&steps[1]).abs() > 1e-2 {
-            let expected = "two unit vectors square to each other are needed; export the series again";
+            let expected = "two perpendicular unit vectors are needed; export the series again";
             return Err(ImageProblem::bad("ImageOrientationPatient", format!("{o:?}"), expected));
         }
         let length = |tag, field| measures.reals::<1>(tag, field).ok().map(|[h]| h).filter(|&h| h > 0.0);
@@ -347,7 +347,7 @@ fn volume(mut slices: Vec<Slice>, options: &ReadOptions) -> Result<Image, ImageP
         let bytes = slices.iter().flat_map(|slice| &slice.pixels).copied().collect();
         Numbers { scalar: slices[0].scalar, order: Order::Little, bytes }
     } else {
-        // Each slice has a scale of its own (PET): the values themselves are kept.
+        // Each slice has its own scale (PET), so the values themselves are stored.
         Numbers { scalar: Scalar::F32, order: Order::Little, bytes: rescaled(&slices, dims) }
     };
     let scale = if numbers.scalar == slices[0].scalar { scale } else { [1.0, 0.0] };
@@ -397,7 +397,7 @@ fn require_alike(first: &Slice, other: &Slice) -> Result<(), ImageProblem> {
     Ok(())
 }
 
-/// The step from slice to slice [mm, LPS]; an error where the slices are not evenly spaced.
+/// The step from slice to slice [mm, LPS]; an error if slices are unevenly spaced.
 fn slice_step(slices: &[Slice], normal: &Vector3) -> Result<Vector3, ImageProblem> {
     let [first, .., last] = slices else {
         let thickness = slices[0].thickness.ok_or(ImageProblem::MissingField { field: "SliceThickness" })?;

@@ -1,16 +1,16 @@
-//! DICOM segmentations (PS3.3 C.8.20): frames of one segment each, a bit or a fraction a pixel, or frames of labels. They become a label image;
-//! the label is the number of the segment. Frames without any voxel may be missing: what lies beyond the first and the last one is taken as empty.
-//! Leaves out: compressed frames, segmentations of several orientations.
+//! DICOM segmentations (PS3.3 C.8.20): frames of one segment each, with a bit or a fraction per pixel, or frames of labels. They become a
+//! label image whose labels are the segment numbers. Frames without voxels may be missing: slices beyond the first and the last frame are
+//! assumed empty. Leaves out: compressed frames, segmentations of several orientations.
 
 use pliant_geometry::Vector3;
 
 use super::{Elements, Frames, Grid, Image, Numbers, Order, PIXELS, Placed, ReadOptions, Scalar, ToWorld};
 use super::{Fault, ImageProblem, LabelNames, checked_size};
 
-/// Slices that the whole may have beyond those that are there, plus 16 for each of these.
+/// Limit of missing slices, plus 16 for each existing one.
 const MOST_MISSING: u64 = 512;
 
-/// How the frames tell what is inside.
+/// The encoding of the inside in the frames.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     /// A bit a pixel.
@@ -70,14 +70,11 @@ pub(super) fn read(elements: &Elements<'_>, options: &ReadOptions) -> Result<Ima
             }
         }
     }
-    let mut notes = vec![
-        "the frames end where the segments do: whether the scan cuts them off along its slices is not known"
-            .to_owned(),
-    ];
+    let mut notes =
+        vec!["the frames end with the segments: the scan may cut them off along its slices".to_owned()];
     if shared > 0 {
-        notes.push(format!(
-            "segments overlap in {shared} voxels, which count to the segment of the highest number"
-        ));
+        notes
+            .push(format!("segments overlap in {shared} voxels, which belong to the highest segment number"));
     }
     let bytes = labels.into_iter().flat_map(u16::to_le_bytes).collect();
     let numbers = Numbers { scalar: Scalar::U16, order: Order::Little, bytes };
@@ -119,7 +116,7 @@ fn segment(frames: &Frames<'_>, frame: usize) -> Result<u16, ImageProblem> {
     const FIELD: &str = "ReferencedSegmentNumber";
     let group = frames.group(frame, 0x0062_000A).ok_or(ImageProblem::MissingField { field: FIELD })?;
     match group.short(0x0062_000B, FIELD)? {
-        0 => Err(ImageProblem::bad(FIELD, 0, "segments are counted from 1; export the segmentation again")),
+        0 => Err(ImageProblem::bad(FIELD, 0, "segment numbers start at 1; export the segmentation again")),
         number => Ok(number),
     }
 }
@@ -184,7 +181,7 @@ impl Stack {
         let most = MOST_MISSING + 16 * (gaps.len() as u64 + 1);
         if steps + 1.0 > most as f64 {
             let value = format!("spread over {steps} slices of {spacing:.3} mm");
-            let expected = "frames so far apart are none of one organ; export the segmentation again";
+            let expected = "frames this far apart cannot belong to one organ; export the segmentation again";
             return Err(ImageProblem::bad("frames", value, expected));
         }
         let step = (places[last].position - places[first].position) / steps;
