@@ -10,7 +10,8 @@
 //!
 //! ```
 //! use pliant_gpu::{Device, GpuStepper, StepFailure, Wanted};
-//! use pliant_mechanics::{Model, Observable, State};
+//! use pliant_explicit::{Observable, State};
+//! use pliant_mechanics::Model;
 //!
 //! fn fall(device: &Device, model: &Model, step: f64) -> Result<State<f32>, StepFailure> {
 //!     let mut state = State::at_rest(model);

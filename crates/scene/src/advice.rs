@@ -1,8 +1,7 @@
 //! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what is on, to take a
 //! smaller step where steps are kept below the limit, or to damp more where damping is the trouble.
 
-use pliant_explicit::stability::OnUnstable;
-use pliant_explicit::{Scalar, State};
+use pliant_explicit::stability::{OnUnstable, Stability};
 
 use crate::assemble::Built;
 use crate::format::{Precision, SolverName};
@@ -15,12 +14,12 @@ use crate::scene::Scene;
 const RESOLVED: f64 = 1.0;
 
 /// The remedy of a failed explicit step, where the run's state says more than the failure itself.
-pub(crate) fn remedy<R: Scalar>(
+pub(crate) fn remedy(
     failure: &FailureSummary,
     scene: &Scene,
     built: &Built,
     plan: &Plan,
-    state: &State<R>,
+    stability: &Stability,
 ) -> Option<String> {
     if scene.run.solver != SolverName::Explicit || built.corotational.is_some() {
         return None;
@@ -29,7 +28,7 @@ pub(crate) fn remedy<R: Scalar>(
         return Some(told);
     }
     let on_unstable = scene.run.on_unstable.unwrap_or_default();
-    let seen = state.stability.smallest.as_ref().map(|look| look.limit / plan.step);
+    let seen = stability.smallest.as_ref().map(|look| look.limit / plan.step);
     Some(match (failure.kind, on_unstable) {
         ("unstable", OnUnstable::Substep) => "its steps are cut into 100 parts at the most, and that is not enough: try a slower or smaller \
                                               motion, or a coarser mesh there"

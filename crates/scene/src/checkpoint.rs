@@ -2,21 +2,23 @@
 //!
 //! The file: [`MAGIC`], the [`FORMAT`] (u32), the length of the body (u64), the body in postcard's encoding, and the
 //! CRC-32 of all before it (u32); little-endian. The body: [`Origin`] (what the run was), [`Progressed`] (how far it
-//! and its outputs were), then [`Moment`] in the run's number type. A file appears under its name only once it is whole.
+//! and its outputs were), then the states of its participants with what a restart needs beside them. A file appears under its name only once it is whole.
 
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use pliant_explicit::{Scalar, State};
+use pliant_explicit::State;
 use pliant_geometry::io::read_limited;
 use pliant_mechanics::fingerprint;
 use serde::{Deserialize, Serialize};
 
 use crate::assemble::Built;
+use crate::corotational::Remembered;
 use crate::diagnostic::counted;
 use crate::format::{LoadSteps, Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, ShellStrains, Written, number, replace};
+use crate::participant::{Kept, Numeric, Participant};
 use crate::plan::Plan;
 use crate::run::History;
 use crate::scene::Scene;
@@ -25,7 +27,7 @@ use crate::solver::Memory;
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-const FORMAT: u32 = 6;
+const FORMAT: u32 = 7;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -62,14 +64,6 @@ pub(crate) struct Progressed {
     pub sampling: Schedule,
     /// Of each output of the scene.
     pub outputs: Vec<(Schedule, Written)>,
-}
-
-/// A state between the two halves of a step, after [`advance`](crate::solver::Solver::advance), and what the solver
-/// knows beside it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Moment<R> {
-    pub state: State<R>,
-    pub memory: Memory<R>,
 }
 
 /// Why a run cannot be resumed.
@@ -309,8 +303,8 @@ pub struct Checkpoint {
     path: PathBuf,
     origin: Origin,
     pub(crate) progressed: Progressed,
-    /// The [`Moment`], encoded.
-    moment: Vec<u8>,
+    /// The participant, encoded.
+    participant: Vec<u8>,
 }
 
 impl Checkpoint {
@@ -362,8 +356,8 @@ impl Checkpoint {
         let decoded = postcard::take_from_bytes::<Origin>(&content[HEAD..])
             .and_then(|(origin, rest)| Ok((origin, postcard::take_from_bytes::<Progressed>(rest)?)));
         match decoded {
-            Ok((origin, (progressed, moment))) => {
-                Ok(Self { path, origin, progressed, moment: moment.to_vec() })
+            Ok((origin, (progressed, rest))) => {
+                Ok(Self { path, origin, progressed, participant: rest.to_vec() })
             }
             Err(_) => Err(ResumeError::Damaged { path }),
         }
@@ -407,10 +401,7 @@ impl Checkpoint {
         if time > until + 0.51 * step {
             return Err(ResumeError::BeyondTheEnd { time, until });
         }
-        let whole = match self.origin.precision {
-            Precision::Single => self.moment::<f32>(built).is_some(),
-            Precision::Double => self.moment::<f64>(built).is_some(),
-        };
+        let whole = self.kept(built).is_some();
         if !whole || self.progressed.outputs.len() != scene.outputs.len() {
             return Err(ResumeError::Damaged { path: self.path.clone() });
         }
@@ -420,21 +411,35 @@ impl Checkpoint {
         Ok(Plan { step, steps: (until / step - 1e-9).ceil().max(1.0) as u64, ..plan.clone() })
     }
 
-    /// The state, if it has the sizes of the model's.
-    pub(crate) fn moment<R: Scalar>(&self, built: &Built) -> Option<Moment<R>> {
-        let moment: Moment<R> = postcard::from_bytes(&self.moment).ok()?;
+    /// The state with what a restart needs, if it has the sizes of the model's.
+    pub(crate) fn kept(&self, built: &Built) -> Option<Kept> {
+        let samples = self.progressed.history.reactions.iter();
+        if samples.map(Vec::len).any(|len| len != built.model.constraints.len()) {
+            return None;
+        }
+        if built.corotational.is_some() {
+            let remembered: Remembered = postcard::from_bytes(&self.participant).ok()?;
+            let fits = remembered.fits(built.model.node_count());
+            return fits.then(|| Kept::Shells(Box::new(remembered)));
+        }
+        match self.origin.precision {
+            Precision::Single => self.solids::<f32>(built),
+            Precision::Double => self.solids::<f64>(built),
+        }
+    }
+
+    fn solids<R: Numeric>(&self, built: &Built) -> Option<Kept> {
+        let (state, memory): (State<R>, Memory<R>) = postcard::from_bytes(&self.participant).ok()?;
         let rest = State::<R>::at_rest(&built.model);
         let sizes = |state: &State<R>| {
             let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
             let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
             (nodes, history.collect::<Vec<_>>())
         };
-        let samples = self.progressed.history.reactions.iter();
-        let fits = sizes(&moment.state) == sizes(&rest)
-            && moment.state.stability.fits(&built.model)
-            && moment.memory.fits(rest.displacement.len())
-            && samples.map(Vec::len).all(|len| len == built.model.constraints.len());
-        fits.then_some(moment)
+        let fits = sizes(&state) == sizes(&rest)
+            && state.stability.fits(&built.model)
+            && memory.fits(rest.displacement.len());
+        fits.then(|| R::keep(state, memory))
     }
 }
 
@@ -470,15 +475,15 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// Writes one, and removes those before the last two.
-    pub fn write<R: Scalar>(
+    pub fn write(
         &self,
         progressed: &Progressed,
-        state: &State<R>,
-        memory: &Memory<R>,
+        participant: &dyn Participant,
     ) -> Result<PathBuf, OutputError> {
         let path = self.folder.path().join(name(progressed.steps));
         let failed = |reason: &dyn std::fmt::Display| OutputError::new(&path, reason);
-        let bytes = encode(&self.origin, progressed, state, memory).map_err(|e| failed(&e))?;
+        let state = participant.encode().map_err(|error| failed(&error))?;
+        let bytes = encode(&self.origin, progressed, &state).map_err(|error| failed(&error))?;
         replace(&path, |file| file.write_all(&bytes).and_then(|()| file.sync_all()))
             .map_err(|error| failed(&error))?;
         let mut earlier = checkpoints_in(self.folder.path()).map_err(|error| failed(&error))?;
@@ -490,14 +495,10 @@ impl<'a> Checkpoints<'a> {
     }
 }
 
-fn encode<R: Scalar>(
-    origin: &Origin,
-    progressed: &Progressed,
-    state: &State<R>,
-    memory: &Memory<R>,
-) -> postcard::Result<Vec<u8>> {
-    // As the fields of a [`Moment`], one after the other.
-    Ok(Checkpoint::framed(&postcard::to_stdvec(&(origin, progressed, state, memory))?))
+fn encode(origin: &Origin, progressed: &Progressed, participant: &[u8]) -> postcard::Result<Vec<u8>> {
+    let mut body = postcard::to_stdvec(&(origin, progressed))?;
+    body.extend(participant);
+    Ok(Checkpoint::framed(&body))
 }
 
 const PREFIX: &str = "checkpoint-";
@@ -551,7 +552,8 @@ mod tests {
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
         };
-        encode(&Origin::of(&scene, &built, &plan), &progressed, &state, &Memory::Nothing).unwrap()
+        let participant = postcard::to_stdvec(&(state, Memory::<f32>::Nothing)).unwrap();
+        encode(&Origin::of(&scene, &built, &plan), &progressed, &participant).unwrap()
     }
 
     #[test]
@@ -593,8 +595,7 @@ mod tests {
             body[place - HEAD] = body[place - HEAD].wrapping_add(0x7f);
             let forged = Checkpoint::framed(&body);
             if let Ok(read) = Checkpoint::from_bytes(Path::new("x.pliant"), &forged) {
-                let _ = read.moment::<f32>(&built);
-                let _ = read.moment::<f64>(&built);
+                let _ = read.kept(&built);
             }
         }
     }
@@ -602,11 +603,11 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_6_is_as_it_was() {
+    fn the_layout_of_format_7_is_as_it_was() {
         let state = State::<f32>::at_rest(&built("").model);
         let bytes = postcard::to_stdvec(&state).unwrap();
         let memory = Memory::Equilibrium(Equilibrium::<f32>::default());
         let memory = postcard::to_stdvec(&memory).unwrap();
-        assert_eq!((FORMAT, bytes.len(), memory.len()), (6, 1083, 61));
+        assert_eq!((FORMAT, bytes.len(), memory.len()), (7, 1083, 61));
     }
 }

@@ -1,18 +1,18 @@
-//! Runs of shells and co-rotational solids behind the face of all solvers.
+//! Shells and co-rotational solids as a participant.
 
 use std::collections::VecDeque;
 use std::fmt::Write;
 use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
-use pliant_explicit::{Observable, State};
 use pliant_gpu::Wanted;
 use pliant_implicit as corotational;
 use pliant_implicit::{
     BackwardEuler, DynamicSettings, Explicit, Forces, Integrator, LinearSolver, Phases, Preconditioner,
     SolveError, StaticSettings, Statics,
 };
-use pliant_mechanics::Energies;
+use pliant_mechanics::grip::Grip;
+use pliant_mechanics::{Energies, fingerprint};
 use serde::{Deserialize, Serialize};
 
 use crate::assemble::{Built, Control, Corotational, Stop};
@@ -21,8 +21,9 @@ use crate::format::{
     IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName,
 };
 use crate::output::{FailureSummary, number};
+use crate::participant::{Instant, Kept, Participant};
 use crate::plan::Plan;
-use crate::solver::{Effort, LoadStepProgress, Memory, Solver};
+use crate::solver::{Effort, LoadStepProgress};
 
 /// Iterations from which on a lagged factorisation is made anew.
 const RENEW_AFTER: usize = 10;
@@ -39,8 +40,11 @@ pub(crate) struct Corotated {
     /// Step [s].
     step: f64,
     /// Steps of the whole run.
-    steps: u64,
+    planned: u64,
     state: corotational::State,
+    /// Whole steps done, and the time [s] they end at.
+    done: u64,
+    time: f64,
     /// Which components of each node are held or moved, six a node.
     prescribed: Vec<bool>,
     /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its positions and rotations.
@@ -90,6 +94,9 @@ struct Path {
 /// What a resumed run needs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Remembered {
+    /// Whole steps done, and the time [s] they end at.
+    done: u64,
+    time: f64,
     state: Snapshot,
     before: Option<(Vec<f64>, Snapshot)>,
     /// The state that an implicit step takes differences with.
@@ -225,7 +232,9 @@ impl Corotated {
         Ok(Self {
             method: method.map_err(|error| failure(&error, &built.model, part, 0.0))?,
             step: plan.step,
-            steps: plan.steps,
+            planned: plan.steps,
+            time: part.start.time,
+            done: 0,
             state: part.start.clone(),
             outside: vec![0.0; prescribed.len()],
             prescribed,
@@ -318,14 +327,6 @@ impl Corotated {
             .map(|at| if self.prescribed[at] { internal[at] - loads[at] } else { 0.0 })
     }
 
-    /// Puts the displacements where all observers look for them.
-    fn show(&self, state: &mut State<f64>) {
-        let places = self.state.position.iter().zip(&self.part.model.rest);
-        for (own, (position, rest)) in state.displacement.iter_mut().zip(places) {
-            *own = (position - rest).into();
-        }
-    }
-
     /// One step of the method, to the time of its number.
     fn go(&mut self, number: u64) -> Result<(), SolveError> {
         match self.method {
@@ -380,7 +381,7 @@ impl Corotated {
 
     fn go_statically(&mut self, number: u64) -> Result<(), SolveError> {
         let until = number as f64 * self.step;
-        let control = self.part.control.map(|control| part_of(control, number, self.steps));
+        let control = self.part.control.map(|control| part_of(control, number, self.planned));
         let Method::Static(solver, _) = &mut self.method else { return Ok(()) };
         let result = match control {
             Some(control) => solver.control(&mut self.state, control),
@@ -492,58 +493,11 @@ fn linear_solver(table: &LinearTable) -> LinearSolver {
     }
 }
 
-impl Solver<f64> for Corotated {
-    fn evaluate(&mut self, state: &mut State<f64>, _wanted: Wanted) -> Result<(), FailureSummary> {
-        if self.evaluated {
-            return Ok(());
-        }
-        self.show(state);
-        let found = self.method.evaluate(&self.state);
-        found.map_err(|error| failure(&error, &self.model, &self.part, self.state.time))?;
-        self.find_energies();
-        self.find_reactions();
-        self.evaluated = true;
-        Ok(())
-    }
-
-    fn advance(
-        &mut self,
-        state: &mut State<f64>,
-        _steps: u64,
-        _watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), FailureSummary> {
-        let number = state.steps + 1;
-        self.go(number).map_err(|error| failure(&error, &self.model, &self.part, self.state.time))?;
-        state.steps = number;
-        state.time = self.state.time;
-        self.evaluated = false;
-        Ok(())
-    }
-
-    /// The balance is not judged.
-    fn balance_floor(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    fn observable(&self) -> &dyn Observable<f64> {
-        self
-    }
-
-    fn memory(&self) -> Memory<f64> {
-        let before = self.before.as_ref().map(|(forces, state)| (forces.clone(), Snapshot::of(state)));
-        let previous = match &self.method {
-            Method::Implicit(solver, _) => solver.previous().map(Snapshot::of),
-            _ => None,
-        };
-        let (energies, effort) = (self.energies, self.effort.clone());
-        let state = Snapshot::of(&self.state);
-        let convergence = self.convergence.clone();
-        Memory::Corotated(Box::new(Remembered { state, before, previous, energies, effort, convergence }))
-    }
-
-    fn resume(&mut self, memory: Memory<f64>) {
-        let Memory::Corotated(remembered) = memory else { return };
-        let Remembered { state, before, previous, energies, effort, convergence } = *remembered;
+impl Corotated {
+    /// Goes on from where a run of the same bodies stood.
+    pub(crate) fn resume(&mut self, remembered: Remembered) {
+        let Remembered { done, time, state, before, previous, energies, effort, convergence } = remembered;
+        (self.done, self.time) = (done, time);
         self.convergence = convergence;
         self.state = state.state();
         if let Method::Implicit(solver, _) = &mut self.method {
@@ -555,8 +509,127 @@ impl Solver<f64> for Corotated {
         self.evaluated = false;
     }
 
-    fn corotational(&self) -> Option<&corotational::State> {
+    fn remembered(&self) -> Remembered {
+        let previous = match &self.method {
+            Method::Implicit(solver, _) => solver.previous().map(Snapshot::of),
+            _ => None,
+        };
+        Remembered {
+            done: self.done,
+            time: self.time,
+            state: Snapshot::of(&self.state),
+            before: self.before.as_ref().map(|(forces, state)| (forces.clone(), Snapshot::of(state))),
+            previous,
+            energies: self.energies,
+            effort: self.effort.clone(),
+            convergence: self.convergence.clone(),
+        }
+    }
+}
+
+impl Instant for Corotated {
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn displacement(&self, node: usize) -> [f64; 3] {
+        (self.state.position[node] - self.part.model.rest[node]).into()
+    }
+
+    fn velocity(&self, node: usize) -> [f64; 3] {
+        self.state.velocity[node].into()
+    }
+
+    fn rotation(&self, node: usize) -> [f64; 3] {
+        self.state.rotation[node].scaled_axis().into()
+    }
+
+    fn nodal_reaction(&self, node: usize) -> [f64; 3] {
+        self.held(6 * node)
+    }
+
+    fn nodal_reaction_moment(&self, node: usize) -> [f64; 3] {
+        self.held(6 * node + 3)
+    }
+
+    fn reaction(&self, constraint: usize) -> [f64; 3] {
+        self.reactions[constraint]
+    }
+
+    fn energies(&self) -> Energies {
+        self.energies
+    }
+
+    fn shells(&self) -> Option<&corotational::State> {
         Some(&self.state)
+    }
+
+    fn is_single(&self) -> bool {
+        false
+    }
+}
+
+impl Participant for Corotated {
+    fn instant(&self) -> &dyn Instant {
+        self
+    }
+
+    fn steps(&self) -> u64 {
+        self.done
+    }
+
+    fn evaluate(&mut self, _wanted: Wanted) -> Result<(), FailureSummary> {
+        if self.evaluated {
+            return Ok(());
+        }
+        let found = self.method.evaluate(&self.state);
+        found.map_err(|error| failure(&error, &self.model, &self.part, self.time))?;
+        self.find_energies();
+        self.find_reactions();
+        self.evaluated = true;
+        Ok(())
+    }
+
+    fn advance(
+        &mut self,
+        _steps: u64,
+        _watch: &mut dyn FnMut(LoadStepProgress),
+    ) -> Result<(), FailureSummary> {
+        let number = self.done + 1;
+        self.go(number).map_err(|error| failure(&error, &self.model, &self.part, self.state.time))?;
+        (self.done, self.time) = (number, self.state.time);
+        self.evaluated = false;
+        Ok(())
+    }
+
+    fn hold(&mut self, grips: &[Grip]) -> bool {
+        grips.is_empty()
+    }
+
+    fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
+        let weighted = |&(node, weight): &(u32, f64)| self.state.position[node as usize] * weight;
+        let point: Vector3<f64> = grip.nodes.iter().map(weighted).sum();
+        [point.into(), ((Vector3::from(grip.place) - point) * grip.stiffness).into()]
+    }
+
+    /// The balance is not judged.
+    fn balance_floor(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn kept(&self) -> Kept {
+        Kept::Shells(Box::new(self.remembered()))
+    }
+
+    fn encode(&self) -> postcard::Result<Vec<u8>> {
+        postcard::to_stdvec(&self.remembered())
+    }
+
+    fn fingerprint(&self) -> u64 {
+        let bits = |numbers: &[f64]| -> Vec<u64> { numbers.iter().map(|x| x.to_bits()).collect() };
+        let positions = self.state.position.iter().flat_map(|x| bits(x.as_slice()));
+        let rotations = self.state.rotation.iter().flat_map(|q| bits(q.coords.as_slice()));
+        fingerprint(&(positions.collect::<Vec<_>>(), rotations.collect::<Vec<_>>()))
     }
 
     fn ended(&self) -> Option<&str> {
@@ -564,10 +637,10 @@ impl Solver<f64> for Corotated {
     }
 
     /// A static state stands at the last equilibrium found, which may lie within the step that failed.
-    fn keeps_what_it_found(&mut self, state: &mut State<f64>) -> bool {
+    fn keeps_what_it_found(&mut self) -> bool {
         let is_static = matches!(self.method, Method::Static(..));
-        if is_static && self.state.time > state.time {
-            state.time = self.state.time;
+        if is_static && self.state.time > self.time {
+            self.time = self.state.time;
             self.evaluated = false;
         }
         is_static
@@ -585,28 +658,6 @@ impl Solver<f64> for Corotated {
 
     fn effort(&self) -> Option<Effort> {
         (!matches!(self.method, Method::Explicit(_))).then(|| self.effort.clone())
-    }
-}
-
-impl Observable<f64> for Corotated {
-    fn energies(&self) -> &Energies {
-        &self.energies
-    }
-
-    fn reaction(&self, constraint: usize) -> [f64; 3] {
-        self.reactions[constraint]
-    }
-
-    fn nodal_reaction(&self, node: usize) -> [f64; 3] {
-        self.held(6 * node)
-    }
-
-    fn nodal_reaction_moment(&self, node: usize) -> [f64; 3] {
-        self.held(6 * node + 3)
-    }
-
-    fn velocity(&self, _state: &State<f64>, node: usize) -> [f64; 3] {
-        self.state.velocity[node].into()
     }
 }
 

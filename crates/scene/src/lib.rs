@@ -46,6 +46,7 @@ pub mod niftysim;
 mod of_mesh;
 mod output;
 mod overview;
+mod participant;
 mod plan;
 mod plausible;
 mod printable;

@@ -3,20 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use pliant_explicit::{Clock, Scalar, State};
+use pliant_explicit::Clock;
 use pliant_geometry::Mesh;
 use pliant_gpu::{DeviceMapping, DevicePoints, PointValue, Wanted};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 
 use crate::assemble::Built;
-use crate::checkpoint::Moment;
-use crate::corotational::Corotated;
-use crate::format::{Precision, VtuTable};
+use crate::format::VtuTable;
 use crate::output::{Column, FailureSummary, Frame, Samples, Snapshot};
+use crate::participant::{Kept, Participant, participant, participant_from};
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::{Memory, Solver, on_device, on_processor};
 
 /// A scene under way, in any numbers and with any solver. After a failure it stays at the last good instant.
 pub trait Live: Send {
@@ -85,42 +83,10 @@ pub trait Live: Send {
 /// Where a run stands between two steps: all that another one needs to go on from there.
 #[derive(Clone, Debug)]
 pub struct Standing {
-    numbers: Numbers,
+    kept: Kept,
     clock: Option<Clock>,
     /// Length of its steps [s].
     step: f64,
-}
-
-#[derive(Clone, Debug)]
-enum Numbers {
-    Single(Moment<f32>),
-    Double(Moment<f64>),
-}
-
-/// The number types that runs compute in.
-trait Numeric: Scalar {
-    fn kept(moment: Moment<Self>) -> Numbers;
-    fn taken(numbers: Numbers) -> Option<Moment<Self>>;
-}
-
-impl Numeric for f32 {
-    fn kept(moment: Moment<f32>) -> Numbers {
-        Numbers::Single(moment)
-    }
-
-    fn taken(numbers: Numbers) -> Option<Moment<f32>> {
-        if let Numbers::Single(moment) = numbers { Some(moment) } else { None }
-    }
-}
-
-impl Numeric for f64 {
-    fn kept(moment: Moment<f64>) -> Numbers {
-        Numbers::Double(moment)
-    }
-
-    fn taken(numbers: Numbers) -> Option<Moment<f64>> {
-        if let Numbers::Double(moment) = numbers { Some(moment) } else { None }
-    }
 }
 
 /// Begins to play a scene.
@@ -152,21 +118,20 @@ pub fn go_on(
 type Begun = Result<Option<Box<dyn Live>>, FailureSummary>;
 
 fn begin(scene: &Scene, built: &Arc<Built>, plan: &Plan, from: Option<(Standing, &Built)>) -> Begun {
-    let run = &scene.run;
-    match (&plan.target.device, plan.target.precision, &built.corotational) {
-        (Some(device), ..) => {
-            Played::<f32>::begin(scene, built, plan, from, |state| on_device(run, built, plan, device, state))
+    let participant = match from {
+        None => participant(scene, built, plan, None)?,
+        Some((standing, before)) => {
+            if !same_mesh(before, built) {
+                return Ok(None);
+            }
+            let Standing { kept, clock, step } = standing;
+            match participant_from(scene, built, plan, kept, clock.map(|clock| (clock, step, before)))? {
+                Some(participant) => participant,
+                None => return Ok(None),
+            }
         }
-        (None, _, Some(part)) => Played::<f64>::begin(scene, built, plan, from, |_| {
-            Ok(Box::new(Corotated::new(run, built, part, plan)?))
-        }),
-        (None, Precision::Single, None) => {
-            Played::<f32>::begin(scene, built, plan, from, |_| on_processor(run, built, plan))
-        }
-        (None, Precision::Double, None) => {
-            Played::<f64>::begin(scene, built, plan, from, |_| on_processor(run, built, plan))
-        }
-    }
+    };
+    Ok(Some(Box::new(Played::new(scene, built, participant, plan.step))))
 }
 
 /// Whether bodies of a model have the nodes and cells that those of another one have.
@@ -179,11 +144,10 @@ fn same_mesh(a: &Built, b: &Built) -> bool {
     a.model.rest == b.model.rest && shells(a) == shells(b) && cells(a) == cells(b)
 }
 
-struct Played<R> {
+struct Played {
     built: Arc<Built>,
-    state: State<R>,
-    solver: Box<dyn Solver<R>>,
-    snapshot: Snapshot<R>,
+    participant: Box<dyn Participant>,
+    snapshot: Snapshot,
     /// What finds the points of the snapshot where the state lies on a device.
     mapping: Option<DeviceMapping>,
     samples: Samples,
@@ -193,85 +157,42 @@ struct Played<R> {
     evaluated: Option<Wanted>,
 }
 
-impl<R: Numeric> Played<R> {
-    fn begin(
-        scene: &Scene,
-        built: &Arc<Built>,
-        plan: &Plan,
-        from: Option<(Standing, &Built)>,
-        solver: impl FnOnce(&State<R>) -> Result<Box<dyn Solver<R>>, FailureSummary>,
-    ) -> Begun {
-        let step = plan.step;
-        let Some((Standing { numbers, clock, step: step_before }, before)) = from else {
-            let state = State::at_rest(&built.model);
-            return Ok(Some(Box::new(Self::new(scene, built, solver(&state)?, state, step))));
-        };
-        let Some(Moment { mut state, memory }) = R::taken(numbers) else { return Ok(None) };
-        let rest = State::<R>::at_rest(&built.model);
-        let kept = |state: &State<R>| -> Vec<[usize; 2]> {
-            state.history.iter().map(|h| [h.cells.len(), h.pressures.len()]).collect()
-        };
-        if !same_mesh(before, built)
-            || kept(&state) != kept(&rest)
-            || !memory.fits(rest.displacement.len())
-            || matches!(memory, Memory::Corotated(_)) != built.corotational.is_some()
-        {
-            return Ok(None);
-        }
-        if let Some(clock) = &clock
-            && before.model.fingerprints() != built.model.fingerprints()
-        {
-            state.change_model(&before.model, &built.model, clock.before);
-        }
-        let mut solver = solver(&state)?;
-        if let Some(clock) = &clock {
-            solver.go_on(clock, step_before, &state);
-        }
-        solver.resume(memory);
-        Ok(Some(Box::new(Self::new(scene, built, solver, state, step))))
-    }
-
-    fn new(
-        scene: &Scene,
-        built: &Arc<Built>,
-        solver: Box<dyn Solver<R>>,
-        state: State<R>,
-        step: f64,
-    ) -> Self {
+impl Played {
+    fn new(scene: &Scene, built: &Arc<Built>, participant: Box<dyn Participant>, step: f64) -> Self {
         let snapshot = snapshot(built, &scene.shown(1.0));
         let samples = Samples::new(built, &scene.sampled());
         let built = Arc::clone(built);
-        Self { built, state, solver, snapshot, mapping: None, samples, step, evaluated: None }
+        Self { built, participant, snapshot, mapping: None, samples, step, evaluated: None }
     }
 
     fn evaluate(&mut self, wanted: Wanted) -> Result<(), FailureSummary> {
         if self.evaluated.is_none() {
-            self.solver.evaluate(&mut self.state, wanted)?;
+            self.participant.evaluate(wanted)?;
             self.evaluated = Some(wanted);
         }
         Ok(())
     }
 }
 
-fn snapshot<R: Scalar>(built: &Built, shown: &VtuTable) -> Snapshot<R> {
+fn snapshot(built: &Built, shown: &VtuTable) -> Snapshot {
     Snapshot::new(built, shown.on.as_deref(), &shown.data, shown.at, shown.curved)
 }
 
-impl<R: Numeric> Live for Played<R> {
+impl Live for Played {
     fn time(&self) -> f64 {
-        self.state.time
+        self.participant.time()
     }
 
     fn advance(&mut self, most: u64) -> Result<u64, FailureSummary> {
         self.evaluate(Wanted::Everything)?;
-        let steps = self.solver.stride().min(most.max(1));
-        self.solver.advance(&mut self.state, steps, &mut |_| {})?;
+        let steps = self.participant.stride().min(most.max(1));
+        self.participant.advance(steps, &mut |_| {})?;
         self.evaluated = None;
         Ok(steps)
     }
 
     fn coast(&mut self, steps: u64, within: Duration) -> Option<Result<u64, FailureSummary>> {
-        let coasted = self.solver.coast(&mut self.state, steps, within)?;
+        let coasted = self.participant.coast(steps, within)?;
         self.evaluated = None;
         Some(coasted)
     }
@@ -286,7 +207,7 @@ impl<R: Numeric> Live for Played<R> {
             let mut points = (0..)
                 .zip(&snapshot.mesh().points)
                 .map(|(point, place)| ([place.x, place.y, place.z], snapshot.nodes_of(built, point)));
-            match self.solver.map(&mut points)? {
+            match self.participant.map(&mut points)? {
                 Ok(mapping) => self.mapping = Some(mapping),
                 Err(failure) => return Some(Err(failure)),
             }
@@ -295,20 +216,19 @@ impl<R: Numeric> Live for Played<R> {
         if let Some(values) = given {
             mapping.give(values);
         }
-        self.solver.apply(mapping, value);
+        self.participant.apply(mapping, value);
         Some(Ok(mapping.points().clone()))
     }
 
     fn stand(&mut self) -> Option<Standing> {
-        if self.evaluated.is_some() || self.solver.bring_back(&mut self.state).is_err() {
+        if self.evaluated.is_some() || self.participant.bring_back().is_err() {
             return None;
         }
-        let moment = Moment { state: self.state.clone(), memory: self.solver.memory() };
-        Some(Standing { clock: self.solver.clock(&self.state), numbers: R::kept(moment), step: self.step })
+        Some(Standing { clock: self.participant.clock(), kept: self.participant.kept(), step: self.step })
     }
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
-        self.solver.hold(grips)
+        self.participant.hold(grips)
     }
 
     fn delay(&self) -> u64 {
@@ -316,8 +236,7 @@ impl<R: Numeric> Live for Played<R> {
     }
 
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
-        let (model, displacement) = (&self.built.model, &self.state.displacement);
-        [grip.point(model, displacement), grip.force(model, displacement)]
+        self.participant.pulled(grip)
     }
 
     fn nodes_of(&self, point: u32) -> Vec<(u32, f64)> {
@@ -331,21 +250,16 @@ impl<R: Numeric> Live for Played<R> {
 
     fn mesh(&mut self) -> Result<&Mesh, FailureSummary> {
         self.evaluate(Wanted::Everything)?;
-        self.snapshot.fill(&Frame {
-            built: &self.built,
-            state: &self.state,
-            stepper: self.solver.observable(),
-            corotational: self.solver.corotational(),
-        });
+        self.snapshot.fill(&Frame { built: &self.built, now: self.participant.instant() });
         Ok(self.snapshot.mesh())
     }
 
     fn energies(&self) -> Energies {
-        *self.solver.observable().energies()
+        self.participant.energies()
     }
 
     fn reaction(&self, constraint: usize) -> [f64; 3] {
-        self.solver.observable().reaction(constraint)
+        self.participant.reaction(constraint)
     }
 
     fn columns(&self) -> Vec<Column> {
@@ -353,22 +267,11 @@ impl<R: Numeric> Live for Played<R> {
     }
 
     fn sample(&mut self, row: &mut Vec<f64>) {
-        self.samples.read(
-            &Frame {
-                built: &self.built,
-                state: &self.state,
-                stepper: self.solver.observable(),
-                corotational: self.solver.corotational(),
-            },
-            row,
-        );
+        self.samples.read(&Frame { built: &self.built, now: self.participant.instant() }, row);
     }
 
     fn fingerprint(&self) -> u64 {
-        let bits = |vectors: &[[R; 3]]| -> Vec<u64> {
-            vectors.iter().flatten().map(|x| x.to_f64().to_bits()).collect()
-        };
-        pliant_mechanics::fingerprint(&(bits(&self.state.displacement), bits(&self.state.increment)))
+        self.participant.fingerprint()
     }
 }
 

@@ -2,26 +2,25 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use pliant_explicit::stability::Stability;
-use pliant_explicit::{Observable, Scalar, State};
 use pliant_gpu::Wanted;
 use pliant_mechanics::Energies;
 use serde::{Deserialize, Serialize};
 
 use crate::advice::remedy;
 use crate::assemble::Built;
-use crate::checkpoint::{Checkpoint, Checkpoints, Moment, Progressed};
-use crate::corotational::Corotated;
-use crate::format::{Precision, SolverName};
+use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
+use crate::format::SolverName;
 use crate::output::{
     CONVERGENCE, FailureSummary, Frame, INTERRUPTED, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY,
     Schedule, Scheduled, ShellStrains, Snapshot, Summary, markdown, observers, plot, steps_to, summarise,
 };
+use crate::participant::{Instant, Participant, participant};
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::solver::{Effort, Equilibria, LoadStepProgress, Memory, Solver, on_device, on_processor};
+use crate::solver::{Effort, Equilibria, LoadStepProgress};
 use crate::view::Draw;
 
 /// How far a run is.
@@ -159,24 +158,7 @@ pub fn run_with(
         .num_threads(scene.run.threads as usize)
         .build()
         .map_err(|error| OutputError::new(folder.path(), error))?;
-    let mut outcome = pool.install(|| match (&plan.target.device, plan.target.precision) {
-        (Some(device), _) => {
-            let solver = |state: &_| on_device(&scene.run, built, plan, device, state);
-            go::<f32>(scene, built, plan, folder, options, solver, report)
-        }
-        (None, Precision::Single) => {
-            go::<f32>(scene, built, plan, folder, options, |_| on_processor(&scene.run, built, plan), report)
-        }
-        (None, Precision::Double) => {
-            let solver = |_: &State<f64>| -> Result<Box<dyn Solver<f64> + '_>, FailureSummary> {
-                match &built.corotational {
-                    Some(part) => Ok(Box::new(Corotated::new(&scene.run, built, part, plan)?)),
-                    None => on_processor(&scene.run, built, plan),
-                }
-            };
-            go::<f64>(scene, built, plan, folder, options, solver, report)
-        }
-    })?;
+    let mut outcome = pool.install(|| go(scene, built, plan, folder, options, report))?;
     if let Err(error) = write_pages(scene, built, plan, folder, &mut outcome) {
         let time = Some(outcome.time);
         outcome.failure.get_or_insert_with(|| FailureSummary::output(&error, time));
@@ -211,23 +193,28 @@ fn write_pages(
     written.map(|_| ())
 }
 
-fn go<'a, R: Scalar>(
-    scene: &'a Scene,
-    built: &'a Built,
-    plan: &'a Plan,
-    folder: &'a OutputFolder,
+fn go(
+    scene: &Scene,
+    built: &Built,
+    plan: &Plan,
+    folder: &OutputFolder,
     options: Options<'_>,
-    solver: impl FnOnce(&State<R>) -> Result<Box<dyn Solver<R> + 'a>, FailureSummary>,
     report: &mut (dyn FnMut(Progress) + Send),
 ) -> Result<Outcome, OutputError> {
-    let state = beginning(built, folder, options)?;
-    let solver = match solver(&state.state) {
-        Ok(solver) => solver,
+    let kept = match options.resume {
+        Some(checkpoint) => {
+            let other = || OutputError::new(folder.path(), "the checkpoint is of another model");
+            Some(checkpoint.kept(built).ok_or_else(other)?)
+        }
+        None => None,
+    };
+    let participant = match participant(scene, built, plan, kept) {
+        Ok(participant) => participant,
         Err(failure) => return Ok(Outcome::not_begun(failure, built)),
     };
-    let mut course = Course::<R>::new(scene, built, plan, folder, options, state, solver)?;
+    let mut course = Course::new(scene, built, plan, folder, options, participant)?;
     let before = options.resume.map_or(0.0, |checkpoint| checkpoint.progressed.wall_seconds);
-    let started = Instant::now();
+    let started = std::time::Instant::now();
     let wall_seconds = || before + started.elapsed().as_secs_f64();
     let wall = || Duration::try_from_secs_f64(wall_seconds()).unwrap_or_default();
     let mut reported = started;
@@ -235,9 +222,9 @@ fn go<'a, R: Scalar>(
         match course.see() {
             Ok(last) => {
                 if reported.elapsed() >= REPORT || last {
-                    reported = Instant::now();
+                    reported = std::time::Instant::now();
                     report(Progress {
-                        time: course.state.time,
+                        time: course.participant.time(),
                         until: scene.scene.until,
                         wall: wall(),
                         load_step: None,
@@ -252,7 +239,7 @@ fn go<'a, R: Scalar>(
         let stop = options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
         let mut watch = |step: LoadStepProgress| {
             if reported.elapsed() >= REPORT {
-                reported = Instant::now();
+                reported = std::time::Instant::now();
                 let [from, to] = step.iteration.span;
                 let time = from + step.iteration.fraction * (to - from);
                 report(Progress { time, until: scene.scene.until, wall: wall(), load_step: Some(step) });
@@ -265,56 +252,43 @@ fn go<'a, R: Scalar>(
             break Some(failure);
         }
     };
-    let failure = failure.map(|failure| match remedy(&failure, scene, built, plan, &course.state) {
-        Some(remedy) => failure.advised(&remedy),
-        None => failure,
-    });
+    let failure =
+        failure.map(|failure| match remedy(&failure, scene, built, plan, &course.participant.stability()) {
+            Some(remedy) => failure.advised(&remedy),
+            None => failure,
+        });
     let picture = options.picture.filter(|_| failure.is_none());
     let (drawn, failure) = match picture.map(|picture| course.draw(picture, folder)).transpose() {
         Ok(drawn) => (drawn, failure),
-        Err(error) => (None, Some(FailureSummary::output(&error, Some(course.state.time)))),
+        Err(error) => (None, Some(FailureSummary::output(&error, Some(course.participant.time())))),
     };
-    let solver = course.solver.observable();
+    let participant = course.participant;
     Ok(Outcome {
         failure,
-        steps: course.state.steps,
-        time: course.state.time,
+        steps: participant.steps(),
+        time: participant.time(),
         wall_seconds: wall_seconds(),
-        energies: *solver.energies(),
+        energies: participant.energies(),
         worst_balance: course.worst_balance,
-        balance_floor: course.solver.balance_floor(),
+        balance_floor: participant.balance_floor(),
         worst_hourglass: course.worst_hourglass,
         stability: plan
             .limits
             .as_ref()
             .filter(|_| scene.run.solver == SolverName::Explicit)
-            .map(|_| course.state.stability),
-        equilibria: course.solver.equilibria(),
-        effort: course.solver.effort(),
-        convergence: course.solver.convergence(),
-        ended: course.solver.ended().map(ToOwned::to_owned),
+            .map(|_| participant.stability()),
+        equilibria: participant.equilibria(),
+        effort: participant.effort(),
+        convergence: participant.convergence(),
+        ended: participant.ended().map(ToOwned::to_owned),
         strains: course.strains,
-        reactions: (0..built.model.constraints.len()).map(|index| solver.reaction(index)).collect(),
+        reactions: (0..built.model.constraints.len()).map(|index| participant.reaction(index)).collect(),
         history: course.history,
         files: course.files.into_iter().chain(course.kept).chain(drawn.clone()).collect(),
         picture: drawn,
         threads: rayon::current_num_threads(),
         resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
     })
-}
-
-/// Where the run begins: at rest, or where a checkpoint was.
-fn beginning<R: Scalar>(
-    built: &Built,
-    folder: &OutputFolder,
-    options: Options<'_>,
-) -> Result<Moment<R>, OutputError> {
-    match options.resume {
-        Some(checkpoint) => checkpoint
-            .moment(built)
-            .ok_or_else(|| OutputError::new(folder.path(), "the checkpoint is of another model")),
-        None => Ok(Moment { state: State::at_rest(&built.model), memory: Memory::Nothing }),
-    }
 }
 
 /// Hourglass energy over internal energy; 0 while both together are below the floor [J] from which on energies mean
@@ -329,13 +303,12 @@ fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
 }
 
 /// A run under way.
-struct Course<'a, R> {
+struct Course<'a> {
     scene: &'a Scene,
     built: &'a Built,
     plan: &'a Plan,
-    state: State<R>,
-    solver: Box<dyn Solver<R> + 'a>,
-    watching: Vec<Scheduled<R>>,
+    participant: Box<dyn Participant>,
+    watching: Vec<Scheduled>,
     history: History,
     sampling: Schedule,
     worst_balance: f64,
@@ -351,7 +324,7 @@ struct Course<'a, R> {
     kept: Option<PathBuf>,
 }
 
-impl<'a, R: Scalar> Course<'a, R> {
+impl<'a> Course<'a> {
     /// At the start, or where a checkpoint was.
     fn new(
         scene: &'a Scene,
@@ -359,8 +332,7 @@ impl<'a, R: Scalar> Course<'a, R> {
         plan: &'a Plan,
         folder: &'a OutputFolder,
         options: Options<'_>,
-        Moment { state, memory }: Moment<R>,
-        mut solver: Box<dyn Solver<R> + 'a>,
+        participant: Box<dyn Participant>,
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
@@ -369,8 +341,7 @@ impl<'a, R: Scalar> Course<'a, R> {
         if before.is_some() {
             folder.go_on(scene)?;
         }
-        let watching = observers::<R>(scene, built, folder.path(), &mut files, written)?;
-        solver.resume(memory);
+        let watching = observers(scene, built, folder.path(), &mut files, written)?;
         Ok(Self {
             scene,
             built,
@@ -381,9 +352,8 @@ impl<'a, R: Scalar> Course<'a, R> {
             worst_balance: before.map_or(0.0, |before| before.worst_balance),
             worst_hourglass: before.map_or((0.0, 0.0), |before| before.worst_hourglass),
             strains: before.map_or_else(ShellStrains::default, |before| before.strains.clone()),
-            checkpoints: Checkpoints::new(scene, built, plan, folder, state.time),
-            state,
-            solver,
+            checkpoints: Checkpoints::new(scene, built, plan, folder, participant.time()),
+            participant,
             pictured: options.picture.is_some(),
             files,
             kept: None,
@@ -392,48 +362,47 @@ impl<'a, R: Scalar> Course<'a, R> {
 
     /// Evaluates the current instant and shows it to all who look; whether it is the last.
     fn see(&mut self) -> Result<bool, FailureSummary> {
-        let (time, last) = (self.state.time, self.is_last());
+        let (time, last) = (self.participant.time(), self.is_last());
         let step = self.plan.step_from(time);
         let looked_at = self.watching.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
         let wanted = if looked_at || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies };
-        self.solver.evaluate(&mut self.state, wanted)?;
-        let observable = self.solver.observable();
-        if self.state.work.largest > self.solver.balance_floor() {
-            self.worst_balance = self.worst_balance.max(observable.energies().balance);
+        self.participant.evaluate(wanted)?;
+        let energies = self.participant.energies();
+        if self.participant.largest_energy() > self.participant.balance_floor() {
+            self.worst_balance = self.worst_balance.max(energies.balance);
         }
-        let share = hourglass_share(observable.energies(), self.solver.balance_floor());
+        let share = hourglass_share(&energies, self.participant.balance_floor());
         if share > self.worst_hourglass.0 {
-            self.worst_hourglass = (share, self.state.time);
+            self.worst_hourglass = (share, self.participant.time());
         }
         if self.sampling.is_due(time, step, last) {
-            self.history.sample(self.built, observable, &self.state);
-            self.strains.look(self.built, self.solver.corotational());
+            self.history.sample(self.built, self.participant.instant());
+            self.strains.look(self.built, self.participant.shells());
         }
-        let frame = frame(self.built, &self.state, self.solver.as_ref());
+        let frame = Frame { built: self.built, now: self.participant.instant() };
         look(&mut self.watching, &frame, step, last)
-            .map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?;
+            .map_err(|error| FailureSummary::output(&error, Some(self.participant.time())))?;
         Ok(last)
     }
 
     fn is_last(&self) -> bool {
-        let over = self.state.time + 0.5 * self.plan.step_from(self.state.time) >= self.scene.scene.until;
-        over || self.solver.ended().is_some()
+        let over = self.participant.time() + 0.5 * self.plan.step_from(self.participant.time())
+            >= self.scene.scene.until;
+        over || self.participant.ended().is_some()
     }
 
     /// After a step that failed: shows what was found until then to those who have not looked at it.
     fn show_what_was_found(&mut self) {
-        let seen = self.state.time;
-        if !self.solver.keeps_what_it_found(&mut self.state)
-            || self.solver.evaluate(&mut self.state, Wanted::Everything).is_err()
-        {
+        let seen = self.participant.time();
+        if !self.participant.keeps_what_it_found() || self.participant.evaluate(Wanted::Everything).is_err() {
             return;
         }
-        let (time, step) = (self.state.time, self.plan.step);
-        self.strains.look(self.built, self.solver.corotational());
+        let (time, step) = (self.participant.time(), self.plan.step);
+        self.strains.look(self.built, self.participant.shells());
         if time > seen {
-            self.history.sample(self.built, self.solver.observable(), &self.state);
+            self.history.sample(self.built, self.participant.instant());
         }
-        let frame = frame(self.built, &self.state, self.solver.as_ref());
+        let frame = Frame { built: self.built, now: self.participant.instant() };
         for (schedule, observer) in &mut self.watching {
             if (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true) {
                 // The failure of the step is reported.
@@ -444,13 +413,13 @@ impl<'a, R: Scalar> Course<'a, R> {
 
     /// The steps to the next instant at which there is something to do.
     fn stride(&self) -> u64 {
-        let time = self.state.time;
+        let time = self.participant.time();
         let step = self.plan.step_from(time);
         (self.watching.iter().map(|(schedule, _)| schedule))
             .chain([&self.sampling])
             .map(|schedule| schedule.stride(time, step))
             .chain(self.checkpoints.as_ref().map(|checkpoints| checkpoints.stride(time, step)))
-            .chain([steps_to(self.scene.scene.until, time, step), self.solver.stride()])
+            .chain([steps_to(self.scene.scene.until, time, step), self.participant.stride()])
             .fold(u64::MAX, u64::min)
     }
 
@@ -462,16 +431,16 @@ impl<'a, R: Scalar> Course<'a, R> {
         watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
         let steps = self.stride();
-        self.solver.advance(&mut self.state, steps, watch)?;
+        self.participant.advance(steps, watch)?;
         let last = self.is_last();
         let due = (self.checkpoints.as_mut()).is_some_and(|all| {
-            all.is_due(self.state.time, self.plan.step_from(self.state.time), last || stop)
+            all.is_due(self.participant.time(), self.plan.step_from(self.participant.time()), last || stop)
         });
         if due && let Some(checkpoints) = &self.checkpoints {
-            self.solver.bring_back(&mut self.state)?;
+            self.participant.bring_back()?;
             let progressed = Progressed {
-                time: self.state.time,
-                steps: self.state.steps,
+                time: self.participant.time(),
+                steps: self.participant.steps(),
                 wall_seconds,
                 worst_balance: self.worst_balance,
                 worst_hourglass: self.worst_hourglass,
@@ -480,13 +449,14 @@ impl<'a, R: Scalar> Course<'a, R> {
                 sampling: self.sampling,
                 outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
             };
-            let written = checkpoints.write(&progressed, &self.state, &self.solver.memory());
-            self.kept = Some(written.map_err(|error| FailureSummary::output(&error, Some(self.state.time)))?);
+            let written = checkpoints.write(&progressed, self.participant.as_ref());
+            self.kept =
+                Some(written.map_err(|error| FailureSummary::output(&error, Some(self.participant.time())))?);
         }
         // What is left of the last instant is quickly done.
         if stop && !last {
             return Err(FailureSummary::interrupted(
-                self.state.time,
+                self.participant.time(),
                 due.then_some(self.kept.as_deref()).flatten(),
             ));
         }
@@ -497,9 +467,9 @@ impl<'a, R: Scalar> Course<'a, R> {
     fn draw(&self, picture: &dyn Draw, folder: &OutputFolder) -> Result<PathBuf, OutputError> {
         let shown = self.scene.shown(self.scene.scene.until);
         let mut snapshot =
-            Snapshot::<R>::new(self.built, shown.on.as_deref(), &shown.data, shown.at, shown.curved);
-        snapshot.fill(&frame(self.built, &self.state, self.solver.as_ref()));
-        let drawn = picture.draw(snapshot.mesh(), self.state.time);
+            Snapshot::new(self.built, shown.on.as_deref(), &shown.data, shown.at, shown.curved);
+        snapshot.fill(&Frame { built: self.built, now: self.participant.instant() });
+        let drawn = picture.draw(snapshot.mesh(), self.participant.time());
         let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
         folder.write(PICTURE, &png)
     }
@@ -508,20 +478,11 @@ impl<'a, R: Scalar> Course<'a, R> {
     fn finish(&mut self) -> Result<(), FailureSummary> {
         (self.watching.iter_mut())
             .try_for_each(|(_, observer)| observer.finish())
-            .map_err(|error| FailureSummary::output(&error, Some(self.state.time)))
+            .map_err(|error| FailureSummary::output(&error, Some(self.participant.time())))
     }
 }
 
-fn frame<'a, R>(built: &'a Built, state: &'a State<R>, solver: &'a dyn Solver<R>) -> Frame<'a, R> {
-    Frame { built, state, stepper: solver.observable(), corotational: solver.corotational() }
-}
-
-fn look<R: Scalar>(
-    watching: &mut [Scheduled<R>],
-    frame: &Frame<'_, R>,
-    step: f64,
-    last: bool,
-) -> Result<(), OutputError> {
+fn look(watching: &mut [Scheduled], frame: &Frame<'_>, step: f64, last: bool) -> Result<(), OutputError> {
     for (schedule, observer) in watching {
         if schedule.is_due(frame.time(), step, last) {
             observer.see(frame)?;
@@ -531,10 +492,10 @@ fn look<R: Scalar>(
 }
 
 impl History {
-    fn sample<R: Scalar>(&mut self, built: &Built, stepper: &dyn Observable<R>, state: &State<R>) {
-        self.times.push(state.time);
-        self.energies.push(*stepper.energies());
-        let size = |constraint| stepper.reaction(constraint).iter().map(|f| f * f).sum::<f64>().sqrt();
+    fn sample(&mut self, built: &Built, now: &dyn Instant) {
+        self.times.push(now.time());
+        self.energies.push(now.energies());
+        let size = |constraint| now.reaction(constraint).iter().map(|f| f * f).sum::<f64>().sqrt();
         self.reactions.push((0..built.model.constraints.len()).map(size).collect());
     }
 }

@@ -14,7 +14,6 @@ use pliant_mechanics::model::Contradiction;
 use serde::{Deserialize, Serialize};
 
 use crate::assemble::Built;
-use crate::corotational::Remembered;
 use crate::format::{RunTable, SolverName};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
@@ -43,8 +42,6 @@ pub(crate) enum Memory<R> {
     Nothing,
     /// The equilibrium last found.
     Equilibrium(Equilibrium<R>),
-    /// Of shells and co-rotational solids.
-    Corotated(Box<Remembered>),
 }
 
 impl<R> Memory<R> {
@@ -55,7 +52,6 @@ impl<R> Memory<R> {
             Self::Equilibrium(equilibrium) => {
                 equilibrium.residual.len() == nodes && equilibrium.way.fits(nodes)
             }
-            Self::Corotated(remembered) => remembered.fits(nodes),
         }
     }
 }
@@ -96,7 +92,7 @@ pub struct Equilibria {
     pub displacement_error: f64,
 }
 
-/// Brings a state from instant to instant.
+/// Brings the state of solids in large strain from instant to instant.
 pub(crate) trait Solver<R>: Send {
     /// Makes what can be asked belong to the state's instant, and of the state what is wanted.
     fn evaluate(&mut self, state: &mut State<R>, wanted: Wanted) -> Result<(), FailureSummary>;
@@ -171,33 +167,8 @@ pub(crate) trait Solver<R>: Send {
     /// Goes on where another solver, with steps of length `step` [s], has stood at a state.
     fn go_on(&mut self, _clock: &Clock, _step: f64, _state: &State<R>) {}
 
-    /// Of shells and co-rotational solids: their state, with rotations.
-    fn corotational(&self) -> Option<&pliant_implicit::State> {
-        None
-    }
-
     /// How good its equilibria are; `None` of one that finds none by dynamic relaxation.
     fn equilibria(&self) -> Option<Equilibria> {
-        None
-    }
-
-    /// Why it is at its end before the time of the scene is over.
-    fn ended(&self) -> Option<&str> {
-        None
-    }
-
-    /// After a step that failed: whether what it found on the way is to be shown; the state's time then is that of it.
-    fn keeps_what_it_found(&mut self, _state: &mut State<R>) -> bool {
-        false
-    }
-
-    /// Residuals of its last iterations, as a table; `None` of one that solves no equations.
-    fn convergence(&self) -> Option<String> {
-        None
-    }
-
-    /// What its equations took; `None` of one that solves none.
-    fn effort(&self) -> Option<Effort> {
         None
     }
 }

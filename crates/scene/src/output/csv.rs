@@ -4,7 +4,6 @@ use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use pliant_explicit::Scalar;
 use pliant_geometry::{Locator, Vector3};
 use pliant_implicit::Carried;
 
@@ -14,6 +13,7 @@ use super::file::{create, reopen};
 use super::{Frame, Observer, OutputError, Written, fields};
 use crate::assemble::{BodyCells, Built};
 use crate::format::{CsvTable, FieldName, ProbeTable};
+use crate::participant::CellsNow;
 
 pub(super) struct Rows {
     path: PathBuf,
@@ -122,9 +122,9 @@ impl Samples {
     }
 
     /// Adds the sample of an instant to a row.
-    pub(crate) fn read<R: Scalar>(&mut self, frame: &Frame<'_, R>, row: &mut Vec<f64>) {
+    pub(crate) fn read(&mut self, frame: &Frame<'_>, row: &mut Vec<f64>) {
         for &constraint in &self.reactions {
-            row.extend(frame.stepper.reaction(constraint));
+            row.extend(frame.now.reaction(constraint));
         }
         for (point, held) in
             self.moments.iter().flat_map(|(point, all)| all.iter().map(move |held| (point, held)))
@@ -132,10 +132,10 @@ impl Samples {
             row.extend(held.moment(frame, *point));
         }
         if self.energy {
-            let e = frame.stepper.energies();
+            let e = frame.now.energies();
             row.extend([e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]);
         }
-        if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
+        if let (Some(part), Some(state)) = (&frame.built.corotational, frame.now.shells()) {
             if self.energy && !part.model.facets.is_empty() {
                 // An element that has no energy ends the run with a reason.
                 let parts = state.shell_energy(&part.model).unwrap_or_default();
@@ -148,13 +148,14 @@ impl Samples {
         let of_cells: Vec<FieldName> =
             self.probes.iter().flat_map(|probe| &probe.fields).filter(|f| !f.is_nodal()).copied().collect();
         let cells_wanted = !of_cells.is_empty();
-        let cells = cells_wanted.then(|| fields::Cells::new(frame, &of_cells));
-        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.corotational)
+        let cells =
+            cells_wanted.then(|| frame.now.cells(of_cells.contains(&FieldName::ElementStep))).flatten();
+        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.now.shells())
         {
             self.corotated.fill(&part.model, state, &of_cells);
         }
         for probe in &self.probes {
-            probe.read(frame, cells.as_ref(), &self.corotated, row);
+            probe.read(frame, cells.as_deref(), &self.corotated, row);
         }
     }
 }
@@ -186,18 +187,18 @@ fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
 
 impl Held {
     /// The moment [N m] of the forces and moments on the nodes about a point [m].
-    fn moment<R: Scalar>(&self, frame: &Frame<'_, R>, point: [f64; 3]) -> [f64; 3] {
+    fn moment(&self, frame: &Frame<'_>, point: [f64; 3]) -> [f64; 3] {
         let mut sum = Vector3::zeros();
         for &(node, own) in &self.0 {
             let node = node as usize;
             let masked = |value: [f64; 3], first: usize| {
                 Vector3::from_fn(|c, _| if own[first + c] { value[c] } else { 0.0 })
             };
-            let displacement = frame.state.displacement[node].map(R::to_f64);
+            let displacement = frame.now.displacement(node);
             let arm = Vector3::from(frame.built.model.rest[node]) + Vector3::from(displacement)
                 - Vector3::from(point);
-            sum += arm.cross(&masked(frame.stepper.nodal_reaction(node), 0));
-            sum += masked(frame.stepper.nodal_reaction_moment(node), 3);
+            sum += arm.cross(&masked(frame.now.nodal_reaction(node), 0));
+            sum += masked(frame.now.nodal_reaction_moment(node), 3);
         }
         sum.into()
     }
@@ -283,10 +284,10 @@ impl Rows {
 }
 
 /// Where a point of a surface on a shell is [m].
-fn carried<R>(frame: &Frame<'_, R>, point: &Carried) -> Vector3 {
+fn carried(frame: &Frame<'_>, point: &Carried) -> Vector3 {
     let part = frame.built.corotational.as_ref();
     let found =
-        part.and_then(|part| Some(part.surface.as_ref()?.carried(&part.model, frame.corotational?, point)));
+        part.and_then(|part| Some(part.surface.as_ref()?.carried(&part.model, frame.now.shells()?, point)));
     found.unwrap_or_else(|| Vector3::repeat(f64::NAN))
 }
 
@@ -308,8 +309,8 @@ pub(super) fn last_time(path: &Path) -> Option<f64> {
     text.strip_suffix('\n')?.lines().next_back()?.split(',').next()?.parse().ok()
 }
 
-impl<R: Scalar> Observer<R> for Rows {
-    fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
+impl Observer for Rows {
+    fn see(&mut self, frame: &Frame<'_>) -> Result<(), OutputError> {
         self.row.clear();
         self.row.push(frame.time());
         self.samples.read(frame, &mut self.row);
@@ -383,10 +384,10 @@ impl Probe {
         Self { weights, cell, fields }
     }
 
-    fn read<R: Scalar>(
+    fn read(
         &self,
-        frame: &Frame<'_, R>,
-        cells: Option<&fields::Cells<'_, R>>,
+        frame: &Frame<'_>,
+        cells: Option<&dyn CellsNow>,
         corotated: &fields::Corotated,
         row: &mut Vec<f64>,
     ) {

@@ -1,6 +1,5 @@
 //! The curved surface of shells as a mesh of small triangles.
 
-use pliant_explicit::Scalar;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 use pliant_implicit::{CurvedSurface, EdgeRule, Picture, PictureFields};
 
@@ -72,8 +71,8 @@ impl Curved {
     }
 
     /// Puts the wanted fields and the normals of an instant into the mesh.
-    pub(super) fn fill<R: Scalar>(&mut self, mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName]) {
-        let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) else { return };
+    pub(super) fn fill(&mut self, mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName]) {
+        let (Some(part), Some(state)) = (&frame.built.corotational, frame.now.shells()) else { return };
         let model = &part.model;
         self.found.fill(&self.picture, &self.surface, model, state);
         self.cells.fill(model, state, wanted);

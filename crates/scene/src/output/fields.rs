@@ -1,9 +1,7 @@
 //! Values of the fields a user can ask for, at nodes and cells.
 
 use nalgebra::Matrix3;
-use pliant_explicit::Scalar;
-use pliant_explicit::recover::{CellFields, Recovery};
-use pliant_explicit::stability::cell_limit;
+use pliant_explicit::recover::CellFields;
 use pliant_implicit::{Model, ShellFields, SolidFields, State};
 use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
@@ -15,46 +13,19 @@ use crate::format::FieldName;
 pub(super) type Value = [f64; 9];
 
 /// The value of a nodal field on a node of the model; the first `components` numbers count.
-pub(super) fn nodal<R: Scalar>(frame: &Frame<'_, R>, field: FieldName, node: usize) -> Value {
+pub(super) fn nodal(frame: &Frame<'_>, field: FieldName, node: usize) -> Value {
     let vector = match field {
-        FieldName::Velocity => frame.stepper.velocity(frame.state, node),
-        FieldName::Reaction => frame.stepper.nodal_reaction(node),
-        FieldName::ReactionMoment => frame.stepper.nodal_reaction_moment(node),
-        FieldName::Rotation => {
-            frame.corotational.map_or([0.0; 3], |state| state.rotation[node].scaled_axis().into())
-        }
-        _ => frame.state.displacement[node].map(R::to_f64),
+        FieldName::Velocity => frame.now.velocity(node),
+        FieldName::Reaction => frame.now.nodal_reaction(node),
+        FieldName::ReactionMoment => frame.now.nodal_reaction_moment(node),
+        FieldName::Rotation => frame.now.rotation(node),
+        _ => frame.now.displacement(node),
     };
     padded(&vector)
 }
 
-/// Finds the fields of cells of solids at an instant.
-pub(super) struct Cells<'a, R> {
-    recovery: Recovery<'a, R>,
-    model: &'a pliant_mechanics::Model,
-    displacement: &'a [[R; 3]],
-    /// Whether their stable steps are wanted, which cost far more than the rest.
-    steps: bool,
-}
-
-/// Fields of a cell, and its stable step [s] if it was wanted.
-pub(super) struct Found(CellFields, Option<f64>);
-
-impl<'a, R: Scalar> Cells<'a, R> {
-    pub fn new(frame: &Frame<'a, R>, wanted: &[FieldName]) -> Self {
-        let (model, displacement) = (&frame.built.model, &frame.state.displacement);
-        let recovery = Recovery::new(model, frame.state);
-        Self { recovery, model, displacement, steps: wanted.contains(&FieldName::ElementStep) }
-    }
-
-    pub fn at(&self, solid: usize, cell: usize) -> Found {
-        let step = self.steps.then(|| cell_limit(self.model, solid, cell, self.displacement));
-        Found(self.recovery.cell(solid, cell), step)
-    }
-}
-
 /// The value of a cell field; the first `components` numbers count.
-pub(super) fn of_cell(Found(fields, step): &Found, field: FieldName) -> Value {
+pub(super) fn of_cell((fields, step): &(CellFields, Option<f64>), field: FieldName) -> Value {
     match field {
         FieldName::ElementStep => padded(&[step.unwrap_or(f64::NAN)]),
         FieldName::CauchyStress => tensor(&fields.cauchy_stress),

@@ -14,7 +14,6 @@ mod vtu;
 
 use std::path::{Path, PathBuf};
 
-use pliant_explicit::{Observable, Scalar, State};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use file::{check_own_folder, replace};
@@ -34,6 +33,7 @@ pub(crate) use snapshot::Snapshot;
 pub(crate) use summary::{INTERRUPTED, bodies, markdown, summarise, told_limit};
 
 use crate::assemble::Built;
+use crate::participant::Instant;
 use crate::registry::OutputTable;
 use crate::scene::Scene;
 
@@ -58,24 +58,21 @@ impl OutputError {
 }
 
 /// One instant of a run, seen between the two halves of a step.
-pub(crate) struct Frame<'a, R> {
+pub(crate) struct Frame<'a> {
     pub built: &'a Built,
-    pub state: &'a State<R>,
-    pub stepper: &'a dyn Observable<R>,
-    /// Of shells and co-rotational solids: their state, with rotations.
-    pub corotational: Option<&'a pliant_implicit::State>,
+    pub now: &'a dyn Instant,
 }
 
-impl<R: Scalar> Frame<'_, R> {
+impl Frame<'_> {
     pub fn time(&self) -> f64 {
-        self.state.time
+        self.now.time()
     }
 }
 
 /// Looks at the instants of a run.
-pub(crate) trait Observer<R> {
+pub(crate) trait Observer {
     /// Writes down an instant.
-    fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError>;
+    fn see(&mut self, frame: &Frame<'_>) -> Result<(), OutputError>;
 
     /// What is written so far.
     fn written(&self) -> Written;
@@ -151,23 +148,23 @@ pub(crate) fn steps_to(goal: f64, time: f64, step: f64) -> u64 {
 }
 
 /// An observer with its schedule.
-pub(crate) type Scheduled<R> = (Schedule, Box<dyn Observer<R>>);
+pub(crate) type Scheduled = (Schedule, Box<dyn Observer>);
 
 /// The observers of a scene's outputs. Their files are opened here; all paths go to `files`. Those of a run that goes
 /// on take up what is `written`.
-pub(crate) fn observers<R: Scalar>(
+pub(crate) fn observers(
     scene: &Scene,
     built: &Built,
     folder: &Path,
     files: &mut Vec<PathBuf>,
     written: Option<&[(Schedule, Written)]>,
-) -> Result<Vec<Scheduled<R>>, OutputError> {
-    let mut all: Vec<Scheduled<R>> = Vec::new();
+) -> Result<Vec<Scheduled>, OutputError> {
+    let mut all: Vec<Scheduled> = Vec::new();
     for (index, (name, table)) in scene.outputs.iter().enumerate() {
         let before = written.and_then(|written| written.get(index));
-        let (every, observer): (f64, Box<dyn Observer<R>>) = match table {
+        let (every, observer): (f64, Box<dyn Observer>) = match table {
             OutputTable::Vtu(table) => {
-                let mut series = vtu::Series::<R>::new(built, table, folder, name)?;
+                let mut series = vtu::Series::new(built, table, folder, name)?;
                 if let Some((_, Written::Frames(times))) = before {
                     series.take_up(times);
                 }

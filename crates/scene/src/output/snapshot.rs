@@ -1,8 +1,5 @@
 //! A body, all bodies or a carried surface as a mesh with the fields of an instant. Points are at rest.
 
-use std::marker::PhantomData;
-
-use pliant_explicit::Scalar;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use rayon::prelude::*;
 
@@ -12,12 +9,11 @@ use crate::assemble::{BodyCells, Built, Corotational};
 use crate::format::{At, FieldName};
 
 /// A mesh that takes the fields of instants.
-pub(crate) struct Snapshot<R> {
+pub(crate) struct Snapshot {
     mesh: Mesh,
     fields: Vec<FieldName>,
     at: At,
     content: Content,
-    number: PhantomData<R>,
 }
 
 /// What the points and cells of the mesh are in the model.
@@ -32,7 +28,7 @@ enum Content {
     Curved(Box<super::curved::Curved>),
 }
 
-impl<R: Scalar> Snapshot<R> {
+impl Snapshot {
     /// Of a body or surface by name, or of all bodies; with `curved`, of the curved surface of shells.
     pub fn new(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Self {
         let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
@@ -50,7 +46,7 @@ impl<R: Scalar> Snapshot<R> {
         let named = |(label, name): (i32, Option<&str>)| Some((label, name?.to_owned()));
         let label_names = built.labels(on).iter().filter_map(named).collect();
         let mesh = Mesh { label_names, ..mesh };
-        Self { mesh, fields: fields.to_vec(), at, content, number: PhantomData }
+        Self { mesh, fields: fields.to_vec(), at, content }
     }
 
     /// The mesh, with the fields of the last instant.
@@ -73,7 +69,7 @@ impl<R: Scalar> Snapshot<R> {
     }
 
     /// Takes the fields of an instant.
-    pub fn fill(&mut self, frame: &Frame<'_, R>) {
+    pub fn fill(&mut self, frame: &Frame<'_>) {
         match &mut self.content {
             Content::Surface(index) => {
                 if let Some(displacement) = carried_on_shell(frame, *index) {
@@ -90,7 +86,7 @@ impl<R: Scalar> Snapshot<R> {
             }
             Content::Corotational { nodes, cells, fields } => {
                 fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
-                if let (Some(part), Some(state)) = (&frame.built.corotational, frame.corotational) {
+                if let (Some(part), Some(state)) = (&frame.built.corotational, frame.now.shells()) {
                     fields.fill(&part.model, state, &self.fields);
                     fill_corotational(&mut self.mesh, &part.model, fields, &self.fields, self.at, cells);
                 }
@@ -101,7 +97,7 @@ impl<R: Scalar> Snapshot<R> {
 }
 
 /// Fields on a carried surface; those of cells as means at the nodes.
-fn fill_surface<R: Scalar>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], surface: usize) {
+fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surface: usize) {
     let model = &frame.built.model;
     let mapping = &model.surfaces[surface].mapping;
     let (nodal, of_cells): (Vec<FieldName>, Vec<FieldName>) =
@@ -118,7 +114,7 @@ fn fill_surface<R: Scalar>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[Fiel
     if of_cells.is_empty() {
         return;
     }
-    let fields_of = fields::Cells::new(frame, &of_cells);
+    let Some(fields_of) = frame.now.cells(of_cells.contains(&FieldName::ElementStep)) else { return };
     let mut averages = Averages::new(model.node_count(), &of_cells);
     for (index, solid) in model.solids.iter().enumerate() {
         let cells: Vec<_> =
@@ -205,11 +201,11 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
 }
 
 /// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
-pub(super) fn carried_on_shell<R>(frame: &Frame<'_, R>, surface: usize) -> Option<Vec<Vector3>> {
+pub(super) fn carried_on_shell(frame: &Frame<'_>, surface: usize) -> Option<Vec<Vector3>> {
     let part = frame.built.corotational.as_ref()?;
     let (points, curved) = (part.carried.get(&surface)?, part.surface.as_ref()?);
     let mut positions = vec![Vector3::zeros(); points.len()];
-    curved.carried_all(&part.model, frame.corotational?, points, &mut positions);
+    curved.carried_all(&part.model, frame.now.shells()?, points, &mut positions);
     for (position, rest) in positions.iter_mut().zip(&frame.built.surfaces[surface].points) {
         *position -= rest;
     }
@@ -290,7 +286,7 @@ fn fill_corotational(
     }
 }
 
-fn fill_nodal<R: Scalar>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldName], nodes: &[u32]) {
+fn fill_nodal(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], nodes: &[u32]) {
     for &field in wanted.iter().filter(|field| field.is_nodal()) {
         let value = |&node: &u32| {
             let value = fields::nodal(frame, field, node as usize);
@@ -301,19 +297,13 @@ fn fill_nodal<R: Scalar>(mesh: &mut Mesh, frame: &Frame<'_, R>, wanted: &[FieldN
     }
 }
 
-fn fill_cells<R: Scalar>(
-    mesh: &mut Mesh,
-    frame: &Frame<'_, R>,
-    wanted: &[FieldName],
-    at: At,
-    cells: &[Vec<(u32, u32)>],
-) {
+fn fill_cells(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], at: At, cells: &[Vec<(u32, u32)>]) {
     let wanted: Vec<FieldName> = wanted.iter().copied().filter(|field| !field.is_nodal()).collect();
     if wanted.is_empty() {
         return;
     }
     let model = &frame.built.model;
-    let fields_of = fields::Cells::new(frame, &wanted);
+    let Some(fields_of) = frame.now.cells(wanted.contains(&FieldName::ElementStep)) else { return };
     let mut averages = Averages::new(mesh.points.len(), &wanted);
     for (block, places) in mesh.blocks.iter_mut().zip(cells) {
         let recovered: Vec<_> =
@@ -428,7 +418,7 @@ nodes = { label = "left" }
         let model = &built.corotational.as_ref().unwrap().model;
         assert_eq!([0, 1].map(|facet| model.facets[facet].thickness), [1e-3, 2e-3]);
         let labels = |on: Option<&str>, curved: Option<u32>| {
-            let snapshot = Snapshot::<f64>::new(&built, on, &[], At::Cells, curved);
+            let snapshot = Snapshot::new(&built, on, &[], At::Cells, curved);
             assert_eq!(snapshot.mesh().label_names, wall.label_names);
             snapshot.mesh().blocks[0].data["label"].values.clone()
         };

@@ -5,7 +5,6 @@ use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use pliant_explicit::Scalar;
 use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_vtu};
 
 use super::file::{check_own_folder, replace};
@@ -14,17 +13,17 @@ use super::{Frame, Observer, OutputError, Written};
 use crate::assemble::Built;
 use crate::format::VtuTable;
 
-pub(super) struct Series<R> {
+pub(super) struct Series {
     folder: PathBuf,
     index: PathBuf,
     name: String,
     times: Vec<f64>,
     /// Times of the frames that an interrupted run had written beyond these; their files stay until they are replaced.
     beyond: Vec<f64>,
-    snapshot: Snapshot<R>,
+    snapshot: Snapshot,
 }
 
-impl<R: Scalar> Series<R> {
+impl Series {
     pub(super) fn new(
         built: &Built,
         table: &VtuTable,
@@ -67,12 +66,11 @@ impl<R: Scalar> Series<R> {
     }
 }
 
-impl<R: Scalar> Observer<R> for Series<R> {
-    fn see(&mut self, frame: &Frame<'_, R>) -> Result<(), OutputError> {
+impl Observer for Series {
+    fn see(&mut self, frame: &Frame<'_>) -> Result<(), OutputError> {
         self.snapshot.fill(frame);
         let path = self.folder.join(frame_name(self.times.len()));
-        let options =
-            VtuOptions { compress: true, single: R::PRECISION == "single", time: Some(frame.time()) };
+        let options = VtuOptions { compress: true, single: frame.now.is_single(), time: Some(frame.time()) };
         let written = replace(&path, |file| {
             let mut writer = BufWriter::new(file);
             write_vtu(&mut writer, self.snapshot.mesh(), &options).map_err(|error| match error {
@@ -106,7 +104,7 @@ impl<R: Scalar> Observer<R> for Series<R> {
     }
 }
 
-impl<R> Series<R> {
+impl Series {
     fn remove_beyond(&mut self) -> Result<(), OutputError> {
         for index in 0..std::mem::take(&mut self.beyond).len() {
             let path = self.folder.join(frame_name(self.times.len() + index));
