@@ -9,13 +9,14 @@ use std::error::Error;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
 use pliant_imaging::{Cleaning, Image, LabelImage, ReadOptions, Region, read};
 use pliant_meshing::{Hausdorff, TriangleMesh};
 use pliant_scene::source::Source;
-use pliant_scene::{OutputFolder, Scene, build, plan, run};
+use pliant_scene::{OutputFolder, Scene, World, build, plan, run};
 
 /// Density of all tissue [kg/m³].
 const DENSITY: f64 = 1060.0;
@@ -188,7 +189,7 @@ impl Scan {
         build(&Scene::from_source(Source::parse("alone", alone)?, folder.into())?)?;
         let seconds = started.elapsed().as_secs_f64();
         let scene = Scene::from_source(Source::parse("scene.toml", text)?, folder.into())?;
-        let built = build(&scene)?;
+        let built = Arc::new(build(&scene)?);
         for warning in &built.warnings {
             println!("<!-- {}: {} -->", self.name, warning.message);
         }
@@ -207,7 +208,7 @@ impl Scan {
         let (seen, voxels) = (seen?, voxels?);
         let off = Hausdorff::between(&seen, &voxels, voxels.diagonal() / 300.0);
         let results = OutputFolder::prepare(folder.join("out"), &scene, true)?;
-        let summary = run(&scene, &built, &plan, &results, &mut |_| {})?;
+        let summary = run(&World::of(&scene, &built, &plan), &results, &mut |_| {})?;
         let mut row = String::new();
         write!(
             row,

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use pliant_scene::{OutputFolder, Scene, build, open, plan, run};
+use pliant_scene::{OutputFolder, Scene, World, open, run};
 use pliant_validation::{claim, numbers, reference};
 
 /// The table over time that a scene wrote.
@@ -41,11 +41,10 @@ fn table(name: &str, changes: &[&str]) -> Table {
         source.assign(change).unwrap_or_else(|error| panic!("{change}: {error:?}"));
     }
     let scene = Scene::from_source(source, folder).unwrap_or_else(|error| panic!("{}", error.plain()));
-    let built = build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
-    let plan = plan(&scene, &built).unwrap_or_else(|error| panic!("{}", error.plain()));
+    let world = World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
     let out = tempfile::tempdir().unwrap();
     let outputs = OutputFolder::prepare(out.path().join(name), &scene, false).unwrap();
-    let summary = run(&scene, &built, &plan, &outputs, &mut |_| {}).unwrap();
+    let summary = run(&world, &outputs, &mut |_| {}).unwrap();
     let told = serde_json::to_value(&summary).unwrap();
     assert_eq!(told["status"], "done", "{name}: {told}");
     let text = std::fs::read_to_string(outputs.path().join("history.csv")).unwrap();

@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::io;
 use pliant_gpu::{Adapter, GpuError};
-use pliant_scene::diagnostic::{Diagnostic, SceneErrors};
+use pliant_scene::diagnostic::Diagnostic;
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
-    Built, Checkpoint, Draw, MeshCache, Meshing, Options, OutputFolder, Plan, Reads, Scene, Sweep,
-    SweepOptions, niftysim, number, reference, registry,
+    Checkpoint, Draw, MeshCache, Meshing, Options, OutputFolder, Reads, Scene, Sweep, SweepOptions, World,
+    niftysim, number, reference, registry,
 };
 use serde_json::{Value as Json, json};
 use tempfile::TempDir;
@@ -54,7 +54,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
 }
 
 /// Reads, builds and plans a scene; warnings go to standard error.
-pub fn prepare(path: &Path, overrides: &Overrides) -> Result<(Scene, Arc<Built>, Plan), Failure> {
+pub fn prepare(path: &Path, overrides: &Overrides) -> Result<World, Failure> {
     prepare_changed(path, overrides, |_| {})
 }
 
@@ -63,7 +63,7 @@ pub fn prepare_changed(
     path: &Path,
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
-) -> Result<(Scene, Arc<Built>, Plan), Failure> {
+) -> Result<World, Failure> {
     let Opened { mut source, folder, assumed, _translated } =
         open(path, overrides.sandbox, overrides.allow_partial)?;
     let mut mistakes: Vec<_> =
@@ -96,19 +96,21 @@ pub fn prepare_changed(
     }
     let mut scene = Scene::from_source(source, folder)?;
     change(&mut scene);
-    let mut built = build(&scene, &mesh_cache(overrides.no_cache))?;
-    built.warnings.extend(assumed.map(Diagnostic::warning));
-    if !built.warnings.is_empty() {
-        report::show(&scene.source.errors(built.warnings.clone()));
+    let mut world = build(&scene, &mesh_cache(overrides.no_cache))?;
+    if let Some(assumed) = assumed {
+        world.doubt(Diagnostic::warning(assumed));
     }
-    let plan = in_pool(&scene, || pliant_scene::plan(&scene, &built))?;
-    Ok((scene, Arc::new(built), plan))
+    let warnings: Vec<Diagnostic> = world.warnings().cloned().collect();
+    if !warnings.is_empty() {
+        report::show(&scene.source.errors(warnings));
+    }
+    Ok(world)
 }
 
 /// Builds a scene; a bar shows the progress of meshes from images.
-fn build(scene: &Scene, cache: &MeshCache) -> Result<Built, Failure> {
+fn build(scene: &Scene, cache: &MeshCache) -> Result<World, Failure> {
     let bar: OnceCell<Bar> = OnceCell::new();
-    let built = pliant_scene::build_watched(scene, cache, &|meshing| {
+    let built = World::assemble(scene, cache, &|meshing| {
         let Meshing { body, part, now } = meshing;
         bar.get_or_init(Bar::new).update_mesh(part, format!("mesh of `{body}`: {now}"));
     });
@@ -197,16 +199,6 @@ fn mesh_cache(off: bool) -> MeshCache {
     if off { MeshCache::off() } else { MeshCache::of_user() }
 }
 
-/// Runs `work` on the scene's number of threads.
-fn in_pool<T: Send>(
-    scene: &Scene,
-    work: impl FnOnce() -> Result<T, SceneErrors> + Send,
-) -> Result<T, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(scene.run.threads as usize).build();
-    let pool = pool.map_err(|error| Failure::plain(error, "try fewer `threads`"))?;
-    Ok(pool.install(work)?)
-}
-
 /// The folder of a run that starts at rest.
 fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure> {
     let file = pliant_scene::scene_file(&arguments.scene);
@@ -216,26 +208,26 @@ fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure>
 
 fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     let checkpoint = arguments.resume.as_deref().map(Checkpoint::read).transpose()?;
-    let (scene, built, mut plan) = prepare(&arguments.scene, &arguments.overrides)?;
+    let mut world = prepare(&arguments.scene, &arguments.overrides)?;
     if let Some(checkpoint) = &checkpoint {
-        plan = checkpoint.continues(&scene, &built, &plan)?;
+        world = checkpoint.continues(&world)?;
     }
     if !arguments.long {
         let before = checkpoint.as_ref().map_or(0.0, Checkpoint::time);
-        refuse_very_long(&scene, &built, &plan, before)?;
+        refuse_very_long(&world, before)?;
     }
     let folder = match &checkpoint {
         Some(checkpoint) => {
             let own = checkpoint.path().parent().unwrap_or(Path::new(""));
             let path = arguments.out.clone().unwrap_or_else(|| own.to_owned());
-            OutputFolder::reopen(path, &scene, checkpoint)?
+            OutputFolder::reopen(path, &world.scene, checkpoint)?
         }
-        None => fresh_folder(arguments, &scene)?,
+        None => fresh_folder(arguments, &world.scene)?,
     };
-    for note in built.notes.iter().chain(&plan.note).chain(&plan.target.note) {
+    for note in world.notes() {
         eprintln!("note: {note}");
     }
-    let photographer = arguments.picture.then(|| pictures::Photographer::new(&scene, &built)).transpose()?;
+    let photographer = arguments.picture.then(|| pictures::Photographer::new(&world)).transpose()?;
     let bar = Bar::new();
     let options = Options {
         resume: checkpoint.as_ref(),
@@ -243,7 +235,7 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
         picture: photographer.as_ref().map(|photographer| photographer as &dyn Draw),
     };
     let mut report = |progress| bar.update(progress);
-    let result = pliant_scene::run_with(&scene, &built, &plan, &folder, options, &mut report);
+    let result = pliant_scene::run_with(&world, &folder, options, &mut report);
     bar.finish();
     let interrupted = matches!(&result, Ok(summary) if summary.status == "interrupted");
     let (words, failure, json) = match result {
@@ -275,17 +267,20 @@ const FEW_STEPS: f64 = 1e6;
 const A_DAY: f64 = 86_400.0;
 
 /// Rejects a run of more than a day, estimated from its first steps.
-fn refuse_very_long(scene: &Scene, built: &Arc<Built>, plan: &Plan, before: f64) -> Result<(), Failure> {
-    let steps = (scene.scene.until - before) / plan.step;
+fn refuse_very_long(world: &World, before: f64) -> Result<(), Failure> {
+    let scene = &world.scene;
+    let steps = (scene.scene.until - before) / world.step();
     if steps < FEW_STEPS {
         return Ok(());
     }
-    let Some(each) = in_pool(scene, || Ok(seconds_of_a_step(scene, built, plan)))? else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(scene.run.threads as usize).build();
+    let pool = pool.map_err(|error| Failure::plain(error, "try fewer `threads`"))?;
+    let Some(each) = pool.install(|| seconds_of_a_step(world)) else { return Ok(()) };
     let wall = steps * each;
     if wall < A_DAY {
         return Ok(());
     }
-    let [simulated, step] = [scene.scene.until - before, plan.step].map(number);
+    let [simulated, step] = [scene.scene.until - before, world.step()].map(number);
     let message = format!(
         "the run takes {} steps of {step} s for {simulated} s, about {} on this machine",
         number(steps),
@@ -304,9 +299,9 @@ fn days(seconds: f64) -> String {
 }
 
 /// Wall time [s] of a step, from the first steps; `None` if they fail.
-fn seconds_of_a_step(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Option<f64> {
+fn seconds_of_a_step(world: &World) -> Option<f64> {
     const ENOUGH: Duration = Duration::from_millis(100);
-    let mut live = pliant_scene::live(scene, built, plan).ok()?;
+    let mut live = pliant_scene::live(&Arc::new(world.clone())).ok()?;
     let (started, mut steps) = (Instant::now(), 0);
     while started.elapsed() < ENOUGH {
         steps += live.advance(u64::MAX).ok()?.max(1);
@@ -397,8 +392,8 @@ fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
 }
 
 fn check(arguments: &Check) -> Result<ExitCode, Failure> {
-    let (scene, built, plan) = prepare(&arguments.scene, &arguments.overrides)?;
-    say(pliant_scene::overview(&scene, &built, &plan).trim_end())?;
+    let world = prepare(&arguments.scene, &arguments.overrides)?;
+    say(pliant_scene::overview(&world).trim_end())?;
     Ok(ExitCode::SUCCESS)
 }
 

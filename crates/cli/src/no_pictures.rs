@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use pliant_geometry::Mesh;
-use pliant_scene::{Built, Draw, Scene};
+use pliant_scene::{Draw, World};
 
 use crate::arguments::{Render, View};
 use crate::report::Failure;
@@ -29,7 +29,7 @@ pub fn view(_arguments: &View) -> Result<ExitCode, Failure> {
 pub enum Photographer {}
 
 impl Photographer {
-    pub fn new(_scene: &Scene, _built: &Built) -> Result<Self, Failure> {
+    pub fn new(_world: &World) -> Result<Self, Failure> {
         Err(missing())
     }
 }

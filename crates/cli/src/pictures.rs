@@ -10,7 +10,7 @@ use pliant_picture::{
 };
 use pliant_scene::format::{BackgroundName, FieldName, MapName, TextureName, UpName, VtuTable};
 use pliant_scene::registry::OutputTable;
-use pliant_scene::{Built, Draw, Options, OutputFolder, Scene};
+use pliant_scene::{Draw, Options, OutputFolder, Scene, World};
 
 use crate::arguments::{Frames, Overrides, Render};
 use crate::commands::prepare_changed;
@@ -172,8 +172,8 @@ pub struct Photographer {
 }
 
 impl Photographer {
-    pub fn new(scene: &Scene, built: &Built) -> Result<Self, Failure> {
-        let look = Look { hide: built.hidden(&scene.view), ..look_of(scene) };
+    pub fn new(world: &World) -> Result<Self, Failure> {
+        let look = Look { hide: world.hidden(&world.scene.view), ..look_of(&world.scene) };
         Ok(Self { look, graphics: Graphics::open()? })
     }
 }
@@ -287,17 +287,16 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
     })?;
     let overrides = with_view(arguments);
     let mut every = 0.0;
-    let (mut scene, built, plan) =
-        prepare_changed(path, &overrides, |scene| every = forget_outputs(scene, arguments))?;
-    scene.outputs = vec![("shown".into(), OutputTable::Vtu(scene.shown(every)))];
-    let mut look = Look { hide: built.hidden(&scene.view), ..look_of(&scene) };
+    let mut world = prepare_changed(path, &overrides, |scene| every = forget_outputs(scene, arguments))?;
+    world.scene.outputs = vec![("shown".into(), OutputTable::Vtu(world.scene.shown(every)))];
+    let scene = &world.scene;
+    let mut look = Look { hide: world.hidden(&scene.view), ..look_of(scene) };
     typed(&mut look, arguments);
-    let run = OutputFolder::prepare(space.path().join("run"), &scene, false)
+    let run = OutputFolder::prepare(space.path().join("run"), scene, false)
         .map_err(|error| Failure::plain(&error, error.remedy))?;
     let bar = Bar::new();
     let options = Options { stop: Some(signals::stop()), ..Options::default() };
-    let result =
-        pliant_scene::run_with(&scene, &built, &plan, &run, options, &mut |progress| bar.update(progress));
+    let result = pliant_scene::run_with(&world, &run, options, &mut |progress| bar.update(progress));
     bar.finish();
     let summary = result.map_err(|error| Failure::plain(&error, error.remedy))?;
     for warning in &summary.warnings {

@@ -7,20 +7,15 @@ use crate::assemble::Built;
 use crate::format::{Precision, SolverName};
 use crate::output::{FailureSummary, number};
 use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::world::Part;
 
 /// Damping [1/s] times step [s] from which on a step does not resolve the damping: central differences take
 /// (1 − a) / (1 + a) of a velocity over a step, a = ½ damping × step, and 2 turns it round.
 const RESOLVED: f64 = 1.0;
 
 /// The remedy of a failed explicit step, where the run's state says more than the failure itself.
-pub(crate) fn remedy(
-    failure: &FailureSummary,
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
-    stability: &Stability,
-) -> Option<String> {
+pub(crate) fn remedy(failure: &FailureSummary, part: &Part, stability: &Stability) -> Option<String> {
+    let Part { scene, built, plan, .. } = part;
     if scene.run.solver != SolverName::Explicit || built.corotational.is_some() {
         return None;
     }

@@ -17,12 +17,11 @@ use crate::assemble::Built;
 use crate::corotational::Remembered;
 use crate::diagnostic::counted;
 use crate::format::{LoadSteps, Precision, SolverName};
-use crate::output::{OutputError, OutputFolder, Schedule, ShellStrains, Written, number, replace};
+use crate::output::{OutputError, OutputFolder, Schedule, Written, number, replace};
 use crate::participant::{Kept, Numeric, Participant};
-use crate::plan::Plan;
-use crate::run::History;
-use crate::scene::Scene;
+use crate::run::{History, Watched};
 use crate::solver::Memory;
+use crate::world::{Part, World};
 
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
@@ -38,13 +37,22 @@ const KEPT: usize = 2;
 /// What a run was: what has to be the same to go on with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Origin {
-    precision: Precision,
-    solver: SolverName,
     /// Duration [s] of the scene, from which the step comes.
     until: f64,
+    participants: Vec<OwnOrigin>,
+    /// The outputs, with their fingerprints.
+    outputs: Vec<(String, u64)>,
+}
+
+/// The same of a participant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct OwnOrigin {
+    name: String,
+    precision: Precision,
+    solver: SolverName,
     /// Step [s].
     step: f64,
-    /// The parts of model and outputs, with their fingerprints.
+    /// The parts of the model, with their fingerprints.
     parts: Vec<(String, u64)>,
 }
 
@@ -54,11 +62,8 @@ pub(crate) struct Progressed {
     pub time: f64,
     pub steps: u64,
     pub wall_seconds: f64,
-    pub worst_balance: f64,
-    /// The largest hourglass energy over the internal one, and its time [s].
-    pub worst_hourglass: (f64, f64),
-    /// How far shells were strained.
-    pub strains: ShellStrains,
+    /// The worst that was seen of each participant.
+    pub watched: Vec<Watched>,
     /// Samples for plot and summary.
     pub history: History,
     pub sampling: Schedule,
@@ -244,12 +249,10 @@ fn differing(parts: &[String]) -> String {
     }
 }
 
-impl Origin {
-    fn of(scene: &Scene, built: &Built, plan: &Plan) -> Self {
+impl OwnOrigin {
+    fn of(Part { name, scene, built, plan }: &Part) -> Self {
         let mut parts = built.model.fingerprints();
         parts.extend(built.corotational.iter().flat_map(|part| part.fingerprints()));
-        let outputs = scene.outputs.iter();
-        parts.extend(outputs.map(|(name, table)| (format!("output `{name}`"), fingerprint(table))));
         parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));
         parts.push(("`run.on-unstable`".into(), fingerprint(&scene.run.on_unstable.unwrap_or_default())));
         parts.push(("`run.mass-scaling`".into(), fingerprint(&scene.run.mass_scaling)));
@@ -258,40 +261,59 @@ impl Origin {
         }
         parts.push(("`run.iterations`".into(), fingerprint(&scene.run.iterations)));
         parts.push(("`run.linear`".into(), fingerprint(&scene.run.linear)));
+        let (precision, solver, step) = (plan.target.precision, scene.run.solver, plan.step);
+        Self { name: name.clone(), precision, solver, step, parts }
+    }
+}
+
+impl Origin {
+    fn of(world: &World) -> Self {
+        let outputs = world.scene.outputs.iter();
         Self {
-            precision: plan.target.precision,
-            solver: scene.run.solver,
-            until: scene.scene.until,
-            step: plan.step,
-            parts,
+            until: world.scene.scene.until,
+            participants: world.participants.iter().map(OwnOrigin::of).collect(),
+            outputs: outputs.map(|(name, table)| (format!("output `{name}`"), fingerprint(table))).collect(),
         }
     }
 
+    /// All that is compared, with its fingerprint.
+    fn parts(&self) -> Vec<(String, u64)> {
+        let own = self.participants.iter().flat_map(|own| &own.parts);
+        let names: Vec<&String> = self.participants.iter().map(|own| &own.name).collect();
+        let mut parts: Vec<_> = own.chain(&self.outputs).cloned().collect();
+        parts.push(("the list of participants".into(), fingerprint(&names)));
+        parts
+    }
+
     /// Refuses another scene, precision, solver or step. A longer `until` is no other scene.
-    fn check(&self, scene: &Scene, built: &Built, plan: &Plan) -> Result<(), ResumeError> {
-        let own = Self::of(scene, built, plan);
-        if own.precision != self.precision {
-            let [checkpoint, scene] = [self.precision, own.precision].map(Precision::word);
-            return Err(ResumeError::OtherPrecision { checkpoint, scene });
+    fn check(&self, world: &World) -> Result<(), ResumeError> {
+        let now = Self::of(world);
+        for (own, before) in now.participants.iter().zip(&self.participants) {
+            if own.precision != before.precision {
+                let [checkpoint, scene] = [before.precision, own.precision].map(Precision::word);
+                return Err(ResumeError::OtherPrecision { checkpoint, scene });
+            }
+            if own.solver != before.solver {
+                let [checkpoint, scene] = [before.solver, own.solver].map(SolverName::word);
+                return Err(ResumeError::OtherSolver { checkpoint, scene });
+            }
         }
-        if own.solver != self.solver {
-            let [checkpoint, scene] = [self.solver, own.solver].map(SolverName::word);
-            return Err(ResumeError::OtherSolver { checkpoint, scene });
-        }
-        if own.parts != self.parts {
-            let differ = |a: &Self, b: &Self| -> Vec<String> {
-                a.parts.iter().filter(|part| !b.parts.contains(part)).map(|part| part.0.clone()).collect()
+        let (own, before) = (now.parts(), self.parts());
+        if own != before {
+            let differ = |a: &[(String, u64)], b: &[(String, u64)]| -> Vec<String> {
+                a.iter().filter(|part| !b.contains(part)).map(|part| part.0.clone()).collect()
             };
-            let mut parts = differ(&own, self);
-            parts.extend(differ(self, &own));
+            let mut parts = differ(&own, &before);
+            parts.extend(differ(&before, &own));
             let mut seen = std::collections::HashSet::new();
             parts.retain(|part| seen.insert(part.clone()));
-            let until = (own.until != self.until).then_some(self.until);
+            let until = (now.until != self.until).then_some(self.until);
             return Err(ResumeError::OtherScene { parts, until });
         }
-        let step = plan.steps_of(scene, built, self.until).1;
-        if step != self.step && plan.ends.is_none() {
-            return Err(ResumeError::OtherStep { checkpoint: self.step, scene: step });
+        for (part, before) in world.lasting(self.until).participants.iter().zip(&self.participants) {
+            if part.plan.step != before.step && part.plan.ends.is_none() {
+                return Err(ResumeError::OtherStep { checkpoint: before.step, scene: part.plan.step });
+            }
         }
         Ok(())
     }
@@ -303,8 +325,8 @@ pub struct Checkpoint {
     path: PathBuf,
     origin: Origin,
     pub(crate) progressed: Progressed,
-    /// The participant, encoded.
-    participant: Vec<u8>,
+    /// The participants, each encoded.
+    participants: Vec<Vec<u8>>,
 }
 
 impl Checkpoint {
@@ -353,12 +375,8 @@ impl Checkpoint {
         if found > expected || crc32fast::hash(content).to_le_bytes() != crc {
             return Err(ResumeError::Damaged { path });
         }
-        let decoded = postcard::take_from_bytes::<Origin>(&content[HEAD..])
-            .and_then(|(origin, rest)| Ok((origin, postcard::take_from_bytes::<Progressed>(rest)?)));
-        match decoded {
-            Ok((origin, (progressed, rest))) => {
-                Ok(Self { path, origin, progressed, participant: rest.to_vec() })
-            }
+        match postcard::from_bytes(&content[HEAD..]) {
+            Ok((origin, progressed, participants)) => Ok(Self { path, origin, progressed, participants }),
             Err(_) => Err(ResumeError::Damaged { path }),
         }
     }
@@ -384,63 +402,82 @@ impl Checkpoint {
         self.progressed.time
     }
 
-    /// Whether a run that ends at a time [s] has no step left: only its last instant may still have to be written.
-    pub(crate) fn is_at_the_end(&self, until: f64) -> bool {
-        self.time() + 0.5 * self.origin.step >= until
+    /// The time [s] between common instants.
+    fn step(&self) -> f64 {
+        self.origin.participants.iter().map(|own| own.step).fold(0.0, f64::max)
     }
 
-    /// How the scene goes on from here: its plan with the step of the checkpoint. Only `until` may differ from the
-    /// scene of the interrupted run.
+    /// Whether a run that ends at a time [s] has no step left: only its last instant may still have to be written.
+    pub(crate) fn is_at_the_end(&self, until: f64) -> bool {
+        self.time() + 0.5 * self.step() >= until
+    }
+
+    /// The world that goes on from here, with the steps of the checkpoint. Only `until` may differ from that of the interrupted run.
     ///
     /// # Errors
-    /// If this is not the scene of the checkpoint, or it ends before.
-    pub fn continues(&self, scene: &Scene, built: &Built, plan: &Plan) -> Result<Plan, ResumeError> {
-        self.origin.check(scene, built, plan)?;
-        let (time, until, step) = (self.time(), scene.scene.until, self.origin.step);
+    /// If this is not the world of the checkpoint, or it ends before.
+    pub fn continues(&self, world: &World) -> Result<World, ResumeError> {
+        self.origin.check(world)?;
+        let (time, until, step) = (self.time(), world.scene.scene.until, self.step());
         // The last instant is the one nearest to the end; round-off is no reason to refuse it.
         if time > until + 0.51 * step {
             return Err(ResumeError::BeyondTheEnd { time, until });
         }
-        let whole = self.kept(built).is_some();
-        if !whole || self.progressed.outputs.len() != scene.outputs.len() {
+        if self.kept(world).is_none() || self.progressed.outputs.len() != world.scene.outputs.len() {
             return Err(ResumeError::Damaged { path: self.path.clone() });
         }
-        if plan.ends.is_some() {
-            return Ok(plan.clone());
+        let mut world = world.clone();
+        let common = (until / step - 1e-9).ceil().max(1.0) as u64;
+        for (part, own) in world.participants.iter_mut().zip(&self.origin.participants) {
+            if part.plan.ends.is_none() {
+                let ratio = (step / own.step).round().max(1.0) as u64;
+                (part.plan.step, part.plan.steps) = (own.step, common * ratio);
+            }
         }
-        Ok(Plan { step, steps: (until / step - 1e-9).ceil().max(1.0) as u64, ..plan.clone() })
+        Ok(world)
     }
 
-    /// The state with what a restart needs, if it has the sizes of the model's.
-    pub(crate) fn kept(&self, built: &Built) -> Option<Kept> {
-        let samples = self.progressed.history.reactions.iter();
-        if samples.map(Vec::len).any(|len| len != built.model.constraints.len()) {
+    /// The states with what a restart needs, if they have the sizes of the models'.
+    pub(crate) fn kept(&self, world: &World) -> Option<Vec<Kept>> {
+        let parts = &world.participants;
+        let constraints: usize = parts.iter().map(|part| part.built.model.constraints.len()).sum();
+        let whole = self.progressed.history.reactions.iter().all(|row| row.len() == constraints)
+            && self.progressed.watched.len() == parts.len()
+            && self.participants.len() == parts.len()
+            && self.origin.participants.len() == parts.len();
+        let all = parts.iter().zip(&self.participants).zip(&self.origin.participants);
+        if !whole {
             return None;
         }
-        if built.corotational.is_some() {
-            let remembered: Remembered = postcard::from_bytes(&self.participant).ok()?;
-            let fits = remembered.fits(built.model.node_count());
-            return fits.then(|| Kept::Shells(Box::new(remembered)));
-        }
-        match self.origin.precision {
-            Precision::Single => self.solids::<f32>(built),
-            Precision::Double => self.solids::<f64>(built),
-        }
+        all.map(|((part, bytes), own)| kept(&part.built, own.precision, bytes)).collect()
     }
+}
 
-    fn solids<R: Numeric>(&self, built: &Built) -> Option<Kept> {
-        let (state, memory): (State<R>, Memory<R>) = postcard::from_bytes(&self.participant).ok()?;
-        let rest = State::<R>::at_rest(&built.model);
-        let sizes = |state: &State<R>| {
-            let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
-            let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
-            (nodes, history.collect::<Vec<_>>())
-        };
-        let fits = sizes(&state) == sizes(&rest)
-            && state.stability.fits(&built.model)
-            && memory.fits(rest.displacement.len());
-        fits.then(|| R::keep(state, memory))
+/// The state of a participant from its bytes, if it has the sizes of the model's.
+fn kept(built: &Built, precision: Precision, bytes: &[u8]) -> Option<Kept> {
+    if built.corotational.is_some() {
+        let remembered: Remembered = postcard::from_bytes(bytes).ok()?;
+        let fits = remembered.fits(built.model.node_count());
+        return fits.then(|| Kept::Shells(Box::new(remembered)));
     }
+    match precision {
+        Precision::Single => solids::<f32>(built, bytes),
+        Precision::Double => solids::<f64>(built, bytes),
+    }
+}
+
+fn solids<R: Numeric>(built: &Built, bytes: &[u8]) -> Option<Kept> {
+    let (state, memory): (State<R>, Memory<R>) = postcard::from_bytes(bytes).ok()?;
+    let rest = State::<R>::at_rest(&built.model);
+    let sizes = |state: &State<R>| {
+        let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
+        let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
+        (nodes, history.collect::<Vec<_>>())
+    };
+    let fits = sizes(&state) == sizes(&rest)
+        && state.stability.fits(&built.model)
+        && memory.fits(rest.displacement.len());
+    fits.then(|| R::keep(state, memory))
 }
 
 /// Writes the checkpoints of a run.
@@ -452,16 +489,10 @@ pub(crate) struct Checkpoints<'a> {
 
 impl<'a> Checkpoints<'a> {
     /// For a run that asks for them; `time` is where it starts.
-    pub fn new(
-        scene: &Scene,
-        built: &Built,
-        plan: &Plan,
-        folder: &'a OutputFolder,
-        time: f64,
-    ) -> Option<Self> {
-        let every = scene.run.checkpoint?.every;
-        let schedule = Schedule::after(every, time, plan.step_from(time));
-        Some(Self { folder, origin: Origin::of(scene, built, plan), schedule })
+    pub fn new(world: &World, folder: &'a OutputFolder, time: f64) -> Option<Self> {
+        let every = world.scene.run.checkpoint?.every;
+        let schedule = Schedule::after(every, time, world.step_from(time));
+        Some(Self { folder, origin: Origin::of(world), schedule })
     }
 
     /// Whether one is to be written at an instant.
@@ -478,12 +509,13 @@ impl<'a> Checkpoints<'a> {
     pub fn write(
         &self,
         progressed: &Progressed,
-        participant: &dyn Participant,
+        participants: &[Box<dyn Participant>],
     ) -> Result<PathBuf, OutputError> {
         let path = self.folder.path().join(name(progressed.steps));
         let failed = |reason: &dyn std::fmt::Display| OutputError::new(&path, reason);
-        let state = participant.encode().map_err(|error| failed(&error))?;
-        let bytes = encode(&self.origin, progressed, &state).map_err(|error| failed(&error))?;
+        let states: Result<Vec<_>, _> = participants.iter().map(|participant| participant.encode()).collect();
+        let states = states.map_err(|error| failed(&error))?;
+        let bytes = encode(&self.origin, progressed, &states).map_err(|error| failed(&error))?;
         replace(&path, |file| file.write_all(&bytes).and_then(|()| file.sync_all()))
             .map_err(|error| failed(&error))?;
         let mut earlier = checkpoints_in(self.folder.path()).map_err(|error| failed(&error))?;
@@ -495,10 +527,8 @@ impl<'a> Checkpoints<'a> {
     }
 }
 
-fn encode(origin: &Origin, progressed: &Progressed, participant: &[u8]) -> postcard::Result<Vec<u8>> {
-    let mut body = postcard::to_stdvec(&(origin, progressed))?;
-    body.extend(participant);
-    Ok(Checkpoint::framed(&body))
+fn encode(origin: &Origin, progressed: &Progressed, participants: &[Vec<u8>]) -> postcard::Result<Vec<u8>> {
+    Ok(Checkpoint::framed(&postcard::to_stdvec(&(origin, progressed, participants))?))
 }
 
 const PREFIX: &str = "checkpoint-";
@@ -532,28 +562,24 @@ mod tests {
     use pliant_explicit::Equilibrium;
 
     use super::*;
-    use crate::plan::plan;
     use crate::testing::{built, scene};
 
     const CHECKPOINTED: &str = "[run]\ncheckpoint = { every = 0.05 }\n";
 
     fn small() -> Vec<u8> {
-        let (scene, built) = (scene(CHECKPOINTED), built(CHECKPOINTED));
-        let plan = plan(&scene, &built).unwrap();
-        let state = State::<f32>::at_rest(&built.model);
+        let world = World::new(&scene(CHECKPOINTED)).unwrap();
+        let state = State::<f32>::at_rest(&world.participants[0].built.model);
         let progressed = Progressed {
             time: 0.05,
             steps: 7,
             wall_seconds: 1.0,
-            worst_balance: 0.0,
-            worst_hourglass: (0.0, 0.0),
-            strains: ShellStrains::default(),
+            watched: vec![Watched::default()],
             history: History::default(),
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
         };
         let participant = postcard::to_stdvec(&(state, Memory::<f32>::Nothing)).unwrap();
-        encode(&Origin::of(&scene, &built, &plan), &progressed, &participant).unwrap()
+        encode(&Origin::of(&world), &progressed, &[participant]).unwrap()
     }
 
     #[test]
@@ -589,13 +615,13 @@ mod tests {
     #[test]
     fn a_body_of_nonsense_with_a_right_checksum_is_refused() {
         let whole = small();
-        let built = built(CHECKPOINTED);
+        let world = World::new(&scene(CHECKPOINTED)).unwrap();
         for place in HEAD..whole.len() - CRC {
             let mut body = whole[HEAD..whole.len() - CRC].to_vec();
             body[place - HEAD] = body[place - HEAD].wrapping_add(0x7f);
             let forged = Checkpoint::framed(&body);
             if let Ok(read) = Checkpoint::from_bytes(Path::new("x.pliant"), &forged) {
-                let _ = read.kept(&built);
+                let _ = read.kept(&world);
             }
         }
     }

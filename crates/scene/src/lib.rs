@@ -24,10 +24,10 @@
 //!     nodes = { set = "z-min" }
 //! "#;
 //! let scene = Scene::from_source(Source::parse("block.toml", text)?, ".".into())?;
-//! let built = pliant_scene::build(&scene)?;
-//! let plan = pliant_scene::plan(&scene, &built)?;
-//! assert_eq!(built.model.node_count(), 27);
-//! let limits = plan.limits.unwrap();
+//! let world = pliant_scene::World::new(&scene)?;
+//! let block = world.only().unwrap();
+//! assert_eq!(block.built.model.node_count(), 27);
+//! let limits = block.plan.limits.as_ref().unwrap();
 //! assert!(limits.bound.step <= limits.limit.step);
 //! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
 //! ```
@@ -47,6 +47,7 @@ mod of_mesh;
 mod output;
 mod overview;
 mod participant;
+mod participants;
 mod plan;
 mod plausible;
 mod printable;
@@ -55,6 +56,7 @@ pub mod reference;
 pub mod registry;
 mod run;
 mod scene;
+mod simulation;
 mod solver;
 pub mod source;
 mod starter;
@@ -63,6 +65,7 @@ mod target;
 #[cfg(test)]
 mod testing;
 mod view;
+mod world;
 
 pub use assemble::{
     BodyCells, Built, BuiltBody, Control, Corotational, Meshing, SizeDoubt, Stop, build, build_watched,
@@ -75,7 +78,7 @@ pub use live::{Live, Standing, go_on, live};
 pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
 pub use output::{
     AddedMass, BodySummary, Column, FailureSummary, LoadStepSummary, OutputError, OutputFolder,
-    StabilitySummary, Summary, failed_input, failed_output, number,
+    ParticipantSummary, StabilitySummary, Summary, failed_input, failed_output, number,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};
@@ -88,3 +91,4 @@ pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;
 pub use view::Draw;
+pub use world::{Part, World};

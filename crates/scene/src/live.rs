@@ -6,17 +6,17 @@ use std::time::Duration;
 use pliant_explicit::Clock;
 use pliant_geometry::Mesh;
 use pliant_gpu::{DeviceMapping, DevicePoints, PointValue, Wanted};
-use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
+use pliant_mechanics::{Energies, fingerprint};
 
 use crate::assemble::Built;
 use crate::format::VtuTable;
 use crate::output::{Column, FailureSummary, Frame, Samples, Snapshot};
-use crate::participant::{Kept, Participant, participant, participant_from};
-use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::participant::{Kept, participant_from};
+use crate::simulation::Simulation;
+use crate::world::World;
 
-/// A scene under way, in any numbers and with any solver. After a failure it stays at the last good instant.
+/// A world under way, in any numbers and with any solvers. After a failure it stays at the last good instant.
 pub trait Live: Send {
     /// Time [s].
     fn time(&self) -> f64;
@@ -43,8 +43,15 @@ pub trait Live: Send {
     /// device that was lost.
     fn stand(&mut self) -> Option<Standing>;
 
-    /// Takes hold of points: these grips and no others act from the next step on. False where the solver knows none.
+    /// Takes hold of points: these grips and no others act from the next step on. False where a stepper knows none, or where a grip holds
+    /// nodes of several participants.
     fn hold(&mut self, grips: &[Grip]) -> bool;
+
+    /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where steps are stable with any.
+    fn stiffest(&self, grip: &Grip) -> f64;
+
+    /// The place of a node at rest [m].
+    fn rest(&self, node: u32) -> [f64; 3];
 
     /// Steps until grips that are taken now act: 1 where the instant was looked at and its forces are found, else 0.
     fn delay(&self) -> u64;
@@ -52,7 +59,7 @@ pub trait Live: Send {
     /// The point of a grip now [m], and its force on the body [N].
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2];
 
-    /// The point of what is shown, as a combination of nodes of the model.
+    /// The point of what is shown, as a combination of nodes, counted over the models of all participants.
     fn nodes_of(&self, point: u32) -> Vec<(u32, f64)>;
 
     /// Shows another series.
@@ -67,8 +74,8 @@ pub trait Live: Send {
     /// Energies at the instant last evaluated [J].
     fn energies(&self) -> Energies;
 
-    /// Force [N] that holds or moves the nodes of a constraint, at the instant last evaluated.
-    fn reaction(&self, constraint: usize) -> [f64; 3];
+    /// Forces [N] that hold or move the nodes of each constraint of all participants, at the instant last evaluated.
+    fn reactions(&self) -> Vec<[f64; 3]>;
 
     /// What is sampled: reactions, energies and the probes of all tables of the scene, with units.
     fn columns(&self) -> Vec<Column>;
@@ -82,56 +89,50 @@ pub trait Live: Send {
 
 /// Where a run stands between two steps: all that another one needs to go on from there.
 #[derive(Clone, Debug)]
-pub struct Standing {
+pub struct Standing(Vec<OwnStanding>);
+
+/// Where a participant stands.
+#[derive(Clone, Debug)]
+struct OwnStanding {
     kept: Kept,
     clock: Option<Clock>,
     /// Length of its steps [s].
     step: f64,
 }
 
-/// Begins to play a scene.
+/// Begins to play a world.
 ///
 /// # Errors
-/// If its solver can't be made.
-pub fn live(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Result<Box<dyn Live>, FailureSummary> {
-    match begin(scene, built, plan, None)? {
-        Some(live) => Ok(live),
-        None => Err(FailureSummary::input(&"nothing to begin with")),
-    }
+/// If a stepper can't be made.
+pub fn live(world: &Arc<World>) -> Result<Box<dyn Live>, FailureSummary> {
+    Ok(Box::new(Played::new(world, Simulation::new(world, None)?)))
 }
 
-/// Plays a scene on from where a run of another one stands, with displacements, velocities and what relaxing laws remember. `None`
-/// where this one has another mesh, solver or precision than what was built `before`.
+/// Plays a world on from where a run of another one stands, with displacements, velocities and what relaxing laws remember. `None`
+/// where this one has another mesh, solver or precision than that `before`.
 ///
 /// # Errors
-/// If its solver can't be made.
+/// If a stepper can't be made.
 pub fn go_on(
-    scene: &Scene,
-    built: &Arc<Built>,
-    plan: &Plan,
-    standing: Standing,
-    before: &Built,
+    world: &Arc<World>,
+    Standing(standing): Standing,
+    before: &World,
 ) -> Result<Option<Box<dyn Live>>, FailureSummary> {
-    begin(scene, built, plan, Some((standing, before)))
-}
-
-type Begun = Result<Option<Box<dyn Live>>, FailureSummary>;
-
-fn begin(scene: &Scene, built: &Arc<Built>, plan: &Plan, from: Option<(Standing, &Built)>) -> Begun {
-    let participant = match from {
-        None => participant(scene, built, plan, None)?,
-        Some((standing, before)) => {
-            if !same_mesh(before, built) {
-                return Ok(None);
-            }
-            let Standing { kept, clock, step } = standing;
-            match participant_from(scene, built, plan, kept, clock.map(|clock| (clock, step, before)))? {
-                Some(participant) => participant,
-                None => return Ok(None),
-            }
+    if world.participants.len() != standing.len() || world.participants.len() != before.participants.len() {
+        return Ok(None);
+    }
+    let mut participants = Vec::new();
+    for ((part, own), before) in world.participants.iter().zip(standing).zip(&before.participants) {
+        if !same_mesh(&before.built, &part.built) {
+            return Ok(None);
         }
-    };
-    Ok(Some(Box::new(Played::new(scene, built, participant, plan.step))))
+        let OwnStanding { kept, clock, step } = own;
+        match participant_from(part, kept, clock.map(|clock| (clock, step, &*before.built)))? {
+            Some(participant) => participants.push(participant),
+            None => return Ok(None),
+        }
+    }
+    Ok(Some(Box::new(Played::new(world, Simulation::of(world, participants)))))
 }
 
 /// Whether bodies of a model have the nodes and cells that those of another one have.
@@ -145,54 +146,76 @@ fn same_mesh(a: &Built, b: &Built) -> bool {
 }
 
 struct Played {
-    built: Arc<Built>,
-    participant: Box<dyn Participant>,
+    world: Arc<World>,
+    simulation: Simulation,
+    /// First node of each participant, counted over all.
+    first_nodes: Vec<u32>,
     snapshot: Snapshot,
     /// What finds the points of the snapshot where the state lies on a device.
     mapping: Option<DeviceMapping>,
     samples: Samples,
-    /// Length of a step [s].
-    step: f64,
     /// Whether forces, energies and reactions belong to the state's instant; all fields too with `Everything`.
     evaluated: Option<Wanted>,
 }
 
 impl Played {
-    fn new(scene: &Scene, built: &Arc<Built>, participant: Box<dyn Participant>, step: f64) -> Self {
-        let snapshot = snapshot(built, &scene.shown(1.0));
-        let samples = Samples::new(built, &scene.sampled());
-        let built = Arc::clone(built);
-        Self { built, participant, snapshot, mapping: None, samples, step, evaluated: None }
+    fn new(world: &Arc<World>, simulation: Simulation) -> Self {
+        let mut first_nodes = vec![0];
+        for part in &world.participants {
+            first_nodes.push(first_nodes[first_nodes.len() - 1] + part.built.model.node_count() as u32);
+        }
+        Self {
+            snapshot: Snapshot::new(world, &world.scene.shown(1.0)),
+            samples: Samples::new(world, &world.scene.sampled()),
+            world: Arc::clone(world),
+            simulation,
+            first_nodes,
+            mapping: None,
+            evaluated: None,
+        }
     }
 
     fn evaluate(&mut self, wanted: Wanted) -> Result<(), FailureSummary> {
         if self.evaluated.is_none() {
-            self.participant.evaluate(wanted)?;
+            self.simulation.evaluate(wanted)?;
             self.evaluated = Some(wanted);
         }
         Ok(())
     }
-}
 
-fn snapshot(built: &Built, shown: &VtuTable) -> Snapshot {
-    Snapshot::new(built, shown.on.as_deref(), &shown.data, shown.at, shown.curved)
+    /// The participant of a node, and the node's number there.
+    fn locate(&self, node: u32) -> (usize, u32) {
+        let part = self.first_nodes.partition_point(|&first| first <= node).saturating_sub(1);
+        let part = part.min(self.world.participants.len() - 1);
+        (part, node - self.first_nodes[part])
+    }
+
+    /// The participant of a grip, and the grip with the numbers of the nodes there; `None` where it holds nodes of several.
+    fn own(&self, grip: &Grip) -> Option<(usize, Grip)> {
+        let (part, _) = self.locate(grip.nodes.first().map_or(0, |&(node, _)| node));
+        let nodes = grip.nodes.iter().map(|&(node, weight)| {
+            let (own, node) = self.locate(node);
+            (own == part).then_some((node, weight))
+        });
+        Some((part, Grip { nodes: nodes.collect::<Option<_>>()?, ..grip.clone() }))
+    }
 }
 
 impl Live for Played {
     fn time(&self) -> f64 {
-        self.participant.time()
+        self.simulation.time()
     }
 
     fn advance(&mut self, most: u64) -> Result<u64, FailureSummary> {
         self.evaluate(Wanted::Everything)?;
-        let steps = self.participant.stride().min(most.max(1));
-        self.participant.advance(steps, &mut |_| {})?;
+        let steps = self.simulation.stride().min(most.max(1));
+        self.simulation.advance(steps, &mut |_| {})?;
         self.evaluated = None;
         Ok(steps)
     }
 
     fn coast(&mut self, steps: u64, within: Duration) -> Option<Result<u64, FailureSummary>> {
-        let coasted = self.participant.coast(steps, within)?;
+        let coasted = self.simulation.only()?.coast(steps, within)?;
         self.evaluated = None;
         Some(coasted)
     }
@@ -202,12 +225,13 @@ impl Live for Played {
         value: PointValue,
         given: Option<&[f32]>,
     ) -> Option<Result<DevicePoints, FailureSummary>> {
+        let only = self.simulation.only()?;
         if self.mapping.is_none() {
-            let (built, snapshot) = (&self.built, &self.snapshot);
+            let (world, snapshot) = (&self.world, &self.snapshot);
             let mut points = (0..)
                 .zip(&snapshot.mesh().points)
-                .map(|(point, place)| ([place.x, place.y, place.z], snapshot.nodes_of(built, point)));
-            match self.participant.map(&mut points)? {
+                .map(|(point, place)| ([place.x, place.y, place.z], snapshot.nodes_of(world, point).1));
+            match only.map(&mut points)? {
                 Ok(mapping) => self.mapping = Some(mapping),
                 Err(failure) => return Some(Err(failure)),
             }
@@ -216,19 +240,39 @@ impl Live for Played {
         if let Some(values) = given {
             mapping.give(values);
         }
-        self.participant.apply(mapping, value);
+        only.apply(mapping, value);
         Some(Ok(mapping.points().clone()))
     }
 
     fn stand(&mut self) -> Option<Standing> {
-        if self.evaluated.is_some() || self.participant.bring_back().is_err() {
+        if self.evaluated.is_some() || self.simulation.bring_back().is_err() {
             return None;
         }
-        Some(Standing { clock: self.participant.clock(), kept: self.participant.kept(), step: self.step })
+        let parts = self.world.participants.iter().zip(self.simulation.participants());
+        let own = parts.map(|(part, now)| OwnStanding {
+            clock: now.clock(),
+            kept: now.kept(),
+            step: part.plan.step,
+        });
+        Some(Standing(own.collect()))
     }
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
-        self.participant.hold(grips)
+        let mut of_parts = vec![Vec::new(); self.world.participants.len()];
+        for grip in grips {
+            let Some((part, own)) = self.own(grip) else { return false };
+            of_parts[part].push(own);
+        }
+        self.simulation.hold(&of_parts)
+    }
+
+    fn stiffest(&self, grip: &Grip) -> f64 {
+        self.own(grip).map_or(0.0, |(part, own)| self.simulation.participants()[part].stiffest(&own))
+    }
+
+    fn rest(&self, node: u32) -> [f64; 3] {
+        let (part, node) = self.locate(node);
+        self.world.participants[part].built.model.rest[node as usize]
     }
 
     fn delay(&self) -> u64 {
@@ -236,30 +280,36 @@ impl Live for Played {
     }
 
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
-        self.participant.pulled(grip)
+        let pulled = self.own(grip).map(|(part, own)| self.simulation.participants()[part].pulled(&own));
+        pulled.unwrap_or([grip.place, [0.0; 3]])
     }
 
     fn nodes_of(&self, point: u32) -> Vec<(u32, f64)> {
-        self.snapshot.nodes_of(&self.built, point)
+        let (part, nodes) = self.snapshot.nodes_of(&self.world, point);
+        nodes.into_iter().map(|(node, weight)| (self.first_nodes[part] + node, weight)).collect()
     }
 
     fn show(&mut self, shown: &VtuTable) {
-        self.snapshot = snapshot(&self.built, shown);
+        self.snapshot = Snapshot::new(&self.world, shown);
         self.mapping = None;
     }
 
     fn mesh(&mut self) -> Result<&Mesh, FailureSummary> {
         self.evaluate(Wanted::Everything)?;
-        self.snapshot.fill(&Frame { built: &self.built, now: self.participant.instant() });
+        self.snapshot.fill(&self.simulation.frames(&self.world));
         Ok(self.snapshot.mesh())
     }
 
     fn energies(&self) -> Energies {
-        self.participant.energies()
+        self.simulation.energies()
     }
 
-    fn reaction(&self, constraint: usize) -> [f64; 3] {
-        self.participant.reaction(constraint)
+    fn reactions(&self) -> Vec<[f64; 3]> {
+        let of = |frame: &Frame<'_>| {
+            let constraints = 0..frame.part.built.model.constraints.len();
+            constraints.map(|constraint| frame.now.reaction(constraint)).collect::<Vec<_>>()
+        };
+        self.simulation.frames(&self.world).iter().flat_map(of).collect()
     }
 
     fn columns(&self) -> Vec<Column> {
@@ -267,11 +317,14 @@ impl Live for Played {
     }
 
     fn sample(&mut self, row: &mut Vec<f64>) {
-        self.samples.read(&Frame { built: &self.built, now: self.participant.instant() }, row);
+        self.samples.read(&self.simulation.frames(&self.world), row);
     }
 
     fn fingerprint(&self) -> u64 {
-        self.participant.fingerprint()
+        match self.simulation.participants() {
+            [only] => only.fingerprint(),
+            all => fingerprint(&all.iter().map(|one| one.fingerprint()).collect::<Vec<_>>()),
+        }
     }
 }
 
@@ -281,32 +334,33 @@ mod tests {
     use crate::testing::{CUBE, read};
 
     /// The cube, damped so that it comes to rest.
-    fn damped() -> (Scene, Arc<Built>, Plan) {
+    fn damped() -> Arc<World> {
         other(&[])
     }
 
-    fn corner(built: &Built, live: &dyn Live, part: f64, step: f64, by: [f64; 3]) -> Grip {
-        let last = built.model.node_count() as u32 - 1;
+    fn model(world: &World) -> &pliant_mechanics::Model {
+        &world.only().unwrap().built.model
+    }
+
+    fn corner(world: &World, live: &dyn Live, part: f64, by: [f64; 3]) -> Grip {
+        let last = model(world).node_count() as u32 - 1;
         let mut grip = Grip { nodes: vec![(last, 0.25), (last - 1, 0.75)], ..Grip::default() };
-        grip.stiffness = part * grip.stiffest(&built.model, step);
+        grip.stiffness = part * live.stiffest(&grip);
         let [point, _] = live.pulled(&grip);
         grip.place = [0, 1, 2].map(|c| point[c] + by[c]);
         grip
     }
 
     /// The damped cube with other numbers.
-    fn other(changes: &[(&str, &str)]) -> (Scene, Arc<Built>, Plan) {
+    fn other(changes: &[(&str, &str)]) -> Arc<World> {
         let mut text = CUBE.replace("density = 1000", "density = 1000\ndamping = 200");
         changes.iter().for_each(|(from, to)| text = text.replace(from, to));
-        let scene = read(&text);
-        let built = crate::build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
-        let plan = crate::plan(&scene, &built).unwrap_or_else(|error| panic!("{}", error.plain()));
-        (scene, Arc::new(built), plan)
+        Arc::new(World::new(&read(&text)).unwrap_or_else(|error| panic!("{}", error.plain())))
     }
 
-    fn pulled_for((scene, built, plan): &(Scene, Arc<Built>, Plan), steps: u64) -> Box<dyn Live> {
-        let mut live = live(scene, built, plan).unwrap();
-        let grip = Grip { stiffness: 20.0, ..corner(built, live.as_ref(), 0.5, plan.step, [0.0, 0.0, 5e-3]) };
+    fn pulled_for(world: &Arc<World>, steps: u64) -> Box<dyn Live> {
+        let mut live = live(world).unwrap();
+        let grip = Grip { stiffness: 20.0, ..corner(world, live.as_ref(), 0.5, [0.0, 0.0, 5e-3]) };
         live.hold(&[grip]);
         (0..steps).for_each(|_| assert_eq!(live.advance(1).unwrap(), 1));
         live
@@ -317,10 +371,10 @@ mod tests {
     }
 
     /// The grip of [`pulled_for`], as stiff after the change.
-    fn hold_on(live: &mut dyn Live, built: &Built) {
-        let last = built.model.node_count() as u32 - 1;
+    fn hold_on(live: &mut dyn Live, world: &World) {
+        let last = model(world).node_count() as u32 - 1;
         let [x, y, z] = [last, last - 1]
-            .map(|n| built.model.rest[n as usize])
+            .map(|n| live.rest(n))
             .into_iter()
             .zip([0.25, 0.75])
             .fold([0.0; 3], |sum, (x, w)| [0, 1, 2].map(|c| sum[c] + w * x[c]));
@@ -343,8 +397,8 @@ mod tests {
         assert!(half.stand().is_none(), "the forces at this instant belong to the step to come");
         half.advance(1).unwrap();
         let standing = half.stand().unwrap();
-        let mut half = go_on(&again.0, &again.1, &again.2, standing, &stage.1).unwrap().unwrap();
-        hold_on(half.as_mut(), &again.1);
+        let mut half = go_on(&again, standing, &stage).unwrap().unwrap();
+        hold_on(half.as_mut(), &again);
         for _ in 151..300 {
             half.advance(1).unwrap();
         }
@@ -362,16 +416,17 @@ mod tests {
         let less = ("damping = 200", "damping = 5");
         let (soft, stiff) =
             (other(&[less]), other(&[less, ("young-modulus = 10e3", "young-modulus = 40e3")]));
-        assert!(stiff.2.step < 0.6 * soft.2.step);
+        let step = |world: &World| world.only().unwrap().plan.step;
+        assert!(step(&stiff) < 0.6 * step(&soft));
         let mut going = pulled_for(&soft, 4000);
         let pulled = height(going.as_mut());
         going.advance(1).unwrap();
         let (standing, time) = (going.stand().unwrap(), going.time());
-        let mut going = go_on(&stiff.0, &stiff.1, &stiff.2, standing, &soft.1).unwrap().unwrap();
+        let mut going = go_on(&stiff, standing, &soft).unwrap().unwrap();
         assert_eq!(going.time(), time);
-        hold_on(going.as_mut(), &stiff.1);
+        hold_on(going.as_mut(), &stiff);
         going.advance(1).unwrap();
-        assert!((going.time() - time - stiff.2.step).abs() < 1e-12, "time goes on in the new steps");
+        assert!((going.time() - time - step(&stiff)).abs() < 1e-12, "time goes on in the new steps");
         for _ in 0..12_000 {
             going.advance(1).unwrap();
         }
@@ -391,11 +446,11 @@ mod tests {
         // It swings up; at its fastest the steps become shorter.
         let mut going = pulled_for(&coarse, 16);
         let standing = going.stand().unwrap();
-        let mut going = go_on(&fine.0, &fine.1, &fine.2, standing, &coarse.1).unwrap().unwrap();
-        hold_on(going.as_mut(), &fine.1);
+        let mut going = go_on(&fine, standing, &coarse).unwrap().unwrap();
+        hold_on(going.as_mut(), &fine);
         (0..68).for_each(|_| assert_eq!(going.advance(1).unwrap(), 1));
         let mut whole = pulled_for(&fine, 0);
-        hold_on(whole.as_mut(), &fine.1);
+        hold_on(whole.as_mut(), &fine);
         let mut largest = 0.0_f64;
         for _ in 0..100 {
             whole.advance(1).unwrap();
@@ -415,8 +470,8 @@ mod tests {
         let (light, heavy) = (other(&[]), other(&[("density = 1000", "density = 3000")]));
         let mut going = pulled_for(&light, 60);
         let standing = going.stand().unwrap();
-        let mut going = go_on(&heavy.0, &heavy.1, &heavy.2, standing, &light.1).unwrap().unwrap();
-        hold_on(going.as_mut(), &heavy.1);
+        let mut going = go_on(&heavy, standing, &light).unwrap().unwrap();
+        hold_on(going.as_mut(), &heavy);
         go(going.as_mut(), 400);
         assert!(going.energies().balance < 0.02, "{:?}", going.energies());
     }
@@ -425,7 +480,7 @@ mod tests {
     fn another_mesh_goes_on_from_nothing() {
         let (coarse, fine) = (other(&[]), other(&[("cells = [2, 2, 2]", "cells = [2, 2, 3]")]));
         let standing = pulled_for(&coarse, 10).stand().unwrap();
-        assert!(go_on(&fine.0, &fine.1, &fine.2, standing, &coarse.1).unwrap().is_none());
+        assert!(go_on(&fine, standing, &coarse).unwrap().is_none());
     }
 
     fn go(live: &mut dyn Live, steps: u64) {
@@ -435,12 +490,12 @@ mod tests {
 
     #[test]
     fn a_grip_pulls_with_the_force_that_the_base_holds_and_leaves_nothing_behind() {
-        let (scene, built, plan) = damped();
-        let mut live = live(&scene, &built, &plan).unwrap();
-        let grip = corner(&built, live.as_ref(), 0.5, plan.step, [0.0, 0.0, 2e-3]);
+        let world = damped();
+        let mut live = live(&world).unwrap();
+        let grip = corner(&world, live.as_ref(), 0.5, [0.0, 0.0, 2e-3]);
         assert!(live.hold(std::slice::from_ref(&grip)));
         go(live.as_mut(), 4000);
-        let ([_, force], base) = (live.pulled(&grip), live.reaction(0));
+        let ([_, force], base) = (live.pulled(&grip), live.reactions()[0]);
         let most = force.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         assert!(most > 1e-2, "{force:?}");
         for c in 0..3 {
@@ -457,19 +512,19 @@ mod tests {
 
     #[test]
     fn the_stiffest_grip_leaves_steps_stable() {
-        let (scene, built, plan) = damped();
-        let mut live = live(&scene, &built, &plan).unwrap();
-        let grip = corner(&built, live.as_ref(), 1.0, plan.step, [1e-3, 0.0, 0.0]);
+        let world = damped();
+        let mut live = live(&world).unwrap();
+        let grip = corner(&world, live.as_ref(), 1.0, [1e-3, 0.0, 0.0]);
         live.hold(&[grip]);
         go(live.as_mut(), 3000);
     }
 
     #[test]
     fn what_is_played_has_the_bits_of_what_is_run() {
-        let (scene, built, plan) = damped();
+        let world = damped();
         let mut states = Vec::new();
         for looks in [1, 50] {
-            let mut live = live(&scene, &built, &plan).unwrap();
+            let mut live = live(&world).unwrap();
             for _ in 0..100 / looks {
                 go(live.as_mut(), looks);
             }

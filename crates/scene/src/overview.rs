@@ -13,22 +13,47 @@ use crate::output::{AddedMass, bodies, number, told_limit};
 use crate::plan::{Limits, Plan};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
+use crate::world::World;
 
 /// The model in words: bodies, quality, constraints, loads, critical step, expected cost.
-pub fn overview(scene: &Scene, built: &Built, plan: &Plan) -> String {
+pub fn overview(world: &World) -> String {
     let mut page = String::new();
     // Writing to a String cannot fail.
-    let _ = write_overview(&mut page, scene, built, plan);
+    let _ = write_overview(&mut page, world);
     page
 }
 
-fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> fmt::Result {
+fn write_overview(page: &mut String, world: &World) -> fmt::Result {
+    let scene = &world.scene;
     if !scene.scene.title.is_empty() {
         writeln!(page, "{}\n", scene.scene.title)?;
     }
     for set in scene.source.assignments() {
         writeln!(page, "set on the command line: {set}")?;
     }
+    for part in &world.participants {
+        if let Some(name) = part.prefix() {
+            writeln!(page, "participant `{name}`, solver `{}`\n", part.scene.run.solver.word())?;
+        }
+        write_model(page, &part.built)?;
+        if world.only().is_none() {
+            write_step(page, &part.scene, &part.built, &part.plan)?;
+            writeln!(page)?;
+        }
+    }
+    write_outputs(page, scene)?;
+    match world.only() {
+        Some(part) => write_step(page, &part.scene, &part.built, &part.plan)?,
+        None => writeln!(page, "all meet every {} s", number(world.slowest().plan.step))?,
+    }
+    let notes = world.participants.iter().flat_map(|part| &part.built.notes);
+    for remark in world.warnings().map(ToString::to_string).chain(notes.cloned()) {
+        writeln!(page, "note: {remark}")?;
+    }
+    Ok(())
+}
+
+fn write_model(page: &mut String, built: &Built) -> fmt::Result {
     for (summary, body) in bodies(built).iter().zip(&built.bodies) {
         let quality = QualityReport::new(&body.mesh);
         writeln!(page, "body `{}`: {}", body.name, body.origin)?;
@@ -107,6 +132,10 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
     {
         writeln!(page, "{} to points", counted(springs, "spring"))?;
     }
+    Ok(())
+}
+
+fn write_outputs(page: &mut String, scene: &Scene) -> fmt::Result {
     for (name, table) in &scene.outputs {
         match table {
             OutputTable::Vtu(vtu) => {
@@ -116,10 +145,6 @@ fn write_overview(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) 
                 writeln!(page, "output `{name}`: {name}.csv, a row every {} s", number(csv.every))
             }
         }?;
-    }
-    write_step(page, scene, built, plan)?;
-    for remark in built.warnings.iter().map(ToString::to_string).chain(built.notes.iter().cloned()) {
-        writeln!(page, "note: {remark}")?;
     }
     Ok(())
 }

@@ -20,6 +20,7 @@ use crate::scene::Scene;
 use crate::solver::{
     Effort, Equilibria, LoadStepProgress, MappedPoint, Memory, Solver, on_device, on_processor,
 };
+use crate::world::Part;
 
 /// A participant as outputs read it, at the instant last evaluated. Nodes and constraints are numbered in its model.
 pub(crate) trait Instant {
@@ -125,6 +126,11 @@ pub(crate) trait Participant: Instant + Send {
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a stepper that knows none.
     fn hold(&mut self, grips: &[Grip]) -> bool;
+
+    /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where they are stable with any.
+    fn stiffest(&self, _grip: &Grip) -> f64 {
+        f64::INFINITY
+    }
 
     /// The point of a grip now [m], and its force on the body [N].
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2];
@@ -246,6 +252,8 @@ impl Numeric for f64 {
 /// Solids in large strain, with the stepper that advances them.
 pub(crate) struct Solids<R> {
     model: Arc<Model>,
+    /// Length of a step [s].
+    step: f64,
     state: State<R>,
     solver: Box<dyn Solver<R>>,
 }
@@ -345,6 +353,10 @@ impl<R: Numeric> Participant for Solids<R> {
         self.solver.hold(grips)
     }
 
+    fn stiffest(&self, grip: &Grip) -> f64 {
+        grip.stiffest(&self.model, self.step)
+    }
+
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
         let displacement = &self.state.displacement;
         [grip.point(&self.model, displacement), grip.force(&self.model, displacement)]
@@ -394,14 +406,10 @@ impl<R: Numeric> Participant for Solids<R> {
 ///
 /// # Errors
 /// If its stepper can't be made.
-pub(crate) fn participant(
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
-    kept: Option<Kept>,
-) -> Result<Box<dyn Participant>, FailureSummary> {
+pub(crate) fn participant(part: &Part, kept: Option<Kept>) -> Result<Box<dyn Participant>, FailureSummary> {
+    let Part { scene, built, plan, .. } = part;
     match kept {
-        Some(kept) => participant_from(scene, built, plan, kept, None)?
+        Some(kept) => participant_from(part, kept, None)?
             .ok_or_else(|| FailureSummary::input(&"the state is one of another model")),
         None => match (&built.corotational, plan.target.precision) {
             (Some(part), _) => Ok(Box::new(Corotated::new(&scene.run, built, part, plan)?)),
@@ -417,12 +425,11 @@ pub(crate) fn participant(
 /// # Errors
 /// If its stepper can't be made.
 pub(crate) fn participant_from(
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
+    part: &Part,
     kept: Kept,
     steps: Option<(Clock, f64, &Built)>,
 ) -> Result<Option<Box<dyn Participant>>, FailureSummary> {
+    let Part { scene, built, plan, .. } = part;
     match (kept, &built.corotational, plan.target.precision) {
         (Kept::Shells(remembered), Some(part), _) if remembered.fits(built.model.node_count()) => {
             let mut participant = Corotated::new(&scene.run, built, part, plan)?;
@@ -446,7 +453,7 @@ fn solids<R: Numeric>(
     state: State<R>,
 ) -> Result<Box<dyn Participant>, FailureSummary> {
     let solver = R::solver(&scene.run, built, plan, &state)?;
-    Ok(Box::new(Solids { model: Arc::clone(&built.model), state, solver }))
+    Ok(Box::new(Solids { model: Arc::clone(&built.model), step: plan.step, state, solver }))
 }
 
 fn solids_from<R: Numeric>(
@@ -474,5 +481,5 @@ fn solids_from<R: Numeric>(
         solver.go_on(&clock, step, &state);
     }
     solver.resume(memory);
-    Ok(Some(Box::new(Solids { model: Arc::clone(&built.model), state, solver })))
+    Ok(Some(Box::new(Solids { model: Arc::clone(&built.model), step: plan.step, state, solver })))
 }

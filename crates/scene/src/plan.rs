@@ -127,7 +127,7 @@ fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<Stri
         number(stable)
     );
     let help = "take `step = \"auto\"`, or `solver = \"implicit\"` for long steps";
-    let place = scene.source.span(&["run", "step"]);
+    let place = scene.source.span(&scene.run_at("step"));
     Err(Box::new(Diagnostic::error(message).at(place, "too large").help(help)))
 }
 
@@ -157,7 +157,7 @@ fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<
                     number(automatic(&bound, &limit)),
                     number(limit.step)
                 );
-                let place = scene.source.span(&["run", "step"]);
+                let place = scene.source.span(&scene.run_at("step"));
                 return fail(Diagnostic::error(message).at(place, "too large").help(help));
             }
             note_on_step(step, limit.step)

@@ -12,8 +12,8 @@ use crate::checker::{check_skipping, nearest, read_table};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
     BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MomentTable,
-    MoveTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable, TractionTable, ViewTable,
-    VtuTable,
+    MoveTable, ParticipantTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable,
+    TractionTable, ViewTable, VtuTable,
 };
 use crate::source::{Source, Value};
 
@@ -204,7 +204,11 @@ pub fn sections() -> Vec<Section> {
     let law = |name: &&'static str| {
         Some(Section { header: "[law.NAME]", name: Some(name), schema: law_schema(&AnyLaw::schema(name)?) })
     };
-    let mut all = vec![plain::<SceneTable>("[scene]"), plain::<RunTable>("[run]")];
+    let mut all = vec![
+        plain::<SceneTable>("[scene]"),
+        plain::<RunTable>("[run]"),
+        plain::<ParticipantTable>("[participant.NAME]"),
+    ];
     all.extend(AnyLaw::NAMES.iter().filter_map(law));
     all.extend([plain::<BodyTable>("[body.NAME]"), plain::<SurfaceTable>("[surface.NAME]")]);
     all.extend(typed::<ConstraintTable>("[constraint.NAME]"));
@@ -268,7 +272,7 @@ mod tests {
     #[test]
     fn every_parameter_of_every_table_has_a_meaning() {
         let sections = sections();
-        assert_eq!(sections.len(), 4 + AnyLaw::NAMES.len() + 3 + 6 + 2 + 1);
+        assert_eq!(sections.len(), 5 + AnyLaw::NAMES.len() + 3 + 6 + 2 + 1);
         for Section { header, name, schema } in sections {
             for parameter in describe(&schema) {
                 assert!(!parameter.description.is_empty(), "{header} {name:?}: {}", parameter.key);
@@ -291,7 +295,7 @@ mod tests {
     fn the_schema_of_a_scene_takes_no_unknown_keys() {
         let schema = scene_schema();
         let properties = schema["properties"].as_object().unwrap();
-        assert_eq!(properties.len(), 9);
+        assert_eq!(properties.len(), 10);
         for (table, schema) in properties {
             let named = schema.get("additionalProperties").filter(|inner| inner.is_object());
             let one = named.unwrap_or(schema);

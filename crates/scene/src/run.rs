@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pliant_explicit::stability::Stability;
 use pliant_gpu::Wanted;
@@ -10,18 +10,18 @@ use pliant_mechanics::Energies;
 use serde::{Deserialize, Serialize};
 
 use crate::advice::remedy;
-use crate::assemble::Built;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::format::SolverName;
 use crate::output::{
     CONVERGENCE, FailureSummary, Frame, INTERRUPTED, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY,
     Schedule, Scheduled, ShellStrains, Snapshot, Summary, markdown, observers, plot, steps_to, summarise,
+    time_of,
 };
-use crate::participant::{Instant, Participant, participant};
-use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::participant::Participant;
+use crate::simulation::{Simulation, total};
 use crate::solver::{Effort, Equilibria, LoadStepProgress};
 use crate::view::Draw;
+use crate::world::{Part, World};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -57,31 +57,43 @@ pub(crate) struct History {
     pub reactions: Vec<Vec<f64>>,
 }
 
-/// What a run came to.
+/// The worst that was seen of a participant so far.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Watched {
+    pub worst_balance: f64,
+    /// The largest hourglass energy over the internal one, and its time [s].
+    pub worst_hourglass: (f64, f64),
+    /// How far shells were strained.
+    pub strains: ShellStrains,
+}
+
+impl Watched {
+    fn see(&mut self, participant: &dyn Participant) {
+        let (energies, floor) = (participant.energies(), participant.balance_floor());
+        if participant.largest_energy() > floor {
+            self.worst_balance = self.worst_balance.max(energies.balance);
+        }
+        let share = hourglass_share(&energies, floor);
+        if share > self.worst_hourglass.0 {
+            self.worst_hourglass = (share, participant.time());
+        }
+    }
+}
+
+/// The result of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Outcome {
     pub failure: Option<FailureSummary>,
+    /// Common instants after the start.
     pub steps: u64,
     pub time: f64,
     pub wall_seconds: f64,
+    /// Energies of all participants together.
     pub energies: Energies,
-    pub worst_balance: f64,
-    pub balance_floor: f64,
-    /// The largest hourglass energy over the internal one, and its time [s].
-    pub worst_hourglass: (f64, f64),
-    /// What was seen of the largest stable step; `None` of a run without inertia.
-    pub stability: Option<Stability>,
-    /// How good its equilibria are, if it found some by dynamic relaxation.
-    pub equilibria: Option<Equilibria>,
-    /// What its equations took, if it solved some.
-    pub effort: Option<Effort>,
-    /// Residuals of its last iterations, as a table.
-    pub convergence: Option<String>,
+    /// Of each participant, in the order of the world.
+    pub parts: Vec<PartOutcome>,
     /// Why it ended before the time of the scene was over, without a failure.
     pub ended: Option<String>,
-    /// How far shells were strained.
-    pub strains: ShellStrains,
-    pub reactions: Vec<[f64; 3]>,
     pub history: History,
     pub files: Vec<PathBuf>,
     /// The picture of the last instant.
@@ -91,25 +103,57 @@ pub(crate) struct Outcome {
     pub resumed: Option<(PathBuf, f64)>,
 }
 
+/// The result of a participant.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PartOutcome {
+    pub steps: u64,
+    pub energies: Energies,
+    pub balance_floor: f64,
+    pub watched: Watched,
+    /// The critical time step as it was seen; `None` of a run without inertia.
+    pub stability: Option<Stability>,
+    /// How good its equilibria are, if it found some by dynamic relaxation.
+    pub equilibria: Option<Equilibria>,
+    /// Cost of its equations, if it solved some.
+    pub effort: Option<Effort>,
+    /// Residuals of its last iterations, as a table.
+    pub convergence: Option<String>,
+    pub reactions: Vec<[f64; 3]>,
+}
+
+impl PartOutcome {
+    fn new(part: &Part, participant: &dyn Participant, watched: Watched) -> Self {
+        let watches = part.plan.limits.is_some() && part.scene.run.solver == SolverName::Explicit;
+        let constraints = 0..part.built.model.constraints.len();
+        Self {
+            steps: participant.steps(),
+            energies: participant.energies(),
+            balance_floor: participant.balance_floor(),
+            watched,
+            stability: watches.then(|| participant.stability()),
+            equilibria: participant.equilibria(),
+            effort: participant.effort(),
+            convergence: participant.convergence(),
+            reactions: constraints.map(|index| participant.reaction(index)).collect(),
+        }
+    }
+}
+
 impl Outcome {
-    /// Of a run whose solver could not be made.
-    fn not_begun(failure: FailureSummary, built: &Built) -> Self {
+    /// Of a run whose steppers could not be made.
+    fn not_begun(failure: FailureSummary, world: &World) -> Self {
+        let part = |part: &Part| PartOutcome {
+            reactions: vec![[0.0; 3]; part.built.model.constraints.len()],
+            ..PartOutcome::default()
+        };
         Self {
             failure: Some(failure),
             steps: 0,
             time: 0.0,
             wall_seconds: 0.0,
             energies: Energies::default(),
-            worst_balance: 0.0,
-            balance_floor: 0.0,
-            worst_hourglass: (0.0, 0.0),
-            stability: None,
-            equilibria: None,
-            effort: None,
-            convergence: None,
+            parts: world.participants.iter().map(part).collect(),
             ended: None,
-            strains: ShellStrains::default(),
-            reactions: vec![[0.0; 3]; built.model.constraints.len()],
             history: History::default(),
             files: Vec::new(),
             picture: None,
@@ -121,25 +165,23 @@ impl Outcome {
 
 /// Samples in the history.
 const SAMPLES: f64 = 1000.0;
-/// Those of a run on a graphics processor, which has to stop for each.
+/// Those of a run on a GPU, which has to stop for each.
 const SAMPLES_ON_DEVICE: f64 = 250.0;
 
 /// Wall time between two reports of progress.
 const REPORT: Duration = Duration::from_millis(100);
 
-/// Runs a scene and writes its outputs, `plot.svg` and `summary.md`. A failure of the run, or of writing while it runs,
+/// Runs a world and writes its outputs, `plot.svg` and `summary.md`. A failure of the run, or of writing while it runs,
 /// is in the summary; whatever was written before stays.
 ///
 /// # Errors
 /// If the outputs can't be opened.
 pub fn run(
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
+    world: &World,
     folder: &OutputFolder,
     report: &mut (dyn FnMut(Progress) + Send),
 ) -> Result<Summary, OutputError> {
-    run_with(scene, built, plan, folder, Options::default(), report)
+    run_with(world, folder, Options::default(), report)
 }
 
 /// As [`run`], from a checkpoint or with a way to stop it.
@@ -147,45 +189,39 @@ pub fn run(
 /// # Errors
 /// If the outputs can't be opened.
 pub fn run_with(
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
+    world: &World,
     folder: &OutputFolder,
     options: Options<'_>,
     report: &mut (dyn FnMut(Progress) + Send),
 ) -> Result<Summary, OutputError> {
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(scene.run.threads as usize)
+        .num_threads(world.scene.run.threads as usize)
         .build()
         .map_err(|error| OutputError::new(folder.path(), error))?;
-    let mut outcome = pool.install(|| go(scene, built, plan, folder, options, report))?;
-    if let Err(error) = write_pages(scene, built, plan, folder, &mut outcome) {
+    let mut outcome = pool.install(|| go(world, folder, options, report))?;
+    if let Err(error) = write_pages(world, folder, &mut outcome) {
         let time = Some(outcome.time);
         outcome.failure.get_or_insert_with(|| FailureSummary::output(&error, time));
     }
-    Ok(summarise(scene, built, plan, &outcome))
+    Ok(summarise(world, &outcome))
 }
 
 /// Writes the plot and the page that shows it.
-fn write_pages(
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
-    folder: &OutputFolder,
-    outcome: &mut Outcome,
-) -> Result<(), OutputError> {
+fn write_pages(world: &World, folder: &OutputFolder, outcome: &mut Outcome) -> Result<(), OutputError> {
     let page = folder.path().join(SUMMARY);
-    if let Some(table) = &outcome.convergence {
-        outcome.files.push(folder.write(CONVERGENCE, table)?);
+    for (part, own) in world.participants.iter().zip(&outcome.parts) {
+        let Some(table) = &own.convergence else { continue };
+        let file = part.prefix().map_or(CONVERGENCE.to_owned(), |name| format!("convergence-{name}.csv"));
+        outcome.files.push(folder.write(&file, table)?);
         if let Some(failure) = outcome.failure.as_mut().filter(|failure| failure.kind == "not-converged") {
-            failure.message.push_str(&format!("; the residuals of all iterations are in `{CONVERGENCE}`"));
+            failure.message.push_str(&format!("; the residuals of all iterations are in `{file}`"));
         }
     }
-    let svg = plot(built, &outcome.history)
+    let svg = plot(world, &outcome.history)
         .map_err(|reason| OutputError::new(&folder.path().join(PLOT), reason))?;
     outcome.files.push(folder.write(PLOT, &svg)?);
     outcome.files.push(page);
-    let text = markdown(scene, built, plan, outcome, &summarise(scene, built, plan, outcome));
+    let text = markdown(world, outcome, &summarise(world, outcome));
     let written = folder.write(SUMMARY, &text);
     if written.is_err() {
         outcome.files.pop();
@@ -194,9 +230,7 @@ fn write_pages(
 }
 
 fn go(
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
+    world: &World,
     folder: &OutputFolder,
     options: Options<'_>,
     report: &mut (dyn FnMut(Progress) + Send),
@@ -204,17 +238,18 @@ fn go(
     let kept = match options.resume {
         Some(checkpoint) => {
             let other = || OutputError::new(folder.path(), "the checkpoint is of another model");
-            Some(checkpoint.kept(built).ok_or_else(other)?)
+            Some(checkpoint.kept(world).ok_or_else(other)?)
         }
         None => None,
     };
-    let participant = match participant(scene, built, plan, kept) {
-        Ok(participant) => participant,
-        Err(failure) => return Ok(Outcome::not_begun(failure, built)),
+    let simulation = match Simulation::new(world, kept) {
+        Ok(simulation) => simulation,
+        Err(failure) => return Ok(Outcome::not_begun(failure, world)),
     };
-    let mut course = Course::new(scene, built, plan, folder, options, participant)?;
+    let mut course = Course::new(world, folder, options, simulation)?;
+    let until = world.scene.scene.until;
     let before = options.resume.map_or(0.0, |checkpoint| checkpoint.progressed.wall_seconds);
-    let started = std::time::Instant::now();
+    let started = Instant::now();
     let wall_seconds = || before + started.elapsed().as_secs_f64();
     let wall = || Duration::try_from_secs_f64(wall_seconds()).unwrap_or_default();
     let mut reported = started;
@@ -222,13 +257,9 @@ fn go(
         match course.see() {
             Ok(last) => {
                 if reported.elapsed() >= REPORT || last {
-                    reported = std::time::Instant::now();
-                    report(Progress {
-                        time: course.participant.time(),
-                        until: scene.scene.until,
-                        wall: wall(),
-                        load_step: None,
-                    });
+                    reported = Instant::now();
+                    let time = course.simulation.time();
+                    report(Progress { time, until, wall: wall(), load_step: None });
                 }
                 if last {
                     break course.finish().err();
@@ -239,10 +270,10 @@ fn go(
         let stop = options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
         let mut watch = |step: LoadStepProgress| {
             if reported.elapsed() >= REPORT {
-                reported = std::time::Instant::now();
+                reported = Instant::now();
                 let [from, to] = step.iteration.span;
                 let time = from + step.iteration.fraction * (to - from);
-                report(Progress { time, until: scene.scene.until, wall: wall(), load_step: Some(step) });
+                report(Progress { time, until, wall: wall(), load_step: Some(step) });
             }
         };
         if let Err(failure) = course.step(wall_seconds(), stop, &mut watch) {
@@ -252,39 +283,24 @@ fn go(
             break Some(failure);
         }
     };
-    let failure =
-        failure.map(|failure| match remedy(&failure, scene, built, plan, &course.participant.stability()) {
-            Some(remedy) => failure.advised(&remedy),
-            None => failure,
-        });
+    let failure = failure.map(|failure| course.advised(failure));
     let picture = options.picture.filter(|_| failure.is_none());
     let (drawn, failure) = match picture.map(|picture| course.draw(picture, folder)).transpose() {
         Ok(drawn) => (drawn, failure),
-        Err(error) => (None, Some(FailureSummary::output(&error, Some(course.participant.time())))),
+        Err(error) => (None, Some(FailureSummary::output(&error, Some(course.simulation.time())))),
     };
-    let participant = course.participant;
+    let Course { simulation, watched, history, files, kept, .. } = course;
+    let parts = world.participants.iter().zip(simulation.participants()).zip(watched);
     Ok(Outcome {
         failure,
-        steps: participant.steps(),
-        time: participant.time(),
+        steps: simulation.steps(),
+        time: simulation.time(),
         wall_seconds: wall_seconds(),
-        energies: participant.energies(),
-        worst_balance: course.worst_balance,
-        balance_floor: participant.balance_floor(),
-        worst_hourglass: course.worst_hourglass,
-        stability: plan
-            .limits
-            .as_ref()
-            .filter(|_| scene.run.solver == SolverName::Explicit)
-            .map(|_| participant.stability()),
-        equilibria: participant.equilibria(),
-        effort: participant.effort(),
-        convergence: participant.convergence(),
-        ended: participant.ended().map(ToOwned::to_owned),
-        strains: course.strains,
-        reactions: (0..built.model.constraints.len()).map(|index| participant.reaction(index)).collect(),
-        history: course.history,
-        files: course.files.into_iter().chain(course.kept).chain(drawn.clone()).collect(),
+        energies: simulation.energies(),
+        parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own.as_ref(), watched)).collect(),
+        ended: simulation.ended().map(ToOwned::to_owned),
+        history,
+        files: files.into_iter().chain(kept).chain(drawn.clone()).collect(),
         picture: drawn,
         threads: rayon::current_num_threads(),
         resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
@@ -304,17 +320,13 @@ fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
 
 /// A run under way.
 struct Course<'a> {
-    scene: &'a Scene,
-    built: &'a Built,
-    plan: &'a Plan,
-    participant: Box<dyn Participant>,
+    world: &'a World,
+    simulation: Simulation,
     watching: Vec<Scheduled>,
     history: History,
     sampling: Schedule,
-    worst_balance: f64,
-    /// The largest hourglass energy over the internal one, and its time [s].
-    worst_hourglass: (f64, f64),
-    strains: ShellStrains,
+    /// The worst of each participant.
+    watched: Vec<Watched>,
     checkpoints: Option<Checkpoints<'a>>,
     /// Whether the last instant becomes a picture.
     pictured: bool,
@@ -327,33 +339,30 @@ struct Course<'a> {
 impl<'a> Course<'a> {
     /// At the start, or where a checkpoint was.
     fn new(
-        scene: &'a Scene,
-        built: &'a Built,
-        plan: &'a Plan,
+        world: &'a World,
         folder: &'a OutputFolder,
         options: Options<'_>,
-        participant: Box<dyn Participant>,
+        simulation: Simulation,
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
-        let samples = if plan.target.device.is_some() { SAMPLES_ON_DEVICE } else { SAMPLES };
+        let on_device = world.participants.iter().any(|part| part.plan.target.device.is_some());
+        let samples = if on_device { SAMPLES_ON_DEVICE } else { SAMPLES };
+        let sampling = Schedule::new(world.scene.scene.until / samples);
         let written = before.map(|before| before.outputs.as_slice());
         if before.is_some() {
-            folder.go_on(scene)?;
+            folder.go_on(&world.scene)?;
         }
-        let watching = observers(scene, built, folder.path(), &mut files, written)?;
+        let watching = observers(world, folder.path(), &mut files, written)?;
+        let fresh = || vec![Watched::default(); world.participants.len()];
         Ok(Self {
-            scene,
-            built,
-            plan,
+            world,
             watching,
             history: before.map_or_else(History::default, |before| before.history.clone()),
-            sampling: before.map_or(Schedule::new(scene.scene.until / samples), |before| before.sampling),
-            worst_balance: before.map_or(0.0, |before| before.worst_balance),
-            worst_hourglass: before.map_or((0.0, 0.0), |before| before.worst_hourglass),
-            strains: before.map_or_else(ShellStrains::default, |before| before.strains.clone()),
-            checkpoints: Checkpoints::new(scene, built, plan, folder, participant.time()),
-            participant,
+            sampling: before.map_or(sampling, |before| before.sampling),
+            watched: before.map_or_else(fresh, |before| before.watched.clone()),
+            checkpoints: Checkpoints::new(world, folder, simulation.time()),
+            simulation,
             pictured: options.picture.is_some(),
             files,
             kept: None,
@@ -362,64 +371,79 @@ impl<'a> Course<'a> {
 
     /// Evaluates the current instant and shows it to all who look; whether it is the last.
     fn see(&mut self) -> Result<bool, FailureSummary> {
-        let (time, last) = (self.participant.time(), self.is_last());
-        let step = self.plan.step_from(time);
+        let (time, last) = (self.simulation.time(), self.is_last());
+        let step = self.world.step_from(time);
         let looked_at = self.watching.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
         let wanted = if looked_at || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies };
-        self.participant.evaluate(wanted)?;
-        let energies = self.participant.energies();
-        if self.participant.largest_energy() > self.participant.balance_floor() {
-            self.worst_balance = self.worst_balance.max(energies.balance);
-        }
-        let share = hourglass_share(&energies, self.participant.balance_floor());
-        if share > self.worst_hourglass.0 {
-            self.worst_hourglass = (share, self.participant.time());
-        }
+        self.simulation.evaluate(wanted)?;
+        let participants = self.simulation.participants();
+        self.watched.iter_mut().zip(participants).for_each(|(own, now)| own.see(now.as_ref()));
         if self.sampling.is_due(time, step, last) {
-            self.history.sample(self.built, self.participant.instant());
-            self.strains.look(self.built, self.participant.shells());
+            self.history.sample(&self.simulation.frames(self.world));
+            self.look_at_strains();
         }
-        let frame = Frame { built: self.built, now: self.participant.instant() };
-        look(&mut self.watching, &frame, step, last)
-            .map_err(|error| FailureSummary::output(&error, Some(self.participant.time())))?;
+        let frames = self.simulation.frames(self.world);
+        for (schedule, observer) in &mut self.watching {
+            if schedule.is_due(time, step, last) {
+                observer.see(&frames).map_err(|error| FailureSummary::output(&error, Some(time)))?;
+            }
+        }
         Ok(last)
     }
 
+    fn look_at_strains(&mut self) {
+        let parts = self.world.participants.iter().zip(self.simulation.participants());
+        for (own, (part, now)) in self.watched.iter_mut().zip(parts) {
+            own.strains.look(&part.built, now.shells());
+        }
+    }
+
+    /// A failure with a remedy that knows the run.
+    fn advised(&self, failure: FailureSummary) -> FailureSummary {
+        let mut parts = self.world.participants.iter().zip(self.simulation.participants());
+        let own = parts.find(|(part, _)| failure.body.as_ref().is_none_or(|body| part.scene.has(body)));
+        match own.and_then(|(part, now)| remedy(&failure, part, &now.stability())) {
+            Some(remedy) => failure.advised(&remedy),
+            None => failure,
+        }
+    }
+
     fn is_last(&self) -> bool {
-        let over = self.participant.time() + 0.5 * self.plan.step_from(self.participant.time())
-            >= self.scene.scene.until;
-        over || self.participant.ended().is_some()
+        let time = self.simulation.time();
+        let over = time + 0.5 * self.world.step_from(time) >= self.world.scene.scene.until;
+        over || self.simulation.ended().is_some()
     }
 
     /// After a step that failed: shows what was found until then to those who have not looked at it.
     fn show_what_was_found(&mut self) {
-        let seen = self.participant.time();
-        if !self.participant.keeps_what_it_found() || self.participant.evaluate(Wanted::Everything).is_err() {
+        let seen = self.simulation.time();
+        let Some(only) = self.simulation.only() else { return };
+        if !only.keeps_what_it_found() || only.evaluate(Wanted::Everything).is_err() {
             return;
         }
-        let (time, step) = (self.participant.time(), self.plan.step);
-        self.strains.look(self.built, self.participant.shells());
+        let (time, step) = (self.simulation.time(), self.world.step_from(seen));
+        self.look_at_strains();
+        let frames = self.simulation.frames(self.world);
         if time > seen {
-            self.history.sample(self.built, self.participant.instant());
+            self.history.sample(&frames);
         }
-        let frame = Frame { built: self.built, now: self.participant.instant() };
         for (schedule, observer) in &mut self.watching {
             if (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true) {
                 // The failure of the step is reported.
-                let _ = observer.see(&frame);
+                let _ = observer.see(&frames);
             }
         }
     }
 
     /// The steps to the next instant at which there is something to do.
     fn stride(&self) -> u64 {
-        let time = self.participant.time();
-        let step = self.plan.step_from(time);
+        let time = self.simulation.time();
+        let step = self.world.step_from(time);
         (self.watching.iter().map(|(schedule, _)| schedule))
             .chain([&self.sampling])
             .map(|schedule| schedule.stride(time, step))
             .chain(self.checkpoints.as_ref().map(|checkpoints| checkpoints.stride(time, step)))
-            .chain([steps_to(self.scene.scene.until, time, step), self.participant.stride()])
+            .chain([steps_to(self.world.scene.scene.until, time, step), self.simulation.stride()])
             .fold(u64::MAX, u64::min)
     }
 
@@ -431,45 +455,38 @@ impl<'a> Course<'a> {
         watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
         let steps = self.stride();
-        self.participant.advance(steps, watch)?;
-        let last = self.is_last();
-        let due = (self.checkpoints.as_mut()).is_some_and(|all| {
-            all.is_due(self.participant.time(), self.plan.step_from(self.participant.time()), last || stop)
-        });
+        self.simulation.advance(steps, watch)?;
+        let (time, last) = (self.simulation.time(), self.is_last());
+        let step = self.world.step_from(time);
+        let due = self.checkpoints.as_mut().is_some_and(|all| all.is_due(time, step, last || stop));
         if due && let Some(checkpoints) = &self.checkpoints {
-            self.participant.bring_back()?;
+            self.simulation.bring_back()?;
             let progressed = Progressed {
-                time: self.participant.time(),
-                steps: self.participant.steps(),
+                time,
+                steps: self.simulation.steps(),
                 wall_seconds,
-                worst_balance: self.worst_balance,
-                worst_hourglass: self.worst_hourglass,
-                strains: self.strains.clone(),
+                watched: self.watched.clone(),
                 history: self.history.clone(),
                 sampling: self.sampling,
                 outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
             };
-            let written = checkpoints.write(&progressed, self.participant.as_ref());
-            self.kept =
-                Some(written.map_err(|error| FailureSummary::output(&error, Some(self.participant.time())))?);
+            let written = checkpoints.write(&progressed, self.simulation.participants());
+            self.kept = Some(written.map_err(|error| FailureSummary::output(&error, Some(time)))?);
         }
         // What is left of the last instant is quickly done.
         if stop && !last {
-            return Err(FailureSummary::interrupted(
-                self.participant.time(),
-                due.then_some(self.kept.as_deref()).flatten(),
-            ));
+            let kept = due.then_some(self.kept.as_deref()).flatten();
+            return Err(FailureSummary::interrupted(time, kept));
         }
         Ok(())
     }
 
     /// Draws the instant last seen.
     fn draw(&self, picture: &dyn Draw, folder: &OutputFolder) -> Result<PathBuf, OutputError> {
-        let shown = self.scene.shown(self.scene.scene.until);
-        let mut snapshot =
-            Snapshot::new(self.built, shown.on.as_deref(), &shown.data, shown.at, shown.curved);
-        snapshot.fill(&Frame { built: self.built, now: self.participant.instant() });
-        let drawn = picture.draw(snapshot.mesh(), self.participant.time());
+        let world = self.world;
+        let mut snapshot = Snapshot::new(world, &world.scene.shown(world.scene.scene.until));
+        snapshot.fill(&self.simulation.frames(world));
+        let drawn = picture.draw(snapshot.mesh(), self.simulation.time());
         let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
         folder.write(PICTURE, &png)
     }
@@ -478,24 +495,19 @@ impl<'a> Course<'a> {
     fn finish(&mut self) -> Result<(), FailureSummary> {
         (self.watching.iter_mut())
             .try_for_each(|(_, observer)| observer.finish())
-            .map_err(|error| FailureSummary::output(&error, Some(self.participant.time())))
+            .map_err(|error| FailureSummary::output(&error, Some(self.simulation.time())))
     }
-}
-
-fn look(watching: &mut [Scheduled], frame: &Frame<'_>, step: f64, last: bool) -> Result<(), OutputError> {
-    for (schedule, observer) in watching {
-        if schedule.is_due(frame.time(), step, last) {
-            observer.see(frame)?;
-        }
-    }
-    Ok(())
 }
 
 impl History {
-    fn sample(&mut self, built: &Built, now: &dyn Instant) {
-        self.times.push(now.time());
-        self.energies.push(now.energies());
-        let size = |constraint| now.reaction(constraint).iter().map(|f| f * f).sum::<f64>().sqrt();
-        self.reactions.push((0..built.model.constraints.len()).map(size).collect());
+    fn sample(&mut self, frames: &[Frame<'_>]) {
+        self.times.push(time_of(frames));
+        self.energies.push(total(frames.iter().map(|frame| frame.now.energies())));
+        let size = |force: [f64; 3]| force.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let of = |frame: &Frame<'_>| {
+            let constraints = 0..frame.part.built.model.constraints.len();
+            constraints.map(|constraint| size(frame.now.reaction(constraint))).collect::<Vec<_>>()
+        };
+        self.reactions.push(frames.iter().flat_map(of).collect());
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::checker::{nearest, read_table};
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{BodyTable, RunTable, SceneTable, SurfaceTable, ViewTable};
+use crate::format::{BodyTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, ViewTable};
 use crate::reads::{LONGEST_SCENE, Reads};
 use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
 use crate::source::{Node, Source, Value};
@@ -21,7 +21,9 @@ pub struct Scene {
     pub scene: SceneTable,
     /// `[run]`
     pub run: RunTable,
-    /// `[law.NAME]`, in the order of the file, as all below.
+    /// `[participant.NAME]`, in the order of the file, as all below.
+    pub participants: Vec<(String, ParticipantTable)>,
+    /// `[law.NAME]`
     pub laws: Vec<(String, LawTable)>,
     /// `[body.NAME]`
     pub bodies: Vec<(String, BodyTable)>,
@@ -35,12 +37,17 @@ pub struct Scene {
     pub outputs: Vec<(String, OutputTable)>,
     /// `[view]`
     pub view: ViewTable,
-    /// What is doubtful about values by themselves.
+    /// Doubts about values by themselves.
     pub(crate) doubts: Vec<Diagnostic>,
+    /// Of the scene of one participant: the table that its run comes from.
+    pub(crate) own: Option<String>,
+    /// Whether it is the scene of one participant of several.
+    pub(crate) is_part: bool,
 }
 
 /// The tables a scene file can have.
-const TABLES: [&str; 9] = ["scene", "run", "law", "body", "surface", "constraint", "load", "output", "view"];
+const TABLES: [&str; 10] =
+    ["scene", "run", "participant", "law", "body", "surface", "constraint", "load", "output", "view"];
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -102,6 +109,12 @@ impl Scene {
         check_top(&source, &mut out);
         let scene = read_scene_table(&source, &mut out);
         let run = read_table::<RunTable>(&source, &["run"], &[], &mut out);
+        let participants = read_all(
+            &source,
+            "participant",
+            |s, path, out| read_table::<ParticipantTable>(s, path, &[], out),
+            &mut out,
+        );
         let laws = read_all(&source, "law", read_law, &mut out);
         let bodies =
             read_all(&source, "body", |s, path, out| read_table::<BodyTable>(s, path, &[], out), &mut out);
@@ -127,6 +140,7 @@ impl Scene {
                 folder,
                 scene,
                 run,
+                participants,
                 laws,
                 bodies,
                 surfaces,
@@ -135,6 +149,8 @@ impl Scene {
                 outputs,
                 view,
                 doubts: out,
+                own: None,
+                is_part: false,
             }),
             _ => Err(source.errors(out)),
         }

@@ -9,15 +9,14 @@ use std::sync::{Arc, Mutex};
 
 use pliant_mechanics::Energies;
 
-use crate::assemble::{Built, build_with};
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
 use crate::output::{AXES, ENERGIES, OutputError, OutputFolder, Summary, check_own_folder, number};
-use crate::plan::{Plan, plan};
 use crate::registry::OutputTable;
 use crate::run::{Options, run_with};
 use crate::scene::Scene;
 use crate::source::{SET, Source};
+use crate::world::World;
 
 /// The table of a sweep.
 pub const SWEEP: &str = "sweep.csv";
@@ -165,11 +164,8 @@ impl Sweep {
         Ok(scene)
     }
 
-    fn prepare(&self, run: usize) -> Result<(Scene, Built, Plan), SceneErrors> {
-        let scene = self.scene(run)?;
-        let built = build_with(&scene, &self.cache)?;
-        let plan = plan(&scene, &built)?;
-        Ok((scene, built, plan))
+    fn prepare(&self, run: usize) -> Result<World, SceneErrors> {
+        World::assemble(&self.scene(run)?, &self.cache, &|_| {})
     }
 
     /// Reads, builds and plans every combination; runs nothing. The mistakes come with the combination's number, in
@@ -268,23 +264,23 @@ impl Sweep {
         options: SweepOptions<'_>,
         watch: &mut (dyn FnMut(f64) + Send),
     ) -> Row {
-        let (mut scene, built, plan) = match self.prepare(run) {
+        let mut world = match self.prepare(run) {
             Ok(prepared) => prepared,
             Err(errors) => return Row::failed(errors.plain()),
         };
         if !options.keep_fields {
-            scene.outputs.retain(|(_, table)| !matches!(table, OutputTable::Vtu(_)));
+            world.scene.outputs.retain(|(_, table)| !matches!(table, OutputTable::Vtu(_)));
         }
         let path = folder.path().join(format!("run-{run:04}"));
         // Files in it that are not of a run stay.
-        let folder = match OutputFolder::prepare(path, &scene, true) {
+        let folder = match OutputFolder::prepare(path, &world.scene, true) {
             Ok(folder) => folder,
             Err(error) => return Row::failed(error),
         };
         let options = Options { stop: options.stop, ..Options::default() };
         let mut report = |progress: crate::run::Progress| watch(progress.time / progress.until);
-        match run_with(&scene, &built, &plan, &folder, options, &mut report) {
-            Ok(summary) => Row::new(summary, final_probes(&scene, folder.path())),
+        match run_with(&world, &folder, options, &mut report) {
+            Ok(summary) => Row::new(summary, final_probes(&world.scene, folder.path())),
             Err(error) => Row::failed(error),
         }
     }

@@ -33,7 +33,7 @@ impl Target {
                     None => Ok(Self::processor(run, None)),
                     Some((key, _)) => {
                         let message = format!("`{key}` is given, but the scene runs on the processor");
-                        let place = scene.source.span(&["run", key]);
+                        let place = scene.source.span(&scene.run_at(key));
                         let help = format!("set `device = \"gpu\"` or `\"auto\"`, or leave `{key}` out");
                         Err(Box::new(Diagnostic::error(message).at(place, "not used").help(help)))
                     }
@@ -53,14 +53,14 @@ impl Target {
                     }
                     Err(error) => {
                         let key = if run.adapter.is_some() { "adapter" } else { "device" };
-                        let place = scene.source.span(&["run", key]);
+                        let place = scene.source.span(&scene.run_at(key));
                         Err(Box::new(Diagnostic::error(error.to_string()).at(place, "").help(error.remedy())))
                     }
                 },
                 Some((key, what, help)) => {
                     let error = Diagnostic::error(format!("{what} runs on the processor only"))
-                        .at(scene.source.span(&["run", "device"]), "not for this")
-                        .also(scene.source.span(&["run", key]), "asked for here");
+                        .at(scene.source.span(&scene.run_at("device")), "not for this")
+                        .also(scene.source.span(&scene.run_at(key)), "asked for here");
                     Err(Box::new(error.help(help)))
                 }
             },

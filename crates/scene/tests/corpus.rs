@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use pliant_scene::niftysim::import_bytes;
 use pliant_scene::source::Source;
-use pliant_scene::{Checkpoint, OutputFolder, Scene};
+use pliant_scene::{Checkpoint, OutputFolder, Scene, World};
 
 #[path = "../../geometry/tests/support/noise.rs"]
 mod noise;
@@ -103,10 +103,9 @@ fn broken_checkpoints_give_errors() {
         [output.t]\ntype = 'csv'\nevery = 0.005\nenergy = true\n";
     let scene = Scene::from_source(Source::parse("scene.toml", SCENE).unwrap(), ".".into()).unwrap();
     let out = tempfile::tempdir().unwrap();
-    let built = pliant_scene::build(&scene).unwrap();
-    let plan = pliant_scene::plan(&scene, &built).unwrap();
+    let world = World::new(&scene).unwrap();
     let folder = OutputFolder::prepare(out.path().join("out"), &scene, false).unwrap();
-    pliant_scene::run(&scene, &built, &plan, &folder, &mut |_| {}).unwrap();
+    pliant_scene::run(&world, &folder, &mut |_| {}).unwrap();
     let path = Checkpoint::read(folder.path()).unwrap().path().to_owned();
     let whole = fs::read(&path).unwrap();
     let body = &whole[20..whole.len() - 4];
@@ -116,7 +115,7 @@ fn broken_checkpoints_give_errors() {
         let read = Checkpoint::from_bytes(&path, &Checkpoint::framed(&noise.change(body)));
         outcomes[usize::from(read.is_err())] += 1;
         // What is read is held to the model before anything is done with it.
-        let _ = read.map(|checkpoint| checkpoint.continues(&scene, &built, &plan));
+        let _ = read.map(|checkpoint| checkpoint.continues(&world));
         // Without a fitting checksum no change is taken for a checkpoint.
         let changed = noise.change(&whole);
         assert!(changed == whole || Checkpoint::from_bytes(&path, &changed).is_err());

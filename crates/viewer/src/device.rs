@@ -4,10 +4,8 @@
 use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
-use pliant_gpu::{Device, PointValue};
+use pliant_gpu::PointValue;
 use pliant_mechanics::Energies;
-
-use crate::session::Stage;
 
 /// Wall time between two looks at a state that lies on a device.
 pub const LOOK: Duration = Duration::from_millis(250);
@@ -48,17 +46,5 @@ pub(crate) fn point_value(field: Option<&str>) -> PointValue {
         Some("displacement:y") => PointValue::Component(1),
         Some("displacement:z") => PointValue::Component(2),
         Some(_) => PointValue::Given,
-    }
-}
-
-impl Stage {
-    /// Goes on on a device that is open, where that is the one it asks for.
-    pub(crate) fn share(&mut self, open: Option<&Device>) {
-        if let (Some(open), Some(asked)) = (open, &mut self.plan.target.device)
-            && open.adapter() == asked.adapter()
-            && open.check().is_ok()
-        {
-            *asked = open.clone();
-        }
     }
 }

@@ -6,7 +6,6 @@
 use std::collections::HashSet;
 
 use pliant_geometry::Vector3;
-use pliant_mechanics::Model;
 use pliant_mechanics::grip::Grip;
 use pliant_picture::Subject;
 use pliant_scene::Live;
@@ -77,10 +76,10 @@ pub(crate) fn nodes_of(point: &Point, subject: &Subject, live: &dyn Live) -> Opt
 }
 
 /// The mean length [m] of the edges between the nodes that carry a triangle.
-fn edge(corners: [u32; 3], model: &Model, live: &dyn Live) -> f64 {
+fn edge(corners: [u32; 3], live: &dyn Live) -> f64 {
     let mut nodes = Nodes::new();
     corners.into_iter().for_each(|corner| add(&mut nodes, live.nodes_of(corner), 1.0));
-    let places: Vec<Vector3> = nodes.iter().map(|&(node, _)| model.rest[node as usize].into()).collect();
+    let places: Vec<Vector3> = nodes.iter().map(|&(node, _)| live.rest(node).into()).collect();
     let (mut sum, mut count) = (0.0, 0);
     for (first, a) in places.iter().enumerate() {
         for b in &places[..first] {
@@ -91,11 +90,11 @@ fn edge(corners: [u32; 3], model: &Model, live: &dyn Live) -> f64 {
 }
 
 /// The surface around a point, as a combination of nodes: what lies within two edges of it at rest and hangs together with it.
-fn around(point: &Point, subject: &Subject, model: &Model, live: &dyn Live) -> Option<Nodes> {
+fn around(point: &Point, subject: &Subject, live: &dyn Live) -> Option<Nodes> {
     let corners = subject.triangles().nth(point.triangle as usize)?;
     let middle: Vector3 =
         corners.into_iter().zip(point.weights).map(|(corner, w)| subject.points[corner as usize] * w).sum();
-    let edge = edge(corners, model, live);
+    let edge = edge(corners, live);
     let distance = |corner: u32| (subject.points[corner as usize] - middle).norm();
     let mut reached: Vec<u32> = corners.into_iter().filter(|&c| distance(c) < 2.0 * edge).collect();
     let mut known: HashSet<u32> = reached.iter().copied().collect();
@@ -137,16 +136,9 @@ impl Hold {
         })
     }
 
-    /// Does what hand and pins do; the stiffness stays below what leaves steps [s] stable. False where the solver knows no hand.
-    pub fn take(
-        &mut self,
-        hand: &Hand,
-        model: &Model,
-        step: f64,
-        subject: &Subject,
-        live: &mut dyn Live,
-    ) -> bool {
-        let grip = |point: &Point, stiffness| grip(point, stiffness, model, step, subject, &*live);
+    /// Does what hand and pins do; the stiffness stays below the bound of stable steps. False where the solver knows no hand.
+    pub fn take(&mut self, hand: &Hand, subject: &Subject, live: &mut dyn Live) -> bool {
+        let grip = |point: &Point, stiffness| grip(point, stiffness, subject, &*live);
         let mut found = true;
         match hand {
             Hand::Take(point, stiffness) => {
@@ -183,10 +175,10 @@ impl Hold {
         self.hold(live) && found
     }
 
-    /// Holds the same in a run of another model or step [s].
-    pub fn hold_on(&mut self, model: &Model, step: f64, live: &mut dyn Live) -> bool {
+    /// Holds the same in another run.
+    pub fn hold_on(&mut self, live: &mut dyn Live) -> bool {
         for (grip, taken) in self.grips.iter_mut().zip(&self.taken) {
-            grip.stiffness = taken.stiffness.min(grip.stiffest(model, step));
+            grip.stiffness = taken.stiffness.min(live.stiffest(grip));
         }
         self.hold(live)
     }
@@ -208,18 +200,11 @@ impl Hold {
 }
 
 /// A grip where its point is, as stiff as asked for or as steps allow.
-fn grip(
-    point: &Point,
-    stiffness: f64,
-    model: &Model,
-    step: f64,
-    subject: &Subject,
-    live: &dyn Live,
-) -> Option<(Grip, Taken)> {
-    let nodes = around(point, subject, model, live)?;
+fn grip(point: &Point, stiffness: f64, subject: &Subject, live: &dyn Live) -> Option<(Grip, Taken)> {
+    let nodes = around(point, subject, live)?;
     let at = Grip { nodes: nodes_of(point, subject, live)?, ..Grip::default() };
     let mut grip = Grip { nodes, ..Grip::default() };
-    grip.stiffness = stiffness.min(grip.stiffest(model, step));
+    grip.stiffness = stiffness.min(live.stiffest(&grip));
     [grip.place, _] = live.pulled(&grip);
     let offset = Vector3::from(live.pulled(&at)[0]) - Vector3::from(grip.place);
     Some((grip, Taken { stiffness, offset }))

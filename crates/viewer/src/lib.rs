@@ -15,6 +15,6 @@ pub use hand::{Hand, Hold, Point, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
 pub use replay::{Done, Lags, Move, Recording, Replayed, Surface, replay, replay_in_real_time};
 pub use samples::Samples;
-pub use session::{Frame, Order, Session, Stage};
+pub use session::{Frame, Order, Session};
 #[cfg(feature = "window")]
 pub use window::{Errand, Opening, WindowError, open};

@@ -4,10 +4,8 @@ use pliant_scene::diagnostic::SceneErrors;
 use pliant_scene::reference::{Parameter as Described, describe};
 use pliant_scene::registry::{Section, sections};
 use pliant_scene::source::{Node, Value};
-use pliant_scene::{MeshCache, Scene};
+use pliant_scene::{MeshCache, Scene, World};
 use serde::{Deserialize, Serialize};
-
-use crate::session::Stage;
 
 /// A number of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,11 +85,11 @@ fn collect(path: Vec<String>, node: &Node, described: Option<&Described>, found:
     found.push(Parameter { number: Number { path, value }, unit, meaning });
 }
 
-/// The stage of a scene with other numbers. It is built and planned anew, which takes a while.
+/// The world of a scene with other numbers. It is built and planned anew, which takes a while.
 ///
 /// # Errors
 /// What the scene says of numbers that cannot be.
-pub fn with_numbers(scene: &Scene, numbers: &[Number]) -> Result<Stage, String> {
+pub fn with_numbers(scene: &Scene, numbers: &[Number]) -> Result<World, String> {
     let mut source = scene.source.clone();
     for Number { path, value } in numbers {
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
@@ -99,7 +97,5 @@ pub fn with_numbers(scene: &Scene, numbers: &[Number]) -> Result<Stage, String> 
     }
     let told = |errors: SceneErrors| errors.plain().to_string();
     let scene = Scene::from_source(source, scene.folder.clone()).map_err(told)?;
-    let built = pliant_scene::build_with(&scene, &MeshCache::of_user()).map_err(told)?;
-    let plan = pliant_scene::plan(&scene, &built).map_err(told)?;
-    Ok(Stage { scene, built: built.into(), plan })
+    World::assemble(&scene, &MeshCache::of_user(), &|_| {}).map_err(told)
 }

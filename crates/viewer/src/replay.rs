@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::hand::{Hand, Hold};
 use crate::parameters::{Number, with_numbers};
-use crate::session::{FRAME, Order, Session, Stage};
+use crate::session::{FRAME, Order, Session};
+use pliant_scene::World;
 
 /// Something done to a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -149,20 +150,20 @@ impl Lags {
 /// Repeats a recording by a mouse that moves when it did, while the run goes on in real time: what was felt then, and when.
 ///
 /// # Errors
-/// If a stage can't be made, or the run fails.
-pub fn replay_in_real_time(stage: &Stage, recording: &Recording) -> Result<Recording, String> {
+/// If a world can't be made, or the run fails.
+pub fn replay_in_real_time(world: &World, recording: &Recording) -> Result<Recording, String> {
     let mut orders = Vec::new();
     for then in &recording.moves {
         let order = match &then.done {
             Done::Hand(hand) => Order::Hand(*hand),
             Done::Numbers(numbers) => {
-                Order::Change(Box::new(with_numbers(&stage.scene, numbers)?), numbers.clone())
+                Order::Change(Box::new(with_numbers(&world.scene, numbers)?), numbers.clone())
             }
-            Done::Surface(surface) => Order::Show(Box::new(surface.put_into(&stage.scene.view))),
+            Done::Surface(surface) => Order::Show(Box::new(surface.put_into(&world.scene.view))),
         };
         orders.push((Duration::try_from_secs_f64(then.seconds).unwrap_or_default(), order));
     }
-    let mut session = Session::start(stage.clone(), || ()).map_err(|error| error.to_string())?;
+    let mut session = Session::start(world.clone(), || ()).map_err(|error| error.to_string())?;
     session.order(Order::Record);
     session.order(Order::Play(true));
     let started = Instant::now();
@@ -182,14 +183,14 @@ pub fn replay_in_real_time(stage: &Stage, recording: &Recording) -> Result<Recor
 ///
 /// # Errors
 /// Why the run could not go on.
-pub fn replay(stage: &Stage, recording: &Recording) -> Result<Replayed, String> {
+pub fn replay(world: &World, recording: &Recording) -> Result<Replayed, String> {
     let mut replay = Replay { moves: &recording.moves, of: recording.steps, ..Replay::default() };
-    let (mut now, mut before) = (stage.clone(), None);
+    let (mut now, mut before) = (world.clone(), None);
     loop {
         match replay.play(&now, before.take())? {
             Ended::Whole(replayed) => return Ok(replayed),
             Ended::Change(standing, numbers) => {
-                let next = with_numbers(&stage.scene, numbers)?;
+                let next = with_numbers(&world.scene, numbers)?;
                 before = Some((std::mem::replace(&mut now, next), standing.map(|standing| *standing)));
             }
         }
@@ -212,9 +213,9 @@ struct Replay<'r> {
 }
 
 /// What a view shows of a run.
-fn subject_of(stage: &Stage, view: &ViewTable, live: &mut dyn Live) -> Result<Subject, String> {
+fn subject_of(world: &World, view: &ViewTable, live: &mut dyn Live) -> Result<Subject, String> {
     let mesh = live.mesh().map_err(|failure| failure.message)?;
-    Ok(Subject::new(&visible(mesh, &stage.built.hidden(view))))
+    Ok(Subject::new(&visible(mesh, &world.hidden(view))))
 }
 
 enum Ended<'r> {
@@ -225,18 +226,17 @@ enum Ended<'r> {
 
 impl<'r> Replay<'r> {
     /// Goes on until numbers are others, or to the end.
-    fn play(&mut self, stage: &Stage, from: Option<(Stage, Option<Standing>)>) -> Result<Ended<'r>, String> {
-        let (mut live, _) = stage.enter(from)?;
+    fn play(&mut self, world: &World, from: Option<(World, Option<Standing>)>) -> Result<Ended<'r>, String> {
+        let (mut live, _) = crate::session::enter(world, from)?;
         if let Some(surface) = self.surface {
-            live.show(&stage.scene.shown_as(&surface.put_into(&stage.scene.view), 1.0));
+            live.show(&world.scene.shown_as(&surface.put_into(&world.scene.view), 1.0));
         }
         let subject = match self.subject.take() {
             Some(subject) => subject,
-            None => subject_of(stage, &stage.scene.view, live.as_mut())?,
+            None => subject_of(world, &world.scene.view, live.as_mut())?,
         };
         let subject = self.subject.insert(subject);
-        let (model, step) = (&stage.built.model, stage.plan.step);
-        self.hold.hold_on(model, step, live.as_mut());
+        self.hold.hold_on(live.as_mut());
         loop {
             while let Some((then, rest)) =
                 self.moves.split_first().filter(|(then, _)| then.steps <= self.steps)
@@ -247,13 +247,13 @@ impl<'r> Replay<'r> {
                         if then.looked {
                             live.mesh().map_err(|failure| failure.message)?;
                         }
-                        self.hold.take(hand, model, step, subject, live.as_mut());
+                        self.hold.take(hand, subject, live.as_mut());
                     }
                     Done::Surface(surface) => {
                         self.surface = Some(surface);
-                        let view = surface.put_into(&stage.scene.view);
-                        live.show(&stage.scene.shown_as(&view, 1.0));
-                        *subject = subject_of(stage, &view, live.as_mut())?;
+                        let view = surface.put_into(&world.scene.view);
+                        live.show(&world.scene.shown_as(&view, 1.0));
+                        *subject = subject_of(world, &view, live.as_mut())?;
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {
@@ -263,7 +263,7 @@ impl<'r> Replay<'r> {
                 }
             }
             if self.steps >= self.of {
-                return self.end(stage, live.as_mut()).map(Ended::Whole);
+                return self.end(live.as_mut()).map(Ended::Whole);
             }
             let next = self.moves.first().map_or(self.of, |then| then.steps.min(self.of));
             self.steps += live.advance(next - self.steps).map_err(|failure| failure.message)?;
@@ -273,7 +273,7 @@ impl<'r> Replay<'r> {
         }
     }
 
-    fn end(&self, stage: &Stage, live: &mut dyn Live) -> Result<Replayed, String> {
+    fn end(&self, live: &mut dyn Live) -> Result<Replayed, String> {
         let (time, fingerprint) = (live.time(), live.fingerprint());
         // Reactions belong to the instant at which forces are found.
         live.mesh().map_err(|failure| failure.message)?;
@@ -282,7 +282,7 @@ impl<'r> Replay<'r> {
             fingerprint,
             largest_force: self.largest_force,
             held: self.hold.shown(live).next().filter(|_| self.hold.by_hand()),
-            reactions: (0..stage.built.model.constraints.len()).map(|index| live.reaction(index)).collect(),
+            reactions: live.reactions(),
         })
     }
 }

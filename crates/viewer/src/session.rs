@@ -12,7 +12,7 @@ use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values, visible};
 use pliant_scene::format::ViewTable;
-use pliant_scene::{Built, Column, Live, Plan, Scene, Standing, go_on, live};
+use pliant_scene::{Column, Live, Standing, World, go_on, live};
 
 use crate::device::{Seen, point_value};
 use crate::hand::{Hand, Hold, Point, nodes_of};
@@ -37,8 +37,8 @@ pub enum Order {
     Speed(f64),
     /// Changes what a hand or a pin holds.
     Hand(Hand),
-    /// Goes on as another stage from the next step on, from where the run stands: that of numbers which are others than in the file.
-    Change(Box<Stage>, Vec<Number>),
+    /// Goes on as another world from the next step on, from where the run stands: that of numbers which are others than in the file.
+    Change(Box<World>, Vec<Number>),
     /// Follows a point.
     Probe(Point),
     /// Follows no point any more but those that the scene names.
@@ -113,46 +113,33 @@ pub struct Session {
     thread: Option<JoinHandle<Recording>>,
 }
 
-/// A scene ready to be played.
-#[derive(Clone, Debug)]
-pub struct Stage {
-    /// The scene.
-    pub scene: Scene,
-    /// Its model.
-    pub built: Arc<Built>,
-    /// Its step.
-    pub plan: Plan,
-}
-
-impl Stage {
-    /// Begins to play it, from where a run of a stage before stands if it can be; whether it goes on from there.
-    ///
-    /// # Errors
-    /// If its solver can't be made.
-    pub(crate) fn enter(
-        &self,
-        from: Option<(Self, Option<Standing>)>,
-    ) -> Result<(Box<dyn Live>, bool), String> {
-        let told = |failure: pliant_scene::FailureSummary| failure.message;
-        if let Some((before, Some(standing))) = from {
-            let going = go_on(&self.scene, &self.built, &self.plan, standing, &before.built).map_err(told)?;
-            if let Some(live) = going {
-                return Ok((live, true));
-            }
-        }
-        Ok((live(&self.scene, &self.built, &self.plan).map_err(told)?, false))
+/// Begins to play a world, from where a run of another one stands if it can be; whether it goes on from there.
+///
+/// # Errors
+/// If a stepper can't be made.
+pub(crate) fn enter(
+    world: &World,
+    from: Option<(World, Option<Standing>)>,
+) -> Result<(Box<dyn Live>, bool), String> {
+    let told = |failure: pliant_scene::FailureSummary| failure.message;
+    let world = Arc::new(world.clone());
+    if let Some((before, Some(standing))) = from
+        && let Some(live) = go_on(&world, standing, &before).map_err(told)?
+    {
+        return Ok((live, true));
     }
+    Ok((live(&world).map_err(told)?, false))
 }
 
 impl Session {
     /// Starts to play a scene, standing still. `wake` is called after each frame.
-    pub fn start(stage: Stage, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    pub fn start(world: World, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (input, frames) = triple_buffer::TripleBuffer::new(&Frame::default()).split();
         let (orders, inbox) = channel();
-        let threads = stage.scene.run.threads as usize;
+        let threads = world.scene.run.threads as usize;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(std::io::Error::other)?;
-        let run = move || pool.install(move || play(stage, &inbox, input, &wake));
+        let run = move || pool.install(move || play(world, &inbox, input, &wake));
         let thread = std::thread::Builder::new().name("solver".into()).spawn(run)?;
         Ok(Self { orders, frames, thread: Some(thread) })
     }
@@ -221,7 +208,7 @@ impl Pace {
     }
 }
 
-/// What of a run lasts when it goes on as another stage.
+/// What of a run lasts when it goes on as another world.
 struct Course {
     hold: Hold,
     /// What is shown, and the view that the scene opened with.
@@ -249,8 +236,8 @@ struct Course {
     recording: Option<Recording>,
     /// When the first move was recorded.
     started: Option<Instant>,
-    /// The stage to go on as, and its numbers that are others than in the file.
-    change: Option<(Box<Stage>, Vec<Number>)>,
+    /// The world to go on as, and its numbers that are others than in the file.
+    change: Option<(Box<World>, Vec<Number>)>,
     numbers: Vec<Number>,
     followed: Vec<Followed>,
     columns: Arc<[Column]>,
@@ -267,18 +254,18 @@ struct Followed {
     rest: Vector3,
 }
 
-/// Why a stage is left.
+/// Why a world is left.
 enum Left {
     Quit,
     /// To start anew.
     Reset,
-    /// For another stage.
+    /// For another world.
     Change,
 }
 
-/// The solver's thread while it plays a stage.
+/// The solver's thread while it plays a world.
 struct Player<'s> {
-    stage: &'s Stage,
+    world: &'s World,
     subject: Arc<Subject>,
     /// Labels whose cells are not shown.
     hidden: Vec<i32>,
@@ -289,18 +276,18 @@ struct Player<'s> {
 }
 
 fn play(
-    mut stage: Stage,
+    mut world: World,
     inbox: &Receiver<(Instant, Order)>,
     mut frames: triple_buffer::Input<Frame>,
     wake: &(impl Fn() + Send),
 ) -> Recording {
-    let mut course = Course::new(&stage);
+    let mut course = Course::new(&world);
     let mut from = None;
     let mut subject = None;
     loop {
         let (left, standing);
         (left, standing, subject, course) = {
-            let mut player = match Player::enter(&stage, from, subject, course) {
+            let mut player = match Player::enter(&world, from, subject, course) {
                 Ok(player) => player,
                 Err(message) => {
                     frames.input_buffer_mut().failure = Some(message);
@@ -326,20 +313,20 @@ fn play(
             course.start_anew();
         }
         from = course.change.take().map(|(mut next, numbers)| {
-            next.share(stage.plan.target.device.as_ref());
+            next.share(world.device());
             course.record(false, Instant::now(), Done::Numbers(numbers.clone()));
             course.numbers = numbers;
-            (std::mem::replace(&mut stage, *next), standing)
+            (std::mem::replace(&mut world, *next), standing)
         });
     }
 }
 
 impl Course {
-    fn new(stage: &Stage) -> Self {
+    fn new(world: &World) -> Self {
         Self {
             hold: Hold::default(),
-            view: stage.scene.view.clone(),
-            usual: Surface::of(&stage.scene.view),
+            view: world.scene.view.clone(),
+            usual: Surface::of(&world.scene.view),
             field: None,
             steps: 0,
             failure: None,
@@ -421,24 +408,24 @@ impl Course {
 }
 
 impl<'s> Player<'s> {
-    /// Begins to play a stage, or goes on as it from where a run of the stage before stands.
+    /// Begins to play a world, or goes on as it from where a run of the world before stands.
     fn enter(
-        stage: &'s Stage,
-        from: Option<(Stage, Option<Standing>)>,
+        world: &'s World,
+        from: Option<(World, Option<Standing>)>,
         subject: Option<Arc<Subject>>,
         mut course: Course,
     ) -> Result<Self, String> {
-        let (mut live, goes_on) = stage.enter(from)?;
+        let (mut live, goes_on) = enter(world, from)?;
         if !goes_on && course.steps > 0 {
             course.start_anew();
             course.note = Some("the mesh or the solver is another one: it starts anew".into());
         }
-        course.hold.hold_on(&stage.built.model, stage.plan.step, live.as_mut());
-        let on_device = stage.plan.target.device.is_some();
+        course.hold.hold_on(live.as_mut());
+        let on_device = world.device().is_some();
         let known = subject.filter(|_| goes_on);
         let is_known = known.is_some();
         let mut player =
-            Self { stage, subject: known.unwrap_or_default(), hidden: Vec::new(), live, on_device, course };
+            Self { world, subject: known.unwrap_or_default(), hidden: Vec::new(), live, on_device, course };
         player.show_as_viewed();
         if !is_known {
             player.renew_subject()?;
@@ -452,7 +439,7 @@ impl<'s> Player<'s> {
         (Some(self.subject), self.course)
     }
 
-    /// Follows orders and goes on, until the stage is left.
+    /// Follows orders and goes on, until the world is left.
     fn go(
         &mut self,
         inbox: &Receiver<(Instant, Order)>,
@@ -504,7 +491,7 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// Whether another stage waits, and the run stands between two steps.
+    /// Whether another world waits, and the run stands between two steps.
     fn is_due_to_change(&self) -> bool {
         let course = &self.course;
         course.change.is_some() && (course.steps == 0 || course.failure.is_some() || self.live.delay() == 0)
@@ -536,7 +523,7 @@ impl<'s> Player<'s> {
                 course.pace.anchor(self.live.time());
             }
             Order::Hand(hand) => self.hold(sent, &hand),
-            Order::Change(stage, numbers) => course.change = Some((stage, numbers)),
+            Order::Change(world, numbers) => course.change = Some((world, numbers)),
             Order::Probe(point) => self.follow(&point),
             Order::ForgetProbes => {
                 course.followed.clear();
@@ -558,9 +545,8 @@ impl<'s> Player<'s> {
         if !matches!(hand, Hand::Pull(_)) {
             self.course.seen.at = None;
         }
-        let (model, step) = (&self.stage.built.model, self.stage.plan.step);
         let looked = self.live.delay() > 0;
-        let held = self.course.hold.take(hand, model, step, &self.subject, self.live.as_mut());
+        let held = self.course.hold.take(hand, &self.subject, self.live.as_mut());
         let course = &mut self.course;
         course.note = (!held).then(|| "this solver knows no hand: it does not pull".into());
         let number = course.recording.as_ref().map_or(0, |recording| recording.moves.len());
@@ -573,9 +559,8 @@ impl<'s> Player<'s> {
     fn follow(&mut self, point: &Point) {
         let Some(nodes) = nodes_of(point, &self.subject, self.live.as_ref()) else { return };
         let point = Grip { nodes, ..Grip::default() };
-        let rest = &self.stage.built.model.rest;
-        let rest =
-            point.nodes.iter().map(|&(node, weight)| Vector3::from(rest[node as usize]) * weight).sum();
+        let rest = |&(node, weight): &(u32, f64)| Vector3::from(self.live.rest(node)) * weight;
+        let rest = point.nodes.iter().map(rest).sum();
         self.course.followed.push(Followed { point, rest });
         self.name_columns();
     }
@@ -605,8 +590,8 @@ impl<'s> Player<'s> {
     }
 
     fn show_as_viewed(&mut self) {
-        let (scene, course) = (&self.stage.scene, &mut self.course);
-        self.hidden = self.stage.built.hidden(&course.view);
+        let (scene, course) = (&self.world.scene, &mut self.course);
+        self.hidden = self.world.hidden(&course.view);
         self.live.show(&scene.shown_as(&course.view, 1.0));
         let part = course.view.component.map(|part| format!(":{}", part.word())).unwrap_or_default();
         course.field = scene.field_of(&course.view).map(|field| format!("{}{part}", field.name()));
@@ -626,7 +611,7 @@ impl<'s> Player<'s> {
             course.owed = 0;
             return;
         }
-        let left = (course.pace.goal() - self.live.time()) / self.stage.plan.step;
+        let left = (course.pace.goal() - self.live.time()) / self.world.step();
         let coasted = match self.on_device && course.is_going() {
             true => self.live.coast(left.ceil().max(1.0) as u64, FRAME / 2),
             false => None,
@@ -716,7 +701,7 @@ impl<'s> Player<'s> {
             frame.held.clone_from(&course.seen.held);
             frame.sample.clone_from(&course.seen.sample);
         }
-        let device = self.stage.plan.target.device.as_ref();
+        let device = self.world.device();
         frame.read_backs = device.map_or(0, |device| device.read_backs());
         frame.on_device = on_device;
         frame.columns.clone_from(&course.columns);
@@ -733,7 +718,7 @@ impl<'s> Player<'s> {
         frame.steps_a_frame = steps;
         frame.step_seconds = course.step_seconds;
         frame.real_time_factor = if frame.playing { course.pace.factor(frame.time) } else { 0.0 };
-        let step = if course.steps > 0 { frame.time / course.steps as f64 } else { self.stage.plan.step };
+        let step = if course.steps > 0 { frame.time / course.steps as f64 } else { self.world.step() };
         frame.possible_factor = if course.step_seconds > 0.0 { step / course.step_seconds } else { 0.0 };
         frame.input_lag = course.input_lag;
         frame.failure.clone_from(&course.failure);

@@ -9,19 +9,20 @@ use pliant_geometry::Vector3;
 use pliant_gpu::{Device, DevicePoints, PointValue};
 use pliant_picture::{Camera, Drawn, Plane, Renderer, Section, Style, Subject, Target};
 use pliant_scene::Live;
+use pliant_scene::World;
 use pliant_scene::format::{ColourBy, FieldName, ViewTable};
-use pliant_viewer::{Frame, Hand, Order, Point, Session, Stage};
-use support::{BALL, stage, subject, wait};
+use pliant_viewer::{Frame, Hand, Order, Point, Session};
+use support::{BALL, subject, wait, world};
 
 /// The ball on a graphics processor, pulled down, if there is one.
-fn on_device() -> Option<Stage> {
+fn on_device() -> Option<World> {
     let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
     if let Err(error) = Device::open(None) {
         assert!(!required, "{error}");
         eprintln!("skipped: {error}");
         return None;
     }
-    Some(stage(&scene("gpu")))
+    Some(world(&scene("gpu")))
 }
 
 fn scene(device: &str) -> String {
@@ -150,9 +151,9 @@ fn in_memory(live: &mut dyn Live) -> (Vec<Vector3>, Vec<f64>) {
 
 #[test]
 fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
-    let Some(stage) = on_device() else { return };
-    let device = stage.plan.target.device.clone().unwrap();
-    let mut live = pliant_scene::live(&stage.scene, &stage.built, &stage.plan).unwrap();
+    let Some(world) = on_device() else { return };
+    let device = world.device().cloned().unwrap();
+    let mut live = pliant_scene::live(&std::sync::Arc::new(world.clone())).unwrap();
     let subject = Subject::new(live.mesh().unwrap());
     let mut screen = Screen::new(&device, &subject);
     let style = Style { range: Some([0.0, 0.02]), ..Style::default() };
@@ -181,14 +182,14 @@ fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
         assert!((Vector3::new(x, y, z) - place).norm() < 1e-8, "{drawn:?} {place:?}");
         assert!((value - size).abs() < 1e-6 * size.max(1e-4));
     }
-    assert!((live.time() - steps as f64 * stage.plan.step).abs() < 1e-9);
+    assert!((live.time() - steps as f64 * world.step()).abs() < 1e-9);
 }
 
 #[test]
 fn pictures_from_the_device_are_those_from_memory_with_and_without_a_section() {
-    let Some(stage) = on_device() else { return };
-    let device = stage.plan.target.device.clone().unwrap();
-    let mut live = pliant_scene::live(&stage.scene, &stage.built, &stage.plan).unwrap();
+    let Some(world) = on_device() else { return };
+    let device = world.device().cloned().unwrap();
+    let mut live = pliant_scene::live(&std::sync::Arc::new(world.clone())).unwrap();
     let subject = Subject::new(live.mesh().unwrap());
     let (mut one, mut other) = (Screen::new(&device, &subject), Screen::new(&device, &subject));
     while live.time() < 0.05 {
@@ -240,12 +241,12 @@ fn frames(session: &mut Session, looks: u64) -> Vec<Frame> {
 
 #[test]
 fn a_session_reads_back_at_its_looks_and_at_no_frame_between() {
-    let Some(stage) = on_device() else { return };
-    let device = stage.plan.target.device.clone().unwrap();
-    let view = stage.scene.view.clone();
-    let subject = subject(&stage);
+    let Some(world) = on_device() else { return };
+    let device = world.device().cloned().unwrap();
+    let view = world.scene.view.clone();
+    let subject = subject(&world);
     let mut screen = Screen::new(&device, &subject);
-    let mut session = Session::start(stage, || ()).unwrap();
+    let mut session = Session::start(world, || ()).unwrap();
     // Slowly, so that any machine keeps up.
     session.order(Order::Speed(0.02));
     session.order(Order::Play(true));
@@ -285,13 +286,13 @@ fn a_session_reads_back_at_its_looks_and_at_no_frame_between() {
 #[test]
 fn a_hand_pulls_on_the_device_as_on_the_processor() {
     let Some(on_device) = on_device() else { return };
-    let on_processor = stage(&scene("cpu"));
-    assert_eq!(on_device.plan.step, on_processor.plan.step);
-    let held = [on_device, on_processor].map(|stage| {
-        let subject = subject(&stage);
+    let on_processor = world(&scene("cpu"));
+    assert_eq!(on_device.step(), on_processor.step());
+    let held = [on_device, on_processor].map(|world| {
+        let subject = subject(&world);
         let middle = |t: [u32; 3]| t.map(|p| subject.points[p as usize].x).iter().sum::<f64>();
         let (_, tip) = subject.triangles().map(middle).zip(0..).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
-        let mut session = Session::start(stage, || ()).unwrap();
+        let mut session = Session::start(world, || ()).unwrap();
         session.order(Order::Step(20));
         session.order(Order::Hand(Hand::Take(Point { triangle: tip, weights: [0.5, 0.25, 0.25] }, 20.0)));
         session.order(Order::Step(20));

@@ -5,7 +5,7 @@ mod support;
 
 use pliant_geometry::Vector3;
 use pliant_viewer::{Hand, Order, Point, Session};
-use support::{BALL, LIVER, stage, subject, wait};
+use support::{BALL, LIVER, subject, wait, world};
 
 /// Pulls of a drag, a sixtieth of a second each.
 const PULLS: u32 = 60;
@@ -34,16 +34,16 @@ impl Random {
 /// So many drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. What is torn is told, at
 /// most in one of a hundred, all that is shown is a number, and after the first tenth memory grows by less than a megabyte.
 fn drag(text: &str, drags: u64) {
-    let stage = stage(text);
-    let steps = (1.0 / 60.0 / stage.plan.step).ceil() as u64;
-    let subject = subject(&stage);
+    let world = world(text);
+    let steps = (1.0 / 60.0 / world.step()).ceil() as u64;
+    let subject = subject(&world);
     let surface = subject.surface_points();
     let extent = |axis: usize| {
         let along = surface.iter().map(|&point| subject.points[point as usize][axis]);
         along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
     };
     let size = (0..3).map(extent).fold(0.0, f64::max);
-    let mut session = Session::start(stage, || ()).unwrap();
+    let mut session = Session::start(world, || ()).unwrap();
     let (mut random, mut before, mut strongest) = (Random(1), None, 0.0_f64);
     let (mut pulls, mut total, mut broken) = (0, 0, 0);
     for drag in 0..drags {

@@ -6,12 +6,13 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::{CellLabel, Vector3};
 use pliant_picture::{Camera, Projection, Subject};
+use pliant_scene::World;
 use pliant_scene::format::ViewTable;
 use pliant_viewer::{
-    Done, Frame, Hand, Lags, Number, Order, Point, Recording, Samples, Session, Stage, parameters, pick,
-    replay, replay_in_real_time, with_numbers,
+    Done, Frame, Hand, Lags, Number, Order, Point, Recording, Samples, Session, parameters, pick, replay,
+    replay_in_real_time, with_numbers,
 };
-use support::{BALL, shell, stage, subject, wait};
+use support::{BALL, shell, subject, wait, world};
 
 /// A triangle at the far end from the base.
 fn tip(subject: &Subject) -> Point {
@@ -23,8 +24,8 @@ fn tip(subject: &Subject) -> Point {
 
 #[test]
 fn a_hundred_known_pixels_pick_the_right_triangles() {
-    let stage = stage(BALL);
-    let subject = subject(&stage);
+    let world = world(BALL);
+    let subject = subject(&world);
     for projection in [Projection::Perspective, Projection::Orthographic] {
         let mut camera = Camera { projection, azimuth: 30.0, ..Camera::default() };
         camera.fit(&subject.points, 1.6);
@@ -56,7 +57,7 @@ fn a_hundred_known_pixels_pick_the_right_triangles() {
 
 #[test]
 fn what_is_taken_away_by_a_section_is_not_picked() {
-    let subject = subject(&stage(BALL));
+    let subject = subject(&world(BALL));
     let (from, along) = (Vector3::new(0.5, 0.001, 0.002), -Vector3::x());
     let (_, near) = pick(&subject, &subject.points, &from, &along, |_| true).unwrap();
     let (_, far) = pick(&subject, &subject.points, &from, &along, |point| point.x < 0.0).unwrap();
@@ -69,12 +70,12 @@ fn hidden_labels_show_what_lies_inside_and_are_repeated() {
         .lines()
         .map(|line| if line.starts_with("mesh") { "mesh = { organ = 'brain', edge = 0.012 }" } else { line })
         .collect::<Vec<_>>();
-    let stage = stage(&brain.join("\n"));
-    let mut session = Session::start(stage.clone(), || ()).unwrap();
+    let world = world(&brain.join("\n"));
+    let mut session = Session::start(world.clone(), || ()).unwrap();
     session.order(Order::Record);
     let whole = wait(&mut session, |frame| !frame.points.is_empty());
     let hide = vec![CellLabel::Name("tissue".into())];
-    session.order(Order::Show(Box::new(ViewTable { hide, ..stage.scene.view.clone() })));
+    session.order(Order::Show(Box::new(ViewTable { hide, ..world.scene.view.clone() })));
     let count = whole.subject.triangle_count();
     let inside = wait(&mut session, |frame| frame.subject.triangle_count() != count);
     let reach = |frame: &Frame| {
@@ -87,12 +88,12 @@ fn hidden_labels_show_what_lies_inside_and_are_repeated() {
     let recording = session.end().unwrap();
     assert_eq!(Recording::from_bytes(&recording.to_bytes().unwrap()).unwrap(), recording);
     assert!(matches!(&recording.moves[0].done, Done::Surface(surface) if surface.hide == ["tissue"]));
-    replay(&stage, &recording).unwrap();
+    replay(&world, &recording).unwrap();
 }
 
 #[test]
 fn it_plays_stands_still_steps_and_starts_anew() {
-    let mut session = Session::start(stage(BALL), || ()).unwrap();
+    let mut session = Session::start(world(BALL), || ()).unwrap();
     let first = wait(&mut session, |frame| !frame.points.is_empty());
     assert_eq!((first.steps, first.playing), (0, false));
     session.order(Order::Step(3));
@@ -110,7 +111,7 @@ fn it_plays_stands_still_steps_and_starts_anew() {
 
 #[test]
 fn simulated_time_follows_wall_time_and_not_faster_than_asked() {
-    let mut session = Session::start(stage(BALL), || ()).unwrap();
+    let mut session = Session::start(world(BALL), || ()).unwrap();
     session.order(Order::Speed(0.1));
     session.order(Order::Play(true));
     let started = Instant::now();
@@ -121,9 +122,9 @@ fn simulated_time_follows_wall_time_and_not_faster_than_asked() {
 
 #[test]
 fn the_hand_pulls_with_its_spring_and_the_base_holds_against_it() {
-    let stage = stage(BALL);
-    let tip = tip(&subject(&stage));
-    let mut session = Session::start(stage, || ()).unwrap();
+    let world = world(BALL);
+    let tip = tip(&subject(&world));
+    let mut session = Session::start(world, || ()).unwrap();
     session.order(Order::Record);
     let first = wait(&mut session, |frame| !frame.points.is_empty());
     session.order(Order::Hand(Hand::Take(tip, 20.0)));
@@ -144,11 +145,11 @@ fn the_hand_pulls_with_its_spring_and_the_base_holds_against_it() {
     assert_eq!((recording.steps, recording.moves.len()), (3000, 3));
 
     // Repeated twice: the same bits, and the force of the hand is what the base holds.
-    let stage = support::stage(BALL);
+    let world = support::world(BALL);
     let mut held = recording;
     held.moves.pop();
-    let once = replay(&stage, &held).unwrap();
-    assert_eq!(once, replay(&stage, &held).unwrap());
+    let once = replay(&world, &held).unwrap();
+    assert_eq!(once, replay(&world, &held).unwrap());
     let [_, force] = once.held.unwrap().map(Vector3::from);
     let base = Vector3::from(once.reactions[0]);
     assert!((force + base).norm() < 1e-3 * force.norm(), "{force:?} {base:?}");
@@ -158,10 +159,10 @@ fn the_hand_pulls_with_its_spring_and_the_base_holds_against_it() {
 
 #[test]
 fn pins_hold_what_is_pulled() {
-    let stage = stage(BALL);
-    let tip = tip(&subject(&stage));
+    let world = world(BALL);
+    let tip = tip(&subject(&world));
     let pulled = |pinned: bool| {
-        let mut session = Session::start(stage.clone(), || ()).unwrap();
+        let mut session = Session::start(world.clone(), || ()).unwrap();
         if pinned {
             session.order(Order::Hand(Hand::Pin(tip)));
         }
@@ -187,7 +188,7 @@ fn a_run_that_breaks_tells_body_and_element_and_keeps_the_last_good_picture() {
         "{BALL}[constraint.crush]\ntype = 'move'\nbody = 'ball'\nby = [-0.2, 0, 0]\nto = 0.02\n\
          nodes = {{ half-space = {{ point = [0.03, 0, 0], normal = [1, 0, 0] }} }}\n"
     );
-    let mut session = Session::start(stage(&text), || ()).unwrap();
+    let mut session = Session::start(world(&text), || ()).unwrap();
     session.order(Order::Play(true));
     let broken = wait(&mut session, |frame| frame.failure.is_some());
     let told = broken.failure.clone().unwrap();
@@ -205,14 +206,14 @@ fn number(path: &str, value: f64) -> Number {
     Number { path: path.split('.').map(str::to_owned).collect(), value }
 }
 
-fn change(session: &Session, stage: &Stage, numbers: &[Number]) {
-    let other = with_numbers(&stage.scene, numbers).unwrap();
+fn change(session: &Session, world: &World, numbers: &[Number]) {
+    let other = with_numbers(&world.scene, numbers).unwrap();
     session.order(Order::Change(Box::new(other), numbers.to_vec()));
 }
 
 /// The ball, so damped that it comes to rest soon.
-fn calm() -> Stage {
-    stage(&BALL.replace("damping = 60", "damping = 150"))
+fn calm() -> World {
+    world(&BALL.replace("damping = 60", "damping = 150"))
 }
 
 /// Pulls at the tip until the ball is at rest; the point held [m] and the force [N].
@@ -251,16 +252,16 @@ fn a_law_made_stiffer_while_it_is_pulled_ends_as_if_it_had_been_from_the_start()
 
 #[test]
 fn a_change_to_the_same_numbers_changes_no_bit() {
-    let stage = calm();
-    let tip = tip(&subject(&stage));
+    let world = calm();
+    let tip = tip(&subject(&world));
     let ended = |changed: bool| {
-        let mut session = Session::start(stage.clone(), || ()).unwrap();
+        let mut session = Session::start(world.clone(), || ()).unwrap();
         session.order(Order::Hand(Hand::Take(tip, 20.0)));
         session.order(Order::Hand(Hand::Pull([0.06, 0.0, 0.01])));
         for _ in 0..20 {
             session.order(Order::Step(25));
             if changed {
-                change(&session, &stage, &[number("law.tissue.young-modulus", 5e3)]);
+                change(&session, &world, &[number("law.tissue.young-modulus", 5e3)]);
             }
         }
         wait(&mut session, |frame| frame.steps == 500).points
@@ -270,10 +271,10 @@ fn a_change_to_the_same_numbers_changes_no_bit() {
 
 #[test]
 fn numbers_that_cannot_be_are_refused_in_the_words_of_the_scene() {
-    let stage = calm();
-    let refused = with_numbers(&stage.scene, &[number("law.tissue.young-modulus", -1.0)]).unwrap_err();
+    let world = calm();
+    let refused = with_numbers(&world.scene, &[number("law.tissue.young-modulus", -1.0)]).unwrap_err();
     assert!(refused.contains("young-modulus") && refused.contains("-1"), "{refused}");
-    let all = parameters(&stage.scene);
+    let all = parameters(&world.scene);
     let paths: Vec<String> = all.iter().map(|parameter| parameter.number.path.join(".")).collect();
     assert_eq!(
         paths,
@@ -287,7 +288,7 @@ fn numbers_that_cannot_be_are_refused_in_the_words_of_the_scene() {
 fn another_mesh_starts_anew_and_says_so() {
     let mut session = Session::start(calm(), || ()).unwrap();
     session.order(Order::Step(10));
-    let finer = stage(&BALL.replace("edge = 0.012", "edge = 0.01"));
+    let finer = world(&BALL.replace("edge = 0.012", "edge = 0.01"));
     session.order(Order::Change(Box::new(finer), Vec::new()));
     session.order(Order::Step(1));
     let frame = wait(&mut session, |frame| frame.note.is_some());
@@ -299,10 +300,10 @@ fn what_is_sampled_has_names_and_units_and_is_written_once() {
     let text = format!(
         "{BALL}[output.h]\ntype = 'csv'\nevery = 1\nprobes.end = {{ on = 'ball', at = [0.04, 0, 0] }}\n"
     );
-    let stage = stage(&text);
-    let subject = subject(&stage);
+    let world = world(&text);
+    let subject = subject(&world);
     let tip = tip(&subject);
-    let mut session = Session::start(stage, || ()).unwrap();
+    let mut session = Session::start(world, || ()).unwrap();
     let mut samples = Samples::default();
     samples.take(&wait(&mut session, |frame| !frame.columns.is_empty()));
     session.order(Order::Probe(tip));
@@ -339,7 +340,7 @@ fn what_is_sampled_has_names_and_units_and_is_written_once() {
 #[test]
 fn samples_stay_few_however_long_a_run_lasts() {
     let mut samples = Samples::default();
-    let mut frame = wait(&mut Session::start(stage(BALL), || ()).unwrap(), |frame| !frame.columns.is_empty());
+    let mut frame = wait(&mut Session::start(world(BALL), || ()).unwrap(), |frame| !frame.columns.is_empty());
     for number in 0..100_000 {
         frame.time = f64::from(number);
         frame.sample.fill(frame.time);
@@ -353,9 +354,9 @@ fn samples_stay_few_however_long_a_run_lasts() {
 
 #[test]
 fn a_mouse_is_felt_within_a_frame_and_a_replay_of_it_has_the_same_bits_twice() {
-    let stage = calm();
-    let tip = tip(&subject(&stage));
-    let mut session = Session::start(stage.clone(), || ()).unwrap();
+    let world = calm();
+    let tip = tip(&subject(&world));
+    let mut session = Session::start(world.clone(), || ()).unwrap();
     session.order(Order::Record);
     session.order(Order::Play(true));
     session.order(Order::Hand(Hand::Take(tip, 20.0)));
@@ -369,9 +370,9 @@ fn a_mouse_is_felt_within_a_frame_and_a_replay_of_it_has_the_same_bits_twice() {
     assert_eq!(recording.moves.len(), 61);
     let bytes = recording.to_bytes().unwrap();
     assert_eq!(Recording::from_bytes(&bytes).unwrap(), recording);
-    assert_eq!(replay(&stage, &recording).unwrap(), replay(&stage, &recording).unwrap());
+    assert_eq!(replay(&world, &recording).unwrap(), replay(&world, &recording).unwrap());
 
-    let played = replay_in_real_time(&stage, &recording).unwrap();
+    let played = replay_in_real_time(&world, &recording).unwrap();
     let lags = Lags::of(&played);
     println!("{lags:?}");
     assert!(lags.moves >= 60, "{lags:?}");
@@ -381,9 +382,9 @@ fn a_mouse_is_felt_within_a_frame_and_a_replay_of_it_has_the_same_bits_twice() {
 #[test]
 fn a_solver_that_knows_no_hand_says_so_and_plays_on() {
     for solver in ["implicit", "static", "explicit"] {
-        let stage = shell(solver);
-        let tip = tip(&subject(&stage));
-        let mut session = Session::start(stage, || ()).unwrap();
+        let world = shell(solver);
+        let tip = tip(&subject(&world));
+        let mut session = Session::start(world, || ()).unwrap();
         session.order(Order::Hand(Hand::Take(tip, 20.0)));
         let told = wait(&mut session, |frame| frame.note.is_some());
         assert!(told.note.unwrap().contains("knows no hand") && told.held.is_empty(), "{solver}");

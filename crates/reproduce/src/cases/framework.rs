@@ -5,7 +5,7 @@
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_explicit::State;
 use pliant_scene::source::Source;
-use pliant_scene::{Built, OutputFolder, Plan, SAFETY, Scene};
+use pliant_scene::{OutputFolder, SAFETY, Scene, World};
 use rayon::ThreadPoolBuilder;
 
 use crate::case::{Case, CaseError, Findings, Row};
@@ -44,41 +44,34 @@ fn scene(cells: usize, until: f64) -> Result<Scene, CaseError> {
 }
 
 /// A scene that is ready to run.
-struct Program {
-    scene: Scene,
-    built: Built,
-    plan: Plan,
-}
+struct Program(World);
 
 impl Program {
     fn new(cells: usize) -> Result<Self, CaseError> {
         let short = scene(cells, 1e-3)?;
-        let built = pliant_scene::build(&short)?;
         // The duration for the timed number of steps.
-        let limits = pliant_scene::plan(&short, &built)?.limits;
+        let short = World::new(&short)?;
+        let limits = short.participants[0].plan.limits.as_ref();
         let step = SAFETY * limits.map_or(1e-3, |limits| limits.limit.step);
         let scene = scene(cells, step * (ELEMENT_STEPS / cells.pow(3)) as f64)?;
-        let built = pliant_scene::build(&scene)?;
-        let plan = pliant_scene::plan(&scene, &built)?;
-        Ok(Self { scene, built, plan })
+        Ok(Self(World::new(&scene)?))
     }
 
     /// Wall time of a step of the solver alone [s], on its own threads like the whole program.
     fn bare(&self) -> Result<f64, CaseError> {
-        let model = &self.built.model;
-        let mut clocked = Clocked::<f32>::new(model.clone(), self.plan.step, State::at_rest(model))?;
+        let model = &self.0.participants[0].built.model;
+        let mut clocked = Clocked::<f32>::new(model.clone(), self.0.step(), State::at_rest(model))?;
         let pool = ThreadPoolBuilder::new().build().map_err(|error| CaseError::Run(error.to_string()))?;
-        Ok(pool.install(|| clocked.seconds_per_step(self.plan.steps as usize))?)
+        Ok(pool.install(|| clocked.seconds_per_step(self.0.steps() as usize))?)
     }
 
     /// Wall time of a step of the whole program [s], from its own summary.
     fn whole(&self) -> Result<f64, CaseError> {
         let unwritable = |error: &dyn std::fmt::Display| CaseError::Run(error.to_string());
         let place = tempfile::tempdir().map_err(|error| unwritable(&error))?;
-        let folder = OutputFolder::prepare(place.path().join("run"), &self.scene, false)
+        let folder = OutputFolder::prepare(place.path().join("run"), &self.0.scene, false)
             .map_err(|error| unwritable(&error))?;
-        let summary = pliant_scene::run(&self.scene, &self.built, &self.plan, &folder, &mut |_| ())
-            .map_err(|error| unwritable(&error))?;
+        let summary = pliant_scene::run(&self.0, &folder, &mut |_| ()).map_err(|error| unwritable(&error))?;
         match summary.error {
             None => Ok(summary.wall_seconds / summary.steps as f64),
             Some(failure) => Err(CaseError::Run(failure.message)),
@@ -135,6 +128,6 @@ mod tests {
     fn both_take_the_same_steps() {
         let program = Program::new(10).unwrap();
         let steps = (ELEMENT_STEPS / 1000) as u64;
-        assert!(program.plan.steps.abs_diff(steps) <= 1, "{}", program.plan.steps);
+        assert!(program.0.steps().abs_diff(steps) <= 1, "{}", program.0.steps());
     }
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError, PointValue};
 use pliant_scene::source::{Source, Value};
-use pliant_scene::{Built, Plan, Scene, live};
+use pliant_scene::{Scene, World, live};
 
 use crate::CaseError;
 use crate::case::{Case, Findings, Row};
@@ -55,26 +55,27 @@ fn play(text: &str, seconds: f64, set: &[(&[&str], Value)]) -> Result<Played, Ca
     }
     let mut scene = Scene::from_source(source, ".".into())?;
     scene.outputs.clear();
-    let built = Arc::new(pliant_scene::build(&scene)?);
-    let plan = pliant_scene::plan(&scene, &built)?;
+    let world = Arc::new(World::new(&scene)?);
     let threads = scene.run.threads as usize;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| CaseError::Run(error.to_string()))?;
-    pool.install(|| go(&scene, &built, &plan, seconds))
+    pool.install(|| go(&world, seconds))
 }
 
 /// Continues frame by frame; a GPU places the points without a read-back.
-fn go(scene: &Scene, built: &Arc<Built>, plan: &Plan, seconds: f64) -> Result<Played, CaseError> {
+fn go(world: &Arc<World>, seconds: f64) -> Result<Played, CaseError> {
     let failed = |failure: pliant_scene::FailureSummary| CaseError::Run(failure.message);
-    let mut live = live(scene, built, plan).map_err(failed)?;
-    let elements = built.model.solids.iter().map(|solid| solid.cells.len()).sum();
+    let mut live = live(world).map_err(failed)?;
+    let solids = world.participants.iter().flat_map(|part| &part.built.model.solids);
+    let elements = solids.map(|solid| solid.cells.len()).sum();
+    let step = world.step();
     let (mut stepping, mut preparing, mut frames) = (0.0, 0.0, 0);
     let mut farthest = Default::default();
     while live.time() < seconds {
         let started = Instant::now();
         let next = (frames + 1) as f64 / FRAMES;
         while live.time() < next {
-            let most = ((next - live.time()) / plan.step).ceil().max(1.0) as u64;
+            let most = ((next - live.time()) / step).ceil().max(1.0) as u64;
             match live.coast(most, Duration::MAX) {
                 Some(steps) => steps.map_err(failed)?,
                 None => live.advance(most).map_err(failed)?,
@@ -95,7 +96,7 @@ fn go(scene: &Scene, built: &Arc<Built>, plan: &Plan, seconds: f64) -> Result<Pl
             farthest = (mesh, moved);
         }
     }
-    Ok(Played { elements, step: plan.step, stepping, preparing, frames, farthest })
+    Ok(Played { elements, step, stepping, preparing, frames, farthest })
 }
 
 impl Played {

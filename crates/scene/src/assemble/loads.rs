@@ -420,7 +420,7 @@ impl LoadTable {
     }
 
     /// What it acts on; `None`: everything.
-    pub(super) fn on(&self) -> Option<&str> {
+    pub(crate) fn on(&self) -> Option<&str> {
         Some(match self {
             Self::Force(load) => &load.on,
             Self::Moment(load) => &load.on,

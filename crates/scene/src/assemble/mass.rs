@@ -14,7 +14,8 @@ impl Builder<'_> {
     /// Refuses what means nothing to a solver without inertia.
     pub(super) fn check_explicit_only(&mut self) {
         self.check_load_times();
-        let run = &self.scene.run;
+        let scene = self.scene;
+        let run = &scene.run;
         if run.solver != SolverName::QuasiStatic {
             return;
         }
@@ -25,7 +26,7 @@ impl Builder<'_> {
                 "`{key}` is for `solver = \"explicit\"`: quasi-static equilibria have no stable step"
             );
             self.error(
-                &["run", key],
+                &scene.run_at(key),
                 message,
                 "means nothing here",
                 "remove it, or take `solver = \"explicit\"`",
@@ -35,9 +36,10 @@ impl Builder<'_> {
 
     /// Refuses times of load steps that can't be.
     fn check_load_times(&mut self) {
-        let run = &self.scene.run;
+        let scene = self.scene;
+        let run = &scene.run;
         let LoadSteps::Times(LoadTimes { times }) = &run.load_steps else { return };
-        let path = ["run", "load-steps"];
+        let path = scene.run_at("load-steps");
         let increasing = [&[0.0], times.as_slice()].concat().windows(2).all(|pair| pair[0] < pair[1]);
         if !increasing {
             let help =
@@ -74,7 +76,7 @@ impl Builder<'_> {
             share * 100.0
         );
         if share > MUCH {
-            let place = self.source().span(&["run", "mass-scaling"]);
+            let place = self.source().span(&self.scene.run_at("mass-scaling"));
             let help = "motions become slower than they are; take a smaller `target-step`, or remove it to see what it changes";
             self.out.push(Diagnostic::warning(told).at(place, "more than 5 %").help(help));
         } else {

@@ -5,6 +5,7 @@ mod body;
 mod linear;
 mod load;
 mod output;
+mod participant;
 mod view;
 
 pub use body::{
@@ -23,6 +24,7 @@ pub use load::{
     TractionTable, Vectors,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
+pub use participant::ParticipantTable;
 pub use view::{
     BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, Labels, MapName, Nothing,
     TextureName, UpName, ViewTable,
@@ -50,7 +52,7 @@ pub struct SceneTable {
 }
 
 /// How the scene is run.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RunTable {
     /// Where the solver runs.

@@ -6,14 +6,17 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::{Locator, Vector3};
 use pliant_implicit::Carried;
+use pliant_mechanics::Energies;
 
 use crc32fast::Hasher;
 
 use super::file::{create, reopen};
-use super::{Frame, Observer, OutputError, Written, fields};
+use super::{Frame, Observer, OutputError, Written, fields, time_of};
 use crate::assemble::{BodyCells, Built};
 use crate::format::{CsvTable, FieldName, ProbeTable};
 use crate::participant::CellsNow;
+use crate::simulation::total;
+use crate::world::{Part, World};
 
 pub(super) struct Rows {
     path: PathBuf,
@@ -37,8 +40,60 @@ pub struct Column {
     pub unit: &'static str,
 }
 
-/// What a table samples at an instant.
+/// The samples of a table at an instant: energies of several participants together, then those of each participant.
 pub(crate) struct Samples {
+    columns: Vec<Column>,
+    /// Whether energies of all participants together come first.
+    total: bool,
+    parts: Vec<Own>,
+}
+
+impl Samples {
+    pub(crate) fn new(world: &World, table: &CsvTable) -> Self {
+        let total = table.energy && world.participants.len() > 1;
+        let mut columns: Vec<Column> = Vec::new();
+        if total {
+            columns.extend(ENERGIES.map(|energy| Column::of_energy(energy, None)));
+        }
+        let mut parts = Vec::new();
+        for part in &world.participants {
+            let own = Own::new(part, table);
+            columns.extend_from_slice(&own.columns);
+            parts.push(own);
+        }
+        Self { columns, total, parts }
+    }
+
+    pub(crate) fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Adds the sample of an instant to a row.
+    pub(crate) fn read(&mut self, frames: &[Frame<'_>], row: &mut Vec<f64>) {
+        if self.total {
+            row.extend(in_columns(&total(frames.iter().map(|frame| frame.now.energies()))));
+        }
+        self.parts.iter_mut().zip(frames).for_each(|(own, frame)| own.read(frame, row));
+    }
+}
+
+fn in_columns(e: &Energies) -> [f64; 6] {
+    [e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]
+}
+
+impl Column {
+    /// An energy, of a participant or of all.
+    fn of_energy(energy: &str, part: Option<&str>) -> Self {
+        let name = match part {
+            Some(part) => format!("energy.{part}.{energy}"),
+            None => format!("energy.{energy}"),
+        };
+        Self { name, unit: if energy == "balance" { "" } else { "J" } }
+    }
+}
+
+/// Those of one participant.
+struct Own {
     columns: Vec<Column>,
     reactions: Vec<usize>,
     /// The point [m] about which moments of reactions are taken, and what each of them prescribes.
@@ -72,8 +127,9 @@ const SHELL_ENERGIES: [&str; 3] = ["membrane", "bending", "drilling"];
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
-impl Samples {
-    pub(crate) fn new(built: &Built, table: &CsvTable) -> Self {
+impl Own {
+    fn new(part: &Part, table: &CsvTable) -> Self {
+        let built = &*part.built;
         let wanted = |name: &String| table.reactions.as_ref().is_none_or(|list| list.contains(name));
         let constraints = built.model.constraints.iter();
         let reactions: Vec<usize> =
@@ -93,16 +149,16 @@ impl Samples {
         });
         let shells = built.corotational.as_ref().is_some_and(|part| !part.model.facets.is_empty());
         if table.energy {
-            for energy in ENERGIES {
-                add(format!("energy.{energy}"), if energy == "balance" { "" } else { "J" });
-            }
-            let parts = SHELL_ENERGIES.iter().filter(|_| shells);
-            parts.for_each(|energy| add(format!("energy.{energy}"), "J"));
+            let of_shells = SHELL_ENERGIES.into_iter().filter(|_| shells);
+            columns
+                .extend(ENERGIES.into_iter().chain(of_shells).map(|e| Column::of_energy(e, part.prefix())));
         }
+        let mut add = |name: String, unit| columns.push(Column { name, unit });
         if built.corotational.as_ref().is_some_and(|part| part.control.is_some()) {
-            add("load-factor".into(), "");
+            add(part.prefix().map_or("load-factor".into(), |part| format!("load-factor.{part}")), "");
         }
-        for (name, probe) in &table.probes {
+        let probes = || table.probes.iter().filter(|(_, probe)| part.shows(Some(&probe.on)));
+        for (name, probe) in probes() {
             for field in &probe.data {
                 let column = format!("probe.{name}.{}", field.name());
                 match field.components() {
@@ -112,17 +168,13 @@ impl Samples {
                 }
             }
         }
-        let probes = table.probes.values().map(|probe| Probe::new(built, probe)).collect();
+        let probes = probes().map(|(_, probe)| Probe::new(built, probe)).collect();
         let corotated = fields::Corotated::default();
         Self { columns, reactions, moments, energy: table.energy, probes, corotated }
     }
 
-    pub(crate) fn columns(&self) -> &[Column] {
-        &self.columns
-    }
-
     /// Adds the sample of an instant to a row.
-    pub(crate) fn read(&mut self, frame: &Frame<'_>, row: &mut Vec<f64>) {
+    fn read(&mut self, frame: &Frame<'_>, row: &mut Vec<f64>) {
         for &constraint in &self.reactions {
             row.extend(frame.now.reaction(constraint));
         }
@@ -132,10 +184,9 @@ impl Samples {
             row.extend(held.moment(frame, *point));
         }
         if self.energy {
-            let e = frame.now.energies();
-            row.extend([e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]);
+            row.extend(in_columns(&frame.now.energies()));
         }
-        if let (Some(part), Some(state)) = (&frame.built.corotational, frame.now.shells()) {
+        if let (Some(part), Some(state)) = (&frame.built().corotational, frame.now.shells()) {
             if self.energy && !part.model.facets.is_empty() {
                 // An element that has no energy ends the run with a reason.
                 let parts = state.shell_energy(&part.model).unwrap_or_default();
@@ -150,7 +201,8 @@ impl Samples {
         let cells_wanted = !of_cells.is_empty();
         let cells =
             cells_wanted.then(|| frame.now.cells(of_cells.contains(&FieldName::ElementStep))).flatten();
-        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built.corotational, frame.now.shells())
+        if let (true, Some(part), Some(state)) =
+            (cells_wanted, &frame.built().corotational, frame.now.shells())
         {
             self.corotated.fill(&part.model, state, &of_cells);
         }
@@ -195,7 +247,7 @@ impl Held {
                 Vector3::from_fn(|c, _| if own[first + c] { value[c] } else { 0.0 })
             };
             let displacement = frame.now.displacement(node);
-            let arm = Vector3::from(frame.built.model.rest[node]) + Vector3::from(displacement)
+            let arm = Vector3::from(frame.built().model.rest[node]) + Vector3::from(displacement)
                 - Vector3::from(point);
             sum += arm.cross(&masked(frame.now.nodal_reaction(node), 0));
             sum += masked(frame.now.nodal_reaction_moment(node), 3);
@@ -205,8 +257,8 @@ impl Held {
 }
 
 impl Rows {
-    pub(super) fn new(built: &Built, table: &CsvTable, folder: &Path, name: &str) -> Self {
-        let samples = Samples::new(built, table);
+    pub(super) fn new(world: &World, table: &CsvTable, folder: &Path, name: &str) -> Self {
+        let samples = Samples::new(world, table);
         let names = samples.columns().iter().map(|column| column.name.as_str());
         let header: Vec<&str> = std::iter::once("time").chain(names).collect();
         Self {
@@ -285,7 +337,7 @@ impl Rows {
 
 /// Where a point of a surface on a shell is [m].
 fn carried(frame: &Frame<'_>, point: &Carried) -> Vector3 {
-    let part = frame.built.corotational.as_ref();
+    let part = frame.built().corotational.as_ref();
     let found =
         part.and_then(|part| Some(part.surface.as_ref()?.carried(&part.model, frame.now.shells()?, point)));
     found.unwrap_or_else(|| Vector3::repeat(f64::NAN))
@@ -310,10 +362,10 @@ pub(super) fn last_time(path: &Path) -> Option<f64> {
 }
 
 impl Observer for Rows {
-    fn see(&mut self, frame: &Frame<'_>) -> Result<(), OutputError> {
+    fn see(&mut self, frames: &[Frame<'_>]) -> Result<(), OutputError> {
         self.row.clear();
-        self.row.push(frame.time());
-        self.samples.read(frame, &mut self.row);
+        self.row.push(time_of(frames));
+        self.samples.read(frames, &mut self.row);
         let row: Vec<String> = self.row.iter().map(|value| format!("{value:e}")).collect();
         self.write(row.join(","))
     }
@@ -407,7 +459,7 @@ impl Probe {
                     }
                 }
             } else {
-                value = match (&recovered, &self.cell, &frame.built.corotational) {
+                value = match (&recovered, &self.cell, &frame.built().corotational) {
                     (Some(cell), ..) => fields::of_cell(cell, field),
                     (_, Some(Place::Corotated(cell)), Some(part)) => corotated.of(&part.model, *cell, field),
                     _ => [f64::NAN; 9],

@@ -72,7 +72,7 @@ impl Curved {
 
     /// Puts the wanted fields and the normals of an instant into the mesh.
     pub(super) fn fill(&mut self, mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName]) {
-        let (Some(part), Some(state)) = (&frame.built.corotational, frame.now.shells()) else { return };
+        let (Some(part), Some(state)) = (&frame.built().corotational, frame.now.shells()) else { return };
         let model = &part.model;
         self.found.fill(&self.picture, &self.surface, model, state);
         self.cells.fill(model, state, wanted);

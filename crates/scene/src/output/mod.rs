@@ -5,6 +5,7 @@ mod curved;
 mod fields;
 mod file;
 mod folder;
+mod merged;
 mod plot;
 mod snapshot;
 mod stability;
@@ -23,19 +24,20 @@ pub use stability::{AddedMass, StabilitySummary};
 pub(crate) use strains::ShellStrains;
 pub use strains::StrainSummary;
 pub use summary::{
-    BodySummary, FailureSummary, LoadStepSummary, Summary, failed_input, failed_output, number,
+    BodySummary, FailureSummary, LoadStepSummary, ParticipantSummary, Summary, failed_input, failed_output,
+    number,
 };
 
 pub use csv::Column;
 pub(crate) use csv::{AXES, ENERGIES, Samples};
-pub(crate) use plot::plot;
+pub(crate) use plot::{constraints, plot};
 pub(crate) use snapshot::Snapshot;
 pub(crate) use summary::{INTERRUPTED, bodies, markdown, summarise, told_limit};
 
 use crate::assemble::Built;
 use crate::participant::Instant;
 use crate::registry::OutputTable;
-use crate::scene::Scene;
+use crate::world::{Part, World};
 
 /// An output that could not be written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -57,22 +59,28 @@ impl OutputError {
     }
 }
 
-/// One instant of a run, seen between the two halves of a step.
+/// One participant at an instant, seen between the two halves of a step.
+#[derive(Clone, Copy)]
 pub(crate) struct Frame<'a> {
-    pub built: &'a Built,
+    pub part: &'a Part,
     pub now: &'a dyn Instant,
 }
 
 impl Frame<'_> {
-    pub fn time(&self) -> f64 {
-        self.now.time()
+    fn built(&self) -> &Built {
+        &self.part.built
     }
+}
+
+/// Time of the instant of frames [s].
+pub(crate) fn time_of(frames: &[Frame<'_>]) -> f64 {
+    frames.first().map_or(0.0, |frame| frame.now.time())
 }
 
 /// Looks at the instants of a run.
 pub(crate) trait Observer {
-    /// Writes down an instant.
-    fn see(&mut self, frame: &Frame<'_>) -> Result<(), OutputError>;
+    /// Writes down an instant of all participants.
+    fn see(&mut self, frames: &[Frame<'_>]) -> Result<(), OutputError>;
 
     /// What is written so far.
     fn written(&self) -> Written;
@@ -153,18 +161,17 @@ pub(crate) type Scheduled = (Schedule, Box<dyn Observer>);
 /// The observers of a scene's outputs. Their files are opened here; all paths go to `files`. Those of a run that goes
 /// on take up what is `written`.
 pub(crate) fn observers(
-    scene: &Scene,
-    built: &Built,
+    world: &World,
     folder: &Path,
     files: &mut Vec<PathBuf>,
     written: Option<&[(Schedule, Written)]>,
 ) -> Result<Vec<Scheduled>, OutputError> {
     let mut all: Vec<Scheduled> = Vec::new();
-    for (index, (name, table)) in scene.outputs.iter().enumerate() {
+    for (index, (name, table)) in world.scene.outputs.iter().enumerate() {
         let before = written.and_then(|written| written.get(index));
         let (every, observer): (f64, Box<dyn Observer>) = match table {
             OutputTable::Vtu(table) => {
-                let mut series = vtu::Series::new(built, table, folder, name)?;
+                let mut series = vtu::Series::new(world, table, folder, name)?;
                 if let Some((_, Written::Frames(times))) = before {
                     series.take_up(times);
                 }
@@ -172,7 +179,7 @@ pub(crate) fn observers(
                 (table.every, Box::new(series))
             }
             OutputTable::Csv(table) => {
-                let mut rows = csv::Rows::new(built, table, folder, name);
+                let mut rows = csv::Rows::new(world, table, folder, name);
                 match before {
                     Some((_, Written::Rows { bytes, crc })) => rows.take_up(*bytes, *crc)?,
                     _ => rows.start()?,

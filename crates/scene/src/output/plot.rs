@@ -3,8 +3,10 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use crate::assemble::Built;
+use pliant_mechanics::model::Constraint;
+
 use crate::run::History;
+use crate::world::World;
 
 const SIZE: (u32, u32) = (900, 760);
 
@@ -25,14 +27,19 @@ struct Curve<'a> {
     values: Vec<f64>,
 }
 
+/// The constraints of all participants.
+pub(crate) fn constraints(world: &World) -> impl Iterator<Item = &Constraint> {
+    world.participants.iter().flat_map(|part| &part.built.model.constraints)
+}
+
 /// The plot as SVG text; the error is what the drawing library says.
-pub(crate) fn plot(built: &Built, history: &History) -> Result<String, String> {
+pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         root.fill(&WHITE).map_err(|error| error.to_string())?;
         let (upper, lower) = root.split_vertically(SIZE.1 / 2);
-        let reactions: Vec<Curve<'_>> = (built.model.constraints.iter().enumerate())
+        let reactions: Vec<Curve<'_>> = (constraints(world).enumerate())
             .map(|(index, constraint)| Curve {
                 name: &constraint.name,
                 values: history.reactions.iter().map(|row| row[index]).collect(),

@@ -4,12 +4,67 @@ use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use rayon::prelude::*;
 
 use super::fields::Cell;
+use super::merged::merged;
 use super::{Frame, fields};
 use crate::assemble::{BodyCells, Built, Corotational};
-use crate::format::{At, FieldName};
+use crate::format::{At, FieldName, VtuTable};
+use crate::world::{Part, World};
 
-/// A mesh that takes the fields of instants.
+/// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of whatever participants.
 pub(crate) struct Snapshot {
+    /// Participants that are shown, by number.
+    parts: Vec<(usize, Own)>,
+    /// Those of several together.
+    merged: Option<Mesh>,
+}
+
+impl Snapshot {
+    /// Of what a series shows.
+    pub fn new(world: &World, table: &VtuTable) -> Self {
+        let on = table.on.as_deref();
+        let shown = world.participants.iter().enumerate().filter(|(_, part)| part.shows(on));
+        let own = |part: &Part| Own::new(&part.built, on, &part.fields(&table.data), table.at, table.curved);
+        let mut snapshot =
+            Self { parts: shown.map(|(index, part)| (index, own(part))).collect(), merged: None };
+        snapshot.merge();
+        snapshot
+    }
+
+    /// The mesh, with the fields of the last instant.
+    pub fn mesh(&self) -> &Mesh {
+        // A series of a body that there is not is refused when the scene is built.
+        self.merged.as_ref().unwrap_or_else(|| &self.parts[0].1.mesh)
+    }
+
+    /// A point of the mesh as a combination of nodes of a participant; nothing where it is none, as on curved surfaces.
+    pub fn nodes_of(&self, world: &World, point: u32) -> (usize, Vec<(u32, f64)>) {
+        let mut point = point as usize;
+        for (index, own) in &self.parts {
+            let points = own.mesh.points.len();
+            if point < points {
+                return (*index, own.nodes_of(&world.participants[*index].built, point as u32));
+            }
+            point -= points;
+        }
+        (0, Vec::new())
+    }
+
+    /// Takes the fields of an instant.
+    pub fn fill(&mut self, frames: &[Frame<'_>]) {
+        self.parts.iter_mut().for_each(|(index, own)| own.fill(&frames[*index]));
+        self.merge();
+    }
+
+    fn merge(&mut self) {
+        if self.parts.len() > 1 {
+            let meshes: Vec<&Mesh> = self.parts.iter().map(|(_, own)| &own.mesh).collect();
+            self.merged = Some(merged(&meshes));
+        }
+    }
+}
+
+/// That of one participant.
+struct Own {
     mesh: Mesh,
     fields: Vec<FieldName>,
     at: At,
@@ -28,9 +83,9 @@ enum Content {
     Curved(Box<super::curved::Curved>),
 }
 
-impl Snapshot {
+impl Own {
     /// Of a body or surface by name, or of all bodies; with `curved`, of the curved surface of shells.
-    pub fn new(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Self {
+    fn new(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Self {
         let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
         let (mesh, content) = match surface {
             Some(index) => (bare(&built.surfaces[index]), Content::Surface(index)),
@@ -49,13 +104,8 @@ impl Snapshot {
         Self { mesh, fields: fields.to_vec(), at, content }
     }
 
-    /// The mesh, with the fields of the last instant.
-    pub fn mesh(&self) -> &Mesh {
-        &self.mesh
-    }
-
     /// A point of the mesh as a combination of nodes of the model; nothing where it is none, as on curved surfaces.
-    pub fn nodes_of(&self, built: &Built, point: u32) -> Vec<(u32, f64)> {
+    fn nodes_of(&self, built: &Built, point: u32) -> Vec<(u32, f64)> {
         match &self.content {
             Content::Surface(index) => {
                 let row = built.model.surfaces[*index].mapping.row(point as usize);
@@ -69,7 +119,7 @@ impl Snapshot {
     }
 
     /// Takes the fields of an instant.
-    pub fn fill(&mut self, frame: &Frame<'_>) {
+    fn fill(&mut self, frame: &Frame<'_>) {
         match &mut self.content {
             Content::Surface(index) => {
                 if let Some(displacement) = carried_on_shell(frame, *index) {
@@ -86,7 +136,7 @@ impl Snapshot {
             }
             Content::Corotational { nodes, cells, fields } => {
                 fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
-                if let (Some(part), Some(state)) = (&frame.built.corotational, frame.now.shells()) {
+                if let (Some(part), Some(state)) = (&frame.built().corotational, frame.now.shells()) {
                     fields.fill(&part.model, state, &self.fields);
                     fill_corotational(&mut self.mesh, &part.model, fields, &self.fields, self.at, cells);
                 }
@@ -98,7 +148,7 @@ impl Snapshot {
 
 /// Fields on a carried surface; those of cells as means at the nodes.
 fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surface: usize) {
-    let model = &frame.built.model;
+    let model = &frame.built().model;
     let mapping = &model.surfaces[surface].mapping;
     let (nodal, of_cells): (Vec<FieldName>, Vec<FieldName>) =
         wanted.iter().partition(|field| field.is_nodal());
@@ -202,11 +252,11 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
 
 /// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
 pub(super) fn carried_on_shell(frame: &Frame<'_>, surface: usize) -> Option<Vec<Vector3>> {
-    let part = frame.built.corotational.as_ref()?;
+    let part = frame.built().corotational.as_ref()?;
     let (points, curved) = (part.carried.get(&surface)?, part.surface.as_ref()?);
     let mut positions = vec![Vector3::zeros(); points.len()];
     curved.carried_all(&part.model, frame.now.shells()?, points, &mut positions);
-    for (position, rest) in positions.iter_mut().zip(&frame.built.surfaces[surface].points) {
+    for (position, rest) in positions.iter_mut().zip(&frame.built().surfaces[surface].points) {
         *position -= rest;
     }
     Some(positions)
@@ -302,7 +352,7 @@ fn fill_cells(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], at: At, 
     if wanted.is_empty() {
         return;
     }
-    let model = &frame.built.model;
+    let model = &frame.built().model;
     let Some(fields_of) = frame.now.cells(wanted.contains(&FieldName::ElementStep)) else { return };
     let mut averages = Averages::new(mesh.points.len(), &wanted);
     for (block, places) in mesh.blocks.iter_mut().zip(cells) {
@@ -418,9 +468,9 @@ nodes = { label = "left" }
         let model = &built.corotational.as_ref().unwrap().model;
         assert_eq!([0, 1].map(|facet| model.facets[facet].thickness), [1e-3, 2e-3]);
         let labels = |on: Option<&str>, curved: Option<u32>| {
-            let snapshot = Snapshot::new(&built, on, &[], At::Cells, curved);
-            assert_eq!(snapshot.mesh().label_names, wall.label_names);
-            snapshot.mesh().blocks[0].data["label"].values.clone()
+            let own = Own::new(&built, on, &[], At::Cells, curved);
+            assert_eq!(own.mesh.label_names, wall.label_names);
+            own.mesh.blocks[0].data["label"].values.clone()
         };
         assert_eq!(labels(None, None), [1.0, 2.0]);
         assert_eq!(labels(Some("copy"), None), [1.0, 2.0]);

@@ -10,9 +10,8 @@ use serde::Serialize;
 use super::number;
 use crate::assemble::Built;
 use crate::diagnostic::counted;
-use crate::plan::Plan;
-use crate::run::Outcome;
-use crate::scene::Scene;
+use crate::run::PartOutcome;
+use crate::world::Part;
 
 /// Hourglass energy, as a fraction of the internal one, from which on a run is doubted.
 const MUCH_HOURGLASS: f64 = 0.05;
@@ -48,7 +47,8 @@ pub struct StabilitySummary {
 }
 
 impl StabilitySummary {
-    pub(crate) fn new(scene: &Scene, plan: &Plan, outcome: &Outcome) -> Option<Self> {
+    pub(crate) fn new(part: &Part, outcome: &PartOutcome) -> Option<Self> {
+        let Part { scene, plan, .. } = part;
         let seen = outcome.stability?;
         let of = |value: fn(&Look) -> f64| seen.smallest.as_ref().map(value);
         Some(Self {
@@ -126,8 +126,12 @@ impl AddedMass {
 }
 
 /// What a user should know before trusting a result.
-pub(crate) fn doubts(built: &Built, outcome: &Outcome, stability: Option<&StabilitySummary>) -> Vec<String> {
-    let (share, time) = outcome.worst_hourglass;
+pub(crate) fn doubts(
+    built: &Built,
+    outcome: &PartOutcome,
+    stability: Option<&StabilitySummary>,
+) -> Vec<String> {
+    let (share, time) = outcome.watched.worst_hourglass;
     let hourglass = (share > MUCH_HOURGLASS).then(|| {
         let (of, remedy) = match share < 10.0 {
             true => (format!("{:.1} % of the internal energy", share * 100.0), HOURGLASS_REMEDY),
@@ -149,7 +153,7 @@ pub(crate) fn doubts(built: &Built, outcome: &Outcome, stability: Option<&Stabil
     (hourglass.into_iter())
         .chain(stability.and_then(StabilitySummary::doubt))
         .chain(equilibria_doubts(outcome))
-        .chain(outcome.strains.doubts())
+        .chain(outcome.watched.strains.doubts())
         .collect()
 }
 
@@ -157,7 +161,7 @@ pub(crate) fn doubts(built: &Built, outcome: &Outcome, stability: Option<&Stabil
 const MUCH_ERROR: f64 = 1e-3;
 
 /// What is doubtful about equilibria.
-fn equilibria_doubts(outcome: &Outcome) -> impl Iterator<Item = String> {
+fn equilibria_doubts(outcome: &PartOutcome) -> impl Iterator<Item = String> {
     let Energies { internal, hourglass, external, .. } = outcome.energies;
     let largest = internal.abs().max(external.abs());
     let displacement = outcome.equilibria.filter(|found| found.displacement_error > MUCH_ERROR).map(|found| {

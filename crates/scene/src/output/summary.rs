@@ -10,13 +10,13 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
-use super::{OutputError, StrainSummary};
+use super::{OutputError, StrainSummary, constraints};
 use crate::assemble::Built;
-use crate::plan::{LimitingElement, Limits, Plan};
+use crate::plan::{LimitingElement, Limits};
 use crate::printable::printable;
-use crate::run::{History, Outcome};
-use crate::scene::Scene;
+use crate::run::{History, Outcome, PartOutcome};
 use crate::solver::{Effort, Equilibria};
+use crate::world::{Part, World};
 
 /// The status of a run that was told to stop.
 pub(crate) const INTERRUPTED: &str = "interrupted";
@@ -36,7 +36,7 @@ pub struct Summary {
     pub elements: usize,
     /// Mass of the materials [kg].
     pub mass: f64,
-    /// Time step [s].
+    /// Time [s] from one common instant of all participants to the next: the time step, where all bodies go together.
     pub step: f64,
     /// Smallest element bound of the critical step [s]; `null` of shells and co-rotational solids, as the two below.
     pub element_bound: Option<f64>,
@@ -44,7 +44,9 @@ pub struct Summary {
     pub true_limit: Option<f64>,
     /// The element that sets the bound.
     pub limiting_element: Option<LimitingElement>,
-    /// What its equations took; `null` where none were solved.
+    /// Each participant, of a scene with several; what follows is then of the first participant that has it.
+    pub participants: Vec<ParticipantSummary>,
+    /// Cost of its equations; `null` where none were solved.
     pub solver: Option<Effort>,
     /// How good the equilibria of a quasi-static run are; `null` of others.
     pub equilibria: Option<Equilibria>,
@@ -81,6 +83,52 @@ pub struct Summary {
     /// Energies at the end [J].
     #[serde(skip)]
     pub energies: Energies,
+}
+
+/// One participant of several.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParticipantSummary {
+    /// Its name.
+    pub name: String,
+    /// Its bodies.
+    pub bodies: Vec<String>,
+    /// Its solver, as in a scene file.
+    pub solver: &'static str,
+    /// Its time step [s].
+    pub step: f64,
+    /// Its steps.
+    pub steps: u64,
+    /// `cpu`, or the name of the GPU.
+    pub device: String,
+    /// `single` or `double`.
+    pub precision: &'static str,
+    /// Its energies at the end [J].
+    pub energies: Energies,
+    /// Imbalance of its energies at the end, as a fraction of the largest; `null` where it is not judged.
+    pub energy_balance: Option<f64>,
+}
+
+impl ParticipantSummary {
+    fn new(part: &Part, outcome: &PartOutcome) -> Self {
+        Self {
+            name: part.name.clone(),
+            bodies: part.scene.bodies.iter().map(|(name, _)| name.clone()).collect(),
+            solver: part.scene.run.solver.word(),
+            step: part.plan.step,
+            steps: outcome.steps,
+            device: part.plan.target.name().to_owned(),
+            precision: part.plan.target.precision.word(),
+            energies: outcome.energies,
+            energy_balance: outcome.balance(),
+        }
+    }
+}
+
+impl PartOutcome {
+    /// Imbalance of the energies at the end; `None` where it is not judged.
+    fn balance(&self) -> Option<f64> {
+        self.balance_floor.is_finite().then_some(self.energies.balance)
+    }
 }
 
 /// One body.
@@ -163,7 +211,7 @@ fn empty(status: &str, error: FailureSummary) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "true_limit": null, "limiting_element": null, "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "true_limit": null, "limiting_element": null, "participants": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
@@ -299,11 +347,18 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
     (0..built.model.bodies.len()).map(of).collect()
 }
 
-/// Puts together what a run came to.
-pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Outcome) -> Summary {
-    let stability = StabilitySummary::new(scene, plan, outcome);
-    let reactions = built.model.constraints.iter().zip(&outcome.reactions);
-    let bodies = bodies(built);
+/// The summary of a run.
+pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
+    let parts = || world.participants.iter().zip(&outcome.parts);
+    let bodies: Vec<BodySummary> = parts().flat_map(|(part, _)| bodies(&part.built)).collect();
+    let limits = parts().find_map(|(part, _)| part.plan.limits.as_ref());
+    let stability = || parts().map(|(part, own)| StabilitySummary::new(part, own));
+    let doubts = |((part, own), seen): ((&Part, &PartOutcome), Option<StabilitySummary>)| {
+        doubts(&part.built, own, seen.as_ref())
+    };
+    let reactions = parts().flat_map(|(part, own)| part.built.model.constraints.iter().zip(&own.reactions));
+    let target = &world.participants[0].plan.target;
+    let balances = parts().filter_map(|(_, own)| own.balance());
     Summary {
         status: match &outcome.failure {
             None => "done",
@@ -311,27 +366,31 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
             Some(_) => "failed",
         },
         error: outcome.failure.clone(),
-        nodes: built.model.node_count(),
+        nodes: bodies.iter().map(|body| body.nodes).sum(),
         elements: bodies.iter().map(|body| body.elements).sum(),
+        mass: parts().map(|(part, _)| part.built.model.mass.iter().sum::<f64>()).sum(),
         bodies,
-        mass: built.model.mass.iter().sum(),
-        step: plan.step,
-        element_bound: plan.limits.as_ref().map(|limits| limits.bound.step),
-        true_limit: plan.limits.as_ref().map(|limits| limits.limit.step),
-        limiting_element: plan.limits.as_ref().map(|limits| limits.limiting.clone()),
-        solver: outcome.effort.clone(),
-        equilibria: outcome.equilibria,
+        step: world.slowest().plan.step,
+        element_bound: limits.map(|limits| limits.bound.step),
+        true_limit: limits.map(|limits| limits.limit.step),
+        limiting_element: limits.map(|limits| limits.limiting.clone()),
+        participants: match world.only() {
+            Some(_) => Vec::new(),
+            None => parts().map(|(part, own)| ParticipantSummary::new(part, own)).collect(),
+        },
+        solver: parts().find_map(|(_, own)| own.effort.clone()),
+        equilibria: parts().find_map(|(_, own)| own.equilibria),
         ended: outcome.ended.clone(),
-        shell_strains: outcome.strains.0.clone(),
-        device: plan.target.name().to_owned(),
-        precision: plan.target.precision.word(),
+        shell_strains: parts().flat_map(|(_, own)| own.watched.strains.0.clone()).collect(),
+        device: target.name().to_owned(),
+        precision: target.precision.word(),
         steps: outcome.steps,
         wall_seconds: outcome.wall_seconds,
         real_time_factor: outcome.time / outcome.wall_seconds.max(f64::MIN_POSITIVE),
-        warnings: doubts(built, outcome, stability.as_ref()),
-        stability,
-        added_mass: AddedMass::new(built),
-        energy_balance: outcome.balance_floor.is_finite().then_some(outcome.energies.balance),
+        warnings: parts().zip(stability()).flat_map(doubts).collect(),
+        stability: stability().flatten().next(),
+        added_mass: parts().find_map(|(part, _)| AddedMass::new(&part.built)),
+        energy_balance: balances.reduce(f64::max),
         reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
         time: outcome.time,
@@ -340,28 +399,16 @@ pub(crate) fn summarise(scene: &Scene, built: &Built, plan: &Plan, outcome: &Out
 }
 
 /// The page to read.
-pub(crate) fn markdown(
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> String {
+pub(crate) fn markdown(world: &World, outcome: &Outcome, summary: &Summary) -> String {
     let mut page = String::new();
     // Writing to a String cannot fail.
-    let _ = write_page(&mut page, scene, built, plan, outcome, summary);
+    let _ = write_page(&mut page, world, outcome, summary);
     // Names and titles come from files that others wrote: no codes for terminals, no HTML.
     printable(&page).replace('<', "&lt;")
 }
 
-fn write_page(
-    page: &mut String,
-    scene: &Scene,
-    built: &Built,
-    plan: &Plan,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> std::fmt::Result {
+fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Summary) -> std::fmt::Result {
+    let scene = &world.scene;
     let title = if scene.scene.title.is_empty() { "Untitled scene" } else { &scene.scene.title };
     writeln!(page, "# {title}\n")?;
     match &outcome.failure {
@@ -393,7 +440,8 @@ fn write_page(
         page,
         "| body | mesh | nodes | elements | volume [m³] | mass [kg] |\n|---|---|---|---|---|---|"
     )?;
-    for (body, built) in summary.bodies.iter().zip(&built.bodies) {
+    let built = world.participants.iter().flat_map(|part| &part.built.bodies);
+    for (body, built) in summary.bodies.iter().zip(built) {
         let BodySummary { name, nodes, elements, volume, mass } = body;
         writeln!(
             page,
@@ -403,29 +451,14 @@ fn write_page(
             number(*mass)
         )?;
     }
-    writeln!(page, "\n## Time step\n")?;
-    writeln!(page, "| | |\n|---|---|")?;
-    writeln!(page, "| step | {} s |", number(plan.step))?;
-    if let Some(Limits { bound, limit, limiting }) = &plan.limits {
-        writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
-        writeln!(page, "| true limit (assembled operator) | {} |", told_limit(limit.step))?;
+    for (part, own) in world.participants.iter().zip(&outcome.parts) {
+        write_part(page, part, own)?;
     }
-    if let Some(AddedMass { mass, percent, elements, .. }) = &summary.added_mass {
-        let mass = number(*mass);
-        writeln!(page, "| mass added by scaling | {mass} kg, {percent:.2} %, to {elements} elements |")?;
+    if world.only().is_none() {
+        writeln!(page, "\n## Energy of all at the end\n\n| | J |\n|---|---|")?;
+        write_energy_rows(page, &outcome.energies)?;
     }
-    if let Some(note) = &plan.note {
-        writeln!(page, "\n{note}.")?;
-    }
-    if let Some(stability) = &summary.stability {
-        writeln!(page, "\nDuring the run: {stability}.")?;
-    }
-    if let Some(effort) = &summary.solver {
-        write_effort(page, effort, outcome.steps)?;
-    }
-    write_strains(page, &summary.shell_strains)?;
-    write_energies(page, outcome)?;
-    write_reactions(page, built, outcome)?;
+    write_reactions(page, world, outcome)?;
     writeln!(page, "\n## Cost\n\n| | |\n|---|---|")?;
     writeln!(page, "| wall time | {} s |", number(summary.wall_seconds))?;
     writeln!(page, "| real-time factor | {} |", number(summary.real_time_factor))?;
@@ -435,8 +468,8 @@ fn write_page(
     writeln!(page, "| threads | {} |", outcome.threads)?;
     writeln!(page, "| precision | {} |", summary.precision)?;
     let doubts = summary.warnings.iter().map(|doubt| format!("**Warning:** {doubt}"));
-    let remarks: Vec<String> = (doubts.chain(built.warnings.iter().map(ToString::to_string)))
-        .chain(built.notes.iter().cloned())
+    let remarks: Vec<String> = (doubts.chain(world.warnings().map(ToString::to_string)))
+        .chain(world.participants.iter().flat_map(|part| &part.built.notes).cloned())
         .collect();
     if !remarks.is_empty() {
         writeln!(page, "\n## Remarks\n")?;
@@ -444,6 +477,37 @@ fn write_page(
     }
     writeln!(page, "\n## Files\n")?;
     outcome.files.iter().try_for_each(|file| writeln!(page, "* `{}`", short(file)))
+}
+
+/// Steps, equations, strains and energies of a participant.
+fn write_part(page: &mut String, part: &Part, outcome: &PartOutcome) -> std::fmt::Result {
+    let Part { built, plan, .. } = part;
+    let of = part.prefix().map(|name| format!(" of `{name}`")).unwrap_or_default();
+    writeln!(page, "\n## Time step{of}\n")?;
+    writeln!(page, "| | |\n|---|---|")?;
+    if part.prefix().is_some() {
+        writeln!(page, "| solver | {} |", part.scene.run.solver.word())?;
+    }
+    writeln!(page, "| step | {} s |", number(plan.step))?;
+    if let Some(Limits { bound, limit, limiting }) = &plan.limits {
+        writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
+        writeln!(page, "| true limit (assembled operator) | {} |", told_limit(limit.step))?;
+    }
+    if let Some(AddedMass { mass, percent, elements, .. }) = AddedMass::new(built) {
+        let mass = number(mass);
+        writeln!(page, "| mass added by scaling | {mass} kg, {percent:.2} %, to {elements} elements |")?;
+    }
+    if let Some(note) = &plan.note {
+        writeln!(page, "\n{note}.")?;
+    }
+    if let Some(stability) = StabilitySummary::new(part, outcome) {
+        writeln!(page, "\nDuring the run: {stability}.")?;
+    }
+    if let Some(effort) = &outcome.effort {
+        write_effort(page, effort, outcome.steps)?;
+    }
+    write_strains(page, &outcome.watched.strains.0)?;
+    write_energies(page, &of, outcome)
 }
 
 fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Result {
@@ -489,9 +553,8 @@ fn write_strains(page: &mut String, strains: &[StrainSummary]) -> std::fmt::Resu
     Ok(())
 }
 
-fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
-    let Energies { kinetic, internal, damping, hourglass, external, balance } = outcome.energies;
-    writeln!(page, "\n## Energy at the end\n\n| | J |\n|---|---|")?;
+fn write_energy_rows(page: &mut String, energies: &Energies) -> std::fmt::Result {
+    let Energies { kinetic, internal, damping, hourglass, external, .. } = *energies;
     for (name, value) in [
         ("external work", external),
         ("internal (stored and viscous)", internal),
@@ -501,6 +564,13 @@ fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
     ] {
         writeln!(page, "| {name} | {} |", number(value))?;
     }
+    Ok(())
+}
+
+fn write_energies(page: &mut String, of: &str, outcome: &PartOutcome) -> std::fmt::Result {
+    let Energies { internal, external, balance, .. } = outcome.energies;
+    writeln!(page, "\n## Energy{of} at the end\n\n| | J |\n|---|---|")?;
+    write_energy_rows(page, &outcome.energies)?;
     if outcome.balance_floor.is_infinite() {
         return writeln!(
             page,
@@ -512,7 +582,7 @@ fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
             page,
             "\nBalance: {:.3} % of the largest energy at the end, {:.3} % at worst (judged above {} J).",
             balance * 100.0,
-            outcome.worst_balance * 100.0,
+            outcome.watched.worst_balance * 100.0,
             number(outcome.balance_floor)
         );
     };
@@ -537,15 +607,16 @@ fn write_energies(page: &mut String, outcome: &Outcome) -> std::fmt::Result {
     )
 }
 
-fn write_reactions(page: &mut String, built: &Built, outcome: &Outcome) -> std::fmt::Result {
-    if built.model.constraints.is_empty() {
+fn write_reactions(page: &mut String, world: &World, outcome: &Outcome) -> std::fmt::Result {
+    if constraints(world).next().is_none() {
         return Ok(());
     }
     writeln!(
         page,
         "\n## Reactions\n\n| constraint | nodes | at the end [N] | largest [N] |\n|---|---|---|---|"
     )?;
-    for (index, (constraint, force)) in built.model.constraints.iter().zip(&outcome.reactions).enumerate() {
+    let forces = outcome.parts.iter().flat_map(|own| &own.reactions);
+    for (index, (constraint, force)) in constraints(world).zip(forces).enumerate() {
         let [x, y, z] = force.map(number);
         let nodes = constraint.nodes.len();
         let largest = number(outcome.history.largest_reaction(index));

@@ -9,9 +9,9 @@ use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_
 
 use super::file::{check_own_folder, replace};
 use super::snapshot::Snapshot;
-use super::{Frame, Observer, OutputError, Written};
-use crate::assemble::Built;
+use super::{Frame, Observer, OutputError, Written, time_of};
 use crate::format::VtuTable;
+use crate::world::World;
 
 pub(super) struct Series {
     folder: PathBuf,
@@ -25,7 +25,7 @@ pub(super) struct Series {
 
 impl Series {
     pub(super) fn new(
-        built: &Built,
+        world: &World,
         table: &VtuTable,
         folder: &Path,
         name: &str,
@@ -40,7 +40,7 @@ impl Series {
             name: name.into(),
             times: Vec::new(),
             beyond: Vec::new(),
-            snapshot: Snapshot::new(built, table.on.as_deref(), &table.data, table.at, table.curved),
+            snapshot: Snapshot::new(world, table),
         })
     }
 
@@ -67,10 +67,15 @@ impl Series {
 }
 
 impl Observer for Series {
-    fn see(&mut self, frame: &Frame<'_>) -> Result<(), OutputError> {
-        self.snapshot.fill(frame);
+    fn see(&mut self, frames: &[Frame<'_>]) -> Result<(), OutputError> {
+        self.snapshot.fill(frames);
+        let time = time_of(frames);
         let path = self.folder.join(frame_name(self.times.len()));
-        let options = VtuOptions { compress: true, single: frame.now.is_single(), time: Some(frame.time()) };
+        let options = VtuOptions {
+            compress: true,
+            single: frames.iter().all(|frame| frame.now.is_single()),
+            time: Some(time),
+        };
         let written = replace(&path, |file| {
             let mut writer = BufWriter::new(file);
             write_vtu(&mut writer, self.snapshot.mesh(), &options).map_err(|error| match error {
@@ -80,12 +85,12 @@ impl Observer for Series {
             writer.flush()
         });
         written.map_err(|error| OutputError::new(&path, error))?;
-        self.times.push(frame.time());
+        self.times.push(time);
         // A later frame of the interrupted run stays in the list as long as it comes later.
         if !self.beyond.is_empty() {
             self.beyond.remove(0);
         }
-        if self.beyond.first().is_some_and(|&time| time <= frame.time()) {
+        if self.beyond.first().is_some_and(|&later| later <= time) {
             self.remove_beyond()?;
         }
         self.list()

@@ -8,12 +8,13 @@ use pliant_gpu::{Device, DevicePoints, PointValue};
 
 use super::App;
 use crate::device::{LOOK, point_value};
-use crate::session::{Order, Stage};
+use crate::session::Order;
+use pliant_scene::World;
 
-/// Opens the window on the device of a stage, if it has one.
-pub(super) fn setup(stage: &Stage) -> WgpuConfiguration {
+/// Opens the window on the device of a world, if it has one.
+pub(super) fn setup(world: &World) -> WgpuConfiguration {
     let mut configuration = WgpuConfiguration::default();
-    if let Some(device) = &stage.plan.target.device {
+    if let Some(device) = world.device() {
         let ((instance, adapter), (device, queue)) = (device.origin(), device.wgpu());
         configuration.wgpu_setup = WgpuSetup::Existing(WgpuSetupExisting {
             instance: instance.clone(),
@@ -25,9 +26,9 @@ pub(super) fn setup(stage: &Stage) -> WgpuConfiguration {
     configuration
 }
 
-/// The device of a stage, if the window is on it.
-pub(super) fn shared(state: &RenderState, stage: &Stage) -> Option<Device> {
-    stage.plan.target.device.clone().filter(|device| *device.wgpu().0 == state.device)
+/// The device of a world, if the window is on it.
+pub(super) fn shared(state: &RenderState, world: &World) -> Option<Device> {
+    world.device().cloned().filter(|device| *device.wgpu().0 == state.device)
 }
 
 impl App {

@@ -28,15 +28,16 @@ use self::parameters::Numbers;
 use self::picture::{Cut, SCALE};
 use crate::hand::{Hand, Point};
 use crate::samples::Samples;
-use crate::session::{Frame, Order, Session, Stage};
+use crate::session::{Frame, Order, Session};
+use pliant_scene::World;
 
 /// Reads a scene; the message of what is wrong with it.
-pub type Read = Arc<dyn Fn(&Path) -> Result<Stage, String> + Send + Sync>;
+pub type Read = Arc<dyn Fn(&Path) -> Result<World, String> + Send + Sync>;
 
 /// What a window opens with.
 pub struct Opening {
     /// The scene.
-    pub stage: Stage,
+    pub world: World,
     /// How it is looked at.
     pub style: Style,
     /// From where; target and height are those that fit.
@@ -88,7 +89,7 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
         depth_buffer: 32,
         multisampling: SAMPLES as u16,
         renderer: eframe::Renderer::Wgpu,
-        wgpu_options: device::setup(&opening.stage),
+        wgpu_options: device::setup(&opening.world),
         ..Default::default()
     };
     let outcome = Arc::<Mutex<Option<Result<String, String>>>>::default();
@@ -103,7 +104,7 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
 
 struct App {
     target: Target,
-    stage: Stage,
+    world: World,
     session: Session,
     subject: Arc<Subject>,
     frame: Frame,
@@ -149,7 +150,7 @@ struct App {
     looked: Instant,
     read: Read,
     /// A scene that is being read.
-    reading: Option<Receiver<(PathBuf, Result<Stage, String>)>>,
+    reading: Option<Receiver<(PathBuf, Result<World, String>)>>,
     message: Option<String>,
     frame_seconds: f64,
     painted: Instant,
@@ -174,9 +175,9 @@ impl App {
             samples: SAMPLES,
         };
         context.egui_ctx.set_visuals(egui::Visuals::light());
-        let Opening { stage, style, camera, file, read, record, errand } = opening;
-        let session = begin(&stage, &context.egui_ctx)?;
-        let device = device::shared(state, &stage);
+        let Opening { world, style, camera, file, read, record, errand } = opening;
+        let session = begin(&world, &context.egui_ctx)?;
+        let device = device::shared(state, &world);
         let app = Self {
             target,
             session,
@@ -184,10 +185,10 @@ impl App {
             points: Arc::default(),
             values: Arc::default(),
             fresh: true,
-            numbers: Numbers::of(&stage.scene),
-            view: stage.scene.view.clone(),
-            labels: stage.built.labels(stage.scene.view.on.as_deref()),
-            stage,
+            numbers: Numbers::of(&world.scene),
+            view: world.scene.view.clone(),
+            labels: world.labels(world.scene.view.on.as_deref()),
+            world,
             home: camera,
             camera,
             locked: style.range.is_some(),
@@ -230,19 +231,19 @@ impl App {
 
     /// The field that colours tell.
     fn field(&self) -> Option<FieldName> {
-        self.stage.scene.field_of(&self.view)
+        self.world.scene.field_of(&self.view)
     }
 
     /// What a user should know now: why it cannot go on, what was done last, what the scene warns of.
     fn banner(&self) -> Option<String> {
-        let mut warnings = self.stage.built.warnings.iter().map(|warning| warning.message.clone());
+        let warnings = self.world.warnings().map(|warning| warning.message.clone());
         let told = self.frame.failure.clone().or_else(|| self.message.clone());
-        told.or_else(|| self.frame.note.clone()).or_else(|| warnings.next_back())
+        told.or_else(|| self.frame.note.clone()).or_else(|| warnings.last())
     }
 
     /// The scene's title, or the name of its file.
     fn title(&self) -> String {
-        let title = &self.stage.scene.scene.title;
+        let title = &self.world.scene.scene.title;
         if title.is_empty() { self.file.display().to_string() } else { title.clone() }
     }
 
@@ -341,7 +342,7 @@ impl App {
         }
         let Some(Ok((path, read))) = self.reading.as_ref().map(|reading| reading.try_recv()) else { return };
         self.reading = None;
-        let replaced = read.and_then(|stage| self.replace(path, stage));
+        let replaced = read.and_then(|world| self.replace(path, world));
         self.message = Some(replaced.err().unwrap_or_else(|| REPLACED.into()));
     }
 
@@ -361,19 +362,19 @@ impl App {
         }
     }
 
-    fn replace(&mut self, path: PathBuf, mut stage: Stage) -> Result<(), String> {
-        stage.share(self.device.as_ref());
-        let before = std::mem::replace(&mut self.session, begin(&stage, &self.context)?);
+    fn replace(&mut self, path: PathBuf, mut world: World) -> Result<(), String> {
+        world.share(self.device.as_ref());
+        let before = std::mem::replace(&mut self.session, begin(&world, &self.context)?);
         // A long step ends in its own time.
         std::thread::spawn(move || drop(before));
         if path != self.file {
-            self.view = stage.scene.view.clone();
+            self.view = world.scene.view.clone();
             self.subject = Arc::default();
         }
-        self.numbers = Numbers::of(&stage.scene);
+        self.numbers = Numbers::of(&world.scene);
         self.forget_probes();
-        self.labels = stage.built.labels(self.view.on.as_deref());
-        self.stage = stage;
+        self.labels = world.labels(self.view.on.as_deref());
+        self.world = world;
         self.changed = modified(&path);
         self.file = path;
         self.samples.clear();
@@ -484,9 +485,9 @@ impl eframe::App for App {
 }
 
 /// Starts to play a scene.
-fn begin(stage: &Stage, context: &egui::Context) -> Result<Session, String> {
+fn begin(world: &World, context: &egui::Context) -> Result<Session, String> {
     let context = context.clone();
-    Session::start(stage.clone(), move || context.request_repaint()).map_err(|error| error.to_string())
+    Session::start(world.clone(), move || context.request_repaint()).map_err(|error| error.to_string())
 }
 
 fn modified(path: &Path) -> Option<SystemTime> {

@@ -161,7 +161,7 @@ impl App {
     /// What is drawn beside colours; whether another surface is asked for.
     fn shape(&mut self, ui: &mut egui::Ui) -> bool {
         let before = Surface::of(&self.view);
-        let scene = &self.stage.scene;
+        let scene = &self.world.scene;
         let bodies = scene.bodies.iter().map(|(name, _)| name);
         let names: Vec<&String> = bodies.chain(scene.surfaces.iter().map(|(name, _)| name)).collect();
         if names.len() > 1 {
@@ -172,7 +172,7 @@ impl App {
                     ui.selectable_value(&mut self.view.on, Some(name.clone()), name);
                 }
             });
-            self.labels = self.stage.built.labels(self.view.on.as_deref());
+            self.labels = self.world.labels(self.view.on.as_deref());
         }
         if scene.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell) {
             let parts = egui::Slider::new(&mut self.view.curved, 1..=12).text("parts of an edge");
@@ -220,7 +220,7 @@ impl App {
     /// The fields that bodies of the scene have.
     pub(super) fn fields(&self) -> Vec<FieldName> {
         let on = self.view.on.as_ref();
-        let bodies = self.stage.scene.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
+        let bodies = self.world.scene.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
         let models: Vec<_> = bodies.map(|(_, body)| body.model).collect();
         let all = FieldName::ALL.into_iter();
         if models.is_empty() {

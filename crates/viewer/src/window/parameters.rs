@@ -7,18 +7,19 @@ use pliant_scene::Scene;
 
 use super::App;
 use crate::parameters::{Number, Parameter, parameters, with_numbers};
-use crate::session::{Order, Stage};
+use crate::session::Order;
+use pliant_scene::World;
 
-/// Some numbers, and where the stage that is made of them comes from.
-type Making = (Vec<f64>, Receiver<Result<Stage, String>>);
+/// Some numbers, and where the world that is made of them comes from.
+type Making = (Vec<f64>, Receiver<Result<World, String>>);
 
 /// The numbers that can be changed.
 pub(super) struct Numbers {
     all: Vec<Parameter>,
     in_file: Vec<f64>,
-    /// Those of the stage that is played, or waits to be.
+    /// Those of the world that is played, or waits to be.
     accepted: Vec<f64>,
-    /// A stage that is being made of some numbers.
+    /// A world that is being made of some numbers.
     making: Option<Making>,
 }
 
@@ -92,7 +93,7 @@ impl App {
         self.take_stage(ui.ctx());
     }
 
-    /// Begins to make the stage of the numbers as they are, unless one is being made.
+    /// Begins to make the world of the numbers as they are, unless one is being made.
     fn make_stage(&mut self, context: &egui::Context) {
         let values = self.numbers.values();
         if values == self.numbers.accepted || self.numbers.making.is_some() {
@@ -100,7 +101,7 @@ impl App {
         }
         let (send, receive) = channel();
         let (scene, numbers, context) =
-            (self.stage.scene.clone(), self.numbers.changed(&values), context.clone());
+            (self.world.scene.clone(), self.numbers.changed(&values), context.clone());
         let work = move || {
             // The window may be closed by now.
             let _ = send.send(with_numbers(&scene, &numbers));
@@ -112,7 +113,7 @@ impl App {
         }
     }
 
-    /// Takes a stage that is made; invalid numbers are reported and taken back.
+    /// Takes a world that is made; invalid numbers are reported and taken back.
     fn take_stage(&mut self, context: &egui::Context) {
         let Some((values, made)) = &self.numbers.making else { return };
         let made = match made.try_recv() {
@@ -123,11 +124,11 @@ impl App {
         let values = values.clone();
         self.numbers.making = None;
         match made {
-            Ok(stage) => {
+            Ok(world) => {
                 self.message = None;
                 let changed = self.numbers.changed(&values);
                 self.numbers.accepted = values;
-                self.order(Order::Change(Box::new(stage), changed));
+                self.order(Order::Change(Box::new(world), changed));
                 // They may be others again by now.
                 self.make_stage(context);
             }

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use pliant_picture::Subject;
 use pliant_scene::Scene;
+use pliant_scene::World;
 use pliant_scene::source::Source;
-use pliant_viewer::{Frame, Session, Stage};
+use pliant_viewer::{Frame, Session};
 
 /// A ball held at one end.
 pub const BALL: &str = include_str!("ball.toml");
@@ -38,7 +39,7 @@ nodes = { half-space = { point = [-0.095, 0, 0], normal = [-1, 0, 0] } }
 "#;
 
 /// A strip of a shell, held at one end, with a solver of shells.
-pub fn shell(solver: &str) -> Stage {
+pub fn shell(solver: &str) -> World {
     let text = r#"
 [scene]
 until = 100
@@ -62,22 +63,20 @@ nodes = { set = "x-min" }
 threads = 1
 "#;
     let more = if solver == "static" { "load-steps = 10\n" } else { "" };
-    stage(&format!("{text}solver = '{solver}'\n{more}"))
+    world(&format!("{text}solver = '{solver}'\n{more}"))
 }
 
-pub fn stage(text: &str) -> Stage {
+pub fn world(text: &str) -> World {
     staged(Source::parse("ball.toml", text).unwrap_or_else(|error| panic!("{}", error.plain())), ".".into())
 }
 
-pub fn staged(source: Source, folder: PathBuf) -> Stage {
+pub fn staged(source: Source, folder: PathBuf) -> World {
     let scene = Scene::from_source(source, folder).unwrap_or_else(|error| panic!("{}", error.plain()));
-    let built = pliant_scene::build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
-    let plan = pliant_scene::plan(&scene, &built).unwrap_or_else(|error| panic!("{}", error.plain()));
-    Stage { scene, built: built.into(), plan }
+    World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()))
 }
 
-pub fn subject(stage: &Stage) -> Subject {
-    let mut live = pliant_scene::live(&stage.scene, &stage.built, &stage.plan).unwrap();
+pub fn subject(world: &World) -> Subject {
+    let mut live = pliant_scene::live(&std::sync::Arc::new(world.clone())).unwrap();
     Subject::new(live.mesh().unwrap())
 }
 

@@ -348,13 +348,14 @@ impl Builder<'_> {
     }
 
     fn add_control(&mut self, table: &ControlTable) {
-        let path = ["run", "control"];
+        let scene = self.scene;
+        let path = scene.run_at("control");
         let scene = self.scene;
         if !scene.loads.iter().any(|(name, _)| *name == table.load) {
             let known: Vec<&str> = scene.loads.iter().map(|(name, _)| name.as_str()).collect();
             let help = suggestion(&table.load, &known, SCENE, "loads");
             let message = format!("there is no load `{}`", table.load);
-            self.error(&["run", "control", "load"], message, "no such load", help);
+            self.error(&[&path[..], &["load"]].concat(), message, "no such load", help);
             return;
         }
         let given = [table.displacement.is_some(), table.arc_length.is_some(), table.volume.is_some()];
@@ -364,7 +365,7 @@ impl Builder<'_> {
             return;
         }
         let control = match (&table.displacement, table.arc_length, table.volume) {
-            (Some(wanted), _, _) => (self.controlled_node(wanted, &["run", "control", "displacement"]))
+            (Some(wanted), _, _) => (self.controlled_node(wanted, &[&path[..], &["displacement"]].concat()))
                 .map(|(node, component, by)| Control::Displacement { node, component, by }),
             (_, Some(length), _) => {
                 self.stop(table.stop.as_ref()).map(|stop| Control::ArcLength { length, stop })
@@ -374,7 +375,7 @@ impl Builder<'_> {
         };
         if table.stop.is_some() && table.arc_length.is_none() {
             let message = "`stop` is for `arc-length`: other controls end where they are set to end";
-            self.error(&["run", "control", "stop"], message, "means nothing here", "remove it");
+            self.error(&[&path[..], &["stop"]].concat(), message, "means nothing here", "remove it");
         }
         if let Some(part) = &mut self.corotational {
             part.control = control;
@@ -384,7 +385,8 @@ impl Builder<'_> {
     /// Where a path by arc length ends: at the load as written, unless `stop` says otherwise.
     fn stop(&mut self, table: Option<&StopTable>) -> Option<Stop> {
         let Some(table) = table else { return Some(Stop { load_factor: Some(1.0), ..Stop::default() }) };
-        let path = ["run", "control", "stop", "displacement"];
+        let scene = self.scene;
+        let path = [&scene.run_at("control")[..], &["stop", "displacement"]].concat();
         let displacement = match &table.displacement {
             Some(wanted) => Some(self.controlled_node(wanted, &path)?),
             None => None,
@@ -426,7 +428,8 @@ impl Builder<'_> {
                 corotational::LoadKind::Pressure { cells, .. } => Some(cells),
                 _ => None,
             });
-        let path = ["run", "control", "volume"];
+        let scene = self.scene;
+        let path = [&scene.run_at("control")[..], &["volume"]].concat();
         let Some(cells) = pressed else {
             let message = format!("`{load}` is no pressure on a shell, which a volume is controlled by");
             self.error(&path, message, "of what?", "let `load` name a pressure on a closed shell");

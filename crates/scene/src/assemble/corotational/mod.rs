@@ -93,7 +93,7 @@ impl Builder<'_> {
                 let message =
                     format!("the solver `{}` is not for bodies of model `solid`", scene.run.solver.word());
                 let help = "take `solver = \"explicit\"` or `\"quasi-static\"`, or `model = \"corotational\"` for the bodies";
-                self.error(&["run", "solver"], message, "not for these bodies", help);
+                self.error(&scene.run_at("solver"), message, "not for these bodies", help);
             }
             self.check_keys_of_shells(false);
             return;
@@ -110,30 +110,30 @@ impl Builder<'_> {
             let message =
                 format!("the solver `quasi-static` is not for bodies of model `{}`", table.model.word());
             let help = "take `solver = \"static\"`";
-            self.error(&["run", "solver"], message, "not for these bodies", help);
+            self.error(&scene.run_at("solver"), message, "not for these bodies", help);
         }
         if scene.run.precision == Some(crate::format::Precision::Single) {
             let message =
                 format!("bodies of model `{}` are computed in double precision only", table.model.word());
-            self.error(&["run", "precision"], message, "not for these bodies", "leave `precision` out");
+            self.error(&scene.run_at("precision"), message, "not for these bodies", "leave `precision` out");
         }
         if scene.run.checkpoint.is_some()
             && scene.run.control.as_ref().is_some_and(|c| c.arc_length.is_some())
         {
             let message = "there are no checkpoints of a run by arc length, which goes on in the direction of its last step";
             let help = "leave it out, or control a displacement";
-            self.error(&["run", "checkpoint"], message, "not with `arc-length`", help);
+            self.error(&scene.run_at("checkpoint"), message, "not with `arc-length`", help);
         }
         if scene.run.mass_scaling.is_some() {
             let message = format!("mass is not scaled for bodies of model `{}`", table.model.word());
             let help = "leave it out, or take `solver = \"implicit\"`, which has no stable step";
-            self.error(&["run", "mass-scaling"], message, "not for these bodies", help);
+            self.error(&scene.run_at("mass-scaling"), message, "not for these bodies", help);
         }
         if scene.run.on_unstable.is_some() {
             let message =
                 format!("the stable step of bodies of model `{}` is not watched", table.model.word());
             let help = "leave it out; their step is held against the stable one at rest before the run";
-            self.error(&["run", "on-unstable"], message, "not for these bodies", help);
+            self.error(&scene.run_at("on-unstable"), message, "not for these bodies", help);
         }
         self.check_keys_of_shells(true);
         for key in ["damping", "stiffness-damping"] {
@@ -162,12 +162,13 @@ impl Builder<'_> {
 
     /// Refuses keys that say nothing for the models and the solver there are.
     fn check_keys_of_shells(&mut self, present: bool) {
-        let run = &self.scene.run;
+        let scene = self.scene;
+        let run = &scene.run;
         let newton = present && matches!(run.solver, SolverName::Implicit | SolverName::Static);
         let dynamic = matches!(run.solver, SolverName::Explicit | SolverName::Implicit);
-        if dynamic && self.source().node(&["run", "load-steps"]).is_some() {
+        if dynamic && scene.gives("load-steps") {
             let message = "`load-steps` is for `solver = \"quasi-static\"` and `\"static\"`; others take a `step` in seconds";
-            self.error(&["run", "load-steps"], message, "means nothing here", "remove it");
+            self.error(&scene.run_at("load-steps"), message, "means nothing here", "remove it");
         }
         for (key, wanted, of) in [
             ("iterations", newton, "`solver = \"implicit\"` and `\"static\"`"),
@@ -175,9 +176,9 @@ impl Builder<'_> {
             ("control", newton && run.solver == SolverName::Static, "`solver = \"static\"`"),
             ("integrator", newton && run.solver == SolverName::Implicit, "`solver = \"implicit\"`"),
         ] {
-            if self.source().node(&["run", key]).is_some() && !wanted {
+            if scene.gives(key) && !wanted {
                 let message = format!("`{key}` is for {of} of shells and co-rotational solids");
-                self.error(&["run", key], message, "means nothing here", "remove it");
+                self.error(&scene.run_at(key), message, "means nothing here", "remove it");
             }
         }
         let taken = self

@@ -1,0 +1,91 @@
+//! Participants: bodies that one stepper advances together, apart from the others of the scene.
+
+use pliant_explicit::stability::OnUnstable;
+use pliant_gpu::Design;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{
+    ControlTable, DeviceName, IntegratorName, LinearWay, LoadSteps, MassScalingTable, Precision, RunTable,
+    SolverName, StepChoice,
+};
+
+/// Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: the solids together, and the shells
+/// and co-rotational solids together. Participants advance at their own steps and meet at common instants, where outputs see them.
+/// A key that is left out is as in `[run]`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ParticipantTable {
+    /// The bodies, all of model `solid`, or none of them.
+    pub bodies: Vec<String>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub solver: Option<SolverName>,
+    /// Time step [s], as in `[run]`. Common instants are as far apart as the longest step of all participants; shorter steps are made a
+    /// little shorter where they don't divide it.
+    #[serde(default)]
+    pub step: Option<StepChoice>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub on_unstable: Option<OnUnstable>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub mass_scaling: Option<MassScalingTable>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub load_steps: Option<LoadSteps>,
+    /// As in `[run]`.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub tolerance: Option<f64>,
+    /// As in `[run]`.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 10_000))]
+    pub iterations: Option<u32>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub integrator: Option<IntegratorName>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub linear: Option<LinearWay>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub control: Option<ControlTable>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub precision: Option<Precision>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub device: Option<DeviceName>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub adapter: Option<String>,
+    /// As in `[run]`.
+    #[serde(default)]
+    pub design: Option<Design>,
+}
+
+impl ParticipantTable {
+    /// `[run]` with the keys that are given here in place of its own.
+    pub(crate) fn over(&self, run: &RunTable) -> RunTable {
+        let run = run.clone();
+        RunTable {
+            solver: self.solver.unwrap_or(run.solver),
+            step: self.step.unwrap_or(run.step),
+            on_unstable: self.on_unstable.or(run.on_unstable),
+            mass_scaling: self.mass_scaling.or(run.mass_scaling),
+            load_steps: self.load_steps.clone().unwrap_or(run.load_steps),
+            tolerance: self.tolerance.or(run.tolerance),
+            iterations: self.iterations.or(run.iterations),
+            integrator: self.integrator.or(run.integrator),
+            linear: self.linear.clone().unwrap_or(run.linear),
+            control: self.control.clone().or(run.control),
+            precision: self.precision.or(run.precision),
+            device: self.device.unwrap_or(run.device),
+            adapter: self.adapter.clone().or(run.adapter),
+            design: self.design.or(run.design),
+            threads: run.threads,
+            checkpoint: run.checkpoint,
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Meshes of several participants as one.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
+
+/// Meshes with their data as one mesh. Data that a mesh lacks are not a number there; labels are 0. Cells have the number of their `body`,
+/// counted over all meshes.
+pub(super) fn merged(meshes: &[&Mesh]) -> Mesh {
+    let mut all = Mesh::default();
+    let sizes = meshes.iter().map(|mesh| mesh.points.len());
+    all.point_data = joined(meshes.iter().map(|mesh| &mesh.point_data).zip(sizes));
+    let mut first_points = vec![0];
+    let mut first_bodies = vec![0.0];
+    for mesh in meshes {
+        all.points.extend_from_slice(&mesh.points);
+        all.label_names.extend(mesh.label_names.clone());
+        first_points.push(all.points.len() as u32);
+        let bodies = mesh.blocks.iter().filter_map(|block| block.data.get("body"));
+        let most = bodies.flat_map(|body| &body.values).copied().fold(0.0, f64::max);
+        first_bodies.push(first_bodies[first_bodies.len() - 1] + most + 1.0);
+    }
+    let kinds: BTreeSet<CellKind> =
+        meshes.iter().flat_map(|mesh| &mesh.blocks).map(|block| block.kind).collect();
+    for kind in kinds {
+        let blocks: Vec<(usize, &CellBlock)> =
+            meshes.iter().enumerate().filter_map(|(index, mesh)| Some((index, mesh.block(kind)?))).collect();
+        let nodes = blocks.iter().flat_map(|&(index, block)| {
+            let first = first_points[index];
+            block.nodes.iter().map(move |node| first + node)
+        });
+        let mut whole = CellBlock::new(kind, nodes.collect());
+        whole.data = joined(blocks.iter().map(|(_, block)| (&block.data, block.len())));
+        let body = blocks.iter().flat_map(|&(index, block)| {
+            let (first, own) = (first_bodies[index], block.data.get("body"));
+            (0..block.len()).map(move |cell| first + own.map_or(0.0, |own| own.values[cell]))
+        });
+        whole.data.insert("body".into(), DataArray::scalar(body.collect()));
+        if let Some(labels) = whole.data.get_mut("label") {
+            labels.values.iter_mut().filter(|label| label.is_nan()).for_each(|label| *label = 0.0);
+        }
+        all.blocks.push(whole);
+    }
+    all
+}
+
+/// Data one after another, of so many items each.
+fn joined<'a>(
+    parts: impl Iterator<Item = (&'a BTreeMap<String, DataArray>, usize)> + Clone,
+) -> BTreeMap<String, DataArray> {
+    let mut names: BTreeMap<&str, usize> = BTreeMap::new();
+    for (data, _) in parts.clone() {
+        names.extend(data.iter().map(|(name, array)| (name.as_str(), array.components)));
+    }
+    let join = |(name, components): (&str, usize)| {
+        let mut values = Vec::new();
+        for (data, items) in parts.clone() {
+            match data.get(name) {
+                Some(array) => values.extend_from_slice(&array.values),
+                None => values.resize(values.len() + items * components, f64::NAN),
+            }
+        }
+        (name.to_owned(), DataArray { components, values })
+    };
+    names.into_iter().map(join).collect()
+}

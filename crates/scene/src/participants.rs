@@ -1,0 +1,313 @@
+//! Which bodies of a scene go together: each participant as a scene of its own, with the tables that are about its bodies.
+
+use std::collections::BTreeMap;
+
+use crate::checker::nearest;
+use crate::diagnostic::{Diagnostic, SceneErrors};
+use crate::format::{
+    BodyModel, ColourBy, DeviceName, FieldName, ParticipantTable, RunTable, SolverName, ViewTable,
+};
+use crate::registry::{ConstraintTable, OutputTable};
+use crate::scene::Scene;
+
+impl ConstraintTable {
+    /// The body whose nodes it is about.
+    pub(crate) fn body(&self) -> &str {
+        match self {
+            Self::Fix(table) => &table.body,
+            Self::Move(table) => &table.body,
+            Self::Spring(table) => &table.body,
+        }
+    }
+}
+
+/// The participant of each name of a body, a surface or a constraint.
+struct Owners {
+    of: BTreeMap<String, usize>,
+    constraints: BTreeMap<String, usize>,
+}
+
+impl Scene {
+    /// The participants with their names: the scene itself where all bodies go together.
+    ///
+    /// # Errors
+    /// If a participant names a body that there is not, or that goes with another one, or none; or if a table of a scene of several
+    /// participants names a body or a surface that there is not.
+    pub(crate) fn split(&self) -> Result<Vec<(String, Self)>, SceneErrors> {
+        let mut out = Vec::new();
+        let groups = self.groups(&mut out);
+        if !out.is_empty() {
+            return Err(self.source.errors(out));
+        }
+        if groups.len() == 1 && self.participants.is_empty() {
+            return Ok(vec![(String::new(), self.clone())]);
+        }
+        let owners = self.owners(&groups, &mut out);
+        if !out.is_empty() {
+            return Err(self.source.errors(out));
+        }
+        let part = |(index, (name, _)): (usize, &(String, Vec<String>))| {
+            (name.clone(), self.part(index, name, &owners))
+        };
+        Ok(groups.iter().enumerate().map(part).collect())
+    }
+
+    /// The bodies of each participant, with its name.
+    fn groups(&self, out: &mut Vec<Diagnostic>) -> Vec<(String, Vec<String>)> {
+        let known: Vec<&str> = self.bodies.iter().map(|(name, _)| name.as_str()).collect();
+        let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+        for (name, table) in &self.participants {
+            let path = ["participant", name.as_str(), "bodies"];
+            if table.bodies.is_empty() {
+                let message = format!("participant `{name}` has no body");
+                let help = "name one or more, or leave the participant out";
+                out.push(Diagnostic::error(message).at(self.source.span(&path), "empty").help(help));
+            }
+            for (index, body) in table.bodies.iter().enumerate() {
+                let index = index.to_string();
+                let place = self.source.span(&[path[0], path[1], path[2], &index]);
+                if !known.contains(&body.as_str()) {
+                    let help = did_you_mean(body, &known);
+                    let message = format!("there is no body `{body}`");
+                    out.push(Diagnostic::error(message).at(place, "no such body").help(help));
+                } else if let Some((other, _)) = groups.iter().find(|(_, bodies)| bodies.contains(body)) {
+                    let message = format!("`{body}` goes with participant `{other}` already");
+                    let help = "a body has one participant: leave it out of the others";
+                    out.push(Diagnostic::error(message).at(place, "named twice").help(help));
+                }
+            }
+            groups.push((name.clone(), table.bodies.clone()));
+        }
+        for (word, solid) in [("solids", true), ("shells", false)] {
+            let of_kind = self.bodies.iter().filter(|(_, body)| (body.model == BodyModel::Solid) == solid);
+            let free = of_kind.filter(|(name, _)| !groups.iter().any(|(_, bodies)| bodies.contains(name)));
+            let bodies: Vec<String> = free.map(|(name, _)| name.clone()).collect();
+            if bodies.is_empty() {
+                continue;
+            }
+            if let Some((_, table)) = self.participants.iter().find(|(name, _)| name == word) {
+                let place = self.source.key_span(&["participant", word]);
+                let message = format!(
+                    "`{}` goes with no participant, and the name of the others, `{word}`, is taken",
+                    bodies[0]
+                );
+                let help = if table.bodies.is_empty() {
+                    "name it there"
+                } else {
+                    "give this participant another name"
+                };
+                out.push(Diagnostic::error(message).at(place, "taken").help(help));
+            }
+            groups.push((word.into(), bodies));
+        }
+        groups
+    }
+
+    fn owners(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) -> Owners {
+        let mut of = BTreeMap::new();
+        for (index, (_, bodies)) in groups.iter().enumerate() {
+            of.extend(bodies.iter().map(|body| (body.clone(), index)));
+        }
+        for (name, surface) in &self.surfaces {
+            match of.get(&surface.on).copied() {
+                Some(index) => {
+                    of.insert(name.clone(), index);
+                }
+                None => self.unknown(&surface.on, &["surface", name, "on"], &of, out),
+            }
+        }
+        let mut constraints = BTreeMap::new();
+        for (name, table) in &self.constraints {
+            match of.get(table.body()) {
+                Some(&index) => {
+                    constraints.insert(name.clone(), index);
+                }
+                None => self.unknown(table.body(), &["constraint", name, "body"], &of, out),
+            }
+        }
+        for (name, load) in &self.loads {
+            if let Some(on) = load.on().filter(|on| !of.contains_key(*on)) {
+                self.unknown(on, &["load", name, "on"], &of, out);
+            }
+        }
+        for (name, output) in &self.outputs {
+            match output {
+                OutputTable::Vtu(table) => {
+                    if let Some(on) = table.on.as_ref().filter(|on| !of.contains_key(*on)) {
+                        self.unknown(on, &["output", name, "on"], &of, out);
+                    }
+                }
+                OutputTable::Csv(table) => {
+                    for (probe, place) in table.probes.iter().filter(|(_, place)| !of.contains_key(&place.on))
+                    {
+                        self.unknown(&place.on, &["output", name, "probes", probe, "on"], &of, out);
+                    }
+                    for (index, reaction) in table.reactions.iter().flatten().enumerate() {
+                        if !constraints.contains_key(reaction) {
+                            let known: Vec<&str> = constraints.keys().map(String::as_str).collect();
+                            let index = index.to_string();
+                            let place = self.source.span(&["output", name, "reactions", &index]);
+                            let message = format!("there is no constraint `{reaction}`");
+                            let help = did_you_mean(reaction, &known);
+                            out.push(Diagnostic::error(message).at(place, "no such constraint").help(help));
+                        }
+                    }
+                }
+            }
+        }
+        if let Some(on) = self.view.on.as_ref().filter(|on| !of.contains_key(*on)) {
+            self.unknown(on, &["view", "on"], &of, out);
+        }
+        Owners { of, constraints }
+    }
+
+    fn unknown(&self, name: &str, path: &[&str], of: &BTreeMap<String, usize>, out: &mut Vec<Diagnostic>) {
+        let known: Vec<&str> = of.keys().map(String::as_str).collect();
+        let message = format!("there is no body or surface `{name}`");
+        let help = did_you_mean(name, &known);
+        let place = self.source.span(path);
+        out.push(Diagnostic::error(message).at(place, "no such body or surface").help(help));
+    }
+
+    /// The scene of one participant.
+    fn part(&self, index: usize, name: &str, owners: &Owners) -> Self {
+        let owns = |on: &str| owners.of.get(on) == Some(&index);
+        let table = self.participants.iter().find(|(known, _)| known == name);
+        let bodies: Vec<_> = self.bodies.iter().filter(|(body, _)| owns(body)).cloned().collect();
+        let models: Vec<BodyModel> = bodies.iter().map(|(_, body)| body.model).collect();
+        let has = |field: FieldName| models.iter().any(|&model| field.is_of(model));
+        // A field that no body of the scene has is reported once, with the first participant.
+        let strange = |field: FieldName| !self.bodies.iter().any(|(_, body)| field.is_of(body.model));
+        let used = |law: &String| bodies.iter().any(|(_, body)| body.law.values().contains(&law));
+        let used_elsewhere =
+            |law: &String| self.bodies.iter().any(|(_, body)| body.law.values().contains(&law));
+        let layered = |law: &String| {
+            bodies
+                .iter()
+                .any(|(_, body)| body.layers.iter().any(|layer| layer.law.as_deref() == Some(law.as_str())))
+        };
+        let layered_elsewhere = |law: &String| {
+            self.bodies
+                .iter()
+                .any(|(_, body)| body.layers.iter().any(|layer| layer.law.as_deref() == Some(law.as_str())))
+        };
+        let laws = self.laws.iter().filter(|(law, _)| {
+            used(law) || layered(law) || (index == 0 && !used_elsewhere(law) && !layered_elsewhere(law))
+        });
+        let mut outputs = Vec::new();
+        for (name, output) in &self.outputs {
+            let mut output = output.clone();
+            let shown = match &mut output {
+                OutputTable::Vtu(table) => {
+                    if table.on.is_none() {
+                        table.data.retain(|&field| has(field) || (index == 0 && strange(field)));
+                        if !models.contains(&BodyModel::Shell)
+                            && self.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell)
+                        {
+                            table.curved = None;
+                        }
+                    }
+                    table.on.as_deref().is_none_or(owns)
+                }
+                OutputTable::Csv(table) => {
+                    if let Some(reactions) = &mut table.reactions {
+                        reactions.retain(|constraint| owners.constraints.get(constraint) == Some(&index));
+                    }
+                    table.probes.retain(|_, probe| owns(&probe.on));
+                    true
+                }
+            };
+            if shown {
+                outputs.push((name.clone(), output));
+            }
+        }
+        let mut view = self.view.clone();
+        let seen = view.on.as_deref().is_none_or(owns);
+        let coloured = match view.colour {
+            Some(ColourBy::Field(field)) => has(field) || (index == 0 && strange(field)),
+            _ => true,
+        };
+        if !seen {
+            view = ViewTable { on: None, colour: None, hide: Vec::new(), ..view };
+        } else if !coloured {
+            view.colour = None;
+        }
+        let on_part = |on: Option<&str>| on.is_none_or(owns);
+        let solid = models.contains(&BodyModel::Solid);
+        Self {
+            run: self.run_of(table.map(|(_, table)| table), solid),
+            own: table.map(|(name, _)| name.clone()),
+            is_part: true,
+            participants: Vec::new(),
+            laws: laws.cloned().collect(),
+            bodies,
+            surfaces: self.surfaces.iter().filter(|(_, surface)| owns(&surface.on)).cloned().collect(),
+            constraints: self.constraints.iter().filter(|(_, table)| owns(table.body())).cloned().collect(),
+            loads: self.loads.iter().filter(|(_, load)| on_part(load.on())).cloned().collect(),
+            outputs,
+            view,
+            doubts: if index == 0 { self.doubts.clone() } else { Vec::new() },
+            source: self.source.clone(),
+            folder: self.folder.clone(),
+            scene: self.scene.clone(),
+        }
+    }
+
+    /// The run of a participant: its own keys, and those of `[run]` that mean something for its bodies and its solver.
+    fn run_of(&self, table: Option<&ParticipantTable>, solid: bool) -> RunTable {
+        let solver = table.and_then(|table| table.solver).unwrap_or(self.run.solver);
+        let mut run = self.run.clone();
+        let usual = || RunTable::default();
+        if solver != run.solver {
+            run = RunTable { step: usual().step, load_steps: usual().load_steps, tolerance: None, ..run };
+        }
+        if !solid || solver != SolverName::Explicit {
+            (run.on_unstable, run.mass_scaling) = (None, None);
+        }
+        if !solid {
+            run = RunTable { precision: None, device: DeviceName::Cpu, adapter: None, design: None, ..run };
+        }
+        if solid || !matches!(solver, SolverName::Implicit | SolverName::Static) {
+            run =
+                RunTable { iterations: None, integrator: None, control: None, linear: usual().linear, ..run };
+        }
+        match table {
+            Some(table) => table.over(&run),
+            None => run,
+        }
+    }
+
+    /// Whether the run of this scene, or of this participant, has a key of its own.
+    pub(crate) fn gives(&self, key: &str) -> bool {
+        match &self.own {
+            Some(own) => self.source.node(&["participant", own, key]).is_some(),
+            None => !self.is_part && self.source.node(&["run", key]).is_some(),
+        }
+    }
+
+    /// Where a key of the run stands: in the table of the participant if it is given there, else in `[run]`.
+    pub(crate) fn run_at<'k>(&'k self, key: &'k str) -> Vec<&'k str> {
+        if let Some(own) = &self.own {
+            let path = vec!["participant", own.as_str(), key];
+            if self.source.node(&path).is_some() {
+                return path;
+            }
+        }
+        vec!["run", key]
+    }
+
+    /// Whether a body or a surface of it has a name.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.bodies.iter().any(|(own, _)| own == name) || self.surfaces.iter().any(|(own, _)| own == name)
+    }
+}
+
+fn did_you_mean(word: &str, known: &[&str]) -> String {
+    match nearest(word, known.iter().copied()) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None => format!(
+            "the scene has {}",
+            known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+        ),
+    }
+}

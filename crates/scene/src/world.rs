@@ -1,0 +1,228 @@
+//! A scene with its participants, built and planned: all that a run needs, and nothing that changes while it runs.
+
+use std::sync::Arc;
+
+use pliant_geometry::Labels;
+use pliant_gpu::Device;
+
+use crate::assemble::{Built, Meshing, build_watched};
+use crate::cache::MeshCache;
+use crate::diagnostic::{Diagnostic, SceneErrors};
+use crate::format::{FieldName, ViewTable};
+use crate::plan::{Plan, plan};
+use crate::scene::Scene;
+
+/// A scene with its participants.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// The scene.
+    pub scene: Scene,
+    /// Bodies that one stepper advances together. One of them where all bodies go together.
+    pub participants: Vec<Part>,
+}
+
+/// A participant: some bodies of a scene, with their model and how it is stepped.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Its name; empty where all bodies go together.
+    pub name: String,
+    /// The tables of the scene that are about it.
+    pub scene: Scene,
+    /// Its model.
+    pub built: Arc<Built>,
+    /// Its steps: a whole number of them between the common instants of all participants.
+    pub plan: Plan,
+}
+
+impl World {
+    /// Builds a scene and chooses its steps; meshes of images are made anew.
+    ///
+    /// # Errors
+    /// All mistakes that were found, with their places.
+    pub fn new(scene: &Scene) -> Result<Self, SceneErrors> {
+        Self::assemble(scene, &MeshCache::off(), &|_| {})
+    }
+
+    /// Builds a scene, with the meshes of images that are kept, and chooses its steps. `watch` hears how far meshes are.
+    ///
+    /// # Errors
+    /// All mistakes that were found, with their places.
+    pub fn assemble(
+        scene: &Scene,
+        cache: &MeshCache,
+        watch: &dyn Fn(Meshing<'_>),
+    ) -> Result<Self, SceneErrors> {
+        let mut mistakes = Vec::new();
+        let mut built = Vec::new();
+        for (name, part) in scene.split()? {
+            match build_watched(&part, cache, watch) {
+                Ok(own) => built.push((name, part, own)),
+                Err(errors) => mistakes.extend_from_slice(errors.diagnostics()),
+            }
+        }
+        if !mistakes.is_empty() {
+            return Err(scene.source.errors(mistakes));
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(scene.run.threads as usize).build();
+        let planned = |(name, part, built): (String, Scene, Built)| {
+            let plan = match &pool {
+                Ok(pool) => pool.install(|| plan(&part, &built)),
+                Err(_) => plan(&part, &built),
+            };
+            Ok(Part { name, plan: plan?, scene: part, built: Arc::new(built) })
+        };
+        let participants = built.into_iter().map(planned).collect::<Result<Vec<_>, SceneErrors>>()?;
+        let world = Self { scene: scene.clone(), participants };
+        world.with_common_instants()
+    }
+
+    /// Of a scene whose bodies all go together.
+    pub fn of(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Self {
+        let part =
+            Part { name: String::new(), scene: scene.clone(), built: Arc::clone(built), plan: plan.clone() };
+        Self { scene: scene.clone(), participants: vec![part] }
+    }
+
+    /// Makes the steps of each participant a multiple of those of the one with the fewest.
+    fn with_common_instants(mut self) -> Result<Self, SceneErrors> {
+        if let [_] = self.participants[..] {
+            return Ok(self);
+        }
+        if let Some(part) = self.participants.iter().find(|part| part.plan.ends.is_some()) {
+            let place = self.scene.source.span(&part.scene.run_at("load-steps"));
+            let message = "participants of a scene meet at equal times, and these load steps are unequal";
+            let help = "give a number of load steps, or run the bodies in scenes of their own";
+            let diagnostic = Diagnostic::error(message).at(place, "unequal").help(help);
+            return Err(self.scene.source.errors(vec![diagnostic]));
+        }
+        self.meet();
+        Ok(self)
+    }
+
+    /// The same of another duration [s].
+    pub(crate) fn lasting(&self, until: f64) -> Self {
+        let mut world = self.clone();
+        world.scene.scene.until = until;
+        for part in &mut world.participants {
+            (part.plan.steps, part.plan.step) = part.plan.steps_of(&part.scene, &part.built, until);
+        }
+        world.meet();
+        world
+    }
+
+    /// Makes the steps of each participant a multiple of those of the participant with the fewest.
+    fn meet(&mut self) {
+        if let [_] = self.participants[..] {
+            return;
+        }
+        let (until, common) = (self.scene.scene.until, self.steps());
+        for part in &mut self.participants {
+            part.plan.steps = common * part.plan.steps.div_ceil(common);
+            part.plan.step = until / part.plan.steps as f64;
+        }
+    }
+
+    /// The participant where all bodies go together.
+    pub fn only(&self) -> Option<&Part> {
+        match &self.participants[..] {
+            [part] => Some(part),
+            _ => None,
+        }
+    }
+
+    /// The participant that has the least steps, and so the common instants of all.
+    pub(crate) fn slowest(&self) -> &Part {
+        let steps = |part: &&Part| part.plan.steps;
+        // A world has a participant: a scene without bodies is refused when it is read.
+        self.participants.iter().min_by_key(steps).unwrap_or(&self.participants[0])
+    }
+
+    /// Steps of a participant between two common instants.
+    pub(crate) fn ratio(&self, part: &Part) -> u64 {
+        (part.plan.steps / self.slowest().plan.steps).max(1)
+    }
+
+    /// Common instants after the start.
+    pub fn steps(&self) -> u64 {
+        self.slowest().plan.steps
+    }
+
+    /// The time [s] from one common instant to the next, at a time.
+    pub(crate) fn step_from(&self, time: f64) -> f64 {
+        self.slowest().plan.step_from(time)
+    }
+
+    /// The time [s] from one common instant to the next; of unequal ones the mean.
+    pub fn step(&self) -> f64 {
+        self.slowest().plan.step
+    }
+
+    /// The GPU of the scene, where all bodies go together on one.
+    pub fn device(&self) -> Option<&Device> {
+        self.only()?.plan.target.device.as_ref()
+    }
+
+    /// Goes on on a device that is open, where that is the one it asks for.
+    pub fn share(&mut self, open: Option<&Device>) {
+        for part in &mut self.participants {
+            if let (Some(open), Some(asked)) = (open, &mut part.plan.target.device)
+                && open.adapter() == asked.adapter()
+                && open.check().is_ok()
+            {
+                *asked = open.clone();
+            }
+        }
+    }
+
+    /// Adds a doubt to those that did not keep the models from being built.
+    pub fn doubt(&mut self, warning: Diagnostic) {
+        Arc::make_mut(&mut self.participants[0].built).warnings.push(warning);
+    }
+
+    /// Remarks on how the scene was built and is stepped.
+    pub fn notes(&self) -> impl Iterator<Item = &String> {
+        let of = |part| {
+            let Part { built, plan, .. }: &Part = part;
+            built.notes.iter().chain(&plan.note).chain(&plan.target.note)
+        };
+        self.participants.iter().flat_map(of)
+    }
+
+    /// Doubts that did not keep the models from being built.
+    pub fn warnings(&self) -> impl Iterator<Item = &Diagnostic> {
+        self.participants.iter().flat_map(|part| &part.built.warnings)
+    }
+
+    /// The labels of a body or a surface by name, or of all bodies.
+    pub fn labels(&self, on: Option<&str>) -> Labels {
+        let mut labels = Labels::default();
+        self.participants
+            .iter()
+            .filter(|part| part.shows(on))
+            .for_each(|part| labels.join(part.built.labels(on)));
+        labels
+    }
+
+    /// The labels that a view hides.
+    pub fn hidden(&self, view: &ViewTable) -> Vec<i32> {
+        if view.hide.is_empty() { Vec::new() } else { view.hidden(&self.labels(view.on.as_deref())) }
+    }
+}
+
+impl Part {
+    /// Whether it has the body or the surface of a name, or all are meant.
+    pub(crate) fn shows(&self, on: Option<&str>) -> bool {
+        on.is_none_or(|on| self.scene.has(on))
+    }
+
+    /// The fields of some that its bodies have.
+    pub(crate) fn fields(&self, fields: &[FieldName]) -> Vec<FieldName> {
+        let has = |field: &FieldName| self.scene.bodies.iter().any(|(_, body)| field.is_of(body.model));
+        fields.iter().copied().filter(has).collect()
+    }
+
+    /// What it is called in messages and columns.
+    pub(crate) fn prefix(&self) -> Option<&str> {
+        (!self.name.is_empty()).then_some(self.name.as_str())
+    }
+}

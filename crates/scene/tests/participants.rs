@@ -1,0 +1,211 @@
+//! One scene with solids and shells: each participant comes out as it does in a scene of its own, outputs see both at common instants,
+//! and a run that was interrupted goes on with the same bits.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+
+use pliant_geometry::CellKind;
+use pliant_geometry::io;
+use pliant_scene::source::Source;
+use pliant_scene::{Checkpoint, Options, OutputFolder, Scene, Summary, World, live};
+
+const LAWS: &str = r#"
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 10e3
+poisson-ratio = 0.3
+[law.wall]
+type = "neo-hookean"
+young-modulus = 1e6
+poisson-ratio = 0.4
+"#;
+
+const SOLID: &str = r#"
+[body.cube]
+mesh = { block = { size = [0.2, 0.1, 0.1], cells = [4, 2, 2] }, as = "hexes" }
+law = "tissue"
+density = 1000
+damping = 5
+[constraint.base]
+type = "fix"
+body = "cube"
+nodes = { set = "x-min" }
+"#;
+
+const SHELL: &str = r#"
+[body.strip]
+model = "shell"
+mesh = { plate = { size = [0.1, 0.02] }, edge = 0.01 }
+law = "wall"
+density = 1000
+thickness = 0.002
+damping = 20
+[constraint.end]
+type = "fix"
+body = "strip"
+nodes = { set = "x-min" }
+"#;
+
+/// What the shell's own run says.
+const IMPLICIT: &str = "solver = 'implicit'\nstep = 0.01\n";
+
+const HEAD: &str = "[scene]\nuntil = 0.2\ngravity = [0, 0, -9.81]\n";
+
+const OUTPUTS: &str =
+    "[output.history]\ntype = 'csv'\nevery = 0.02\n[output.fields]\ntype = 'vtu'\nevery = 0.1\n";
+
+fn world(text: &str) -> World {
+    let source = Source::parse("two.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
+    let scene = Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
+    World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()))
+}
+
+fn both(more: &str) -> String {
+    format!("{HEAD}[participant.walls]\nbodies = ['strip']\n{IMPLICIT}{LAWS}{SOLID}{SHELL}{OUTPUTS}{more}")
+}
+
+fn run(world: &World, folder: &Path) -> Summary {
+    let folder = OutputFolder::prepare(folder.to_owned(), &world.scene, false).unwrap();
+    let summary = pliant_scene::run(world, &folder, &mut |_| ()).unwrap();
+    assert_eq!(summary.status, "done", "{:?}", summary.error);
+    summary
+}
+
+/// The last values of the columns of a table, by name.
+fn last_row(folder: &Path) -> Vec<(String, f64)> {
+    let text = fs::read_to_string(folder.join("history.csv")).unwrap();
+    let names = text.lines().next().unwrap().split(',');
+    let values = text.lines().last().unwrap().split(',').map(|value| value.parse().unwrap());
+    names.map(str::to_owned).zip(values).collect()
+}
+
+fn value(row: &[(String, f64)], name: &str) -> f64 {
+    row.iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no column `{name}`")).1
+}
+
+#[test]
+fn each_participant_comes_out_as_it_does_alone() {
+    let place = tempfile::tempdir().unwrap();
+    let two = world(&both(""));
+    let names: Vec<&str> = two.participants.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names, ["walls", "solids"]);
+    let together = run(&two, &place.path().join("two"));
+    assert_eq!((together.participants.len(), together.bodies.len(), together.steps), (2, 2, 20));
+    let [walls, solids] = &together.participants[..] else { panic!("two participants") };
+    assert_eq!((walls.solver, solids.solver, walls.steps), ("implicit", "explicit", 20));
+    assert!(solids.steps > 100 && solids.steps.is_multiple_of(20), "{}", solids.steps);
+    assert!((solids.steps as f64 * solids.step - 0.2).abs() < 1e-12);
+
+    // Alone at the same steps.
+    let run_table = format!("[run]\nstep = {:e}\n", solids.step);
+    run(&world(&format!("{HEAD}{run_table}{LAWS}{SOLID}{OUTPUTS}")), &place.path().join("solid"));
+    run(&world(&format!("{HEAD}[run]\n{IMPLICIT}{LAWS}{SHELL}{OUTPUTS}")), &place.path().join("shell"));
+    let [both, solid, shell] = ["two", "solid", "shell"].map(|name| last_row(&place.path().join(name)));
+    for axis in ["x", "y", "z"] {
+        let base = format!("reaction.base.{axis}");
+        assert_eq!(value(&both, &base), value(&solid, &base));
+        let end = format!("reaction.end.{axis}");
+        assert_eq!(value(&both, &end), value(&shell, &end));
+    }
+    for energy in ["kinetic", "internal", "external", "damping"] {
+        let column = format!("energy.{energy}");
+        let [a, b] = [value(&solid, &column), value(&shell, &column)];
+        assert_eq!(value(&both, &format!("energy.solids.{energy}")), a);
+        assert_eq!(value(&both, &format!("energy.walls.{energy}")), b);
+        assert!((value(&both, &column) - (a + b)).abs() <= 1e-15 * (a.abs() + b.abs()), "{energy}");
+    }
+    let page = fs::read_to_string(place.path().join("two/summary.md")).unwrap();
+    for piece in ["## Time step of `walls`", "## Time step of `solids`", "## Energy of all at the end"] {
+        assert!(page.contains(piece), "no `{piece}` in {page}");
+    }
+}
+
+#[test]
+fn outputs_show_all_bodies_together() {
+    let place = tempfile::tempdir().unwrap();
+    let world = world(&both(""));
+    run(&world, place.path().join("two").as_path());
+    let mesh = io::read(&place.path().join("two/fields/000002.vtu")).unwrap().mesh;
+    let [hexes, triangles] = [CellKind::Hex, CellKind::Triangle].map(|kind| mesh.block(kind).unwrap());
+    let nodes: usize = world.participants.iter().map(|part| part.built.model.node_count()).sum();
+    assert_eq!((mesh.points.len(), hexes.len()), (nodes, 16));
+    assert_eq!(hexes.data["body"].values, vec![1.0; 16]);
+    assert!(triangles.data["body"].values.iter().all(|&body| body == 0.0));
+    for block in [hexes, triangles] {
+        assert!(block.data["von-mises"].values.iter().all(|value| value.is_finite() && *value >= 0.0));
+    }
+    let mut playing = live(&Arc::new(world)).unwrap();
+    playing.advance(1).unwrap();
+    assert_eq!(playing.mesh().unwrap().points.len(), nodes);
+    assert!((playing.time() - 0.01).abs() < 1e-12);
+}
+
+#[test]
+fn an_interrupted_run_of_two_goes_on_with_the_same_bits() {
+    let place = tempfile::tempdir().unwrap();
+    let whole = world(&both("[run]\ncheckpoint = { every = 0.1 }\n"));
+    run(&whole, &place.path().join("whole"));
+    let half = world(&both("[run]\ncheckpoint = { every = 0.1 }\n").replace("until = 0.2", "until = 0.1"));
+    run(&half, &place.path().join("half"));
+    let checkpoint = Checkpoint::read(&place.path().join("half")).unwrap();
+    let onward = checkpoint.continues(&whole).unwrap();
+    let folder = OutputFolder::reopen(place.path().join("half"), &onward.scene, &checkpoint).unwrap();
+    let options = Options { resume: Some(&checkpoint), ..Options::default() };
+    let summary = pliant_scene::run_with(&onward, &folder, options, &mut |_| ()).unwrap();
+    assert_eq!(summary.status, "done", "{:?}", summary.error);
+    let [a, b] = ["whole", "half"]
+        .map(|name| fs::read_to_string(place.path().join(name).join("history.csv")).unwrap());
+    assert_eq!(a, b);
+    let other = world(&format!("{HEAD}{LAWS}{SOLID}{OUTPUTS}[run]\ncheckpoint = {{ every = 0.1 }}\n"));
+    let refused = checkpoint.continues(&other).unwrap_err().to_string();
+    assert!(refused.contains("differ"), "{refused}");
+}
+
+#[test]
+fn without_tables_solids_and_shells_are_participants_of_the_run() {
+    let two = world(&format!("{HEAD}{LAWS}{SOLID}{SHELL}"));
+    let names: Vec<&str> = two.participants.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names, ["solids", "shells"]);
+    let steps: Vec<u64> = two.participants.iter().map(|part| part.plan.steps).collect();
+    assert!(steps.iter().all(|own| own.is_multiple_of(two.steps())), "{steps:?}");
+    assert!(steps.contains(&two.steps()));
+}
+
+#[test]
+fn mistakes_of_participants_are_underlined() {
+    let told = |text: &str| {
+        let source = Source::parse("two.toml", text).unwrap();
+        let scene =
+            Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
+        World::new(&scene).expect_err("a mistake").plain().to_string()
+    };
+    let table = |bodies: &str, more: &str| {
+        format!("{HEAD}[participant.walls]\nbodies = {bodies}\n{more}{LAWS}{SOLID}{SHELL}{OUTPUTS}")
+    };
+    for (text, says) in [
+        (table("['strop']", ""), "there is no body `strop` (help: did you mean `strip`?)"),
+        (table("[]", ""), "participant `walls` has no body"),
+        (table("['strip', 'cube']", ""), "they have no solver in common"),
+        (table("['strip', 'strip']", ""), "`strip` goes with participant `walls` already"),
+        (
+            table("['cube']", "solver = 'implicit'\n"),
+            "the solver `implicit` is not for bodies of model `solid`",
+        ),
+        (
+            table("['strip']", "mass-scaling = { target-step = 1 }\n"),
+            "mass is not scaled for bodies of model `shell`",
+        ),
+        (
+            format!("{}[load.p]\ntype = 'force'\non = 'strep'\nnodes = 'all'\ntotal = [0, 0, 1]\n", both("")),
+            "there is no body or surface `strep` (help: did you mean `strip`?)",
+        ),
+        (
+            both("[output.one]\ntype = 'csv'\nevery = 1\nreactions = ['bose']\n"),
+            "there is no constraint `bose`",
+        ),
+    ] {
+        let told = told(&text);
+        assert!(told.contains(says), "{told}\n{text}");
+    }
+}
