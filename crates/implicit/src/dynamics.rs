@@ -16,7 +16,7 @@ use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::forces::Forces;
 use crate::linear::{LinearReport, LinearSolver};
-use crate::model::Model;
+use crate::model::{Model, Spring};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::state::State;
 use crate::system::{Phases, System};
@@ -177,6 +177,13 @@ impl BackwardEuler {
     /// Time spent in the parts of the solver so far.
     pub fn phases(&self) -> Phases {
         self.system.phases
+    }
+
+    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
+    /// loads.
+    pub fn hold(&mut self, springs: &[Spring]) {
+        self.system.held.clear();
+        self.system.held.extend_from_slice(springs);
     }
 
     /// How its steps are solved.
@@ -453,6 +460,11 @@ impl Explicit {
     /// If an element collapses or folds over.
     pub fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
         self.forces.evaluate(state)
+    }
+
+    /// Takes hold of nodes, as [`Forces::hold`].
+    pub fn hold(&mut self, springs: &[Spring]) {
+        self.forces.hold(springs);
     }
 
     /// The forces last evaluated.

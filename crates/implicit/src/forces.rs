@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::SolveError;
-use crate::model::Model;
+use crate::model::{Model, Spring};
 use crate::state::State;
 use crate::system::System;
 
@@ -29,6 +29,13 @@ impl Forces {
             *load += state.load_factor * controlled;
         }
         Ok(())
+    }
+
+    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
+    /// loads.
+    pub fn hold(&mut self, springs: &[Spring]) {
+        self.system.held.clear();
+        self.system.held.extend_from_slice(springs);
     }
 
     /// Force [N] and moment [N m] that elements and springs resist with, six numbers a node.

@@ -496,6 +496,13 @@ impl Model {
         8.0 * f64::EPSILON * stiffness * extent
     }
 
+    /// The largest force [N/m] of a displacement of one node of a cell.
+    pub fn stiffest(&self) -> f64 {
+        let shells = self.facets.iter().map(|facet| facet.stiffest());
+        let solids = self.tets.iter().map(|tet| tet.modulus() * tet.volume.cbrt());
+        shells.chain(solids).fold(0.0, f64::max)
+    }
+
     /// The mean length of the facets' and other cells' edges at rest [m]; 1 without any.
     pub(crate) fn mean_edge(&self) -> f64 {
         let (mut sum, mut count) = (0.0, 0);

@@ -11,7 +11,7 @@ use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::linear::{LinearSolver, dot};
-use crate::model::{Load, LoadKind, Model};
+use crate::model::{Load, LoadKind, Model, Spring};
 use crate::sparse::NONE;
 use crate::state::State;
 use crate::system::{Phases, System};
@@ -185,6 +185,13 @@ impl Statics {
     /// Time spent in the parts of the solver so far.
     pub fn phases(&self) -> Phases {
         self.system.phases
+    }
+
+    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
+    /// loads.
+    pub fn hold(&mut self, springs: &[Spring]) {
+        self.system.held.clear();
+        self.system.held.extend_from_slice(springs);
     }
 
     /// The attempts of the last call of [`solve`](Self::solve) or [`control`](Self::control), one after the other.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::error::SolveError;
 use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18, symmetrise};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
-use crate::model::{LoadKind, Model, Motion, Spread};
+use crate::model::{LoadKind, Model, Motion, Spread, Spring};
 use crate::rotation::skew;
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
@@ -52,6 +52,8 @@ pub(crate) struct System {
     pub(crate) controlled: Vec<f64>,
     /// What prescribed increments make of forces on free components: K_fc d_c.
     pub(crate) coupling: Vec<f64>,
+    /// Springs that come and go between steps; their forces count as loads.
+    pub(crate) held: Vec<Spring>,
     /// Pressures on facets.
     pressure: Vec<Pressure>,
     /// The curved surface, if a load acts on it.
@@ -139,6 +141,7 @@ impl System {
             external: vec![0.0; 6 * nodes],
             controlled: vec![0.0; 6 * nodes],
             coupling: Vec::new(),
+            held: Vec::new(),
             pressure: vec![Pressure::default(); model.facets.len()],
             exact_pressure: true,
             surface: model
@@ -186,6 +189,16 @@ impl System {
             self.energy += 0.5 * spring.stiffness * stretch.norm_squared();
             for c in 0..3 {
                 self.internal[at + c] += spring.stiffness * stretch[c];
+                if tangent.is_some() && self.equations.number[at + c] != NONE {
+                    self.matrix.add_diagonal(self.equations.number[at + c] as usize, spring.stiffness);
+                }
+            }
+        }
+        for spring in &self.held {
+            let at = 6 * spring.node as usize;
+            let stretch = state.position[spring.node as usize] - spring.anchor;
+            for c in 0..3 {
+                self.external[at + c] -= spring.stiffness * stretch[c];
                 if tangent.is_some() && self.equations.number[at + c] != NONE {
                     self.matrix.add_diagonal(self.equations.number[at + c] as usize, spring.stiffness);
                 }

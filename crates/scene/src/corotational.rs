@@ -9,7 +9,7 @@ use pliant_gpu::Wanted;
 use pliant_implicit as corotational;
 use pliant_implicit::{
     BackwardEuler, DynamicSettings, Explicit, Forces, Integrator, LinearSolver, Phases, Preconditioner,
-    SolveError, StaticSettings, Statics,
+    SolveError, Spring, StaticSettings, Statics,
 };
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::{Energies, fingerprint};
@@ -27,6 +27,12 @@ use crate::solver::{Effort, LoadStepProgress};
 
 /// Iterations from which on a lagged factorisation is made anew.
 const RENEW_AFTER: usize = 10;
+
+/// Stiffness of the firmest grip over that of the stiffest cell.
+const FIRM: f64 = 10.0;
+
+/// Part of the room between a step of 0.9 of the stable one and that one which a grip may take.
+const ROOM: f64 = 0.15;
 
 /// Iterations of Newton's method whose residuals are kept: the last ones.
 const ITERATIONS_KEPT: usize = 10_000;
@@ -61,6 +67,8 @@ pub(crate) struct Corotated {
     convergence: VecDeque<Iterated>,
     /// The path of a run by arc length so far.
     path: Path,
+    grips: Vec<Grip>,
+    springs: Vec<Spring>,
 }
 
 /// An iteration of Newton's method.
@@ -246,6 +254,8 @@ impl Corotated {
             effort_before: Effort::default(),
             convergence: VecDeque::new(),
             path: Path::default(),
+            grips: Vec::new(),
+            springs: Vec::new(),
             model: Arc::clone(&built.model),
             part: Arc::clone(part),
         })
@@ -325,6 +335,33 @@ impl Corotated {
         let [internal, loads] = [forces.internal(), forces.loads()];
         [first, first + 1, first + 2]
             .map(|at| if self.prescribed[at] { internal[at] - loads[at] } else { 0.0 })
+    }
+
+    /// Puts a spring at each node of each grip. Together they pull with k (p − x̄), x̄ the mean of the nodes by their weights; within a step
+    /// they keep the shape of what is held, so that a spring has a node of its own and the equations no entries more.
+    fn put_springs(&mut self) {
+        self.springs.clear();
+        for grip in &self.grips {
+            let place = |node: u32| self.state.position[node as usize];
+            let middle: Vector3<f64> = grip.nodes.iter().map(|&(node, weight)| place(node) * weight).sum();
+            let pull = Vector3::from(grip.place) - middle;
+            self.springs.extend(grip.nodes.iter().map(|&(node, weight)| Spring {
+                node,
+                anchor: place(node) + pull,
+                stiffness: weight * grip.stiffness,
+            }));
+        }
+        match &mut self.method {
+            Method::Static(solver, forces) => {
+                solver.hold(&self.springs);
+                forces.hold(&self.springs);
+            }
+            Method::Implicit(solver, forces) => {
+                solver.hold(&self.springs);
+                forces.hold(&self.springs);
+            }
+            Method::Explicit(solver) => solver.hold(&self.springs),
+        }
     }
 
     /// One step of the method, to the time of its number.
@@ -582,6 +619,7 @@ impl Participant for Corotated {
         if self.evaluated {
             return Ok(());
         }
+        self.put_springs();
         let found = self.method.evaluate(&self.state);
         found.map_err(|error| failure(&error, &self.model, &self.part, self.time))?;
         self.find_energies();
@@ -596,6 +634,7 @@ impl Participant for Corotated {
         _watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), FailureSummary> {
         let number = self.done + 1;
+        self.put_springs();
         self.go(number).map_err(|error| failure(&error, &self.model, &self.part, self.state.time))?;
         (self.done, self.time) = (number, self.state.time);
         self.evaluated = false;
@@ -603,7 +642,21 @@ impl Participant for Corotated {
     }
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
-        grips.is_empty()
+        self.grips.clear();
+        self.grips.extend_from_slice(grips);
+        self.evaluated = false;
+        true
+    }
+
+    /// Explicit steps of 0.9 of the stable step stay stable up to it, as those of solids do. Implicit ones are stable with any, and
+    /// their equations stay well conditioned.
+    fn stiffest(&self, grip: &Grip) -> f64 {
+        if !matches!(self.method, Method::Explicit(_)) {
+            return FIRM * self.part.model.stiffest();
+        }
+        let mass = |&(node, weight): &(u32, f64)| self.part.model.mass[node as usize] / weight;
+        let lightest = grip.nodes.iter().map(mass).fold(f64::INFINITY, f64::min);
+        ROOM * 4.0 * lightest / (self.step * self.step)
     }
 
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {

@@ -380,17 +380,26 @@ fn a_mouse_is_felt_within_a_frame_and_a_replay_of_it_has_the_same_bits_twice() {
 }
 
 #[test]
-fn a_solver_that_knows_no_hand_says_so_and_plays_on() {
+fn hand_and_pins_hold_shells_with_every_solver() {
     for solver in ["implicit", "static", "explicit"] {
         let world = shell(solver);
         let tip = tip(&subject(&world));
         let mut session = Session::start(world, || ()).unwrap();
-        session.order(Order::Hand(Hand::Take(tip, 20.0)));
-        let told = wait(&mut session, |frame| frame.note.is_some());
-        assert!(told.note.unwrap().contains("knows no hand") && told.held.is_empty(), "{solver}");
+        session.order(Order::Hand(Hand::Take(tip, 5.0)));
+        let taken = wait(&mut session, |frame| frame.held.len() == 1);
+        assert_eq!(taken.note, None, "{solver}");
+        let [point, _] = taken.held[0].map(Vector3::from);
+        let place = point + Vector3::new(0.0, 0.0, 0.005);
+        session.order(Order::Hand(Hand::Pull(place.into())));
         session.order(Order::Step(5));
         let frame = wait(&mut session, |frame| frame.steps == 5);
         assert_eq!(frame.failure, None, "{solver}");
+        let [_, force] = frame.held[0];
+        assert!(force[2] > 0.0, "{solver}: {force:?}");
+        session.order(Order::Hand(Hand::Release));
+        session.order(Order::Hand(Hand::Pin(tip)));
+        let pinned = wait(&mut session, |frame| frame.note.is_none() && frame.held.len() == 1);
+        assert_eq!(pinned.failure, None, "{solver}");
         session.order(Order::Reset);
         wait(&mut session, |frame| frame.steps == 0 && frame.time == 0.0);
     }

@@ -1,0 +1,95 @@
+//! Grips on shells: a strip that is held at one end and pulled at the other, with each solver of shells. The hand's force is that of its
+//! spring, and the clamp holds against it and the weight.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use pliant_mechanics::grip::Grip;
+use pliant_scene::source::Source;
+use pliant_scene::{Live, Scene, World, live};
+
+const STRIP: &str = r#"
+[scene]
+until = 10
+gravity = [0, 0, -9.81]
+[law.wall]
+type = "neo-hookean"
+young-modulus = 1e6
+poisson-ratio = 0.4
+[body.strip]
+model = "shell"
+mesh = { plate = { size = [0.1, 0.02] }, edge = 0.01 }
+law = "wall"
+density = 1000
+thickness = 0.002
+damping = 20
+[constraint.end]
+type = "fix"
+body = "strip"
+nodes = { set = "x-min" }
+"#;
+
+/// Its weight [N].
+const WEIGHT: f64 = 9.81 * 1000.0 * 0.1 * 0.02 * 0.002;
+
+fn world(solver: &str) -> Arc<World> {
+    let source = Source::parse("strip.toml", format!("{STRIP}[run]\n{solver}\n")).unwrap();
+    let scene = Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
+    Arc::new(World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain())))
+}
+
+/// The free end of the strip, lifted by a spring from where it is.
+fn lifted(world: &World, live: &dyn Live, stiffness: f64, by: f64) -> Grip {
+    let rest = &world.only().unwrap().built.model.rest;
+    let tip: Vec<u32> = (0..rest.len() as u32).filter(|&node| rest[node as usize][0] > 0.0999).collect();
+    let nodes = tip.iter().map(|&node| (node, 1.0 / tip.len() as f64)).collect();
+    let mut grip = Grip { nodes, ..Grip::default() };
+    grip.stiffness = stiffness.min(live.stiffest(&grip));
+    let [[x, y, z], _] = live.pulled(&grip);
+    grip.place = [x, y, z + by];
+    grip
+}
+
+#[test]
+fn the_clamp_holds_against_hand_and_weight() {
+    for (solver, steps) in
+        [("solver = 'implicit'\nstep = 0.01", 400), ("solver = 'static'\nload-steps = 10", 10), ("", 40_000)]
+    {
+        let world = world(solver);
+        let mut live = live(&world).unwrap();
+        let grip = lifted(&world, live.as_ref(), 5.0, 0.01);
+        assert!(live.hold(std::slice::from_ref(&grip)), "{solver}");
+        for _ in 0..steps {
+            live.advance(1).unwrap_or_else(|failure| panic!("{solver}: {}", failure.message));
+        }
+        live.mesh().unwrap();
+        let [point, force] = live.pulled(&grip).map(Vector3::from);
+        let spring = (Vector3::from(grip.place) - point) * grip.stiffness;
+        assert!((force - spring).norm() < 1e-12, "{solver}");
+        let clamp = Vector3::from(live.reactions()[0]);
+        let sum = clamp + force - Vector3::new(0.0, 0.0, WEIGHT);
+        println!("{solver:?}: hand {force:?} N, clamp {clamp:?} N, sum {:.1e} N", sum.norm());
+        // What a start of the motion leaves of its inertia, and Newton's method of its residual.
+        assert!(sum.norm() < 1e-4 * WEIGHT, "{solver}: {sum:?}");
+        // The spring is a hundred times as stiff as the strip: it holds the tip up.
+        assert!((0.0..0.005).contains(&(grip.place[2] - point[2])), "{solver}: {point:?}");
+    }
+}
+
+#[test]
+fn what_is_let_go_of_comes_back() {
+    let world = world("solver = 'implicit'\nstep = 0.01");
+    let settle = |live: &mut dyn Live| {
+        (0..400).for_each(|_| assert_eq!(live.advance(1).unwrap(), 1));
+        live.mesh().unwrap().point_data["displacement"].values.clone()
+    };
+    let mut free = live(&world).unwrap();
+    let hanging = settle(free.as_mut());
+    let grip = lifted(&world, free.as_ref(), 5.0, 0.02);
+    assert!(free.hold(&[grip]));
+    let held = settle(free.as_mut());
+    assert!(free.hold(&[]));
+    let let_go = settle(free.as_mut());
+    let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(apart(&hanging, &held) > 0.01 && apart(&hanging, &let_go) < 1e-6);
+}
