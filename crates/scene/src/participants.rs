@@ -63,13 +63,18 @@ impl Scene {
                 let help = "name one or more, or leave the participant out";
                 out.push(Diagnostic::error(message).at(self.source.span(&path), "empty").help(help));
             }
-            for (index, body) in table.bodies.iter().enumerate() {
-                let index = index.to_string();
+            for (at, body) in table.bodies.iter().enumerate() {
+                let index = at.to_string();
                 let place = self.source.span(&[path[0], path[1], path[2], &index]);
                 if !known.contains(&body.as_str()) {
                     let help = did_you_mean(body, &known);
                     let message = format!("there is no body `{body}`");
                     out.push(Diagnostic::error(message).at(place, "no such body").help(help));
+                } else if table.bodies.iter().position(|first| first == body).is_some_and(|first| first < at)
+                {
+                    let message = format!("`{body}` is named twice");
+                    let help = "leave one of them out";
+                    out.push(Diagnostic::error(message).at(place, "again").help(help));
                 } else if let Some((other, _)) = groups.iter().find(|(_, bodies)| bodies.contains(body)) {
                     let message = format!("`{body}` goes with participant `{other}` already");
                     let help = "a body has one participant: leave it out of the others";
