@@ -288,7 +288,8 @@ impl Origin {
     /// Refuses another scene, precision, solver or step. A longer `until` is no other scene.
     fn check(&self, world: &World) -> Result<(), ResumeError> {
         let now = Self::of(world);
-        for (own, before) in now.participants.iter().zip(&self.participants) {
+        let pairs = now.participants.iter().zip(&self.participants);
+        for (own, before) in pairs.filter(|(own, before)| own.name == before.name) {
             if own.precision != before.precision {
                 let [checkpoint, scene] = [before.precision, own.precision].map(Precision::word);
                 return Err(ResumeError::OtherPrecision { checkpoint, scene });
