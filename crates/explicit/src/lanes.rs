@@ -1,9 +1,13 @@
 //! Numbers side by side: kernels written once, generic over [`Lanes`], run sixteen, eight or four cells at a time.
 //!
-//! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it. The processor
-//! is asked once, when a force field is made: AVX-512 (with the feature `avx512`), AVX2 with FMA, SSE4.2, or NEON; without
-//! any of them the kernels run in plain numbers. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
-//! (tested), elsewhere to round-off.
+//! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it. The CPU
+//! is queried once, when a force field is made: AVX-512 (with the feature `avx512`; 16 numbers in single, 8 in double precision), AVX2 with
+//! FMA (8, 4), SSE4.2 or NEON (4, 2); without any of them the kernels run in plain numbers. Nobody needs `target-cpu=native`;
+//! `CentralDifference::in_lanes` chooses other instructions. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
+//! (tested for every law and element in `forces/tests.rs`), elsewhere to round-off.
+//!
+//! This file holds all `unsafe` code of the crate: registers read from and written to arrays, and nodes of a block read without a
+//! comparison each, since all are compared once.
 #![allow(unsafe_code)]
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -96,7 +100,7 @@ pub(crate) fn load_symmetric<R: Scalar, L: Lanes<R>>(from: &Symmetric<Pack<R>>, 
     symmetric
 }
 
-/// Work that is written for any lanes. What it calls must be inlined, or it is not compiled for the processor.
+/// Work that is written for any lanes. Every function that it calls must be `#[inline(always)]`, or it is not compiled for these instructions.
 pub trait Work<R> {
     /// What comes out.
     type Output;

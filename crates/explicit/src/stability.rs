@@ -1,22 +1,32 @@
-//! The largest stable step of a deformed state, watched during a run.
+//! The critical time step of a deformed state, monitored during a run. A run takes 0.9 of that at rest. The *true limit* is the critical
+//! time step of the assembled model, 2/ω_max.
 //!
 //! A cell's own limit is Δt_e = 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
 //! (`tangent.rs`); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the true
-//! limit L of a reference state, at first rest, the limit now is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e),
-//! where r_e² is the stiffness of the cell in the reference state over that now, the smaller one of the ratios for all
-//! modes and for plane waves. So a cell that is slower than the assembly counts with its own limit, and one that the
-//! assembly holds back, with its change. Measured on deformed bodies against the true limit about their state, it is 0 to
-//! 25 % too small; of fibres that carry tension only, whose stiffness jumps at rest, up to 4.3 % too large:
+//! limit L of a reference state, at first rest, the current limit is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e).
+//! r_e² is the stiffness of the cell in the reference state over the current one, the smaller of two ratios: over all
+//! modes, and over plane waves n⊗y. The first ratio alone misses a compression along one axis, as does any bound V M Σ|b_a|²:
+//! on the glued cube it stays at 0.94 where the true limit falls to 0.83. A cell slower than the assembly thus counts with its own
+//! limit, and one that the assembly holds back, with its change. Compared with the true limit of deformed bodies, the estimate is 0 to
+//! 25 % too small; with fibres that carry tension only, whose stiffness jumps at rest, up to 4.3 % too large:
 //! `validation/tests/stability.rs`.
 //!
-//! Where this estimate falls below the step it may be the cells in question that do not matter. Then the true limit
-//! of the current state is found, by Lanczos' iteration of many force evaluations, and the current state becomes the
-//! reference.
+//! *When.* Every [`CHECK_EVERY`] steps, and at once where the least J or the largest stretch √(1 + |C − I|) has changed by [`CHANGE`]. The
+//! force pass finds both at no cost.
 //!
-//! Stiffness is found for the cells that stand first in two cheap orders, one by an isotropic guess of their speed
+//! *Which cells.* Stiffness is computed for the first cells of two cheap orders, one by an isotropic guess of their speed
 //! and one by stretch: 18 stresses and the eigenvalue problems cost far more than a step of a cell.
 //! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control
 //! does not change with deformation. Loads that follow the surface do not count.
+//!
+//! *Then.* If the estimate would change the steps, the true limit of the current state is computed, by Lanczos' iteration of many force
+//! evaluations, and the current state becomes the reference. This happens once in [`REFERENCE_EVERY`] steps at most, and always before
+//! [`OnUnstable::Stop`] ends a run. If a part of a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that
+//! take [`RESERVE`] at most. Fewer parts are used again once they keep this reserve. Velocities continue (formula in `stepper.rs`), and
+//! relaxing laws take coefficients of the new length. Observers, checkpoints and step counts see whole steps only.
+//!
+//! The state holds all that monitoring needs to resume ([`Stability`] and [`State::reference`]). Stiffnesses in the reference state are computed
+//! from it again, so a resumed run has the same bits. A new reference allocates memory; nothing else in a step does.
 
 use pliant_mechanics::model::{Model, Solid, with_cells};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, cast, dot, sub};

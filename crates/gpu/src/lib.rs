@@ -1,4 +1,4 @@
-//! Explicit dynamics of solids on any graphics processor, through wgpu: Vulkan, Metal or Direct3D 12, found at run time.
+//! Explicit dynamics of solids on any GPU, through wgpu: Vulkan, Metal or Direct3D 12, found at run time. Single precision.
 //!
 //! ```
 //! for adapter in pliant_gpu::adapters() {
@@ -6,7 +6,7 @@
 //! }
 //! ```
 //!
-//! [`GpuStepper`] advances a state of a model as `CentralDifference` does on the processor, hundreds of steps at a time:
+//! [`GpuStepper`] advances a state of a model as `CentralDifference` does on the CPU, hundreds of steps at a time:
 //!
 //! ```
 //! use pliant_gpu::{Device, GpuStepper, StepFailure, Wanted};
@@ -22,6 +22,60 @@
 //!     Ok(state)
 //! }
 //! ```
+//!
+//! # State
+//!
+//! The current state is on the device. The state in memory is what a checkpoint holds: [`GpuStepper::bring_back`] and
+//! [`GpuStepper::upload`] copy it in the same layout of histories, so a run started on a CPU can continue on a GPU and back.
+//!
+//! # Kernels
+//!
+//! Kernels are WGSL, one file each (`shaders/`), joined when a stepper is made. An *element* computes the forces of a cell with the stress of its
+//! law (`AnyLaw::shader`). A *design* ([`Design`]) finds displacements and takes forces (`displacement_of`, `give`, `internal_force`),
+//! so a new element or law works in every design. Group 0 binds the instant, group 1 the arrays of the cells (in node passes their
+//! forces), group 2 those of the design or of the nodes, group 3 those of blocks and loads.
+//!
+//! # Designs
+//!
+//! [`Design`] lists them, and `paths.rs` counts bytes and operations of each. All but `float-atomics` give the same bits every time, however
+//! the steps are divided. A force beyond the range of whole numbers is an error and never wraps around.
+//!
+//! `blocks` adds forces as `fixed-atomics` does; a group owns up to 64 nodes. Every block at a border cell computes this cell with the same
+//! numbers and its own copy of the history; any copy can be read back. Displacements and increments have two sides: a kernel reads *now* and
+//! writes *next*, so blocks do not wait for each other, and the instant of a failure stays intact on its side. Each solid has a kernel: the
+//! last one at a node moves it, earlier ones leave their forces. When an instant is evaluated, the forces are left for the node pass.
+//! Averaged pressures have their own kernels before.
+//!
+//! # Submissions
+//!
+//! A submission holds up to 128 instants, of 0.2 s at most together. The values of an instant are a uniform with a moving offset. Factors of curves
+//! are computed in double precision on the CPU and are rows of a table, one per instant.
+//!
+//! # Evaluations
+//!
+//! Every 1 to 100 steps the stepper evaluates an instant: energies, reactions, extremes of J and |C − I|. The interval halves where the
+//! deformation changed by more than 2 % since the last evaluation. In between, the device sums work in single precision, group by group;
+//! the sums go into the energy balance of the CPU. Every step is evaluated while the energies are off balance. `StepControl` monitors
+//! the critical time step as on the CPU, from displacements read back after a change of 10 % or after 1000 steps.
+//!
+//! # Failures
+//!
+//! The first cell with J ≤ 0, inverted corner or force that is not a number stops the device at that instant: later kernels do nothing. The
+//! state is read back as it was, and one evaluation on the CPU names element, node and time. A lost or full device and a model
+//! beyond its limits are errors of their own ([`GpuError`]).
+//!
+//! # Grips and windows
+//!
+//! While a grip holds, a kernel finds its force from the displacements, and marked nodes add it to their loads. Only p − Σ wᵢ Xᵢ is computed
+//! before, in double precision. [`GpuStepper::coast`] takes steps for a given time without any read-back. [`DeviceMapping`] computes points
+//! that are combinations of nodes, with a value each, in an array that a renderer binds. [`Device::read_backs`] counts all read-backs.
+//!
+//! # Tests
+//!
+//! `tests/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
+//! and load on unordered meshes deformed at random. Tests also run devices opened with
+//! lower limits (`Device::open_within`) and devices destroyed during a run. The gate runs
+//! all of them on Mesa's software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
 
 mod blocks;
 mod design;

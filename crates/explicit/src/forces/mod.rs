@@ -2,8 +2,13 @@
 //! Voigt matrices. Cells are added up block by block (`blocks.rs`) in a fixed order, so that the number of threads never
 //! changes a bit.
 //!
-//! Cells lie in packs of [`PACK`], number by number, the last pack filled up with cells of no volume. The cost is counted in
-//! `crates/bench/src/count.rs`. Runs on the current rayon pool.
+//! Cells lie in packs of [`PACK`], number by number, the last pack filled up with cells of no volume. History lies so too, in the state
+//! and in checkpoints. The cost is counted in `crates/bench/src/count.rs`. Runs on the current rayon pool.
+//!
+//! A force field works through batches of four packs of points (`batch.rs`): displacement gradients, then stresses of the law, then nodal forces. So
+//! elements and laws are each compiled once per kind of lanes, never each law in each element, and the law is chosen once per batch.
+//! `plain.rs`: one point per cell, with hourglass control from `hourglass.rs`; `averaged.rs`: tets with averaged pressure; `full_hex.rs`:
+//! eight points. Every element whose force is the gradient of an energy runs through the battery in `tests.rs`.
 
 mod averaged;
 mod batch;

@@ -1,4 +1,6 @@
-//! Fibre directions of cells: the same everywhere, from the mesh, or by a rule.
+//! Fibre directions of cells: the same everywhere, from the mesh, or by a rule at the centre of the cell. Tangents are those of the nearest
+//! point of the surface. Walls take the gradient of a harmonic function on the body's own elements. A cell without a direction is an error
+//! that names it.
 
 use pliant_geometry::{CellBlock, CellId, CellKind, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::harmonic::Laplacian;

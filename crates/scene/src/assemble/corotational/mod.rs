@@ -1,4 +1,5 @@
-//! Shells and co-rotational solids: their cells, constraints and loads, in a model of their own that shares the nodes.
+//! Shells and co-rotational solids: their cells, constraints and loads, in a model of their own that shares the nodes. Bodies, names of
+//! constraints and carried surfaces stay in the scene's `Model`, which then has no cells.
 
 mod cells;
 mod constraints;
