@@ -289,7 +289,7 @@ fn numbers_out_of_range_on_the_command_line_are_refused() {
         ("--until", "-1", "found -1 (given on the command line)"),
         ("--until", "nan", "nan is not a finite number (given on the command line)"),
         ("--step", "0", "`run.step` must be greater than 0, found 0 (given on the command line)"),
-        ("--step", "1", "the step 1.000 s is above the true limit"),
+        ("--step", "1", "the step 1.000 s is above the critical time step"),
         ("--threads", "-1", "at least 0"),
         ("--threads", "99999", "at most 1024, found 99999"),
         ("--until", "soon", "invalid value 'soon' for '--until <S>'"),
@@ -640,12 +640,16 @@ fn a_step_above_the_true_limit_is_refused_and_one_below_it_runs() {
     let number = |key: &str| object[key].as_f64().unwrap();
     let (bound, limit) = (number("element_bound"), number("true_limit"));
     assert!(number("step") <= 0.9 * limit && bound < limit, "{object}");
-    let says =
-        ["above the true limit", "is set by element 0 (tet4) of `block`", "take `step = \"auto\"`", "m"];
+    let says = [
+        "above the critical time step",
+        "is set by element 0 (tet4) of `block`",
+        "take `step = \"auto\"`",
+        "m",
+    ];
     spoilt("step = \"auto\"", &format!("step = {:e}", 1.01 * limit), &says);
     let told = Workshop::block("step = \"auto\"", &format!("step = {:e}", 0.95 * limit)).run(&[]);
     told.done();
-    assert!(told.err.contains("lies close to the true limit"), "{}", told.err);
+    assert!(told.err.contains("is close to the critical time step"), "{}", told.err);
 }
 
 #[test]

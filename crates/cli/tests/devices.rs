@@ -39,7 +39,7 @@ fn devices_are_listed_with_what_matters() {
 fn without_an_adapter_the_packages_are_named_and_auto_runs_on_the_processor() {
     let told = without_adapters(&on("device = \"cpu\""), &["devices"]);
     assert_eq!(told.code, 0);
-    assert!(told.out.contains("no graphics processor was found"), "{}", told.out);
+    assert!(told.out.contains("no GPU was found"), "{}", told.out);
     assert!(told.out.contains("mesa-vulkan-drivers"), "{}", told.out);
 
     let refused = without_adapters(&on("device = \"gpu\""), &["run", "case", "--json"]);
@@ -51,7 +51,7 @@ fn without_an_adapter_the_packages_are_named_and_auto_runs_on_the_processor() {
     let ran = without_adapters(&on("device = \"auto\""), &["run", "case", "--json", "--step", "1e-3"]);
     let json = ran.done();
     assert_eq!((&json["device"], &json["precision"]), (&"cpu".into(), &"double".into()));
-    assert!(ran.words().contains("it runs on the processor"), "{}", ran.err);
+    assert!(ran.words().contains("it runs on the CPU"), "{}", ran.err);
 }
 
 #[test]
@@ -67,13 +67,13 @@ fn what_only_the_processor_can_do_is_refused_by_name_before_the_run() {
         let told = on(run).pliant(&["check", "case"]);
         assert_eq!(told.code, 2, "{}", told.out);
         assert!(told.underlines(line) || told.underlines("device = \"gpu\""), "{}", told.err);
-        assert!(told.words().contains(&format!("{says} runs on the processor only")), "{}", told.err);
+        assert!(told.words().contains(&format!("{says} runs on the CPU only")), "{}", told.err);
         assert!(told.words().contains("device = \"cpu\""), "{}", told.err);
     }
     let auto = on("device = \"auto\"\nsolver = \"quasi-static\"\nload-steps = 2");
     let told = auto.run(&[]);
     assert_eq!(told.done()["device"], "cpu");
-    assert!(told.words().contains("the solver `quasi-static` runs on the processor only"), "{}", told.err);
+    assert!(told.words().contains("the solver `quasi-static` runs on the CPU only"), "{}", told.err);
 }
 
 #[test]
@@ -81,11 +81,7 @@ fn an_adapter_that_is_not_there_or_not_used_is_refused_in_the_users_line() {
     for line in ["adapter = \"x\"", "design = \"blocks\""] {
         let unused = on(&format!("device = \"cpu\"\n{line}")).run(&[]);
         assert_eq!(unused.code, 2);
-        assert!(
-            unused.underlines(line) && unused.words().contains("runs on the processor"),
-            "{}",
-            unused.err
-        );
+        assert!(unused.underlines(line) && unused.words().contains("runs on the CPU"), "{}", unused.err);
     }
     if !has_graphics_processor() {
         return;

@@ -425,7 +425,7 @@ fn shells_of_an_image_become_a_wall() {
 fn cached(workshop: &Workshop, more: &[&str]) -> Option<bool> {
     let told = workshop.run(&[&["--force"], more].concat());
     assert_eq!(told.code, 0, "{}", told.err);
-    match (told.err.contains("seg.nii.gz: from the cache"), told.err.contains("kept in the cache")) {
+    match (told.err.contains("seg.nii.gz: from the cache"), told.err.contains("stored in the cache")) {
         (false, false) => None,
         (hit, _) => Some(hit),
     }
@@ -464,7 +464,7 @@ fn the_mesh_of_an_image_is_kept_and_made_anew_where_anything_changes() {
 fn a_kept_mesh_still_warns() {
     let workshop = workshop("{ image = \"seg.nii.gz\", label = 5, edge = 0.008 }", "\"tissue\"");
     workshop.write("case/seg.nii.gz", Picture::ball_with_a_rod(5).packed());
-    for kept in ["kept in the cache", "from the cache"] {
+    for kept in ["stored in the cache", "from the cache"] {
         let told = workshop.run(&["--force"]);
         assert!(
             told.words().contains(kept) && told.words().contains("the mesh misses a part of the body"),

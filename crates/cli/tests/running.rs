@@ -215,7 +215,7 @@ fn a_run_tells_its_result_in_words() {
     for piece in [
         "| block |",
         "element bound",
-        "true limit",
+        "critical time step (assembled model)",
         "Balance:",
         "| base |",
         "wall time",
@@ -359,7 +359,7 @@ fn steps_are_cut_where_the_stable_one_falls_below_them_and_it_is_told() {
         "{page}"
     );
     let told = workshop.pliant(&["run", "case", "--force"]);
-    assert!(told.out.contains("into 2 parts at the most"), "{}", told.out);
+    assert!(told.out.contains("into at most 2 parts"), "{}", told.out);
     // `substep` is the default, and gives the result of a small step.
     let tip = |workshop: &Workshop| workshop.table("out/case/history.csv").1;
     let fine = Workshop::new(&changed(SOFT, "on-unstable = \"substep\"\n", ""));
@@ -895,7 +895,7 @@ fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
     );
     assert!(error["load_step"]["residual"].as_f64().unwrap() > 1e-9 && error["node"].is_number(), "{error}");
     // Gravity acts from the start: its equilibrium comes before the first load step.
-    for piece in ["what acts at t = 0: no equilibrium", "largest at node", "iterations", "nothing holds"] {
+    for piece in ["the loads at t = 0: no equilibrium", "largest at node", "iterations", "nothing holds"] {
         assert!(told.err.contains(piece), "{}", told.err);
     }
 }
@@ -1076,7 +1076,8 @@ fn check_prints_the_model_and_writes_nothing() {
         "output `fields`: fields.pvd, a frame every 0.004000 s",
         "element bound",
         "set by element 0 (tet4) of `block`",
-        "true limit",
+        "critical time step",
+        "assembled",
         "expected cost",
         "real-time factor",
     ] {

@@ -69,7 +69,7 @@ fn a_mistake_shows_what_was_typed_underlined() {
         ("law.tissue.young-modulus=soft", &["expected a number [Pa], found the text \"soft\""]),
         ("run.solver=quasistatic", &["did you mean \"quasi-static\"?"]),
         ("body.block.law=tisue", &["there is no law `tisue`", "did you mean `tissue`?"]),
-        ("run.step=1", &["the step 1.000 s is above the true limit"]),
+        ("run.step=1", &["the step 1.000 s is above the critical time step"]),
         ("scene.gravity.3=0", &["`scene.gravity` is an array of 3", "counted from 0"]),
         ("scene.until.x=0", &["`scene.until` is not a table"]),
         ("scene.until", &["is not an assignment", "write key=value, such as run.threads=2"]),

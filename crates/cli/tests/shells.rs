@@ -421,7 +421,7 @@ fn an_integrator_of_second_order_keeps_vibrations() {
     assert!(first < 0.8 && second > 0.95, "{first} {second}");
     refused(
         &[(STEPS, "load-steps = 2\nintegrator = \"bdf2\"")],
-        &["`integrator` is for `solver = \"implicit\"`", "means nothing here"],
+        &["`integrator` is for `solver = \"implicit\"`", "has no effect here"],
     );
 }
 
@@ -496,12 +496,12 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
     );
     refused(
         &[explicit, (STEPS, "step = 1e-2")],
-        &["is above the stable step", "`solver = \"implicit\"` for long steps"],
+        &["is above the critical time step", "`solver = \"implicit\"` for long steps"],
     );
     for (changes, pieces) in [
         (
             run("device = \"gpu\""),
-            ["shells and co-rotational solids runs on the processor only", "`device = \"cpu\"`"],
+            ["shells and co-rotational solids runs on the CPU only", "`device = \"cpu\"`"],
         ),
         (
             run("precision = \"single\""),
@@ -513,7 +513,7 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
         ),
         (
             run("on-unstable = \"stop\""),
-            ["the stable step of bodies of model `shell` is not watched", "leave it out"],
+            ["the critical time step of bodies of model `shell` is not monitored", "leave it out"],
         ),
         (run("control = { load = \"pull\", arc-length = 0.1 }"), ["there is no load `pull`", "`push`"]),
         (
@@ -524,10 +524,10 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
         refused(&[(STEPS, &changes)], &pieces);
     }
     for (line, pieces) in [
-        ("element = \"tet4\"", ["`wall` is a shell, and this element is of a solid", "`dkt-opt`"]),
-        ("hourglass = 0.1", ["`hourglass` is for `model = \"solid\"`", "means nothing here"]),
-        ("fibre = [1, 0, 0]", ["`fibre` is for `model = \"solid\"`", "means nothing here"]),
-        ("velocity = [1, 0, 0]", ["a static run has no inertia", "plays no part"]),
+        ("element = \"tet4\"", ["`wall` is a shell, and this element is for solids", "`dkt-opt`"]),
+        ("hourglass = 0.1", ["`hourglass` is for `model = \"solid\"`", "has no effect here"]),
+        ("fibre = [1, 0, 0]", ["`fibre` is for `model = \"solid\"`", "has no effect here"]),
+        ("velocity = [1, 0, 0]", ["a static run has no inertia", "has no effect"]),
         (
             "stiffness-damping = 1e-3",
             ["damping by stiffness needs the solver `implicit`, not `static`", "leave it out"],
@@ -537,7 +537,7 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
     }
     for key in ["iterations = 3", "linear = \"direct\"", "control = { load = \"push\", arc-length = 0.1 }"] {
         let name = key.split(' ').next().unwrap();
-        refused(&[explicit, (STEPS, key)], &[&format!("`{name}` is for `solver ="), "means nothing here"]);
+        refused(&[explicit, (STEPS, key)], &[&format!("`{name}` is for `solver ="), "has no effect here"]);
     }
     let relaxing = "poisson-ratio = 0.3\nprony = [{ part = \"isochoric\", weight = 0.3, time = 0.5 }]";
     refused(&[("poisson-ratio = 0.3", relaxing)], &["law `wall` relaxes, and `wall` is of model `shell`"]);
@@ -553,7 +553,7 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
     refused(&tets, &["a pressure on a co-rotational solid does not follow its faces", "take a `traction`"]);
     let told = wall(&[(STEPS, &run("device = \"auto\""))]).run(&[]);
     assert_eq!(told.done()["device"], "cpu");
-    says(&told, &["runs on the processor only"]);
+    says(&told, &["runs on the CPU only"]);
 }
 
 #[test]
@@ -798,7 +798,7 @@ fn layers_that_say_too_little_or_too_much_are_refused() {
     for (layers, pieces) in [
         (
             format!("layers = [{{ thickness = 1e-3, {orthotropic} }}]"),
-            ["there is no direction", "`fibre = [x, y, z]`"],
+            ["no direction is given", "`fibre = [x, y, z]`"],
         ),
         (
             format!("fibre = [0, 0, 1]\nlayers = [{{ thickness = 1e-3, {orthotropic} }}]"),
@@ -806,7 +806,7 @@ fn layers_that_say_too_little_or_too_much_are_refused() {
         ),
         (
             "layers = [{ thickness = 1e-3, young-modulus = [2e6, 1e6] }]".into(),
-            ["has a part of its elasticity, or too much", "`shear-modulus`"],
+            ["has incomplete or conflicting elastic constants", "`shear-modulus`"],
         ),
         (
             format!(

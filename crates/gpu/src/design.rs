@@ -32,11 +32,11 @@ impl Design {
     pub const ALL: &[Self] =
         &[Self::Gather, Self::Blocks, Self::FloatAtomics, Self::FixedAtomics, Self::Fast];
 
-    /// The one that is taken where nobody asks for another.
+    /// The default.
     ///
-    /// On software adapters `gather` measured best (Mesa's llvmpipe, 55,566 tetrahedra: 78 ns of processor time per cell and
-    /// step, 113 to 161 for the others). On graphics processors `fast` moves the fewest bytes, needs no atomics and has forces of any size;
-    /// that it is the fastest there is reckoned from bytes and operations and not measured yet.
+    /// On software adapters `gather` measured best (Mesa's llvmpipe, 55,566 tetrahedra: 78 ns of CPU time per cell and
+    /// step, 113 to 161 for the others). On GPUs `fast` moves the fewest bytes, needs no atomics and has forces of any size.
+    /// Counted bytes and operations suggest that it is the fastest there; this is not measured yet.
     pub fn usual(kind: Kind) -> Self {
         match kind {
             Kind::Software => Self::Gather,

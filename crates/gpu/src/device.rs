@@ -11,13 +11,13 @@ use crate::GpuError;
 pub enum Kind {
     /// A card with memory of its own.
     Discrete,
-    /// Shares its memory with the processor.
+    /// Shares its memory with the CPU.
     Integrated,
     /// Part of a virtual machine.
     Virtual,
     /// Something else.
     Other,
-    /// The processor in disguise: right, but slower than Pliant's own kernels for it.
+    /// Software on the CPU: correct, but slower than Pliant's own CPU kernels.
     Software,
 }
 
@@ -267,11 +267,11 @@ impl Device {
     pub(crate) fn allows(&self, arrays: u32, group: u32) -> Result<(), GpuError> {
         let most = self.device.limits().max_storage_buffers_per_shader_stage;
         if most < arrays {
-            return Err(self.lacks(format!("{arrays} arrays a kernel (it has {most})")));
+            return Err(self.lacks(format!("{arrays} arrays per kernel (it has {most})")));
         }
         let largest = self.adapter.group_size;
         if largest < group {
-            return Err(self.lacks(format!("groups of {group} invocations (its are of {largest})")));
+            return Err(self.lacks(format!("groups of {group} invocations (it allows {largest})")));
         }
         Ok(())
     }

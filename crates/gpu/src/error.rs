@@ -1,4 +1,4 @@
-//! What can go wrong with a device, and what to do.
+//! Errors of a device, with remedies.
 
 use pliant_mechanics::model::Contradiction;
 
@@ -6,7 +6,7 @@ use pliant_mechanics::model::Contradiction;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
     /// No adapter was found.
-    #[error("no graphics processor was found: no driver for Vulkan, Metal or Direct3D 12 answers")]
+    #[error("no GPU was found: no driver for Vulkan, Metal or Direct3D 12 answers")]
     NoAdapter,
     /// No adapter has this name.
     #[error("there is no adapter `{asked}`; found: {}", found.join(", "))]
@@ -78,8 +78,8 @@ pub enum GpuError {
         /// The most that is allowed [B].
         limit: u64,
     },
-    /// Something that runs on the processor only.
-    #[error("{what} can't run on a graphics processor")]
+    /// Something that runs on the CPU only.
+    #[error("{what} can't run on a GPU")]
     Unsupported {
         /// What it is.
         what: String,
@@ -95,8 +95,8 @@ pub enum GpuError {
     /// Constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
-    /// The driver reports a fault of the program.
-    #[error("`{adapter}` reports a fault in its use: {reason}")]
+    /// The driver reports an error of the program.
+    #[error("`{adapter}` reports an error: {reason}")]
     Internal {
         /// The adapter.
         adapter: String,
@@ -143,7 +143,7 @@ impl GpuError {
             Self::Overflow { .. } => "take the design `gather`, whose forces are floating-point numbers",
             Self::Contradiction(_) => "leave the node out of one of the two, or give both the same motion",
             Self::Internal { .. } => {
-                "take `device = \"cpu\"`, and report this: it is a fault of Pliant or of the driver"
+                "take `device = \"cpu\"`, and report this: it is an error in Pliant or in the driver"
             }
         }
     }

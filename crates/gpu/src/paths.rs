@@ -2,7 +2,7 @@
 //!
 //! What an elastic `tet4` moves and computes in a step, counted from the arrays below for six cells a node, each number read once
 //! from memory; operations are those of a prototype's PTX (sm_90, neo-Hookean). The node itself (u, Δu read and written, its
-//! constants) is 80 B, 13 a cell. Of none a time on a graphics processor is measured.
+//! constants) is 80 B, 13 a cell. No times on GPUs are measured yet.
 //!
 //! | design | bytes | operations | where they go |
 //! |---|---|---|---|
@@ -89,8 +89,8 @@ impl Paths {
         }
     }
 
-    /// One kernel a step. Of the forces of a block only whole numbers are kept, 16 bytes a node: in shared memory every graphics
-    /// processor adds them natively, in any order to the same sum. Slots to gather them from would take 48 bytes or more a cell
+    /// One kernel a step. Of the forces of a block only whole numbers are kept, 16 bytes a node: in shared memory every GPU adds
+    /// them natively, in any order to the same sum. Slots to gather them from would take 48 bytes or more a cell
     /// there, which makes blocks smaller and cells at borders more.
     fn blocks(
         memory: &Memory<'_>,

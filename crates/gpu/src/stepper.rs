@@ -1,4 +1,4 @@
-//! The central difference method on a device; the method itself stands in the stepper of `pliant-mechanics`.
+//! The central difference method on a device; the stepper of `pliant-explicit` has its formulas.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
@@ -25,14 +25,14 @@ use crate::solids::{DeviceSolid, Four};
 use crate::transfer::Transfer;
 use crate::{Design, Device, GpuError};
 
-/// Most steps between two instants that are looked at: the energies, how far cells are deformed, whether all is sound.
+/// Most steps between two evaluated instants, with energies, deformation of the cells and checks.
 const LOOK_EVERY: u64 = 100;
 
-/// Looks come closer together where the deformation changes by more than this factor from one to the next.
+/// Evaluations are more frequent where the deformation changes by more than this factor from one to the next.
 const CALM: f64 = 1.02;
 
-/// Steps between two looks at the largest stable step, unless the deformation has changed: for each the displacements come
-/// back, and the processor ranks all cells.
+/// Steps between two checks of the critical time step, unless the deformation has changed. Each check reads the displacements back,
+/// and the CPU ranks all cells.
 const LIMIT_EVERY: u64 = 1000;
 
 /// A submission takes no longer than this [s]: systems take a device away from a program that keeps it for seconds.
@@ -680,7 +680,7 @@ impl GpuStepper {
         }
     }
 
-    /// Brings back the state as it stood at an instant that is not sound. The processor finds out what is wrong with it.
+    /// Brings back the state as it stood at an instant that is not sound. The CPU then finds the cause.
     fn fail(&mut self, state: &mut State<f32>, at: u32) -> StepFailure {
         self.go_back(state, at);
         if let Err(error) = self.bring_arrays_back(state) {
@@ -691,7 +691,7 @@ impl GpuStepper {
             .map_err(|error| error.to_string())
             .and_then(|mut stepper| match stepper.evaluate(&mut copy) {
                 Err(error) => Ok(error),
-                Ok(()) => Err("a cell it finds broken is sound on the processor".to_owned()),
+                Ok(()) => Err("a cell that it reports as broken is valid on the CPU".to_owned()),
             });
         match found {
             Ok(error) => error.into(),

@@ -1,6 +1,6 @@
-//! Meshes of images, kept between runs. A mesh lies in a file that is named after what it is made of: the content of the image, all
-//! parameters and the mesher itself, so that it is never stale. A file appears under its name only once it is whole, and one that
-//! is damaged, or holds a mesh that no mesher makes, counts as missing; so any number of processes can share a folder. The files that were used last stay.
+//! Cache of meshes made from images and surfaces. The name of a file is a hash of all inputs: the content of the image, all parameters and
+//! the source text of the mesher, so no mesh is stale. A file appears under its name only once it is complete. A file that is damaged, or
+//! holds a mesh that no mesher makes, counts as missing, so any number of processes can share a folder. Files unused for longest are deleted.
 //!
 //! The file: [`MAGIC`], the CRC-32 of the body (u32, little-endian), the body in postcard's encoding.
 

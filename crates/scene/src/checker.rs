@@ -1,9 +1,9 @@
-//! Checks what a user wrote against the JSON schema of the parameters, and says what is wrong where.
+//! Checks the tables of a user against the JSON schema of the parameters. Each mistake is reported with its place.
 //!
 //! The schema is the one that schemars derives from the parameter struct: meaning, unit, range and default are declared
 //! there once. Whatever keys a table's schema does not name are mistakes, whether or not the struct denies unknown
 //! fields, because serde cannot deny them in structs with flattened parts. Names that only serde knows (`alias`) and the
-//! schema's `pattern`, `multipleOf` and `uniqueItems` are not looked at.
+//! schema's `pattern`, `multipleOf` and `uniqueItems` are ignored.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -579,7 +579,7 @@ impl<'s> Checker<'s, '_> {
         }
     }
 
-    /// Checks a value against the alternatives of its kind and keeps what the one with the fewest mistakes says.
+    /// Checks a value against the alternatives of its kind and keeps the mistakes of the alternative with the fewest.
     fn best(
         &mut self,
         node: &Node,
@@ -642,7 +642,7 @@ impl<'s> Checker<'s, '_> {
         self.report(diagnostic.help(hint).help(trail.explained(doc)))
     }
 
-    /// Whether a value in its range has a size that makes sense; tells of one that has not, or is unlikely.
+    /// Whether a value in its range has a plausible size; reports one that is impossible or unlikely.
     fn is_possible(
         &mut self,
         node: &Node,

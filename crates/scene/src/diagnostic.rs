@@ -1,8 +1,8 @@
-//! Mistakes in a scene: each a message, its place in the user's own file, and a remedy.
+//! Errors and warnings about a scene: each has a message, its place in the user's own file, and a remedy.
 //!
 //! All mistakes of a file are collected; the first [`MOST_SHOWN`] are shown together. [`SceneErrors`] is what a command
 //! line prints: through miette's graphical handler with the lines underlined, or one mistake a line with
-//! [`SceneErrors::plain`]. Nothing in it makes a terminal do anything, and no line or value is shown at any length.
+//! [`SceneErrors::plain`]. Control codes of terminals are removed, and long lines and values are shortened.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -29,7 +29,7 @@ pub(crate) fn counted(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
-/// How grave a [`Diagnostic`] is.
+/// The severity of a [`Diagnostic`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// The scene cannot run.
@@ -55,7 +55,7 @@ impl From<Range<usize>> for Place {
     }
 }
 
-/// One mistake, or one doubt, about a scene.
+/// One error or warning about a scene.
 ///
 /// ```
 /// use pliant_scene::diagnostic::Diagnostic;
@@ -101,7 +101,7 @@ impl Diagnostic {
         Self::new(Severity::Error, message.into())
     }
 
-    /// A doubt that the scene can run with.
+    /// A warning: the scene can run.
     pub fn warning(message: impl Into<String>) -> Self {
         Self::new(Severity::Warning, message.into())
     }
@@ -290,7 +290,7 @@ impl SceneErrors {
         &self.source.inner().0
     }
 
-    /// What was found, in the order of the text; what has no place in it comes last.
+    /// All errors and warnings in the order of the text; those without a place come last.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }

@@ -1,4 +1,4 @@
-//! What `pliant check` prints: the model before it runs.
+//! The report of `pliant check`: the model before it runs.
 
 use std::fmt::{self, Write};
 
@@ -44,7 +44,7 @@ fn write_overview(page: &mut String, world: &World) -> fmt::Result {
     write_outputs(page, scene)?;
     match world.only() {
         Some(part) => write_step(page, &part.scene, &part.built, &part.plan)?,
-        None => writeln!(page, "all meet every {} s", number(world.slowest().plan.step))?,
+        None => writeln!(page, "common instants every {} s", number(world.slowest().plan.step))?,
     }
     let notes = world.participants.iter().flat_map(|part| &part.built.notes);
     for remark in world.warnings().map(ToString::to_string).chain(notes.cloned()) {
@@ -227,10 +227,10 @@ fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> f
         return writeln!(page, "\nsolver `{solver}`: {steps} of {step} s for {until} s");
     };
     let seconds = plan.steps as f64 * limit.seconds_per_call;
-    writeln!(page, "\ncritical step:")?;
+    writeln!(page, "\ncritical time step:")?;
     writeln!(page, "  element bound {} s, set by {limiting}", number(bound.step))?;
     let calls = limit.force_calls;
-    writeln!(page, "  true limit    {} (assembled operator, {calls} force calls)", told_limit(limit.step))?;
+    writeln!(page, "  assembled     {} ({calls} force calls)", told_limit(limit.step))?;
     writeln!(
         page,
         "  step          {} s, {} steps for {} s",

@@ -1,4 +1,5 @@
-//! Which time step a run takes: from the mesh and the laws, or as the user asks, held against the true limit.
+//! The time step of a run: from the mesh and the laws, or as requested and then compared with the critical time step of the assembled
+//! model, the *true limit*.
 
 use pliant_explicit::critical_step::{ElementBound, TrueLimit, element_bound, true_limit};
 use pliant_implicit::Explicit;
@@ -11,7 +12,7 @@ use crate::output::number;
 use crate::scene::Scene;
 use crate::target::Target;
 
-/// Part of the true limit that an automatic step takes.
+/// Fraction of the critical time step of the assembled model that an automatic step takes.
 pub const SAFETY: f64 = 0.9;
 /// A step that is shortened by more than this part is reported.
 const SHORTENED: f64 = 1e-3;
@@ -29,9 +30,9 @@ pub struct Plan {
     pub steps: u64,
     /// What limits explicit steps of solids; `None` of shells and co-rotational solids.
     pub limits: Option<Limits>,
-    /// What to tell the user about a step that was asked for.
+    /// A remark about a requested step.
     pub note: Option<String>,
-    /// Where the run computes.
+    /// The device and the number type.
     pub target: Target,
 }
 
@@ -40,7 +41,7 @@ pub struct Plan {
 pub struct Limits {
     /// The smallest element bound.
     pub bound: ElementBound,
-    /// The limit of the assembled operator.
+    /// The critical time step of the assembled model.
     pub limit: TrueLimit,
     /// The cell that sets the bound.
     pub limiting: LimitingElement,
@@ -70,10 +71,10 @@ impl std::fmt::Display for LimitingElement {
     }
 }
 
-/// Chooses the step, and where to compute.
+/// Chooses the step and the device.
 ///
 /// # Errors
-/// If the step asked for is above the true limit, or the scene can't run where it asks to.
+/// If the requested step is above the critical time step of the assembled model, or the scene can't run on the requested device.
 pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
     let fail = |diagnostic| Err(scene.source.errors(vec![diagnostic]));
     let (limits, note) = match &built.corotational {
@@ -114,7 +115,7 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
     Ok(plan)
 }
 
-/// Holds an explicit step of shells and co-rotational solids against what is stable.
+/// Compares an explicit step of shells and co-rotational solids with the critical one.
 fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<String>, Box<Diagnostic>> {
     let StepChoice::Seconds(step) = scene.run.step else { return Ok(None) };
     let stable = Explicit::stable_step(&part.model);
@@ -122,7 +123,7 @@ fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<Stri
         return Ok(None);
     }
     let message = format!(
-        "the step {} s is above the stable step {} s: it would be unstable",
+        "the step {} s is above the critical time step {} s: it would be unstable",
         number(step),
         number(stable)
     );
@@ -131,7 +132,7 @@ fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<Stri
     Err(Box::new(Diagnostic::error(message).at(place, "too large").help(help)))
 }
 
-/// What limits the steps of solids, and what to tell about the step asked for.
+/// What limits the steps of solids, and a remark about a requested step.
 fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<Diagnostic>> {
     let fail = |diagnostic| Err(Box::new(diagnostic));
     let Some(bound) = element_bound(&built.model) else {
@@ -146,7 +147,7 @@ fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<
         StepChoice::Seconds(step) if scene.run.solver == SolverName::Explicit => {
             if step > limit.step {
                 let message = format!(
-                    "the step {} s is above the true limit {} s of the model: it would be unstable",
+                    "the step {} s is above the critical time step {} s of the assembled model: it would be unstable",
                     number(step),
                     number(limit.step)
                 );
@@ -211,7 +212,7 @@ impl Plan {
     }
 }
 
-/// The automatic step; the element bound stands in where every node is held and there is no limit.
+/// The automatic step. If every node is held there is no limit, and the element bound replaces it.
 fn automatic(bound: &ElementBound, limit: &TrueLimit) -> f64 {
     SAFETY * if limit.step.is_finite() { limit.step } else { bound.step }
 }
@@ -219,7 +220,7 @@ fn automatic(bound: &ElementBound, limit: &TrueLimit) -> f64 {
 fn note_on_step(step: f64, limit: f64) -> Option<String> {
     (step > SAFETY * limit).then(|| {
         format!(
-            "the step {} s lies close to the true limit {} s: stable at rest, with little reserve for deformation",
+            "the step {} s is close to the critical time step {} s of the assembled model: stable at rest, with little reserve for deformation",
             number(step),
             number(limit)
         )
@@ -271,14 +272,14 @@ mod tests {
         let automatic = planned("").unwrap().limits.unwrap();
         let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
         let close = asked(0.95 * automatic.limit.step).unwrap();
-        assert!(close.note.is_some_and(|note| note.contains("close to the true limit")));
+        assert!(close.note.is_some_and(|note| note.contains("close to the critical time step")));
         // A whole part of the duration, or the note tells that it is shortened.
         let below = automatic.bound.step.min(0.9 * automatic.limit.step);
         assert_eq!(asked(0.1 / (0.1 / below).ceil()).unwrap().note, None);
         let refused = asked(1.001 * automatic.limit.step).unwrap_err().plain().to_string();
         for piece in [
             "cube.toml:",
-            "above the true limit",
+            "above the critical time step",
             "is set by element 0 (hex8) of `cube`",
             "`step = \"auto\"`",
         ] {

@@ -1,4 +1,4 @@
-//! Files that a scene is read from: regular ones of a bounded length, and where a sandbox is asked for, only those in its folder.
+//! Files that a scene may read: regular files of bounded length, with `--sandbox` only those in its folder.
 
 use std::io;
 use std::path::{Path, PathBuf};

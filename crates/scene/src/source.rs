@@ -200,7 +200,7 @@ impl Source {
                 diagnostics.push(diagnostic);
             }
         }
-        // The tree of a text with syntax errors is a guess, and so is what is wrong with its numbers.
+        // The tree of a text with syntax errors is a guess, and so are mistakes in its numbers.
         let value = diagnostics.is_empty().then(|| table_value(table.get_ref(), &mut diagnostics));
         drop(table);
         match value {
@@ -285,7 +285,7 @@ impl Source {
         }
     }
 
-    /// Puts a value of the command line in the place of what the file says; tables on the way are made where missing.
+    /// Replaces a value of the file by one of the command line; missing tables on the way are made.
     ///
     /// Diagnostics about it say that it was given on the command line. The error says why the path cannot be.
     pub fn set(&mut self, path: &[&str], value: impl Into<Value>) -> Result<(), Box<Diagnostic>> {

@@ -1,5 +1,5 @@
 //! Sweeps: one scene run for every combination of some values, each run on one thread, several at a time, and one table
-//! of what they came to.
+//! of their results.
 
 use std::fs;
 use std::ops::Range;
@@ -62,7 +62,7 @@ pub struct SweepProgress {
     pub part: f64,
 }
 
-/// What a sweep came to.
+/// The result of a sweep.
 #[derive(Clone, Debug)]
 pub struct SweepSummary {
     /// The table.
@@ -71,11 +71,11 @@ pub struct SweepSummary {
     pub failures: Vec<(usize, String)>,
     /// Runs.
     pub runs: usize,
-    /// Whether it was told to stop before its end.
+    /// Whether it was stopped before its end.
     pub interrupted: bool,
 }
 
-/// What one run came to.
+/// The result of one run.
 struct Row {
     status: &'static str,
     message: String,
@@ -456,7 +456,7 @@ impl Axis {
                 Some(Ok(range)) => values.extend(range),
                 Some(Err(why)) => {
                     let help = "write FROM..TO/N, such as 1e3..5e3/5 for 1000, 2000, 3000, 4000 and 5000";
-                    return Err(refused(format!("`{text}` is no range: {why}"), span, help));
+                    return Err(refused(format!("`{text}` is not a range: {why}"), span, help));
                 }
             }
         }
@@ -499,10 +499,10 @@ fn range(text: &str) -> Option<Result<Vec<String>, String>> {
         return Some(Err("the number of values is missing".into()));
     };
     let Some(last) = to.trim().parse::<f64>().ok().filter(|x| x.is_finite()) else {
-        return Some(Err(format!("`{}` is no number", to.trim())));
+        return Some(Err(format!("`{}` is not a number", to.trim())));
     };
     let Some(count) = count.trim().parse::<usize>().ok().filter(|count| (2..=MOST).contains(count)) else {
-        return Some(Err(format!("the number of values must be a whole one from 2 to {MOST}")));
+        return Some(Err(format!("the number of values must be a whole number from 2 to {MOST}")));
     };
     let value = |index: usize| {
         let s = index as f64 / (count - 1) as f64;

@@ -1,4 +1,4 @@
-//! Where a run computes: on the processor or on a graphics processor, as the scene asks and the machine has it.
+//! The device of a run: the CPU or a GPU, as requested by the scene and available on the machine.
 
 use pliant_gpu::{Device, GpuError, Kind};
 
@@ -7,22 +7,22 @@ use crate::diagnostic::Diagnostic;
 use crate::format::{DeviceName, Precision, RunTable, SolverName};
 use crate::scene::Scene;
 
-/// Where a run computes, and in which numbers.
+/// The device of a run, and its number type.
 #[derive(Clone, Debug)]
 pub struct Target {
-    /// The graphics processor; `None`: the processor.
+    /// The GPU; `None`: the CPU.
     pub device: Option<Device>,
     /// The number type.
     pub precision: Precision,
-    /// Why it is not where one might expect it.
+    /// Why the run uses another device than one might expect.
     pub note: Option<String>,
 }
 
 impl Target {
-    /// As the scene asks; opens the device.
+    /// The target that the scene requests; opens the device.
     ///
     /// # Errors
-    /// If a graphics processor is asked for, and there is none or it can't run the scene.
+    /// If a GPU is requested, and there is none or it can't run the scene.
     pub(crate) fn choose(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
         let run = &scene.run;
         let corotational = built.corotational.is_some();
@@ -32,7 +32,7 @@ impl Target {
                 match given.into_iter().find(|(_, given)| *given) {
                     None => Ok(Self::processor(run, None)),
                     Some((key, _)) => {
-                        let message = format!("`{key}` is given, but the scene runs on the processor");
+                        let message = format!("`{key}` is given, but the scene runs on the CPU");
                         let place = scene.source.span(&scene.run_at(key));
                         let help = format!("set `device = \"gpu\"` or `\"auto\"`, or leave `{key}` out");
                         Err(Box::new(Diagnostic::error(message).at(place, "not used").help(help)))
@@ -45,7 +45,7 @@ impl Target {
                         let software = device.adapter().kind == Kind::Software;
                         let note = software.then(|| {
                             format!(
-                                "`{}` is the processor in disguise: right, but slower than `device = \"cpu\"`",
+                                "`{}` is software on the CPU: correct, but slower than `device = \"cpu\"`",
                                 device.adapter().name
                             )
                         });
@@ -58,23 +58,21 @@ impl Target {
                     }
                 },
                 Some((key, what, help)) => {
-                    let error = Diagnostic::error(format!("{what} runs on the processor only"))
+                    let error = Diagnostic::error(format!("{what} runs on the CPU only"))
                         .at(scene.source.span(&scene.run_at("device")), "not for this")
-                        .also(scene.source.span(&scene.run_at(key)), "asked for here");
+                        .also(scene.source.span(&scene.run_at(key)), "requested here");
                     Err(Box::new(error.help(help)))
                 }
             },
             DeviceName::Auto => Ok(match processor_only(run, corotational) {
-                Some((_, what, _)) => {
-                    Self::processor(run, Some(format!("{what} runs on the processor only")))
-                }
+                Some((_, what, _)) => Self::processor(run, Some(format!("{what} runs on the CPU only"))),
                 None => match open(run) {
                     Ok(device) if device.adapter().kind == Kind::Software => {
                         let name = &device.adapter().name;
                         Self::processor(
                             run,
                             Some(format!(
-                                "the only adapter, `{name}`, is the processor in disguise: it runs there"
+                                "the only adapter, `{name}`, is software: the run uses the CPU directly"
                             )),
                         )
                     }
@@ -82,7 +80,7 @@ impl Target {
                         let note = Some(format!("it runs on `{}`", device.adapter().name));
                         Self { device: Some(device), precision: Precision::Single, note }
                     }
-                    Err(error) => Self::processor(run, Some(format!("{error}: it runs on the processor"))),
+                    Err(error) => Self::processor(run, Some(format!("{error}: it runs on the CPU"))),
                 },
             }),
         }
@@ -92,13 +90,13 @@ impl Target {
         Self { device: None, precision: run.precision.unwrap_or(Precision::Double), note }
     }
 
-    /// `cpu`, or the name of the graphics processor.
+    /// `cpu`, or the name of the GPU.
     pub fn name(&self) -> &str {
         self.device.as_ref().map_or("cpu", |device| &device.adapter().name)
     }
 }
 
-/// The key that a graphics processor can't serve, in words, and what to do.
+/// The key that a GPU can't support, in words, and a remedy.
 fn processor_only(run: &RunTable, corotational: bool) -> Option<(&'static str, &'static str, &'static str)> {
     if corotational {
         let help = "set `device = \"cpu\"`, or leave it out";

@@ -1,6 +1,6 @@
 // Forces of uniform-strain hexahedra with hourglass control. Rows at rest: the eight B_a, with the volume and the stiffness
 // k [N/m] of the control beside the first two, and 3/2 κ² [1/m²] beside the third; the four patterns γ at each node. Corners are looked
-// at where the patterns are large enough to invert one; forces/corners.rs of the mechanics says why.
+// at where the patterns are large enough to invert one; forces/corners.rs of pliant-explicit says why.
 
 const FIRST_CORNER = 16u;
 

@@ -147,9 +147,9 @@ fn what_a_device_lacks_is_named_with_what_it_has() {
         (
             |limits, _| limits.max_storage_buffers_per_shader_stage = 8,
             Design::Gather,
-            "arrays a kernel (it has 8)",
+            "arrays per kernel (it has 8)",
         ),
-        (|limits, _| limits.max_compute_invocations_per_workgroup = 64, Design::Gather, "its are of 64"),
+        (|limits, _| limits.max_compute_invocations_per_workgroup = 64, Design::Gather, "it allows 64"),
         (|limits, _| limits.max_compute_workgroup_storage_size = 9000, Design::Fast, "it has 9000"),
     ];
     let model = moved_cube("tet4", elastic(neo_hookean()));

@@ -10,8 +10,7 @@ pub fn device() -> Option<Device> {
         Ok(device) => Some(device),
         Err(GpuError::NoAdapter) if std::env::var("PLIANT_REQUIRE_GPU").as_deref() != Ok("1") => {
             // Past the capture of what passing tests print. A notice that can't be written is none.
-            let notice =
-                format!("skipped: no graphics processor was found ({})", GpuError::NoAdapter.remedy());
+            let notice = format!("skipped: no GPU was found ({})", GpuError::NoAdapter.remedy());
             let _ = writeln!(std::io::stderr(), "{notice}");
             None
         }

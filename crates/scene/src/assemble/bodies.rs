@@ -94,7 +94,7 @@ impl Builder<'_> {
             if table.fraction.is_some() {
                 let message = format!("`{name}` is a {}, whose cells are all full", table.model.word());
                 let help = "leave it out, or set `model = \"solid\"`";
-                self.error(&["body", name, "fraction"], message, "plays no part", help);
+                self.error(&["body", name, "fraction"], message, "has no effect", help);
             }
             self.add_corotational(draft, first);
             return;
@@ -116,7 +116,7 @@ impl Builder<'_> {
             let word = self.scene.run.solver.word();
             let message = format!("`{name}` has a velocity, but a {word} run has no inertia");
             let help = "leave it out, or run the scene with `solver = \"explicit\"`";
-            self.error(&["body", name, "velocity"], message, "plays no part", help);
+            self.error(&["body", name, "velocity"], message, "has no effect", help);
         }
         self.model.initial_velocity.resize(first, [0.0; 3]);
         self.model.initial_velocity.resize(self.model.rest.len(), velocity);
@@ -128,7 +128,7 @@ impl Builder<'_> {
             .is_none_or(|element| !element.is_shell() && element.is_tet() == (kind == CellKind::Tet));
         if !fits {
             let cells = if kind == CellKind::Tet { "tets" } else { "hexes" };
-            let message = format!("the mesh of `{name}` has {cells}, which this element is not for");
+            let message = format!("the mesh of `{name}` has {cells}, which this element does not support");
             let help = "tets: `tet4`, `tet4-anp`, `tet4-ianp`; hexes: `hex8`, `hex8-full`; leave `element` out to let the mesh decide";
             self.error(&["body", name, "element"], message, "does not fit the mesh", help);
         }
@@ -295,9 +295,9 @@ impl Builder<'_> {
         for (name, law) in &scene.laws {
             let families = law.law.families();
             let unused = match families {
-                0 if law.extras.fibre.is_some() => Some("has no fibres: its `fibre` says nothing"),
+                0 if law.extras.fibre.is_some() => Some("has no fibres: its `fibre` has no effect"),
                 0 | 1 if law.extras.second_fibre.is_some() => {
-                    Some("has not two families of fibres: its `second-fibre` says nothing")
+                    Some("has not two families of fibres: its `second-fibre` has no effect")
                 }
                 _ => None,
             };

@@ -77,7 +77,7 @@ impl Builder<'_> {
         let path = ["body", draft.name, "fibre"];
         if matches!(fibre, Fibre::PerCell(FibreRule::Laplace { .. })) {
             let message = "a rule by Laplace's equation needs a solid";
-            self.error(&path, message, "not of a shell", "take another rule, or cell data of the mesh");
+            self.error(&path, message, "not for shells", "take another rule, or cell data of the mesh");
             return None;
         }
         let cells: Vec<u32> = (0..block.len() as u32).collect();

@@ -25,7 +25,7 @@ impl Builder<'_> {
         let Some(data) = block.data.get(key).filter(|data| data.components == 1) else {
             let known: Vec<&str> = block.data.keys().map(String::as_str).collect();
             let message = format!(
-                "the {} cells of `{}` have no data `{key}` of one number a cell",
+                "the {} cells of `{}` have no data `{key}` of one number per cell",
                 block.kind.name(),
                 draft.name
             );
@@ -40,7 +40,7 @@ impl Builder<'_> {
             cells.iter().filter(is_part).map(|&index| CellId { kind: block.kind, index }).collect();
         if !wrong.is_empty() {
             let message =
-                format!("`{key}` is no part of one in cells of `{}`: {}", draft.name, list_cells(&wrong));
+                format!("`{key}` is not a fraction in cells of `{}`: {}", draft.name, list_cells(&wrong));
             let help = "it is the part of a cell that the body fills, above 0 and at most 1";
             self.error(&path, message, "these fractions", help);
             return None;

@@ -109,8 +109,8 @@ impl Builder<'_> {
                     let made = recipe.make(&scan, watch)?;
                     let put = key.map(|key| self.cache.put(&key, &made));
                     let how = put.map(|put| match put {
-                        Ok(()) => "made, and kept in the cache".into(),
-                        Err(error) => format!("made, but not kept in the cache: {error}"),
+                        Ok(()) => "made and stored in the cache".into(),
+                        Err(error) => format!("made, but not stored in the cache: {error}"),
                     });
                     (made, how)
                 }
@@ -308,7 +308,7 @@ fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
         return refuse(
             "fix",
             "`fix` repairs the cells of a mesh file",
-            "`clean` cleans what new cells are made of",
+            "`clean` cleans the input of new cells",
         );
     }
     if table.file.is_some() {
@@ -319,7 +319,7 @@ fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
         return Ok(Recipe { cleaning, cells });
     }
     if table.factor() != 1.0 {
-        return refuse("scale", "`scale` does not go with `image`", "an image tells its own unit");
+        return refuse("scale", "`scale` does not go with `image`", "an image states its own unit");
     }
     Ok(Recipe { cleaning, cells })
 }

@@ -23,12 +23,12 @@ impl Builder<'_> {
             [("on-unstable", run.on_unstable.is_some()), ("mass-scaling", run.mass_scaling.is_some())];
         for (key, _) in given.into_iter().filter(|(_, given)| *given) {
             let message = format!(
-                "`{key}` is for `solver = \"explicit\"`: quasi-static equilibria have no stable step"
+                "`{key}` is for `solver = \"explicit\"`: quasi-static equilibria have no critical time step"
             );
             self.error(
                 &scene.run_at(key),
                 message,
-                "means nothing here",
+                "has no effect here",
                 "remove it, or take `solver = \"explicit\"`",
             );
         }

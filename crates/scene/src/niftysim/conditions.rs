@@ -264,7 +264,7 @@ impl Reader<'_> {
             other => {
                 let found =
                     other.map_or("has no load shape".into(), |word| format!("has load shape `{word}`"));
-                let note = format!("the constraint of line {} {found}: taken as POLY345", line(of));
+                let note = format!("the constraint of line {} {found}: treated as POLY345", line(of));
                 self.remarks.notes.push(note);
                 Shape::Polynomial
             }

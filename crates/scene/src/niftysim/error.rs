@@ -104,7 +104,7 @@ pub enum ImportProblem {
         count: usize,
     },
     /// A word with no meaning here.
-    #[error("`{found}` is no {what}; known: {known}")]
+    #[error("`{found}` is not a known {what}; known: {known}")]
     Unknown {
         /// What the word should be.
         what: &'static str,

@@ -155,7 +155,7 @@ impl Model {
         let collapsed = nodes.chunks_exact(each).position(|cell| sorted(cell.to_vec()).len() < each);
         if let Some(cell) = collapsed {
             let what = format!(
-                "nodes closer than {} merge, which takes two nodes of element {cell} together",
+                "nodes closer than {} merge, which merges two nodes of element {cell}",
                 distance.unwrap_or(0.0)
             );
             let problem = ImportProblem::Contradiction { what, remedy: "give a smaller distance" };
@@ -309,7 +309,7 @@ impl System {
         let damping = needed(of, "DampingCoeff", "<DampingCoeff>0.5</DampingCoeff>")?;
         let steps = positive(until, "the total time")? / positive(step, "the time step")?;
         if steps > MOST_STEPS {
-            let (what, range) = ("the total time over the time step", "1e12 at the most");
+            let (what, range) = ("the total time over the time step", "at most 1e12");
             return Err(fault(of, ImportProblem::OutOfRange { what, value: steps, range }));
         }
         Ok(Self {

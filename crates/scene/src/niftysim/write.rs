@@ -144,7 +144,7 @@ impl Writer {
         let dropped = mesh.drop_unused_points();
         if dropped > 0 {
             self.notes.push(format!(
-                "`{body}`: {dropped} nodes that no element uses were dropped; later ones move up"
+                "`{body}`: {dropped} nodes that no element uses were dropped; later ones are renumbered"
             ));
         }
         mesh
@@ -161,11 +161,11 @@ impl Writer {
         let range =
             if least < largest { format!("{least:.4} to {largest:.4}") } else { format!("{largest:.4}") };
         self.notes.push(format!(
-            "`{body}`: NiftySim's hourglass stiffness is {coefficient} (λ + 2μ), which is {range} μ; 0.2 μ bends more truly"
+            "`{body}`: NiftySim's hourglass stiffness is {coefficient} (λ + 2μ), which is {range} μ; 0.2 μ is more accurate in bending"
         ));
         if largest > MOST_HOURGLASS {
             self.notes.push(format!(
-                "`{body}`: hourglass = {largest:.4} is above {MOST_HOURGLASS}, the greatest that a scene takes"
+                "`{body}`: hourglass = {largest:.4} is above {MOST_HOURGLASS}, the largest that a scene allows"
             ));
         }
         Some(written)
@@ -341,7 +341,7 @@ impl Writer {
         }
         if self.laws.iter().any(Material::relaxes) {
             self.note(
-                "NHV, TIV: relaxation advances by backward Euler, as in NiftySim; `exact` is more exact",
+                "NHV, TIV: relaxation advances by backward Euler, as in NiftySim; `exact` is more accurate",
             );
         }
     }

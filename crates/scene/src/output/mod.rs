@@ -1,4 +1,4 @@
-//! Observers: what looks at a run and writes it down. They never change the state.
+//! Observers: they write down instants of a run and never change the state.
 
 mod csv;
 mod curved;

@@ -1,4 +1,4 @@
-//! What a run tells of its stable step, of added mass and of hourglass energy.
+//! What a run reports about its critical time step, added mass and hourglass energy.
 
 use std::fmt;
 
@@ -16,7 +16,7 @@ use crate::world::Part;
 /// Hourglass energy, as a fraction of the internal one, from which on a run is doubted.
 const MUCH_HOURGLASS: f64 = 0.05;
 
-/// What was seen of the largest stable step while it was watched.
+/// The monitored critical time step.
 #[derive(Clone, Debug, Serialize)]
 pub struct StabilitySummary {
     /// What the run does when the limit falls below its step.
@@ -84,7 +84,7 @@ impl fmt::Display for StabilitySummary {
                 number(limit),
                 number(time)
             )?,
-            _ if self.limited => write!(f, "the run ended before the stable step was checked")?,
+            _ if self.limited => write!(f, "the run ended before the critical time step was checked")?,
             _ => write!(f, "any step is stable, as no node is free to move")?,
         }
         if let (Some(first), Some(last)) = (self.first_cut, self.last_cut) {
@@ -93,7 +93,7 @@ impl fmt::Display for StabilitySummary {
             let extra = counted(self.extra_steps as usize, "extra step");
             write!(
                 f,
-                "; steps were cut {times} between t = {first} s and {last} s, into {} parts at the most: {extra}",
+                "; steps were cut {times} between t = {first} s and {last} s, into at most {} parts: {extra}",
                 self.most_substeps
             )?;
         } else if self.steps_below > 0 {
@@ -157,16 +157,16 @@ pub(crate) fn doubts(
         .collect()
 }
 
-/// Estimated error of displacements, over the largest one, from which on equilibria are doubted.
+/// Estimated error of displacements, over the largest one, above which equilibria give a warning.
 const MUCH_ERROR: f64 = 1e-3;
 
-/// What is doubtful about equilibria.
+/// Warnings about equilibria.
 fn equilibria_doubts(outcome: &PartOutcome) -> impl Iterator<Item = String> {
     let Energies { internal, hourglass, external, .. } = outcome.energies;
     let largest = internal.abs().max(external.abs());
     let displacement = outcome.equilibria.filter(|found| found.displacement_error > MUCH_ERROR).map(|found| {
         format!(
-            "the equilibria are found to about {:.1} % of the displacements: take a smaller `tolerance`, in single precision with \
+            "the displacements of the equilibria are off by about {:.1} %: take a smaller `tolerance`, in single precision with \
              `precision = \"double\"`",
             found.displacement_error * 100.0
         )
@@ -175,8 +175,8 @@ fn equilibria_doubts(outcome: &PartOutcome) -> impl Iterator<Item = String> {
         let missing = (internal + hourglass - external).abs() - error.abs();
         (missing > BALANCE_LIMIT * largest).then(|| {
             format!(
-                "{:.1} % of the energy is missing between equilibria: the body has snapped from one shape to another, or the load steps \
-                 are too few",
+                "{:.1} % of the energy is missing between equilibria: the body has snapped from one shape to another, or there are too few \
+                 load steps",
                 100.0 * missing / largest
             )
         })

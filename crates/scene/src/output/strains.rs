@@ -1,4 +1,4 @@
-//! How far the shells of a run are strained, and what a run tells where that is more than small-strain elasticity holds for.
+//! Largest strains of shells, and the warning where they exceed the range of small-strain elasticity.
 
 use pliant_implicit::State;
 use serde::{Deserialize, Serialize};
@@ -72,8 +72,8 @@ impl ShellStrains {
             let percent = |strain: &f64| format!("{:.1} %", 100.0 * strain);
             Some(format!(
                 "`{body}` is strained by {} in triangle {element} (counted from 0) at t = {} s, by {} of it in its middle \
-                 surface, and by more than 10 % from t = {} s on: shells are linearly elastic for small strain, so that forces \
-                 and stresses are doubtful there; take smaller loads, or a solid with a hyperelastic law",
+                 surface, and by more than 10 % from t = {} s on: shells are linearly elastic for small strain, so forces \
+                 and stresses are questionable there; take smaller loads, or a solid with a hyperelastic law",
                 percent(largest),
                 number(*time),
                 percent(membrane),

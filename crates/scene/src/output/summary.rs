@@ -1,4 +1,4 @@
-//! What a run came to: as one JSON object, and as a page to read.
+//! The result of a run: as one JSON object, and as a page to read.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -54,7 +54,7 @@ pub struct Summary {
     pub ended: Option<String>,
     /// How far each shell was strained at most, of the instants that were looked at (up to 1000).
     pub shell_strains: Vec<StrainSummary>,
-    /// Where it was computed: `cpu`, or the name of the graphics processor.
+    /// The device: `cpu`, or the name of the GPU.
     pub device: String,
     /// `single` or `double`.
     pub precision: &'static str,
@@ -64,7 +64,7 @@ pub struct Summary {
     pub wall_seconds: f64,
     /// Simulated time over wall time.
     pub real_time_factor: f64,
-    /// What was seen of the largest stable step; `null` of a quasi-static run.
+    /// The monitored critical time step; `null` of a quasi-static run.
     pub stability: Option<StabilitySummary>,
     /// What mass scaling adds; `null` without it.
     pub added_mass: Option<AddedMass>,
@@ -274,7 +274,7 @@ impl FailureSummary {
     /// A load step, counted from 1 (0: what acts at the start), of so many that came to no equilibrium.
     pub(crate) fn load_step(error: &RelaxationError, number: u64, of: u64) -> Self {
         let which = match number {
-            0 => "what acts at t = 0".to_owned(),
+            0 => "the loads at t = 0".to_owned(),
             _ => format!("load step {number} of {of}"),
         };
         let message = format!("{which}: {error}; {}", error.remedy());
@@ -415,7 +415,7 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
         None => {
             writeln!(page, "Done: {} s simulated in {} steps.\n", number(outcome.time), outcome.steps)?;
             if let Some(why) = &outcome.ended {
-                writeln!(page, "It ended before its last step: {why}.\n")?;
+                writeln!(page, "The run ended before its last step: {why}.\n")?;
             }
         }
         Some(failure) if failure.kind == INTERRUPTED => {
@@ -491,7 +491,7 @@ fn write_part(page: &mut String, part: &Part, outcome: &PartOutcome) -> std::fmt
     writeln!(page, "| step | {} s |", number(plan.step))?;
     if let Some(Limits { bound, limit, limiting }) = &plan.limits {
         writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
-        writeln!(page, "| true limit (assembled operator) | {} |", told_limit(limit.step))?;
+        writeln!(page, "| critical time step (assembled model) | {} |", told_limit(limit.step))?;
     }
     if let Some(AddedMass { mass, percent, elements, .. }) = AddedMass::new(built) {
         let mass = number(mass);
@@ -514,24 +514,28 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
     writeln!(page, "\n## Equations\n\n| | |\n|---|---|")?;
     let per_step = |count: u64| number(count as f64 / steps.max(1) as f64);
     let iterations = effort.newton_iterations;
-    writeln!(page, "| iterations of Newton's method | {iterations}, {} a step |", per_step(iterations))?;
+    writeln!(page, "| iterations of Newton's method | {iterations}, {} per step |", per_step(iterations))?;
     if effort.linear_iterations > 0 {
         let iterations = effort.linear_iterations;
         writeln!(
             page,
-            "| iterations of conjugate gradients | {iterations}, {} a step |",
+            "| iterations of conjugate gradients | {iterations}, {} per step |",
             per_step(iterations)
         )?;
-        writeln!(page, "| their last residual, relative | {} |", number(effort.linear_residual))?;
+        writeln!(
+            page,
+            "| last residual of conjugate gradients, relative | {} |",
+            number(effort.linear_residual)
+        )?;
     }
     if let Some(residual) = effort.residual {
         writeln!(page, "| last residual, relative | {} |", number(residual))?;
     }
     writeln!(page, "| steps that were halved | {} |", effort.halved)?;
     let milliseconds = |seconds: f64| number(seconds * 1e3 / steps.max(1) as f64);
-    writeln!(page, "| forces and stiffness | {} ms a step |", milliseconds(effort.seconds_cells))?;
-    writeln!(page, "| factors or preconditioner | {} ms a step |", milliseconds(effort.seconds_factors))?;
-    writeln!(page, "| solution | {} ms a step |", milliseconds(effort.seconds_solution))?;
+    writeln!(page, "| forces and stiffness | {} ms per step |", milliseconds(effort.seconds_cells))?;
+    writeln!(page, "| factors or preconditioner | {} ms per step |", milliseconds(effort.seconds_factors))?;
+    writeln!(page, "| solution | {} ms per step |", milliseconds(effort.seconds_solution))?;
     if let Some(time) = effort.unstable_from {
         writeln!(page, "| unstable equilibria | from t = {} s on |", number(time))?;
     }
@@ -559,7 +563,7 @@ fn write_energy_rows(page: &mut String, energies: &Energies) -> std::fmt::Result
         ("external work", external),
         ("internal (stored and viscous)", internal),
         ("kinetic", kinetic),
-        ("taken by damping", damping),
+        ("lost to damping", damping),
         ("hourglass control", hourglass),
     ] {
         writeln!(page, "| {name} | {} |", number(value))?;
@@ -574,13 +578,13 @@ fn write_energies(page: &mut String, of: &str, outcome: &PartOutcome) -> std::fm
     if outcome.balance_floor.is_infinite() {
         return writeln!(
             page,
-            "\nThe balance is not judged: an implicit step takes energy like a damper, and external work is a sum of trapezia."
+            "\nThe balance is not checked: an implicit step dissipates energy like a damper, and external work is a sum of trapezia."
         );
     }
     let Some(equilibria) = &outcome.equilibria else {
         return writeln!(
             page,
-            "\nBalance: {:.3} % of the largest energy at the end, {:.3} % at worst (judged above {} J).",
+            "\nBalance: {:.3} % of the largest energy at the end, {:.3} % at worst (checked above {} J).",
             balance * 100.0,
             outcome.watched.worst_balance * 100.0,
             number(outcome.balance_floor)
@@ -596,13 +600,13 @@ fn write_energies(page: &mut String, of: &str, outcome: &PartOutcome) -> std::fm
                 of_largest(error.abs())
             )
         }
-        None => "whose error isn't known: a large part of the way was made in one".to_owned(),
+        None => "with an unknown error, since one load step covers a large part of the way".to_owned(),
     };
     writeln!(
         page,
-        "\nInternal and external energy differ by {:.3} % of the largest energy. Internal is what the laws store, and what relaxing ones \
-         have dissipated. External is the work of loads, reactions and prescribed motions by the trapezoidal rule over each load step, \
-         {error}; more load steps make it better, and change neither forces nor displacements of elastic bodies.",
+        "\nInternal and external energy differ by {:.3} % of the largest energy. Internal energy is what laws store and viscoelastic ones \
+         have dissipated. External energy is the work of loads, reactions and prescribed motions by the trapezoidal rule over each load step, \
+         {error}. More load steps reduce the error, and change neither forces nor displacements of elastic bodies.",
         balance * 100.0
     )
 }
@@ -642,7 +646,7 @@ pub fn number(value: f64) -> String {
     format!("{value:.*}", digits as usize)
 }
 
-/// The true limit of a step [s] in words.
+/// The critical time step of the assembled model [s] in words.
 pub(crate) fn told_limit(limit: f64) -> String {
     if limit.is_finite() {
         format!("{} s", number(limit))

@@ -149,8 +149,8 @@ impl Builder<'_> {
             Some(Element::Comas2010) => (cst, Bending::Comas2010),
             Some(_) => {
                 let help = "elements of shells: `dkt-curved`, `dkt-opt`, `dkt-cst`, `membrane`, `plate`, `comas-2010`";
-                let message = format!("`{name}` is a shell, and this element is of a solid");
-                self.error(&["body", name, "element"], message, "not of a shell", help);
+                let message = format!("`{name}` is a shell, and this element is for solids");
+                self.error(&["body", name, "element"], message, "not for shells", help);
                 return None;
             }
         };
@@ -244,7 +244,7 @@ impl Builder<'_> {
         }
         if let Some(number) = table.layers.iter().position(|layer| layer.young_modulus.is_some()) {
             let message =
-                format!("layer {number} of `{name}` is stiffer in one direction, and there is no direction");
+                format!("layer {number} of `{name}` is stiffer in one direction, but no direction is given");
             let help = "add `fibre = [x, y, z]` to the body, `{ cell-data = \"name\" }` or a rule such as `around`: what angles \
                         count from, projected on each triangle";
             self.error(&["body", name, "layers", &number.to_string()], message, "from where?", help);
@@ -280,7 +280,8 @@ impl Builder<'_> {
                 self.elasticity(name, table, law, path)?.into()
             }
             _ => {
-                let message = format!("layer {number} of `{name}` has a part of its elasticity, or too much");
+                let message =
+                    format!("layer {number} of `{name}` has incomplete or conflicting elastic constants");
                 let help =
                     "give it either a `law`, or all of `young-modulus`, `poisson-ratio` and `shear-modulus`";
                 self.error(&path, message, "this layer", help);
@@ -355,8 +356,8 @@ impl Builder<'_> {
     fn normals(&mut self, draft: &Draft<'_>, first: u32) -> Option<BTreeMap<u32, Vector3>> {
         let &Draft { name, table, mesh, .. } = draft;
         if table.normals == Some(Normals::Mesh) && table.crease.is_some() {
-            let message = format!("`{name}` has its normals from the mesh, where there is no crease");
-            self.error(&["body", name, "crease"], message, "means nothing here", "remove it, or `normals`");
+            let message = format!("`{name}` takes its normals from the mesh, so `crease` has no effect");
+            self.error(&["body", name, "crease"], message, "has no effect here", "remove it, or `normals`");
             return None;
         }
         let found = mesh.point_data.get(NORMAL).filter(|data| data.components == 3);
@@ -394,7 +395,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Tells of nodes of a membrane that nothing holds across at the start of a static run.
+    /// Reports nodes of a membrane without transverse stiffness at the start of a static run.
     fn tell_slack(&mut self, name: &str, table: &BodyTable, formulation: Formulation, first: usize) {
         let slack = formulation.bending == Bending::None && formulation.membrane != Membrane::None;
         let Some(part) = self.corotational.as_ref().filter(|_| slack && table.pre_tension == 0.0) else {
@@ -416,9 +417,9 @@ impl Builder<'_> {
         let count = flat.values().filter(|(_, flat)| *flat).count();
         if count > 0 {
             self.notes.push(format!(
-                "`{name}`: {} of the membrane lie in one plane with all triangles round them, and without tension nothing holds \
-                 them across: the static solver starts with an artificial stiffness there, proportional to the residual, of \
-                 which nothing is left at equilibrium; `pre-tension` [N/m] would hold them",
+                "`{name}`: {} of the membrane lie in one plane with all triangles round them, and without tension they have no \
+                 transverse stiffness: the static solver starts with an artificial stiffness, proportional to the residual, \
+                 which vanishes at equilibrium; `pre-tension` [N/m] gives a real one",
                 counted(count, "node")
             ));
         }
@@ -442,8 +443,8 @@ impl Builder<'_> {
         }
         if let Some(stoutness) = notes.stoutness.filter(|&stoutness| stoutness > STOUT) {
             self.notes.push(format!(
-                "`{name}` is {stoutness:.2} times as thick as wide (twice its area over its border): shear across the thickness is \
-                 left out, which makes such a strip about {:.0} % too stiff against twist (0.63 times that)",
+                "`{name}` is {stoutness:.2} times as thick as wide (twice its area over its border): transverse shear is \
+                 neglected, which makes such a strip about {:.0} % too stiff in torsion (0.63 times that)",
                 63.0 * stoutness
             ));
         }
@@ -464,12 +465,12 @@ impl Builder<'_> {
                  plates 6 to 26 % too soft"
             );
             let place = self.source().span(&["body", name, "element"]);
-            let help = "it is there for comparison; take `dkt-curved`";
+            let help = "it exists for comparison; take `dkt-curved`";
             self.out.push(Diagnostic::warning(message).at(place, "converges to a wrong plate").help(help));
         }
     }
 
-    /// Tells why a part was refused, at the key that is about it.
+    /// Reports why a part was rejected, at its key.
     fn refuse_part(&mut self, name: &str, error: &ModelError) {
         let (key, help) = match error {
             ModelError::OutOfRange { what, .. }

@@ -67,7 +67,7 @@ impl Builder<'_> {
     fn no_timing(&mut self, table: &LoadTable, path: &[&str]) -> Option<Curve> {
         let timing = table.timing();
         if timing.curve.is_some() || timing.from != 0.0 || timing.to.is_some() {
-            let message = "the factor of a controlled load is found: it has no course of its own";
+            let message = "the factor of a controlled load is computed: it has no curve of its own";
             self.error(path, message, "this load", "leave out `curve`, `from` and `to`");
             return None;
         }
@@ -375,7 +375,7 @@ impl Builder<'_> {
         };
         if table.stop.is_some() && table.arc_length.is_none() {
             let message = "`stop` is for `arc-length`: other controls end where they are set to end";
-            self.error(&[&path[..], &["stop"]].concat(), message, "means nothing here", "remove it");
+            self.error(&[&path[..], &["stop"]].concat(), message, "has no effect here", "remove it");
         }
         if let Some(part) = &mut self.corotational {
             part.control = control;

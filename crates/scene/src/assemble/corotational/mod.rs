@@ -85,7 +85,7 @@ pub struct Stop {
 }
 
 impl Builder<'_> {
-    /// Refuses scenes of both kinds of bodies, and solvers that are not for them.
+    /// Rejects scenes of both kinds of bodies, and solvers that do not support them.
     pub(in crate::assemble) fn check_models(&mut self) {
         let scene = self.scene;
         let other = |body: &&(String, BodyTable)| body.1.model != BodyModel::Solid;
@@ -104,7 +104,7 @@ impl Builder<'_> {
                 "`{solid}` is of model `solid` and `{first}` of model `{}`: they have no solver in common",
                 table.model.word()
             );
-            let help = "give all bodies `model = \"shell\"` or `\"corotational\"`, or run them in scenes of their own";
+            let help = "give all bodies `model = \"shell\"` or `\"corotational\"`, or give the solids a participant of their own";
             self.error(&["body", first, "model"], message, "not beside a `solid`", help);
         }
         if scene.run.solver == SolverName::QuasiStatic {
@@ -121,19 +121,21 @@ impl Builder<'_> {
         if scene.run.checkpoint.is_some()
             && scene.run.control.as_ref().is_some_and(|c| c.arc_length.is_some())
         {
-            let message = "there are no checkpoints of a run by arc length, which goes on in the direction of its last step";
+            let message = "a run by arc length has no checkpoints, since it continues in the direction of its last step";
             let help = "leave it out, or control a displacement";
             self.error(&scene.run_at("checkpoint"), message, "not with `arc-length`", help);
         }
         if scene.run.mass_scaling.is_some() {
             let message = format!("mass is not scaled for bodies of model `{}`", table.model.word());
-            let help = "leave it out, or take `solver = \"implicit\"`, which has no stable step";
+            let help = "leave it out, or take `solver = \"implicit\"`, which has no critical time step";
             self.error(&scene.run_at("mass-scaling"), message, "not for these bodies", help);
         }
         if scene.run.on_unstable.is_some() {
-            let message =
-                format!("the stable step of bodies of model `{}` is not watched", table.model.word());
-            let help = "leave it out; their step is held against the stable one at rest before the run";
+            let message = format!(
+                "the critical time step of bodies of model `{}` is not monitored",
+                table.model.word()
+            );
+            let help = "leave it out; their step is compared with the critical one at rest before the run";
             self.error(&scene.run_at("on-unstable"), message, "not for these bodies", help);
         }
         self.check_keys_of_shells(true);
@@ -142,7 +144,7 @@ impl Builder<'_> {
                 |body: &BodyTable| if key == "damping" { body.damping } else { body.stiffness_damping };
             if let Some((name, _)) = scene.bodies.iter().find(|(_, body)| value(body) != value(table)) {
                 let message = format!("`{name}` and `{first}` have different `{key}`");
-                let help = "shells and co-rotational solids of a scene all have the same";
+                let help = "shells and co-rotational solids of a participant share one value";
                 self.error(&["body", name, key], message, "another", help);
             }
         }
@@ -161,7 +163,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Refuses keys that say nothing for the models and the solver there are.
+    /// Rejects keys without effect on the models and the solver.
     fn check_keys_of_shells(&mut self, present: bool) {
         let scene = self.scene;
         let run = &scene.run;
@@ -169,7 +171,7 @@ impl Builder<'_> {
         let dynamic = matches!(run.solver, SolverName::Explicit | SolverName::Implicit);
         if dynamic && scene.gives("load-steps") {
             let message = "`load-steps` is for `solver = \"quasi-static\"` and `\"static\"`; others take a `step` in seconds";
-            self.error(&scene.run_at("load-steps"), message, "means nothing here", "remove it");
+            self.error(&scene.run_at("load-steps"), message, "has no effect here", "remove it");
         }
         for (key, wanted, of) in [
             ("iterations", newton, "`solver = \"implicit\"` and `\"static\"`"),
@@ -179,7 +181,7 @@ impl Builder<'_> {
         ] {
             if scene.gives(key) && !wanted {
                 let message = format!("`{key}` is for {of} of shells and co-rotational solids");
-                self.error(&scene.run_at(key), message, "means nothing here", "remove it");
+                self.error(&scene.run_at(key), message, "has no effect here", "remove it");
             }
         }
         let taken = self
@@ -223,7 +225,7 @@ impl Builder<'_> {
                     let message =
                         format!("`{key}` is for {of}, and `{name}` is of model `{}`", body.model.word());
                     let help = "remove it, or change `model`";
-                    self.error(&["body", name, key], message, "means nothing here", help);
+                    self.error(&["body", name, key], message, "has no effect here", help);
                 }
             }
         }
@@ -241,7 +243,7 @@ impl Builder<'_> {
             let owner = self.model.bodies.iter().find(|body| body.nodes.contains(&node));
             let Some((name, first)) = owner.map(|body| (body.name.clone(), body.nodes.start)) else { return };
             let message = format!(
-                "`{name}` is free in {} of 6, and a static run needs all of it held (the part with node {})",
+                "`{name}` is free in {} of 6, and a static run needs every part constrained (this one has node {})",
                 counted(free_modes, "rigid motion"),
                 node - first
             );
