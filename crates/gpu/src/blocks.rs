@@ -25,7 +25,7 @@ pub(crate) struct DeviceBlocks {
     pub bound: Bound,
     /// How many there are.
     pub count: usize,
-    /// The cells, block by block; some stand in several.
+    /// The cells, block by block; some are in several blocks.
     pub order: Vec<u32>,
     /// The nodes of all blocks.
     pub nodes: Vec<u32>,
@@ -196,7 +196,7 @@ pub(crate) struct NodeBlocks {
     blocks: Vec<Block>,
     /// The nodes of all blocks, with what they take and leave; in each block first those that it moves.
     nodes: Vec<u32>,
-    /// The cells of all blocks; those at borders stand in several.
+    /// The cells of all blocks; those at borders are in several blocks.
     cells: Vec<u32>,
     /// Their corners among the nodes of their block, in rows of all cells.
     corners: Vec<u32>,

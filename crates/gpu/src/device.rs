@@ -38,7 +38,7 @@ impl std::fmt::Display for Kind {
 pub struct Adapter {
     /// Its name.
     pub name: String,
-    /// What it is.
+    /// The adapter.
     pub kind: Kind,
     /// `vulkan`, `metal` or `dx12`.
     pub backend: String,
@@ -149,7 +149,7 @@ impl Device {
         Self::open_within(name, |_, _| {})
     }
 
-    /// Opens an adapter as if it had less than it has, to see what becomes of a model there.
+    /// Opens an adapter with lower limits, to test models on smaller devices.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -195,7 +195,7 @@ impl Device {
         Ok(Self { adapter, device, queue, instance, handle, faults, read_backs: Arc::default() })
     }
 
-    /// What it is.
+    /// The adapter.
     pub fn adapter(&self) -> &Adapter {
         &self.adapter
     }
@@ -210,7 +210,7 @@ impl Device {
         (&self.instance, &self.handle)
     }
 
-    /// How often something was read back to ordinary memory since it was opened, by whatever works on it.
+    /// The number of read-backs to ordinary memory since the device was opened, by any user of it.
     pub fn read_backs(&self) -> u64 {
         self.read_backs.load(Ordering::Relaxed)
     }
@@ -219,14 +219,14 @@ impl Device {
         self.read_backs.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Takes an error for one that the driver reports.
+    /// Handles an error as if the driver had reported it.
     #[doc(hidden)]
     pub fn report(&self, error: &wgpu::Error) {
         self.faults.report(error);
     }
 
     /// # Errors
-    /// What the driver has reported first, if anything.
+    /// The first error that the driver reported, if any.
     pub fn check(&self) -> Result<(), GpuError> {
         match &*self.faults.first.lock().unwrap_or_else(PoisonError::into_inner) {
             None => Ok(()),
@@ -234,7 +234,7 @@ impl Device {
         }
     }
 
-    /// What the driver has reported first, or else `reason`.
+    /// The first error that the driver reported, or else `reason`.
     pub(crate) fn fault(&self, reason: &dyn std::fmt::Display) -> GpuError {
         self.check().err().unwrap_or_else(|| GpuError::Internal {
             adapter: self.adapter.name.clone(),
@@ -242,10 +242,10 @@ impl Device {
         })
     }
 
-    /// Runs what makes the arrays of a model, whose bytes `needed` tells.
+    /// Runs `make`, which makes the arrays of a model; `needed` gives their bytes.
     ///
     /// # Errors
-    /// If the memory is full or the device fails, which goes before what was made of it.
+    /// If the memory is full or the device fails; these errors take precedence over those of `make`.
     pub(crate) fn fill<T>(
         &self,
         needed: impl Fn() -> u64,
@@ -304,7 +304,7 @@ impl Device {
     }
 
     fn poll(&self, how: wgpu::PollType) -> Result<(), GpuError> {
-        // wgpu 30 panics where the driver says while waiting that the device is lost, once it has told so.
+        // wgpu 30 panics if the driver reports a lost device during a wait, after it has called the callback.
         let waited = catch_unwind(AssertUnwindSafe(|| self.device.poll(how)));
         self.check()?;
         let reason = match waited {

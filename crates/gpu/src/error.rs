@@ -11,7 +11,7 @@ pub enum GpuError {
     /// No adapter has this name.
     #[error("there is no adapter `{asked}`; found: {}", found.join(", "))]
     UnknownAdapter {
-        /// What was asked for.
+        /// The requested name.
         asked: String,
         /// The names of those found.
         found: Vec<String>,

@@ -42,7 +42,7 @@ impl<'d> Memory<'d> {
         let size = array_size(bytes.len());
         self.count(what, size)?;
         let buffer = self.buffer(what, size, ARRAY, true);
-        // Fails where the device is lost or its memory full, which whoever makes the arrays finds out.
+        // Fails if the device is lost or its memory is full; the caller that makes the arrays checks both.
         let mut view = buffer.get_mapped_range_mut(..).map_err(|error| self.device.fault(&error))?;
         view.slice(..bytes.len()).copy_from_slice(bytes);
         drop(view);

@@ -42,7 +42,7 @@ pub(crate) struct DeviceNodes {
 pub(crate) struct NodeKernels {
     /// Finds the coming increments.
     pub pass: Kernel,
-    /// Goes on from an instant that was looked at.
+    /// Continues from an evaluated instant.
     pub advance: Kernel,
 }
 

@@ -1,7 +1,7 @@
-//! What a device itself can do, measured here and now: copy, multiply and add, and begin kernels.
+//! Peak rates of a device, measured: copies, multiply-adds, and kernel launches.
 //!
 //! A chain of the same kernel is submitted again and again, longer and longer until it takes [`ENOUGH`]; the best of the
-//! repeats counts: a peak is what nothing else disturbed.
+//! repeats counts, since other work can only slow it down.
 
 use std::time::{Duration, Instant};
 
@@ -19,7 +19,7 @@ const ENOUGH: Duration = Duration::from_millis(30);
 /// The longest chain in a submission.
 const LONGEST: usize = 1 << 14;
 
-/// What a device can do.
+/// Peak rates of a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeviceRates {
     /// Bytes read and written in copying [1/s].

@@ -91,7 +91,7 @@ pub(crate) struct Instants {
     count: usize,
 }
 
-/// Where numbers stand in a row of the table.
+/// Places of numbers in a row of the table.
 pub(crate) fn table_constants(model: &Model) -> [(&'static str, usize); 2] {
     let loads = 4 * model.constraints.len();
     [("LOADS", loads), ("GRAVITY", loads + model.loads.len())]

@@ -35,10 +35,10 @@ const CALM: f64 = 1.02;
 /// and the CPU ranks all cells.
 const LIMIT_EVERY: u64 = 1000;
 
-/// A submission takes no longer than this [s]: systems take a device away from a program that keeps it for seconds.
+/// A submission takes at most this long [s]: systems reset a device that a program occupies for seconds.
 const LONGEST_SUBMISSION: f64 = 0.2;
 
-/// What comes back of an evaluated instant.
+/// What is read back of an evaluated instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
     /// Energies and reactions.
@@ -47,7 +47,7 @@ pub enum Wanted {
     Everything,
 }
 
-/// Where a state stood when it was looked at.
+/// Where a state was when it was evaluated.
 #[derive(Clone, Copy)]
 struct Origin {
     side: usize,
@@ -56,7 +56,7 @@ struct Origin {
     stability: Stability,
 }
 
-/// What came of an evaluation.
+/// The results of an evaluation.
 struct Results {
     sums: Sums,
     hourglass: f64,
@@ -70,10 +70,10 @@ struct Results {
     reactions: Vec<Four>,
 }
 
-/// Steps a state of one model by one step size, in single precision, on a device. The state lies there: what a call
-/// changes of the one that is handed in is its clock, its energies, what was seen of the limit, and what it is asked for.
+/// Steps a state of one model by one step size, in single precision, on a device. The current state is on the device: of the
+/// state that is passed in, a call changes the clock, the energies, the record of the critical time step, and what it is asked to read back.
 ///
-/// The first state that is handed in is taken up; [`upload`](Self::upload) takes up another one.
+/// The first state that is passed in is uploaded; [`upload`](Self::upload) uploads another one.
 pub struct GpuStepper {
     device: Device,
     model: Arc<Model>,
@@ -98,7 +98,7 @@ pub struct GpuStepper {
     loaded: bool,
     /// Whether its instant is evaluated.
     evaluated: bool,
-    /// The last instant that was looked at, the instants since then and the length of their steps [s].
+    /// The last evaluated instant, the instants since then and the length of their steps [s].
     origin: Option<Origin>,
     since: u32,
     /// Whether the work of the instants since then is entered.
@@ -221,7 +221,7 @@ impl GpuStepper {
         })
     }
 
-    /// Watches the largest stable step with a monitor of the same model.
+    /// Monitors the critical time step with a monitor of the same model.
     #[must_use]
     pub fn watched(mut self, monitor: Monitor) -> Self {
         self.control.watch(monitor);
@@ -253,7 +253,7 @@ impl GpuStepper {
         self.design
     }
 
-    /// Takes up a state as it stands, between two instants or at the first one.
+    /// Uploads a state, between two instants or at the first one.
     pub fn upload(&mut self, state: &State<f32>) {
         let queue = &self.device.queue;
         let velocity = |node: usize| {
@@ -349,7 +349,7 @@ impl GpuStepper {
         let mut left = steps;
         while left > 0 {
             self.evaluate(state, Wanted::Energies)?;
-            // Where energies are off balance each step counts.
+            // While energies are off balance, every step is evaluated.
             let stride = if state.work.is_off_balance() { 1 } else { left.min(self.stride) };
             self.go(state, stride)?;
             left -= stride;
@@ -357,8 +357,8 @@ impl GpuStepper {
         Ok(())
     }
 
-    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without looking: nothing comes back.
-    /// Returns how many. Where something breaks the device stands still, which the next evaluation tells. The first instant is
+    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without any read-back.
+    /// Returns how many. After a failure the device stops, and the next evaluation reports it. The first instant is
     /// evaluated where that is not done yet.
     ///
     /// # Errors
@@ -557,7 +557,7 @@ impl GpuStepper {
         self.results()
     }
 
-    /// Goes on from the instants that are pushed, at first with a side; the first of them may be one that was looked at.
+    /// Goes on from the instants that are pushed, at first with a side; the first of them may be an evaluated one.
     fn submit_steps(&mut self, from_look: bool, mut side: usize) -> wgpu::SubmissionIndex {
         let nodes = &self.kernels;
         let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
@@ -652,7 +652,7 @@ impl GpuStepper {
     }
 
     /// # Errors
-    /// If something was not sound at an instant, where the device then stopped.
+    /// If a check failed at an instant, where the device then stopped.
     fn check(&mut self, state: &mut State<f32>, results: &Results) -> Result<(), StepFailure> {
         match (results.broken, results.overflown) {
             // The forces of a broken cell may be of any size.
@@ -680,7 +680,7 @@ impl GpuStepper {
         }
     }
 
-    /// Brings back the state as it stood at an instant that is not sound. The CPU then finds the cause.
+    /// Reads the state back as it was at an instant whose checks failed. The CPU then finds the cause.
     fn fail(&mut self, state: &mut State<f32>, at: u32) -> StepFailure {
         self.go_back(state, at);
         if let Err(error) = self.bring_arrays_back(state) {

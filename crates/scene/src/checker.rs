@@ -263,7 +263,7 @@ impl<'s> Form<'s> {
         }
     }
 
-    /// The word that a property must be, where it is what tells alternatives apart.
+    /// The word that a property must be, if it distinguishes alternatives.
     fn tag(&self, key: &str) -> Option<&'s str> {
         self.property(key)?.get("const")?.as_str()
     }
@@ -787,7 +787,7 @@ impl<'s> Checker<'s, '_> {
         values.map(Json::Array)
     }
 
-    /// A table that may be one of several: told apart by a tag, by which key it has, or by what fits best. `words` could
+    /// A table that may be one of several: distinguished by a tag, by its keys, or by the best fit. `words` could
     /// have stood in its place.
     fn choice(
         &mut self,

@@ -273,7 +273,7 @@ mod tests {
         let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
         let close = asked(0.95 * automatic.limit.step).unwrap();
         assert!(close.note.is_some_and(|note| note.contains("close to the critical time step")));
-        // A whole part of the duration, or the note tells that it is shortened.
+        // A whole part of the duration, or the note reports that it is shortened.
         let below = automatic.bound.step.min(0.9 * automatic.limit.step);
         assert_eq!(asked(0.1 / (0.1 / below).ceil()).unwrap().note, None);
         let refused = asked(1.001 * automatic.limit.step).unwrap_err().plain().to_string();

@@ -110,7 +110,7 @@ impl Node {
         Self { place: Place::CommandLine, key_span: None, value }
     }
 
-    /// A value of an option that is shown as typed, from where it stands in the part after [`SET`].
+    /// A value of an option that is shown as typed, from its place in the part after [`SET`].
     fn of_option(self, text: &Arc<str>) -> Self {
         let shift = |span: Range<usize>| span.start + SET.len()..span.end + SET.len();
         let place = match self.place {
@@ -504,7 +504,7 @@ fn node_of(
     Node { place: Place::File(span), key_span, value: owned }
 }
 
-/// Whether a key is given twice only because the table it stands in is.
+/// Whether a key is given twice only because its table is.
 fn repeats_table(table: &Diagnostic, key: &Diagnostic, text: &str) -> bool {
     let twice = |diagnostic: &Diagnostic| diagnostic.message.ends_with(GIVEN_TWICE);
     let (Some(header), Some(own)) = (&table.span, &key.span) else { return false };

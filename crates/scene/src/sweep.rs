@@ -464,7 +464,7 @@ impl Axis {
     }
 }
 
-/// The parts of a text between commas that stand in no brackets and no quotes.
+/// The parts of a text between commas outside brackets and quotes.
 fn split(text: &str) -> Vec<Range<usize>> {
     let (mut parts, mut start, mut depth, mut quote) = (Vec::new(), 0, 0_i32, None);
     let mut escaped = false;

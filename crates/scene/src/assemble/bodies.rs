@@ -326,7 +326,7 @@ fn parts(table: &BodyTable, block: &CellBlock) -> Vec<Part> {
     for cell in 0..block.len() as u32 {
         let label = labels.map(|labels| labels.item(cell as usize)[0].to_string());
         let label = label.as_deref();
-        // A label without a value has been told.
+        // A label without a value is already reported.
         let (Some(law), Some(&density)) = (table.law.of(label), table.density.of(label)) else { continue };
         let hourglass =
             table.hourglass.of(label).copied().filter(|_| has_hourglass).unwrap_or(Hourglass(0.0));

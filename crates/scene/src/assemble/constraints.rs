@@ -54,7 +54,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The motion of some nodes of a body (`None`: they are not known, which has been told).
+    /// The motion of some nodes of a body (`None`: they are unknown, which is already reported).
     fn motion(&mut self, table: &MoveTable, nodes: Option<(usize, &[u32])>, path: &[&str]) -> Option<Motion> {
         let curve = self.curve(&table.timing, path);
         if let Some(rotate) = &table.rotate {
@@ -187,7 +187,7 @@ impl Builder<'_> {
     }
 }
 
-/// A nearest node farther from its point than so many times the size of its body is doubted.
+/// A nearest node farther from its point than this many body sizes gives a warning.
 const FAR: f64 = 10.0;
 
 /// The points by which a selection takes nearest nodes, each with its distance [m] from the first of these.

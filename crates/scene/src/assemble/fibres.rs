@@ -34,7 +34,7 @@ struct Lost {
     help: &'static str,
 }
 
-/// A direction for each cell asked for, `None` where it is lost.
+/// A direction for each requested cell, `None` where it is undefined.
 type Directions = (Vec<Option<[f64; 3]>>, Lost);
 
 impl Builder<'_> {

@@ -9,7 +9,7 @@ use super::{Builder, suggestion};
 use crate::format::Cells;
 
 impl Builder<'_> {
-    /// How much of each of some cells of a body is filled; diagnostics where that can't be told.
+    /// How much of each of some cells of a body is filled; diagnostics where the data are missing or wrong.
     pub(super) fn fractions(
         &mut self,
         draft: &Draft<'_>,

@@ -1,4 +1,4 @@
-//! Meshes of segmented images and of surface files: read, cut out, cleaned and made of the cells asked for, or taken from the cache.
+//! Meshes of segmented images and of surface files: read, cut out, cleaned and meshed with the requested cells, or read from the cache.
 
 use std::cell::Cell;
 use std::f64::consts::FRAC_PI_3;
@@ -213,7 +213,7 @@ impl Builder<'_> {
     }
 }
 
-/// The labels that a table asks for, as far as the image has them, or the value from which on voxels are inside.
+/// The labels that a table requests, as far as the image has them, or the threshold above which voxels are inside.
 fn choice(image: &Image, table: &MeshTable) -> Result<Choice, Fault> {
     if let (Some(threshold), None) = (table.threshold, &table.masks) {
         return Ok(Choice::From(threshold));
@@ -297,7 +297,7 @@ impl Scan {
     }
 }
 
-/// What a table asks for.
+/// The request of a table.
 fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
     let refuse =
         |key, message: &str, help: &str| Err(Fault { key, message: message.into(), help: help.into() });
@@ -360,7 +360,7 @@ fn require_one_cut(table: &MeshTable) -> Result<(), Fault> {
     Ok(())
 }
 
-/// The cells that a table asks for: of the sizes that it gives exactly one that goes with them.
+/// The cells that a table requests, with exactly one size that fits them.
 fn goal(table: &MeshTable) -> Result<Goal, Fault> {
     let cells = table.made_of();
     let sizes = [
@@ -439,7 +439,7 @@ pub(super) fn words(cells: Cells) -> &'static str {
 }
 
 impl Fineness {
-    /// The edge of the cells [m], or of the first ones where a distance is asked for, given the box of the body [m].
+    /// The edge of the cells [m], or of the first ones where a distance is requested, given the box of the body [m].
     fn edge_in(&self, bounds: [Vector3; 2]) -> f64 {
         let chosen = self.distance.map_or(0.0, |distance| OrganTets::edge_for(distance, bounds));
         self.edge.unwrap_or(chosen)
@@ -478,7 +478,7 @@ impl Recipe {
         for protected in table.protect.iter().flatten() {
             let (label, edge) = protected.label_and_edge();
             let number = match label {
-                // The mesher refuses a number that no cell gets.
+                // The mesher rejects a number that no cell gets.
                 CellLabel::Number(number) => *number,
                 CellLabel::Name(_) => known.find(label).map_err(|error| {
                     let help =
@@ -616,7 +616,7 @@ impl Recipe {
     }
 }
 
-/// Fills an anatomy with labelled tets or hexes; what is doubtful about them comes along.
+/// Fills an anatomy with labelled tets or hexes; returns warnings about them.
 fn fill(
     anatomy: &Anatomy<'_>,
     cells: Cells,
@@ -654,7 +654,7 @@ fn extracted(anatomy: &Anatomy<'_>, voxel: f64) -> Result<TriangleMesh, MeshingE
     Ok(surface)
 }
 
-/// A surface in the triangles or shells asked for, and what is doubtful about it.
+/// A surface in the requested triangles or shells, with warnings about it.
 fn cover(
     mut surface: TriangleMesh,
     goal: &Goal,

@@ -384,7 +384,7 @@ impl Builder<'_> {
         }
     }
 
-    /// A carried surface has no cells whose stress could be told.
+    /// Rejects fields that need cells: a carried surface has no cells with stresses.
     fn refuse_cell_fields(&mut self, fields: &[FieldName], surface: usize, path: &[&str], help: &str) {
         let on_shell = self.corotational.as_ref().is_some_and(|part| part.carried.contains_key(&surface));
         if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {

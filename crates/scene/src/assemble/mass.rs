@@ -1,4 +1,4 @@
-//! Mass scaling, and what of `[run]` is for dynamics only.
+//! Mass scaling, and the keys of `[run]` that are for dynamics only.
 
 use pliant_explicit::critical_step;
 
@@ -7,7 +7,7 @@ use crate::diagnostic::{Diagnostic, counted};
 use crate::format::{LoadSteps, LoadTimes, SolverName, StepChoice};
 use crate::output::number;
 
-/// Added mass, as a fraction, from which on a scene is doubted.
+/// Added mass, as a fraction, above which a scene gives a warning.
 const MUCH: f64 = 0.05;
 
 impl Builder<'_> {

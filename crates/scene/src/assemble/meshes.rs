@@ -240,7 +240,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Applies the repairs a body's mesh asks for. Returns the number of each node in the file, empty if it is the same.
+    /// Applies the requested repairs of a body's mesh. Returns the number of each node in the file, empty if it is the same.
     pub(super) fn repair(&mut self, mesh: &mut Mesh, table: &MeshTable, path: &[&str]) -> Vec<u32> {
         let Some(fixes) = &table.fix else { return Vec::new() };
         let numbers = (0..mesh.points.len()).map(|node| node as f64).collect();

@@ -105,7 +105,7 @@ pub struct Meshing<'a> {
     pub now: &'static str,
 }
 
-/// As [`build_with`]; `watch` hears how far meshes of images are.
+/// As [`build_with`]; `watch` receives the progress of meshes of images.
 ///
 /// # Errors
 /// All mistakes that were found, with their places.

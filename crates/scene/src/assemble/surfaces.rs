@@ -10,7 +10,7 @@ use super::{Builder, MeshOrigin};
 use crate::diagnostic::Diagnostic;
 use crate::output::number;
 
-/// A point further from its body than this part of the body's size is doubted.
+/// A point farther from its body than this fraction of the body's size gives a warning.
 const FAR: f64 = 0.05;
 
 impl Builder<'_> {

@@ -47,7 +47,7 @@ pub(super) enum Action {
 /// A constraint of NiftySim, or the part of one that is the same everywhere.
 #[derive(Clone, Debug)]
 pub(super) struct Condition {
-    /// Where it stands in the XML.
+    /// Its line in the XML.
     pub line: u32,
     pub action: Action,
     pub shape: Shape,
@@ -59,7 +59,7 @@ pub(super) struct Condition {
     pub faces: Vec<Vec<u32>>,
 }
 
-/// What the reading of conditions has to tell.
+/// Remarks from reading the conditions.
 #[derive(Debug, Default)]
 pub(super) struct Remarks {
     pub notes: Vec<String>,
@@ -415,7 +415,7 @@ pub(super) fn sorted(mut nodes: Vec<u32>) -> Vec<u32> {
     nodes
 }
 
-/// A node that stands in a list more than once.
+/// A node that a list names more than once.
 fn repeated(nodes: &[u32]) -> Option<u32> {
     let mut nodes = nodes.to_vec();
     nodes.sort_unstable();

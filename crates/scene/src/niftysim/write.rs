@@ -20,9 +20,9 @@ const HILLY_POINTS: f64 = 2000.0;
 /// π as NiftySim has it, in the curve HILLY.
 #[expect(clippy::approx_constant, reason = "NiftySim's")]
 const PI: f64 = 3.14159_f32 as f64;
-/// From this excess over 1 on, in NiftySim's step after the total time, POLY345 is told to go on there.
+/// From this excess over 1 on, in NiftySim's step after the total time, POLY345 continues there.
 const TOLD_EXCESS: f64 = 1e-5;
-/// Frames of a model that asks for no output.
+/// Frames of a model that requests no output.
 const FRAMES: f64 = 20.0;
 
 /// Writes a model read from the file `stem`.xml.

@@ -78,7 +78,7 @@ impl Corotated {
             let tets = model.tets.par_iter().map(|tet| tet.stable_step());
             self.steps = [facets.collect(), tets.collect()];
         }
-        // An element that is folded over or inverted has ended the run before anyone looks at it.
+        // A folded or inverted element has ended the run before an observer sees it.
         let _ = self.shells.fill(model, state);
         let _ = self.solids.fill(model, state);
     }

@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Refuses a link, and whatever else is neither a regular file nor missing.
+/// Rejects a link and anything else that is neither a regular file nor missing.
 pub(crate) fn check_own(path: &Path) -> io::Result<()> {
     match fs::symlink_metadata(path) {
         Ok(found) if found.is_symlink() => Err(link(path)),
@@ -15,7 +15,7 @@ pub(crate) fn check_own(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Refuses a folder that is a link.
+/// Rejects a folder that is a link.
 pub(crate) fn check_own_folder(path: &Path) -> io::Result<()> {
     if path.is_symlink() { Err(link(path)) } else { Ok(()) }
 }

@@ -17,7 +17,7 @@ pub(crate) const SUMMARY: &str = "summary.md";
 pub(crate) const PLOT: &str = "plot.svg";
 /// Residuals of the iterations of a run that solves equations.
 pub(crate) const CONVERGENCE: &str = "convergence.csv";
-/// The picture of the last instant, if one was asked for.
+/// The picture of the last instant, if requested.
 pub(crate) const PICTURE: &str = "picture.png";
 /// Locked by the run that writes to the folder; holds the number of its process.
 const LOCK: &str = ".pliant-lock";
@@ -42,8 +42,8 @@ impl OutputFolder {
         Path::new("out").join(name)
     }
 
-    /// Makes the folder. One that holds something is refused unless `force` is given; then what an earlier run of the
-    /// same outputs left is removed, and nothing else.
+    /// Makes the folder. A non-empty folder is rejected unless `force` is given; then the files of an earlier run of the
+    /// same outputs are removed, and nothing else.
     ///
     /// # Errors
     /// If the folder holds something, holds a link where this run would write, is held by another run, or can't be
@@ -54,8 +54,7 @@ impl OutputFolder {
         Ok(folder)
     }
 
-    /// Makes the folder. One that holds something else than files called as `own` tells is refused unless `force` is
-    /// given.
+    /// Makes the folder. One with files for whose names `own` is false is rejected unless `force` is given.
     ///
     /// # Errors
     /// If the folder holds something, is held by another run, or can't be written to.
@@ -111,7 +110,7 @@ impl OutputFolder {
         Ok(Self { path, _lock: Arc::new(lock) })
     }
 
-    /// Removes what tells of a whole run and what a killed one left unfinished, before a resumed run goes on: pages
+    /// Before a resumed run continues, removes the files of a finished run and the unfinished files of a killed one: pages
     /// are there only of a run that has ended.
     pub(crate) fn go_on(&self, scene: &Scene) -> Result<(), OutputError> {
         let removed = || -> io::Result<()> {
@@ -190,7 +189,7 @@ impl Lock {
 }
 
 impl Drop for Lock {
-    /// The name goes before the lock does, so that nobody locks a file that is about to go.
+    /// The name is removed before the lock, so that no run locks a file about to disappear.
     fn drop(&mut self) {
         if is_at(&self.file, &self.path).unwrap_or(false) {
             let _ = fs::remove_file(&self.path);
@@ -254,7 +253,7 @@ fn has_ended(folder: &Path, scene: &Scene, time: f64) -> bool {
     pages && outputs()
 }
 
-/// Removes what an earlier run of the same outputs left, so that no file tells of another run than its neighbours.
+/// Removes the files of an earlier run of the same outputs, so that all files belong to one run.
 /// A CSV file stays until it is written anew.
 fn remove_earlier(folder: &Path, scene: &Scene) -> Result<(), OutputError> {
     check_links(folder, scene)?;

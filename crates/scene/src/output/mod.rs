@@ -124,17 +124,17 @@ impl Schedule {
         schedule
     }
 
-    /// Whether an instant is still to be looked at.
+    /// Whether the observer has yet to see an instant.
     pub fn awaits(&self, time: f64, step: f64, last: bool) -> bool {
         last || time + 0.5 * step >= self.seen as f64 * self.every
     }
 
-    /// How many steps may go on from a time without missing an instant to be looked at; at least one.
+    /// How many steps from a time miss no instant that the observer has to see; at least one.
     pub fn stride(&self, time: f64, step: f64) -> u64 {
         steps_to(self.seen as f64 * self.every, time, step)
     }
 
-    /// Whether an instant is to be looked at; from now on it is not.
+    /// Whether the observer has to see an instant; it then counts as seen.
     pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
         let due = self.awaits(time, step, last);
         if due {

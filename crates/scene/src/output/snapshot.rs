@@ -10,7 +10,7 @@ use crate::assemble::{BodyCells, Built, Corotational};
 use crate::format::{At, FieldName, VtuTable};
 use crate::world::{Part, World};
 
-/// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of whatever participants.
+/// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of any participants.
 pub(crate) struct Snapshot {
     /// Participants that are shown, by number.
     parts: Vec<(usize, Own)>,
@@ -32,7 +32,7 @@ impl Snapshot {
 
     /// The mesh, with the fields of the last instant.
     pub fn mesh(&self) -> &Mesh {
-        // A series of a body that there is not is refused when the scene is built.
+        // A series of an unknown body is rejected when the scene is built.
         self.merged.as_ref().unwrap_or_else(|| &self.parts[0].1.mesh)
     }
 

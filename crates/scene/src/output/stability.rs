@@ -13,7 +13,7 @@ use crate::diagnostic::counted;
 use crate::run::PartOutcome;
 use crate::world::Part;
 
-/// Hourglass energy, as a fraction of the internal one, from which on a run is doubted.
+/// Hourglass energy, as a fraction of the internal one, above which a run gives a warning.
 const MUCH_HOURGLASS: f64 = 0.05;
 
 /// The monitored critical time step.
@@ -21,9 +21,9 @@ const MUCH_HOURGLASS: f64 = 0.05;
 pub struct StabilitySummary {
     /// What the run does when the limit falls below its step.
     pub on_unstable: OnUnstable,
-    /// How often the limit was looked at.
+    /// How often the limit was checked.
     pub checks: u64,
-    /// The smallest limit seen [s]; `None` if it was never looked at.
+    /// The smallest limit seen [s]; `None` if it was never checked.
     pub smallest_limit: Option<f64>,
     /// The smallest limit over the running step.
     pub limit_over_step: Option<f64>,

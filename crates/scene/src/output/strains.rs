@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::number;
 use crate::assemble::{BodyCells, Built};
 
-/// Strain from which on a run of shells is doubted.
+/// Strain above which a run of shells gives a warning.
 const MUCH: f64 = 0.1;
 
 /// The largest strain of a shell during a run.

@@ -18,7 +18,7 @@ use crate::run::{History, Outcome, PartOutcome};
 use crate::solver::{Effort, Equilibria};
 use crate::world::{Part, World};
 
-/// The status of a run that was told to stop.
+/// The status of a stopped run.
 pub(crate) const INTERRUPTED: &str = "interrupted";
 
 /// The result of a run.
@@ -52,7 +52,7 @@ pub struct Summary {
     pub equilibria: Option<Equilibria>,
     /// Why a path by arc length ended before its last load step; `null` of all others.
     pub ended: Option<String>,
-    /// How far each shell was strained at most, of the instants that were looked at (up to 1000).
+    /// The largest strain of each shell, over up to 1000 sampled instants.
     pub shell_strains: Vec<StrainSummary>,
     /// The device: `cpu`, or the name of the GPU.
     pub device: String,
@@ -159,7 +159,7 @@ pub struct LoadStepSummary {
     pub residual: Option<f64>,
 }
 
-/// Why a run failed or an input was refused.
+/// Why a run failed or an input was rejected.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureSummary {
     /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `device`, `output`, `input` or `interrupted`.
@@ -196,7 +196,7 @@ fn as_map<S: Serializer>(pairs: &[(String, [f64; 3])], serializer: S) -> Result<
     serializer.collect_map(pairs.iter().map(|(name, force)| (name, force)))
 }
 
-/// The JSON object of an input that was refused: the keys of [`Summary`], empty where nothing was built.
+/// The JSON object of a rejected input: the keys of [`Summary`], empty where nothing was built.
 pub fn failed_input(message: &str) -> Json {
     empty("invalid", FailureSummary::about("input", message.into(), None))
 }
@@ -223,7 +223,7 @@ impl FailureSummary {
         Self::about("output", message, time)
     }
 
-    /// A run that was told to stop, and the checkpoint it left.
+    /// A stopped run, and the checkpoint it left.
     pub(crate) fn interrupted(time: f64, checkpoint: Option<&Path>) -> Self {
         let way = match checkpoint {
             Some(path) => format!("go on with `--resume {}`", path.display()),
@@ -248,7 +248,7 @@ impl FailureSummary {
         }
     }
 
-    /// A scene that should have been refused before.
+    /// A scene that should have been rejected before.
     pub(crate) fn input(error: &dyn std::fmt::Display) -> Self {
         Self::about("input", error.to_string(), None)
     }

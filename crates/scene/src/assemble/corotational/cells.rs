@@ -168,7 +168,7 @@ impl Builder<'_> {
             let material = match known.get(&label) {
                 Some(&material) => material,
                 None => {
-                    // A label without a value has been told.
+                    // A label without a value is already reported.
                     let law = table.law.of(label.as_deref())?;
                     let density = table.density.of(label.as_deref())?.0;
                     let path = bodies::law_path(name, &given.law, law);

@@ -328,7 +328,7 @@ impl Corotational {
         facets.peek().is_some() && facets.all(|facet| !facet.bends())
     }
 
-    /// Each part of the model in words with a number that tells it from others; see [`fingerprint`].
+    /// Each part of the model in words, with its [`fingerprint`].
     pub(crate) fn fingerprints(&self) -> Vec<(String, u64)> {
         let model = &self.model;
         vec![
@@ -411,7 +411,7 @@ mod tests {
         }
     }
 
-    /// A plate that starts turned by a right angle, as a table tells, is not strained: its nodes have turned with it.
+    /// A plate that starts rotated by a right angle, as in a table, is not strained: its nodes have turned with it.
     #[test]
     fn a_start_that_is_a_rotation_costs_nothing() {
         let folder = tempfile::tempdir().unwrap();
