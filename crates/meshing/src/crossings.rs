@@ -24,24 +24,61 @@ impl RTreeObject for Boxed {
 /// Pairs of intersecting triangles, smaller number first, increasing, and a point of the first intersection
 /// [m].
 pub(crate) fn crossings(points: &[Vector3], triangles: &[[u32; 3]]) -> (Vec<[u32; 2]>, Option<Vector3>) {
-    let boxed = |(number, nodes): (u32, &[u32; 3])| {
-        let [a, b, c] = nodes.map(|n| points[n as usize]);
-        Boxed { number, low: a.inf(&b).inf(&c), high: a.sup(&b).sup(&c) }
+    crossing_groups(points, triangles, 1, |_| true)
+}
+
+/// The same of groups of so many triangles each, one after the other. A group may cross itself: it is a pair with itself then. Of each
+/// pair that counts at least one is looked at.
+pub(crate) fn crossing_groups(
+    points: &[Vector3],
+    triangles: &[[u32; 3]],
+    each: usize,
+    is_looked_at: impl Fn(u32) -> bool + Sync,
+) -> (Vec<[u32; 2]>, Option<Vector3>) {
+    let boxed = |nodes: &[[u32; 3]]| {
+        let start = points[nodes[0][0] as usize];
+        nodes.as_flattened().iter().map(|&n| points[n as usize]).fold([start; 2], widened)
     };
-    let tree = RTree::bulk_load((0..).zip(triangles).map(boxed).collect());
-    let of = |own: usize| {
-        let envelope = boxed((own as u32, &triangles[own])).envelope();
-        let near = tree.locate_in_envelope_intersecting(envelope).map(|other| other.number);
-        let crossing = |&other: &u32| {
-            other as usize > own && meet(points, triangles[own], triangles[other as usize]).is_some()
+    let boxes: Vec<[Vector3; 2]> = triangles.par_chunks(each).map(boxed).collect();
+    let numbered = |(number, &[low, high]): (u32, &[Vector3; 2])| Boxed { number, low, high };
+    let tree = RTree::bulk_load((0..).zip(&boxes).map(numbered).collect());
+    let group = |number: u32| &triangles[number as usize * each..][..each];
+    let within = |number: u32, [low, high]: [Vector3; 2]| {
+        let reaches = move |nodes: &&[u32; 3]| {
+            let [a, b, c] = nodes.map(|n| &points[n as usize]);
+            (0..3).all(|k| a[k].min(b[k]).min(c[k]) <= high[k] && a[k].max(b[k]).max(c[k]) >= low[k])
         };
-        let mut others: Vec<u32> = near.filter(crossing).collect();
-        others.sort_unstable();
-        others.into_iter().map(move |other| [own as u32, other])
+        group(number).iter().filter(reaches)
     };
-    let pairs: Vec<[u32; 2]> = (0..triangles.len()).into_par_iter().flat_map_iter(of).collect();
-    let place = pairs.first().and_then(|&[s, t]| meet(points, triangles[s as usize], triangles[t as usize]));
+    let meeting = |own: u32, other: u32| {
+        let [a, b] = [own, other].map(|number| boxes[number as usize]);
+        let both = [a[0].sup(&b[0]), a[1].inf(&b[1])];
+        within(own, both).find_map(|&s| {
+            let near = s.iter().map(|&n| points[n as usize]).fold([points[s[0] as usize]; 2], widened);
+            within(other, [near[0].sup(&both[0]), near[1].inf(&both[1])]).find_map(|&t| meet(points, s, t))
+        })
+    };
+    let of = |own: u32| {
+        let [low, high] = boxes[own as usize];
+        let near = tree.locate_in_envelope_intersecting(AABB::from_corners(low.into(), high.into()));
+        let looked = is_looked_at(own);
+        let others = near.map(|other| other.number).filter(|&other| {
+            (other > own || each > 1 && other == own)
+                && (looked || is_looked_at(other))
+                && meeting(own, other).is_some()
+        });
+        let mut others: Vec<u32> = others.collect();
+        others.sort_unstable();
+        others.into_iter().map(move |other| [own, other])
+    };
+    let pairs: Vec<[u32; 2]> = (0..boxes.len() as u32).into_par_iter().flat_map_iter(of).collect();
+    let place = pairs.first().and_then(|&[own, other]| meeting(own, other));
     (pairs, place)
+}
+
+/// A box made to hold a point.
+fn widened([low, high]: [Vector3; 2], x: Vector3) -> [Vector3; 2] {
+    [low.inf(&x), high.sup(&x)]
 }
 
 impl TriangleMesh {
@@ -68,7 +105,8 @@ fn meet(points: &[Vector3], s: [u32; 3], t: [u32; 3]) -> Option<Vector3> {
     if s.iter().filter(|n| t.contains(n)).count() > 1 {
         return None;
     }
-    [(s, t), (t, s)].into_iter().find_map(|(own, other)| {
+    let reaching = |&(own, other): &([u32; 3], [u32; 3])| !is_beside(points, other, own);
+    [(s, t), (t, s)].into_iter().filter(reaching).find_map(|(own, other)| {
         (0..3).find_map(|k| {
             let edge = [own[k], own[(k + 1) % 3]];
             if edge.iter().any(|n| other.contains(n)) {
@@ -77,6 +115,15 @@ fn meet(points: &[Vector3], s: [u32; 3], t: [u32; 3]) -> Option<Vector3> {
             pierced(edge.map(|n| points[n as usize]), other.map(|n| points[n as usize]))
         })
     })
+}
+
+/// Whether a triangle lies on one side of the plane of another, or touches it. No edge of it pierces the other then.
+fn is_beside(points: &[Vector3], plane: [u32; 3], triangle: [u32; 3]) -> bool {
+    let [a, b, c] = plane.map(|n| points[n as usize]);
+    let normal = (b - a).cross(&(c - a));
+    let heights =
+        triangle.map(|n| if plane.contains(&n) { 0.0 } else { normal.dot(&(points[n as usize] - a)) });
+    heights.iter().all(|&h| h >= 0.0) || heights.iter().all(|&h| h <= 0.0)
 }
 
 /// Where a segment pierces a triangle, edges included: where a body meets its mirror image, edges cross edges.
@@ -97,6 +144,27 @@ fn pierced([p, q]: [Vector3; 2], [a, b, c]: [Vector3; 3]) -> Option<Vector3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Fans of triangles at places of a sequence that repeats itself no sooner than the test ends.
+    #[test]
+    fn groups_cross_where_triangles_of_theirs_do() {
+        let place =
+            |k: usize| [0.618, 0.414, 0.732].map(|x| (x * k as f64 + 0.1 * (k * k % 17) as f64).fract());
+        let points: Vec<Vector3> = (0..180).map(|k| Vector3::from(place(k))).collect();
+        let triangles: Vec<[u32; 3]> = (0..60)
+            .flat_map(|k| [[3 * k, 3 * k + 1, 3 * k + 2], [3 * k, 3 * k + 2, (3 * k + 4) % 180]])
+            .collect();
+        let singles = crossings(&points, &triangles).0;
+        for (each, odd_only) in [(2, false), (4, false), (4, true)] {
+            let is_looked_at = |group: u32| !odd_only || group % 2 == 1;
+            let mut expected: Vec<[u32; 2]> = singles.iter().map(|pair| pair.map(|t| t / each)).collect();
+            expected.retain(|pair| pair.iter().any(|&group| is_looked_at(group)));
+            expected.sort_unstable();
+            expected.dedup();
+            assert!(expected.len() > 10 && expected.len() < singles.len());
+            assert_eq!(crossing_groups(&points, &triangles, each as usize, is_looked_at).0, expected);
+        }
+    }
 
     #[test]
     fn two_triangles_cross_touch_or_share_an_edge() {

@@ -1,8 +1,8 @@
 //! Curved shells of closed surfaces that fold: a flap, a thin gap, a sharp rim. Normals stand within 60° of their triangles, or there are
-//! none; what the report tells is what the mesh holds.
+//! none; shells do not cross; what the report tells is what the mesh holds.
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
-use pliant_meshing::{DEFAULT_CELL_LIMIT, FittedShells, ImplicitField, ShellGoal, TriangleMesh};
+use pliant_meshing::{DEFAULT_CELL_LIMIT, FittedShells, Flaw, ImplicitField, ShellGoal, TriangleMesh};
 
 /// A body of a signed distance, positive inside, within ± 25 mm.
 struct Body(fn(&Vector3) -> f64);
@@ -70,6 +70,7 @@ fn fitted(name: &str, body: fn(&Vector3) -> f64, goal: ShellGoal) -> FittedShell
     assert!(angle <= 60.0, "{name}: {angle}");
     assert_eq!(fitted.report.creases.count, without);
     assert_eq!(fitted.report.creases.place.is_some(), without > 0);
+    assert_eq!(fitted.report.crossings, Flaw::default(), "{name}");
     fitted
 }
 
@@ -81,9 +82,22 @@ fn normals_stand_on_their_triangles_at_a_fold_with_a_thin_gap() {
 }
 
 #[test]
-#[ignore = "20 to 30 s; the fold goes the same way"]
+#[ignore = "about a minute each"]
 fn normals_stand_on_their_triangles_at_flaps_and_sharp_rims() {
     for (name, body) in [("flap", flap as fn(&Vector3) -> f64), ("lens", lens)] {
         fitted(name, body, FEW);
+    }
+}
+
+/// 1 % is out of reach; the report says so, of the shells that were repaired.
+#[test]
+#[ignore = "about a minute each"]
+fn shells_of_a_fold_do_not_cross_where_the_goal_is_out_of_reach() {
+    let report = fitted("fold", fold, ShellGoal::Error(0.01)).report;
+    let off = report.distances.largest() / report.diagonal;
+    assert_eq!(report.reached, off <= 0.01);
+    if !report.reached {
+        let told = format!("the best so far is {:.3} %", 100.0 * off);
+        assert!(report.warnings()[0].contains(&told), "{report}");
     }
 }

@@ -1,6 +1,6 @@
 //! Where shells pass through themselves or each other: small flat pieces of the curved surface, of which an edge of one pierces the other.
 //! No step of the fit makes flat triangles cross, nor curved ones once normals stand. Curved shells that cross all the same are flattened
-//! and halved; at the end what is left is flattened as long as that helps.
+//! and halved; at the end what is left is flattened as long as that helps, then repaired (`repair`).
 //! Leaves out: pieces that share an edge.
 
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use rstar::{AABB, RTree, primitives::Rectangle};
 
 use super::Shells;
 use super::measure::pieces;
-use crate::crossings::crossings;
+use crate::crossings::crossing_groups;
 use crate::hausdorff::lattice;
 
 /// Parts of an edge between the corners of pieces: while the fit goes on, and at its end if the shells are few.
@@ -27,20 +27,45 @@ const STEPS: usize = 5;
 /// Shells that cross others or themselves.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Crossing {
-    /// Numbers of their triangles, increasing.
-    pub(super) shells: Vec<u32>,
-    /// A point where two of them meet [m].
+    /// Pairs of numbers of their triangles, smaller first, increasing. What crosses itself is a pair with itself.
+    pub(super) pairs: Vec<[u32; 2]>,
+    /// A point where the first pair meets [m].
     pub(super) place: Option<Vector3>,
+}
+
+impl Crossing {
+    /// Numbers of their triangles, increasing.
+    pub(super) fn shells(&self) -> Vec<u32> {
+        let mut shells = self.pairs.as_flattened().to_vec();
+        shells.sort_unstable();
+        shells.dedup();
+        shells
+    }
 }
 
 impl Shells {
     pub(super) fn crossing(&self) -> Crossing {
-        let few = self.mesh.len() * FINE * FINE <= MOST_PIECES;
-        self.crossing_of(self.mesh.alive().collect(), if few { FINE } else { COARSE })
+        self.crossing_of(self.mesh.alive().collect(), self.parts_in_the_end(), |_| true)
+    }
+
+    /// Parts of an edge in which all are looked at in the end.
+    fn parts_in_the_end(&self) -> usize {
+        if self.mesh.len() * FINE * FINE <= MOST_PIECES { FINE } else { COARSE }
     }
 
     /// Shells that cross among those that move and what is near them, looked at in pieces of so many parts of an edge.
     pub(super) fn crossing_near_moving(&self, parts: usize) -> Vec<u32> {
+        self.crossing_of(self.near(|shell| self.moves(shell)), parts, |_| true).shells()
+    }
+
+    /// How many pairs cross of which one at least moves, looked at as in the end.
+    pub(super) fn crossing_with_moving(&self) -> usize {
+        let moves = |shell: u32| self.moves(shell);
+        self.crossing_of(self.near(moves), self.parts_in_the_end(), moves).pairs.len()
+    }
+
+    /// Some shells and those that may touch them.
+    fn near(&self, is_one: impl Fn(u32) -> bool) -> Vec<u32> {
         let alive: Vec<u32> = self.mesh.alive().collect();
         let boxed = |&t: &u32| {
             let patch = self.patch(t);
@@ -51,12 +76,12 @@ impl Shells {
         // The middle control point lies outside the box of the others by less than a quarter of its size.
         let grown = |[low, high]: [Vector3; 2]| [low - 0.25 * (high - low), high + 0.25 * (high - low)];
         let boxes: Vec<[Vector3; 2]> = alive.par_iter().map(boxed).map(grown).collect();
-        let moving: Vec<bool> = alive.iter().map(|&t| self.moves(t)).collect();
+        let ones: Vec<bool> = alive.iter().map(|&t| is_one(t)).collect();
         let tree = RTree::bulk_load(
             boxes
                 .iter()
-                .zip(&moving)
-                .filter(|(_, moving)| **moving)
+                .zip(&ones)
+                .filter(|(_, is_one)| **is_one)
                 .map(|([low, high], _)| Rectangle::from_corners((*low).into(), (*high).into()))
                 .collect(),
         );
@@ -64,19 +89,19 @@ impl Shells {
             let own: AABB<[f64; 3]> = AABB::from_corners((*low).into(), (*high).into());
             tree.locate_in_envelope_intersecting(own).next().is_some()
         };
-        let kept = alive.iter().zip(&boxes).filter(|(_, own)| near(own)).map(|(&t, _)| t).collect();
-        self.crossing_of(kept, parts).shells
+        alive.iter().zip(&boxes).filter(|(_, own)| near(own)).map(|(&t, _)| t).collect()
     }
 
-    fn crossing_of(&self, shells: Vec<u32>, parts: usize) -> Crossing {
-        let (points, triangles) = self.in_pieces(&shells, parts);
-        let each = triangles.len() / shells.len().max(1);
-        let (pairs, place) = crossings(&points, &triangles);
-        let mut crossing: Vec<u32> =
-            pairs.as_flattened().iter().map(|&piece| shells[piece as usize / each]).collect();
-        crossing.sort_unstable();
-        crossing.dedup();
-        Crossing { shells: crossing, place }
+    fn crossing_of(
+        &self,
+        shells: Vec<u32>,
+        parts: usize,
+        is_looked_at: impl Fn(u32) -> bool + Sync,
+    ) -> Crossing {
+        let (points, pieces) = self.in_pieces(&shells, parts);
+        let looked = |at: u32| is_looked_at(shells[at as usize]);
+        let (pairs, place) = crossing_groups(&points, &pieces, parts * parts, looked);
+        Crossing { pairs: pairs.into_iter().map(|pair| pair.map(|at| shells[at as usize])).collect(), place }
     }
 
     /// The curved surface in flat pieces, those of a shell one after the other. Neighbours share the points of their edge.
@@ -103,12 +128,12 @@ impl Shells {
         }
         let mut now = self.crossing();
         for step in 1..=STEPS {
-            if now.shells.is_empty() {
+            if now.pairs.is_empty() {
                 return;
             }
             let mut tried = self.clone();
             let mut nodes: Vec<u32> =
-                now.shells.iter().flat_map(|&t| self.mesh.triangles[t as usize]).collect();
+                now.shells().iter().flat_map(|&t| self.mesh.triangles[t as usize]).collect();
             nodes.sort_unstable();
             nodes.dedup();
             let part = step as f64 / STEPS as f64;
@@ -119,7 +144,7 @@ impl Shells {
                 tried.stand(node);
             }
             let then = tried.crossing();
-            if then.shells.len() < now.shells.len() {
+            if then.shells().len() < now.shells().len() {
                 (*self, now) = (tried, then);
             }
         }

@@ -179,7 +179,7 @@ impl Shells {
             reached,
             stopped: stopped && !reached,
             creases: Flaw::of(creases.len(), creases.first().map(|&n| self.mesh.points[n])),
-            crossings: Flaw::of(crossing.shells.len(), crossing.place),
+            crossings: Flaw::of(crossing.shells().len(), crossing.place),
         };
         FittedShells { mesh, error_map, report }
     }

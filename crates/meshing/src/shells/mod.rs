@@ -1,8 +1,9 @@
 //! A fine surface by few curved shells: cubic Bézier triangles ([`CurvedTriangle`]) whose vertices and normals are fitted to it.
 //! A decimated surface starts; then, round by round, the shells that are too far off, either way, are halved at their longest edges, and
 //! round them triangles are evened out and fitted again, while the others rest. What is reached is looked at more closely before it counts.
-//! Normals stand within 60° of their triangles and shells do not pass through each other: where they would, they are halved, too. The
-//! work is bounded, by a count that is the same on every machine; what was closest by then is the result.
+//! Normals stand within 60° of their triangles and shells do not pass through each other: where they would, they are halved, too.
+//! What crosses in the end is repaired (`repair`). The work is bounded, by a count that is the same on every machine; what was closest by
+//! then is the result.
 //! Leaves out: creases of the target, but where it folds too sharply for one normal; edges that bend more than their end normals tell.
 
 mod crossing;
@@ -10,6 +11,7 @@ mod effort;
 mod fit;
 mod measure;
 mod refine;
+mod repair;
 mod report;
 mod solve;
 mod target;
@@ -245,6 +247,7 @@ impl<'t> Fit<'t> {
         shells.require_upright();
         shells.activate((0..shells.mesh.points.len() as u32).collect());
         shells.uncross();
+        shells.repair(target);
         shells.finished(target, self.rounds, self.goal, !ended)
     }
 
@@ -281,7 +284,7 @@ impl<'t> Fit<'t> {
     fn flaws(&self) -> [Vec<u32>; 2] {
         let mesh = &self.shells.mesh;
         let creased = |t: &u32| mesh.triangles[*t as usize].iter().any(|&n| self.shells.creased[n as usize]);
-        [mesh.alive().filter(creased).collect(), self.shells.crossing().shells]
+        [mesh.alive().filter(creased).collect(), self.shells.crossing().shells()]
     }
 
     /// Whether halving a shell may mend it.

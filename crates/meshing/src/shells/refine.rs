@@ -14,6 +14,9 @@ const GOOD_SHAPE: f64 = 0.75;
 /// Triangles are worth less where the cosine to the normal of a corner is below this.
 const ALONG: f64 = 0.3;
 
+/// Points nearer to each other than this part of the diagonal coincide.
+const COINCIDING: f64 = 1e-9;
+
 /// Searches to move a point along the target.
 const SEARCHES: usize = 5;
 
@@ -209,8 +212,8 @@ impl Shells {
             touched.resize(self.mesh.triangles.len(), true);
             let middle = 0.5 * (self.mesh.points[a as usize] + self.mesh.points[b as usize]);
             self.place(fresh, target);
-            if self.is_crossed_round(fresh) {
-                // As it was, which crosses nothing new.
+            if self.is_crossed_round(fresh) || self.reach(fresh) <= COINCIDING * target.diagonal {
+                // As it was, which crosses nothing new. Points that fall on each other would have no curve between them.
                 self.mesh.points[fresh as usize] = middle;
                 self.stand(fresh);
             }
