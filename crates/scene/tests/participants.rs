@@ -213,3 +213,24 @@ fn mistakes_of_participants_are_underlined() {
         assert!(told.contains(says), "{told}\n{text}");
     }
 }
+
+#[test]
+fn solids_of_different_steps_and_precisions_go_together() {
+    let place = tempfile::tempdir().unwrap();
+    let soft = "[law.soft]\ntype = 'neo-hookean'\nyoung-modulus = 10e3\npoisson-ratio = 0.3\n";
+    let bar = "[body.bar]\nmesh = { block = { size = [0.2, 0.1, 0.1], cells = [4, 2, 2] }, as = 'hexes' }\nlaw = 'soft'\n\
+               density = 1000\n[constraint.end]\ntype = 'fix'\nbody = 'bar'\nnodes = { set = 'x-min' }\n";
+    let table = "[participant.slow]\nbodies = ['bar']\nprecision = 'single'\n";
+    let two = world(&format!("{HEAD}{table}{LAWS}{soft}{SOLID}{bar}{OUTPUTS}"));
+    let summary = run(&two, &place.path().join("two"));
+    let [slow, fast] = &summary.participants[..] else { panic!("two participants") };
+    assert_eq!((slow.precision, fast.precision), ("single", "double"));
+    assert!(fast.steps >= 8 * slow.steps, "{} {}", fast.steps, slow.steps);
+    let alone = format!("{HEAD}[run]\nprecision = 'single'\nstep = {:e}\n{soft}{bar}{OUTPUTS}", slow.step);
+    run(&world(&alone), &place.path().join("bar"));
+    let [both, bar] = ["two", "bar"].map(|name| last_row(&place.path().join(name)));
+    for axis in ["x", "y", "z"] {
+        let column = format!("reaction.end.{axis}");
+        assert_eq!(value(&both, &column), value(&bar, &column));
+    }
+}

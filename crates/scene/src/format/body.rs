@@ -14,7 +14,7 @@ use super::NodeVectors;
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyTable {
-    /// How it is modelled. All bodies of a scene are `solid`, or none is.
+    /// How it is modelled. Solids and other bodies of a scene are different participants (`[participant.NAME]`).
     #[serde(default)]
     pub model: BodyModel,
     /// Its mesh, from a file, a built-in shape, or a segmented image. A shell's mesh is of triangles (quads are cut into
@@ -60,7 +60,7 @@ pub struct BodyTable {
     /// stiffness and mass are so much smaller, but never less than a tenth. If not given, `fraction` of `immersed-hexes`.
     #[serde(default)]
     pub fraction: Option<String>,
-    /// Mass-proportional damping [1/s]. All shells and co-rotational solids of a scene have the same.
+    /// Mass-proportional damping [1/s]. All shells and co-rotational solids of a participant have the same.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub damping: f64,

@@ -58,20 +58,20 @@ pub struct RunTable {
     /// Where the solver runs.
     #[serde(default)]
     pub device: DeviceName,
-    /// The graphics processor, by a part of its name in `pliant devices`; if not given, the best one.
+    /// The GPU, by a part of its name in `pliant devices`; if not given, the best one.
     #[serde(default)]
     pub adapter: Option<String>,
-    /// How the kernels of a graphics processor bring forces from cells to nodes; if not given, the way that measured best.
+    /// How the kernels of a GPU bring forces from cells to nodes; if not given, the way that measured best.
     #[serde(default)]
     pub design: Option<Design>,
-    /// Number type of the solver; if not given, `double` on the processor and `single` on a graphics processor, which has
+    /// Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has
     /// no other.
     #[serde(default)]
     pub precision: Option<Precision>,
     /// How the state goes from instant to instant.
     #[serde(default)]
     pub solver: SolverName,
-    /// Time step [s], made a little shorter where it does not divide the duration; `auto`: 0.9 × the true limit of the assembled
+    /// Time step [s], made a little shorter where it does not divide the duration; `auto`: 0.9 × the critical time step of the assembled
     /// model at rest, `load-steps` where the solver is `quasi-static` or `static`, and 0.01 s where it is `implicit`.
     #[serde(default)]
     pub step: StepChoice,
@@ -210,12 +210,12 @@ impl SolverName {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DeviceName {
-    /// The processor.
+    /// The CPU.
     #[default]
     Cpu,
-    /// A graphics processor.
+    /// A GPU.
     Gpu,
-    /// A graphics processor where there is one and it can run the scene, else the processor; the run says which and why.
+    /// A GPU where there is one and it can run the scene, else the CPU; the run says which and why.
     Auto,
 }
 
