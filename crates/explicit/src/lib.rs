@@ -4,26 +4,20 @@
 //! [`Model`] is constant, [`State`] changes, [`CentralDifference`] advances a state on a model:
 //!
 //! ```
-//! use pliant_mechanics::curve::{Curve, Shape};
-//! use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
-//! use pliant_mechanics::load::{Load, LoadKind};
-//! use pliant_mechanics::model::{Body, Cells, Constraint, Material, Model, Motion, Solid};
 //! use pliant_explicit::{CentralDifference, State, critical_step};
+//! use pliant_mechanics::Model;
+//! use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+//! use pliant_mechanics::load::Load;
+//! use pliant_mechanics::model::{Cells, Material, Solid};
 //!
 //! // One tetrahedron, one face held, falling under its own weight.
-//! let rest = vec![[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
-//! let mut model = Model { mass: vec![0.0; 4], rest, ..Model::default() };
-//! model.bodies.push(Body { name: "block".into(), nodes: 0..4, damping: 0.0 });
-//! let volumetric = Volumetric::quadratic(10_000.0);
-//! let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric });
-//! let material = Material { law, prony: Default::default(), density: 1000.0 };
+//! let mut model = Model::default();
+//! let tet = model.add_body("tet", &[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
+//! let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
 //! let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
-//! model.add_solid(Solid { body: 0, material, cells, fibre: vec![], original: vec![0] });
-//! let motion = Motion::Fixed;
-//! model.constraints.push(Constraint { name: "base".into(), nodes: vec![0, 1, 2], components: [true; 3], motion });
-//! let gravity = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -9.81] };
-//! let curve = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
-//! model.loads.push(Load { name: "gravity".into(), kind: gravity, curve, surface: None });
+//! model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
+//! model.fix("base", vec![0, 1, 2]);
+//! model.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
 //!
 //! let step = 0.9 * critical_step::element_bound(&model).unwrap().step;
 //! let mut state = State::<f64>::at_rest(&model);

@@ -1,6 +1,6 @@
 //! Loads: nodal forces, tractions per reference area, pressure that follows the deformed surface, gravity.
 
-use crate::curve::Curve;
+use crate::curve::{Curve, Shape};
 use crate::mapping::Mapping;
 use crate::tensor::{Vector, add, cross, scale, sub};
 
@@ -45,6 +45,13 @@ pub enum LoadKind {
 }
 
 impl Load {
+    /// The weight of a body under a constant acceleration [m/s²].
+    pub fn gravity(body: usize, acceleration: Vector<f64>) -> Self {
+        let kind = LoadKind::Gravity { body, acceleration };
+        let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
+        Self { name: "gravity".into(), kind, curve, surface: None }
+    }
+
     /// Adds the nodal forces [N] at a time. `position` gives the current place of a (carried or own) node; gravity is
     /// not added here: it acts through the masses.
     pub fn add_forces(

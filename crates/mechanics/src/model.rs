@@ -76,6 +76,13 @@ pub struct Material {
     pub density: f64,
 }
 
+impl Material {
+    /// A law without relaxation, and the density [kg/m³].
+    pub fn elastic(law: AnyLaw, density: f64) -> Self {
+        Self { law, prony: Prony::default(), density }
+    }
+}
+
 /// The cells of one body that share an element and a material.
 #[derive(Clone, Debug)]
 pub struct Solid {
@@ -92,6 +99,12 @@ pub struct Solid {
 }
 
 impl Solid {
+    /// Cells of a body without fibres, in the order of the user's mesh.
+    pub fn new(body: usize, material: Material, cells: Cells) -> Self {
+        let original = (0..cells.len() as u32).collect();
+        Self { body, material, cells, fibre: Vec::new(), original }
+    }
+
     /// The directions of the families of fibres in a cell, at rest.
     pub fn fibres(&self, cell: usize) -> &[Vector<f64>] {
         let families = self.material.law.families();
@@ -588,6 +601,42 @@ pub struct Contradiction {
 pub const FREE: u32 = u32::MAX;
 
 impl Model {
+    /// Adds a body of nodes at rest [m], without mass or damping; its number. Solids give it cells and mass, constraints hold it.
+    ///
+    /// ```
+    /// use pliant_mechanics::Model;
+    /// use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+    /// use pliant_mechanics::load::Load;
+    /// use pliant_mechanics::model::{Cells, Material, Solid};
+    ///
+    /// let mut model = Model::default();
+    /// let tet = model.add_body("tet", &[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
+    /// let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
+    /// let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
+    /// model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
+    /// model.fix("base", vec![0, 1, 2]);
+    /// model.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
+    /// assert!((model.mass.iter().sum::<f64>() - 1000.0 * 0.1_f64.powi(3) / 6.0).abs() < 1e-12);
+    /// ```
+    pub fn add_body(&mut self, name: &str, rest: &[Vector<f64>]) -> usize {
+        let first = self.rest.len() as u32;
+        self.rest.extend_from_slice(rest);
+        self.mass.resize(self.rest.len(), 0.0);
+        self.bodies.push(Body { name: name.into(), nodes: first..self.rest.len() as u32, damping: 0.0 });
+        self.bodies.len() - 1
+    }
+
+    /// Fixes nodes where they are at rest; the number of the constraint.
+    pub fn fix(&mut self, name: &str, nodes: Vec<u32>) -> usize {
+        self.constrain(name, nodes, Motion::Fixed)
+    }
+
+    /// Prescribes the motion of nodes along all axes; the number of the constraint.
+    pub fn constrain(&mut self, name: &str, nodes: Vec<u32>, motion: Motion) -> usize {
+        self.constraints.push(Constraint { name: name.into(), nodes, components: [true; 3], motion });
+        self.constraints.len() - 1
+    }
+
     /// Adds ρV/N of every cell of a solid to its nodes. The cells are brought into an order that is good for the caches;
     /// [`Solid::original`] goes along.
     ///

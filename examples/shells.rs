@@ -1,0 +1,41 @@
+//! A shell: a strip clamped at one end and lifted at the other: `cargo run --release --bin shells`.
+
+use std::error::Error;
+
+use nalgebra::Vector3;
+use pliant_implicit::element::Elasticity;
+use pliant_implicit::{
+    Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
+};
+use pliant_mechanics::curve::{Curve, Shape};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // 1 m × 0.1 m × 10 mm in ten squares of two triangles.
+    let points = (0..22).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0)).collect();
+    let cells =
+        (0..10).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]).collect();
+    let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.0 }, density: 1000.0 };
+    let mut model = Model::new(points);
+    model.add_shell(&Shell::new("strip", cells, 0.01, material))?;
+    model.constraints.push(Constraint {
+        name: "clamp".into(),
+        nodes: vec![0, 1],
+        components: [true; 6],
+        motion: Motion::Fixed,
+    });
+    let force = 1e-4;
+    model.loads.push(Load {
+        name: "lift".into(),
+        kind: LoadKind::Force { nodes: vec![20, 21], force: Vector3::new(0.0, 0.0, 0.5 * force) },
+        curve: Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 },
+        controlled: false,
+    });
+
+    let mut state = State::at_rest(&model);
+    Statics::new(model.clone(), StaticSettings::default())?.solve(&mut state, 1.0)?;
+    let up = state.displacement(&model, 20).z;
+    // F L³/3EI of a beam.
+    let beam = force / (3.0 * 1e6 * 0.1 * 0.01_f64.powi(3) / 12.0);
+    println!("the end rises by {:.4} mm, that of a beam by {:.4} mm", 1e3 * up, 1e3 * beam);
+    if (up / beam - 1.0).abs() < 0.01 { Ok(()) } else { Err("not as a beam".into()) }
+}

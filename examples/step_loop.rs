@@ -1,0 +1,48 @@
+//! A step loop that reads a displacement and a reaction: a cube of one hexahedron, pulled at its top: `cargo run --release --bin step-loop`.
+
+use std::error::Error;
+
+use pliant_explicit::{CentralDifference, Observable, State, critical_step};
+use pliant_mechanics::Model;
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+use pliant_mechanics::model::{Cells, Material, Motion, Solid};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let cube = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+    let points = cube.map(|corner| corner.map(|x| 0.1 * f64::from(x)));
+
+    let mut model = Model::default();
+    let body = model.add_body("cube", &points);
+    let (shear, bulk) = (1000.0, 10_000.0);
+    let law = AnyLaw::NeoHookean(NeoHookean { shear, volumetric: Volumetric::quadratic(bulk) });
+    let cells = Cells::full_hex8(vec![[0, 1, 2, 3, 4, 5, 6, 7]], &model.rest);
+    model.add_solid(Solid::new(body, Material::elastic(law, 1000.0), cells));
+    model.bodies[body].damping = 50.0; // 1/s
+    model.fix("base", vec![0, 1, 2, 3]);
+    let pull = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.5 };
+    let top = model.constrain("top", vec![4, 5, 6, 7], Motion::Displacement([0.0, 0.0, 0.001], pull));
+
+    let step = 0.5 * critical_step::element_bound(&model).ok_or("no cells")?.step;
+    let mut state = State::<f64>::at_rest(&model);
+    let mut stepper = CentralDifference::new(model, step)?;
+    let mut next = 0.0;
+    while state.time < 1.0 {
+        stepper.evaluate(&mut state)?;
+        if state.time >= next {
+            let (up, force) = (state.displacement[6][2], stepper.reaction(top)[2]);
+            println!("t = {:.2} s: top at {:.3} mm, pulled with {force:.4} N", state.time, 1e3 * up);
+            next += 0.25;
+        }
+        stepper.advance(&mut state);
+    }
+    stepper.evaluate(&mut state)?;
+    // Both faces are held: strain along one axis alone, of modulus K + 4μ/3.
+    let expected = (bulk + 4.0 / 3.0 * shear) * 0.01 * 0.01;
+    let found = stepper.reaction(top)[2];
+    if (found / expected - 1.0).abs() < 0.02 {
+        Ok(())
+    } else {
+        Err(format!("{found} N, not {expected} N").into())
+    }
+}
