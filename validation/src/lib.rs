@@ -2,7 +2,6 @@
 //! (from `pliant-reproduce`, which shows some of the same computations to users), and the reference numbers in `data/`.
 //! A test prints what it measured: `cargo test -p pliant-validation -- --nocapture`.
 
-mod random;
 mod reference;
 mod run;
 pub mod shells;
@@ -12,6 +11,6 @@ pub use pliant_reproduce::{
     Equilibrium, HOURGLASS, Hexes, Specimen, Tets, deformation, elastic, largest, law, liver,
     liver_relaxation, numbers, run_on, smooth_step, soft_tissue,
 };
-pub use random::Random;
+pub use pliant_testing::Random;
 pub use reference::{claim, data_file, reference};
 pub use run::{relax, run, run_watched, settle, watched};

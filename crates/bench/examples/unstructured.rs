@@ -8,6 +8,7 @@ use pliant_bench::{Clocked, Specimen, Spread, Timed, elastic, soft_tissue};
 use pliant_explicit::State;
 use pliant_geometry::Mesh;
 use pliant_meshing::{Organ, Phantom, Stuffing, VolumeCell};
+use pliant_testing::Random;
 
 /// Turns of all meshes.
 const TURNS: usize = 200;
@@ -17,10 +18,9 @@ const SECONDS: f64 = 0.003;
 /// Numbers from 0 on in an order without pattern.
 fn shuffled(count: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count as u32).collect();
-    let mut seed = 1_u64;
+    let mut random = Random::new(1);
     for k in (1..count).rev() {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        order.swap(k, (seed >> 33) as usize % (k + 1));
+        order.swap(k, random.below(k + 1));
     }
     order
 }

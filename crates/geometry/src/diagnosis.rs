@@ -374,7 +374,9 @@ fn line<T>(title: &str, items: &[T], name: impl Fn(&T) -> String) -> String {
 mod tests {
     use super::*;
     use crate::DataArray;
-    use crate::testing::{Noise, UNIT_CUBE, block_of_hexes, block_of_tets, points};
+    use pliant_testing::Random;
+
+    use crate::testing::{UNIT_CUBE, block_of_hexes, block_of_tets, noise, points};
 
     const TET: CellKind = CellKind::Tet;
 
@@ -520,8 +522,8 @@ mod tests {
 
     #[test]
     fn huge_and_coincident_coordinates_are_survived() {
-        let mut noise = Noise::new(4);
-        let x: Vec<Vector3> = (0..8).map(|_| noise.vector() * 1e200).collect();
+        let mut random = Random::new(4);
+        let x: Vec<Vector3> = (0..8).map(|_| noise(&mut random) * 1e200).collect();
         diagnose(&single(CellKind::Hex, x, &[0, 1, 2, 3, 4, 5, 6, 7]));
         let found = diagnose(&single(CellKind::Hex, vec![Vector3::zeros(); 5000], &[0, 1, 2, 3, 4, 5, 6, 7]));
         assert_eq!(found.duplicate_nodes.len(), 4999);

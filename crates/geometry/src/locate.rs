@@ -372,13 +372,15 @@ pub fn barycentric_of_closest([a, b, c]: &[Vector3; 3], p: &Vector3) -> [f64; 3]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Noise, UNIT_CUBE, block_of_hexes, block_of_tets, points};
+    use pliant_testing::Random;
+
+    use crate::testing::{UNIT_CUBE, block_of_hexes, block_of_tets, noise, points};
 
     /// A block 4 × 3 × 3 with every node moved by up to `amount` in each direction.
     fn distorted(mut mesh: Mesh, amount: f64) -> Mesh {
-        let mut noise = Noise::new(7);
+        let mut random = Random::new(7);
         for point in &mut mesh.points {
-            *point += noise.vector() * amount;
+            *point += noise(&mut random) * amount;
         }
         mesh
     }
@@ -409,9 +411,9 @@ mod tests {
     fn weights_reproduce_every_point_inside_and_outside() {
         for mesh in meshes() {
             let locator = Locator::new(&mesh);
-            let mut noise = Noise::new(8);
+            let mut random = Random::new(8);
             for _ in 0..500 {
-                let p = Vector3::new(2.0, 1.5, 1.5) + noise.vector() * 4.0;
+                let p = Vector3::new(2.0, 1.5, 1.5) + noise(&mut random) * 4.0;
                 let location = locator.locate(p).unwrap();
                 reproduces(&mesh, &location, &p);
                 assert!(location.distance > 0.0 || least(location.weights()) >= -1e-11);
@@ -423,15 +425,15 @@ mod tests {
     fn a_point_made_in_a_cell_is_found_there() {
         for mesh in meshes() {
             let locator = Locator::new(&mesh);
-            let mut noise = Noise::new(9);
+            let mut random = Random::new(9);
             let block = &mesh.blocks[0];
             for (index, nodes) in block.cells().enumerate() {
                 let x: Vec<Vector3> = nodes.iter().map(|&node| mesh.points[node as usize]).collect();
                 for _ in 0..20 {
                     let weights: Vec<f64> = match block.kind {
-                        CellKind::Hex => hex_weights(&(noise.vector() * 0.999)).to_vec(),
+                        CellKind::Hex => hex_weights(&(noise(&mut random) * 0.999)).to_vec(),
                         _ => {
-                            let raw: Vec<f64> = (0..4).map(|_| noise.number().abs() + 1e-3).collect();
+                            let raw: Vec<f64> = (0..4).map(|_| random.number().abs() + 1e-3).collect();
                             raw.iter().map(|w| w / raw.iter().sum::<f64>()).collect()
                         }
                     };
@@ -452,9 +454,9 @@ mod tests {
         for mesh in meshes() {
             let locator = Locator::new(&mesh);
             let entries: Vec<&Entry> = locator.tree.iter().collect();
-            let mut noise = Noise::new(10);
+            let mut random = Random::new(10);
             for _ in 0..300 {
-                let p = Vector3::new(2.0, 1.5, 1.5) + noise.vector() * 6.0;
+                let p = Vector3::new(2.0, 1.5, 1.5) + noise(&mut random) * 6.0;
                 let found = locator.locate(p).unwrap().distance;
                 let least = entries.iter().map(|e| e.locate(&p).distance).fold(f64::INFINITY, f64::min);
                 assert!((found - least).abs() <= 1e-11);
@@ -464,12 +466,12 @@ mod tests {
 
     #[test]
     fn distance_agrees_with_sampling() {
-        let mut noise = Noise::new(11);
+        let mut random = Random::new(11);
         for mesh in meshes() {
             let locator = Locator::new(&mesh);
             let entry = locator.tree.iter().next().unwrap();
             for _ in 0..20 {
-                let p = entry.corners[0] + noise.vector() * 3.0;
+                let p = entry.corners[0] + noise(&mut random) * 3.0;
                 let distance = entry.locate(&p).distance;
                 let mut sampled = f64::INFINITY;
                 for i in 0..=40 {
@@ -530,9 +532,9 @@ mod tests {
         for nodes in [[0, 1, 2, 2, 4, 5, 6, 6], [0, 1, 2, 3, 4, 5, 7, 6], [0, 1, 2, 3, 5, 6, 7, 4]] {
             mesh.blocks[0].nodes = nodes.to_vec();
             let locator = Locator::new(&mesh);
-            let mut noise = Noise::new(12);
+            let mut random = Random::new(12);
             for _ in 0..200 {
-                let p = noise.vector() * 2.0;
+                let p = noise(&mut random) * 2.0;
                 let location = locator.locate(p).unwrap();
                 assert!(location.distance.is_finite());
                 reproduces(&mesh, &location, &p);

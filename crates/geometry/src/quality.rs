@@ -288,7 +288,9 @@ impl fmt::Display for QualityReport {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Noise, UNIT_CUBE, block_of_hexes, block_of_tets, points};
+    use pliant_testing::Random;
+
+    use crate::testing::{UNIT_CUBE, block_of_hexes, block_of_tets, noise, points};
 
     /// Regular tet of edge 2 √2.
     const REGULAR: [[f64; 3]; 4] = [[1., 1., 1.], [-1., 1., -1.], [1., -1., -1.], [-1., -1., 1.]];
@@ -312,9 +314,9 @@ mod tests {
 
     #[test]
     fn acoustic_length_of_a_tet_is_made_of_its_heights() {
-        let mut noise = Noise::new(1);
+        let mut random = Random::new(1);
         for _ in 0..100 {
-            let x: [Vector3; 4] = std::array::from_fn(|_| noise.vector());
+            let x: [Vector3; 4] = std::array::from_fn(|_| noise(&mut random));
             let sum: f64 = (0..4)
                 .map(|a| {
                     let [i, j, k] = [(a + 1) % 4, (a + 2) % 4, (a + 3) % 4];
@@ -362,10 +364,12 @@ mod tests {
     /// Σ_a X_a ⊗ ∫∇N_a = V I and Σ_a ∫∇N_a = 0: mean gradients see a linear field exactly.
     #[test]
     fn gradient_integrals_reproduce_linear_fields() {
-        let mut noise = Noise::new(2);
+        let mut random = Random::new(2);
         for kind in [CellKind::Tet, CellKind::Hex] {
-            let x: Vec<Vector3> =
-                points(&UNIT_CUBE)[..kind.node_count()].iter().map(|p| p + noise.vector() * 0.2).collect();
+            let x: Vec<Vector3> = points(&UNIT_CUBE)[..kind.node_count()]
+                .iter()
+                .map(|p| p + noise(&mut random) * 0.2)
+                .collect();
             let (volume, integrals) = gradient_integrals(kind, &x);
             let sum =
                 x.iter().zip(&integrals).map(|(x, b)| x * b.transpose()).sum::<nalgebra::Matrix3<f64>>();
@@ -376,9 +380,9 @@ mod tests {
 
     #[test]
     fn no_tet_is_better_than_the_regular_one() {
-        let mut noise = Noise::new(3);
+        let mut random = Random::new(3);
         for _ in 0..2000 {
-            let tet: Vec<Vector3> = regular().iter().map(|p| p + noise.vector()).collect();
+            let tet: Vec<Vector3> = regular().iter().map(|p| p + noise(&mut random)).collect();
             assert!(relative_acoustic_length(CellKind::Tet, &tet) <= 1.0 + 1e-12);
         }
     }

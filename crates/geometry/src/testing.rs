@@ -1,6 +1,7 @@
 //! Small meshes and repeatable noise for the tests of this crate.
 
 use crate::{CellKind, Mesh, Vector3};
+use pliant_testing::Random;
 
 /// Corners of the unit cube in the order of a hex.
 pub(crate) const UNIT_CUBE: [[f64; 3]; 8] = [
@@ -19,24 +20,9 @@ pub(crate) fn points(coordinates: &[[f64; 3]]) -> Vec<Vector3> {
     coordinates.iter().copied().map(Vector3::from).collect()
 }
 
-/// A linear congruential generator: the same numbers on every machine.
-pub(crate) struct Noise(u64);
-
-impl Noise {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// From −1 to 1.
-    pub(crate) fn number(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    /// Each coordinate from −1 to 1.
-    pub(crate) fn vector(&mut self) -> Vector3 {
-        Vector3::new(self.number(), self.number(), self.number())
-    }
+/// Each coordinate from −1 to 1.
+pub(crate) fn noise(random: &mut Random) -> Vector3 {
+    random.vector().into()
 }
 
 /// A block of unit cubes from the origin; x runs fastest.

@@ -7,10 +7,7 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{Format, MeshFileError, read_bytes};
 
-#[path = "support/noise.rs"]
-mod noise;
-
-use noise::{Noise, peak};
+use pliant_testing::{Random, peak};
 
 /// Memory that reading may add [KiB]; the files are below 64 KiB.
 const MOST: u64 = 64 << 10;
@@ -47,11 +44,11 @@ fn broken_meshes_give_errors_in_little_memory() {
         let count = corpus.iter().filter(|(_, own, _)| own == format).count();
         assert!(count >= 3, "{}: {count}", format.name());
     }
-    let mut noise = Noise(20_260_101);
+    let mut noise = Random::new(20_260_101);
     let mut outcomes = [0; 2];
     for (name, format, seed) in &seeds {
         for _ in 0..150 {
-            match read_bytes(&noise.change(seed), *format) {
+            match read_bytes(&noise.damaged(seed), *format) {
                 Ok(file) => {
                     outcomes[0] += 1;
                     let points = file.mesh.points.len();

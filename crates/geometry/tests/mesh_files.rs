@@ -11,6 +11,7 @@ use pliant_geometry::io::{
     write_pvd, write_vtu,
 };
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use pliant_testing::Random;
 
 fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data")
@@ -678,12 +679,8 @@ fn deep_xml_is_an_error_or_a_mesh_but_no_crash() {
 /// quickly.
 #[test]
 fn broken_files_never_panic() {
-    let mut state = 0x2545_f491_4f6c_dd1d_u64;
-    let mut random = move || {
-        // Knuth's MMIX constants.
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize
-    };
+    let mut numbers = Random::new(0x2545_f491_4f6c_dd1d);
+    let mut random = move || numbers.below(usize::MAX);
     let mut files: Vec<(Vec<u8>, Format, String)> = fs::read_dir(data())
         .unwrap()
         .filter_map(|entry| {

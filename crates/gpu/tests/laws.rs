@@ -15,6 +15,7 @@ use pliant_mechanics::Number;
 use pliant_mechanics::law::samples::{every_law, law, merged, term};
 use pliant_mechanics::law::{AnyLaw, Deformation};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, cross, dot, scale, sub};
+use pliant_testing::Random;
 use serde_json::json;
 
 const EPSILON: f64 = f32::EPSILON as f64;
@@ -32,35 +33,25 @@ fn laws() -> Vec<AnyLaw> {
     every_law().into_iter().chain(more).collect()
 }
 
-/// Numbers between −1 and 1, the same in every run.
-struct Random(u64);
+/// A number of a magnitude between the two, every order of magnitude as likely as another.
+fn magnitude(random: &mut Random, least: f64, largest: f64) -> f64 {
+    least * (largest / least).powf(0.5 + 0.5 * random.number())
+}
 
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    /// Of a magnitude between the two, every order of magnitude as likely as another.
-    fn magnitude(&mut self, least: f64, largest: f64) -> f64 {
-        least * (largest / least).powf(0.5 + 0.5 * self.next())
-    }
-
-    /// A unit vector.
-    fn direction(&mut self) -> Vector<f64> {
-        loop {
-            let v = [self.next(), self.next(), self.next()];
-            let square = dot(v, v);
-            if (0.01..1.0).contains(&square) {
-                return scale(v, square.sqrt().recip());
-            }
+/// A unit vector.
+fn direction(random: &mut Random) -> Vector<f64> {
+    loop {
+        let v = random.vector();
+        let square = dot(v, v);
+        if (0.01..1.0).contains(&square) {
+            return scale(v, square.sqrt().recip());
         }
     }
 }
 
 /// R − I about a random axis, by Rodrigues' formula.
 fn rotation_change(random: &mut Random) -> Tensor<f64> {
-    let ([x, y, z], angle) = (random.direction(), random.magnitude(1e-4, 3.0));
+    let ([x, y, z], angle) = (direction(random), magnitude(random, 1e-4, 3.0));
     let skew = Tensor([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]);
     let squared = skew.times_symmetric(&Symmetric::IDENTITY).0.map(|row| skew.transpose().apply(row));
     Tensor(skew.0.map(|row| scale(row, angle.sin()))).plus_scaled(&Tensor(squared), 1.0 - angle.cos())
@@ -68,13 +59,13 @@ fn rotation_change(random: &mut Random) -> Tensor<f64> {
 
 /// U − I with principal values between −`size` and `size` along random directions.
 fn stretch(random: &mut Random, size: f64) -> Tensor<f64> {
-    let (a, other) = (random.direction(), random.direction());
+    let (a, other) = (direction(random), direction(random));
     let b = sub(other, scale(a, dot(a, other)));
     let b = scale(b, dot(b, b).sqrt().recip());
     let c = cross(a, b);
     let mut h = Tensor::ZERO;
     for direction in [a, b, c] {
-        h.add_outer(scale(direction, size * random.next()), direction);
+        h.add_outer(scale(direction, size * random.number()), direction);
     }
     h
 }
@@ -87,7 +78,7 @@ struct Sample {
 
 impl Sample {
     fn new(h: &Tensor<f64>, random: &mut Random) -> Self {
-        let fibres = [random.direction(), random.direction()].map(|a| a.map(|x| x as f32));
+        let fibres = [direction(random), direction(random)].map(|a| a.map(|x| x as f32));
         Self { h: h.0.map(|row| row.map(|x| x as f32)), fibres }
     }
 
@@ -104,10 +95,10 @@ impl Sample {
 /// Strains of 1e-6 to 60 %, half of them above 10 %, every other one under a rotation; rest, dilations, nearly
 /// diagonal tensors.
 fn samples() -> Vec<Sample> {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let mut samples: Vec<Sample> = (0..1000)
         .map(|k| {
-            let size = random.magnitude(if k % 4 < 2 { 1e-6 } else { 0.1 }, 0.6);
+            let size = magnitude(&mut random, if k % 4 < 2 { 1e-6 } else { 0.1 }, 0.6);
             let mut h = stretch(&mut random, size);
             if k % 2 == 1 {
                 // R U − I = (R − I) + (U − I) + (R − I)(U − I).
@@ -279,9 +270,9 @@ fn pressure<R: Number>(law: &AnyLaw, volume_change: R) -> R {
 #[test]
 fn pressures_follow_double_precision_as_closely_as_single_precision_does() {
     let Some(device) = support::device() else { return };
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let mut changes: Vec<f32> =
-        (0..200).map(|_| (random.magnitude(1e-7, 0.9) * random.next().signum()) as f32).collect();
+        (0..200).map(|_| (magnitude(&mut random, 1e-7, 0.9) * random.number().signum()) as f32).collect();
     changes.push(0.0);
     for law in laws().into_iter().filter(AnyLaw::has_volumetric_energy) {
         let found = values(&device, &law, "law_pressure(x)", &changes);
@@ -351,10 +342,10 @@ fn every_law_is_valid_without_any_optional_feature() {
 #[test]
 fn functions_of_one_number_keep_their_relative_digits() {
     let Some(device) = support::device() else { return };
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     // From 1e-9 on, below and above zero.
     let mut magnitudes = |largest: f64| -> Vec<f32> {
-        (0..20_000).map(|_| (random.magnitude(1e-9, largest) * random.next().signum()) as f32).collect()
+        (0..20_000).map(|_| (magnitude(&mut random, 1e-9, largest) * random.number().signum()) as f32).collect()
     };
     let changes: Vec<f32> = magnitudes(20.0).into_iter().filter(|x| *x > -0.999).collect();
     let ratios: Vec<f32> = changes.iter().map(|x| 1.0 + x).collect();

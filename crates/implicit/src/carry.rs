@@ -129,8 +129,8 @@ impl CurvedSurface {
 mod tests {
     use super::*;
     use crate::surface::EdgeRule;
-    use crate::testing::Random;
     use crate::tests::{ball, cube, model, strip};
+    use pliant_testing::Random;
 
     fn vector(random: &mut Random) -> Vector3<f64> {
         Vector3::from_fn(|_, _| random.number())

@@ -698,7 +698,7 @@ mod tests {
     use super::*;
     use crate::element::Elasticity;
     use crate::rotation::exponential;
-    use crate::testing::Random;
+    use pliant_testing::Random;
 
     const MATERIAL: Material = Material { elastic: Elasticity { young: 1e3, poisson: 0.3 }, density: 1000.0 };
 

@@ -182,8 +182,8 @@ mod tests {
 
     use super::*;
     use crate::surface::EdgeRule;
-    use crate::testing::Random;
     use crate::tests::{ball, cube, model};
+    use pliant_testing::Random;
 
     fn shaken(model: &Model, size: f64, seed: u64) -> State {
         let mut random = Random::new(seed);

@@ -138,9 +138,10 @@ mod tests {
     use super::*;
     use crate::rotation::exponential;
     use crate::surface::EdgeRule;
-    use crate::testing::{Pose, Random, moved};
+    use crate::testing::{Pose, moved};
     use crate::tests::{ball, model};
     use crate::{CurvedSurface, State};
+    use pliant_testing::Random;
 
     const STRAIGHT: [[bool; 6]; 2] = [[false; 6], [true, true, false, false, false, true]];
 

@@ -240,7 +240,8 @@ impl Patch {
 mod tests {
     use super::*;
     use crate::rotation::exponential;
-    use crate::testing::{Random, moved};
+    use crate::testing::moved;
+    use pliant_testing::Random;
 
     fn clamped(weights: [f64; 3]) -> [f64; 3] {
         let positive = weights.map(|w| w.max(0.0));

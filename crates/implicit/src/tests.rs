@@ -8,8 +8,8 @@ use crate::facet::Tangent;
 use crate::linear::{LinearSolver, Preconditioner};
 use crate::rotation::exponential;
 use crate::system::System;
-use crate::testing::Random;
 use crate::*;
+use pliant_testing::Random;
 
 pub(crate) const MATERIAL: Material =
     Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };

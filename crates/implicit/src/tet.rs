@@ -177,7 +177,7 @@ mod tests {
     use crate::element::Elasticity;
     use crate::model::Model;
     use crate::rotation::exponential;
-    use crate::testing::Random;
+    use pliant_testing::Random;
 
     fn tet() -> (Tet, Model) {
         let rest = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 0.9, 0.1], [0.1, 0.3, 0.8]].map(Vector3::from);

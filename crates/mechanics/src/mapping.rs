@@ -75,15 +75,14 @@ impl Mapping {
 
 #[cfg(test)]
 mod tests {
+    use pliant_testing::Random;
+
     use super::*;
 
     #[test]
     fn forces_come_up_by_the_transpose_of_what_went_down() {
-        let mut seed = 1_u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut numbers = Random::new(1);
+        let mut random = || numbers.half();
         let rows: Vec<Vec<(u32, f64)>> =
             (0..50).map(|i| (0..8).map(|k| ((i * 7 + k * 3) % 20, random())).collect()).collect();
         let mapping = Mapping::from_rows(rows.iter().map(Vec::as_slice));

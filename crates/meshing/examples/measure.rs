@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use pliant_meshing::{MeshingError, Organ, Phantom, Stuffing, Voxels};
+use pliant_testing::Random;
 
 #[allow(dead_code)]
 #[path = "../tests/meshing/checks.rs"]
@@ -50,10 +51,10 @@ fn default_lattice(phantom: &Phantom, edge: f64) -> Result<(), MeshingError> {
 }
 
 fn worst_lattice(phantom: &Phantom, edge: f64) -> Result<(), MeshingError> {
-    let mut offsets = checks::Offsets(9);
+    let mut random = Random::new(9);
     let (mut sharpest, mut bluntest, mut shortest) = (180.0_f64, 0.0_f64, f64::INFINITY);
     for _ in 0..8 {
-        let stuffing = Stuffing { origin: Some(offsets.vector(edge)), ..Stuffing::new(edge) };
+        let stuffing = Stuffing { origin: Some(checks::offset(&mut random, edge)), ..Stuffing::new(edge) };
         let mesh = stuffing.mesh(phantom)?.mesh;
         let [low, high] = checks::dihedral_range(&mesh);
         (sharpest, bluntest) = (sharpest.min(low), bluntest.max(high));

@@ -6,6 +6,7 @@ use std::time::Instant;
 use pliant_geometry::Vector3;
 use pliant_imaging::{Cleaning, Smoothing};
 use pliant_meshing::{Anatomy, OrganTets};
+use pliant_testing::Random;
 
 #[allow(dead_code)]
 #[path = "../tests/meshing/checks.rs"]
@@ -27,9 +28,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("{name}: field in {:.3} s", start.elapsed().as_secs_f64());
         let truth = images::truth(name);
         for edge in edges {
-            let mut offsets = checks::Offsets(5);
+            let mut random = Random::new(5);
             for number in 0..lattices {
-                let origin = if number == 0 { Vector3::zeros() } else { offsets.vector(edge) };
+                let origin = if number == 0 { Vector3::zeros() } else { checks::offset(&mut random, edge) };
                 let start = Instant::now();
                 let request = OrganTets { origin: Some(origin), ..OrganTets::new(edge) };
                 let made = request.mesh(&anatomy, &|_| {})?;

@@ -1081,6 +1081,8 @@ mod tests {
 
     use serde::Deserialize;
 
+    use pliant_testing::Random;
+
     use super::*;
 
     /// A law of the tests.
@@ -1702,11 +1704,8 @@ mod tests {
                     probes.a = 1\ntable = [[0, 0], [1, 1.5e3]] # µm\nanything = { x = [1, \"ä\"] }\n\
                     [[t.more]]\nx = 1979-05-27\n";
         let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::unicode_nocolor());
-        let mut state = 1u64;
-        let mut next = |n: usize| {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 33) as usize % n
-        };
+        let mut random = Random::new(1);
+        let mut next = |limit: usize| random.below(limit);
         let alphabet = b"[]{}=.'\"\n,#-09einfau\xc3\xa4\\ ";
         for round in 0..4000 {
             let mut bytes = text.as_bytes().to_vec();

@@ -9,10 +9,7 @@ use pliant_scene::niftysim::import_bytes;
 use pliant_scene::source::Source;
 use pliant_scene::{Checkpoint, OutputFolder, Scene, World};
 
-#[path = "../../geometry/tests/support/noise.rs"]
-mod noise;
-
-use noise::{Noise, peak};
+use pliant_testing::{Random, peak};
 
 /// Memory that reading may add [KiB]; the files are below 64 KiB.
 const MOST: u64 = 64 << 10;
@@ -59,11 +56,11 @@ fn broken_scenes_give_mistakes() {
     for (name, bytes) in corpus("toml") {
         println!("{name}: {}", mistakes(&bytes).unwrap_or_else(|| panic!("{name} is read")));
     }
-    let (before, mut noise, mut outcomes) = (peak(), Noise(20_261_122), [0; 2]);
+    let (before, mut noise, mut outcomes) = (peak(), Random::new(20_261_122), [0; 2]);
     for (_, seed) in scenes() {
         assert!(mistakes(&seed).is_none());
         for _ in 0..300 {
-            outcomes[usize::from(mistakes(&noise.change(&seed)).is_some())] += 1;
+            outcomes[usize::from(mistakes(&noise.damaged(&seed)).is_some())] += 1;
         }
     }
     println!("{} scenes, {} with mistakes", outcomes[0], outcomes[1]);
@@ -80,9 +77,9 @@ fn broken_models_give_errors() {
     }
     let seed = fs::read(folder().join("../../../../validation/data/niftysim/H8_NH.xml")).unwrap();
     assert!(import_bytes(nowhere, &seed).is_ok());
-    let (before, mut noise, mut outcomes) = (peak(), Noise(20_261_122), [0; 2]);
+    let (before, mut noise, mut outcomes) = (peak(), Random::new(20_261_122), [0; 2]);
     for _ in 0..1500 {
-        let imported = import_bytes(nowhere, &noise.change(&seed));
+        let imported = import_bytes(nowhere, &noise.damaged(&seed));
         outcomes[usize::from(imported.is_err())] += 1;
         if let Ok(imported) = imported {
             Source::parse("scene.toml", imported.scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
@@ -110,14 +107,14 @@ fn broken_checkpoints_give_errors() {
     let whole = fs::read(&path).unwrap();
     let body = &whole[20..whole.len() - 4];
     assert_eq!(Checkpoint::framed(body), whole);
-    let (before, mut noise, mut outcomes) = (peak(), Noise(20_261_122), [0; 2]);
+    let (before, mut noise, mut outcomes) = (peak(), Random::new(20_261_122), [0; 2]);
     for _ in 0..3000 {
-        let read = Checkpoint::from_bytes(&path, &Checkpoint::framed(&noise.change(body)));
+        let read = Checkpoint::from_bytes(&path, &Checkpoint::framed(&noise.damaged(body)));
         outcomes[usize::from(read.is_err())] += 1;
         // What is read is held to the model before anything is done with it.
         let _ = read.map(|checkpoint| checkpoint.continues(&world));
         // Without a fitting checksum no change is taken for a checkpoint.
-        let changed = noise.change(&whole);
+        let changed = noise.damaged(&whole);
         assert!(changed == whole || Checkpoint::from_bytes(&path, &changed).is_err());
     }
     println!("{} checkpoints, {} errors", outcomes[0], outcomes[1]);

@@ -10,6 +10,7 @@ use pliant_scene::niftysim::{ImportError, Imported, import};
 use pliant_scene::registry::LoadTable;
 use pliant_scene::source::Source;
 use pliant_scene::{Built, Scene};
+use pliant_testing::Random;
 
 fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../validation/data/niftysim").join(name)
@@ -621,11 +622,8 @@ fn every_sample_is_imported_and_none_panics_when_damaged() {
 
 /// Cut off, with bits flipped, and with characters replaced: an error or a scene, never a panic.
 fn damage(bytes: &[u8], folder: &Folder, rounds: usize) {
-    let mut state = 1_u64;
-    let mut next = |n: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize % n
-    };
+    let mut random = Random::new(1);
+    let mut next = |limit: usize| random.below(limit);
     let alphabet = b"0123456789-.eE <>/\"=NTaHl";
     let path = folder.0.join("damaged.xml");
     for round in 0..rounds {

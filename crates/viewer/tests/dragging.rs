@@ -4,6 +4,7 @@
 mod support;
 
 use pliant_geometry::Vector3;
+use pliant_testing::Random;
 use pliant_viewer::{Hand, Order, Point, Session};
 use support::{BALL, LIVER, subject, wait, world};
 
@@ -17,18 +18,9 @@ fn resident() -> Option<usize> {
     std::fs::read_to_string("/proc/self/statm").ok()?.split(' ').nth(1)?.parse().ok()
 }
 
-/// Numbers in [0, 1), the same ones every time.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as f64 / f64::from(1_u32 << 31)
-    }
-
-    fn walk(&mut self) -> Vector3 {
-        Vector3::new(self.next() - 0.5, self.next() - 0.5, self.next() - 0.5) * 2.0
-    }
+/// A step of a walk in any direction, up to 1 along each axis.
+fn walk(random: &mut Random) -> Vector3 {
+    Vector3::from_fn(|_, _| random.part() - 0.5) * 2.0
 }
 
 /// So many drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. What is torn is told, at
@@ -44,17 +36,17 @@ fn drag(text: &str, drags: u64) {
     };
     let size = (0..3).map(extent).fold(0.0, f64::max);
     let mut session = Session::start(world, || ()).unwrap();
-    let (mut random, mut before, mut strongest) = (Random(1), None, 0.0_f64);
+    let (mut random, mut before, mut strongest) = (Random::new(1), None, 0.0_f64);
     let (mut pulls, mut total, mut broken) = (0, 0, 0);
     for drag in 0..drags {
-        let triangle = (random.next() * subject.triangle_count() as f64) as u32;
-        let stiffness = 20.0 * 25.0_f64.powf(random.next());
+        let triangle = (random.part() * subject.triangle_count() as f64) as u32;
+        let stiffness = 20.0 * 25.0_f64.powf(random.part());
         session.order(Order::Hand(Hand::Take(Point { triangle, weights: [0.2, 0.3, 0.5] }, stiffness)));
         let taken = wait(&mut session, |frame| !frame.held.is_empty() || frame.failure.is_some());
         assert_eq!(taken.failure, None, "before drag {drag}");
         let mut place = Vector3::from(taken.held[0][0]);
         for _ in 0..PULLS {
-            place += random.walk() * WALK * size;
+            place += walk(&mut random) * WALK * size;
             session.order(Order::Hand(Hand::Pull(place.into())));
             session.order(Order::Step(steps));
             pulls += 1;

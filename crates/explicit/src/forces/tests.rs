@@ -6,6 +6,7 @@ use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, Transversely
 use pliant_mechanics::model::{Averaging, Body, Cells, LocalNodes, Material};
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::tensor::{cross, dot, scale};
+use pliant_testing::Random;
 
 use super::*;
 use crate::State;
@@ -16,18 +17,9 @@ use crate::recover::{CellFields, Recovery};
 /// Every element whose force is the gradient of an energy.
 const ELEMENTS: [&str; 5] = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"];
 
-struct Random(u64);
-
-impl Random {
-    /// Uniform in (−½, ½).
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    }
-
-    fn vector(&mut self, size: f64) -> Vector<f64> {
-        [0, 1, 2].map(|_| 2.0 * size * self.next())
-    }
+/// A vector with each coordinate in [−size, size).
+fn vector(random: &mut Random, size: f64) -> Vector<f64> {
+    random.vector().map(|x| size * x)
 }
 
 const CELLS: u32 = 3;
@@ -45,12 +37,12 @@ fn filled_cube(
     density: f64,
     fraction: impl FnMut(usize) -> f64,
 ) -> Model {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let n = CELLS + 1;
     let mut rest = Vec::new();
     for (z, y, x) in (0..n).flat_map(|z| (0..n).flat_map(move |y| (0..n).map(move |x| (z, y, x)))) {
         let interior = [x, y, z].iter().all(|&i| i > 0 && i < CELLS);
-        let shift = if interior { random.vector(0.012) } else { [0.0; 3] };
+        let shift = if interior { vector(&mut random, 0.012) } else { [0.0; 3] };
         rest.push(add([x, y, z].map(|i| f64::from(i) * 0.1), shift));
     }
     let mut hex_nodes = Vec::new();
@@ -178,11 +170,11 @@ fn every_element() -> impl Iterator<Item = Model> {
 
 /// Each also with cells of which the body fills a part.
 fn every_element_full_or_not() -> impl Iterator<Item = Model> {
-    let mut random = Random(19);
+    let mut random = Random::new(19);
     let filled = laws().into_iter().flat_map(|law| ELEMENTS.map(|element| (element, law)));
     every_element().chain(
         filled.map(move |(element, law)| {
-            filled_cube(element, law, 700.0, 1000.0, |_| 0.55 + 0.9 * random.next())
+            filled_cube(element, law, 700.0, 1000.0, |_| 0.55 + 0.9 * random.half())
         }),
     )
 }
@@ -226,9 +218,9 @@ fn rigid_motion_costs_no_force_and_no_energy() {
 
 #[test]
 fn force_is_the_derivative_of_energy() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for model in every_element_full_or_not() {
-        let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.008)).collect();
+        let displacement: Vec<_> = model.rest.iter().map(|_| vector(&mut random, 0.008)).collect();
         let (forces, _) = forces(&model, &displacement);
         let scale = largest(forces.iter().copied());
         for node in [0, 21, 42, 63] {
@@ -248,10 +240,10 @@ fn force_is_the_derivative_of_energy() {
 /// Of the written energy density; with the J of the cell instead of the averaged one it was up to 1.88 times too large.
 #[test]
 fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
-    let mut random = Random(29);
+    let mut random = Random::new(29);
     for model in every_kernel().chain(every_element_full_or_not()) {
         let mut state = State::<f64>::at_rest(&model);
-        state.displacement.iter_mut().for_each(|u| *u = random.vector(0.01));
+        state.displacement.iter_mut().for_each(|u| *u = vector(&mut random, 0.01));
         let hourglass = forces(&model, &state.displacement).1;
         let recovery = Recovery::new(&model, &state);
         let (summed, expected) = (recovery.stored_energy() + hourglass, energy(&model, &state.displacement));
@@ -270,11 +262,11 @@ fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
 
 #[test]
 fn the_pressure_written_is_the_one_of_the_volume_ratio_written() {
-    let mut random = Random(31);
+    let mut random = Random::new(31);
     for element in ["tet4", "tet4-anp", "hex8", "hex8-full"] {
         let model = distorted_cube(element, laws()[0]);
         let mut state = State::<f64>::at_rest(&model);
-        state.displacement.iter_mut().for_each(|u| *u = random.vector(0.01));
+        state.displacement.iter_mut().for_each(|u| *u = vector(&mut random, 0.01));
         let recovery = Recovery::new(&model, &state);
         for cell in 0..model.solids[0].cells.len() {
             let fields = recovery.cell(0, cell);
@@ -286,9 +278,9 @@ fn the_pressure_written_is_the_one_of_the_volume_ratio_written() {
 
 #[test]
 fn forces_and_torques_sum_to_zero() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for model in every_element_full_or_not() {
-        let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
+        let displacement: Vec<_> = model.rest.iter().map(|_| vector(&mut random, 0.01)).collect();
         let (forces, _) = forces(&model, &displacement);
         let scale = largest(forces.iter().copied());
         let (mut sum, mut torque) = ([0.0; 3], [0.0; 3]);
@@ -316,12 +308,12 @@ fn cells_filled_by_half_are_cells_of_half_the_modulus_and_half_the_density() {
         AnyLaw::NeoHookean(NeoHookean { shear, volumetric }),
         AnyLaw::TransverselyIsotropic(TransverselyIsotropic { shear, fibre: 550.0, volumetric }),
     ];
-    let mut random = Random(23);
+    let mut random = Random::new(23);
     for (law, soft) in laws().into_iter().zip(soft) {
         for element in ELEMENTS {
             let half = filled_cube(element, law, 700.0, 1000.0, |_| 0.5);
             let light = filled_cube(element, soft, 350.0, 500.0, |_| 1.0);
-            let displacement: Vec<_> = half.rest.iter().map(|_| random.vector(0.01)).collect();
+            let displacement: Vec<_> = half.rest.iter().map(|_| vector(&mut random, 0.01)).collect();
             // A factor of a power of two commutes with every rounding but those of an averaged pressure.
             let of = |model| forces(model, &displacement);
             assert!(apart(&of(&light).0, &of(&half).0) < 1e-14, "{element}");
@@ -338,9 +330,9 @@ fn cells_filled_by_half_are_cells_of_half_the_modulus_and_half_the_density() {
 
 #[test]
 fn single_precision_follows_double() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     for model in every_element_full_or_not() {
-        let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
+        let displacement: Vec<_> = model.rest.iter().map(|_| vector(&mut random, 0.01)).collect();
         let (fine, _) = forces(&model, &displacement);
         let coarse_displacement: Vec<Vector<f32>> = displacement.iter().map(|&u| cast(u)).collect();
         let mut coarse = InternalForces::<f32>::new(&model, 1.0);
@@ -375,10 +367,11 @@ fn moved_on<R: Scalar>(processor: Processor, model: &Model) -> (Vec<Vector<f64>>
     let mut internal = InternalForces::<R>::new(model, 0.1);
     internal.set_processor(processor);
     let mut history = State::<R>::at_rest(model).history;
-    let mut random = Random(13);
+    let mut random = Random::new(13);
     let mut deformed = Deformed::default();
     for _ in 0..3 {
-        let displacement: Vec<Vector<R>> = model.rest.iter().map(|_| cast(random.vector(0.01))).collect();
+        let displacement: Vec<Vector<R>> =
+            model.rest.iter().map(|_| cast(vector(&mut random, 0.01))).collect();
         deformed = internal.evaluate(&displacement, &mut history).deformed;
     }
     ((0..model.node_count()).map(|node| cast(internal.at(node))).collect(), deformed)
@@ -434,8 +427,8 @@ fn lanes_compute_what_plain_numbers_do_for_every_law_and_element() {
 fn packs_of_tets_are_their_cells_one_by_one() {
     for law in every_law() {
         let model = distorted_cube("tet4", law);
-        let mut random = Random(17);
-        let displacement: Vec<_> = model.rest.iter().map(|_| random.vector(0.01)).collect();
+        let mut random = Random::new(17);
+        let displacement: Vec<_> = model.rest.iter().map(|_| vector(&mut random, 0.01)).collect();
         let solid = &model.solids[0];
         let mut expected = vec![[0.0; 3]; model.node_count()];
         for cell in 0..solid.cells.len() {
@@ -462,7 +455,7 @@ fn packs_of_tets_are_their_cells_one_by_one() {
 /// all lanes.
 #[test]
 fn a_corner_turned_inside_out_is_found_and_no_other() {
-    let mut random = Random(41);
+    let mut random = Random::new(41);
     let (law, mut counts) = (laws()[0], [0, 0]);
     for element in ["hex8", "hex8-full"] {
         let model = distorted_cube(element, law);
@@ -471,7 +464,7 @@ fn a_corner_turned_inside_out_is_found_and_no_other() {
             let size = 0.001 * f64::from(round);
             // Squeezed to a tenth of their height.
             let squeezed = |rest: &Vector<f64>| {
-                let [x, y, z] = random.vector(size);
+                let [x, y, z] = vector(&mut random, size);
                 [x, y, 0.1 * z - 0.9 * rest[2]]
             };
             let displacement: Vec<_> = model.rest.iter().map(squeezed).collect();
@@ -498,7 +491,7 @@ fn a_corner_turned_inside_out_is_found_and_no_other() {
 /// κ is a bound: F at a corner differs from the mean by no more than κ |q|.
 #[test]
 fn corners_follow_the_hourglass_patterns_within_their_reach() {
-    let mut random = Random(43);
+    let mut random = Random::new(43);
     let model = distorted_cube("hex8", laws()[0]);
     let Cells::Hex8(block) = &model.solids[0].cells else { panic!("hexes") };
     let control = block.hourglass.as_ref().unwrap();
@@ -506,7 +499,7 @@ fn corners_follow_the_hourglass_patterns_within_their_reach() {
         let x = block.nodes[cell].map(|node| model.rest[node as usize]);
         let mut closest = 0.0_f64;
         for _ in 0..50 {
-            let u: Vec<Vector<f64>> = (0..8).map(|_| random.vector(0.01)).collect();
+            let u: Vec<Vector<f64>> = (0..8).map(|_| vector(&mut random, 0.01)).collect();
             let mut mean = nalgebra::Matrix3::<f64>::zeros();
             for (u, b) in u.iter().zip(&block.rest[cell].gradient) {
                 mean += nalgebra::Vector3::from(*u) * nalgebra::Vector3::from(*b).transpose();

@@ -5,6 +5,7 @@ use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};
 use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::Vector;
+use pliant_testing::Random;
 use serde_json::{Value, json};
 
 /// Every element.
@@ -53,26 +54,13 @@ pub fn smooth(to: f64) -> Curve {
     Curve { shape: Shape::SmoothStep, from: 0.0, to }
 }
 
-/// Numbers between −½ and ½.
-struct Random(u64);
+/// A vector in [−½, ½)³.
+fn vector(random: &mut Random) -> Vector<f64> {
+    [0; 3].map(|_| random.half())
+}
 
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    }
-
-    fn vector(&mut self) -> Vector<f64> {
-        [self.next(), self.next(), self.next()]
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        ((self.next() + 0.5) * end as f64) as usize
-    }
-
-    fn shuffle<T>(&mut self, items: &mut [T]) {
-        (1..items.len()).for_each(|last| items.swap(last, self.below(last + 1)));
-    }
+fn shuffle<T>(random: &mut Random, items: &mut [T]) {
+    (1..items.len()).for_each(|last| items.swap(last, random.below(last + 1)));
 }
 
 /// Nodes and hexahedra; inner nodes are shifted by up to half of `jitter` cells.
@@ -82,7 +70,7 @@ fn grid(jitter: f64, random: &mut Random) -> (Vec<Vector<f64>>, Vec<[u32; 8]>) {
         |end: u32| (0..end).flat_map(move |z| (0..end).flat_map(move |y| (0..end).map(move |x| [x, y, z])));
     let shifted = |at: [u32; 3]| {
         let interior = at.iter().all(|&i| i > 0 && i < CELLS);
-        let shift = if interior { random.vector() } else { [0.0; 3] };
+        let shift = if interior { vector(random) } else { [0.0; 3] };
         [0, 1, 2].map(|c| (f64::from(at[c]) + jitter * shift[c]) * size)
     };
     let rest = all(CELLS + 1).map(shifted).collect();
@@ -130,7 +118,7 @@ fn body(
 
 /// The cube, free.
 pub fn free_cube(element: &str, material: Material) -> Model {
-    let (rest, hexes) = grid(0.2, &mut Random(7));
+    let (rest, hexes) = grid(0.2, &mut Random::new(7));
     body(element, material, rest, tets_of(&hexes), hexes)
 }
 
@@ -146,15 +134,15 @@ pub struct Jumble {
 
 /// A cube whose inner nodes lie at random, whose nodes and cells are numbered at random, and cells from any of their nodes.
 pub fn jumbled_cube(element: &str, material: Material) -> Jumble {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let (ordered, mut hexes) = grid(0.5, &mut random);
     let mut node: Vec<u32> = (0..ordered.len() as u32).collect();
-    random.shuffle(&mut node);
+    shuffle(&mut random, &mut node);
     let mut rest = ordered.clone();
     (0..).zip(&node).for_each(|(from, &to): (usize, _)| rest[to as usize] = ordered[from]);
     let mut tets = tets_of(&hexes);
-    random.shuffle(&mut tets);
-    random.shuffle(&mut hexes);
+    shuffle(&mut random, &mut tets);
+    shuffle(&mut random, &mut hexes);
     for tet in &mut tets {
         // Even permutations keep the volume.
         tet[1..].rotate_left(random.below(3));
@@ -180,7 +168,7 @@ pub fn jumbled_cube(element: &str, material: Material) -> Jumble {
 /// (z/L) Σ a sin(k·X + φ) over some waves with lengths of the cube's size, such that the largest ‖sym ∇u‖ is 0.2.
 fn deformation(places: &[Vector<f64>], random: &mut Random) -> Vec<Vector<f64>> {
     let wave =
-        |_| (random.vector(), random.vector().map(|k| 2.0 * k * std::f64::consts::TAU / EDGE), random.next());
+        |_| (vector(random), vector(random).map(|k| 2.0 * k * std::f64::consts::TAU / EDGE), random.half());
     let waves: Vec<_> = (0..5).map(wave).collect();
     let field = |x: Vector<f64>| {
         let mut u = [0.0; 3];

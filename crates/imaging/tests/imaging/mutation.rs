@@ -5,18 +5,9 @@ use std::fs;
 use std::path::Path;
 
 use pliant_imaging::{ImageFormat, ReadOptions, read_bytes};
+use pliant_testing::Random;
 
 use crate::write::*;
-
-/// Knuth's multiplier, for repeatable noise.
-struct Noise(u64);
-
-impl Noise {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 33) as usize % limit.max(1)
-    }
-}
 
 /// One file of each format and variant.
 fn seeds() -> Vec<(ImageFormat, Vec<u8>)> {
@@ -45,7 +36,7 @@ fn seeds() -> Vec<(ImageFormat, Vec<u8>)> {
     seeds
 }
 
-fn mutated(seed: &[u8], noise: &mut Noise) -> Vec<u8> {
+fn mutated(seed: &[u8], noise: &mut Random) -> Vec<u8> {
     let mut bytes = seed.to_vec();
     for _ in 0..1 + noise.below(4) {
         let at = noise.below(bytes.len());
@@ -83,7 +74,7 @@ fn peak() -> Option<u64> {
 #[test]
 fn mutated_images_give_an_image_or_an_error() {
     let before = peak();
-    let mut noise = Noise(20_260_101);
+    let mut noise = Random::new(20_260_101);
     let mut outcomes = [0; 2];
     for (format, seed) in seeds() {
         for _ in 0..2000 {

@@ -63,6 +63,8 @@ impl<R: Number> Turning<R> {
 
 #[cfg(test)]
 mod tests {
+    use pliant_testing::Random;
+
     use super::*;
     use crate::Real;
     use crate::tensor::{dot, scale, sub};
@@ -85,11 +87,8 @@ mod tests {
 
     #[test]
     fn principal_axes_of_any_tensor_even_with_equal_values() {
-        let mut seed = 1_u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        };
+        let mut numbers = Random::new(1);
+        let mut random = || numbers.number();
         for _ in 0..2000 {
             let s = [0; 6].map(|_| random());
             // As it is, tiny, nearly spherical, and of rank one (two equal values).

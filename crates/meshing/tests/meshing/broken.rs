@@ -6,6 +6,7 @@ use std::path::Path;
 use pliant_geometry::io::{Format, read_bytes};
 use pliant_geometry::{Mesh, Vector3};
 use pliant_meshing::{Closing, Enclosed, TriangleMesh};
+use pliant_testing::Random;
 
 /// All that is made of surfaces, with cells of an eighth of the box. Returns whether there was a body.
 fn fill(mesh: &Mesh) -> bool {
@@ -24,11 +25,8 @@ fn fill(mesh: &Mesh) -> bool {
 #[test]
 fn surfaces_of_broken_files_never_panic() {
     let geometry = Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometry/tests");
-    let mut state = 1_u64;
-    let mut below = move |limit: usize| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 33) as usize % limit.max(1)
-    };
+    let mut random = Random::new(1);
+    let mut below = move |limit: usize| random.below(limit);
     let (mut tried, mut bodies) = (0, 0);
     let mut paths: Vec<_> = ["data", "corpus"]
         .iter()
@@ -58,11 +56,8 @@ fn surfaces_of_broken_files_never_panic() {
 /// Triangles between few points at random: every kind of edge, folds, crossings, on a lattice also exact contact.
 #[test]
 fn surfaces_at_random_never_panic() {
-    let mut state = 7_u64;
-    let mut below = move |limit: usize| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 33) as usize % limit
-    };
+    let mut random = Random::new(7);
+    let mut below = move |limit: usize| random.below(limit);
     for round in 0..40 {
         let scale = [1.0, 1e-3, 1e-12, 1e9, 1e150][round % 5];
         let points = (0..8).map(|_| Vector3::from_fn(|_, _| below(3) as f64) * scale).collect();

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
+use pliant_testing::Random;
 
 /// Six times the signed volume of a tetrahedron.
 fn determinant([a, b, c, d]: [Vector3; 4]) -> f64 {
@@ -179,17 +180,7 @@ pub fn euler_characteristic(faces: &[Vec<u32>]) -> isize {
     vertices.len() as isize - edge_counts(faces).len() as isize + faces.len() as isize
 }
 
-/// A short sequence of numbers in [−½, ½), the same every time (Knuth's multiplier).
-pub struct Offsets(pub u64);
-
-impl Offsets {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    }
-
-    /// A vector with each coordinate in [−½, ½) `length`.
-    pub fn vector(&mut self, length: f64) -> Vector3 {
-        Vector3::new(self.next(), self.next(), self.next()) * length
-    }
+/// A vector with each coordinate in [−½, ½) `length`.
+pub fn offset(random: &mut Random, length: f64) -> Vector3 {
+    Vector3::from(random.vector()) * (0.5 * length)
 }

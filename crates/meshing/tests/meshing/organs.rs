@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use pliant_geometry::Vector3;
 use pliant_imaging::{Cleaning, Grid, LabelError, LabelImage, Smoothing};
 use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets};
+use pliant_testing::Random;
 
 use crate::checks::*;
 use crate::images;
@@ -56,10 +57,10 @@ fn a_sphere_of_voxels_wherever_the_lattice_lies() {
 fn sphere_at(lattices: usize) {
     let ball = anatomy(&images::ball(0.05), &[1]);
     let exact = 4.0 / 3.0 * PI * 0.05_f64.powi(3);
-    let mut offsets = Offsets(1);
+    let mut random = Random::new(1);
     for edge in [0.008, 0.012, 0.016, 0.020] {
         for _ in 0..lattices {
-            let made = meshed(&ball, edge, offsets.vector(edge));
+            let made = meshed(&ball, edge, offset(&mut random, edge));
             let faces = check_sound(&made);
             assert_eq!(euler_characteristic(&faces), 2);
             assert!(made.report.acoustic_part >= 0.75, "{}", made.report);
@@ -98,9 +99,9 @@ fn the_liver_wherever_the_lattice_lies() {
 fn liver_at(edge: f64, lattices: usize) {
     let liver = anatomy(&images::liver(), &[1]);
     let truth = images::truth("liver");
-    let mut offsets = Offsets(5);
+    let mut random = Random::new(5);
     for _ in 0..lattices {
-        let made = meshed(&liver, edge, offsets.vector(edge));
+        let made = meshed(&liver, edge, offset(&mut random, edge));
         let [forth, back, rms] = images::distances(&made.mesh, &truth);
         println!("{}\nH {:.3} / {:.3} a, RMS {:.3} a", made.report, forth / edge, back / edge, rms / edge);
         check_sound(&made);
@@ -129,9 +130,9 @@ fn brain_at(lattices: usize) {
     let image = images::brain();
     let brain = anatomy(&image, &[1, 2, 3]);
     let truth = images::truth("brain");
-    let mut offsets = Offsets(5);
+    let mut random = Random::new(5);
     for _ in 0..lattices {
-        let made = meshed(&brain, edge, offsets.vector(edge));
+        let made = meshed(&brain, edge, offset(&mut random, edge));
         let [_, _, rms] = images::distances(&made.mesh, &truth);
         println!("{}\nRMS {:.3} a", made.report, rms / edge);
         check_sound(&made);

@@ -2,6 +2,7 @@
 
 use pliant_geometry::Vector3;
 use pliant_meshing::{ImplicitField, Organ, Phantom, Stuffing, Voxels, brain_label};
+use pliant_testing::Random;
 
 use crate::checks::*;
 
@@ -73,9 +74,9 @@ fn sampled_box(body: &Phantom) -> (Vector3, Vector3, Vector3) {
 #[test]
 fn scale_multiplies_lengths() {
     let (one, two) = (organ(Organ::Liver), Phantom::new(Organ::Liver, 2.0).expect("a positive scale"));
-    let mut offsets = Offsets(7);
+    let mut random = Random::new(7);
     for _ in 0..100 {
-        let point = offsets.vector(0.2);
+        let point = offset(&mut random, 0.2);
         assert!((two.value(&(2.0 * point)) - 2.0 * one.value(&point)).abs() < 1e-15);
     }
     assert_eq!(two.bounds().1, 2.0 * one.bounds().1);
@@ -114,11 +115,11 @@ fn the_mesh_of_the_liver_has_its_volume() {
 /// offsets.
 #[test]
 fn raw_meshes_of_organs_keep_a_fifth_of_the_ideal_step() {
-    let mut offsets = Offsets(3);
+    let mut random = Random::new(3);
     for kind in [Organ::Liver, Organ::Brain] {
         for edge in [0.010, 0.008] {
             for _ in 0..4 {
-                let stuffing = Stuffing { origin: Some(offsets.vector(edge)), ..Stuffing::new(edge) };
+                let stuffing = Stuffing { origin: Some(offset(&mut random, edge)), ..Stuffing::new(edge) };
                 let filled = stuffing.mesh(&organ(kind)).expect("the organ is meshed");
                 let boundary = conforming_boundary(&filled.mesh);
                 let odd = edge_counts(&boundary).values().filter(|&&count| count != 2).count();

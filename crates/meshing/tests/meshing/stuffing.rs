@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use pliant_geometry::Vector3;
 use pliant_meshing::{Ellipsoid, FieldMesh, ImplicitField, Organ, Phantom, Stuffing};
+use pliant_testing::Random;
 
 use crate::checks::*;
 
@@ -20,7 +21,7 @@ fn stuffed(field: &impl ImplicitField, edge: f64, origin: Vector3) -> FieldMesh 
 /// T1 of the specification: 20 offsets of the lattice at 8, 12, 16 and 20 mm.
 #[test]
 fn a_sphere_is_round_closed_and_free_of_slivers_wherever_the_lattice_lies() {
-    let mut offsets = Offsets(1);
+    let mut random = Random::new(1);
     let exact = 4.0 / 3.0 * PI * RADIUS.powi(3);
     let (mut sharpest, mut shortest) = (180.0_f64, f64::INFINITY);
     for edge in [0.008, 0.012, 0.016, 0.020] {
@@ -28,7 +29,7 @@ fn a_sphere_is_round_closed_and_free_of_slivers_wherever_the_lattice_lies() {
         // (a/r)².
         let tolerance = 0.02 * (edge / 0.008_f64).powi(2);
         for _ in 0..20 {
-            let filled = stuffed(&sphere(), edge, offsets.vector(edge));
+            let filled = stuffed(&sphere(), edge, offset(&mut random, edge));
             let boundary = conforming_boundary(&filled.mesh);
             assert!(tet_volumes(&filled.mesh).iter().all(|&volume| volume > 0.0));
             assert!((tet_volume(&filled.mesh) / exact - 1.0).abs() < tolerance);

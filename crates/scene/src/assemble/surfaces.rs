@@ -109,6 +109,7 @@ impl Builder<'_> {
 #[cfg(test)]
 mod tests {
     use crate::testing::{CUBE, built, built_alone, mistakes};
+    use pliant_testing::Random;
 
     #[test]
     fn a_carried_surface_moves_rigidly_and_linearly_with_its_body() {
@@ -153,14 +154,8 @@ mod tests {
             assert!(apart(&skin.mapping.apply(&moved(rest)), &moved(&skin.rest)) < 1e-10);
         }
         // ⟨J v, f⟩ = ⟨v, Jᵀ f⟩.
-        let mut seed = 1_u64;
-        let mut random = |count: usize| -> Vec<[f64; 3]> {
-            let mut next = || {
-                seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-            };
-            (0..count).map(|_| [next(), next(), next()]).collect()
-        };
+        let mut numbers = Random::new(1);
+        let mut random = |count: usize| -> Vec<[f64; 3]> { (0..count).map(|_| numbers.vector()).collect() };
         let (velocity, force) = (random(rest.len()), random(skin.rest.len()));
         let mut up = vec![[0.0; 3]; rest.len()];
         for (row, &f) in force.iter().enumerate() {

@@ -1,0 +1,85 @@
+//! Helpers of tests: numbers at random that are the same in every run, files damaged by them, and the memory of the process.
+//!
+//! ```
+//! let mut random = pliant_testing::Random::new(1);
+//! assert!((-1.0..1.0).contains(&random.number()) && random.below(3) < 3);
+//! ```
+
+use std::fs;
+
+/// A linear congruential generator (Knuth's MMIX): the same numbers on every machine.
+#[derive(Clone, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// The sequence of a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        self.0
+    }
+
+    /// A number in [−1, 1).
+    pub fn number(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// A number in [−½, ½).
+    pub fn half(&mut self) -> f64 {
+        0.5 * self.number()
+    }
+
+    /// A number in [0, 1).
+    pub fn part(&mut self) -> f64 {
+        (self.next() >> 33) as f64 / f64::from(1_u32 << 31)
+    }
+
+    /// A vector in [−1, 1)³.
+    pub fn vector(&mut self) -> [f64; 3] {
+        [0; 3].map(|_| self.number())
+    }
+
+    /// A whole number from 0 to below `limit`; 0 where that is 0.
+    pub fn below(&mut self, limit: usize) -> usize {
+        (self.next() >> 33) as usize % limit.max(1)
+    }
+
+    /// The same bytes with up to four changes: cut off, cut out, filled, repeated, a bit turned.
+    pub fn damaged(&mut self, seed: &[u8]) -> Vec<u8> {
+        let mut bytes = seed.to_vec();
+        for _ in 0..1 + self.below(4) {
+            let at = self.below(bytes.len());
+            match self.below(6) {
+                0 => bytes.truncate(at),
+                1 => {
+                    let to = (at + self.below(24)).min(bytes.len());
+                    bytes.drain(at..to);
+                }
+                2 => {
+                    let value = [0, 0x7F, 0x80, 0xFF, b' ', b'9', b'-', b'"'][self.below(8)];
+                    let to = (at + 1 + self.below(8)).min(bytes.len());
+                    bytes[at.min(to)..to].fill(value);
+                }
+                3 => {
+                    let again = bytes[at..(at + self.below(16)).min(bytes.len())].to_vec();
+                    bytes.splice(at..at, again);
+                }
+                _ => {
+                    if let Some(byte) = bytes.get_mut(at) {
+                        *byte ^= 1 << self.below(8);
+                    }
+                }
+            }
+        }
+        bytes
+    }
+}
+
+/// Peak memory of this process [KiB], on Linux.
+pub fn peak() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?.parse().ok()
+}
