@@ -227,12 +227,12 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     for note in world.notes() {
         eprintln!("note: {note}");
     }
-    let photographer = arguments.picture.then(|| pictures::Photographer::new(&world)).transpose()?;
+    let picture = arguments.picture.then(|| pictures::FinalPicture::new(&world)).transpose()?;
     let bar = Bar::new();
     let options = Options {
         resume: checkpoint.as_ref(),
         stop: Some(signals::stop()),
-        picture: photographer.as_ref().map(|photographer| photographer as &dyn Draw),
+        picture: picture.as_ref().map(|picture| picture as &dyn Draw),
     };
     let mut report = |progress| bar.update(progress);
     let result = pliant_scene::run_with(&world, &folder, options, &mut report);

@@ -26,15 +26,15 @@ pub fn view(_arguments: &View) -> Result<ExitCode, Failure> {
 
 /// Draws nothing and is never constructed.
 #[derive(Debug)]
-pub enum Photographer {}
+pub enum FinalPicture {}
 
-impl Photographer {
+impl FinalPicture {
     pub fn new(_world: &World) -> Result<Self, Failure> {
         Err(missing())
     }
 }
 
-impl Draw for Photographer {
+impl Draw for FinalPicture {
     fn draw(&self, _mesh: &Mesh, _time: f64) -> Result<Vec<u8>, String> {
         match *self {}
     }

@@ -166,19 +166,19 @@ fn typed(look: &mut Look, arguments: &Render) {
 
 /// Draws the final state of a run.
 #[derive(Debug)]
-pub struct Photographer {
+pub struct FinalPicture {
     look: Look,
     graphics: Graphics,
 }
 
-impl Photographer {
+impl FinalPicture {
     pub fn new(world: &World) -> Result<Self, Failure> {
         let look = Look { hide: world.hidden(&world.scene.view), ..look_of(&world.scene) };
         Ok(Self { look, graphics: Graphics::open()? })
     }
 }
 
-impl Draw for Photographer {
+impl Draw for FinalPicture {
     fn draw(&self, mesh: &Mesh, time: f64) -> Result<Vec<u8>, String> {
         let picture = self.look.picture(&self.graphics, mesh, time).map_err(|error| error.to_string())?;
         picture.png().map_err(|error| error.to_string())

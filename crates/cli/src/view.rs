@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use pliant_scene::World;
-use pliant_viewer::{Errand, Lags, Opening, Recording, WindowError, open, replay, replay_in_real_time};
+use pliant_viewer::{Lags, Opening, Recording, SelfTest, WindowError, open, replay, replay_in_real_time};
 
 use crate::arguments::View;
 use crate::commands::prepare;
@@ -42,7 +42,7 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
         world,
         read: Arc::new(read),
         record: arguments.record.clone(),
-        errand: errand(arguments),
+        self_test: self_test(arguments),
     })?;
     if let Some(told) = told {
         say(told)?;
@@ -51,11 +51,11 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
 }
 
 /// The automatic task of the window.
-fn errand(arguments: &View) -> Option<Errand> {
+fn self_test(arguments: &View) -> Option<SelfTest> {
     let file = arguments.screenshot.clone();
     match file {
-        _ if arguments.rehearse => Some(Errand::Rehearsal { file }),
-        Some(file) => Some(Errand::Portrait { after: arguments.after, file }),
+        _ if arguments.rehearse => Some(SelfTest::Rehearsal { file }),
+        Some(file) => Some(SelfTest::Portrait { after: arguments.after, file }),
         None => None,
     }
 }

@@ -67,7 +67,7 @@
 //! # Grips and windows
 //!
 //! While a grip holds, a kernel finds its force from the displacements, and marked nodes add it to their loads. Only p − Σ wᵢ Xᵢ is computed
-//! before, in double precision. [`GpuStepper::coast`] takes steps for a given time without any read-back. [`DeviceMapping`] computes points
+//! before, in double precision. [`GpuStepper::advance_without_read_back`] takes steps for a given time without any read-back. [`DeviceMapping`] computes points
 //! that are combinations of nodes, with a value each, in an array that a renderer binds. [`Device::read_backs`] counts all read-backs.
 //!
 //! # Tests

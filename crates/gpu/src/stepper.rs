@@ -363,7 +363,7 @@ impl GpuStepper {
     ///
     /// # Errors
     /// As [`Self::evaluate`] at the first instant, and if the device fails.
-    pub fn coast(
+    pub fn advance_without_read_back(
         &mut self,
         state: &mut State<f32>,
         steps: u64,

@@ -345,7 +345,9 @@ fn functions_of_one_number_keep_their_relative_digits() {
     let mut random = Random::new(3);
     // From 1e-9 on, below and above zero.
     let mut magnitudes = |largest: f64| -> Vec<f32> {
-        (0..20_000).map(|_| (magnitude(&mut random, 1e-9, largest) * random.number().signum()) as f32).collect()
+        (0..20_000)
+            .map(|_| (magnitude(&mut random, 1e-9, largest) * random.number().signum()) as f32)
+            .collect()
     };
     let changes: Vec<f32> = magnitudes(20.0).into_iter().filter(|x| *x > -0.999).collect();
     let ratios: Vec<f32> = changes.iter().map(|x| 1.0 + x).collect();

@@ -4,7 +4,7 @@
 use std::error::Error;
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
-use pliant_picture::{Camera, Frame, Graphics, Studio, Style, Subject};
+use pliant_picture::{Camera, Frame, Graphics, Offscreen, Style, Subject};
 
 const SIZE: [u32; 2] = [640, 480];
 
@@ -25,14 +25,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let graphics = Graphics::open()?;
     let subject = Subject::new(&mesh);
-    let mut studio = Studio::new(&graphics, &subject, SIZE)?;
+    let mut offscreen = Offscreen::new(&graphics, &subject, SIZE)?;
     let points: Vec<Vector3> = mesh.points.iter().zip(&moved).map(|(p, u)| p + u).collect();
     let values: Vec<f64> = moved.iter().map(|u| u.norm()).collect();
     let largest = values.iter().copied().fold(0.0, f64::max);
     let mut camera = Camera::default();
     camera.fit(&points, f64::from(SIZE[0]) / f64::from(SIZE[1]));
     let style = Style { range: Some([0.0, largest]), edges: true, ..Style::default() };
-    let picture = studio.draw(&Frame { points, values, critical: None }, &camera, &style)?;
+    let picture = offscreen.draw(&Frame { points, values, critical: None }, &camera, &style)?;
     std::fs::write(&file, picture.png()?)?;
     println!("wrote {file}");
     Ok(())

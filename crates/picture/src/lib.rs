@@ -4,7 +4,7 @@
 //!
 //! ```no_run
 //! use pliant_geometry::{CellKind, Mesh, Vector3};
-//! use pliant_picture::{Camera, Frame, Graphics, Studio, Style, Subject};
+//! use pliant_picture::{Camera, Frame, Graphics, Offscreen, Style, Subject};
 //!
 //! let points = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.], [0., 0., 0.1]];
 //! let mut mesh = Mesh { points: points.map(Vector3::from).to_vec(), ..Mesh::default() };
@@ -12,12 +12,12 @@
 //!
 //! let graphics = Graphics::open()?;
 //! let subject = Subject::new(&mesh);
-//! let mut studio = Studio::new(&graphics, &subject, [640, 480])?;
+//! let mut offscreen = Offscreen::new(&graphics, &subject, [640, 480])?;
 //! let frame = Frame { points: mesh.points.clone(), values: vec![0.0, 1.0, 2.0, 3.0], critical: None };
 //! let style = Style { range: Some([0.0, 3.0]), ..Style::default() };
 //! let mut camera = Camera::default();
 //! camera.fit(&frame.points, 640.0 / 480.0);
-//! let picture = studio.draw(&frame, &camera, &style)?;
+//! let picture = offscreen.draw(&frame, &camera, &style)?;
 //! std::fs::write("tet.png", picture.png()?)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -29,11 +29,11 @@ mod film;
 mod graphics;
 mod legend;
 mod lines;
+mod offscreen;
 mod picture;
 mod renderer;
 mod section;
 mod series;
-mod studio;
 mod style;
 mod subject;
 mod text;
@@ -44,10 +44,10 @@ pub use error::PictureError;
 pub use film::{AnimatedPng, Film, ffmpeg};
 pub use graphics::Graphics;
 pub use legend::{Legend, readable, swatches, ticks};
+pub use offscreen::{Frame, Offscreen};
 pub use picture::{Difference, Picture};
 pub use renderer::{Drawn, Renderer, Target, drawn_value};
 pub use section::{Plane, Section};
 pub use series::{Look, Series, SeriesError};
-pub use studio::{Frame, Studio};
 pub use style::{Background, Style, Texture};
 pub use subject::{Subject, critical_cell, nodal_values, visible};

@@ -11,8 +11,8 @@ use crate::colour::Extremes;
 use crate::error::PictureError;
 use crate::graphics::Graphics;
 use crate::legend::{Legend, readable};
+use crate::offscreen::{Frame, Offscreen};
 use crate::picture::Picture;
-use crate::studio::{Frame, Studio};
 use crate::style::Style;
 use crate::subject::{Subject, critical_cell, nodal_values, visible};
 
@@ -317,7 +317,7 @@ impl Look {
         let mut common = Common::default();
         common.add(&subject, &frame, look.style.ghost);
         let (camera, style) = look.settle(common);
-        let picture = Studio::new(graphics, &subject, look.size)?.draw(&frame, &camera, &style)?;
+        let picture = Offscreen::new(graphics, &subject, look.size)?.draw(&frame, &camera, &style)?;
         Ok(look.finished(picture, &style, time, step))
     }
 
@@ -351,10 +351,10 @@ impl Look {
             common.add(&subject, &read(index)?.0, look.style.ghost);
         }
         let (camera, style) = look.settle(common);
-        let mut studio = Studio::new(graphics, &subject, look.size)?;
+        let mut offscreen = Offscreen::new(graphics, &subject, look.size)?;
         for (count, &index) in frames.iter().enumerate() {
             let (frame, step) = read(index)?;
-            let picture = studio.draw(&frame, &camera, &style)?;
+            let picture = offscreen.draw(&frame, &camera, &style)?;
             take(count, look.finished(picture, &style, series.frames[index].0, step))?;
         }
         Ok(())

@@ -84,7 +84,7 @@ mod drawn {
     use pliant_geometry::Vector3;
     use pliant_geometry::io::encode_base64;
     use pliant_picture::{
-        Axis, Background, Camera, ColourMap, Frame, Graphics, PictureError, Projection, Studio, Style,
+        Axis, Background, Camera, ColourMap, Frame, Graphics, Offscreen, PictureError, Projection, Style,
         Subject, Texture,
     };
 
@@ -215,7 +215,7 @@ mod drawn {
         style: &Style,
         size: [u32; 2],
     ) -> Result<String, PictureError> {
-        let picture = Studio::new(graphics, subject, size)?.draw(frame, camera, style)?;
+        let picture = Offscreen::new(graphics, subject, size)?.draw(frame, camera, style)?;
         let mut uri = b"data:image/png;base64,".to_vec();
         encode_base64(&picture.png()?, &mut uri);
         Ok(uri.into_iter().map(char::from).collect())

@@ -14,7 +14,7 @@ use pliant_mechanics::fingerprint;
 use serde::{Deserialize, Serialize};
 
 use crate::assemble::Built;
-use crate::corotational::Remembered;
+use crate::corotational::ShellSnapshot;
 use crate::diagnostic::counted;
 use crate::format::{LoadSteps, Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, Written, number, replace};
@@ -457,7 +457,7 @@ impl Checkpoint {
 /// The state of a participant from its bytes, if it has the sizes of the model's.
 fn kept(built: &Built, precision: Precision, bytes: &[u8]) -> Option<Kept> {
     if built.corotational.is_some() {
-        let remembered: Remembered = postcard::from_bytes(bytes).ok()?;
+        let remembered: ShellSnapshot = postcard::from_bytes(bytes).ok()?;
         let fits = remembered.fits(built.model.node_count());
         return fits.then(|| Kept::Shells(Box::new(remembered)));
     }

@@ -101,20 +101,20 @@ struct Path {
 
 /// What a resumed run needs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Remembered {
+pub(crate) struct ShellSnapshot {
     /// Whole steps done, and the time [s] they end at.
     done: u64,
     time: f64,
-    state: Snapshot,
-    before: Option<(Vec<f64>, Snapshot)>,
+    state: PlainState,
+    before: Option<(Vec<f64>, PlainState)>,
     /// The state that an implicit step takes differences with.
-    previous: Option<Snapshot>,
+    previous: Option<PlainState>,
     energies: Energies,
     effort: Effort,
     convergence: VecDeque<Iterated>,
 }
 
-impl Remembered {
+impl ShellSnapshot {
     /// Whether it is of a model with so many nodes.
     pub(crate) fn fits(&self, nodes: usize) -> bool {
         let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
@@ -124,7 +124,7 @@ impl Remembered {
 
 /// A state in plain numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Snapshot {
+struct PlainState {
     time: f64,
     load_factor: f64,
     position: Vec<[f64; 3]>,
@@ -134,7 +134,7 @@ struct Snapshot {
     spin: Vec<[f64; 3]>,
 }
 
-impl Snapshot {
+impl PlainState {
     fn of(state: &corotational::State) -> Self {
         let plain = |vectors: &[Vector3<f64>]| vectors.iter().map(|&v| v.into()).collect();
         Self {
@@ -532,8 +532,8 @@ fn linear_solver(table: &LinearTable) -> LinearSolver {
 
 impl Corotated {
     /// Goes on from where a run of the same bodies stood.
-    pub(crate) fn resume(&mut self, remembered: Remembered) {
-        let Remembered { done, time, state, before, previous, energies, effort, convergence } = remembered;
+    pub(crate) fn resume(&mut self, remembered: ShellSnapshot) {
+        let ShellSnapshot { done, time, state, before, previous, energies, effort, convergence } = remembered;
         (self.done, self.time) = (done, time);
         self.convergence = convergence;
         self.state = state.state();
@@ -546,16 +546,16 @@ impl Corotated {
         self.evaluated = false;
     }
 
-    fn remembered(&self) -> Remembered {
+    fn snapshot(&self) -> ShellSnapshot {
         let previous = match &self.method {
-            Method::Implicit(solver, _) => solver.previous().map(Snapshot::of),
+            Method::Implicit(solver, _) => solver.previous().map(PlainState::of),
             _ => None,
         };
-        Remembered {
+        ShellSnapshot {
             done: self.done,
             time: self.time,
-            state: Snapshot::of(&self.state),
-            before: self.before.as_ref().map(|(forces, state)| (forces.clone(), Snapshot::of(state))),
+            state: PlainState::of(&self.state),
+            before: self.before.as_ref().map(|(forces, state)| (forces.clone(), PlainState::of(state))),
             previous,
             energies: self.energies,
             effort: self.effort.clone(),
@@ -671,11 +671,11 @@ impl Participant for Corotated {
     }
 
     fn kept(&self) -> Kept {
-        Kept::Shells(Box::new(self.remembered()))
+        Kept::Shells(Box::new(self.snapshot()))
     }
 
     fn encode(&self) -> postcard::Result<Vec<u8>> {
-        postcard::to_stdvec(&self.remembered())
+        postcard::to_stdvec(&self.snapshot())
     }
 
     fn fingerprint(&self) -> u64 {

@@ -74,7 +74,7 @@ pub use assemble::{
 pub use bound::element_bound;
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
-pub use live::{Live, Standing, go_on, live};
+pub use live::{Live, Snapshot, go_on, live};
 pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
 pub use output::{
     AddedMass, BodySummary, Column, FailureSummary, LoadStepSummary, OutputError, OutputFolder,

@@ -11,7 +11,7 @@ use pliant_mechanics::{Energies, fingerprint};
 
 use crate::assemble::Built;
 use crate::format::VtuTable;
-use crate::output::{Column, FailureSummary, Frame, Samples, Snapshot};
+use crate::output::{Column, FailureSummary, FieldMesh, Frame, Samples};
 use crate::participant::{Kept, participant_from};
 use crate::simulation::Simulation;
 use crate::world::World;
@@ -29,7 +29,11 @@ pub trait Live: Send {
 
     /// Goes up to `steps` steps on where the state lies on a graphics processor, as many as take about `within`: nothing comes back to
     /// ordinary memory, and what breaks is told by [`mesh`](Self::mesh). How many; `None` of a solver whose state lies there.
-    fn coast(&mut self, steps: u64, within: Duration) -> Option<Result<u64, FailureSummary>>;
+    fn advance_without_read_back(
+        &mut self,
+        steps: u64,
+        within: Duration,
+    ) -> Option<Result<u64, FailureSummary>>;
 
     /// The points shown at the instant, found on the graphics processor where the state lies, with a value each; `given` takes the
     /// place of those given before. `None` of a solver whose state lies in ordinary memory.
@@ -41,7 +45,7 @@ pub trait Live: Send {
 
     /// Where it stands, for [`go_on`]. `None` where the instant was looked at, whose forces belong to the step to come; and of a
     /// device that was lost.
-    fn stand(&mut self) -> Option<Standing>;
+    fn snapshot(&mut self) -> Option<Snapshot>;
 
     /// Takes hold of points: these grips and no others act from the next step on. False where a stepper knows none, or where a grip holds
     /// nodes of several participants.
@@ -89,11 +93,11 @@ pub trait Live: Send {
 
 /// Where a run stands between two steps: all that another one needs to go on from there.
 #[derive(Clone, Debug)]
-pub struct Standing(Vec<OwnStanding>);
+pub struct Snapshot(Vec<OwnSnapshot>);
 
 /// Where a participant stands.
 #[derive(Clone, Debug)]
-struct OwnStanding {
+struct OwnSnapshot {
     kept: Kept,
     clock: Option<Clock>,
     /// Length of its steps [s].
@@ -115,18 +119,18 @@ pub fn live(world: &Arc<World>) -> Result<Box<dyn Live>, FailureSummary> {
 /// If a stepper can't be made.
 pub fn go_on(
     world: &Arc<World>,
-    Standing(standing): Standing,
+    Snapshot(snapshot): Snapshot,
     before: &World,
 ) -> Result<Option<Box<dyn Live>>, FailureSummary> {
-    if world.participants.len() != standing.len() || world.participants.len() != before.participants.len() {
+    if world.participants.len() != snapshot.len() || world.participants.len() != before.participants.len() {
         return Ok(None);
     }
     let mut participants = Vec::new();
-    for ((part, own), before) in world.participants.iter().zip(standing).zip(&before.participants) {
+    for ((part, own), before) in world.participants.iter().zip(snapshot).zip(&before.participants) {
         if !same_mesh(&before.built, &part.built) {
             return Ok(None);
         }
-        let OwnStanding { kept, clock, step } = own;
+        let OwnSnapshot { kept, clock, step } = own;
         match participant_from(part, kept, clock.map(|clock| (clock, step, &*before.built)))? {
             Some(participant) => participants.push(participant),
             None => return Ok(None),
@@ -150,7 +154,7 @@ struct Played {
     simulation: Simulation,
     /// First node of each participant, counted over all.
     first_nodes: Vec<u32>,
-    snapshot: Snapshot,
+    shown: FieldMesh,
     /// What finds the points of the snapshot where the state lies on a device.
     mapping: Option<DeviceMapping>,
     samples: Samples,
@@ -165,7 +169,7 @@ impl Played {
             first_nodes.push(first_nodes[first_nodes.len() - 1] + part.built.model.node_count() as u32);
         }
         Self {
-            snapshot: Snapshot::new(world, &world.scene.shown(1.0)),
+            shown: FieldMesh::new(world, &world.scene.shown(1.0)),
             samples: Samples::new(world, &world.scene.sampled()),
             world: Arc::clone(world),
             simulation,
@@ -214,10 +218,14 @@ impl Live for Played {
         Ok(steps)
     }
 
-    fn coast(&mut self, steps: u64, within: Duration) -> Option<Result<u64, FailureSummary>> {
-        let coasted = self.simulation.only()?.coast(steps, within)?;
+    fn advance_without_read_back(
+        &mut self,
+        steps: u64,
+        within: Duration,
+    ) -> Option<Result<u64, FailureSummary>> {
+        let advanced = self.simulation.only()?.advance_without_read_back(steps, within)?;
         self.evaluated = None;
-        Some(coasted)
+        Some(advanced)
     }
 
     fn place(
@@ -227,10 +235,10 @@ impl Live for Played {
     ) -> Option<Result<DevicePoints, FailureSummary>> {
         let only = self.simulation.only()?;
         if self.mapping.is_none() {
-            let (world, snapshot) = (&self.world, &self.snapshot);
+            let (world, shown) = (&self.world, &self.shown);
             let mut points = (0..)
-                .zip(&snapshot.mesh().points)
-                .map(|(point, place)| ([place.x, place.y, place.z], snapshot.nodes_of(world, point).1));
+                .zip(&shown.mesh().points)
+                .map(|(point, place)| ([place.x, place.y, place.z], shown.nodes_of(world, point).1));
             match only.map(&mut points)? {
                 Ok(mapping) => self.mapping = Some(mapping),
                 Err(failure) => return Some(Err(failure)),
@@ -244,17 +252,17 @@ impl Live for Played {
         Some(Ok(mapping.points().clone()))
     }
 
-    fn stand(&mut self) -> Option<Standing> {
+    fn snapshot(&mut self) -> Option<Snapshot> {
         if self.evaluated.is_some() || self.simulation.bring_back().is_err() {
             return None;
         }
         let parts = self.world.participants.iter().zip(self.simulation.participants());
-        let own = parts.map(|(part, now)| OwnStanding {
+        let own = parts.map(|(part, now)| OwnSnapshot {
             clock: now.clock(),
             kept: now.kept(),
             step: part.plan.step,
         });
-        Some(Standing(own.collect()))
+        Some(Snapshot(own.collect()))
     }
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
@@ -285,19 +293,19 @@ impl Live for Played {
     }
 
     fn nodes_of(&self, point: u32) -> Vec<(u32, f64)> {
-        let (part, nodes) = self.snapshot.nodes_of(&self.world, point);
+        let (part, nodes) = self.shown.nodes_of(&self.world, point);
         nodes.into_iter().map(|(node, weight)| (self.first_nodes[part] + node, weight)).collect()
     }
 
     fn show(&mut self, shown: &VtuTable) {
-        self.snapshot = Snapshot::new(&self.world, shown);
+        self.shown = FieldMesh::new(&self.world, shown);
         self.mapping = None;
     }
 
     fn mesh(&mut self) -> Result<&Mesh, FailureSummary> {
         self.evaluate(Wanted::Everything)?;
-        self.snapshot.fill(&self.simulation.frames(&self.world));
-        Ok(self.snapshot.mesh())
+        self.shown.fill(&self.simulation.frames(&self.world));
+        Ok(self.shown.mesh())
     }
 
     fn energies(&self) -> Energies {
@@ -392,12 +400,12 @@ mod tests {
         let mut whole = pulled_for(&stage, 300);
         let again = other(&[viscous]);
         let mut half = pulled_for(&stage, 150);
-        assert!(half.stand().is_some());
+        assert!(half.snapshot().is_some());
         half.mesh().unwrap();
-        assert!(half.stand().is_none(), "the forces at this instant belong to the step to come");
+        assert!(half.snapshot().is_none(), "the forces at this instant belong to the step to come");
         half.advance(1).unwrap();
-        let standing = half.stand().unwrap();
-        let mut half = go_on(&again, standing, &stage).unwrap().unwrap();
+        let snapshot = half.snapshot().unwrap();
+        let mut half = go_on(&again, snapshot, &stage).unwrap().unwrap();
         hold_on(half.as_mut(), &again);
         for _ in 151..300 {
             half.advance(1).unwrap();
@@ -421,8 +429,8 @@ mod tests {
         let mut going = pulled_for(&soft, 4000);
         let pulled = height(going.as_mut());
         going.advance(1).unwrap();
-        let (standing, time) = (going.stand().unwrap(), going.time());
-        let mut going = go_on(&stiff, standing, &soft).unwrap().unwrap();
+        let (snapshot, time) = (going.snapshot().unwrap(), going.time());
+        let mut going = go_on(&stiff, snapshot, &soft).unwrap().unwrap();
         assert_eq!(going.time(), time);
         hold_on(going.as_mut(), &stiff);
         going.advance(1).unwrap();
@@ -445,8 +453,8 @@ mod tests {
         let (coarse, fine) = (in_steps("0.002"), in_steps("0.001"));
         // It swings up; at its fastest the steps become shorter.
         let mut going = pulled_for(&coarse, 16);
-        let standing = going.stand().unwrap();
-        let mut going = go_on(&fine, standing, &coarse).unwrap().unwrap();
+        let snapshot = going.snapshot().unwrap();
+        let mut going = go_on(&fine, snapshot, &coarse).unwrap().unwrap();
         hold_on(going.as_mut(), &fine);
         (0..68).for_each(|_| assert_eq!(going.advance(1).unwrap(), 1));
         let mut whole = pulled_for(&fine, 0);
@@ -469,8 +477,8 @@ mod tests {
     fn more_mass_unbalances_no_energy() {
         let (light, heavy) = (other(&[]), other(&[("density = 1000", "density = 3000")]));
         let mut going = pulled_for(&light, 60);
-        let standing = going.stand().unwrap();
-        let mut going = go_on(&heavy, standing, &light).unwrap().unwrap();
+        let snapshot = going.snapshot().unwrap();
+        let mut going = go_on(&heavy, snapshot, &light).unwrap().unwrap();
         hold_on(going.as_mut(), &heavy);
         go(going.as_mut(), 400);
         assert!(going.energies().balance < 0.02, "{:?}", going.energies());
@@ -479,8 +487,8 @@ mod tests {
     #[test]
     fn another_mesh_goes_on_from_nothing() {
         let (coarse, fine) = (other(&[]), other(&[("cells = [2, 2, 2]", "cells = [2, 2, 3]")]));
-        let standing = pulled_for(&coarse, 10).stand().unwrap();
-        assert!(go_on(&fine, standing, &coarse).unwrap().is_none());
+        let snapshot = pulled_for(&coarse, 10).snapshot().unwrap();
+        assert!(go_on(&fine, snapshot, &coarse).unwrap().is_none());
     }
 
     fn go(live: &mut dyn Live, steps: u64) {

@@ -12,7 +12,7 @@ use pliant_mechanics::grip::Grip;
 use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::assemble::Built;
-use crate::corotational::{Corotated, Remembered};
+use crate::corotational::{Corotated, ShellSnapshot};
 use crate::format::{Precision, RunTable};
 use crate::output::FailureSummary;
 use crate::plan::Plan;
@@ -78,7 +78,7 @@ pub(crate) enum Kept {
     /// In double precision.
     Double(State<f64>, Memory<f64>),
     /// Of shells and co-rotational solids.
-    Shells(Box<Remembered>),
+    Shells(Box<ShellSnapshot>),
 }
 
 /// Bodies that one stepper advances together.
@@ -108,7 +108,11 @@ pub(crate) trait Participant: Instant + Send {
 
     /// Goes up to `steps` steps on without reading anything back, as many as take about `within`. How many; `None` of a state in
     /// ordinary memory.
-    fn coast(&mut self, _steps: u64, _within: Duration) -> Option<Result<u64, FailureSummary>> {
+    fn advance_without_read_back(
+        &mut self,
+        _steps: u64,
+        _within: Duration,
+    ) -> Option<Result<u64, FailureSummary>> {
         None
     }
 
@@ -334,8 +338,12 @@ impl<R: Numeric> Participant for Solids<R> {
         self.solver.stride()
     }
 
-    fn coast(&mut self, steps: u64, within: Duration) -> Option<Result<u64, FailureSummary>> {
-        self.solver.coast(&mut self.state, steps, within)
+    fn advance_without_read_back(
+        &mut self,
+        steps: u64,
+        within: Duration,
+    ) -> Option<Result<u64, FailureSummary>> {
+        self.solver.advance_without_read_back(&mut self.state, steps, within)
     }
 
     fn map(

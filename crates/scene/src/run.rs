@@ -13,8 +13,8 @@ use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::format::SolverName;
 use crate::output::{
-    CONVERGENCE, FailureSummary, Frame, INTERRUPTED, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY,
-    Schedule, Scheduled, ShellStrains, Snapshot, Summary, markdown, observers, plot, steps_to, summarise,
+    CONVERGENCE, FailureSummary, FieldMesh, Frame, INTERRUPTED, OutputError, OutputFolder, PICTURE, PLOT,
+    SUMMARY, Schedule, Scheduled, ShellStrains, Summary, markdown, observers, plot, steps_to, summarise,
     time_of,
 };
 use crate::participant::Participant;
@@ -246,7 +246,7 @@ fn go(
         Ok(simulation) => simulation,
         Err(failure) => return Ok(Outcome::not_begun(failure, world)),
     };
-    let mut course = Course::new(world, folder, options, simulation)?;
+    let mut run = Run::new(world, folder, options, simulation)?;
     let until = world.scene.scene.until;
     let before = options.resume.map_or(0.0, |checkpoint| checkpoint.progressed.wall_seconds);
     let started = Instant::now();
@@ -254,15 +254,15 @@ fn go(
     let wall = || Duration::try_from_secs_f64(wall_seconds()).unwrap_or_default();
     let mut reported = started;
     let failure = loop {
-        match course.see() {
+        match run.see() {
             Ok(last) => {
                 if reported.elapsed() >= REPORT || last {
                     reported = Instant::now();
-                    let time = course.simulation.time();
+                    let time = run.simulation.time();
                     report(Progress { time, until, wall: wall(), load_step: None });
                 }
                 if last {
-                    break course.finish().err();
+                    break run.finish().err();
                 }
             }
             Err(failure) => break Some(failure),
@@ -276,20 +276,20 @@ fn go(
                 report(Progress { time, until, wall: wall(), load_step: Some(step) });
             }
         };
-        if let Err(failure) = course.step(wall_seconds(), stop, &mut watch) {
+        if let Err(failure) = run.step(wall_seconds(), stop, &mut watch) {
             if failure.kind != INTERRUPTED {
-                course.show_what_was_found();
+                run.show_what_was_found();
             }
             break Some(failure);
         }
     };
-    let failure = failure.map(|failure| course.advised(failure));
+    let failure = failure.map(|failure| run.advised(failure));
     let picture = options.picture.filter(|_| failure.is_none());
-    let (drawn, failure) = match picture.map(|picture| course.draw(picture, folder)).transpose() {
+    let (drawn, failure) = match picture.map(|picture| run.draw(picture, folder)).transpose() {
         Ok(drawn) => (drawn, failure),
-        Err(error) => (None, Some(FailureSummary::output(&error, Some(course.simulation.time())))),
+        Err(error) => (None, Some(FailureSummary::output(&error, Some(run.simulation.time())))),
     };
-    let Course { simulation, watched, history, files, kept, .. } = course;
+    let Run { simulation, watched, history, files, kept, .. } = run;
     let parts = world.participants.iter().zip(simulation.participants()).zip(watched);
     Ok(Outcome {
         failure,
@@ -319,7 +319,7 @@ fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
 }
 
 /// A run under way.
-struct Course<'a> {
+struct Run<'a> {
     world: &'a World,
     simulation: Simulation,
     watching: Vec<Scheduled>,
@@ -336,7 +336,7 @@ struct Course<'a> {
     kept: Option<PathBuf>,
 }
 
-impl<'a> Course<'a> {
+impl<'a> Run<'a> {
     /// At the start, or where a checkpoint was.
     fn new(
         world: &'a World,
@@ -484,9 +484,9 @@ impl<'a> Course<'a> {
     /// Draws the instant last seen.
     fn draw(&self, picture: &dyn Draw, folder: &OutputFolder) -> Result<PathBuf, OutputError> {
         let world = self.world;
-        let mut snapshot = Snapshot::new(world, &world.scene.shown(world.scene.scene.until));
-        snapshot.fill(&self.simulation.frames(world));
-        let drawn = picture.draw(snapshot.mesh(), self.simulation.time());
+        let mut shown = FieldMesh::new(world, &world.scene.shown(world.scene.scene.until));
+        shown.fill(&self.simulation.frames(world));
+        let drawn = picture.draw(shown.mesh(), self.simulation.time());
         let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
         folder.write(PICTURE, &png)
     }

@@ -113,7 +113,7 @@ pub(crate) trait Solver<R>: Send {
 
     /// Goes up to `steps` steps on without looking, as many as take about `within`: nothing comes back to ordinary memory. How many;
     /// `None` of a solver whose state lies there.
-    fn coast(
+    fn advance_without_read_back(
         &mut self,
         _state: &mut State<R>,
         _steps: u64,
@@ -254,14 +254,14 @@ impl Solver<f32> for GpuStepper {
         STRIDE
     }
 
-    fn coast(
+    fn advance_without_read_back(
         &mut self,
         state: &mut State<f32>,
         steps: u64,
         within: Duration,
     ) -> Option<Result<u64, FailureSummary>> {
-        let coasted = GpuStepper::coast(self, state, steps, within);
-        Some(coasted.map_err(|failure| FailureSummary::step(&failure, state.time)))
+        let advanced = GpuStepper::advance_without_read_back(self, state, steps, within);
+        Some(advanced.map_err(|failure| FailureSummary::step(&failure, state.time)))
     }
 
     fn map(

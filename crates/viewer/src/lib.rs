@@ -17,4 +17,4 @@ pub use replay::{Done, Lags, Move, Recording, Replayed, Surface, replay, replay_
 pub use samples::Samples;
 pub use session::{Frame, Order, Session};
 #[cfg(feature = "window")]
-pub use window::{Errand, Opening, WindowError, open};
+pub use window::{Opening, SelfTest, WindowError, open};

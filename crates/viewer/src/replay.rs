@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use pliant_geometry::{CellLabel, Vector3};
 use pliant_picture::{Subject, visible};
 use pliant_scene::format::ViewTable;
-use pliant_scene::{Live, Standing};
+use pliant_scene::{Live, Snapshot};
 use serde::{Deserialize, Serialize};
 
 use crate::hand::{Hand, Hold};
@@ -189,9 +189,9 @@ pub fn replay(world: &World, recording: &Recording) -> Result<Replayed, String> 
     loop {
         match replay.play(&now, before.take())? {
             Ended::Whole(replayed) => return Ok(replayed),
-            Ended::Change(standing, numbers) => {
+            Ended::Change(snapshot, numbers) => {
                 let next = with_numbers(&world.scene, numbers)?;
-                before = Some((std::mem::replace(&mut now, next), standing.map(|standing| *standing)));
+                before = Some((std::mem::replace(&mut now, next), snapshot.map(|snapshot| *snapshot)));
             }
         }
     }
@@ -220,13 +220,13 @@ fn subject_of(world: &World, view: &ViewTable, live: &mut dyn Live) -> Result<Su
 
 enum Ended<'r> {
     /// Numbers are others from here on.
-    Change(Option<Box<Standing>>, &'r [Number]),
+    Change(Option<Box<Snapshot>>, &'r [Number]),
     Whole(Replayed),
 }
 
 impl<'r> Replay<'r> {
     /// Goes on until numbers are others, or to the end.
-    fn play(&mut self, world: &World, from: Option<(World, Option<Standing>)>) -> Result<Ended<'r>, String> {
+    fn play(&mut self, world: &World, from: Option<(World, Option<Snapshot>)>) -> Result<Ended<'r>, String> {
         let (mut live, _) = crate::session::enter(world, from)?;
         if let Some(surface) = self.surface {
             live.show(&world.scene.shown_as(&surface.put_into(&world.scene.view), 1.0));
@@ -257,8 +257,8 @@ impl<'r> Replay<'r> {
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {
-                        let standing = live.stand().ok_or("numbers were changed within a step")?;
-                        return Ok(Ended::Change(Some(Box::new(standing)), numbers));
+                        let snapshot = live.snapshot().ok_or("numbers were changed within a step")?;
+                        return Ok(Ended::Change(Some(Box::new(snapshot)), numbers));
                     }
                 }
             }

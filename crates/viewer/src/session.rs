@@ -12,7 +12,7 @@ use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values, visible};
 use pliant_scene::format::ViewTable;
-use pliant_scene::{Column, Live, Standing, World, go_on, live};
+use pliant_scene::{Column, Live, Snapshot, World, go_on, live};
 
 use crate::device::{Seen, point_value};
 use crate::hand::{Hand, Hold, Point, nodes_of};
@@ -119,12 +119,12 @@ pub struct Session {
 /// If a stepper can't be made.
 pub(crate) fn enter(
     world: &World,
-    from: Option<(World, Option<Standing>)>,
+    from: Option<(World, Option<Snapshot>)>,
 ) -> Result<(Box<dyn Live>, bool), String> {
     let told = |failure: pliant_scene::FailureSummary| failure.message;
     let world = Arc::new(world.clone());
-    if let Some((before, Some(standing))) = from
-        && let Some(live) = go_on(&world, standing, &before).map_err(told)?
+    if let Some((before, Some(snapshot))) = from
+        && let Some(live) = go_on(&world, snapshot, &before).map_err(told)?
     {
         return Ok((live, true));
     }
@@ -132,7 +132,7 @@ pub(crate) fn enter(
 }
 
 impl Session {
-    /// Starts to play a scene, standing still. `wake` is called after each frame.
+    /// Starts to play a scene, snapshot still. `wake` is called after each frame.
     pub fn start(world: World, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (input, frames) = triple_buffer::TripleBuffer::new(&Frame::default()).split();
         let (orders, inbox) = channel();
@@ -209,7 +209,7 @@ impl Pace {
 }
 
 /// What of a run lasts when it goes on as another world.
-struct Course {
+struct Playback {
     hold: Hold,
     /// What is shown, and the view that the scene opened with.
     view: ViewTable,
@@ -272,7 +272,7 @@ struct Player<'s> {
     live: Box<dyn Live>,
     /// Whether the state lies on a device.
     on_device: bool,
-    course: Course,
+    course: Playback,
 }
 
 fn play(
@@ -281,12 +281,12 @@ fn play(
     mut frames: triple_buffer::Input<Frame>,
     wake: &(impl Fn() + Send),
 ) -> Recording {
-    let mut course = Course::new(&world);
+    let mut course = Playback::new(&world);
     let mut from = None;
     let mut subject = None;
     loop {
-        let (left, standing);
-        (left, standing, subject, course) = {
+        let (left, snapshot);
+        (left, snapshot, subject, course) = {
             let mut player = match Player::enter(&world, from, subject, course) {
                 Ok(player) => player,
                 Err(message) => {
@@ -300,10 +300,10 @@ fn play(
             wake();
             let left = player.go(inbox, &mut frames, wake);
             let goes_on = matches!(left, Left::Change) && player.course.steps > 0;
-            let standing =
-                if goes_on && player.course.failure.is_none() { player.live.stand() } else { None };
+            let snapshot =
+                if goes_on && player.course.failure.is_none() { player.live.snapshot() } else { None };
             let (subject, course) = player.end();
-            (left, standing, subject, course)
+            (left, snapshot, subject, course)
         };
         if matches!(left, Left::Quit) {
             let recording = course.recording.unwrap_or_default();
@@ -316,12 +316,12 @@ fn play(
             next.share(world.device());
             course.record(false, Instant::now(), Done::Numbers(numbers.clone()));
             course.numbers = numbers;
-            (std::mem::replace(&mut world, *next), standing)
+            (std::mem::replace(&mut world, *next), snapshot)
         });
     }
 }
 
-impl Course {
+impl Playback {
     fn new(world: &World) -> Self {
         Self {
             hold: Hold::default(),
@@ -411,9 +411,9 @@ impl<'s> Player<'s> {
     /// Begins to play a world, or goes on as it from where a run of the world before stands.
     fn enter(
         world: &'s World,
-        from: Option<(World, Option<Standing>)>,
+        from: Option<(World, Option<Snapshot>)>,
         subject: Option<Arc<Subject>>,
-        mut course: Course,
+        mut course: Playback,
     ) -> Result<Self, String> {
         let (mut live, goes_on) = enter(world, from)?;
         if !goes_on && course.steps > 0 {
@@ -435,7 +435,7 @@ impl<'s> Player<'s> {
     }
 
     /// What lasts.
-    fn end(self) -> (Option<Arc<Subject>>, Course) {
+    fn end(self) -> (Option<Arc<Subject>>, Playback) {
         (Some(self.subject), self.course)
     }
 
@@ -612,11 +612,11 @@ impl<'s> Player<'s> {
             return;
         }
         let left = (course.pace.goal() - self.live.time()) / self.world.step();
-        let coasted = match self.on_device && course.is_going() {
-            true => self.live.coast(left.ceil().max(1.0) as u64, FRAME / 2),
+        let advanced = match self.on_device && course.is_going() {
+            true => self.live.advance_without_read_back(left.ceil().max(1.0) as u64, FRAME / 2),
             false => None,
         };
-        match coasted.unwrap_or_else(|| self.live.advance(1)) {
+        match advanced.unwrap_or_else(|| self.live.advance(1)) {
             Ok(steps) => {
                 course.steps += steps;
                 course.batch = (course.batch.0 + steps, course.batch.1 + started.elapsed());

@@ -163,7 +163,7 @@ fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
     let mut steps = 0;
     // A quarter of a second, as between two looks.
     for _ in 0..30 {
-        steps += live.coast(8, Duration::from_secs(1)).unwrap().unwrap();
+        steps += live.advance_without_read_back(8, Duration::from_secs(1)).unwrap().unwrap();
         let points = live.place(PointValue::Size, None).unwrap().unwrap();
         if !std::mem::replace(&mut bound, true) {
             screen.bind(&points);
@@ -193,7 +193,7 @@ fn pictures_from_the_device_are_those_from_memory_with_and_without_a_section() {
     let subject = Subject::new(live.mesh().unwrap());
     let (mut one, mut other) = (Screen::new(&device, &subject), Screen::new(&device, &subject));
     while live.time() < 0.05 {
-        live.coast(100, Duration::from_secs(1)).unwrap().unwrap();
+        live.advance_without_read_back(100, Duration::from_secs(1)).unwrap().unwrap();
     }
     let points = live.place(PointValue::Size, None).unwrap().unwrap();
     let (places, sizes) = in_memory(live.as_mut());

@@ -96,24 +96,24 @@ fn steps_without_a_look_have_the_bits_of_those_with_and_read_nothing_back() {
     let model = moved_cube("hex8", elastic(neo_hookean()));
     let step = step_of(&model);
     for design in [Design::Gather, Design::Blocks] {
-        let (mut looked, mut coasted) = (State::<f32>::at_rest(&model), State::<f32>::at_rest(&model));
+        let (mut looked, mut advanced) = (State::<f32>::at_rest(&model), State::<f32>::at_rest(&model));
         let mut one = stepper(&device, &model, step, design);
         let mut other = stepper(&device, &model, step, design);
-        other.evaluate(&mut coasted, Wanted::Energies).unwrap();
+        other.evaluate(&mut advanced, Wanted::Energies).unwrap();
         for steps in [1, 2, 150, 7] {
             one.advance(&mut looked, steps).unwrap();
             let before = device.read_backs();
             let mut left = steps;
             while left > 0 {
-                left -= other.coast(&mut coasted, left, LONG).unwrap();
+                left -= other.advance_without_read_back(&mut advanced, left, LONG).unwrap();
             }
             assert_eq!(device.read_backs(), before, "{design}: something came back");
-            assert_eq!(looked.time, coasted.time);
+            assert_eq!(looked.time, advanced.time);
         }
         one.evaluate(&mut looked, Wanted::Everything).unwrap();
-        other.evaluate(&mut coasted, Wanted::Everything).unwrap();
-        assert_eq!(looked.displacement, coasted.displacement, "{design}");
-        assert_eq!(looked.increment, coasted.increment, "{design}");
+        other.evaluate(&mut advanced, Wanted::Everything).unwrap();
+        assert_eq!(looked.displacement, advanced.displacement, "{design}");
+        assert_eq!(looked.increment, advanced.increment, "{design}");
         let (a, b) = (one.energies(), other.energies());
         assert!((a.external - b.external).abs() <= 1e-5 * a.external.abs(), "{design}: {a:?} {b:?}");
         assert!((a.internal - b.internal).abs() <= 1e-5 * a.internal.abs(), "{design}: {a:?} {b:?}");
@@ -140,7 +140,7 @@ fn points_on_the_device_are_those_of_the_state() {
         (30, PointValue::Given),
         (31, PointValue::Size),
     ] {
-        stepper.coast(&mut state, steps, LONG).unwrap();
+        stepper.advance_without_read_back(&mut state, steps, LONG).unwrap();
         mapping.give(&vec![7.0; count]);
         stepper.apply(&mapping, value);
         let drawn = mapping.points().read().unwrap();

@@ -2,12 +2,12 @@
 
 mod csv;
 mod curved;
+mod field_mesh;
 mod fields;
 mod file;
 mod folder;
 mod merged;
 mod plot;
-mod snapshot;
 mod stability;
 mod strains;
 mod summary;
@@ -30,8 +30,8 @@ pub use summary::{
 
 pub use csv::Column;
 pub(crate) use csv::{AXES, ENERGIES, Samples};
+pub(crate) use field_mesh::FieldMesh;
 pub(crate) use plot::{constraints, plot};
-pub(crate) use snapshot::Snapshot;
 pub(crate) use summary::{INTERRUPTED, bodies, markdown, summarise, told_limit};
 
 use crate::assemble::Built;

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_vtu};
 
+use super::field_mesh::FieldMesh;
 use super::file::{check_own_folder, replace};
-use super::snapshot::Snapshot;
 use super::{Frame, Observer, OutputError, Written, time_of};
 use crate::format::VtuTable;
 use crate::world::World;
@@ -20,7 +20,7 @@ pub(super) struct Series {
     times: Vec<f64>,
     /// Times of the frames that an interrupted run had written beyond these; their files stay until they are replaced.
     beyond: Vec<f64>,
-    snapshot: Snapshot,
+    shown: FieldMesh,
 }
 
 impl Series {
@@ -40,7 +40,7 @@ impl Series {
             name: name.into(),
             times: Vec::new(),
             beyond: Vec::new(),
-            snapshot: Snapshot::new(world, table),
+            shown: FieldMesh::new(world, table),
         })
     }
 
@@ -68,7 +68,7 @@ impl Series {
 
 impl Observer for Series {
     fn see(&mut self, frames: &[Frame<'_>]) -> Result<(), OutputError> {
-        self.snapshot.fill(frames);
+        self.shown.fill(frames);
         let time = time_of(frames);
         let path = self.folder.join(frame_name(self.times.len()));
         let options = VtuOptions {
@@ -78,7 +78,7 @@ impl Observer for Series {
         };
         let written = replace(&path, |file| {
             let mut writer = BufWriter::new(file);
-            write_vtu(&mut writer, self.snapshot.mesh(), &options).map_err(|error| match error {
+            write_vtu(&mut writer, self.shown.mesh(), &options).map_err(|error| match error {
                 MeshFileError::Write { source, .. } => source,
                 other => io::Error::other(other),
             })?;

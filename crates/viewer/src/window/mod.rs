@@ -1,12 +1,12 @@
 //! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
 
 mod device;
-mod errand;
 mod paint;
 mod panels;
 mod parameters;
 mod picture;
 mod plots;
+mod self_test;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -21,11 +21,11 @@ use pliant_gpu::Device;
 use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
 use pliant_scene::format::{FieldName, ViewTable};
 
-pub use self::errand::Errand;
-use self::errand::Errands;
 use self::paint::{SAMPLES, place};
 use self::parameters::Numbers;
 use self::picture::{Cut, SCALE};
+use self::self_test::RunningTest;
+pub use self::self_test::SelfTest;
 use crate::hand::{Hand, Point};
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session};
@@ -49,7 +49,7 @@ pub struct Opening {
     /// Where what the hand did is written when the window closes or the scene starts anew.
     pub record: Option<PathBuf>,
     /// What it does by itself before it closes; without, it stays open.
-    pub errand: Option<Errand>,
+    pub self_test: Option<SelfTest>,
 }
 
 /// A window that could not be opened.
@@ -58,9 +58,9 @@ pub enum WindowError {
     /// Neither a screen nor a graphics processor, or no thread.
     #[error("no window can be opened: {0}")]
     Window(String),
-    /// An errand that went wrong.
+    /// An self_test that went wrong.
     #[error("the window: {0}")]
-    Errand(String),
+    SelfTest(String),
 }
 
 impl WindowError {
@@ -71,7 +71,7 @@ impl WindowError {
                 "a window needs a screen (X11 or Wayland, with libxkbcommon-x11) and Vulkan, Metal or Direct3D 12 (Debian, \
                  Ubuntu: `apt-get install mesa-vulkan-drivers libvulkan1 libxkbcommon-x11-0`); `pliant render` needs no screen"
             }
-            Self::Errand(_) => "",
+            Self::SelfTest(_) => "",
         }
     }
 }
@@ -79,7 +79,7 @@ impl WindowError {
 /// Opens the window, and comes back once it is closed.
 ///
 /// # Errors
-/// If it can't be opened, or its errand fails.
+/// If it can't be opened, or its self_test fails.
 pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
@@ -99,7 +99,7 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     });
     eframe::run_native("Pliant", options, create).map_err(|error| WindowError::Window(error.to_string()))?;
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
-    outcome.transpose().map_err(WindowError::Errand)
+    outcome.transpose().map_err(WindowError::SelfTest)
 }
 
 struct App {
@@ -154,7 +154,7 @@ struct App {
     message: Option<String>,
     frame_seconds: f64,
     painted: Instant,
-    errands: Option<Errands>,
+    running_test: Option<RunningTest>,
     /// Frames drawn.
     drawn: u64,
     context: egui::Context,
@@ -175,7 +175,7 @@ impl App {
             samples: SAMPLES,
         };
         context.egui_ctx.set_visuals(egui::Visuals::light());
-        let Opening { world, style, camera, file, read, record, errand } = opening;
+        let Opening { world, style, camera, file, read, record, self_test } = opening;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
         let app = Self {
@@ -217,7 +217,7 @@ impl App {
             message: None,
             frame_seconds: 0.0,
             painted: Instant::now(),
-            errands: errand.map(Errands::new),
+            running_test: self_test.map(RunningTest::new),
             drawn: 0,
             context: context.egui_ctx.clone(),
             record,
@@ -247,12 +247,12 @@ impl App {
         if title.is_empty() { self.file.display().to_string() } else { title.clone() }
     }
 
-    /// Goes on with an errand; ends the window once it is done.
-    fn go_on_errand(&mut self) {
-        let Some(mut errands) = self.errands.take() else { return };
+    /// Goes on with an self_test; ends the window once it is done.
+    fn go_on_testing(&mut self) {
+        let Some(mut running_test) = self.running_test.take() else { return };
         self.context.request_repaint();
-        match errands.check(self) {
-            None => self.errands = Some(errands),
+        match running_test.check(self) {
+            None => self.running_test = Some(running_test),
             Some(told) => {
                 *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(told);
                 self.context.send_viewport_cmd(egui::ViewportCommand::Close);
@@ -461,14 +461,14 @@ impl eframe::App for App {
         egui::Panel::bottom("plots").show(ui, |ui| self.plots(ui));
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.scene(ui));
         self.drawn += 1;
-        self.go_on_errand();
+        self.go_on_testing();
         context.request_repaint_after(Duration::from_millis(250));
     }
 
     fn raw_input_hook(&mut self, _context: &egui::Context, input: &mut egui::RawInput) {
-        if let Some(mut errands) = self.errands.take() {
-            errands.give(self, &mut input.events);
-            self.errands = Some(errands);
+        if let Some(mut running_test) = self.running_test.take() {
+            running_test.give(self, &mut input.events);
+            self.running_test = Some(running_test);
         }
     }
 

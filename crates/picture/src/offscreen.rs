@@ -31,7 +31,7 @@ const TARGET: Target = Target {
 
 /// Takes pictures of one subject, all of one size.
 #[derive(Debug)]
-pub struct Studio<'s> {
+pub struct Offscreen<'s> {
     graphics: Graphics,
     subject: &'s Subject,
     renderer: Renderer,
@@ -47,7 +47,7 @@ pub struct Studio<'s> {
 /// Rows of a picture in a buffer begin at multiples of this [B].
 const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
 
-impl<'s> Studio<'s> {
+impl<'s> Offscreen<'s> {
     /// For pictures of so many pixels.
     ///
     /// # Errors

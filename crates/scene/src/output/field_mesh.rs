@@ -11,23 +11,22 @@ use crate::format::{At, FieldName, VtuTable};
 use crate::world::{Part, World};
 
 /// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of any participants.
-pub(crate) struct Snapshot {
+pub(crate) struct FieldMesh {
     /// Participants that are shown, by number.
     parts: Vec<(usize, Own)>,
     /// Those of several together.
     merged: Option<Mesh>,
 }
 
-impl Snapshot {
+impl FieldMesh {
     /// Of what a series shows.
     pub fn new(world: &World, table: &VtuTable) -> Self {
         let on = table.on.as_deref();
         let shown = world.participants.iter().enumerate().filter(|(_, part)| part.shows(on));
         let own = |part: &Part| Own::new(&part.built, on, &part.fields(&table.data), table.at, table.curved);
-        let mut snapshot =
-            Self { parts: shown.map(|(index, part)| (index, own(part))).collect(), merged: None };
-        snapshot.merge();
-        snapshot
+        let mut mesh = Self { parts: shown.map(|(index, part)| (index, own(part))).collect(), merged: None };
+        mesh.merge();
+        mesh
     }
 
     /// The mesh, with the fields of the last instant.

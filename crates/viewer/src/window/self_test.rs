@@ -17,7 +17,7 @@ use super::picture::{in_picture, on_plane, to_screen};
 
 /// What a window does by itself before it closes.
 #[derive(Clone, Debug)]
-pub enum Errand {
+pub enum SelfTest {
     /// Plays, and writes a picture of itself.
     Portrait {
         /// Simulated time [s] until then.
@@ -73,17 +73,17 @@ impl Cue {
     }
 }
 
-/// An errand under way.
-pub(super) struct Errands {
+/// A self-test under way.
+pub(super) struct RunningTest {
     cues: VecDeque<Cue>,
     since: Instant,
     told: fn(&App) -> String,
 }
 
-impl Errands {
-    pub(super) fn new(errand: Errand) -> Self {
-        let (cues, told): (_, fn(&App) -> String) = match errand {
-            Errand::Portrait { after, file } => {
+impl RunningTest {
+    pub(super) fn new(self_test: SelfTest) -> Self {
+        let (cues, told): (_, fn(&App) -> String) = match self_test {
+            SelfTest::Portrait { after, file } => {
                 let mut cues = VecDeque::from([
                     Cue::key("Space plays", Key::Space, |app| app.frame.playing),
                     Cue::wait("it plays", move |app| app.frame.time >= after || app.frame.failure.is_some()),
@@ -92,7 +92,7 @@ impl Errands {
                 cues.extend(portrait(file));
                 (cues, shown)
             }
-            Errand::Rehearsal { file } => {
+            SelfTest::Rehearsal { file } => {
                 let mut cues: VecDeque<Cue> = drawing().chain((0..PICKS).map(picking)).collect();
                 cues.extend(keys().into_iter().chain(camera()).chain(pinning()).chain(pulling()));
                 cues.extend(file.into_iter().flat_map(portrait));
