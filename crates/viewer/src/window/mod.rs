@@ -58,7 +58,7 @@ pub enum WindowError {
     /// Neither a screen nor a graphics processor, or no thread.
     #[error("no window can be opened: {0}")]
     Window(String),
-    /// An self_test that went wrong.
+    /// A self-test that went wrong.
     #[error("the window: {0}")]
     SelfTest(String),
 }
@@ -79,7 +79,7 @@ impl WindowError {
 /// Opens the window, and comes back once it is closed.
 ///
 /// # Errors
-/// If it can't be opened, or its self_test fails.
+/// If it can't be opened, or its self-test fails.
 pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
@@ -247,7 +247,7 @@ impl App {
         if title.is_empty() { self.file.display().to_string() } else { title.clone() }
     }
 
-    /// Goes on with an self_test; ends the window once it is done.
+    /// Goes on with a self-test; ends the window once it is done.
     fn go_on_testing(&mut self) {
         let Some(mut running_test) = self.running_test.take() else { return };
         self.context.request_repaint();
