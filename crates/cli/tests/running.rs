@@ -39,6 +39,7 @@ const KEYS: [&str; 25] = [
     "element_bound",
     "true_limit",
     "limiting_element",
+    "participants",
     "solver",
     "equilibria",
     "ended",

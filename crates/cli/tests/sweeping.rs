@@ -119,7 +119,7 @@ fn all_combinations_are_checked_before_the_first_is_run() {
     assert!(!workshop.path("out").exists());
     for (set, says) in [
         ("law.tissue.young-modulus=1e3,,2e3", "a value of `law.tissue.young-modulus` is missing"),
-        ("law.tissue.young-modulus=1e3..2e3", "is no range: the number of values is missing"),
+        ("law.tissue.young-modulus=1e3..2e3", "is not a range: the number of values is missing"),
         ("law.tisue.young-modulus=1e3,2e3", "did you mean `tissue`?"),
         ("law.tissue.young-modulus", "is not an assignment"),
     ] {
