@@ -149,7 +149,7 @@ fn absurd_sizes_are_refused_before_memory_is_taken() {
     // Within the limit, but not in the file: 1 GiB is announced.
     let volume = Volume { dims: [1 << 13, 1 << 8, 1 << 8], ..Volume::oblique() };
     let announced = &(1_u64 << 30).to_string();
-    says(&error(&nrrd(&volume, "raw", false), ImageFormat::Nrrd), &[announced, "120 are there"]);
+    says(&error(&nrrd(&volume, "raw", false), ImageFormat::Nrrd), &[announced, "120 exist"]);
 }
 
 #[test]
