@@ -555,7 +555,7 @@ fn mistakes_are_named_with_element_line_number_and_remedy() {
         ("NumNodes=\"2\"", "NumNodes=\"3\"", &["found 2 nodes, expected 3"]),
         ("NumNodes=\"2\"", "SpecType=\"NORMAL\"", &["<Normal> is missing"]),
         ("UNIFORM", "DIFFORM", &["found 1 magnitudes, expected 2, one for each node"]),
-        ("UNIFORM", "RANDOM", &["`RANDOM` is no type of magnitudes"]),
+        ("UNIFORM", "RANDOM", &["`RANDOM` is not a known type of magnitudes"]),
         ("<Model>", "<Modell>", &["XML is broken"]),
     ];
     for (from, to, expected) in cases {

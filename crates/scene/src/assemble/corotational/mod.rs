@@ -404,7 +404,7 @@ mod tests {
         }
         for (file, more, says) in [
             ("plain.vtu", "normals = 'mesh'", "has no point data `normal`"),
-            ("ball.vtu", "normals = 'mesh'\ncrease = 30", "has its normals from the mesh"),
+            ("ball.vtu", "normals = 'mesh'\ncrease = 30", "takes its normals from the mesh"),
         ] {
             let told = built(file, more).unwrap_err().plain().to_string();
             assert!(told.contains(says), "{told}");
