@@ -28,7 +28,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 25] = [
+const KEYS: [&str; 26] = [
     "status",
     "error",
     "bodies",

@@ -840,7 +840,9 @@ mod tests {
         mesh.blocks[0].sets.insert("broken".into(), vec![8]);
         mesh.point_sets.insert("gone".into(), vec![99]);
         let surface = boundary(&mesh);
-        for (name, words) in [("broken", "it contains hex 8, but there are 8"), ("gone", "it contains node 99")] {
+        for (name, words) in
+            [("broken", "it contains hex 8, but there are 8"), ("gone", "it contains node 99")]
+        {
             let selection = Selection::Set(name.into());
             assert!(selection.nodes(&mesh, &surface).unwrap_err().to_string().contains(words));
             assert!(selection.faces(&mesh, &surface).is_err());

@@ -53,7 +53,9 @@ mod tests {
         let path = folder.path().join("seven");
         fs::write(&path, "seven77").unwrap();
         assert_eq!(read_limited(&path, 7).unwrap(), b"seven77");
-        assert!(read_limited(&path, 6).unwrap_err().to_string().contains("7 bytes, more than the limit of 6"));
+        assert!(
+            read_limited(&path, 6).unwrap_err().to_string().contains("7 bytes, more than the limit of 6")
+        );
         fs::File::create(&path).unwrap().set_len(1 << 40).unwrap();
         let told = read_limited(&path, 1 << 30).unwrap_err().to_string();
         assert_eq!(told, "it has 1048576 MB, more than the limit of 1024 MB");

@@ -70,6 +70,12 @@ impl Curved {
         (curved, mesh)
     }
 
+    /// The nodes of the facet of a point, with its weights: where the point is, but for the bulge of the curved surface.
+    pub(super) fn nodes_of(&self, part: &Corotational, point: u32) -> Vec<(u32, f64)> {
+        let place = &self.picture.places[self.points[point as usize] as usize];
+        part.model.facets[place.facet as usize].nodes.into_iter().zip(place.weights).collect()
+    }
+
     /// Puts the wanted fields and the normals of an instant into the mesh.
     pub(super) fn fill(&mut self, mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName]) {
         let (Some(part), Some(state)) = (&frame.built().corotational, frame.now.shells()) else { return };

@@ -35,7 +35,7 @@ impl FieldMesh {
         self.merged.as_ref().unwrap_or_else(|| &self.parts[0].1.mesh)
     }
 
-    /// A point of the mesh as a combination of nodes of a participant; nothing where it is none, as on curved surfaces.
+    /// A point of the mesh as a combination of nodes of a participant; of a curved surface, the combination under its bulge.
     pub fn nodes_of(&self, world: &World, point: u32) -> (usize, Vec<(u32, f64)>) {
         let mut point = point as usize;
         for (index, own) in &self.parts {
@@ -103,7 +103,7 @@ impl Own {
         Self { mesh, fields: fields.to_vec(), at, content }
     }
 
-    /// A point of the mesh as a combination of nodes of the model; nothing where it is none, as on curved surfaces.
+    /// A point of the mesh as a combination of nodes of the model; of a curved surface, the combination under its bulge.
     fn nodes_of(&self, built: &Built, point: u32) -> Vec<(u32, f64)> {
         match &self.content {
             Content::Surface(index) => {
@@ -113,7 +113,9 @@ impl Own {
             Content::Bodies { nodes, .. } | Content::Corotational { nodes, .. } => {
                 vec![(nodes[point as usize], 1.0)]
             }
-            Content::Curved(_) => Vec::new(),
+            Content::Curved(curved) => {
+                built.corotational.as_ref().map_or_else(Vec::new, |part| curved.nodes_of(part, point))
+            }
         }
     }
 
