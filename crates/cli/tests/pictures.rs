@@ -229,7 +229,7 @@ mod with_pictures {
             (&["render", "out/case", "--critical"], "needs `element-step` in `data`"),
             (&["render", "case", "--texture", "wood"], "possible values: none, skin"),
             (&["render", "empty"], "has no series of frames"),
-            (&["render", "out/case", "--series", "skin"], "there is `fields`"),
+            (&["render", "out/case", "--series", "skin"], "it has `fields`"),
             (&["render", "out/case", "--colour", "pressure"], "`displacement`, `von-mises`"),
             (&["render", "out/case", "--frames", "9"], "has 6 frames, from 0 to 5"),
             (&["render", "out/case", "--until", "2"], "give the scene"),
