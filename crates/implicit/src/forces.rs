@@ -34,8 +34,7 @@ impl Forces {
     /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
     /// loads.
     pub fn hold(&mut self, springs: &[Spring]) {
-        self.system.held.clear();
-        self.system.held.extend_from_slice(springs);
+        self.system.hold(springs);
     }
 
     /// Force [N] and moment [N m] that elements and springs resist with, six numbers a node.

@@ -490,17 +490,20 @@ impl Model {
     /// and a cell makes forces of them with its largest stiffness k.
     pub(crate) fn round_off(&self) -> f64 {
         let extent = self.rest.iter().map(|x| x.amax()).fold(0.0, f64::max);
+        let stiffness = self.stiffnesses().map(|k| k * k).sum::<f64>().sqrt();
+        8.0 * f64::EPSILON * stiffness * extent
+    }
+
+    /// The largest stiffness [N/m] of each cell.
+    fn stiffnesses(&self) -> impl Iterator<Item = f64> {
         let shells = self.facets.iter().map(|facet| facet.stiffest());
         let solids = self.tets.iter().map(|tet| tet.modulus() * tet.volume.cbrt());
-        let stiffness = shells.chain(solids).map(|k| k * k).sum::<f64>().sqrt();
-        8.0 * f64::EPSILON * stiffness * extent
+        shells.chain(solids)
     }
 
     /// The largest force [N/m] of a displacement of one node of a cell.
     pub fn stiffest(&self) -> f64 {
-        let shells = self.facets.iter().map(|facet| facet.stiffest());
-        let solids = self.tets.iter().map(|tet| tet.modulus() * tet.volume.cbrt());
-        shells.chain(solids).fold(0.0, f64::max)
+        self.stiffnesses().fold(0.0, f64::max)
     }
 
     /// The mean length of the facets' and other cells' edges at rest [m]; 1 without any.

@@ -187,11 +187,9 @@ impl Statics {
         self.system.phases
     }
 
-    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
-    /// loads.
+    /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
     pub fn hold(&mut self, springs: &[Spring]) {
-        self.system.held.clear();
-        self.system.held.extend_from_slice(springs);
+        self.system.hold(springs);
     }
 
     /// The attempts of the last call of [`solve`](Self::solve) or [`control`](Self::control), one after the other.

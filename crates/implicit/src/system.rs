@@ -53,7 +53,7 @@ pub(crate) struct System {
     /// What prescribed increments make of forces on free components: K_fc d_c.
     pub(crate) coupling: Vec<f64>,
     /// Springs that come and go between steps; their forces count as loads.
-    pub(crate) held: Vec<Spring>,
+    held: Vec<Spring>,
     /// Pressures on facets.
     pressure: Vec<Pressure>,
     /// The curved surface, if a load acts on it.
@@ -159,6 +159,13 @@ impl System {
             last_solution: LinearReport::default(),
             model,
         }
+    }
+
+    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
+    /// loads.
+    pub(crate) fn hold(&mut self, springs: &[Spring]) {
+        self.held.clear();
+        self.held.extend_from_slice(springs);
     }
 
     /// Forces at a state and time; with a tangent also the stiffness, and what prescribed increments (six a node) make of it.

@@ -19,7 +19,7 @@ pub struct Grip {
 }
 
 /// Part of the room between a step of 0.9 of the true limit and the limit that a grip may take.
-const ROOM: f64 = 0.15;
+pub const ROOM: f64 = 0.15;
 
 impl Grip {
     /// Where the point is [m].

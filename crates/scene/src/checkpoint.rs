@@ -18,7 +18,7 @@ use crate::corotational::ShellSnapshot;
 use crate::diagnostic::counted;
 use crate::format::{LoadSteps, Precision, SolverName};
 use crate::output::{OutputError, OutputFolder, Schedule, Written, number, replace};
-use crate::participant::{Kept, Numeric, Participant};
+use crate::participant::{Kept, Numeric, Participant, fits};
 use crate::run::{History, Watched};
 use crate::solver::Memory;
 use crate::world::{Part, World};
@@ -457,9 +457,9 @@ impl Checkpoint {
 /// The state of a participant from its bytes, if it has the sizes of the model's.
 fn kept(built: &Built, precision: Precision, bytes: &[u8]) -> Option<Kept> {
     if built.corotational.is_some() {
-        let remembered: ShellSnapshot = postcard::from_bytes(bytes).ok()?;
-        let fits = remembered.fits(built.model.node_count());
-        return fits.then(|| Kept::Shells(Box::new(remembered)));
+        let snapshot: ShellSnapshot = postcard::from_bytes(bytes).ok()?;
+        let fits = snapshot.fits(built.model.node_count());
+        return fits.then(|| Kept::Shells(Box::new(snapshot)));
     }
     match precision {
         Precision::Single => solids::<f32>(built, bytes),
@@ -469,16 +469,7 @@ fn kept(built: &Built, precision: Precision, bytes: &[u8]) -> Option<Kept> {
 
 fn solids<R: Numeric>(built: &Built, bytes: &[u8]) -> Option<Kept> {
     let (state, memory): (State<R>, Memory<R>) = postcard::from_bytes(bytes).ok()?;
-    let rest = State::<R>::at_rest(&built.model);
-    let sizes = |state: &State<R>| {
-        let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
-        let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
-        (nodes, history.collect::<Vec<_>>())
-    };
-    let fits = sizes(&state) == sizes(&rest)
-        && state.stability.fits(&built.model)
-        && memory.fits(rest.displacement.len());
-    fits.then(|| R::keep(state, memory))
+    fits(&state, &memory, &built.model).then(|| R::keep(state, memory))
 }
 
 /// Writes the checkpoints of a run.

@@ -11,7 +11,7 @@ use pliant_implicit::{
     BackwardEuler, DynamicSettings, Explicit, Forces, Integrator, LinearSolver, Phases, Preconditioner,
     SolveError, Spring, StaticSettings, Statics,
 };
-use pliant_mechanics::grip::Grip;
+use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::{Energies, fingerprint};
 use serde::{Deserialize, Serialize};
 
@@ -30,9 +30,6 @@ const RENEW_AFTER: usize = 10;
 
 /// Stiffness of the firmest grip over that of the stiffest cell.
 const FIRM: f64 = 10.0;
-
-/// Part of the room between a step of 0.9 of the stable one and that one which a grip may take.
-const ROOM: f64 = 0.15;
 
 /// Iterations of Newton's method whose residuals are kept: the last ones.
 const ITERATIONS_KEPT: usize = 10_000;
@@ -607,10 +604,6 @@ impl Instant for Corotated {
 }
 
 impl Participant for Corotated {
-    fn instant(&self) -> &dyn Instant {
-        self
-    }
-
     fn steps(&self) -> u64 {
         self.done
     }

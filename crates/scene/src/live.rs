@@ -164,16 +164,14 @@ struct Played {
 
 impl Played {
     fn new(world: &Arc<World>, simulation: Simulation) -> Self {
-        let mut first_nodes = vec![0];
-        for part in &world.participants {
-            first_nodes.push(first_nodes[first_nodes.len() - 1] + part.built.model.node_count() as u32);
-        }
+        let nodes = world.participants.iter().map(|part| part.built.model.node_count() as u32);
+        let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes)));
         Self {
             shown: FieldMesh::new(world, &world.scene.shown(1.0)),
             samples: Samples::new(world, &world.scene.sampled()),
             world: Arc::clone(world),
             simulation,
-            first_nodes,
+            first_nodes: first_nodes.collect(),
             mapping: None,
             evaluated: None,
         }
@@ -189,8 +187,8 @@ impl Played {
 
     /// The participant of a node, and the node's number there.
     fn locate(&self, node: u32) -> (usize, u32) {
-        let part = self.first_nodes.partition_point(|&first| first <= node).saturating_sub(1);
-        let part = part.min(self.world.participants.len() - 1);
+        // The first node of the first participant is 0.
+        let part = self.first_nodes.partition_point(|&first| first <= node) - 1;
         (part, node - self.first_nodes[part])
     }
 
@@ -313,11 +311,7 @@ impl Live for Played {
     }
 
     fn reactions(&self) -> Vec<[f64; 3]> {
-        let of = |frame: &Frame<'_>| {
-            let constraints = 0..frame.part.built.model.constraints.len();
-            constraints.map(|constraint| frame.now.reaction(constraint)).collect::<Vec<_>>()
-        };
-        self.simulation.frames(&self.world).iter().flat_map(of).collect()
+        self.simulation.frames(&self.world).iter().flat_map(Frame::reactions).collect()
     }
 
     fn columns(&self) -> Vec<Column> {

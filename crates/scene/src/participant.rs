@@ -83,9 +83,6 @@ pub(crate) enum Kept {
 
 /// Bodies that one stepper advances together.
 pub(crate) trait Participant: Instant + Send {
-    /// As what outputs read.
-    fn instant(&self) -> &dyn Instant;
-
     /// Whole steps done.
     fn steps(&self) -> u64;
 
@@ -318,10 +315,6 @@ impl<R: Scalar> CellsNow for SolidCells<'_, R> {
 }
 
 impl<R: Numeric> Participant for Solids<R> {
-    fn instant(&self) -> &dyn Instant {
-        self
-    }
-
     fn steps(&self) -> u64 {
         self.state.steps
     }
@@ -472,11 +465,7 @@ fn solids_from<R: Numeric>(
     memory: Memory<R>,
     steps: Option<(Clock, f64, &Built)>,
 ) -> Result<Option<Box<dyn Participant>>, FailureSummary> {
-    let rest = State::<R>::at_rest(&built.model);
-    let sizes = |state: &State<R>| -> Vec<[usize; 2]> {
-        state.history.iter().map(|h| [h.cells.len(), h.pressures.len()]).collect()
-    };
-    if sizes(&state) != sizes(&rest) || !memory.fits(rest.displacement.len()) {
+    if !fits(&state, &memory, &built.model) {
         return Ok(None);
     }
     if let Some((clock, _, before)) = &steps
@@ -490,4 +479,15 @@ fn solids_from<R: Numeric>(
     }
     solver.resume(memory);
     Ok(Some(Box::new(Solids { model: Arc::clone(&built.model), step: plan.step, state, solver })))
+}
+
+/// Whether a state and its memory have the sizes of a model's.
+pub(crate) fn fits<R: Numeric>(state: &State<R>, memory: &Memory<R>, model: &Model) -> bool {
+    let rest = State::<R>::at_rest(model);
+    let sizes = |state: &State<R>| {
+        let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
+        let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
+        (nodes, history.collect::<Vec<_>>())
+    };
+    sizes(state) == sizes(&rest) && state.stability.fits(model) && memory.fits(model.node_count())
 }

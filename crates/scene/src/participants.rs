@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::checker::nearest;
+use crate::assemble::{SCENE, suggestion};
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{
-    BodyModel, ColourBy, DeviceName, FieldName, ParticipantTable, RunTable, SolverName, ViewTable,
+    BodyModel, BodyTable, ColourBy, DeviceName, FieldName, ParticipantTable, RunTable, SolverName, ViewTable,
 };
 use crate::registry::{ConstraintTable, OutputTable};
 use crate::scene::Scene;
@@ -67,11 +67,10 @@ impl Scene {
                 let index = at.to_string();
                 let place = self.source.span(&[path[0], path[1], path[2], &index]);
                 if !known.contains(&body.as_str()) {
-                    let help = did_you_mean(body, &known);
+                    let help = suggestion(body, &known, SCENE, "bodies");
                     let message = format!("there is no body `{body}`");
                     out.push(Diagnostic::error(message).at(place, "no such body").help(help));
-                } else if table.bodies.iter().position(|first| first == body).is_some_and(|first| first < at)
-                {
+                } else if table.bodies[..at].contains(body) {
                     let message = format!("`{body}` is named twice");
                     let help = "leave one of them out";
                     out.push(Diagnostic::error(message).at(place, "again").help(help));
@@ -90,17 +89,13 @@ impl Scene {
             if bodies.is_empty() {
                 continue;
             }
-            if let Some((_, table)) = self.participants.iter().find(|(name, _)| name == word) {
+            if self.participants.iter().any(|(name, _)| name == word) {
                 let place = self.source.key_span(&["participant", word]);
                 let message = format!(
                     "`{}` goes with no participant, and the name of the others, `{word}`, is taken",
                     bodies[0]
                 );
-                let help = if table.bodies.is_empty() {
-                    "name it there"
-                } else {
-                    "give this participant another name"
-                };
+                let help = "name it there, or give this participant another name";
                 out.push(Diagnostic::error(message).at(place, "taken").help(help));
             }
             groups.push((word.into(), bodies));
@@ -153,7 +148,7 @@ impl Scene {
                             let index = index.to_string();
                             let place = self.source.span(&["output", name, "reactions", &index]);
                             let message = format!("there is no constraint `{reaction}`");
-                            let help = did_you_mean(reaction, &known);
+                            let help = suggestion(reaction, &known, SCENE, "constraints");
                             out.push(Diagnostic::error(message).at(place, "no such constraint").help(help));
                         }
                     }
@@ -169,7 +164,7 @@ impl Scene {
     fn unknown(&self, name: &str, path: &[&str], of: &BTreeMap<String, usize>, out: &mut Vec<Diagnostic>) {
         let known: Vec<&str> = of.keys().map(String::as_str).collect();
         let message = format!("there is no body or surface `{name}`");
-        let help = did_you_mean(name, &known);
+        let help = suggestion(name, &known, SCENE, "bodies and surfaces");
         let place = self.source.span(path);
         out.push(Diagnostic::error(message).at(place, "no such body or surface").help(help));
     }
@@ -183,22 +178,13 @@ impl Scene {
         let has = |field: FieldName| models.iter().any(|&model| field.is_of(model));
         // A field that no body of the scene has is reported once, with the first participant.
         let strange = |field: FieldName| !self.bodies.iter().any(|(_, body)| field.is_of(body.model));
-        let used = |law: &String| bodies.iter().any(|(_, body)| body.law.values().contains(&law));
-        let used_elsewhere =
-            |law: &String| self.bodies.iter().any(|(_, body)| body.law.values().contains(&law));
-        let layered = |law: &String| {
-            bodies
-                .iter()
-                .any(|(_, body)| body.layers.iter().any(|layer| layer.law.as_deref() == Some(law.as_str())))
+        let uses = |bodies: &[(String, BodyTable)], law: &String| {
+            let layered = |body: &BodyTable| body.layers.iter().any(|layer| layer.law.as_ref() == Some(law));
+            bodies.iter().any(|(_, body)| body.law.values().contains(&law) || layered(body))
         };
-        let layered_elsewhere = |law: &String| {
-            self.bodies
-                .iter()
-                .any(|(_, body)| body.layers.iter().any(|layer| layer.law.as_deref() == Some(law.as_str())))
-        };
-        let laws = self.laws.iter().filter(|(law, _)| {
-            used(law) || layered(law) || (index == 0 && !used_elsewhere(law) && !layered_elsewhere(law))
-        });
+        // Laws that no body uses are reported once, too.
+        let kept = |law: &String| uses(&bodies, law) || (index == 0 && !uses(&self.bodies, law));
+        let laws = self.laws.iter().filter(|(law, _)| kept(law)).cloned().collect();
         let mut outputs = Vec::new();
         for (name, output) in &self.outputs {
             let mut output = output.clone();
@@ -244,7 +230,7 @@ impl Scene {
             own: table.map(|(name, _)| name.clone()),
             is_part: true,
             participants: Vec::new(),
-            laws: laws.cloned().collect(),
+            laws,
             bodies,
             surfaces: self.surfaces.iter().filter(|(_, surface)| owns(&surface.on)).cloned().collect(),
             constraints: self.constraints.iter().filter(|(_, table)| owns(table.body())).cloned().collect(),
@@ -304,15 +290,5 @@ impl Scene {
     /// Whether a body or a surface of it has a name.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.bodies.iter().any(|(own, _)| own == name) || self.surfaces.iter().any(|(own, _)| own == name)
-    }
-}
-
-fn did_you_mean(word: &str, known: &[&str]) -> String {
-    match nearest(word, known.iter().copied()) {
-        Some(name) => format!("did you mean `{name}`?"),
-        None => format!(
-            "the scene has {}",
-            known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-        ),
     }
 }

@@ -124,7 +124,7 @@ pub(crate) struct PartOutcome {
 impl PartOutcome {
     fn new(part: &Part, participant: &dyn Participant, watched: Watched) -> Self {
         let watches = part.plan.limits.is_some() && part.scene.run.solver == SolverName::Explicit;
-        let constraints = 0..part.built.model.constraints.len();
+        let frame = Frame { part, now: participant };
         Self {
             steps: participant.steps(),
             energies: participant.energies(),
@@ -134,7 +134,7 @@ impl PartOutcome {
             equilibria: participant.equilibria(),
             effort: participant.effort(),
             convergence: participant.convergence(),
-            reactions: constraints.map(|index| participant.reaction(index)).collect(),
+            reactions: frame.reactions().collect(),
         }
     }
 }
@@ -382,10 +382,13 @@ impl<'a> Run<'a> {
             self.history.sample(&self.simulation.frames(self.world));
             self.look_at_strains();
         }
-        let frames = self.simulation.frames(self.world);
-        for (schedule, observer) in &mut self.watching {
-            if schedule.is_due(time, step, last) {
-                observer.see(&frames).map_err(|error| FailureSummary::output(&error, Some(time)))?;
+        // Of steps that no output looks at nothing is made.
+        if looked_at {
+            let frames = self.simulation.frames(self.world);
+            for (schedule, observer) in &mut self.watching {
+                if schedule.is_due(time, step, last) {
+                    observer.see(&frames).map_err(|error| FailureSummary::output(&error, Some(time)))?;
+                }
             }
         }
         Ok(last)
@@ -504,10 +507,6 @@ impl History {
         self.times.push(time_of(frames));
         self.energies.push(total(frames.iter().map(|frame| frame.now.energies())));
         let size = |force: [f64; 3]| force.iter().map(|f| f * f).sum::<f64>().sqrt();
-        let of = |frame: &Frame<'_>| {
-            let constraints = 0..frame.part.built.model.constraints.len();
-            constraints.map(|constraint| size(frame.now.reaction(constraint))).collect::<Vec<_>>()
-        };
-        self.reactions.push(frames.iter().flat_map(of).collect());
+        self.reactions.push(frames.iter().flat_map(Frame::reactions).map(size).collect());
     }
 }

@@ -114,7 +114,7 @@ impl Simulation {
     /// All participants as outputs read them.
     pub fn frames<'a>(&'a self, world: &'a World) -> Vec<Frame<'a>> {
         let of = world.participants.iter().zip(&self.participants);
-        of.map(|(part, participant)| Frame { part, now: participant.instant() }).collect()
+        of.map(|(part, participant)| Frame { part, now: participant.as_ref() }).collect()
     }
 
     /// Energies of all participants together; the worst of their balances.

@@ -72,8 +72,24 @@ impl World {
             Ok(Part { name, plan: plan?, scene: part, built: Arc::new(built) })
         };
         let participants = built.into_iter().map(planned).collect::<Result<Vec<_>, SceneErrors>>()?;
-        let world = Self { scene: scene.clone(), participants };
-        world.with_common_instants()
+        let mut world = Self { scene: scene.clone(), participants };
+        if world.only().is_none() {
+            world.check_load_steps()?;
+        }
+        world.meet();
+        Ok(world)
+    }
+
+    /// Refuses unequal load steps of a participant beside others.
+    fn check_load_steps(&self) -> Result<(), SceneErrors> {
+        let Some(part) = self.participants.iter().find(|part| part.plan.ends.is_some()) else {
+            return Ok(());
+        };
+        let place = self.scene.source.span(&part.scene.run_at("load-steps"));
+        let message = "participants of a scene meet at equal times, and these load steps are unequal";
+        let help = "give a number of load steps, or run the bodies in scenes of their own";
+        let diagnostic = Diagnostic::error(message).at(place, "unequal").help(help);
+        Err(self.scene.source.errors(vec![diagnostic]))
     }
 
     /// Of a scene whose bodies all go together.
@@ -81,22 +97,6 @@ impl World {
         let part =
             Part { name: String::new(), scene: scene.clone(), built: Arc::clone(built), plan: plan.clone() };
         Self { scene: scene.clone(), participants: vec![part] }
-    }
-
-    /// Makes the steps of each participant a multiple of those of the one with the fewest.
-    fn with_common_instants(mut self) -> Result<Self, SceneErrors> {
-        if let [_] = self.participants[..] {
-            return Ok(self);
-        }
-        if let Some(part) = self.participants.iter().find(|part| part.plan.ends.is_some()) {
-            let place = self.scene.source.span(&part.scene.run_at("load-steps"));
-            let message = "participants of a scene meet at equal times, and these load steps are unequal";
-            let help = "give a number of load steps, or run the bodies in scenes of their own";
-            let diagnostic = Diagnostic::error(message).at(place, "unequal").help(help);
-            return Err(self.scene.source.errors(vec![diagnostic]));
-        }
-        self.meet();
-        Ok(self)
     }
 
     /// The same of another duration [s].
@@ -112,7 +112,7 @@ impl World {
 
     /// Makes the steps of each participant a multiple of those of the participant with the fewest.
     fn meet(&mut self) {
-        if let [_] = self.participants[..] {
+        if self.only().is_some() {
             return;
         }
         let (until, common) = (self.scene.scene.until, self.steps());

@@ -294,10 +294,10 @@ impl<'s> Builder<'s> {
 }
 
 /// Whose names are meant, in suggestions.
-const SCENE: &str = "the scene";
+pub(crate) const SCENE: &str = "the scene";
 
 /// "did you mean …?" or a list of what there is; `owner` is `the scene` or another that has such names.
-fn suggestion(word: &str, known: &[&str], owner: &str, what: &str) -> String {
+pub(crate) fn suggestion(word: &str, known: &[&str], owner: &str, what: &str) -> String {
     match nearest(word, known.iter().copied()) {
         Some(name) => format!("did you mean `{name}`?"),
         None if known.is_empty() => format!("{owner} has no {what}"),

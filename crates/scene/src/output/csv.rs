@@ -57,9 +57,7 @@ impl Samples {
         }
         let mut parts = Vec::new();
         for part in &world.participants {
-            let own = Own::new(part, table);
-            columns.extend_from_slice(&own.columns);
-            parts.push(own);
+            parts.push(Own::new(part, table, &mut columns));
         }
         Self { columns, total, parts }
     }
@@ -94,7 +92,6 @@ impl Column {
 
 /// Those of one participant.
 struct Own {
-    columns: Vec<Column>,
     reactions: Vec<usize>,
     /// The point [m] about which moments of reactions are taken, and what each of them prescribes.
     moments: Option<([f64; 3], Vec<Held>)>,
@@ -128,13 +125,13 @@ pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
 impl Own {
-    fn new(part: &Part, table: &CsvTable) -> Self {
+    /// Its columns go to `columns`.
+    fn new(part: &Part, table: &CsvTable, columns: &mut Vec<Column>) -> Self {
         let built = &*part.built;
         let wanted = |name: &String| table.reactions.as_ref().is_none_or(|list| list.contains(name));
         let constraints = built.model.constraints.iter();
         let reactions: Vec<usize> =
             constraints.enumerate().filter(|(_, c)| wanted(&c.name)).map(|(i, _)| i).collect();
-        let mut columns = Vec::new();
         let mut add = |name: String, unit| columns.push(Column { name, unit });
         for &constraint in &reactions {
             let name = &built.model.constraints[constraint].name;
@@ -170,7 +167,7 @@ impl Own {
         }
         let probes = probes().map(|(_, probe)| Probe::new(built, probe)).collect();
         let corotated = fields::Corotated::default();
-        Self { columns, reactions, moments, energy: table.energy, probes, corotated }
+        Self { reactions, moments, energy: table.energy, probes, corotated }
     }
 
     /// Adds the sample of an instant to a row.

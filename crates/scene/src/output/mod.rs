@@ -70,6 +70,11 @@ impl Frame<'_> {
     fn built(&self) -> &Built {
         &self.part.built
     }
+
+    /// Force [N] that holds or moves the nodes of each constraint.
+    pub(crate) fn reactions(&self) -> impl Iterator<Item = [f64; 3]> {
+        (0..self.built().model.constraints.len()).map(|constraint| self.now.reaction(constraint))
+    }
 }
 
 /// Time of the instant of frames [s].
