@@ -9,7 +9,7 @@ use pliant_scene::niftysim::import_bytes;
 use pliant_scene::source::Source;
 use pliant_scene::{Checkpoint, OutputFolder, Scene, World};
 
-use pliant_testing::{Random, peak};
+use pliant_testing::{PeakMemory, Random};
 
 /// Memory that reading may add [KiB]; the files are below 64 KiB.
 const MOST: u64 = 64 << 10;
@@ -56,7 +56,7 @@ fn broken_scenes_give_mistakes() {
     for (name, bytes) in corpus("toml") {
         println!("{name}: {}", mistakes(&bytes).unwrap_or_else(|| panic!("{name} is read")));
     }
-    let (before, mut noise, mut outcomes) = (peak(), Random::new(20_261_122), [0; 2]);
+    let (before, mut noise, mut outcomes) = (PeakMemory::now(), Random::new(20_261_122), [0; 2]);
     for (_, seed) in scenes() {
         assert!(mistakes(&seed).is_none());
         for _ in 0..300 {
@@ -65,7 +65,7 @@ fn broken_scenes_give_mistakes() {
     }
     println!("{} scenes, {} with mistakes", outcomes[0], outcomes[1]);
     assert!(outcomes.iter().all(|&count| count > 50));
-    in_little_memory(before);
+    before.assert_rise_below(MOST);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn broken_models_give_errors() {
     }
     let seed = fs::read(folder().join("../../../../validation/data/niftysim/H8_NH.xml")).unwrap();
     assert!(import_bytes(nowhere, &seed).is_ok());
-    let (before, mut noise, mut outcomes) = (peak(), Random::new(20_261_122), [0; 2]);
+    let (before, mut noise, mut outcomes) = (PeakMemory::now(), Random::new(20_261_122), [0; 2]);
     for _ in 0..1500 {
         let imported = import_bytes(nowhere, &noise.damaged(&seed));
         outcomes[usize::from(imported.is_err())] += 1;
@@ -87,7 +87,7 @@ fn broken_models_give_errors() {
     }
     println!("{} models, {} errors", outcomes[0], outcomes[1]);
     assert!(outcomes.iter().all(|&count| count > 50));
-    in_little_memory(before);
+    before.assert_rise_below(MOST);
 }
 
 /// Bodies are changed inside a fitting checksum, or no change would come past that.
@@ -107,7 +107,7 @@ fn broken_checkpoints_give_errors() {
     let whole = fs::read(&path).unwrap();
     let body = &whole[20..whole.len() - 4];
     assert_eq!(Checkpoint::framed(body), whole);
-    let (before, mut noise, mut outcomes) = (peak(), Random::new(20_261_122), [0; 2]);
+    let (before, mut noise, mut outcomes) = (PeakMemory::now(), Random::new(20_261_122), [0; 2]);
     for _ in 0..3000 {
         let read = Checkpoint::from_bytes(&path, &Checkpoint::framed(&noise.damaged(body)));
         outcomes[usize::from(read.is_err())] += 1;
@@ -119,14 +119,5 @@ fn broken_checkpoints_give_errors() {
     }
     println!("{} checkpoints, {} errors", outcomes[0], outcomes[1]);
     assert!(outcomes.iter().all(|&count| count > 50));
-    in_little_memory(before);
-}
-
-fn in_little_memory(before: Option<u64>) {
-    match (before, peak()) {
-        (Some(before), Some(after)) => {
-            assert!(after - before < MOST, "{before} KiB before, {after} KiB after")
-        }
-        _ => println!("not told how much memory the process held"),
-    }
+    before.assert_rise_below(MOST);
 }

@@ -78,8 +78,25 @@ impl Random {
     }
 }
 
-/// Peak memory of this process [KiB], on Linux.
-pub fn peak() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?.parse().ok()
+/// Peak memory of this process [KiB] at an instant, on Linux.
+#[derive(Clone, Copy, Debug)]
+pub struct PeakMemory(Option<u64>);
+
+impl PeakMemory {
+    /// The peak so far.
+    pub fn now() -> Self {
+        let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        Self(peak.and_then(|peak| peak.split_whitespace().next()?.parse().ok()))
+    }
+
+    /// Panics if the peak has risen by `limit` [KiB] or more since this instant. Prints a notice where the system names no peak.
+    #[track_caller]
+    pub fn assert_rise_below(self, limit: u64) {
+        let Some((before, now)) = self.0.zip(Self::now().0) else {
+            return println!("the system names no peak memory");
+        };
+        // The kernel counts in batches, so that a later reading can be a few pages lower.
+        assert!(now.saturating_sub(before) < limit, "{before} KiB before, {now} KiB now");
+    }
 }
