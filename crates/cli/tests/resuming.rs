@@ -211,7 +211,7 @@ fn a_resumed_quasi_static_run_ends_in_the_same_bits() {
     assert_resumes(&bent("tet4-anp", times, true), ["2", "1", "3"], "unequal load steps");
 }
 
-/// A pressed shell beside a swinging co-rotational block, with a checkpoint every 0.02 s.
+/// A pressed shell beside a swinging block, with a checkpoint every 0.02 s.
 fn shells(run: &str) -> String {
     format!(
         r#"[scene]
@@ -231,7 +231,6 @@ law = "tissue"
 density = 1000
 thickness = 0.004
 [body.block]
-model = "corotational"
 mesh = {{ block = {{ size = [0.1, 0.02, 0.02], cells = [4, 1, 1] }}, at = [0, 0.2, 0] }}
 law = "tissue"
 density = 1000

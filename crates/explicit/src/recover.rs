@@ -6,7 +6,7 @@ use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale,
 use rayon::prelude::*;
 
 use crate::Scalar;
-use crate::forces::{pressure, volumetric_energy};
+use crate::forces::pressure;
 use crate::state::{History, State};
 
 /// The state of one cell.
@@ -227,8 +227,7 @@ fn averages<R: Scalar>(solid: &Solid, history: &History<R>, displacement: &[Vect
         let u: Vec<_> = nodes.iter().map(|&node| sub(cast(displacement[node as usize]), origin)).collect();
         volume_change(&gradient(&u, gradients))
     };
-    let energies =
-        |changes: &[f64]| -> Vec<f64> { changes.iter().map(|&x| volumetric_energy(law, x)).collect() };
+    let energies = |changes: &[f64]| -> Vec<f64> { changes.iter().map(|&x| law.volume_energy(x)).collect() };
     let together = |changes: Vec<f64>, pressures: Vec<f64>, energies: Vec<f64>| {
         let cells = changes.into_iter().zip(pressures).zip(energies);
         Averages::Volumetric(

@@ -11,6 +11,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_mechanics::model::Solid;
 
 use crate::error::SolveError;
 use crate::facet::Tangent;
@@ -18,6 +19,7 @@ use crate::forces::Forces;
 use crate::linear::{LinearReport, LinearSolver};
 use crate::model::{Model, Spring};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
+use crate::solid::highest_frequency_squared;
 use crate::state::State;
 use crate::system::{Phases, System};
 
@@ -413,7 +415,11 @@ impl Explicit {
     /// of the model's.
     pub fn stable_step(model: &Model) -> f64 {
         let shells = model.facets.iter().map(|facet| facet.highest_frequency_squared());
-        let solids = model.tets.iter().map(|tet| tet.highest_frequency_squared());
+        let of_solid = |solid: &Solid| {
+            let cells = (0..solid.cells.len()).map(|cell| highest_frequency_squared(solid, cell));
+            cells.fold(0.0, f64::max)
+        };
+        let solids = model.solids.iter().map(of_solid);
         let highest = shells.chain(solids).fold(0.0, f64::max);
         let mut springs = vec![0.0; model.rest.len()];
         for spring in &model.springs {

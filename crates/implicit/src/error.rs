@@ -17,6 +17,14 @@ pub enum ModelError {
         /// What it must be.
         range: &'static str,
     },
+    /// A solid that only explicit steps can move.
+    #[error("solid `{solid}`: {why}")]
+    NoStiffness {
+        /// Name of the solid.
+        solid: String,
+        /// Why, and what to do instead.
+        why: &'static str,
+    },
     /// Not one value and not one a cell.
     #[error("shell `{shell}` has {cells} elements and {given} {what}; give one, or one an element")]
     Count {
@@ -170,7 +178,7 @@ pub enum SolveError {
     /// An element folded over, collapsed or not finite.
     #[error("element {cell} {}", broken(*.why))]
     Broken {
-        /// Element, facets before tetrahedra.
+        /// Element, facets before the cells of solids.
         cell: usize,
         /// What happened.
         why: Broken,

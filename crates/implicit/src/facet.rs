@@ -130,7 +130,7 @@ pub enum Broken {
     Area(f64),
     /// A node has turned by this angle [rad] against it.
     Folded(f64),
-    /// Of a tetrahedron: the determinant of its deformation gradient is not positive.
+    /// Of a cell of a solid: the determinant of its deformation gradient is not positive, there or at a corner.
     Inverted(f64),
 }
 

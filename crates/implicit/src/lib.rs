@@ -1,5 +1,5 @@
-//! Thin structures in large rotation: co-rotational triangular shells with membrane, bending and twist, and co-rotational tetrahedra beside
-//! them, with static and implicit solvers. Knows nothing of files or windows. SI units throughout.
+//! Static and implicit solvers of thin structures and solids: co-rotational triangular shells with membrane, bending and twist in large
+//! rotation, and solids of any elastic law, which may share nodes with them. Knows nothing of files or windows. SI units throughout.
 //!
 //! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane (Felippa 2003), which takes the
 //! mean strain of the curved triangle, six degrees of freedom a node, in a frame that turns with the facet; its force is the gradient of its energy. [`Model`] is constant, [`State`]
@@ -49,6 +49,7 @@ mod pressure;
 mod recover;
 mod resolution;
 mod rotation;
+mod solid;
 mod sparse;
 mod state;
 mod statics;
@@ -59,7 +60,6 @@ mod system;
 mod testing;
 #[cfg(test)]
 mod tests;
-mod tet;
 
 pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
 pub use error::{ModelError, SolveError};
@@ -68,11 +68,10 @@ pub use forces::Forces;
 pub use linear::{LinearReport, LinearSolver, Preconditioner};
 pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spread, Spring};
 pub use picture::{Picture, PictureFields};
-pub use recover::{ShellFields, SolidFields, von_mises};
+pub use recover::{ShellFields, von_mises};
 pub use resolution::Resolution;
 pub use state::State;
 pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
 pub use strain::ShellStrain;
 pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Place};
 pub use system::Phases;
-pub use tet::Tet;

@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use pliant_mechanics::curve::Curve;
+use pliant_mechanics::load::Face;
+use pliant_mechanics::model::{self, Solid};
 
 use crate::element::{Elasticity, Formulation, Layer};
 use crate::error::ModelError;
 use crate::facet::Facet;
+use crate::solid::refusal;
 use crate::surface::{Carried, straight_edges};
-use crate::tet::Tet;
 
 /// The least part of a direction that lies in a triangle.
 const ALONG: f64 = 1e-3;
@@ -21,8 +23,8 @@ pub struct Model {
     pub rest: Vec<Vector3<f64>>,
     /// Shell elements of all shells.
     pub facets: Vec<Facet>,
-    /// Tetrahedra of all solids.
-    pub tets: Vec<Tet>,
+    /// Solids of any elastic law, their nodes numbered in this model.
+    pub solids: Vec<Solid>,
     /// Nodal normals at rest, which turn with their nodes; several a node at creases.
     pub normals: Vec<Normal>,
     /// The normals at the corners of each facet.
@@ -196,6 +198,13 @@ pub enum LoadKind {
         /// How it comes to the nodes.
         spread: Spread,
     },
+    /// Pressure against the outward normals of deformed faces of solids.
+    FacePressure {
+        /// Faces, outward order.
+        faces: Vec<Face>,
+        /// Pressure [Pa].
+        pressure: f64,
+    },
     /// Forces with fixed directions on points that the curved surface carries, by Jᵀ of the current state to forces and moments. How
     /// these change with the state is left out of the stiffness.
     Carried {
@@ -217,7 +226,7 @@ pub enum Spread {
 }
 
 /// Components of nodes that are held or moved.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Constraint {
     /// Its name in messages.
     pub name: String,
@@ -230,7 +239,7 @@ pub struct Constraint {
 }
 
 /// What constrained components do.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum Motion {
     /// They stay where they start.
     Fixed,
@@ -243,6 +252,8 @@ pub enum Motion {
         /// Factor over time.
         curve: Curve,
     },
+    /// Displacements of the nodes from rest as of solids, in the order of the constraint; its rotations, if some are constrained, stay.
+    Displaced(model::Motion),
 }
 
 impl Model {
@@ -339,33 +350,45 @@ impl Model {
         Some((1 + all.count(), first))
     }
 
-    /// Adds co-rotational tetrahedra, which give mass to their nodes. They may share nodes with shells.
+    /// Adds a solid, which gives mass to its nodes. It may share nodes with shells and other solids.
     ///
     /// # Errors
-    /// If a quantity is out of range or a tetrahedron is degenerate or inverted. The model then is as it was.
-    pub fn add_solid(
-        &mut self,
-        name: &str,
-        cells: &[[u32; 4]],
-        material: Material,
-    ) -> Result<(), ModelError> {
-        check_material(name, material, 0.5, "between -1 and 0.5")?;
-        let mut tets = Vec::with_capacity(cells.len());
-        for (cell, &nodes) in cells.iter().enumerate() {
-            check_nodes(name, cell, &nodes, self.rest.len())?;
-            let corners = nodes.map(|node| self.rest[node as usize]);
-            tets.push(Tet::new(nodes, corners, material).map_err(|value| ModelError::Degenerate {
+    /// If the density is out of range, a cell is degenerate or inverted, or the element or the law has no stiffness here: averages over
+    /// two rings of neighbours, laws that relax. The model then is as it was.
+    pub fn add_solid(&mut self, name: &str, solid: Solid) -> Result<(), ModelError> {
+        if let Some(why) = refusal(&solid) {
+            return Err(ModelError::NoStiffness { solid: name.into(), why });
+        }
+        let density = solid.material.density;
+        if !(density > 0.0 && density.is_finite()) {
+            let range = "positive and finite";
+            return Err(ModelError::OutOfRange {
                 shell: name.into(),
-                cell,
-                what: "volume",
-                value,
-            })?);
+                what: "density".into(),
+                value: density,
+                range,
+            });
         }
-        for tet in &tets {
-            tet.nodes.iter().for_each(|&node| self.mass[node as usize] += tet.mass);
+        for cell in 0..solid.cells.len() {
+            check_nodes(name, cell, solid.cells.nodes(cell), self.rest.len())?;
+            let value = solid.cells.volume(cell);
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(ModelError::Degenerate { shell: name.into(), cell, what: "volume", value });
+            }
         }
-        self.tets.extend(tets);
+        solid.add_mass(&mut self.mass);
+        self.solids.push(solid);
         Ok(())
+    }
+
+    /// The nodes of each cell of the solids.
+    pub(crate) fn solid_cells(&self) -> impl Iterator<Item = &[u32]> {
+        self.solids.iter().flat_map(|solid| (0..solid.cells.len()).map(|cell| solid.cells.nodes(cell)))
+    }
+
+    /// Displacement [m] of a node at a position.
+    pub(crate) fn displacement(&self, position: &[Vector3<f64>], node: u32) -> [f64; 3] {
+        (position[node as usize] - self.rest[node as usize]).into()
     }
 
     fn check_quantities(&self, shell: &Shell) -> Result<(), ModelError> {
@@ -383,7 +406,7 @@ impl Model {
             return check_layers(shell);
         }
         for &material in &shell.material {
-            check_material(&shell.name, material, 1.0, "between -1 and 1")?;
+            check_material(&shell.name, material)?;
         }
         let cells = shell.cells.len();
         for (what, given) in [("thicknesses", shell.thickness.len()), ("materials", shell.material.len())] {
@@ -497,7 +520,12 @@ impl Model {
     /// The largest stiffness [N/m] of each cell.
     fn stiffnesses(&self) -> impl Iterator<Item = f64> {
         let shells = self.facets.iter().map(|facet| facet.stiffest());
-        let solids = self.tets.iter().map(|tet| tet.modulus() * tet.volume.cbrt());
+        let of_solid = |solid: &Solid| {
+            let modulus = solid.material.law.longitudinal_modulus();
+            let volumes = (0..solid.cells.len()).map(|cell| solid.cells.volume(cell));
+            volumes.map(|volume| modulus * volume.cbrt()).collect::<Vec<_>>()
+        };
+        let solids = self.solids.iter().flat_map(of_solid);
         shells.chain(solids)
     }
 
@@ -516,8 +544,8 @@ impl Model {
         for facet in &self.facets {
             (0..3).for_each(|i| add(facet.nodes[i], facet.nodes[(i + 1) % 3]));
         }
-        for tet in &self.tets {
-            (0..4).for_each(|i| add(tet.nodes[i], tet.nodes[(i + 1) % 4]));
+        for nodes in self.solid_cells() {
+            (0..nodes.len()).for_each(|i| add(nodes[i], nodes[(i + 1) % nodes.len()]));
         }
         if count > 0 { sum / f64::from(count) } else { 1.0 }
     }
@@ -558,12 +586,7 @@ fn direction_of(shell: &Shell, cell: usize, corners: &[Vector3<f64>; 3]) -> Resu
     Err(ModelError::Direction { shell: shell.name.clone(), cell })
 }
 
-fn check_material(
-    name: &str,
-    Material { elastic, density }: Material,
-    above: f64,
-    range: &'static str,
-) -> Result<(), ModelError> {
+fn check_material(name: &str, Material { elastic, density }: Material) -> Result<(), ModelError> {
     let out_of_range = |what: &str, value, range| {
         Err(ModelError::OutOfRange { shell: name.into(), what: what.into(), value, range })
     };
@@ -571,8 +594,8 @@ fn check_material(
     if !positive(elastic.young) {
         return out_of_range("Young's modulus", elastic.young, "positive and finite");
     }
-    if !(elastic.poisson > -1.0 && elastic.poisson < above) {
-        return out_of_range("Poisson's ratio", elastic.poisson, range);
+    if !(elastic.poisson > -1.0 && elastic.poisson < 1.0) {
+        return out_of_range("Poisson's ratio", elastic.poisson, "between -1 and 1");
     }
     if !positive(density) {
         return out_of_range("density", density, "positive and finite");

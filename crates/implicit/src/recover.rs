@@ -4,8 +4,7 @@
 //! as its nodal forces: n = t Dm Lᵀd/(t A) of the ANDES membrane (Felippa 2003, CMAME 192:2125), whose strain has a part from drilling,
 //! and m = t³/12 Dm κ with the mean curvature of the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980). Stress at a height z along the
 //! facet's normal is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959), in layers Q (ε + z κ) with ε and κ of n and m.
-//! Tetrahedra: Cauchy stress σ = P Fᵀ/J of their energy.
-//! Leaves out: shear across the thickness, variation within a facet, averages at nodes.
+//! Fields of solids are those of `pliant-explicit`. Leaves out: shear across the thickness, variation within a facet, averages at nodes.
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -15,7 +14,6 @@ use crate::facet::{Resultants, ShellEnergy};
 use crate::model::Model;
 use crate::state::State;
 use crate::strain::ShellStrain;
-use crate::tet::TetStress;
 
 /// Fields of all facets, one entry a facet. Its arrays are made at the first use and kept.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -107,60 +105,6 @@ pub fn von_mises(stress: &Matrix3<f64>) -> f64 {
     (1.5 * deviator.norm_squared()).sqrt()
 }
 
-/// Fields of all tetrahedra, one entry a tetrahedron. Its arrays are made at the first use and kept.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SolidFields {
-    /// Cauchy stress [Pa].
-    pub stress: Vec<Matrix3<f64>>,
-    /// Von Mises stress [Pa].
-    pub von_mises: Vec<f64>,
-    /// Pressure −tr σ/3 [Pa].
-    pub pressure: Vec<f64>,
-    /// Strain energy over the volume at rest [J/m³].
-    pub energy: Vec<f64>,
-    /// J, volume over volume at rest.
-    pub volume_ratio: Vec<f64>,
-}
-
-impl SolidFields {
-    /// Fills the arrays for a state, tetrahedra side by side.
-    ///
-    /// # Errors
-    /// If a tetrahedron is inverted: the first one, counted after the facets. The arrays then are partly of before.
-    pub fn fill(&mut self, model: &Model, state: &State) -> Result<(), SolveError> {
-        let count = model.tets.len();
-        self.stress.resize(count, Matrix3::zeros());
-        for numbers in [&mut self.von_mises, &mut self.pressure, &mut self.energy, &mut self.volume_ratio] {
-            numbers.resize(count, 0.0);
-        }
-        let broken = (
-            &model.tets,
-            &mut self.stress,
-            &mut self.von_mises,
-            &mut self.pressure,
-            &mut self.energy,
-            &mut self.volume_ratio,
-        )
-            .into_par_iter()
-            .with_min_len(64)
-            .enumerate()
-            .find_map_first(|(number, (tet, stress, mises, pressure, energy, ratio))| {
-                match tet.stress(state) {
-                    Ok(TetStress { cauchy, density, volume_ratio }) => {
-                        *stress = cauchy;
-                        *mises = von_mises(&cauchy);
-                        *pressure = -cauchy.trace() / 3.0;
-                        *energy = density;
-                        *ratio = volume_ratio;
-                        None
-                    }
-                    Err(why) => Some(SolveError::Broken { cell: model.facets.len() + number, why }),
-                }
-            });
-        broken.map_or(Ok(()), Err)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
@@ -170,7 +114,7 @@ mod tests {
     use super::*;
     use crate::element::Formulation;
     use crate::rotation::exponential;
-    use crate::tests::{FLAT, MATERIAL, balloon, bar, model, strip};
+    use crate::tests::{FLAT, MATERIAL, balloon, model, strip};
     use crate::{Constraint, Load, LoadKind, Motion, Shell, Spread, StaticSettings, Statics};
 
     const YOUNG: f64 = MATERIAL.elastic.young;
@@ -324,34 +268,6 @@ mod tests {
             let (all, inner) = (off(&ratios), off(&ratios[192..384]));
             println!("cylinder: mean {mean:.4}, off by {inner:.4}, at the ends {all:.4}");
             assert!((mean - 1.0).abs() < 0.003 && inner < middle, "{mean} {inner}");
-        }
-    }
-
-    /// A block stretched by 10, −5 and 2 %, then turned: σ = (2 μ ε + λ tr ε) λi/J along each stretch λi, exactly.
-    #[test]
-    fn a_turned_block_of_tets_has_the_stress_of_its_stretches() {
-        let (points, cells) = bar([2, 1, 1], [2.0, 1.0, 1.0]);
-        let mut model = Model::new(points);
-        model.add_solid("block", &cells, MATERIAL).unwrap();
-        let strain = Vector3::new(0.1, -0.05, 0.02);
-        let stretch = strain.add_scalar(1.0);
-        let mut state = State::at_rest(&model);
-        state.position.iter_mut().for_each(|x| x.component_mul_assign(&stretch));
-        let (state, turn) = turned(&state);
-        let mut fields = SolidFields::default();
-        fields.fill(&model, &state).unwrap();
-        let (mu, ratio) = (0.5 * YOUNG / (1.0 + POISSON), stretch.product());
-        let lambda = 2.0 * mu * POISSON / (1.0 - 2.0 * POISSON);
-        let biot = 2.0 * mu * strain + Vector3::from_element(lambda * strain.sum());
-        let cauchy = Matrix3::from_diagonal(&(biot.component_mul(&stretch) / ratio));
-        let density = mu * strain.norm_squared() + 0.5 * lambda * strain.sum().powi(2);
-        for cell in 0..cells.len() {
-            let back = turn.transpose() * fields.stress[cell] * turn;
-            assert!((back - cauchy).norm() < 1e-10 * cauchy.norm(), "{back}");
-            assert!((fields.volume_ratio[cell] / ratio - 1.0).abs() < 1e-12);
-            assert!((fields.energy[cell] / density - 1.0).abs() < 1e-10);
-            assert!((fields.pressure[cell] + cauchy.trace() / 3.0).abs() < 1e-10 * cauchy.norm());
-            assert!((fields.von_mises[cell] / von_mises(&cauchy) - 1.0).abs() < 1e-10);
         }
     }
 

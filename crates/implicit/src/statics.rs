@@ -551,7 +551,7 @@ fn slack(model: &Model, system: &System) -> (Vec<u32>, f64) {
     let mut mark = |nodes: &[u32], is: bool| nodes.iter().for_each(|&node| slack[node as usize] = is);
     model.facets.iter().for_each(|facet| mark(&facet.nodes, true));
     model.facets.iter().filter(|facet| facet.bends()).for_each(|facet| mark(&facet.nodes, false));
-    model.tets.iter().for_each(|tet| mark(&tet.nodes, false));
+    model.solid_cells().for_each(|nodes| mark(nodes, false));
     let nodes: Vec<usize> = (0..slack.len()).filter(|&node| slack[node]).collect();
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     for &node in &nodes {
@@ -586,7 +586,7 @@ pub fn check_held(model: &Model) -> Result<(), SolveError> {
     }
     let mut used = vec![false; nodes];
     let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
-    for nodes in facets.chain(model.tets.iter().map(|tet| &tet.nodes[..])) {
+    for nodes in facets.chain(model.solid_cells()) {
         for &node in nodes {
             used[node as usize] = true;
             let (x, y) = (root(&mut part, nodes[0] as usize), root(&mut part, node as usize));

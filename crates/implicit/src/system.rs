@@ -5,17 +5,19 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::{SMatrix, SVector, Vector3};
+use pliant_mechanics::load::{Face, NO_NODE, face_areas};
+use pliant_mechanics::model::Solid;
 use rayon::prelude::*;
 
 use crate::error::SolveError;
 use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18, symmetrise};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
-use crate::model::{LoadKind, Model, Motion, Spread, Spring};
+use crate::model::{Load, LoadKind, Model, Motion, Spread, Spring};
 use crate::rotation::skew;
+use crate::solid::{Response, Stars};
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
 use crate::surface::{CurvedSurface, EdgeRule, Patch};
-use crate::tet::{Matrix12, Vector12};
 
 /// Cells computed side by side before they are added up.
 const CHUNK: usize = 256;
@@ -41,7 +43,12 @@ pub(crate) struct System {
     pub(crate) equations: Equations,
     pub(crate) matrix: LowerMatrix,
     places: Vec<Vec<u32>>,
-    tet_places: Vec<Vec<u32>>,
+    /// Of the cells of each solid, and of its stars.
+    solid_places: Vec<[Vec<Vec<u32>>; 2]>,
+    /// Of the faces of each load that presses on solids.
+    face_places: Vec<Vec<Vec<u32>>>,
+    /// The averages of each solid that has some.
+    stars: Vec<Option<Stars>>,
     /// None in a system of forces alone.
     workspace: Option<Workspace>,
     /// Internal forces and moments, six a node [N, N m].
@@ -66,7 +73,7 @@ pub(crate) struct System {
     /// Largest force on a node of a cell [N].
     pub(crate) largest: f64,
     results: Vec<FacetResult>,
-    tet_results: Vec<TetResult>,
+    solid_results: Vec<Response>,
     pub(crate) phases: Phases,
     pub(crate) last_solution: LinearReport,
 }
@@ -93,14 +100,28 @@ impl System {
         let mut system = Self::forces_only(Arc::clone(&model));
         let matrix = &mut system.matrix;
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
-        let cells = facets.chain(model.tets.iter().map(|tet| &tet.nodes[..]));
+        let stars = system.stars.iter().flatten().flat_map(|stars| stars.nodes.iter().map(Vec::as_slice));
+        let cells = facets.chain(model.solid_cells()).chain(stars);
         *matrix = LowerMatrix::new(&system.equations, cells);
         if solver == LinearSolver::Unsymmetric {
             matrix.keep_mirror();
         }
         system.places = model.facets.iter().map(|f| matrix.places(&system.equations, &f.nodes, 6)).collect();
-        system.tet_places =
-            model.tets.iter().map(|tet| matrix.places(&system.equations, &tet.nodes, 3)).collect();
+        let equations = &system.equations;
+        let places = |nodes: &[u32]| matrix.places(equations, nodes, 3);
+        let of_solid = |(solid, stars): (&Solid, &Option<Stars>)| {
+            let cells = (0..solid.cells.len()).map(|cell| places(solid.cells.nodes(cell)));
+            let stars = stars.iter().flat_map(|stars| &stars.nodes).map(|nodes| places(nodes));
+            [cells.collect(), stars.collect()]
+        };
+        let of_load = |load: &Load| match &load.kind {
+            LoadKind::FacePressure { faces, .. } => {
+                Some(faces.iter().map(|face| places(corners(face))).collect())
+            }
+            _ => None,
+        };
+        system.face_places = model.loads.iter().filter_map(of_load).collect();
+        system.solid_places = model.solids.iter().zip(&system.stars).map(of_solid).collect();
         system.coupling = vec![0.0; system.equations.len()];
         system.workspace = Workspace::new(solver, &system.equations, matrix);
         if system.workspace.is_none() {
@@ -120,7 +141,7 @@ impl System {
                 free[6 * node as usize..6 * node as usize + 6].fill(true);
             }
         }
-        for node in model.tets.iter().flat_map(|tet| tet.nodes) {
+        for &node in model.solid_cells().flatten() {
             free[6 * node as usize..6 * node as usize + 3].fill(true);
         }
         for constraint in &model.constraints {
@@ -134,8 +155,10 @@ impl System {
             equations: Equations::new(&free),
             matrix: LowerMatrix::default(),
             places: Vec::new(),
-            tet_places: Vec::new(),
-            tet_results: vec![TetResult::none(); CHUNK.min(model.tets.len())],
+            solid_places: Vec::new(),
+            face_places: Vec::new(),
+            stars: model.solids.iter().map(Stars::of).collect(),
+            solid_results: vec![Response::none(); CHUNK],
             workspace: None,
             internal: vec![0.0; 6 * nodes],
             external: vec![0.0; 6 * nodes],
@@ -189,7 +212,10 @@ impl System {
         }
         // Within the threads' pool, so that no part waits for another thread to take it up.
         rayon::scope(|_| self.evaluate_facets(state, tangent))?;
-        self.evaluate_tets(state, tangent.map(|(_, moved)| moved))?;
+        self.evaluate_solids(state, tangent.map(|(_, moved)| moved))?;
+        if let Some((_, moved)) = tangent {
+            self.press_faces(state, time, moved);
+        }
         for spring in &self.model.springs {
             let at = 6 * spring.node as usize;
             let stretch = state.position[spring.node as usize] - spring.anchor;
@@ -261,6 +287,14 @@ impl System {
                 LoadKind::Area { cells, traction } => {
                     for facet in cells.iter().map(|&cell| &model.facets[cell as usize]) {
                         facet.nodes.iter().for_each(|&node| add(node, 0, traction * (facet.area / 3.0)));
+                    }
+                }
+                LoadKind::FacePressure { faces, pressure } => {
+                    let place = |node: u32| -> [f64; 3] { state.position[node as usize].into() };
+                    for face in faces {
+                        for (node, area) in face_areas(face, place) {
+                            add(node, 0, -*pressure * Vector3::from(area));
+                        }
                     }
                 }
                 LoadKind::Edge { edges, traction } => {
@@ -359,53 +393,116 @@ impl System {
         }
     }
 
-    fn evaluate_tets(&mut self, state: &State, moved: Option<&[f64]>) -> Result<(), SolveError> {
+    fn evaluate_solids(&mut self, state: &State, moved: Option<&[f64]>) -> Result<(), SolveError> {
         let model = Arc::clone(&self.model);
-        let mut results = std::mem::take(&mut self.tet_results);
+        let displacement = |node: u32| model.displacement(&state.position, node);
+        let mut results = std::mem::take(&mut self.solid_results);
+        let mut all_stars = std::mem::take(&mut self.stars);
+        let mut first_cell = model.facets.len();
         let mut broken = None;
-        for first in (0..model.tets.len()).step_by(CHUNK) {
-            let last = (first + CHUNK).min(model.tets.len());
-            results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
-                let stiffness = moved.is_some().then_some(&mut result.tangent);
-                match model.tets[first + at].force(state, stiffness) {
-                    Ok((energy, force)) => {
-                        (result.energy, result.force, result.broken) = (energy, force, None)
-                    }
-                    Err(why) => result.broken = Some(why),
+        for (index, (solid, stars)) in model.solids.iter().zip(&mut all_stars).enumerate() {
+            let count = solid.cells.len();
+            if let Some(stars) = stars {
+                self.energy += stars.find(solid, displacement);
+            }
+            for first in (0..count).step_by(CHUNK) {
+                let last = (first + CHUNK).min(count);
+                results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(
+                    |(at, result)| {
+                        let pressure = stars.as_ref().map(|stars| stars.pressure(first + at));
+                        result.fill(solid, first + at, pressure, displacement, moved.is_some());
+                    },
+                );
+                broken = (first..last).zip(&results).find_map(|(cell, result)| Some((cell, result.broken?)));
+                if broken.is_some() {
+                    break;
                 }
-            });
-            for (number, result) in (first..last).zip(&results) {
-                broken = broken.or(result.broken.map(|why| (number, why)));
-                self.add_tet(number, result, moved);
+                for (cell, result) in (first..last).zip(&results) {
+                    self.energy += result.energy;
+                    self.add_forces(solid.cells.nodes(cell), &result.force);
+                    if let Some(moved) = moved {
+                        self.add_stiffness(solid.cells.nodes(cell), [index, 0, cell], &result.tangent, moved);
+                    }
+                }
+            }
+            if let (Some(stars), Some(moved), None) = (stars, moved, broken) {
+                for (star, nodes) in stars.nodes.iter().enumerate() {
+                    let tangent = &mut results[0].tangent;
+                    stars.stiffness(star, solid, displacement, tangent);
+                    self.add_stiffness(nodes, [index, 1, star], tangent, moved);
+                }
             }
             if broken.is_some() {
                 break;
             }
+            first_cell += count;
         }
-        self.tet_results = results;
-        match broken {
-            Some((number, why)) => Err(SolveError::Broken { cell: model.facets.len() + number, why }),
-            None => Ok(()),
+        (self.solid_results, self.stars) = (results, all_stars);
+        broken.map_or(Ok(()), |(cell, why)| Err(SolveError::Broken { cell: first_cell + cell, why }))
+    }
+
+    /// Adds how pressures on faces of solids change with their nodes, its symmetric part unless both halves are kept: all of it where
+    /// the faces close or end at held nodes.
+    fn press_faces(&mut self, state: &State, time: f64, moved: &[f64]) {
+        let model = Arc::clone(&self.model);
+        let mut load_number = 0;
+        for load in &model.loads {
+            let LoadKind::FacePressure { faces, pressure } = &load.kind else { continue };
+            let places = std::mem::take(&mut self.face_places[load_number]);
+            let factor = if load.controlled { state.load_factor } else { 1.0 } * load.curve.value(time);
+            for (face, places) in faces.iter().zip(&places) {
+                let nodes = corners(face);
+                let mut tangent = pressure_change(face, nodes.len(), state, factor * pressure);
+                if self.matrix.mirror.is_empty() {
+                    let size = 3 * nodes.len();
+                    for (i, j) in (0..size).flat_map(|j| (0..j).map(move |i| (i, j))) {
+                        let mean = 0.5 * (tangent[j * size + i] + tangent[i * size + j]);
+                        (tangent[j * size + i], tangent[i * size + j]) = (mean, mean);
+                    }
+                }
+                self.add_at(nodes, places, &tangent, moved);
+            }
+            self.face_places[load_number] = places;
+            load_number += 1;
         }
     }
 
-    fn add_tet(&mut self, number: usize, result: &TetResult, moved: Option<&[f64]>) {
-        let nodes = self.model.tets[number].nodes;
-        let component = |i: usize| 6 * nodes[i / 3] as usize + i % 3;
-        self.energy += result.energy;
-        for (i, force) in result.force.iter().enumerate() {
-            self.internal[component(i)] += force;
-            self.largest = self.largest.max(force.abs());
+    fn add_forces(&mut self, nodes: &[u32], forces: &[f64]) {
+        for (&node, force) in nodes.iter().zip(forces.chunks_exact(3)) {
+            for (own, force) in self.internal[6 * node as usize..].iter_mut().zip(force) {
+                *own += force;
+                self.largest = self.largest.max(force.abs());
+            }
         }
-        let Some(moved) = moved else { return };
-        self.matrix.add(&self.equations, &nodes, 3, &self.tet_places[number], result.tangent.as_slice());
-        let own = Vector12::from_fn(|i, _| moved[component(i)]);
-        if own != Vector12::zeros() {
-            let change: Vector12 = result.tangent * own;
-            for (i, &value) in change.iter().enumerate() {
-                let equation = self.equations.number[component(i)];
+    }
+
+    /// Adds a stiffness of translations; its place is that of a solid, of its cells (0) or stars (1), by number.
+    fn add_stiffness(
+        &mut self,
+        nodes: &[u32],
+        [solid, kind, at]: [usize; 3],
+        tangent: &[f64],
+        moved: &[f64],
+    ) {
+        let places = std::mem::take(&mut self.solid_places[solid][kind][at]);
+        self.add_at(nodes, &places, tangent, moved);
+        self.solid_places[solid][kind][at] = places;
+    }
+
+    /// Adds a stiffness of translations at its places.
+    fn add_at(&mut self, nodes: &[u32], places: &[u32], tangent: &[f64], moved: &[f64]) {
+        self.matrix.add(&self.equations, nodes, 3, places, tangent);
+        let component = |i: usize| 6 * nodes[i / 3] as usize + i % 3;
+        let size = 3 * nodes.len();
+        for (column, entries) in tangent.chunks_exact(size).enumerate() {
+            let by = moved[component(column)];
+            if by == 0.0 {
+                continue;
+            }
+            for (row, entry) in entries.iter().enumerate() {
+                let equation = self.equations.number[component(row)];
                 if equation != NONE {
-                    self.coupling[equation as usize] += value;
+                    self.coupling[equation as usize] += entry * by;
                 }
             }
         }
@@ -463,11 +560,17 @@ impl System {
     pub(crate) fn prescribed(&self, from: f64, to: f64, increments: &mut [f64]) {
         increments.fill(0.0);
         for constraint in &self.model.constraints {
-            let Motion::Moved { by, curve } = &constraint.motion else { continue };
-            let change = curve.value(to) - curve.value(from);
-            for &node in &constraint.nodes {
+            let change = |index: usize, c: usize| match &constraint.motion {
+                Motion::Moved { by, curve } => by[c] * (curve.value(to) - curve.value(from)),
+                Motion::Displaced(motion) if c < 3 => {
+                    motion.displacement(index, to, 1.0)[c] - motion.displacement(index, from, 1.0)[c]
+                }
+                Motion::Fixed | Motion::Displaced(_) => 0.0,
+            };
+            let moving = !matches!(constraint.motion, Motion::Fixed);
+            for (index, &node) in constraint.nodes.iter().enumerate().filter(|_| moving) {
                 for c in (0..6).filter(|&c| constraint.components[c]) {
-                    increments[6 * node as usize + c] = by[c] * change;
+                    increments[6 * node as usize + c] = change(index, c);
                 }
             }
         }
@@ -488,6 +591,11 @@ impl System {
     }
 }
 
+/// The nodes of a face of a solid.
+fn corners(face: &Face) -> &[u32] {
+    if face[3] == NO_NODE { &face[..3] } else { face }
+}
+
 fn linear_error(error: LinearError) -> SolveError {
     match error {
         LinearError::NotFinite => SolveError::Impossible("the stiffness is not finite; use smaller steps"),
@@ -498,24 +606,39 @@ fn linear_error(error: LinearError) -> SolveError {
     }
 }
 
+/// The derivative of p ∫ N_a n dA of a face by the places of its nodes, column by column: what the pressure pushes against the
+/// outward normal. By differences, exact: the areas are of second order in each place.
+fn pressure_change(face: &Face, count: usize, state: &State, pressure: f64) -> Vec<f64> {
+    let size = 3 * count;
+    let mut tangent = vec![0.0; size * size];
+    let place = |node: u32| -> [f64; 3] { state.position[node as usize].into() };
+    let [first, second] = [face[0], face[2]].map(|node| state.position[node as usize]);
+    let h = 0.1 * (second - first).norm();
+    for (b, &moved) in face[..count].iter().enumerate() {
+        for k in 0..3 {
+            let areas = |by: f64| {
+                let shifted = |node: u32| {
+                    let mut at = place(node);
+                    at[k] += if node == moved { by } else { 0.0 };
+                    at
+                };
+                face_areas(face, shifted).collect::<Vec<_>>()
+            };
+            for (a, (ahead, behind)) in areas(h).into_iter().zip(areas(-h)).enumerate() {
+                for i in 0..3 {
+                    tangent[(3 * b + k) * size + 3 * a + i] =
+                        pressure * (ahead.1[i] - behind.1[i]) / (2.0 * h);
+                }
+            }
+        }
+    }
+    tangent
+}
+
 /// A third of the area times the normal on each corner, as six numbers a node [m²].
 fn flat_forces([a, b, c]: &[Vector3<f64>; 3]) -> Vector18 {
     let third = (b - a).cross(&(c - a)) / 6.0;
     Vector18::from_fn(|i, _| if i % 6 < 3 { third[i % 6] } else { 0.0 })
-}
-
-#[derive(Clone)]
-struct TetResult {
-    energy: f64,
-    force: Vector12,
-    tangent: Matrix12,
-    broken: Option<Broken>,
-}
-
-impl TetResult {
-    fn none() -> Self {
-        Self { energy: 0.0, force: Vector12::zeros(), tangent: Matrix12::zeros(), broken: None }
-    }
 }
 
 /// What is wanted of a facet's stiffness.

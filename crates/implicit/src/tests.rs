@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::law::{AnyLaw, Corotational};
+use pliant_mechanics::model::{Cells, Material as Elastic, Solid};
 
 use crate::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
 use crate::facet::Tangent;
@@ -625,13 +627,22 @@ pub(crate) fn bar(counts: [usize; 3], size: [f64; 3]) -> (Vec<Vector3<f64>>, Vec
     (points, cells)
 }
 
+/// Tets of the co-rotated linear law with the moduli of [`MATERIAL`].
+fn add_block(model: &mut Model, cells: &[[u32; 4]], density: f64) {
+    let Elasticity { young, poisson } = MATERIAL.elastic;
+    let law = AnyLaw::Corotational(Corotational::from_young(young, poisson));
+    let rest: Vec<[f64; 3]> = model.rest.iter().map(|&x| x.into()).collect();
+    let cells = Cells::tet4(cells.to_vec(), &rest);
+    model.add_solid("block", Solid::new(0, Elastic::elastic(law, density), cells)).unwrap();
+}
+
 /// A block pulled by a small stress lengthens by σ/E and thins by ν σ/E, exactly for linear tets; turned by a quarter with its supports it
 /// does the same.
 #[test]
 fn a_block_of_tets_is_stretched_as_by_hooke() {
     let (points, cells) = bar([3, 2, 2], [3.0, 2.0, 2.0]);
     let mut model = Model::new(points);
-    model.add_solid("block", &cells, MATERIAL).unwrap();
+    add_block(&mut model, &cells, MATERIAL.density);
     let on = |f: &dyn Fn(&Vector3<f64>) -> bool| {
         (0..model.rest.len() as u32).filter(|&n| f(&model.rest[n as usize])).collect::<Vec<u32>>()
     };
@@ -675,7 +686,7 @@ fn shells_and_tets_move_together() {
         .collect();
     let build = |skin: bool| {
         let mut model = Model::new(points.clone());
-        model.add_solid("bar", &cells, Material { density: 10.0, ..MATERIAL }).unwrap();
+        add_block(&mut model, &cells, 10.0);
         if skin {
             model.add_shell(&Shell::new("skin", top.clone(), 0.2, MATERIAL)).unwrap();
         }

@@ -111,6 +111,15 @@ impl Solid {
         &self.fibre[cell * families..(cell + 1) * families]
     }
 
+    /// Adds ρV/N [kg] of every cell to the masses of its nodes.
+    pub fn add_mass(&self, mass: &mut [f64]) {
+        for cell in 0..self.cells.len() {
+            let nodes = self.cells.nodes(cell);
+            let share = self.material.density * self.cells.volume(cell) / nodes.len() as f64;
+            nodes.iter().for_each(|&node| mass[node as usize] += share);
+        }
+    }
+
     /// The same solid with neighbouring cells one after another.
     fn in_order(self, rest: &[Vector<f64>]) -> Self {
         let centre = |cell: usize| {
@@ -646,13 +655,7 @@ impl Model {
         let needed = solid.material.law.families() * solid.cells.len();
         assert_eq!(solid.fibre.len(), needed, "every cell has a direction for each family of fibres");
         let solid = solid.in_order(&self.rest);
-        for cell in 0..solid.cells.len() {
-            let nodes = solid.cells.nodes(cell);
-            let share = solid.material.density * solid.cells.volume(cell) / nodes.len() as f64;
-            for &node in nodes {
-                self.mass[node as usize] += share;
-            }
-        }
+        solid.add_mass(&mut self.mass);
         self.solids.push(solid);
     }
 

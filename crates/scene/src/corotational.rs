@@ -1,10 +1,11 @@
-//! Shells and co-rotational solids as a participant.
+//! Shells, and solids whose equations are solved, as a participant.
 
 use std::collections::VecDeque;
 use std::fmt::Write;
 use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+use pliant_explicit::State;
 use pliant_gpu::Wanted;
 use pliant_implicit as corotational;
 use pliant_implicit::{
@@ -21,7 +22,7 @@ use crate::format::{
     IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName,
 };
 use crate::output::{FailureSummary, number};
-use crate::participant::{Instant, Kept, Participant};
+use crate::participant::{CellsNow, Instant, Kept, Participant, SolidCells};
 use crate::plan::Plan;
 use crate::solver::{Effort, LoadStepProgress};
 
@@ -34,7 +35,7 @@ const FIRM: f64 = 10.0;
 /// Iterations of Newton's method whose residuals are kept: the last ones.
 const ITERATIONS_KEPT: usize = 10_000;
 
-/// A run of shells and co-rotational solids.
+/// A run of shells, and of solids whose equations are solved.
 pub(crate) struct Corotated {
     /// Bodies, and the constraints whose reactions are asked for.
     model: Arc<pliant_mechanics::Model>,
@@ -66,6 +67,8 @@ pub(crate) struct Corotated {
     path: Path,
     grips: Vec<Grip>,
     springs: Vec<Spring>,
+    /// Displacements of the solids at the instant last evaluated; `None` without solids.
+    solids: Option<State<f64>>,
 }
 
 /// An iteration of Newton's method.
@@ -253,6 +256,7 @@ impl Corotated {
             path: Path::default(),
             grips: Vec::new(),
             springs: Vec::new(),
+            solids: (!built.model.solids.is_empty()).then(|| State::at_rest(&built.model)),
             model: Arc::clone(&built.model),
             part: Arc::clone(part),
         })
@@ -594,6 +598,10 @@ impl Instant for Corotated {
         self.energies
     }
 
+    fn cells(&self, steps: bool) -> Option<Box<dyn CellsNow + '_>> {
+        Some(Box::new(SolidCells::new(&self.model, self.solids.as_ref()?, steps)))
+    }
+
     fn shells(&self) -> Option<&corotational::State> {
         Some(&self.state)
     }
@@ -617,6 +625,13 @@ impl Participant for Corotated {
         found.map_err(|error| failure(&error, &self.model, &self.part, self.time))?;
         self.find_energies();
         self.find_reactions();
+        if let Some(solids) = &mut self.solids {
+            let rest = &self.part.model.rest;
+            for (own, (now, rest)) in solids.displacement.iter_mut().zip(self.state.position.iter().zip(rest))
+            {
+                *own = (now - rest).into();
+            }
+        }
         self.evaluated = true;
         Ok(())
     }

@@ -169,7 +169,7 @@ fn describe_load(built: &Built, load: &Load) -> String {
     }
 }
 
-/// What the cells of a shell or a co-rotational solid are.
+/// What the triangles of a shell are.
 fn write_corotational(page: &mut String, part: &Corotational, name: &str, built: &Built) -> fmt::Result {
     let body = built.bodies.iter().position(|body| body.name == name).unwrap_or(0);
     match &part.cells[body] {
@@ -188,7 +188,7 @@ fn write_corotational(page: &mut String, part: &Corotational, name: &str, built:
             )?;
             writeln!(page, "  smallest altitude {} m", number(least(Facet::altitude)))
         }
-        BodyCells::Tets(range) => writeln!(page, "  {} co-rotational tets", range.len()),
+        BodyCells::Solids => Ok(()),
     }
 }
 
@@ -212,6 +212,9 @@ fn describe_corotational_load(kind: &pliant_implicit::LoadKind) -> String {
         }
         LoadKind::Pressure { cells, pressure, .. } => {
             format!("{} Pa on {}", number(*pressure), counted(cells.len(), "triangle"))
+        }
+        LoadKind::FacePressure { faces, pressure } => {
+            format!("{} Pa on {}", number(*pressure), counted(faces.len(), "face"))
         }
         LoadKind::Carried { forces, .. } => {
             let sum = forces.iter().sum::<nalgebra::Vector3<f64>>();

@@ -50,12 +50,12 @@ pub(crate) trait Instant {
     /// Energies [J].
     fn energies(&self) -> Energies;
 
-    /// Finds the fields of cells of solids in large strain, where there are some; their stable steps, too, if these are wanted.
+    /// Finds the fields of cells of solids, where there are some; their stable steps, too, if these are wanted.
     fn cells(&self, _steps: bool) -> Option<Box<dyn CellsNow + '_>> {
         None
     }
 
-    /// The state of shells and co-rotational solids.
+    /// The state of shells, and of solids whose equations are solved.
     fn shells(&self) -> Option<&pliant_implicit::State> {
         None
     }
@@ -77,7 +77,7 @@ pub(crate) enum Kept {
     Single(State<f32>, Memory<f32>),
     /// In double precision.
     Double(State<f64>, Memory<f64>),
-    /// Of shells and co-rotational solids.
+    /// Of shells, and of solids whose equations are solved.
     Shells(Box<ShellSnapshot>),
 }
 
@@ -289,9 +289,7 @@ impl<R: Numeric> Instant for Solids<R> {
     }
 
     fn cells(&self, steps: bool) -> Option<Box<dyn CellsNow + '_>> {
-        let recovery = Recovery::new(&self.model, &self.state);
-        let displacement = &self.state.displacement;
-        Some(Box::new(SolidCells { recovery, model: &self.model, displacement, steps }))
+        Some(Box::new(SolidCells::new(&self.model, &self.state, steps)))
     }
 
     fn is_single(&self) -> bool {
@@ -299,12 +297,19 @@ impl<R: Numeric> Instant for Solids<R> {
     }
 }
 
-struct SolidCells<'a, R> {
+/// Fields of the cells of solids at a state.
+pub(crate) struct SolidCells<'a, R> {
     recovery: Recovery<'a, R>,
     model: &'a Model,
     displacement: &'a [[R; 3]],
     /// Whether stable steps are wanted, which cost far more than the rest.
     steps: bool,
+}
+
+impl<'a, R: Scalar> SolidCells<'a, R> {
+    pub(crate) fn new(model: &'a Model, state: &'a State<R>, steps: bool) -> Self {
+        Self { recovery: Recovery::new(model, state), model, displacement: &state.displacement, steps }
+    }
 }
 
 impl<R: Scalar> CellsNow for SolidCells<'_, R> {

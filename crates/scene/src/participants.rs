@@ -82,8 +82,13 @@ impl Scene {
             }
             groups.push((name.clone(), table.bodies.clone()));
         }
-        for (word, solid) in [("solids", true), ("shells", false)] {
-            let of_kind = self.bodies.iter().filter(|(_, body)| (body.model == BodyModel::Solid) == solid);
+        // Equations are solved for solids and shells together.
+        let kinds = match self.run.solver.solves_equations() {
+            true => vec![("bodies", vec![BodyModel::Solid, BodyModel::Shell])],
+            false => vec![("solids", vec![BodyModel::Solid]), ("shells", vec![BodyModel::Shell])],
+        };
+        for (word, kind) in kinds {
+            let of_kind = self.bodies.iter().filter(|(_, body)| kind.contains(&body.model));
             let free = of_kind.filter(|(name, _)| !groups.iter().any(|(_, bodies)| bodies.contains(name)));
             let bodies: Vec<String> = free.map(|(name, _)| name.clone()).collect();
             if bodies.is_empty() {
@@ -224,9 +229,8 @@ impl Scene {
             view.colour = None;
         }
         let on_part = |on: Option<&str>| on.is_none_or(owns);
-        let solid = models.contains(&BodyModel::Solid);
         Self {
-            run: self.run_of(table.map(|(_, table)| table), solid),
+            run: self.run_of(table.map(|(_, table)| table), &models),
             own: table.map(|(name, _)| name.clone()),
             is_part: true,
             participants: Vec::new(),
@@ -245,20 +249,21 @@ impl Scene {
     }
 
     /// The run of a participant: its own keys, and those of `[run]` that mean something for its bodies and its solver.
-    fn run_of(&self, table: Option<&ParticipantTable>, solid: bool) -> RunTable {
+    fn run_of(&self, table: Option<&ParticipantTable>, models: &[BodyModel]) -> RunTable {
         let solver = table.and_then(|table| table.solver).unwrap_or(self.run.solver);
+        let total_lagrangian = !models.contains(&BodyModel::Shell) && !solver.solves_equations();
         let mut run = self.run.clone();
         let usual = || RunTable::default();
         if solver != run.solver {
             run = RunTable { step: usual().step, load_steps: usual().load_steps, tolerance: None, ..run };
         }
-        if !solid || solver != SolverName::Explicit {
+        if !total_lagrangian || solver != SolverName::Explicit {
             (run.on_unstable, run.mass_scaling) = (None, None);
         }
-        if !solid {
+        if !total_lagrangian {
             run = RunTable { precision: None, device: DeviceName::Cpu, adapter: None, design: None, ..run };
         }
-        if solid || !matches!(solver, SolverName::Implicit | SolverName::Static) {
+        if !solver.solves_equations() {
             run =
                 RunTable { iterations: None, integrator: None, control: None, linear: usual().linear, ..run };
         }
@@ -285,6 +290,12 @@ impl Scene {
             }
         }
         vec!["run", key]
+    }
+
+    /// Whether its bodies go with the implicit solvers' model: shells, and solids whose equations are solved.
+    pub(crate) fn is_implicit(&self) -> bool {
+        self.run.solver.solves_equations()
+            || self.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell)
     }
 
     /// Whether a body or a surface of it has a name.

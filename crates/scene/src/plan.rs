@@ -28,7 +28,7 @@ pub struct Plan {
     pub ends: Option<Vec<f64>>,
     /// Steps to take.
     pub steps: u64,
-    /// What limits explicit steps of solids; `None` of shells and co-rotational solids.
+    /// What limits explicit steps of solids; `None` of shells, and of solids whose equations are solved.
     pub limits: Option<Limits>,
     /// A remark about a requested step.
     pub note: Option<String>,
@@ -115,7 +115,7 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
     Ok(plan)
 }
 
-/// Compares an explicit step of shells and co-rotational solids with the critical one.
+/// Compares an explicit step of shells with the critical one.
 fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<String>, Box<Diagnostic>> {
     let StepChoice::Seconds(step) = scene.run.step else { return Ok(None) };
     let stable = Explicit::stable_step(&part.model);

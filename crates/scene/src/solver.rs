@@ -198,7 +198,7 @@ pub(crate) fn on_processor<R: Scalar>(
         }
         // Refused when the model was built.
         SolverName::Implicit | SolverName::Static => {
-            return Err(FailureSummary::input(&"this solver is for shells and co-rotational solids"));
+            return Err(FailureSummary::input(&"this solver has a participant of its own"));
         }
         SolverName::QuasiStatic => {
             let settings = match run.tolerance {

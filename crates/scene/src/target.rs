@@ -100,7 +100,7 @@ impl Target {
 fn processor_only(run: &RunTable, corotational: bool) -> Option<(&'static str, &'static str, &'static str)> {
     if corotational {
         let help = "set `device = \"cpu\"`, or leave it out";
-        return Some(("device", "the model of shells and co-rotational solids", help));
+        return Some(("device", "the model of shells, `implicit` and `static`", help));
     }
     if run.solver == SolverName::QuasiStatic {
         let help = "set `device = \"cpu\"`, or `solver = \"explicit\"`";

@@ -1,5 +1,5 @@
-//! Grips on shells: a strip that is held at one end and pulled at the other, with each solver of shells. The hand's force is that of its
-//! spring, and the clamp holds against it and the weight.
+//! Grips on a shell and a solid: a strip that is held at one end and pulled at the other, with each solver of shells, and a bar with the
+//! implicit ones. The hand's force is that of its spring, and the clamp holds against it and the weight.
 
 use std::sync::Arc;
 
@@ -17,11 +17,9 @@ type = "neo-hookean"
 young-modulus = 1e6
 poisson-ratio = 0.4
 [body.strip]
-model = "shell"
-mesh = { plate = { size = [0.1, 0.02] }, edge = 0.01 }
+BODY
 law = "wall"
 density = 1000
-thickness = 0.002
 damping = 20
 [constraint.end]
 type = "fix"
@@ -29,11 +27,16 @@ body = "strip"
 nodes = { set = "x-min" }
 "#;
 
-/// Its weight [N].
+const SHELL: &str =
+    "model = 'shell'\nmesh = { plate = { size = [0.1, 0.02] }, edge = 0.01 }\nthickness = 0.002";
+const SOLID: &str = "mesh = { block = { size = [0.1, 0.02, 0.002], cells = [10, 2, 1] }, as = 'hexes' }\nelement = 'hex8-full'";
+
+/// The weight of both [N].
 const WEIGHT: f64 = 9.81 * 1000.0 * 0.1 * 0.02 * 0.002;
 
-fn world(solver: &str) -> Arc<World> {
-    let source = Source::parse("strip.toml", format!("{STRIP}[run]\n{solver}\n")).unwrap();
+fn world(body: &str, solver: &str) -> Arc<World> {
+    let text = STRIP.replace("BODY", body) + "[run]\n" + solver;
+    let source = Source::parse("strip.toml", text).unwrap();
     let scene = Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
     Arc::new(World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain())))
 }
@@ -52,10 +55,15 @@ fn lifted(world: &World, live: &dyn Live, stiffness: f64, by: f64) -> Grip {
 
 #[test]
 fn the_clamp_holds_against_hand_and_weight() {
-    for (solver, steps) in
-        [("solver = 'implicit'\nstep = 0.01", 400), ("solver = 'static'\nload-steps = 10", 10), ("", 40_000)]
-    {
-        let world = world(solver);
+    let (implicit, still) = ("solver = 'implicit'\nstep = 0.01", "solver = 'static'\nload-steps = 10");
+    for (body, solver, steps) in [
+        (SHELL, implicit, 400),
+        (SHELL, still, 10),
+        (SHELL, "", 40_000),
+        (SOLID, implicit, 400),
+        (SOLID, still, 10),
+    ] {
+        let world = world(body, solver);
         let mut live = live(&world).unwrap();
         let grip = lifted(&world, live.as_ref(), 5.0, 0.01);
         assert!(live.hold(std::slice::from_ref(&grip)), "{solver}");
@@ -78,7 +86,7 @@ fn the_clamp_holds_against_hand_and_weight() {
 
 #[test]
 fn what_is_let_go_of_comes_back() {
-    let world = world("solver = 'implicit'\nstep = 0.01");
+    let world = world(SHELL, "solver = 'implicit'\nstep = 0.01");
     let settle = |live: &mut dyn Live| {
         (0..400).for_each(|_| assert_eq!(live.advance(1).unwrap(), 1));
         live.mesh().unwrap().point_data["displacement"].values.clone()

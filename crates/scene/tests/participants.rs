@@ -186,20 +186,13 @@ fn mistakes_of_participants_are_underlined() {
     for (text, says) in [
         (table("['strop']", ""), "there is no body `strop` (help: did you mean `strip`?)"),
         (table("[]", ""), "participant `walls` has no body"),
-        (table("['strip', 'cube']", ""), "they have no solver in common"),
+        (table("['strip', 'cube']", ""), "they do not go together with the solver `explicit`"),
         (table("['strip', 'strip']", ""), "`strip` is named twice"),
         (
             table("['strip']", "[participant.other]\nbodies = ['strip']\n"),
             "`strip` goes with participant `walls` already",
         ),
-        (
-            table("['cube']", "solver = 'implicit'\n"),
-            "the solver `implicit` is not for bodies of model `solid`",
-        ),
-        (
-            table("['strip']", "mass-scaling = { target-step = 1 }\n"),
-            "mass is not scaled for bodies of model `shell`",
-        ),
+        (table("['strip']", "mass-scaling = { target-step = 1 }\n"), "mass is not scaled for shells"),
         (
             format!("{}[load.p]\ntype = 'force'\non = 'strep'\nnodes = 'all'\ntotal = [0, 0, 1]\n", both("")),
             "there is no body or surface `strep` (help: did you mean `strip`?)",

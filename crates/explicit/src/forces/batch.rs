@@ -3,7 +3,7 @@
 //! law costs one branch per batch.
 
 use pliant_mechanics::Number;
-use pliant_mechanics::law::{AnyLaw, Deformation, Law, Split, with_law};
+use pliant_mechanics::law::{AnyLaw, Deformation, Law, MOST_FAMILIES, Split, with_law};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot};
 
 use super::Findings;
@@ -15,9 +15,6 @@ use crate::lanes::{
 
 /// Packs of points in a batch: few enough for the first cache.
 pub(super) const PACKS: usize = 4;
-
-/// The most families of fibres of any law.
-const FAMILIES: usize = 2;
 
 /// Displacement gradients of up to [`PACKS`] packs of points, and what the law finds there.
 pub(super) struct Batch<R> {
@@ -143,7 +140,7 @@ impl<R: Scalar, T: Law> Work<R> for Stresses<'_, R, T> {
             for at in (0..PACK).step_by(L::WIDTH) {
                 let h = load_tensor(&batch.gradient[pack], at);
                 let deformation = Deformation::<L>::from_displacement_gradient(&h);
-                let mut directions = [[L::ZERO; 3]; FAMILIES];
+                let mut directions = [[L::ZERO; 3]; MOST_FAMILIES];
                 for (direction, fibre) in directions.iter_mut().zip(own) {
                     *direction = load_vector(fibre, at);
                 }
@@ -173,7 +170,7 @@ pub(super) fn pressures<R: Scalar, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack
         }
     }
     let any = [R::ONE, R::ZERO, R::ZERO].map(|a| Pack([a; PACK]));
-    batch.evaluate::<L>(law, values.len(), PACKS, &[any; FAMILIES]);
+    batch.evaluate::<L>(law, values.len(), PACKS, &[any; MOST_FAMILIES]);
     for (pack, pressure) in values.iter_mut().enumerate() {
         for at in (0..PACK).step_by(L::WIDTH) {
             // S = J U' C⁻¹ with C⁻¹ = c⁻² I and J = c³.
@@ -182,15 +179,6 @@ pub(super) fn pressures<R: Scalar, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack
             (stress / c).store(pressure, at);
         }
     }
-}
-
-/// U(J) [J/m³] at one J − 1, of a law whose volumetric energy is one of J alone.
-pub(crate) fn volumetric_energy(law: &AnyLaw, volume_change: f64) -> f64 {
-    let c = (1.0 + volume_change).cbrt();
-    let (stretch, o) = (volume_change / (c * c + c + 1.0), 0.0);
-    let dilation = Tensor([[stretch, o, o], [o, stretch, o], [o, o, stretch]]);
-    let any = [[1.0, 0.0, 0.0]; FAMILIES];
-    law.energy(&Deformation::from_displacement_gradient(&dilation), &any[..law.families()]).volumetric
 }
 
 /// U'(J) [Pa] at one J − 1.

@@ -21,7 +21,7 @@ mod plain;
 mod tests;
 
 use averaged::AveragedTets;
-pub(crate) use batch::{pressure, volumetric_energy};
+pub(crate) use batch::pressure;
 pub(crate) use blocks::BLOCK;
 use std::ops::Range;
 

@@ -79,6 +79,51 @@ fn stress_is_the_derivative_of_energy() {
     }
 }
 
+/// The derivative of P along any δF is F D:δE + δF S.
+#[test]
+fn the_tangent_is_the_derivative_of_the_stress() {
+    let step = 1e-5;
+    for law in every_law() {
+        for h in GRADIENTS.map(Tensor) {
+            let tangent =
+                law.tangent(&h, &FIBRES[..law.families()], |stress| stress.isochoric + stress.volumetric);
+            let size = tangent.iter().flatten().fold(1.0_f64, |a, b| a.max(b.abs()));
+            let f = Deformation::from_displacement_gradient(&h).gradient;
+            let along = Tensor([[0.3, -0.5, 0.2], [0.1, 0.4, -0.6], [-0.2, 0.7, 0.5]]);
+            let moved = |by: f64| total_stress(&law, &h.plus_scaled(&along, by));
+            let (ahead, behind) = (moved(step), moved(-step));
+            // δE = sym Fᵀ δF, with engineering shears.
+            let product = [0, 1, 2].map(|i| f.transpose().apply(along.transpose().0[i]));
+            let strain = [
+                product[0][0],
+                product[1][1],
+                product[2][2],
+                product[0][1] + product[1][0],
+                product[1][2] + product[2][1],
+                product[0][2] + product[2][0],
+            ];
+            for (p, row) in tangent.iter().enumerate() {
+                let expected: f64 = row.iter().zip(strain).map(|(d, e)| d * e).sum();
+                let found = (ahead.0[p] - behind.0[p]) / (2.0 * step);
+                assert!((found - expected).abs() < 1e-8 * size, "{law:?}: {found} for {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn pressures_of_the_volume_are_the_derivatives_of_its_energy() {
+    let step = 1e-5;
+    for law in every_law().into_iter().filter(AnyLaw::has_volumetric_energy) {
+        for change in [-0.3, 0.0, 0.2] {
+            let [pressure, stiffness] = law.volume_pressures(change);
+            let slope = |f: &dyn Fn(f64) -> f64| (f(change + step) - f(change - step)) / (2.0 * step);
+            assert!((slope(&|x| law.volume_energy(x)) - pressure).abs() < 1e-8, "{law:?}");
+            assert!((slope(&|x| law.volume_pressures(x)[0]) - stiffness).abs() < 1e-8, "{law:?}");
+        }
+    }
+}
+
 #[test]
 fn rotation_changes_neither_energy_nor_stress() {
     for law in every_law() {

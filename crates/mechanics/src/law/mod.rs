@@ -8,6 +8,7 @@
 
 mod arruda_boyce;
 mod check;
+mod corotational;
 mod coupled_neo_hookean;
 mod deformation;
 mod demiray;
@@ -25,6 +26,7 @@ mod principal;
 mod shader;
 mod split;
 mod st_venant_kirchhoff;
+mod tangent;
 mod transversely_isotropic;
 mod veronda_westmann;
 mod volumetric;
@@ -36,6 +38,7 @@ mod battery;
 pub mod samples;
 
 pub use arruda_boyce::ArrudaBoyce;
+pub use corotational::Corotational;
 pub use coupled_neo_hookean::CoupledNeoHookean;
 pub use deformation::Deformation;
 pub use demiray::Demiray;
@@ -61,7 +64,10 @@ use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
 
 use crate::Number;
-use crate::tensor::{Symmetric, Vector};
+use crate::tensor::{Symmetric, Tensor, Vector};
+
+/// The most families of fibres that a law has.
+pub const MOST_FAMILIES: usize = 2;
 
 /// A quantity split into the part that changes shape and the part that changes volume.
 #[derive(Clone, Copy, Debug)]
@@ -207,6 +213,8 @@ registry! {
     "logarithmic-neo-hookean" => LogarithmicNeoHookean,
     /// Hooke's law in the Green–Lagrange strain.
     "st-venant-kirchhoff" => StVenantKirchhoff,
+    /// Hooke's law in a frame that turns with the material.
+    "corotational" => Corotational,
     /// Linear in both invariants.
     "mooney-rivlin" => MooneyRivlin,
     /// Quadratic in both invariants.
@@ -272,4 +280,31 @@ impl AnyLaw {
     pub fn longitudinal_modulus(&self) -> f64 {
         with_law!(self, law => law.longitudinal_modulus())
     }
+
+    /// U(J) [J/m³] at a J − 1, of a law with an energy of the volume alone ([`has_volumetric_energy`](Self::has_volumetric_energy)).
+    pub fn volume_energy(&self, change: f64) -> f64 {
+        let any = [[1.0, 0.0, 0.0]; MOST_FAMILIES];
+        self.energy(&dilation(change), &any[..self.families()]).volumetric
+    }
+
+    /// U′(J) and U″(J) [Pa] at a J − 1 of such a law; U″ is the central difference of U′, right to 1e-9.
+    pub fn volume_pressures(&self, change: f64) -> [f64; 2] {
+        const DIFFERENCE: f64 = 1e-5;
+        let any = [[1.0, 0.0, 0.0]; MOST_FAMILIES];
+        // S = J U′ C⁻¹.
+        let pressure = |change: f64| {
+            let d = dilation(change);
+            let stress = self.stress(&d, &any[..self.families()]).volumetric;
+            stress.0[0] / (d.volume_ratio * d.inverse_cauchy_green.0[0])
+        };
+        let difference = pressure(change + DIFFERENCE) - pressure(change - DIFFERENCE);
+        [pressure(change), difference / (2.0 * DIFFERENCE)]
+    }
+}
+
+/// The same stretch in all directions that has a J − 1.
+fn dilation(change: f64) -> Deformation<f64> {
+    let c = (1.0 + change).cbrt();
+    let (stretch, o) = (change / (c * c + c + 1.0), 0.0);
+    Deformation::from_displacement_gradient(&Tensor([[stretch, o, o], [o, stretch, o], [o, o, stretch]]))
 }

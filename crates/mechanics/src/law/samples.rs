@@ -24,6 +24,7 @@ pub fn every_law() -> Vec<AnyLaw> {
         ("coupled-neo-hookean", with_moduli(json!({}))),
         ("logarithmic-neo-hookean", with_moduli(json!({}))),
         ("st-venant-kirchhoff", with_moduli(json!({}))),
+        ("corotational", with_moduli(json!({}))),
         ("mooney-rivlin", with_bulk(json!({ "c10": 0.3, "c01": 0.15 }))),
         ("polynomial", with_bulk(json!({ "c10": 0.3, "c01": 0.1, "c20": 0.05, "c11": 0.03, "c02": 0.02 }))),
         ("yeoh", with_bulk(json!({ "c1": 0.3, "c2": 0.1, "c3": 0.05 }))),

@@ -90,15 +90,16 @@ impl Builder<'_> {
         }
         self.check_labels(name, ["density", "1000"], &table.density, mesh);
         self.check_labels(name, ["hourglass", "0.2"], &table.hourglass, mesh);
-        if table.model != BodyModel::Solid {
+        if table.model == BodyModel::Shell {
             if table.fraction.is_some() {
-                let message = format!("`{name}` is a {}, whose cells are all full", table.model.word());
+                let message = format!("`{name}` is a shell, whose cells are all full");
                 let help = "leave it out, or set `model = \"solid\"`";
                 self.error(&["body", name, "fraction"], message, "has no effect", help);
             }
-            self.add_corotational(draft, first);
+            self.add_to_implicit(draft, |builder| builder.add_shell(draft, first));
             return;
         }
+        let before = self.model.solids.len();
         for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
             if !self.check_element(name, table, block.kind) {
                 return;
@@ -106,6 +107,9 @@ impl Builder<'_> {
             for part in parts(table, block) {
                 self.add_solid(draft, body, block, part);
             }
+        }
+        if self.scene.is_implicit() {
+            self.add_to_implicit(draft, |builder| builder.add_solids(name, before));
         }
     }
 

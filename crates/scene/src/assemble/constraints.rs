@@ -29,8 +29,8 @@ impl Builder<'_> {
             let components = self.components(axes.as_deref(), body, turns, &path);
             let nodes = body.and_then(|body| self.body_nodes(body, selection, &[path[0], path[1], "nodes"]));
             let motion = match table {
-                ConstraintTable::Move(moved) if self.corotational.is_some() => {
-                    self.corotational_motion(name, moved, body.zip(nodes.as_deref()))
+                ConstraintTable::Move(moved) if body.is_some_and(|body| self.shell_cells(body).is_some()) => {
+                    self.motion_of_shell(name, moved, body.zip(nodes.as_deref()))
                 }
                 ConstraintTable::Move(moved) => self.motion(moved, body.zip(nodes.as_deref()), &path),
                 _ => Some(Motion::Fixed),

@@ -332,10 +332,6 @@ impl Builder<'_> {
                      `stress-bottom`, `membrane-force`, `bending-moment`, `membrane-energy`, `bending-energy`, \
                      `drilling-energy`, `thickness`, `current-thickness`, `surface-strain`, `element-step`"
                 }
-                BodyModel::Corotational => {
-                    "fields of a co-rotational solid: `displacement`, `velocity`, `cauchy-stress`, `von-mises`, `pressure`, \
-                     `J`, `energy-density`, `element-step`"
-                }
                 BodyModel::Solid => "leave it out: it is a field of shells",
             };
             let given = self.source().node(&[path, &[index_text.as_str()]].concat()).is_some();

@@ -36,7 +36,7 @@ pub use meshes::SizeDoubt;
 pub struct Built {
     /// The model.
     pub model: Arc<Model>,
-    /// Shells and co-rotational solids; the model then holds their nodes, but no cells and no loads.
+    /// The model of the implicit solvers: shells, and solids whose equations are solved. Loads are then there.
     pub corotational: Option<Arc<Corotational>>,
     /// The bodies' meshes, in the order of the model's bodies.
     pub bodies: Vec<BuiltBody>,

@@ -14,7 +14,8 @@ use super::NodeVectors;
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyTable {
-    /// How it is modelled. Solids and other bodies of a scene are different participants (`[participant.NAME]`).
+    /// How it is modelled. With the solvers `explicit` and `quasi-static` solids and shells are different participants
+    /// (`[participant.NAME]`).
     #[serde(default)]
     pub model: BodyModel,
     /// Its mesh, from a file, a built-in shape, or a segmented image. A shell's mesh is of triangles (quads are cut into
@@ -24,9 +25,9 @@ pub struct BodyTable {
     /// `tet4-anp` to `tet4`.
     #[serde(default)]
     pub element: Option<Element>,
-    /// The name of its law, or a law for each cell label, by number or by the name of the label: `{ 1 = "soft", tumour = "stiff" }`. Shells and co-rotational solids
+    /// The name of its law, or a law for each cell label, by number or by the name of the label: `{ 1 = "soft", tumour = "stiff" }`. Shells
     /// take Young's modulus and Poisson's ratio of an isotropic law at small strain; a shell whose `layers` all have their own elasticity
-    /// needs none.
+    /// needs none. With the solvers `implicit` and `static` a law of a solid must not relax.
     #[serde(default = "no_law")]
     pub law: ByLabel<String>,
     /// Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure average it apart on parts of
@@ -60,11 +61,12 @@ pub struct BodyTable {
     /// stiffness and mass are so much smaller, but never less than a tenth. If not given, `fraction` of `immersed-hexes`.
     #[serde(default)]
     pub fraction: Option<String>,
-    /// Mass-proportional damping [1/s]. All shells and co-rotational solids of a participant have the same.
+    /// Mass-proportional damping [1/s]. All shells of a participant have the same, and all bodies with the solvers `implicit` and
+    /// `static`.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub damping: f64,
-    /// Stiffness-proportional damping [s] of shells and co-rotational solids with the solver `implicit`; the same for all.
+    /// Stiffness-proportional damping [s] with the solver `implicit`; the same for all bodies of a participant.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub stiffness_damping: f64,
@@ -75,8 +77,8 @@ pub struct BodyTable {
     /// Velocity [m/s] at the start, of all nodes that no constraint holds or moves; not for quasi-static runs.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
-    /// Displacement [m] of each node from rest at the start, of shells and co-rotational solids; the nodes of shells turn with the
-    /// triangles round them. The mesh is the shape at rest.
+    /// Displacement [m] of each node from rest at the start, of shells, and of solids with the solvers `implicit` and `static`; the
+    /// nodes of shells turn with the triangles round them. The mesh is the shape at rest.
     #[serde(default)]
     pub initial_displacement: Option<NodeVectors>,
     /// Fibre direction at rest; overrides that of the law. Of a shell, the direction that the angles of its `layers` count from.
@@ -133,9 +135,6 @@ pub enum BodyModel {
     /// A solid in large strain, by any law: total Lagrangian.
     #[default]
     Solid,
-    /// A solid of tets in large rotation and small strain, stiffly elastic or in long steps: with the solvers `implicit` and
-    /// `static`.
-    Corotational,
     /// A thin wall of triangles with membrane, bending and twist in large rotation and small strain.
     Shell,
 }
@@ -145,7 +144,6 @@ impl BodyModel {
     pub fn word(self) -> &'static str {
         match self {
             Self::Solid => "solid",
-            Self::Corotational => "corotational",
             Self::Shell => "shell",
         }
     }

@@ -1,4 +1,4 @@
-//! How the solvers of shells and co-rotational solids work.
+//! How the solvers `implicit` and `static` solve their equations.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

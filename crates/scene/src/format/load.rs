@@ -72,7 +72,7 @@ pub struct FixTable {
     pub components: Option<Vec<Axis>>,
 }
 
-/// Springs without rest length that pull nodes of shells and co-rotational solids to points.
+/// Springs without rest length that pull nodes to points: of shells, and of solids with the solvers `implicit` and `static`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SpringTable {

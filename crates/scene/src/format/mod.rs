@@ -183,9 +183,9 @@ pub enum SolverName {
     Explicit,
     /// Equilibria without inertia, by dynamic relaxation.
     QuasiStatic,
-    /// Dynamics with inertia in long steps, by backward Euler: for shells and co-rotational solids.
+    /// Dynamics with inertia in long steps, by backward Euler: shells and solids whose law does not relax.
     Implicit,
-    /// Equilibria without inertia, by Newton's method: for shells and co-rotational solids.
+    /// Equilibria without inertia, by Newton's method: shells and solids whose law does not relax.
     Static,
 }
 
@@ -198,6 +198,11 @@ impl SolverName {
             Self::Implicit => "implicit",
             Self::Static => "static",
         }
+    }
+
+    /// Whether it solves equations by Newton's method, for solids and shells together.
+    pub fn solves_equations(self) -> bool {
+        matches!(self, Self::Implicit | Self::Static)
     }
 
     /// Whether it knows no inertia.

@@ -48,7 +48,7 @@ pub enum FieldName {
     /// Strain energy of the instantaneous elastic law per volume at rest [J/m³], with the element's averages of volume: times the
     /// volumes it sums to the stored energy.
     EnergyDensity,
-    /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells and co-rotational solids that
+    /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells that
     /// at rest, which turns with them. The smallest one bounds the step of the whole.
     ElementStep,
     /// Force per length in the wall of a shell [N/m], as a tensor in space.

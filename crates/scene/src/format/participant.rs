@@ -10,13 +10,13 @@ use super::{
     SolverName, StepChoice,
 };
 
-/// Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: the solids together, and the shells
-/// and co-rotational solids together. Participants advance at their own steps and meet at common instants, where outputs see them.
+/// Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: with the solvers `implicit` and
+/// `static` all together, else the solids together and the shells together. Participants advance at their own steps and meet at common instants, where outputs see them.
 /// A key that is left out is as in `[run]`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ParticipantTable {
-    /// The bodies, all of model `solid`, or none of them.
+    /// The bodies: solids or shells, with the solvers `implicit` and `static` also both.
     pub bodies: Vec<String>,
     /// As in `[run]`.
     #[serde(default)]

@@ -39,7 +39,7 @@ pub struct ViewTable {
     #[serde(default)]
     pub on: Option<String>,
     /// What the colours tell; `label`: the labels of the elements, each in a colour of its own; `none`: the colour of tissue. If not given, `von-mises`, and
-    /// `displacement` on surfaces that shells or co-rotational solids carry.
+    /// `displacement` on surfaces that shells carry.
     #[serde(default)]
     pub colour: Option<ColourBy>,
     /// Labels whose elements are left out, so that what lies inside is seen: numbers, names or ranges, as `[2, "tumour", "5-8"]`.

@@ -97,8 +97,8 @@ struct Own {
     moments: Option<([f64; 3], Vec<Held>)>,
     energy: bool,
     probes: Vec<Probe>,
-    /// Fields of the cells of shells and co-rotational solids, if a probe wants some.
-    corotated: fields::Corotated,
+    /// Fields of the triangles of shells, if a probe wants some.
+    shells: fields::OfShells,
 }
 
 /// A point that is followed: the nodes that carry it, and the cell it lies in.
@@ -112,8 +112,8 @@ struct Probe {
 enum Place {
     /// A cell of a solid.
     Solid(usize, usize),
-    /// A cell of a shell or a co-rotational solid.
-    Corotated(fields::Cell),
+    /// A triangle of a shell.
+    Facet(u32),
     /// A point of a surface that a shell carries.
     Carried(Carried, Vector3),
 }
@@ -166,8 +166,8 @@ impl Own {
             }
         }
         let probes = probes().map(|(_, probe)| Probe::new(built, probe)).collect();
-        let corotated = fields::Corotated::default();
-        Self { reactions, moments, energy: table.energy, probes, corotated }
+        let shells = fields::OfShells::default();
+        Self { reactions, moments, energy: table.energy, probes, shells }
     }
 
     /// Adds the sample of an instant to a row.
@@ -201,10 +201,10 @@ impl Own {
         if let (true, Some(part), Some(state)) =
             (cells_wanted, &frame.built().corotational, frame.now.shells())
         {
-            self.corotated.fill(&part.model, state, &of_cells);
+            self.shells.fill(&part.model, state, &of_cells);
         }
         for probe in &self.probes {
-            probe.read(frame, cells.as_deref(), &self.corotated, row);
+            probe.read(frame, cells.as_deref(), &self.shells, row);
         }
     }
 }
@@ -408,10 +408,8 @@ impl Probe {
             };
             let weights =
                 found.nodes.iter().zip(found.weights).map(|(&node, weight)| (first + node, weight)).collect();
-            let cell = fields::Cell::Facet(
-                range.start + built.bodies[body].boundary.faces[found.face as usize].parent.index,
-            );
-            return Self { weights, cell: Some(Place::Corotated(cell)), fields };
+            let facet = range.start + built.bodies[body].boundary.faces[found.face as usize].parent.index;
+            return Self { weights, cell: Some(Place::Facet(facet)), fields };
         }
         let Some(location) = Locator::new(mesh).locate(point) else {
             return Self { weights: Vec::new(), cell: None, fields };
@@ -424,12 +422,6 @@ impl Probe {
             let cell = solid.original.iter().position(|&original| fits && original == location.cell)?;
             Some(Place::Solid(index, cell))
         });
-        let cell = match cells {
-            Some(BodyCells::Tets(range)) => {
-                Some(Place::Corotated(fields::Cell::Tet(range.start + location.cell)))
-            }
-            _ => cell,
-        };
         Self { weights, cell, fields }
     }
 
@@ -437,12 +429,12 @@ impl Probe {
         &self,
         frame: &Frame<'_>,
         cells: Option<&dyn CellsNow>,
-        corotated: &fields::Corotated,
+        shells: &fields::OfShells,
         row: &mut Vec<f64>,
     ) {
         let recovered = cells.zip(self.cell.as_ref()).and_then(|(cells, place)| match *place {
             Place::Solid(solid, cell) => Some(cells.at(solid, cell)),
-            Place::Corotated(_) | Place::Carried(..) => None,
+            Place::Facet(_) | Place::Carried(..) => None,
         });
         for &field in &self.fields {
             let mut value = [0.0; 9];
@@ -458,7 +450,7 @@ impl Probe {
             } else {
                 value = match (&recovered, &self.cell, &frame.built().corotational) {
                     (Some(cell), ..) => fields::of_cell(cell, field),
-                    (_, Some(Place::Corotated(cell)), Some(part)) => corotated.of(&part.model, *cell, field),
+                    (_, Some(Place::Facet(facet)), Some(part)) => shells.of(&part.model, *facet, field),
                     _ => [f64::NAN; 9],
                 };
             }

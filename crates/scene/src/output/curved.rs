@@ -12,7 +12,7 @@ pub(super) struct Curved {
     surface: CurvedSurface,
     picture: Picture,
     found: PictureFields,
-    cells: fields::Corotated,
+    cells: fields::OfShells,
     /// Points of the picture that are shown.
     points: Vec<u32>,
     /// The facet of each triangle that is shown.
@@ -63,7 +63,7 @@ impl Curved {
             surface,
             picture,
             found: PictureFields::default(),
-            cells: fields::Corotated::default(),
+            cells: fields::OfShells::default(),
             points,
             facets,
         };
@@ -103,9 +103,8 @@ impl Curved {
                 }),
                 _ => {
                     let components = field.components();
-                    let value = |&facet: &u32| {
-                        self.cells.of(model, fields::Cell::Facet(facet), field).into_iter().take(components)
-                    };
+                    let value =
+                        |&facet: &u32| self.cells.of(model, facet, field).into_iter().take(components);
                     let values = self.facets.iter().flat_map(value).collect();
                     mesh.blocks[0].data.insert(field.name().into(), DataArray { components, values });
                     continue;

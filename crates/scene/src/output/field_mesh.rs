@@ -3,12 +3,11 @@
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use rayon::prelude::*;
 
-use super::fields::Cell;
 use super::merged::merged;
 use super::{Frame, fields};
 use crate::assemble::{BodyCells, Built, Corotational};
-use crate::format::{At, FieldName, VtuTable};
-use crate::world::{Part, World};
+use crate::format::{At, BodyModel, FieldName, VtuTable};
+use crate::world::World;
 
 /// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of any participants.
 pub(crate) struct FieldMesh {
@@ -23,8 +22,14 @@ impl FieldMesh {
     pub fn new(world: &World, table: &VtuTable) -> Self {
         let on = table.on.as_deref();
         let shown = world.participants.iter().enumerate().filter(|(_, part)| part.shows(on));
-        let own = |part: &Part| Own::new(&part.built, on, &part.fields(&table.data), table.at, table.curved);
-        let mut mesh = Self { parts: shown.map(|(index, part)| (index, own(part))).collect(), merged: None };
+        let mut parts = Vec::new();
+        let mut first_body = 0;
+        for (index, part) in shown {
+            let all = Own::all(&part.built, on, &part.fields(&table.data), table.at, table.curved);
+            parts.extend(all.into_iter().map(|own| (index, Own { first_body, ..own })));
+            first_body += part.built.bodies.len();
+        }
+        let mut mesh = Self { parts, merged: None };
         mesh.merge();
         mesh
     }
@@ -56,15 +61,17 @@ impl FieldMesh {
 
     fn merge(&mut self) {
         if self.parts.len() > 1 {
-            let meshes: Vec<&Mesh> = self.parts.iter().map(|(_, own)| &own.mesh).collect();
+            let meshes: Vec<_> = self.parts.iter().map(|(_, own)| (&own.mesh, own.first_body)).collect();
             self.merged = Some(merged(&meshes));
         }
     }
 }
 
-/// That of one participant.
+/// That of the solids or the shells of one participant.
 struct Own {
     mesh: Mesh,
+    /// Bodies of the participants before it.
+    first_body: usize,
     fields: Vec<FieldName>,
     at: At,
     content: Content,
@@ -76,31 +83,52 @@ enum Content {
     Surface(usize),
     /// Bodies: the model's node of each point, and (solid, cell) of each cell of each block.
     Bodies { nodes: Vec<u32>, cells: Vec<Vec<(u32, u32)>> },
-    /// Shells and co-rotational solids: the model's node of each point, and the cells of each block.
-    Corotational { nodes: Vec<u32>, cells: Vec<Vec<Cell>>, fields: Box<fields::Corotated> },
+    /// Shells: the model's node of each point, and the facet of each cell.
+    Shells { nodes: Vec<u32>, facets: Vec<u32>, fields: Box<fields::OfShells> },
     /// The curved surface of shells.
     Curved(Box<super::curved::Curved>),
 }
 
 impl Own {
-    /// Of a body or surface by name, or of all bodies; with `curved`, of the curved surface of shells.
-    fn new(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Self {
+    /// Of a body or surface by name, or of all bodies, solids before shells; with `curved`, of the curved surface of shells.
+    fn all(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Vec<Self> {
+        let own = |(mesh, content), fields| Self::new(built, on, mesh, content, fields, at);
         let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
-        let (mesh, content) = match surface {
-            Some(index) => (bare(&built.surfaces[index]), Content::Surface(index)),
-            None => match (&built.corotational, curved) {
-                (None, _) => merged_bodies(built, on),
-                (Some(part), None) => merged_corotational(built, part, on),
-                (Some(part), Some(parts)) => {
+        if let Some(index) = surface {
+            return vec![own((bare(&built.surfaces[index]), Content::Surface(index)), fields.to_vec())];
+        }
+        let of = |model| fields.iter().copied().filter(|field| field.is_of(model)).collect();
+        let mut all = Vec::new();
+        if chosen(built, on, false).next().is_some() {
+            all.push(own(merged_bodies(built, on), of(BodyModel::Solid)));
+        }
+        if let Some(part) = &built.corotational
+            && chosen(built, on, true).next().is_some()
+        {
+            let shells = match curved {
+                None => merged_shells(built, part, on),
+                Some(parts) => {
                     let (curved, mesh) = super::curved::Curved::new(built, part, on, parts);
                     (mesh, Content::Curved(Box::new(curved)))
                 }
-            },
-        };
+            };
+            all.push(own(shells, of(BodyModel::Shell)));
+        }
+        all
+    }
+
+    fn new(
+        built: &Built,
+        on: Option<&str>,
+        mesh: Mesh,
+        content: Content,
+        fields: Vec<FieldName>,
+        at: At,
+    ) -> Self {
         let named = |(label, name): (i32, Option<&str>)| Some((label, name?.to_owned()));
         let label_names = built.labels(on).iter().filter_map(named).collect();
         let mesh = Mesh { label_names, ..mesh };
-        Self { mesh, fields: fields.to_vec(), at, content }
+        Self { mesh, first_body: 0, fields, at, content }
     }
 
     /// A point of the mesh as a combination of nodes of the model; of a curved surface, the combination under its bulge.
@@ -110,7 +138,7 @@ impl Own {
                 let row = built.model.surfaces[*index].mapping.row(point as usize);
                 row.map(|(node, weight)| (node as u32, weight)).collect()
             }
-            Content::Bodies { nodes, .. } | Content::Corotational { nodes, .. } => {
+            Content::Bodies { nodes, .. } | Content::Shells { nodes, .. } => {
                 vec![(nodes[point as usize], 1.0)]
             }
             Content::Curved(curved) => {
@@ -135,11 +163,11 @@ impl Own {
                 fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
                 fill_cells(&mut self.mesh, frame, &self.fields, self.at, cells);
             }
-            Content::Corotational { nodes, cells, fields } => {
+            Content::Shells { nodes, facets, fields } => {
                 fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
                 if let (Some(part), Some(state)) = (&frame.built().corotational, frame.now.shells()) {
                     fields.fill(&part.model, state, &self.fields);
-                    fill_corotational(&mut self.mesh, &part.model, fields, &self.fields, self.at, cells);
+                    fill_shells(&mut self.mesh, &part.model, fields, &self.fields, self.at, facets);
                 }
             }
             Content::Curved(curved) => curved.fill(&mut self.mesh, frame, &self.fields),
@@ -202,14 +230,23 @@ fn bare(mesh: &Mesh) -> Mesh {
     Mesh { points: mesh.points.clone(), blocks, ..Mesh::default() }
 }
 
+/// The bodies, one by name or all, that are shells or not.
+fn chosen<'b>(built: &'b Built, on: Option<&'b str>, shells: bool) -> impl Iterator<Item = usize> + 'b {
+    let is_shell = |body: usize| {
+        let cells = built.corotational.as_ref().map(|part| &part.cells[body]);
+        matches!(cells, Some(BodyCells::Facets(_)))
+    };
+    (0..built.bodies.len())
+        .filter(move |&body| is_shell(body) == shells && on.is_none_or(|on| built.bodies[body].name == on))
+}
+
 /// The volume cells of one body or of all, with `label` and, for several bodies, the number of the `body`.
 fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
-    let chosen = |body: usize| on.is_none_or(|name| built.bodies[body].name == name);
     let mut mesh = Mesh::default();
     let mut nodes = Vec::new();
     let mut offsets = vec![0; built.bodies.len()];
-    for (body, offset) in offsets.iter_mut().enumerate().filter(|(body, _)| chosen(*body)) {
-        *offset = mesh.points.len() as u32;
+    for body in chosen(built, on, false) {
+        offsets[body] = mesh.points.len() as u32;
         mesh.points.extend_from_slice(&built.bodies[body].mesh.points);
         nodes.extend(built.model.bodies[body].nodes.clone());
     }
@@ -219,9 +256,9 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
         let mut block = CellBlock::new(kind, Vec::new());
         let mut places = Vec::new();
         let (mut body_of, mut labels) = (Vec::new(), Vec::new());
-        for (body, &offset) in offsets.iter().enumerate().filter(|(body, _)| chosen(*body)) {
+        for body in chosen(built, on, false) {
             let Some(own) = built.bodies[body].mesh.block(kind) else { continue };
-            block.nodes.extend(own.nodes.iter().map(|node| node + offset));
+            block.nodes.extend(own.nodes.iter().map(|node| node + offsets[body]));
             body_of.resize(body_of.len() + own.len(), body as f64);
             match own.data.get("label") {
                 Some(label) => labels.extend_from_slice(&label.values),
@@ -263,72 +300,56 @@ pub(super) fn carried_on_shell(frame: &Frame<'_>, surface: usize) -> Option<Vec<
     Some(positions)
 }
 
-/// The cells of one shell or co-rotational solid or of all, with `label` and, for several bodies, the number of the `body`.
-fn merged_corotational(built: &Built, part: &Corotational, on: Option<&str>) -> (Mesh, Content) {
+/// The triangles of one shell or of all, with `label` and, for several bodies, the number of the `body`.
+fn merged_shells(built: &Built, part: &Corotational, on: Option<&str>) -> (Mesh, Content) {
     let mut mesh = Mesh::default();
-    let (mut nodes, mut cells) = (Vec::new(), Vec::new());
-    let kinds = [CellKind::Triangle, CellKind::Tet];
-    let mut blocks = kinds.map(|kind| (CellBlock::new(kind, Vec::new()), Vec::new(), Vec::new()));
-    let labelled = !built.labels(on).is_empty();
-    let mut labels = kinds.map(|_| Vec::new());
-    for (number, body) in
-        built.bodies.iter().enumerate().filter(|(_, body)| on.is_none_or(|on| body.name == on))
-    {
+    let mut block = CellBlock::new(CellKind::Triangle, Vec::new());
+    let (mut nodes, mut facets, mut labels, mut owners) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for number in chosen(built, on, true) {
+        let BodyCells::Facets(range) = &part.cells[number] else { continue };
+        let body = &built.bodies[number];
         let offset = mesh.points.len() as u32;
         mesh.points.extend_from_slice(&body.mesh.points);
         nodes.extend(built.model.bodies[number].nodes.clone());
-        let (at, range) = match &part.cells[number] {
-            BodyCells::Facets(range) => (0, range),
-            BodyCells::Tets(range) => (1, range),
-        };
-        let cell = [Cell::Facet, Cell::Tet][at];
-        let (block, places, owners) = &mut blocks[at];
-        let own = body.mesh.block(kinds[at]);
+        let own = body.mesh.block(CellKind::Triangle);
         block.nodes.extend(own.map_or(&[][..], |own| &own.nodes[..]).iter().map(|node| node + offset));
-        places.extend(range.clone().map(cell));
-        labels[at].extend_from_slice(own.and_then(|own| own.data.get("label")).map_or(&[], |of| &of.values));
-        labels[at].resize(places.len(), 0.0);
-        owners.resize(places.len(), number as f64);
+        facets.extend(range.clone());
+        labels.extend_from_slice(own.and_then(|own| own.data.get("label")).map_or(&[], |of| &of.values));
+        labels.resize(facets.len(), 0.0);
+        owners.resize(facets.len(), number as f64);
     }
-    let shown = blocks.into_iter().zip(labels).filter(|((block, ..), _)| !block.is_empty());
-    for ((mut block, places, owners), labels) in shown {
-        if built.bodies.len() > 1 {
-            block.data.insert("body".into(), DataArray::scalar(owners));
-        }
-        if labelled {
-            block.data.insert("label".into(), DataArray::scalar(labels));
-        }
-        mesh.blocks.push(block);
-        cells.push(places);
+    if built.bodies.len() > 1 {
+        block.data.insert("body".into(), DataArray::scalar(owners));
     }
-    (mesh, Content::Corotational { nodes, cells, fields: Box::default() })
+    if !built.labels(on).is_empty() {
+        block.data.insert("label".into(), DataArray::scalar(labels));
+    }
+    mesh.blocks.push(block);
+    (mesh, Content::Shells { nodes, facets, fields: Box::default() })
 }
 
-fn fill_corotational(
+fn fill_shells(
     mesh: &mut Mesh,
     model: &pliant_implicit::Model,
-    found: &fields::Corotated,
+    found: &fields::OfShells,
     wanted: &[FieldName],
     at: At,
-    cells: &[Vec<Cell>],
+    facets: &[u32],
 ) {
     let wanted: Vec<FieldName> = wanted.iter().copied().filter(|field| !field.is_nodal()).collect();
     let mut averages = Averages::new(mesh.points.len(), &wanted);
-    for (block, cells) in mesh.blocks.iter_mut().zip(cells) {
+    for block in &mut mesh.blocks {
         for (slot, &field) in wanted.iter().enumerate() {
             let components = field.components();
             if at == At::Cells {
-                let value = |&cell: &Cell| found.of(model, cell, field).into_iter().take(components);
-                let values = cells.iter().flat_map(value).collect();
+                let value = |&facet: &u32| found.of(model, facet, field).into_iter().take(components);
+                let values = facets.iter().flat_map(value).collect();
                 block.data.insert(field.name().into(), DataArray { components, values });
                 continue;
             }
-            for (index, &cell) in cells.iter().enumerate() {
-                let size = match cell {
-                    Cell::Facet(facet) => model.facets[facet as usize].area,
-                    Cell::Tet(tet) => model.tets[tet as usize].volume,
-                };
-                averages.add(slot, block.cell(index), &found.of(model, cell, field)[..components], size);
+            for (index, &facet) in facets.iter().enumerate() {
+                let area = model.facets[facet as usize].area;
+                averages.add(slot, block.cell(index), &found.of(model, facet, field)[..components], area);
             }
         }
     }
@@ -469,7 +490,7 @@ nodes = { label = "left" }
         let model = &built.corotational.as_ref().unwrap().model;
         assert_eq!([0, 1].map(|facet| model.facets[facet].thickness), [1e-3, 2e-3]);
         let labels = |on: Option<&str>, curved: Option<u32>| {
-            let own = Own::new(&built, on, &[], At::Cells, curved);
+            let own = Own::all(&built, on, &[], At::Cells, curved).remove(0);
             assert_eq!(own.mesh.label_names, wall.label_names);
             own.mesh.blocks[0].data["label"].values.clone()
         };

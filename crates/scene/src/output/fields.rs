@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 use pliant_explicit::recover::CellFields;
-use pliant_implicit::{Model, ShellFields, SolidFields, State};
+use pliant_implicit::{Model, ShellFields, State};
 use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
 
@@ -54,78 +54,47 @@ fn tensor(symmetric: &Symmetric<f64>) -> Value {
     [xx, xy, xz, xy, yy, yz, xz, yz, zz]
 }
 
-/// A cell of a shell or a co-rotational solid, by its number in the model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Cell {
-    Facet(u32),
-    Tet(u32),
-}
-
-/// Fields of the cells of shells and co-rotational solids at an instant.
+/// Fields of the triangles of shells at an instant.
 #[derive(Default)]
-pub(super) struct Corotated {
+pub(super) struct OfShells {
     shells: ShellFields,
-    solids: SolidFields,
-    /// Stable steps of facets and tets [s], once they are wanted: they don't change.
-    steps: [Vec<f64>; 2],
+    /// Stable steps of the triangles [s], once they are wanted: they don't change.
+    steps: Vec<f64>,
 }
 
-impl Corotated {
+impl OfShells {
     /// Finds them for the instant of a frame.
     pub fn fill(&mut self, model: &Model, state: &State, wanted: &[FieldName]) {
-        if wanted.contains(&FieldName::ElementStep) && self.steps.iter().all(Vec::is_empty) {
-            let facets = model.facets.par_iter().map(|facet| facet.stable_step());
-            let tets = model.tets.par_iter().map(|tet| tet.stable_step());
-            self.steps = [facets.collect(), tets.collect()];
+        if wanted.contains(&FieldName::ElementStep) && self.steps.is_empty() {
+            self.steps = model.facets.par_iter().map(|facet| facet.stable_step()).collect();
         }
-        // A folded or inverted element has ended the run before an observer sees it.
+        // A folded element has ended the run before an observer sees it.
         let _ = self.shells.fill(model, state);
-        let _ = self.solids.fill(model, state);
     }
 
-    fn step(&self, kind: usize, at: usize) -> f64 {
-        self.steps[kind].get(at).copied().unwrap_or(f64::NAN)
-    }
-
-    /// The value of a field in a cell; the first `components` numbers count.
-    pub fn of(&self, model: &Model, cell: Cell, field: FieldName) -> Value {
+    /// The value of a field in a triangle, numbered in the model; the first `components` numbers count.
+    pub fn of(&self, model: &Model, facet: u32, field: FieldName) -> Value {
         let matrix = |matrix: &Matrix3<f64>| {
             let mut value = [0.0; 9];
             value.copy_from_slice(matrix.as_slice());
             value
         };
-        match cell {
-            Cell::Facet(at) => {
-                let (at, fields) = (at as usize, &self.shells);
-                match field {
-                    FieldName::VonMises => padded(&[fields.largest[at]]),
-                    FieldName::MembraneForce => matrix(&fields.membrane[at]),
-                    FieldName::BendingMoment => matrix(&fields.moment[at]),
-                    FieldName::StressTop => matrix(&fields.stress[0][at]),
-                    FieldName::StressMiddle => matrix(&fields.stress[1][at]),
-                    FieldName::StressBottom => matrix(&fields.stress[2][at]),
-                    FieldName::MembraneEnergy => padded(&[fields.energy[at].membrane]),
-                    FieldName::BendingEnergy => padded(&[fields.energy[at].bending]),
-                    FieldName::DrillingEnergy => padded(&[fields.energy[at].drilling]),
-                    FieldName::Thickness => padded(&[model.facets[at].thickness]),
-                    FieldName::CurrentThickness => padded(&[fields.thickness[at]]),
-                    FieldName::SurfaceStrain => padded(&[fields.strain[at].surface]),
-                    FieldName::ElementStep => padded(&[self.step(0, at)]),
-                    _ => [f64::NAN; 9],
-                }
-            }
-            Cell::Tet(at) => {
-                let (at, fields) = (at as usize, &self.solids);
-                match field {
-                    FieldName::CauchyStress => matrix(&fields.stress[at]),
-                    FieldName::VonMises => padded(&[fields.von_mises[at]]),
-                    FieldName::Pressure => padded(&[fields.pressure[at]]),
-                    FieldName::EnergyDensity => padded(&[fields.energy[at]]),
-                    FieldName::VolumeRatio | FieldName::CellVolumeRatio => padded(&[fields.volume_ratio[at]]),
-                    FieldName::ElementStep => padded(&[self.step(1, at)]),
-                    _ => [f64::NAN; 9],
-                }
-            }
+        let (at, fields) = (facet as usize, &self.shells);
+        match field {
+            FieldName::VonMises => padded(&[fields.largest[at]]),
+            FieldName::MembraneForce => matrix(&fields.membrane[at]),
+            FieldName::BendingMoment => matrix(&fields.moment[at]),
+            FieldName::StressTop => matrix(&fields.stress[0][at]),
+            FieldName::StressMiddle => matrix(&fields.stress[1][at]),
+            FieldName::StressBottom => matrix(&fields.stress[2][at]),
+            FieldName::MembraneEnergy => padded(&[fields.energy[at].membrane]),
+            FieldName::BendingEnergy => padded(&[fields.energy[at].bending]),
+            FieldName::DrillingEnergy => padded(&[fields.energy[at].drilling]),
+            FieldName::Thickness => padded(&[model.facets[at].thickness]),
+            FieldName::CurrentThickness => padded(&[fields.thickness[at]]),
+            FieldName::SurfaceStrain => padded(&[fields.strain[at].surface]),
+            FieldName::ElementStep => padded(&[self.steps.get(at).copied().unwrap_or(f64::NAN)]),
+            _ => [f64::NAN; 9],
         }
     }
 }

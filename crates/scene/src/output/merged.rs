@@ -4,21 +4,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 
-/// Meshes with their data as one mesh. Data that a mesh lacks are not a number there; labels are 0. Cells have the number of their `body`,
-/// counted over all meshes.
-pub(super) fn merged(meshes: &[&Mesh]) -> Mesh {
+/// Meshes with their data as one mesh, each with the number of its first `body`, from which its cells count. Data that a mesh lacks are
+/// not a number there; labels are 0.
+pub(super) fn merged(numbered: &[(&Mesh, usize)]) -> Mesh {
+    let meshes: Vec<&Mesh> = numbered.iter().map(|(mesh, _)| *mesh).collect();
     let mut all = Mesh::default();
     let sizes = meshes.iter().map(|mesh| mesh.points.len());
     all.point_data = joined(meshes.iter().map(|mesh| &mesh.point_data).zip(sizes));
     let mut first_points = vec![0];
-    let mut first_bodies = vec![0.0];
-    for mesh in meshes {
+    for mesh in &meshes {
         all.points.extend_from_slice(&mesh.points);
         all.label_names.extend(mesh.label_names.clone());
         first_points.push(all.points.len() as u32);
-        let bodies = mesh.blocks.iter().filter_map(|block| block.data.get("body"));
-        let most = bodies.flat_map(|body| &body.values).copied().fold(0.0, f64::max);
-        first_bodies.push(first_bodies[first_bodies.len() - 1] + most + 1.0);
     }
     let kinds: BTreeSet<CellKind> =
         meshes.iter().flat_map(|mesh| &mesh.blocks).map(|block| block.kind).collect();
@@ -32,7 +29,7 @@ pub(super) fn merged(meshes: &[&Mesh]) -> Mesh {
         let mut whole = CellBlock::new(kind, nodes.collect());
         whole.data = joined(blocks.iter().map(|(_, block)| (&block.data, block.len())));
         let body = blocks.iter().flat_map(|&(index, block)| {
-            let (first, own) = (first_bodies[index], block.data.get("body"));
+            let (first, own) = (numbered[index].1 as f64, block.data.get("body"));
             (0..block.len()).map(move |cell| first + own.map_or(0.0, |own| own.values[cell]))
         });
         whole.data.insert("body".into(), DataArray::scalar(body.collect()));

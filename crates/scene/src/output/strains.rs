@@ -40,7 +40,7 @@ impl ShellStrains {
         let strains = state.shell_strains(&part.model);
         let shells = built.bodies.iter().zip(&part.cells).filter_map(|(body, cells)| match cells {
             BodyCells::Facets(range) => Some((body, range)),
-            BodyCells::Tets(_) => None,
+            BodyCells::Solids => None,
         });
         for (at, (body, range)) in shells.enumerate() {
             let of = |&cell: &u32| strains[cell as usize].surface;

@@ -38,7 +38,7 @@ pub struct Summary {
     pub mass: f64,
     /// Time [s] from one common instant of all participants to the next: the time step, where all bodies go together.
     pub step: f64,
-    /// Smallest element bound of the critical step [s]; `null` of shells and co-rotational solids, as the two below.
+    /// Smallest element bound of the critical step [s]; `null` of shells and with `implicit` and `static`, as the two below.
     pub element_bound: Option<f64>,
     /// Limit of the assembled operator [s].
     pub true_limit: Option<f64>,
@@ -68,7 +68,7 @@ pub struct Summary {
     pub stability: Option<StabilitySummary>,
     /// What mass scaling adds; `null` without it.
     pub added_mass: Option<AddedMass>,
-    /// Imbalance of the energies at the end, as a fraction of the largest; `null` of shells and co-rotational solids.
+    /// Imbalance of the energies at the end, as a fraction of the largest; `null` of shells and with `implicit` and `static`.
     pub energy_balance: Option<f64>,
     /// Force [N] of each constraint at the end, by name.
     #[serde(serialize_with = "as_map")]
@@ -253,7 +253,7 @@ impl FailureSummary {
         Self::about("input", error.to_string(), None)
     }
 
-    /// A step of shells or co-rotational solids that could not be taken.
+    /// A step of shells, or of the solvers `implicit` and `static`, that could not be taken.
     pub(crate) fn of_solver(
         kind: &'static str,
         message: String,

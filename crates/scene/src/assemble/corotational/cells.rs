@@ -1,4 +1,4 @@
-//! The cells of shells and co-rotational solids: triangles, elements, materials, thickness.
+//! The cells of the implicit solvers' model: triangles, elements, materials, thickness of shells; solids.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::assemble::bodies::{Draft, nodes};
 use crate::assemble::meshes::surface_of;
 use crate::assemble::{Builder, SCENE, bodies, suggestion};
 use crate::diagnostic::{Diagnostic, counted};
-use crate::format::{BodyModel, BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
+use crate::format::{BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
 
 /// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
 const DRILLING: f64 = 0.01;
@@ -71,25 +71,37 @@ impl Builder<'_> {
         Some(Mesh { blocks: vec![whole], ..surface })
     }
 
-    /// Adds the cells of a shell or a co-rotational solid whose nodes are the last of the model.
-    pub(in crate::assemble) fn add_corotational(&mut self, draft: &Draft<'_>, first: u32) {
+    /// Gives a body whose nodes are the last of the model to the model of the implicit solvers; `add` adds its cells.
+    pub(in crate::assemble) fn add_to_implicit(
+        &mut self,
+        draft: &Draft<'_>,
+        add: impl FnOnce(&mut Self) -> Option<BodyCells>,
+    ) {
         let rest = &self.model.rest;
         let model = self.corotational.get_or_insert_with(Corotational::new).model_mut();
         model.rest.extend(rest[model.rest.len()..].iter().map(|&p| Vector3::from(p)));
         model.mass.resize(rest.len(), 0.0);
         model.inertia.resize(rest.len(), 0.0);
         (model.mass_damping, model.stiffness_damping) = (draft.table.damping, draft.table.stiffness_damping);
-        let added = match draft.table.model {
-            BodyModel::Shell => self.add_shell(draft, first),
-            _ => self.add_corotational_solid(draft, first),
-        };
-        let (Some(cells), Some(part)) = (added, &mut self.corotational) else { return };
+        let (Some(cells), Some(part)) = (add(self), &mut self.corotational) else { return };
         part.cells.push(cells);
         // What the scene's own model says of masses.
         self.model.mass.copy_from_slice(&part.model.mass);
     }
 
-    fn add_shell(&mut self, draft: &Draft<'_>, first: u32) -> Option<BodyCells> {
+    /// Adds the solids of the scene's model from a number on.
+    pub(in crate::assemble) fn add_solids(&mut self, name: &str, first: usize) -> Option<BodyCells> {
+        for index in first..self.model.solids.len() {
+            let solid = self.model.solids[index].clone();
+            if let Err(error) = self.corotational.as_mut()?.model_mut().add_solid(name, solid) {
+                self.refuse_part(name, &error);
+                return None;
+            }
+        }
+        Some(BodyCells::Solids)
+    }
+
+    pub(in crate::assemble) fn add_shell(&mut self, draft: &Draft<'_>, first: u32) -> Option<BodyCells> {
         let &Draft { name, table, mesh, .. } = draft;
         let block = mesh.block(CellKind::Triangle)?;
         let formulation = self.formulation(name, table)?;
@@ -488,48 +500,18 @@ impl Builder<'_> {
             ModelError::Normal { .. } => {
                 ("mesh", "`normals = \"triangles\"` takes the mean of the triangles instead")
             }
+            ModelError::NoStiffness { .. } => {
+                let solver = self.scene.run.solver.word();
+                let message = format!("the solver `{solver}` is not for this body: {error}");
+                let help = "take `solver = \"explicit\"` or `\"quasi-static\"`, or follow the message";
+                self.error(&["body", name], message, "not with this solver", help);
+                return;
+            }
             ModelError::Branch { .. } => {
                 ("mesh", "set `branches = true` if walls are meant to meet there, or repair the mesh")
             }
             _ => ("mesh", "`pliant info` reads a mesh file on its own; `fix = \"merge\"` joins nodes"),
         };
         self.error(&["body", name, key], error.to_string(), "here", help);
-    }
-
-    fn add_corotational_solid(&mut self, draft: &Draft<'_>, first: u32) -> Option<BodyCells> {
-        let &Draft { name, table, mesh, .. } = draft;
-        if let Some(other) = table.element.filter(|&element| element != Element::Tet4) {
-            let what = if other.is_shell() { "a shell" } else { "`model = \"solid\"`" };
-            let message = format!("`{name}` is a co-rotational solid, and this element is of {what}");
-            self.error(
-                &["body", name, "element"],
-                message,
-                "not for this model",
-                "take `tet4`, or leave it out",
-            );
-            return None;
-        }
-        if mesh.volume_blocks().any(|block| block.kind != CellKind::Tet && !block.is_empty()) {
-            let message =
-                format!("`{name}` is a co-rotational solid, which is made of tets, and its mesh has hexes");
-            self.error(&["body", name, "mesh"], message, "this mesh", "use a mesh of tets: `as = \"tets\"`");
-            return None;
-        }
-        let block = mesh.block(CellKind::Tet)?;
-        let material = self.materials(draft, block)?;
-        let start = self.corotational.as_ref()?.model.tets.len() as u32;
-        // Cells of one material after the other would change their order: so they go one by one where there are several.
-        let all: Vec<[u32; 4]> = (0..block.len() as u32).map(|cell| nodes(block, cell, first)).collect();
-        let part = self.corotational.as_mut()?;
-        let added = match material[..] {
-            [one] => part.model_mut().add_solid(name, &all, one),
-            _ => (all.iter().zip(&material))
-                .try_for_each(|(cell, &material)| part.model_mut().add_solid(name, &[*cell], material)),
-        };
-        if let Err(error) = added {
-            self.refuse_part(name, &error);
-            return None;
-        }
-        Some(BodyCells::Tets(start..start + block.len() as u32))
     }
 }

@@ -1,4 +1,4 @@
-//! Constraints and springs of shells and co-rotational solids.
+//! Constraints and springs of the implicit solvers.
 
 use pliant_geometry::Vector3;
 use pliant_implicit as corotational;
@@ -47,7 +47,7 @@ impl Builder<'_> {
         Some(chosen)
     }
 
-    /// Adds a constraint of the nodes of a shell or a co-rotational solid, as the scene's own model has it in displacements.
+    /// Adds a constraint to the model of the implicit solvers, as the scene's own model has it in displacements.
     pub(in crate::assemble) fn constrain_corotational(
         &mut self,
         name: &str,
@@ -70,7 +70,10 @@ impl Builder<'_> {
             model::Motion::Displacements(by, curve) => {
                 nodes.iter().zip(by).map(|(&node, &by)| (vec![node], moved(by, curve))).collect()
             }
-            _ => vec![(nodes.to_vec(), Motion::Fixed)],
+            model::Motion::Fixed => vec![(nodes.to_vec(), Motion::Fixed)],
+            model::Motion::Velocity(..) | model::Motion::Rotation { .. } => {
+                vec![(nodes.to_vec(), Motion::Displaced(motion.clone()))]
+            }
         };
         let constraint =
             |(nodes, motion)| corotational::Constraint { name: name.to_owned(), nodes, components, motion };
@@ -92,8 +95,8 @@ impl Builder<'_> {
         }
     }
 
-    /// How nodes of shells and co-rotational solids are moved, without their rotation.
-    pub(in crate::assemble) fn corotational_motion(
+    /// How nodes of shells are moved, without their rotation.
+    pub(in crate::assemble) fn motion_of_shell(
         &mut self,
         name: &str,
         table: &MoveTable,
@@ -108,7 +111,7 @@ impl Builder<'_> {
         }
         let shift = match (&table.by, table.velocity) {
             (_, Some(_)) => {
-                let message = "nodes of shells and co-rotational solids move by a way, not with a velocity";
+                let message = "nodes of shells move by a way, not with a velocity";
                 let help = "give the whole way in `by`, with a `curve`";
                 self.error(&[path[0], path[1], "velocity"], message, "not for this model", help);
                 return None;
@@ -137,8 +140,8 @@ impl Builder<'_> {
         let Some(body) = self.find_body(&table.body, &[path[0], path[1], "body"]) else { return };
         let Some(nodes) = self.body_nodes(body, &table.nodes, &[path[0], path[1], "nodes"]) else { return };
         let Some(part) = &mut self.corotational else {
-            let message = "springs are for shells and co-rotational solids";
-            self.error(&path, message, "not for a `solid`", "take `fix`, or change `model` of the body");
+            let message = "springs are for shells and for the solvers `static` and `implicit`";
+            self.error(&path, message, "not with this solver", "take `fix`, or change the solver");
             return;
         };
         for node in nodes {
@@ -151,6 +154,6 @@ impl Builder<'_> {
 /// Whether two constraints prescribe the same rotation of a node, and not both that it stays.
 fn clash(a: &corotational::Constraint, b: &corotational::Constraint) -> bool {
     let shared = (3..6).any(|c| a.components[c] && b.components[c]);
-    let still = a.motion == Motion::Fixed && b.motion == Motion::Fixed;
+    let still = matches!((&a.motion, &b.motion), (Motion::Fixed, Motion::Fixed));
     shared && !still && a.nodes.iter().any(|node| b.nodes.contains(node))
 }

@@ -1,4 +1,4 @@
-//! Loads on shells and co-rotational solids, and the control of one of them.
+//! Loads of the implicit solvers, and the control of one of them.
 
 use std::collections::BTreeMap;
 
@@ -99,11 +99,9 @@ impl Builder<'_> {
                 single_forces(&self.traction_forces(Target::Body(body), &faces, traction.traction))
             }
             LoadTable::Pressure(pressure) if shell => vec![self.shell_pressure(pressure, body, path)?],
-            LoadTable::Pressure(_) => {
-                let help = "take a `traction`, `model = \"solid\"`, or cover the solid with a shell";
-                let message = "a pressure on a co-rotational solid does not follow its faces";
-                self.error(path, message, "not for this model", help);
-                return None;
+            LoadTable::Pressure(pressure) => {
+                let faces = self.faces(Target::Body(body), &pressure.faces, &at("faces"))?;
+                vec![corotational::LoadKind::FacePressure { faces, pressure: pressure.pressure }]
             }
             LoadTable::Edge(edge) => {
                 if !shell {
@@ -133,7 +131,7 @@ impl Builder<'_> {
         })
     }
 
-    /// A load on a surface that a shell or a co-rotational solid carries.
+    /// A load on a surface that a body carries.
     fn load_on_surface(
         &mut self,
         table: &LoadTable,
@@ -306,7 +304,7 @@ impl Builder<'_> {
     pub(in crate::assemble) fn shell_cells(&self, body: usize) -> Option<Vec<u32>> {
         match self.corotational.as_ref()?.cells.get(body)? {
             BodyCells::Facets(range) => Some(range.clone().collect()),
-            BodyCells::Tets(_) => None,
+            BodyCells::Solids => None,
         }
     }
 

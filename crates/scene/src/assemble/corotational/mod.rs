@@ -1,5 +1,5 @@
-//! Shells and co-rotational solids: their cells, constraints and loads, in a model of their own that shares the nodes. Bodies, names of
-//! constraints and carried surfaces stay in the scene's `Model`, which then has no cells.
+//! Shells, and solids whose equations are solved: their cells, constraints and loads, in the model of the implicit solvers, which shares
+//! the nodes. Bodies, names of constraints and carried surfaces stay in the scene's `Model`.
 
 mod cells;
 mod constraints;
@@ -19,7 +19,7 @@ use crate::diagnostic::counted;
 use crate::format::{BodyModel, BodyTable, Element, SolverName};
 use crate::registry::OutputTable;
 
-/// Shells and co-rotational solids of a scene. Nodes are those of the scene's model.
+/// Shells of a scene, and solids whose equations are solved. Nodes are those of the scene's model.
 #[derive(Clone, Debug)]
 pub struct Corotational {
     /// Their model.
@@ -41,8 +41,8 @@ pub struct Corotational {
 pub enum BodyCells {
     /// Facets of the model.
     Facets(Range<u32>),
-    /// Tetrahedra of the model.
-    Tets(Range<u32>),
+    /// Solids of the model that are of the body.
+    Solids,
 }
 
 /// A control of a whole static run.
@@ -85,37 +85,36 @@ pub struct Stop {
 }
 
 impl Builder<'_> {
-    /// Rejects scenes of both kinds of bodies, and solvers that do not support them.
+    /// Rejects scenes of both kinds of bodies without a common solver, and keys that do not go with the model of the implicit solvers.
     pub(in crate::assemble) fn check_models(&mut self) {
         let scene = self.scene;
-        let other = |body: &&(String, BodyTable)| body.1.model != BodyModel::Solid;
-        let Some((first, table)) = scene.bodies.iter().find(other) else {
-            if matches!(scene.run.solver, SolverName::Implicit | SolverName::Static) {
-                let message =
-                    format!("the solver `{}` is not for bodies of model `solid`", scene.run.solver.word());
-                let help = "take `solver = \"explicit\"` or `\"quasi-static\"`, or `model = \"corotational\"` for the bodies";
-                self.error(&scene.run_at("solver"), message, "not for these bodies", help);
-            }
-            self.check_keys_of_shells(false);
-            return;
-        };
-        if let Some((solid, _)) = scene.bodies.iter().find(|(_, body)| body.model == BodyModel::Solid) {
+        let is_implicit = scene.is_implicit();
+        self.check_keys_of_solver(is_implicit);
+        self.check_keys_of_bodies(is_implicit);
+        let Some((first, table)) = scene.bodies.first().filter(|_| is_implicit) else { return };
+        let solver = scene.run.solver.word();
+        let of_model = |model: BodyModel| scene.bodies.iter().find(|(_, body)| body.model == model);
+        if let (Some((solid, _)), Some((shell, _)), false) =
+            (of_model(BodyModel::Solid), of_model(BodyModel::Shell), scene.run.solver.solves_equations())
+        {
             let message = format!(
-                "`{solid}` is of model `solid` and `{first}` of model `{}`: they have no solver in common",
-                table.model.word()
+                "`{solid}` is a solid and `{shell}` a shell: they do not go together with the solver `{solver}`"
             );
-            let help = "give all bodies `model = \"shell\"` or `\"corotational\"`, or give the solids a participant of their own";
-            self.error(&["body", first, "model"], message, "not beside a `solid`", help);
+            let help =
+                "take `solver = \"static\"` or `\"implicit\"`, or give the solids a participant of their own";
+            self.error(&["body", shell, "model"], message, "not beside a `solid`", help);
         }
         if scene.run.solver == SolverName::QuasiStatic {
-            let message =
-                format!("the solver `quasi-static` is not for bodies of model `{}`", table.model.word());
+            let message = "the solver `quasi-static` is not for bodies of model `shell`";
             let help = "take `solver = \"static\"`";
             self.error(&scene.run_at("solver"), message, "not for these bodies", help);
         }
+        let what = match of_model(BodyModel::Shell) {
+            Some(_) => "shells".to_owned(),
+            None => format!("runs with `solver = \"{solver}\"`"),
+        };
         if scene.run.precision == Some(crate::format::Precision::Single) {
-            let message =
-                format!("bodies of model `{}` are computed in double precision only", table.model.word());
+            let message = format!("{what} are computed in double precision only");
             self.error(&scene.run_at("precision"), message, "not for these bodies", "leave `precision` out");
         }
         if scene.run.checkpoint.is_some()
@@ -126,25 +125,21 @@ impl Builder<'_> {
             self.error(&scene.run_at("checkpoint"), message, "not with `arc-length`", help);
         }
         if scene.run.mass_scaling.is_some() {
-            let message = format!("mass is not scaled for bodies of model `{}`", table.model.word());
+            let message = format!("mass is not scaled for {what}");
             let help = "leave it out, or take `solver = \"implicit\"`, which has no critical time step";
             self.error(&scene.run_at("mass-scaling"), message, "not for these bodies", help);
         }
         if scene.run.on_unstable.is_some() {
-            let message = format!(
-                "the critical time step of bodies of model `{}` is not monitored",
-                table.model.word()
-            );
+            let message = format!("the critical time step of {what} is not monitored");
             let help = "leave it out; their step is compared with the critical one at rest before the run";
             self.error(&scene.run_at("on-unstable"), message, "not for these bodies", help);
         }
-        self.check_keys_of_shells(true);
         for key in ["damping", "stiffness-damping"] {
             let value =
                 |body: &BodyTable| if key == "damping" { body.damping } else { body.stiffness_damping };
             if let Some((name, _)) = scene.bodies.iter().find(|(_, body)| value(body) != value(table)) {
                 let message = format!("`{name}` and `{first}` have different `{key}`");
-                let help = "shells and co-rotational solids of a participant share one value";
+                let help = "bodies of a participant share one value with this solver";
                 self.error(&["body", name, key], message, "another", help);
             }
         }
@@ -163,11 +158,11 @@ impl Builder<'_> {
         }
     }
 
-    /// Rejects keys without effect on the models and the solver.
-    fn check_keys_of_shells(&mut self, present: bool) {
+    /// Rejects keys without effect on the solver.
+    fn check_keys_of_solver(&mut self, is_implicit: bool) {
         let scene = self.scene;
         let run = &scene.run;
-        let newton = present && matches!(run.solver, SolverName::Implicit | SolverName::Static);
+        let newton = is_implicit && run.solver.solves_equations();
         let dynamic = matches!(run.solver, SolverName::Explicit | SolverName::Implicit);
         if dynamic && scene.gives("load-steps") {
             let message = "`load-steps` is for `solver = \"quasi-static\"` and `\"static\"`; others take a `step` in seconds";
@@ -180,7 +175,7 @@ impl Builder<'_> {
             ("integrator", newton && run.solver == SolverName::Implicit, "`solver = \"implicit\"`"),
         ] {
             if scene.gives(key) && !wanted {
-                let message = format!("`{key}` is for {of} of shells and co-rotational solids");
+                let message = format!("`{key}` is for {of}");
                 self.error(&scene.run_at(key), message, "has no effect here", "remove it");
             }
         }
@@ -196,6 +191,10 @@ impl Builder<'_> {
             );
             self.error(&["output", "convergence"], message, "the same file", "give the output another name");
         }
+    }
+
+    /// Rejects keys without effect on the models of the bodies.
+    fn check_keys_of_bodies(&mut self, is_implicit: bool) {
         for (name, body) in &self.scene.bodies {
             let shell = body.model == BodyModel::Shell;
             let others = [
@@ -208,8 +207,8 @@ impl Builder<'_> {
                 ("crease", shell, "a shell"),
                 ("normals", shell, "a shell"),
                 ("branches", shell, "a shell"),
-                ("stiffness-damping", body.model != BodyModel::Solid, "shells and co-rotational solids"),
-                ("initial-displacement", body.model != BodyModel::Solid, "shells and co-rotational solids"),
+                ("stiffness-damping", is_implicit, "shells and the solver `implicit`"),
+                ("initial-displacement", is_implicit, "shells and the solvers `implicit` and `static`"),
                 ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
                 ("layers", shell, "a shell"),
                 ("thickness", body.layers.is_empty(), "a shell without `layers`"),
@@ -224,7 +223,7 @@ impl Builder<'_> {
                 if !wanted && self.source().node(&["body", name, key]).is_some() {
                     let message =
                         format!("`{key}` is for {of}, and `{name}` is of model `{}`", body.model.word());
-                    let help = "remove it, or change `model`";
+                    let help = "remove it, or change `model` or the solver";
                     self.error(&["body", name, key], message, "has no effect here", help);
                 }
             }
@@ -307,19 +306,11 @@ impl Corotational {
         Arc::make_mut(&mut self.model)
     }
 
-    /// How many cells a body has, and their volume at rest [m³].
+    /// How many triangles a shell has, and their volume at rest [m³]; `None` of a solid.
     pub(crate) fn size(&self, body: usize) -> Option<(usize, f64)> {
-        let volume = match self.cells.get(body)? {
-            BodyCells::Facets(range) => {
-                let facets = &self.model.facets[range.start as usize..range.end as usize];
-                facets.iter().map(|facet| facet.area * facet.thickness).sum()
-            }
-            BodyCells::Tets(range) => {
-                self.model.tets[range.start as usize..range.end as usize].iter().map(|tet| tet.volume).sum()
-            }
-        };
-        let (BodyCells::Facets(range) | BodyCells::Tets(range)) = self.cells.get(body)?;
-        Some((range.len(), volume))
+        let BodyCells::Facets(range) = self.cells.get(body)? else { return None };
+        let facets = &self.model.facets[range.start as usize..range.end as usize];
+        Some((range.len(), facets.iter().map(|facet| facet.area * facet.thickness).sum()))
     }
 
     /// Whether only membranes hold a node.
@@ -333,7 +324,6 @@ impl Corotational {
         let model = &self.model;
         vec![
             ("the mesh, thickness or material of shells".into(), fingerprint(&model.facets)),
-            ("the mesh or material of co-rotational solids".into(), fingerprint(&model.tets)),
             ("constraints".into(), fingerprint(&(&model.constraints, &model.springs))),
             ("loads or their control".into(), fingerprint(&(&model.loads, &self.control))),
             ("creases".into(), fingerprint(&(&model.normals, &model.corner_normals))),
@@ -341,18 +331,24 @@ impl Corotational {
         ]
     }
 
-    /// The facet or the tetrahedron of a model that an error names: its body and its number in the body's mesh.
+    /// The facet or the cell of a solid that an error names: its body and its number in the body's mesh.
     pub(crate) fn cell(&self, number: usize) -> Option<(usize, u32)> {
         let facets = self.model.facets.len();
-        let find = |(body, cells): (usize, &BodyCells)| {
-            let (range, number) = match cells {
-                BodyCells::Facets(range) if number < facets => (range, number as u32),
-                BodyCells::Tets(range) if number >= facets => (range, (number - facets) as u32),
-                _ => return None,
-            };
-            range.contains(&number).then(|| (body, number - range.start))
-        };
-        self.cells.iter().enumerate().find_map(find)
+        if number < facets {
+            let own = number as u32;
+            return self.cells.iter().enumerate().find_map(|(body, cells)| match cells {
+                BodyCells::Facets(range) if range.contains(&own) => Some((body, own - range.start)),
+                _ => None,
+            });
+        }
+        let mut left = number - facets;
+        for solid in &self.model.solids {
+            if let Some(&original) = solid.original.get(left) {
+                return Some((solid.body, original));
+            }
+            left -= solid.original.len();
+        }
+        None
     }
 }
 

@@ -1,0 +1,359 @@
+//! Cells of solids of any hyperelastic law: energy, nodal forces and stiffness at a state, in total Lagrangian form (Belytschko, Liu,
+//! Moran, *Nonlinear Finite Elements*, 4.9 and 6.4): f_a = Σ w F S B_a, K_ab = Σ w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with D from
+//! [`AnyLaw::tangent`], and that of the co-rotated linear law in closed form (`closed.rs`).
+//!
+//! `hex8` adds its hourglass control, k γ_a·γ_b I. `hex8-full` takes one mean dilatation J̄ = v/V a cell, whose energy V U(J̄) adds
+//! p cof F B_a to the force, and U″(J̄)/V c_a ⊗ c_b with c_a = Σ w cof F B_a to the stiffness. `tet4-anp` does so for each node with
+//! the tets around it (`star.rs`).
+
+mod closed;
+mod star;
+#[cfg(test)]
+mod tests;
+
+use pliant_mechanics::law::{AnyLaw, Deformation, Split};
+use pliant_mechanics::model::{Averaging, CellBlock, Cells, Hourglass, Solid};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cross, dot, scale, sub};
+
+use crate::facet::Broken;
+
+pub(crate) use star::Stars;
+
+/// The most components of a cell: three a node of a hexahedron.
+pub(crate) const MOST: usize = 24;
+
+/// What a cell makes at a state.
+#[derive(Clone)]
+pub(crate) struct Response {
+    /// Strain energy [J].
+    pub(crate) energy: f64,
+    /// Internal forces [N], three a node.
+    pub(crate) force: [f64; MOST],
+    /// Stiffness [N/m] over the same, column by column; filled if it is asked for.
+    pub(crate) tangent: Vec<f64>,
+    pub(crate) broken: Option<Broken>,
+}
+
+impl Response {
+    pub(crate) fn none() -> Self {
+        Self { energy: 0.0, force: [0.0; MOST], tangent: Vec::new(), broken: None }
+    }
+
+    /// Finds what a cell makes. `pressure` is the averaged one of a tetrahedron, whose energy is counted at its nodes.
+    pub(crate) fn fill(
+        &mut self,
+        solid: &Solid,
+        cell: usize,
+        pressure: Option<f64>,
+        displacement: impl Fn(u32) -> Vector<f64>,
+        stiffness: bool,
+    ) {
+        let size = 3 * solid.cells.nodes_per_cell();
+        self.energy = 0.0;
+        self.force.fill(0.0);
+        self.tangent.clear();
+        self.tangent.resize(if stiffness { size * size } else { 0 }, 0.0);
+        let worst = solid.cells.worst_corner(cell, &displacement).map(|(_, determinant)| determinant);
+        self.broken = worst.filter(|&determinant| is_inverted(determinant)).map(Broken::Inverted);
+        if self.broken.is_some() {
+            return;
+        }
+        let own = Own { law: &solid.material.law, fibres: solid.fibres(cell), stiffness };
+        let found = match &solid.cells {
+            Cells::Tet4(block) => self.fill_plain(own, block, cell, displacement),
+            Cells::Hex8(block) => self.fill_plain(own, block, cell, displacement),
+            Cells::AveragedTet4(block, _) => {
+                let u = moved(block, cell, displacement);
+                let rest = &block.rest[cell];
+                let part = Part::Shape(pressure.unwrap_or(0.0));
+                self.add_point(own, &u, &rest.gradient, rest.volume, part)
+            }
+            Cells::FullHex8(block, points) => {
+                let u = moved(block, cell, displacement);
+                let (points, volume) = (&points[cell], block.rest[cell].volume);
+                let weighted = || points.gradient.iter().zip(points.weight);
+                let share = |(b, w): (&[Vector<f64>; 8], f64)| w * volume_change(&gradient(&u, b));
+                let change = weighted().map(share).sum::<f64>() / volume;
+                let [pressure, second] = own.law.volume_pressures(change);
+                self.energy += volume * own.law.volume_energy(change);
+                let each =
+                    weighted().try_for_each(|(b, w)| self.add_point(own, &u, b, w, Part::Shape(pressure)));
+                if stiffness {
+                    let mut changes = [[0.0; 3]; 8];
+                    for (b, w) in weighted() {
+                        add_volume_change(&mut changes, &gradient(&u, b), b, w);
+                    }
+                    add_dyad(&mut self.tangent, changes.as_flattened(), second / volume);
+                }
+                each
+            }
+        };
+        self.broken = found.err();
+    }
+
+    /// One evaluation point, with hourglass control where there is some.
+    fn fill_plain<const N: usize>(
+        &mut self,
+        own: Own<'_>,
+        block: &CellBlock<N>,
+        cell: usize,
+        displacement: impl Fn(u32) -> Vector<f64>,
+    ) -> Result<(), Broken> {
+        let u = moved(block, cell, displacement);
+        let rest = &block.rest[cell];
+        self.add_point(own, &u, &rest.gradient, rest.volume, Part::Whole)?;
+        if let Some(control) = &block.hourglass {
+            self.add_hourglass(control, cell, &u, own.stiffness);
+        }
+        Ok(())
+    }
+
+    fn add_hourglass<const N: usize>(
+        &mut self,
+        control: &Hourglass<f64, N>,
+        cell: usize,
+        u: &[Vector<f64>; N],
+        stiffness: bool,
+    ) {
+        let k = control.stiffness[cell];
+        for pattern in &control.patterns[cell] {
+            let mut q = [0.0; 3];
+            for (&u, &g) in u.iter().zip(pattern) {
+                q = add(q, scale(u, g));
+            }
+            self.energy += 0.5 * k * dot(q, q);
+            for (a, &g) in pattern.iter().enumerate() {
+                add_to(&mut self.force, a, scale(q, k * g));
+            }
+            if !stiffness {
+                continue;
+            }
+            for (b, &gb) in pattern.iter().enumerate() {
+                for (a, &ga) in pattern.iter().enumerate() {
+                    for c in 0..3 {
+                        self.tangent[(3 * b + c) * 3 * N + 3 * a + c] += k * ga * gb;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds a point of weight `w` [m³] with the gradients `shape` [1/m].
+    fn add_point<const N: usize>(
+        &mut self,
+        own: Own<'_>,
+        u: &[Vector<f64>; N],
+        shape: &[Vector<f64>; N],
+        w: f64,
+        part: Part,
+    ) -> Result<(), Broken> {
+        let h = gradient(u, shape);
+        let ratio = 1.0 + volume_change(&h);
+        if is_inverted(ratio) {
+            return Err(Broken::Inverted(ratio));
+        }
+        if let (AnyLaw::Corotational(law), Part::Whole) = (own.law, part) {
+            let tangent = own.stiffness.then_some(&mut self.tangent[..]);
+            self.energy += w * closed::add_point(law, &h, shape, w, &mut self.force, tangent)?;
+            return Ok(());
+        }
+        let deformation = Deformation::from_displacement_gradient(&h);
+        let energy = own.law.energy(&deformation, own.fibres);
+        let stress = part.of(own.law.stress(&deformation, own.fibres));
+        self.energy += w * energy.isochoric;
+        let mut piola = deformation.gradient.times_symmetric(&stress);
+        match part {
+            Part::Whole => self.energy += w * energy.volumetric,
+            Part::Shape(pressure) => piola = piola.plus_scaled(&deformation.gradient.cofactor(), pressure),
+        }
+        for (a, &b) in shape.iter().enumerate() {
+            add_to(&mut self.force, a, scale(piola.apply(b), w));
+        }
+        if own.stiffness {
+            let tangent = own.law.tangent(&h, own.fibres, |stress| part.of(stress));
+            add_material(&mut self.tangent, &deformation.gradient, &tangent, &stress, shape, w);
+            if let Part::Shape(pressure) = part {
+                add_pressure(&mut self.tangent, &deformation.gradient, shape, w * pressure);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a cell is made of.
+#[derive(Clone, Copy)]
+struct Own<'a> {
+    law: &'a AnyLaw,
+    fibres: &'a [Vector<f64>],
+    /// Whether the stiffness is wanted.
+    stiffness: bool,
+}
+
+/// What of a law a point takes.
+#[derive(Clone, Copy)]
+enum Part {
+    /// All of it.
+    Whole,
+    /// The change of shape, and the pressure U′ [Pa] of an average.
+    Shape(f64),
+}
+
+impl Part {
+    fn of(self, stress: Split<Symmetric<f64>>) -> Symmetric<f64> {
+        match self {
+            Self::Whole => stress.isochoric + stress.volumetric,
+            Self::Shape(_) => stress.isochoric,
+        }
+    }
+}
+
+/// Whether a determinant is zero, negative or not a number.
+fn is_inverted(determinant: f64) -> bool {
+    determinant.is_nan() || determinant <= 0.0
+}
+
+/// Displacements [m] of the nodes of a cell relative to its first one, which keeps the digits of small strains.
+fn moved<const N: usize>(
+    block: &CellBlock<N>,
+    cell: usize,
+    displacement: impl Fn(u32) -> Vector<f64>,
+) -> [Vector<f64>; N] {
+    let u = block.nodes[cell].map(displacement);
+    u.map(|own| sub(own, u[0]))
+}
+
+/// ∂u/∂X.
+fn gradient(u: &[Vector<f64>], shape: &[Vector<f64>]) -> Tensor<f64> {
+    let mut h = Tensor::ZERO;
+    for (&u, &b) in u.iter().zip(shape) {
+        h.add_outer(u, b);
+    }
+    h
+}
+
+/// J − 1 without cancellation.
+fn volume_change(h: &Tensor<f64>) -> f64 {
+    h.trace() + h.second_invariant() + h.determinant()
+}
+
+fn add_to(force: &mut [f64], node: usize, by: Vector<f64>) {
+    for (own, by) in force[3 * node..3 * node + 3].iter_mut().zip(by) {
+        *own += by;
+    }
+}
+
+/// Adds w cof F B_a, the derivative of w J by each node's place.
+fn add_volume_change(changes: &mut [Vector<f64>], h: &Tensor<f64>, shape: &[Vector<f64>], w: f64) {
+    let cofactor = with_identity(h).cofactor();
+    for (own, &b) in changes.iter_mut().zip(shape) {
+        *own = add(*own, scale(cofactor.apply(b), w));
+    }
+}
+
+fn with_identity(h: &Tensor<f64>) -> Tensor<f64> {
+    Tensor::IDENTITY.plus_scaled(h, 1.0)
+}
+
+/// Adds s v ⊗ v.
+fn add_dyad(tangent: &mut [f64], v: &[f64], s: f64) {
+    for (column, &x) in tangent.chunks_exact_mut(v.len()).zip(v) {
+        for (entry, &y) in column.iter_mut().zip(v) {
+            *entry += s * x * y;
+        }
+    }
+}
+
+/// Adds w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with 𝔹_a the change of the engineering strains with the place of a node.
+fn add_material<const N: usize>(
+    tangent: &mut [f64],
+    f: &Tensor<f64>,
+    d: &[[f64; 6]; 6],
+    stress: &Symmetric<f64>,
+    shape: &[Vector<f64>; N],
+    w: f64,
+) {
+    // Of each node its three columns of 𝔹: row i of F with B.
+    let strains = |b: &Vector<f64>| {
+        f.0.map(|row| {
+            [
+                row[0] * b[0],
+                row[1] * b[1],
+                row[2] * b[2],
+                row[0] * b[1] + row[1] * b[0],
+                row[1] * b[2] + row[2] * b[1],
+                row[0] * b[2] + row[2] * b[0],
+            ]
+        })
+    };
+    let all: [[[f64; 6]; 3]; N] = std::array::from_fn(|a| strains(&shape[a]));
+    for (b, own) in all.iter().enumerate() {
+        let pulled = scale(stress.apply(shape[b]), w);
+        for (k, column) in own.iter().enumerate() {
+            let stressed: [f64; 6] = d.map(|row| w * row.iter().zip(column).map(|(d, e)| d * e).sum::<f64>());
+            let start = (3 * b + k) * 3 * N;
+            for (a, other) in all.iter().enumerate() {
+                for (i, row) in other.iter().enumerate() {
+                    tangent[start + 3 * a + i] += row.iter().zip(&stressed).map(|(e, s)| e * s).sum::<f64>();
+                }
+                tangent[start + 3 * a + k] += dot(shape[a], pulled);
+            }
+        }
+    }
+}
+
+/// Adds how p cof F B_a changes: p ε_ikm (F (B_a × B_b))_m between component i of node a and k of b.
+fn add_pressure<const N: usize>(tangent: &mut [f64], f: &Tensor<f64>, shape: &[Vector<f64>; N], p: f64) {
+    for b in 0..N {
+        for a in 0..N {
+            let [x, y, z] = scale(f.apply(cross(shape[a], shape[b])), p);
+            let block = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+            for (k, column) in block.iter().enumerate() {
+                for (i, entry) in column.iter().enumerate() {
+                    tangent[(3 * b + k) * 3 * N + 3 * a + i] += entry;
+                }
+            }
+        }
+    }
+}
+
+/// Why a solid has no place in a model with stiffness; `None` if it has.
+pub(crate) fn refusal(solid: &Solid) -> Option<&'static str> {
+    let averaging = match &solid.cells {
+        Cells::AveragedTet4(_, averaging) => Some(averaging),
+        _ => None,
+    };
+    match averaging {
+        Some(Averaging::Variational) => Some(
+            "`tet4-ianp` couples each tetrahedron with two rings of neighbours, which no stiffness is made for; take `tet4-anp`",
+        ),
+        Some(Averaging::NiftySim) => Some("this average is not the gradient of an energy; take `tet4-anp`"),
+        _ if !solid.material.prony.is_elastic() => {
+            Some("its law relaxes; take a law without `prony`, or the solver `quasi-static` or `explicit`")
+        }
+        _ if solid.cells.averages_pressure() && !solid.material.law.has_volumetric_energy() => Some(
+            "its element averages the pressure, and its law has no energy of the volume alone; take `tet4` or `hex8`",
+        ),
+        _ => None,
+    }
+}
+
+/// An upper bound of a cell's ω² [1/s²] at rest by itself, with its lumped mass: (M V Σ|B|² + k Σγ²)/m, M the longitudinal modulus.
+pub(crate) fn highest_frequency_squared(solid: &Solid, cell: usize) -> f64 {
+    let cells = &solid.cells;
+    let share = solid.material.density * cells.volume(cell) / cells.nodes_per_cell() as f64;
+    let uniform =
+        solid.material.law.longitudinal_modulus() * cells.volume(cell) * cells.gradient_square_sum(cell);
+    let control = match cells {
+        Cells::Hex8(CellBlock { hourglass: Some(control), .. }) => {
+            control.stiffness[cell] * control.patterns[cell].iter().flatten().map(|g| g * g).sum::<f64>()
+        }
+        Cells::FullHex8(_, points) => {
+            // Beyond the mean gradients: Σ w |B|² of the points.
+            let of_points = points[cell].gradient.iter().zip(points[cell].weight);
+            let sum: f64 = of_points.map(|(b, w)| w * b.iter().flatten().map(|x| x * x).sum::<f64>()).sum();
+            solid.material.law.longitudinal_modulus() * sum - uniform
+        }
+        _ => 0.0,
+    };
+    (uniform + control) / share
+}

@@ -1,0 +1,226 @@
+//! The battery of solids: every element with laws of every kind.
+
+use nalgebra::Vector3;
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::law::{AnyLaw, samples};
+use pliant_mechanics::model::{Averaging, Cells, Material, Solid};
+use pliant_mechanics::prony::{Prony, PronyTerm, PronyUpdate};
+use pliant_testing::Random;
+use serde_json::json;
+
+use crate::facet::Tangent;
+use crate::linear::LinearSolver;
+use crate::system::System;
+use crate::tests::bar;
+use crate::{
+    BackwardEuler, Constraint, DynamicSettings, Load, LoadKind, Model, ModelError, Motion, State,
+    StaticSettings, Statics,
+};
+
+const ELEMENTS: [&str; 4] = ["tet4", "tet4-anp", "hex8", "hex8-full"];
+
+fn law(name: &str) -> AnyLaw {
+    let parameters = match name {
+        "st-venant-kirchhoff" | "corotational" => json!({ "young-modulus": 1e4, "poisson-ratio": 0.3 }),
+        "transversely-isotropic" => {
+            json!({ "young-modulus": 1e4, "poisson-ratio": 0.45, "fibre-modulus": 5e3 })
+        }
+        "ogden" => {
+            json!({ "terms": [samples::term(2e3, 2.5), samples::term(1e3, -3.0)], "poisson-ratio": 0.4 })
+        }
+        _ => json!({ "young-modulus": 1e4, "poisson-ratio": 0.45 }),
+    };
+    samples::law(name, parameters)
+}
+
+/// The nodes of the hexahedra of a bar, in the order of its points.
+fn hexes([nx, ny, nz]: [usize; 3]) -> Vec<[u32; 8]> {
+    let number = |i: usize, j: usize, k: usize| (i + (nx + 1) * (j + (ny + 1) * k)) as u32;
+    let cell = |cell: usize| {
+        let [i, j, k] = [cell % nx, cell / nx % ny, cell / nx / ny];
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+            .map(|[x, y, z]| number(i + x, j + y, k + z))
+    };
+    (0..nx * ny * nz).map(cell).collect()
+}
+
+/// A block of counts of cells with sides [m], its inner geometry a little irregular.
+fn block(element: &str, law: AnyLaw, counts: [usize; 3], sides: [f64; 3]) -> Model {
+    let (mut points, tets) = bar(counts, sides);
+    let mut random = Random::new(7);
+    for point in &mut points {
+        *point += Vector3::from(random.vector()) * 0.05 * sides[0] / counts[0] as f64;
+    }
+    let rest: Vec<[f64; 3]> = points.iter().map(|&x| x.into()).collect();
+    let cells = match element {
+        "tet4" => Cells::tet4(tets, &rest),
+        "tet4-anp" => Cells::averaged_tet4(tets, &rest, Averaging::Nodal),
+        "hex8" => Cells::hex8(hexes(counts), &rest, 0.2, law.small_strain().shear),
+        _ => Cells::full_hex8(hexes(counts), &rest),
+    };
+    let fibre = vec![[0.6, 0.0, 0.8]; law.families() * cells.len()];
+    let solid = Solid { fibre, ..Solid::new(0, Material::elastic(law, 1000.0), cells) };
+    let mut model = Model::new(points);
+    model.add_solid("block", solid).unwrap();
+    model
+}
+
+/// Every element with laws of every kind that it takes.
+fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let laws = ["neo-hookean", "st-venant-kirchhoff", "ogden", "transversely-isotropic", "corotational"];
+    let pairs = ELEMENTS.into_iter().flat_map(move |element| laws.map(|law| (element, law)));
+    pairs.filter(|(element, name)| matches!(*element, "tet4" | "hex8") || law(name).has_volumetric_energy())
+}
+
+/// Central differences at a state of strains up to 20 %, turned far: force from energy and stiffness from force to 1e-7 of their largest.
+#[test]
+fn force_and_stiffness_are_derivatives() {
+    for (element, name) in all() {
+        let model = block(element, law(name), [2, 1, 2], [0.2, 0.1, 0.2]);
+        let mut random = Random::new(1);
+        let mut state = State::at_rest(&model);
+        let turn = crate::rotation::exponential(&Vector3::new(1.0, -2.0, 0.5));
+        for x in &mut state.position {
+            *x = turn * (*x + 0.008 * Vector3::from(random.vector()));
+        }
+        let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
+        let still = vec![0.0; 6 * model.rest.len()];
+        system.evaluate(&state, 0.0, Some((Tangent::Full, &still))).unwrap();
+        let (force, size) = (system.internal.clone(), system.equations.len());
+        let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
+        let mut predicted = vec![0.0; size];
+        system.matrix.multiply_values(&system.matrix.value, &along, &mut predicted);
+        let h = 1e-7;
+        let mut at = |by: f64| {
+            let mut moved = vec![0.0; 6 * model.rest.len()];
+            system.spread(&along, &mut moved);
+            let mut state = state.clone();
+            state.advance(&moved, by);
+            system.evaluate(&state, 0.0, None).unwrap();
+            (system.energy, system.internal.clone())
+        };
+        let (ahead, behind) = (at(h), at(-h));
+        let gather = |all: &[f64]| {
+            let mut own = vec![0.0; size];
+            system.gather(all, &mut own);
+            own
+        };
+        let work: f64 = gather(&force).iter().zip(&along).map(|(f, d)| f * d).sum();
+        let slope = (ahead.0 - behind.0) / (2.0 * h);
+        assert!((slope - work).abs() < 1e-6 * work.abs(), "{element} {name}: {slope} for {work}");
+        let largest = predicted.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+        let found = gather(&ahead.1).into_iter().zip(gather(&behind.1)).map(|(a, b)| (a - b) / (2.0 * h));
+        for (found, predicted) in found.zip(&predicted) {
+            assert!((found - predicted).abs() < 1e-7 * largest, "{element} {name}: {found} for {predicted}");
+        }
+    }
+}
+
+fn nodes_at(model: &Model, x: f64) -> Vec<u32> {
+    (0..model.rest.len() as u32).filter(|&n| (model.rest[n as usize].x - x).abs() < 0.02).collect()
+}
+
+/// Clamped at x = 0, pushed to the side at its other end.
+fn cantilever(element: &str, law: AnyLaw, force: f64, to: f64) -> Model {
+    let mut model = block(element, law, [6, 2, 2], [0.3, 0.1, 0.1]);
+    let held = nodes_at(&model, 0.0);
+    let clamp =
+        Constraint { name: "clamp".into(), nodes: held, components: [true; 6], motion: Motion::Fixed };
+    model.constraints.push(clamp);
+    let pushed = nodes_at(&model, 0.3);
+    let force = Vector3::new(0.0, 0.0, force) / pushed.len() as f64;
+    let kind = LoadKind::Force { nodes: pushed, force };
+    let curve = Curve { shape: Shape::Ramp, from: 0.0, to };
+    model.loads.push(Load { name: "push".into(), kind, curve, controlled: false });
+    model
+}
+
+/// Residuals of a load in one step fall with the square near the equilibrium, 5 to 20 % of the length away; all elements and laws.
+#[test]
+fn newtons_method_converges_quadratically() {
+    for (element, name) in all() {
+        let model = cantilever(element, law(name), 0.5, 1.0);
+        let mut state = State::at_rest(&model);
+        let settings = StaticSettings { tolerance: 1e-12, ..StaticSettings::default() };
+        let step = Statics::new(model.clone(), settings).unwrap().solve(&mut state, 1.0).unwrap();
+        let end = nodes_at(&model, 0.3)[0] as usize;
+        println!("{element} {name}: {:.4} m, {:?}", state.displacement(&model, end).z, step.residuals);
+        assert!(state.displacement(&model, end).z > 0.015 && step.parts == 1, "{element} {name}");
+        // Over the load: r' < 10 r² where that is above round-off. A factor of a tenth an iteration would leave 1e-5 of 1e-4.
+        let relative: Vec<f64> = step.residuals.iter().map(|r| r / step.residuals[0]).collect();
+        let close = relative.windows(2).filter(|r| (1e-5..0.1).contains(&r[0]));
+        let checked =
+            close.inspect(|r| assert!(r[1] < 10.0 * r[0] * r[0], "{element} {name}: {relative:?}")).count();
+        assert!(checked > 0, "{element} {name}: {relative:?}");
+    }
+}
+
+/// A push that grows with time, backward Euler: half the step, half the error.
+#[test]
+fn steps_of_backward_euler_are_of_first_order() {
+    for element in ELEMENTS {
+        let model = cantilever(element, law("neo-hookean"), 1.0, 0.2);
+        let at_end = |steps: u32| {
+            let mut state = State::at_rest(&model);
+            let settings =
+                DynamicSettings { tolerance: 1e-6, ..DynamicSettings::new(0.2 / f64::from(steps)) };
+            let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
+            (0..steps).for_each(|_| drop(solver.advance(&mut state).unwrap()));
+            state.position
+        };
+        let finest = at_end(256);
+        let error = |steps: u32| {
+            let off = at_end(steps).into_iter().zip(&finest).map(|(a, b)| (a - b).norm());
+            off.fold(0.0, f64::max)
+        };
+        let (coarse, fine) = (error(16), error(32));
+        println!("{element}: {coarse:.3e}, {fine:.3e} m");
+        // The finest has an eighth of the fine error itself: 2 becomes (1 − 1/16)/(1/2 − 1/16) = 2.14.
+        assert!((1.9..2.4).contains(&(coarse / fine)), "{element}: {}", coarse / fine);
+    }
+}
+
+#[test]
+fn solids_without_stiffness_and_broken_ones_are_refused() {
+    let plain = law("neo-hookean");
+    let (points, tets) = bar([1, 1, 1], [0.1; 3]);
+    let rest: Vec<[f64; 3]> = points.iter().map(|&x| x.into()).collect();
+    let with = |cells: Cells, material: Material| {
+        Model::new(points.clone()).add_solid("block", Solid::new(0, material, cells))
+    };
+    let wide = Cells::averaged_tet4(tets.clone(), &rest, Averaging::Variational);
+    let refused = with(wide, Material::elastic(plain, 1000.0)).unwrap_err();
+    assert!(refused.to_string().contains("`block`: `tet4-ianp` couples"), "{refused}");
+    let term = PronyTerm { part: pliant_mechanics::prony::Part::Isochoric, weight: 0.5, time: 1.0 };
+    let prony = Prony::new(&[term], PronyUpdate::Exact).unwrap();
+    let relaxing = Material { prony, ..Material::elastic(plain, 1000.0) };
+    let refused = with(Cells::tet4(tets.clone(), &rest), relaxing).unwrap_err();
+    assert!(refused.to_string().contains("its law relaxes"), "{refused}");
+    let anp = Cells::averaged_tet4(tets.clone(), &rest, Averaging::Nodal);
+    let refused = with(anp, Material::elastic(law("corotational"), 1000.0)).unwrap_err();
+    assert!(refused.to_string().contains("no energy of the volume alone"), "{refused}");
+    let light = with(Cells::tet4(tets.clone(), &rest), Material::elastic(plain, 0.0));
+    assert!(matches!(light, Err(ModelError::OutOfRange { .. })));
+    let [a, b, c, d] = tets[0];
+    let inverted = with(Cells::tet4(vec![[b, a, c, d]], &rest), Material::elastic(plain, 1000.0));
+    assert!(matches!(inverted, Err(ModelError::Degenerate { what: "volume", .. })), "{inverted:?}");
+    let far = with(Cells::tet4(vec![tets[0]], &rest), Material::elastic(plain, 1000.0));
+    assert!(far.is_ok());
+}
+
+/// A cell turned inside out, and a hexahedron with one corner pushed through, are reported with their numbers.
+#[test]
+fn inverted_cells_are_reported() {
+    for element in ELEMENTS {
+        let model = block(element, law("neo-hookean"), [2, 1, 1], [0.2, 0.1, 0.1]);
+        let mut state = State::at_rest(&model);
+        // A corner that only the second half of the block has.
+        let corner = nodes_at(&model, 0.2)[0] as usize;
+        state.position[corner].x -= 0.15;
+        let mut system = System::forces_only(model.clone().into());
+        let error = system.evaluate(&state, 0.0, None).unwrap_err();
+        let Some((cell, crate::Broken::Inverted(determinant))) = error.broken() else { panic!("{error}") };
+        let half = model.solids[0].cells.len() / 2;
+        assert!(determinant < 0.0 && (half..2 * half).contains(&cell), "{element}: {cell} {determinant}");
+    }
+}

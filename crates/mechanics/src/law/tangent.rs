@@ -1,0 +1,53 @@
+//! The tangent of a law, D = ∂S/∂ε with the engineering strains ε = (E₁₁, E₂₂, E₃₃, 2E₁₂, 2E₂₃, 2E₁₃), by central differences along
+//! δF = F⁻ᵀ δE, for which δC = 2 δE up to terms that cancel. Right for every law, to 1e-9 of its largest entry: nothing but the
+//! stress is asked of a law. Twelve stresses a tangent.
+
+use super::{AnyLaw, Deformation, Split};
+use crate::tensor::{Symmetric, Tensor, Vector};
+
+/// Size of the differences of strain: truncation and round-off both near 1e-10.
+const DIFFERENCE: f64 = 1e-5;
+
+/// Rows and columns of the components 11, 22, 33, 12, 23, 13.
+const COMPONENTS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [0, 2]];
+
+impl AnyLaw {
+    /// D [Pa] of a part of the stress, in the order 11, 22, 33, 12, 23, 13, symmetric. `h` is the displacement gradient; its J must
+    /// be positive.
+    pub fn tangent(
+        &self,
+        h: &Tensor<f64>,
+        fibres: &[Vector<f64>],
+        part: impl Fn(Split<Symmetric<f64>>) -> Symmetric<f64>,
+    ) -> [[f64; 6]; 6] {
+        let f = Deformation::from_displacement_gradient(h).gradient;
+        let inverse_transposed = f.cofactor().scaled(1.0 / f.determinant());
+        let mut columns = [[0.0; 6]; 6];
+        for (column, [i, j]) in columns.iter_mut().zip(COMPONENTS) {
+            // δε = DIFFERENCE in one component, the shears half in each of two places.
+            let mut strain = Tensor::ZERO;
+            strain.0[i][j] = 0.5 * DIFFERENCE;
+            strain.0[j][i] += 0.5 * DIFFERENCE;
+            let mut change = Tensor::ZERO;
+            for (out, row) in change.0.iter_mut().zip(inverse_transposed.0) {
+                // The rows of F⁻ᵀ δE; δE is symmetric.
+                *out = strain.apply(row);
+            }
+            let stress = |by: f64| {
+                let moved = Deformation::from_displacement_gradient(&h.plus_scaled(&change, by));
+                part(self.stress(&moved, fibres))
+            };
+            let (ahead, behind) = (stress(1.0), stress(-1.0));
+            for (entry, (a, b)) in column.iter_mut().zip(ahead.0.into_iter().zip(behind.0)) {
+                *entry = (a - b) / (2.0 * DIFFERENCE);
+            }
+        }
+        let mut symmetric = columns;
+        for (p, row) in symmetric.iter_mut().enumerate() {
+            for (q, entry) in row.iter_mut().enumerate() {
+                *entry = 0.5 * (columns[p][q] + columns[q][p]);
+            }
+        }
+        symmetric
+    }
+}

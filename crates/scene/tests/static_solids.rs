@@ -1,0 +1,206 @@
+//! Solids of any law with the solvers `static` and `implicit`: the same equilibria as by dynamic relaxation, shells beside them in one
+//! system of equations, a resumed run with the same bits, and what is refused.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use pliant_geometry::{CellKind, io};
+use pliant_scene::source::Source;
+use pliant_scene::{Checkpoint, Options, OutputFolder, Scene, Summary, World};
+
+/// A block of 100 × 50 × 50 mm, held at one end, turned and pulled at the other, pressed from above, under its weight.
+fn block(solver: &str, element: &str, law: &str, more: &str) -> String {
+    let cells = if element.starts_with("tet") { "tets" } else { "hexes" };
+    format!(
+        "[scene]\nuntil = 1\ngravity = [0, 0, -9.81]\n[run]\n{solver}\n\
+         [law.tissue]\n{law}\n\
+         [body.block]\nmesh = {{ block = {{ size = [0.1, 0.05, 0.05], cells = [4, 2, 2] }}, as = '{cells}' }}\n\
+         element = '{element}'\nlaw = 'tissue'\ndensity = 1000\n{more}\n\
+         [constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = {{ set = 'x-min' }}\n\
+         [constraint.end]\ntype = 'move'\nbody = 'block'\nnodes = {{ set = 'x-max' }}\n\
+         rotate = {{ axis = [1, 0, 0], angle = 0.3, centre = [0.1, 0.025, 0.025] }}\nto = 1\n\
+         [load.top]\ntype = 'pressure'\non = 'block'\nfaces = {{ set = 'z-max' }}\npressure = 400\nto = 1\n\
+         [output.history]\ntype = 'csv'\nevery = 1\n\
+         probes.a = {{ on = 'block', at = [0.05, 0, 0.05], data = ['displacement', 'pk2-stress', 'J'] }}\n\
+         probes.b = {{ on = 'block', at = [0.075, 0.05, 0.025], data = ['displacement', 'cauchy-stress'] }}\n\
+         probes.c = {{ on = 'block', at = [0.025, 0.025, 0.05], data = ['displacement', 'energy-density'] }}\n"
+    )
+}
+
+fn scene(text: &str) -> Result<Scene, String> {
+    let source = Source::parse("block.toml", text.to_owned()).map_err(|errors| errors.plain().to_string())?;
+    Scene::from_source(source, ".".into()).map_err(|errors| errors.plain().to_string())
+}
+
+fn world(text: &str) -> Result<World, String> {
+    World::new(&scene(text)?).map_err(|errors| errors.plain().to_string())
+}
+
+fn run(text: &str, folder: &Path) -> Summary {
+    let world = world(text).unwrap_or_else(|errors| panic!("{errors}"));
+    let folder = OutputFolder::prepare(folder.to_owned(), &world.scene, false).unwrap();
+    let summary = pliant_scene::run(&world, &folder, &mut |_| ()).unwrap();
+    assert_eq!(summary.status, "done", "{:?}", summary.error);
+    summary
+}
+
+/// The last row of the table of a run, by the names of its columns.
+fn last_row(text: &str) -> BTreeMap<String, f64> {
+    let out = tempfile::tempdir().unwrap();
+    run(text, &out.path().join("out"));
+    let table = fs::read_to_string(out.path().join("out/history.csv")).unwrap();
+    let names = table.lines().next().unwrap().split(',').map(str::to_owned);
+    names.zip(table.lines().last().unwrap().split(',').map(|value| value.parse().unwrap())).collect()
+}
+
+const MATRIX: &str = "young-modulus = 1e4\npoisson-ratio = 0.45";
+const COMPRESSIBLE: &str = "young-modulus = 1e4\npoisson-ratio = 0.3";
+
+/// The displacements of `static` are those of `quasi-static` to 1e-6 of the largest, its stresses to 1e-5, its reactions too.
+#[test]
+fn static_equilibria_are_those_of_dynamic_relaxation() {
+    let ogden = "type = 'ogden'\npoisson-ratio = 0.45\n\
+                 terms = [{ shear-modulus = 2.4e3, exponent = 2.5 }, { shear-modulus = 1e3, exponent = -3.0 }]";
+    let fibres =
+        format!("type = 'transversely-isotropic'\n{MATRIX}\nfibre-modulus = 5e3\nfibre = [0.8, 0.0, 0.6]");
+    let named = |name: &str, moduli: &str| format!("type = '{name}'\n{moduli}");
+    for (element, law) in [
+        ("tet4", named("neo-hookean", MATRIX)),
+        ("tet4", named("st-venant-kirchhoff", COMPRESSIBLE)),
+        ("tet4", named("corotational", COMPRESSIBLE)),
+        ("tet4-anp", named("neo-hookean", MATRIX)),
+        ("tet4-anp", fibres.clone()),
+        ("hex8", ogden.into()),
+        ("hex8", named("gent", &format!("{MATRIX}\nlimit = 30"))),
+        ("hex8", named("corotational", COMPRESSIBLE)),
+        ("hex8-full", fibres),
+        ("hex8-full", named("neo-hookean", "young-modulus = 1e4\npoisson-ratio = 0.49")),
+    ] {
+        let newton =
+            last_row(&block("solver = 'static'\nload-steps = 2\ntolerance = 1e-10", element, &law, ""));
+        let relaxed =
+            last_row(&block("solver = 'quasi-static'\nload-steps = 2\ntolerance = 1e-9", element, &law, ""));
+        for (field, limit) in [
+            ("displacement", 1e-6),
+            ("stress", 1e-5),
+            ("energy-density", 1e-5),
+            (".J", 1e-6),
+            ("reaction.", 1e-5),
+        ] {
+            let of_field = || newton.iter().filter(|(name, _)| name.contains(field));
+            let largest = of_field().map(|(_, value)| value.abs()).fold(0.0, f64::max);
+            let off = of_field().map(|(name, value)| (value - relaxed[name]).abs()).fold(0.0, f64::max);
+            println!("{element} {}: {field} {:.1e}", law.lines().next().unwrap(), off / largest);
+            assert!(
+                largest > 0.0 && off < limit * largest,
+                "{element} {law}: {field} {off:e} of {largest:e}"
+            );
+        }
+    }
+}
+
+/// Backward Euler with damping comes to rest in the equilibrium.
+#[test]
+fn implicit_motion_comes_to_rest_in_the_equilibrium() {
+    let law = format!("type = 'neo-hookean'\n{MATRIX}");
+    let still = last_row(&block("solver = 'static'", "hex8", &law, ""));
+    let moving = block("solver = 'implicit'\nstep = 0.05", "hex8", &law, "damping = 20")
+        .replace("until = 1", "until = 4")
+        .replace("every = 1", "every = 4");
+    let moved = last_row(&moving);
+    for (name, value) in still.iter().filter(|(name, _)| name.contains("displacement")) {
+        assert!((value - moved[name]).abs() < 1e-6, "{name}: {value} and {}", moved[name]);
+    }
+    assert!(moved["energy.kinetic"] < 1e-9 * moved["energy.internal"], "{moved:?}");
+}
+
+const WALL: &str = "[law.wall]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\npoisson-ratio = 0.3\n\
+    [body.wall]\nmodel = 'shell'\nmesh = { plate = { size = [0.1, 0.05], cells = [4, 2] }, at = [0, 0, 0.1] }\n\
+    law = 'wall'\ndensity = 1000\nthickness = 1e-3\n\
+    [constraint.rim]\ntype = 'fix'\nbody = 'wall'\nnodes = { set = 'x-min' }\n\
+    [output.fields]\ntype = 'vtu'\nevery = 1\ndata = ['displacement', 'von-mises', 'pk2-stress', 'thickness']\n";
+
+/// In one participant, a shell and a solid that do not touch move as in scenes of their own; one file shows both.
+#[test]
+fn shells_and_solids_go_together() {
+    let law = format!("type = 'neo-hookean'\n{MATRIX}");
+    let alone = block("solver = 'static'\ntolerance = 1e-10", "hex8", &law, "");
+    let both = alone.clone() + WALL;
+    assert_eq!(world(&both).unwrap().participants.len(), 1);
+    let out = tempfile::tempdir().unwrap();
+    run(&both, out.path());
+    let frame =
+        fs::read_dir(out.path().join("fields")).unwrap().map(|entry| entry.unwrap().path()).max().unwrap();
+    let mesh = io::read(&frame).unwrap().mesh;
+    let of = |kind: CellKind, name: &str| mesh.block(kind).unwrap().data[name].values.clone();
+    assert_eq!((of(CellKind::Triangle, "body")[0], of(CellKind::Hex, "body")[0]), (1.0, 0.0));
+    assert!(of(CellKind::Hex, "von-mises").iter().all(|value| *value > 0.0));
+    assert!(of(CellKind::Triangle, "thickness").iter().all(|value| *value == 1e-3));
+    let has = |kind: CellKind, name: &str| mesh.block(kind).unwrap().data.contains_key(name);
+    assert!(!has(CellKind::Hex, "thickness") && !has(CellKind::Triangle, "pk2-stress"));
+    let (own, together) = (last_row(&alone), last_row(&both));
+    for (name, value) in own.iter().filter(|(name, _)| name.starts_with("probe")) {
+        assert!((value - together[name]).abs() <= 1e-7 * value.abs().max(1e-3), "{name}: {value}");
+    }
+}
+
+#[test]
+fn a_resumed_run_of_solids_ends_in_the_same_bits() {
+    let law = format!("type = 'neo-hookean'\n{MATRIX}");
+    for solver in ["solver = 'implicit'\nstep = 0.05", "solver = 'static'\nstep = 0.05"] {
+        let text =
+            block(&format!("{solver}\ncheckpoint = {{ every = 0.4 }}"), "tet4-anp", &law, "damping = 5");
+        let place = tempfile::tempdir().unwrap();
+        run(&text, &place.path().join("whole"));
+        run(&text.replace("until = 1", "until = 0.4"), &place.path().join("half"));
+        let checkpoint = Checkpoint::read(&place.path().join("half")).unwrap();
+        let onward = checkpoint.continues(&world(&text).unwrap()).unwrap();
+        let folder = OutputFolder::reopen(place.path().join("half"), &onward.scene, &checkpoint).unwrap();
+        let options = Options { resume: Some(&checkpoint), ..Options::default() };
+        let summary = pliant_scene::run_with(&onward, &folder, options, &mut |_| ()).unwrap();
+        assert_eq!(summary.status, "done", "{:?}", summary.error);
+        let [a, b] = ["whole", "half"]
+            .map(|name| fs::read_to_string(place.path().join(name).join("history.csv")).unwrap());
+        assert_eq!(a.lines().last(), b.lines().last(), "{solver}");
+    }
+}
+
+#[test]
+fn bodies_that_the_solver_cannot_take_are_refused_by_name() {
+    let plain = format!("type = 'neo-hookean'\n{MATRIX}");
+    let relaxing = format!("{plain}\nprony = [{{ part = 'isochoric', weight = 0.5, time = 1.0 }}]");
+    let newton = "solver = 'static'";
+    for (text, pieces) in [
+        (block(newton, "tet4", &relaxing, ""), ["solver `static` is not for this body", "its law relaxes"]),
+        (block(newton, "tet4-ianp", &plain, ""), ["`tet4-ianp` couples", "take `tet4-anp`"]),
+        (
+            block("solver = 'static'\nprecision = 'single'", "tet4", &plain, ""),
+            ["`solver = \"static\"` are computed in double", ""],
+        ),
+        (
+            block("solver = 'explicit'\nlinear = 'direct'", "tet4", &plain, ""),
+            ["`linear` is for `solver =", ""],
+        ),
+        (
+            block("solver = 'explicit'", "tet4", &plain, "initial-displacement = { point-data = 'u' }"),
+            ["`initial-displacement` is for shells and the solvers", ""],
+        ),
+        (
+            block(newton, "tet4", &plain, "").replace(
+                "[constraint.base]\ntype = 'fix'",
+                "[constraint.base]\ntype = 'fix'\ncomponents = ['x']",
+            ),
+            ["", ""],
+        ),
+    ] {
+        match world(&text) {
+            Err(told) => assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}"),
+            Ok(_) => assert_eq!(pieces, ["", ""], "{text}"),
+        }
+    }
+    let loose = block(newton, "tet4", &plain, "");
+    let loose = &loose[..loose.find("[constraint.base]").unwrap()];
+    let told = world(loose).unwrap_err();
+    assert!(told.contains("`block` is free in 6 rigid motions of 6"), "{told}");
+}
