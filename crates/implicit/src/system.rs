@@ -445,10 +445,12 @@ impl System {
     /// the faces close or end at held nodes.
     fn press_faces(&mut self, state: &State, time: f64, moved: &[f64]) {
         let model = Arc::clone(&self.model);
-        let mut load_number = 0;
-        for load in &model.loads {
-            let LoadKind::FacePressure { faces, pressure } = &load.kind else { continue };
-            let places = std::mem::take(&mut self.face_places[load_number]);
+        let pressing = model.loads.iter().filter_map(|load| match &load.kind {
+            LoadKind::FacePressure { faces, pressure } => Some((load, faces, pressure)),
+            _ => None,
+        });
+        for (number, (load, faces, pressure)) in pressing.enumerate() {
+            let places = std::mem::take(&mut self.face_places[number]);
             let factor = if load.controlled { state.load_factor } else { 1.0 } * load.curve.value(time);
             for (face, places) in faces.iter().zip(&places) {
                 let nodes = corners(face);
@@ -462,8 +464,7 @@ impl System {
                 }
                 self.add_at(nodes, places, &tangent, moved);
             }
-            self.face_places[load_number] = places;
-            load_number += 1;
+            self.face_places[number] = places;
         }
     }
 

@@ -337,23 +337,22 @@ pub(crate) fn refusal(solid: &Solid) -> Option<&'static str> {
     }
 }
 
-/// An upper bound of a cell's ω² [1/s²] at rest by itself, with its lumped mass: (M V Σ|B|² + k Σγ²)/m, M the longitudinal modulus.
+/// An upper bound of a cell's ω² [1/s²] at rest by itself, with its lumped mass: (M Σ w |B|² + k Σγ²)/m, M the longitudinal modulus.
 pub(crate) fn highest_frequency_squared(solid: &Solid, cell: usize) -> f64 {
     let cells = &solid.cells;
     let share = solid.material.density * cells.volume(cell) / cells.nodes_per_cell() as f64;
-    let uniform =
-        solid.material.law.longitudinal_modulus() * cells.volume(cell) * cells.gradient_square_sum(cell);
+    let squares = match cells {
+        Cells::FullHex8(_, points) => {
+            let square = |b: &[Vector<f64>; 8]| b.iter().map(|&b| dot(b, b)).sum::<f64>();
+            points[cell].gradient.iter().zip(points[cell].weight).map(|(b, w)| w * square(b)).sum()
+        }
+        _ => cells.volume(cell) * cells.gradient_square_sum(cell),
+    };
     let control = match cells {
         Cells::Hex8(CellBlock { hourglass: Some(control), .. }) => {
             control.stiffness[cell] * control.patterns[cell].iter().flatten().map(|g| g * g).sum::<f64>()
         }
-        Cells::FullHex8(_, points) => {
-            // Beyond the mean gradients: Σ w |B|² of the points.
-            let of_points = points[cell].gradient.iter().zip(points[cell].weight);
-            let sum: f64 = of_points.map(|(b, w)| w * b.iter().flatten().map(|x| x * x).sum::<f64>()).sum();
-            solid.material.law.longitudinal_modulus() * sum - uniform
-        }
         _ => 0.0,
     };
-    (uniform + control) / share
+    (solid.material.law.longitudinal_modulus() * squares + control) / share
 }

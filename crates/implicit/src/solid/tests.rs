@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, samples};
+use pliant_mechanics::load::NO_NODE;
 use pliant_mechanics::model::{Averaging, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyTerm, PronyUpdate};
 use pliant_testing::Random;
@@ -112,6 +113,70 @@ fn force_and_stiffness_are_derivatives() {
         let found = gather(&ahead.1).into_iter().zip(gather(&behind.1)).map(|(a, b)| (a - b) / (2.0 * h));
         for (found, predicted) in found.zip(&predicted) {
             assert!((found - predicted).abs() < 1e-7 * largest, "{element} {name}: {found} for {predicted}");
+        }
+    }
+}
+
+/// The same of pressures on closed faces, whose stiffness is symmetric: a hexahedron's quads, a tetrahedron's triangles.
+#[test]
+fn pressures_on_faces_have_their_stiffness() {
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = [[0, 2, 1, NO_NODE], [0, 1, 3, NO_NODE], [1, 2, 3, NO_NODE], [0, 3, 2, NO_NODE]];
+    for (element, faces) in [("hex8", quads.to_vec()), ("tet4", triangles.to_vec())] {
+        let mut model = match element {
+            "hex8" => block("hex8", law("neo-hookean"), [1, 1, 1], [0.1; 3]),
+            _ => {
+                let rest = [[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
+                let mut model = Model::new(rest.map(Vector3::from).to_vec());
+                let cells = Cells::tet4(vec![[0, 1, 2, 3]], &rest);
+                let solid = Solid::new(0, Material::elastic(law("neo-hookean"), 1000.0), cells);
+                model.add_solid("tet", solid).unwrap();
+                model
+            }
+        };
+        let stiffness = |model: &Model, state: &State| {
+            let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
+            let still = vec![0.0; 6 * model.rest.len()];
+            system.evaluate(state, 1.0, Some((Tangent::Full, &still))).unwrap();
+            system
+        };
+        let mut random = Random::new(3);
+        let mut state = State::at_rest(&model);
+        state.position.iter_mut().for_each(|x| *x += 0.01 * Vector3::from(random.vector()));
+        let bare = stiffness(&model, &state);
+        let kind = LoadKind::FacePressure { faces, pressure: 1e5 };
+        let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
+        model.loads.push(Load { name: "press".into(), kind, curve, controlled: false });
+        let mut pressed = stiffness(&model, &state);
+        let size = pressed.equations.len();
+        let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
+        let mut predicted = vec![0.0; size];
+        let own: Vec<f64> = pressed
+            .matrix
+            .value
+            .iter()
+            .zip(&bare.matrix.value)
+            .map(|(with, without)| with - without)
+            .collect();
+        pressed.matrix.multiply_values(&own, &along, &mut predicted);
+        let sum: f64 = pressed.external.iter().sum();
+        assert!(sum.abs() < 1e-10, "{element}: closed faces push with {sum} N");
+        let h = 1e-6;
+        let mut at = |by: f64| {
+            let mut moved = vec![0.0; 6 * model.rest.len()];
+            pressed.spread(&along, &mut moved);
+            let mut state = state.clone();
+            state.advance(&moved, by);
+            pressed.evaluate(&state, 1.0, None).unwrap();
+            let mut loads = vec![0.0; size];
+            pressed.gather(&pressed.external, &mut loads);
+            loads
+        };
+        let (ahead, behind) = (at(h), at(-h));
+        let largest = predicted.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+        for ((a, b), predicted) in ahead.iter().zip(&behind).zip(&predicted) {
+            let found = -(a - b) / (2.0 * h);
+            assert!((found - predicted).abs() < 1e-7 * largest, "{element}: {found} for {predicted}");
         }
     }
 }
