@@ -275,6 +275,7 @@ fn every_law_runs_by_its_name() {
         ("coupled-neo-hookean", elastic, ""),
         ("logarithmic-neo-hookean", elastic, ""),
         ("st-venant-kirchhoff", elastic, ""),
+        ("corotational", elastic, ""),
         ("mooney-rivlin", "", "c10 = 1e3\nc01 = 700\npoisson-ratio = 0.45"),
         ("polynomial", "", "c10 = 1e3\nc01 = 700\nc20 = 100\npoisson-ratio = 0.45"),
         ("yeoh", "", "c1 = 1.7e3\nc2 = 100\nc3 = 50\npoisson-ratio = 0.45"),

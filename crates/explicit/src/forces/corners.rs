@@ -7,7 +7,7 @@
 //! 3/2 (1 + S). So κ² |q|² 3/2 (1 + S) < J² is enough, which costs five operations a cell.
 
 use pliant_mechanics::Number;
-use pliant_mechanics::element::HEX_EDGES;
+use pliant_mechanics::element::{FLAT_HEX, HEX_EDGES};
 use pliant_mechanics::tensor::{Vector, add, cross, dot, sub};
 
 use super::{PackedCells, relative};
@@ -53,14 +53,10 @@ fn depth_at<N: Number>(x: &[Vector<N>; 8], corner: usize) -> N {
     -dot(cross(sub(x[a], origin), sub(x[b], origin)), sub(x[c], origin))
 }
 
-/// Flatness below which a cell is judged by its corners. At glued edges, where stresses grow without end, corners fold at moderate
-/// strains, the more the finer the mesh, while forces stay those of other codes (the reference cubes at 20 and 30 %).
-const FLAT: f64 = 0.25;
-
 /// Whether a cell is so flat that its corners count: by its volume over that at rest.
 #[inline(always)]
 pub(super) fn is_flat<R: Scalar>(flatness: R) -> bool {
-    flatness < R::of(FLAT)
+    flatness < R::of(FLAT_HEX)
 }
 
 /// The square of what J is divided by for the flatness of a uniform-strain hexahedron, about its least stretch: nearly incompressible

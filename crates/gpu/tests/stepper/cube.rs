@@ -224,6 +224,7 @@ pub fn every_law() -> Vec<AnyLaw> {
         ("coupled-neo-hookean", matrix(json!({}))),
         ("logarithmic-neo-hookean", matrix(json!({}))),
         ("st-venant-kirchhoff", matrix(json!({}))),
+        ("corotational", matrix(json!({}))),
         ("mooney-rivlin", bulk(json!({ "c10": 300.0, "c01": 150.0, "volumetric": "ln-squared" }))),
         ("polynomial", bulk(json!({ "c10": 300.0, "c01": 100.0, "c20": 50.0, "c11": 30.0, "c02": 20.0 }))),
         ("yeoh", bulk(json!({ "c1": 300.0, "c2": 100.0, "c3": 50.0, "volumetric": "j-ln-j" }))),

@@ -11,6 +11,7 @@ mod star;
 #[cfg(test)]
 mod tests;
 
+use pliant_mechanics::element::FLAT_HEX;
 use pliant_mechanics::law::{AnyLaw, Deformation, Split};
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, Hourglass, Solid};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cross, dot, scale, sub};
@@ -53,8 +54,7 @@ impl Response {
         self.force.fill(0.0);
         self.tangent.clear();
         self.tangent.resize(if stiffness { size * size } else { 0 }, 0.0);
-        let worst = solid.cells.worst_corner(cell, &displacement).map(|(_, determinant)| determinant);
-        self.broken = worst.filter(|&determinant| is_inverted(determinant)).map(Broken::Inverted);
+        self.broken = inverted_corner(solid, cell, &displacement).map(Broken::Inverted);
         if self.broken.is_some() {
             return;
         }
@@ -205,6 +205,28 @@ impl Part {
             Self::Shape(_) => stress.isochoric,
         }
     }
+}
+
+/// det F at the worst corner of a flat hexahedron, if that is inverted.
+fn inverted_corner(solid: &Solid, cell: usize, displacement: impl Fn(u32) -> Vector<f64>) -> Option<f64> {
+    let flatness = match &solid.cells {
+        Cells::Hex8(block) => {
+            let u = moved(block, cell, &displacement);
+            let h = gradient(&u, &block.rest[cell].gradient);
+            let strain = Symmetric::green_lagrange_twice(&h);
+            let square = strain.commuting_product(&strain).trace();
+            (1.0 + volume_change(&h)) / (1.0 + 0.5 * square).sqrt()
+        }
+        Cells::FullHex8(block, points) => {
+            let u = moved(block, cell, &displacement);
+            let own = points[cell].gradient.iter().zip(points[cell].weight);
+            let volume = |(b, w): (&[Vector<f64>; 8], f64)| w * (1.0 + volume_change(&gradient(&u, b)));
+            own.map(volume).sum::<f64>() / block.rest[cell].volume
+        }
+        Cells::Tet4(_) | Cells::AveragedTet4(..) => return None,
+    };
+    let (_, determinant) = solid.cells.worst_corner(cell, displacement).filter(|_| flatness < FLAT_HEX)?;
+    is_inverted(determinant).then_some(determinant)
 }
 
 /// Whether a determinant is zero, negative or not a number.

@@ -21,6 +21,11 @@ pub const HEX_CORNERS: [[f64; 3]; 8] = [
 pub const HEX_EDGES: [[usize; 3]; 8] =
     [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]];
 
+/// Flatness below which a hexahedron is judged by its corners: its volume over that at rest, of a uniform-strain one over √(1 + |C − I|²/2)
+/// too, about its least stretch. At glued edges, where stresses grow without end, corners fold at moderate strains, the more the finer
+/// the mesh, while forces stay those of other codes (the reference cubes at 20 and 30 %).
+pub const FLAT_HEX: f64 = 0.25;
+
 /// A hexahedron at rest.
 #[derive(Clone, Copy, Debug)]
 pub struct Hex8 {

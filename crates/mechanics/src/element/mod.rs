@@ -3,7 +3,7 @@
 mod hex8;
 mod tet4;
 
-pub use hex8::{GaussPoints, HEX_CORNERS, HEX_EDGES, Hex8, gauss_points, hex8};
+pub use hex8::{FLAT_HEX, GaussPoints, HEX_CORNERS, HEX_EDGES, Hex8, gauss_points, hex8};
 pub use tet4::tet4;
 
 use crate::tensor::Vector;
