@@ -82,7 +82,7 @@ pub(super) fn may_fold<R: Scalar>(reach: &Pack<R>, ratio: &Pack<R>, strain: &Pac
     let mut sound = true;
     for lane in 0..PACK {
         let square = ratio.0[lane] * ratio.0[lane];
-        let flat = square < R::of(FLAT * FLAT) * widening(strain.0[lane]);
+        let flat = square < R::of(FLAT_HEX * FLAT_HEX) * widening(strain.0[lane]);
         sound &= !flat | (reach.0[lane] * (R::ONE + strain.0[lane]) < square);
     }
     !sound
