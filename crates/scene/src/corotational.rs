@@ -51,6 +51,8 @@ pub(crate) struct Corotated {
     time: f64,
     /// Which components of each node are held or moved, six a node.
     prescribed: Vec<bool>,
+    /// The constraint that has the reaction of each component: the first, where two prescribe the same.
+    owners: Vec<[u32; 3]>,
     /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its positions and rotations.
     before: Option<(Vec<f64>, corotational::State)>,
     /// The same forces at the instant that is evaluated.
@@ -246,6 +248,8 @@ impl Corotated {
             state: part.start.clone(),
             outside: vec![0.0; prescribed.len()],
             prescribed,
+            // Contradictions were reported when the model was built.
+            owners: built.model.constrained_components().unwrap_or_default(),
             before: None,
             energies: Energies::default(),
             reactions: vec![[0.0; 3]; built.model.constraints.len()],
@@ -319,10 +323,11 @@ impl Corotated {
     fn find_reactions(&mut self) {
         let forces = self.method.forces();
         let [internal, loads] = [forces.internal(), forces.loads()];
-        for (reaction, constraint) in self.reactions.iter_mut().zip(&self.model.constraints) {
+        let constraints = self.model.constraints.iter().enumerate();
+        for (reaction, (index, constraint)) in self.reactions.iter_mut().zip(constraints) {
             *reaction = [0.0; 3];
             for &node in &constraint.nodes {
-                for c in (0..3).filter(|&c| constraint.components[c]) {
+                for c in (0..3).filter(|&c| self.owners[node as usize][c] == index as u32) {
                     let at = 6 * node as usize + c;
                     reaction[c] += internal[at] - loads[at];
                 }

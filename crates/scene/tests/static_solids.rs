@@ -100,6 +100,25 @@ fn static_equilibria_are_those_of_dynamic_relaxation() {
     }
 }
 
+/// Where two constraints hold the same component of a node, the first has its reaction: reactions and weight balance.
+#[test]
+fn reactions_of_shared_nodes_count_once() {
+    let law = format!("type = 'neo-hookean'\n{MATRIX}");
+    let floor =
+        "[constraint.floor]\ntype = 'fix'\nbody = 'block'\nnodes = { set = 'z-min' }\ncomponents = ['z']\n";
+    let text = block("solver = 'static'", "hex8", &law, "")
+        .replace("pressure = 400", "pressure = 1e-9")
+        .replace("nodes = { set = 'x-max' }", "nodes = { set = 'x-max' }\ncomponents = ['x']")
+        .replace(
+            "rotate = { axis = [1, 0, 0], angle = 0.3, centre = [0.1, 0.025, 0.025] }",
+            "by = [0.005, 0, 0]",
+        );
+    let row = last_row(&(text + floor));
+    let sum: f64 = ["base", "end", "floor"].map(|name| row[&format!("reaction.{name}.z")]).iter().sum();
+    let weight = 9.81 * 1000.0 * 0.1 * 0.05 * 0.05;
+    assert!((sum - weight).abs() < 1e-6 * weight, "{sum} N for {weight} N");
+}
+
 /// Backward Euler with damping comes to rest in the equilibrium.
 #[test]
 fn implicit_motion_comes_to_rest_in_the_equilibrium() {

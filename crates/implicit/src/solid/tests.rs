@@ -274,7 +274,7 @@ fn solids_without_stiffness_and_broken_ones_are_refused() {
 }
 
 /// Half of a block is squeezed to a seventh, and one corner pushed through: tets turn inside out, hexahedra are flat and have an inverted
-/// corner. Pushed through alone, that corner is none of a uniform-strain hexahedron's concern.
+/// corner. Pushed through alone, it inverts tets only.
 #[test]
 fn inverted_cells_are_reported() {
     for element in ELEMENTS {
@@ -284,7 +284,7 @@ fn inverted_cells_are_reported() {
         let end = nodes_at(&model, 0.2);
         state.position[end[0] as usize].x -= 0.11;
         let alone = System::forces_only(model.clone().into()).evaluate(&state, 0.0, None);
-        assert_eq!(alone.is_ok(), element == "hex8", "{element}: {alone:?}");
+        assert_eq!(alone.is_ok(), element.starts_with("hex"), "{element}: {alone:?}");
         end[1..].iter().for_each(|&node| state.position[node as usize].x -= 0.085);
         let mut system = System::forces_only(model.clone().into());
         let error = system.evaluate(&state, 0.0, None).unwrap_err();

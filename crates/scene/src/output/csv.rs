@@ -219,15 +219,12 @@ fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
     let owners = model.constrained_components().unwrap_or_default();
     let of = |&index: &usize| {
         let constraint = &model.constraints[index];
-        let own = |node: u32| match &built.corotational {
-            None => {
-                let [x, y, z] = owners[node as usize].map(|owner| owner as usize == index);
-                [x, y, z, false, false, false]
-            }
-            Some(part) => {
-                let named = part.model.constraints.iter().find(|own| own.name == constraint.name);
-                named.map_or([false; 6], |own| own.components)
-            }
+        let mut of_model = built.corotational.iter().flat_map(|part| &part.model.constraints);
+        let named = of_model.find(|own| own.name == constraint.name);
+        let [.., rx, ry, rz] = named.map_or([false; 6], |own| own.components);
+        let own = |node: u32| {
+            let [x, y, z] = owners[node as usize].map(|owner| owner as usize == index);
+            [x, y, z, rx, ry, rz]
         };
         Held(constraint.nodes.iter().map(|&node| (node, own(node))).collect())
     };
