@@ -4,10 +4,9 @@ use std::error::Error;
 
 use nalgebra::Vector3;
 use pliant_implicit::element::Elasticity;
-use pliant_implicit::{
-    Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
-};
+use pliant_implicit::{Constraint, Load, LoadKind, Material, Model, Motion, Shell};
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_sim::{Part, Simulation};
 
 fn main() -> Result<(), Box<dyn Error>> {
     // 1 m × 0.1 m × 10 mm in ten squares of two triangles.
@@ -31,9 +30,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         controlled: false,
     });
 
-    let mut state = State::at_rest(&model);
-    Statics::new(model.clone(), StaticSettings::default())?.solve(&mut state, 1.0)?;
-    let up = state.displacement(&model, 20).z;
+    let mut simulation = Simulation::new(Part::equilibria("strip", model, 1.0, 1))?;
+    simulation.step()?;
+    let up = simulation.frame()?.displacements("strip").ok_or("no strip")?[20][2];
     // F L³/3EI of a beam.
     let beam = force / (3.0 * 1e6 * 0.1 * 0.01_f64.powi(3) / 12.0);
     println!("the end rises by {:.4} mm, that of a beam by {:.4} mm", 1e3 * up, 1e3 * beam);

@@ -13,8 +13,9 @@ use pliant_scene::diagnostic::Diagnostic;
 use pliant_scene::source::{Source, Value};
 use pliant_scene::{
     Checkpoint, Draw, MeshCache, Meshing, Options, OutputFolder, Reads, Scene, Sweep, SweepOptions, World,
-    niftysim, number, reference, registry,
+    niftysim, reference, registry,
 };
+use pliant_sim::number;
 use serde_json::{Value as Json, json};
 use tempfile::TempDir;
 

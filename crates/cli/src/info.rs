@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{CellKind, Mesh, QualityReport, Spread, Vector3, boundary, diagnose};
 use pliant_meshing::{Curvature, Hausdorff, Percentiles, Thickness, TriangleMesh};
-use pliant_scene::{SizeDoubt, number};
+use pliant_scene::SizeDoubt;
+use pliant_sim::number;
 use serde_json::{Map, Value as Json, json};
 
 use crate::arguments::Info;

@@ -18,7 +18,8 @@ use pliant_meshing::{
     Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Deviation, Enclosed, LabelReport, MeshingError, Missed,
     OrganTets, TetReport, Voxels, require_room_for,
 };
-use pliant_scene::{SizeDoubt, element_bound, number};
+use pliant_scene::{SizeDoubt, element_bound};
+use pliant_sim::number;
 use serde_json::{Value as Json, json};
 
 use crate::arguments::{Labels, MeshCells, MeshImage, Tissue};

@@ -11,10 +11,8 @@ use miette::Diagnostic;
 use pliant_geometry::io::MeshFileError;
 use pliant_gpu::Adapter;
 use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::{
-    LoadStepProgress, Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, number,
-    printable,
-};
+use pliant_scene::{Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, printable};
+use pliant_sim::{LoadStepProgress, number};
 use serde_json::json;
 
 /// Invalid input (exit code 2), or failed output.

@@ -19,3 +19,18 @@ pub struct Energies {
     /// as part of the kinetic energy: of loads that set in at once it stays behind for good.
     pub balance: f64,
 }
+
+impl Energies {
+    /// The sum of energies, and the worst of their balances.
+    pub fn total(all: impl Iterator<Item = Self>) -> Self {
+        let add = |a: Self, b: Self| Self {
+            kinetic: a.kinetic + b.kinetic,
+            internal: a.internal + b.internal,
+            damping: a.damping + b.damping,
+            hourglass: a.hourglass + b.hourglass,
+            external: a.external + b.external,
+            balance: a.balance.max(b.balance),
+        };
+        all.reduce(add).unwrap_or_default()
+    }
+}

@@ -2,10 +2,10 @@
 //! smaller step where steps are kept below the limit, or to damp more where damping is the trouble.
 
 use pliant_explicit::stability::{OnUnstable, Stability};
+use pliant_sim::{Failure, Precision, number};
 
 use crate::assemble::Built;
-use crate::format::{Precision, SolverName};
-use crate::output::{FailureSummary, number};
+use crate::format::SolverName;
 use crate::plan::Plan;
 use crate::world::Part;
 
@@ -14,16 +14,16 @@ use crate::world::Part;
 const RESOLVED: f64 = 1.0;
 
 /// The remedy of a failed explicit step, where the run's state says more than the failure itself.
-pub(crate) fn remedy(failure: &FailureSummary, part: &Part, stability: &Stability) -> Option<String> {
+pub(crate) fn remedy(failure: &Failure, part: &Part, stability: &Stability) -> Option<String> {
     let Part { scene, built, plan, .. } = part;
-    if scene.run.solver != SolverName::Explicit || built.corotational.is_some() {
+    if scene.run.solver != SolverName::Explicit || built.implicit.is_some() {
         return None;
     }
     if let Some(told) = too_much_damping(failure, built, plan) {
         return Some(told);
     }
     let on_unstable = scene.run.on_unstable.unwrap_or_default();
-    let seen = stability.smallest.as_ref().map(|look| look.limit / plan.step);
+    let seen = stability.smallest.as_ref().map(|look| look.limit / plan.steps.step);
     Some(match (failure.kind, on_unstable) {
         ("unstable", OnUnstable::Substep) => "its steps are cut into 100 parts at the most, and that is not enough: try a slower or smaller \
                                               motion, or a coarser mesh there"
@@ -53,16 +53,16 @@ pub(crate) fn remedy(failure: &FailureSummary, part: &Part, stability: &Stabilit
 }
 
 /// That damping is what the steps are too long for, where it is so.
-fn too_much_damping(failure: &FailureSummary, built: &Built, plan: &Plan) -> Option<String> {
+fn too_much_damping(failure: &Failure, built: &Built, plan: &Plan) -> Option<String> {
     let body = built.model.bodies.iter().find(|body| failure.body.as_ref() == Some(&body.name))?;
-    (body.damping * plan.step > RESOLVED).then(|| {
+    (body.damping * plan.steps.step > RESOLVED).then(|| {
         format!(
             "the damping of `{}`, {} 1/s, is too strong for steps of {} s: it turns velocities round; take `damping` below {} 1/s or a \
              `step` below {} s",
             body.name,
             number(body.damping),
-            number(plan.step),
-            number(RESOLVED / plan.step),
+            number(plan.steps.step),
+            number(RESOLVED / plan.steps.step),
             number(RESOLVED / body.damping)
         )
     })

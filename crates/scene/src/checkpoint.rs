@@ -8,19 +8,14 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use pliant_explicit::State;
 use pliant_geometry::io::read_limited;
 use pliant_mechanics::fingerprint;
+use pliant_sim::{Precision, State, counted, number};
 use serde::{Deserialize, Serialize};
 
-use crate::assemble::Built;
-use crate::corotational::ShellSnapshot;
-use crate::diagnostic::counted;
-use crate::format::{LoadSteps, Precision, SolverName};
-use crate::output::{OutputError, OutputFolder, Schedule, Written, number, replace};
-use crate::participant::{Kept, Numeric, Participant, fits};
+use crate::format::{LoadSteps, SolverName};
+use crate::output::{OutputError, OutputFolder, Schedule, Written, replace};
 use crate::run::{History, Watched};
-use crate::solver::Memory;
 use crate::world::{Part, World};
 
 /// The first bytes of every checkpoint.
@@ -252,7 +247,7 @@ fn differing(parts: &[String]) -> String {
 impl OwnOrigin {
     fn of(Part { name, scene, built, plan }: &Part) -> Self {
         let mut parts = built.model.fingerprints();
-        parts.extend(built.corotational.iter().flat_map(|part| part.fingerprints()));
+        parts.extend(built.implicit.iter().flat_map(|part| part.fingerprints()));
         parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));
         parts.push(("`run.on-unstable`".into(), fingerprint(&scene.run.on_unstable.unwrap_or_default())));
         parts.push(("`run.mass-scaling`".into(), fingerprint(&scene.run.mass_scaling)));
@@ -261,7 +256,7 @@ impl OwnOrigin {
         }
         parts.push(("`run.iterations`".into(), fingerprint(&scene.run.iterations)));
         parts.push(("`run.linear`".into(), fingerprint(&scene.run.linear)));
-        let (precision, solver, step) = (plan.target.precision, scene.run.solver, plan.step);
+        let (precision, solver, step) = (plan.target.precision, scene.run.solver, plan.steps.step);
         Self { name: name.clone(), precision, solver, step, parts }
     }
 }
@@ -312,8 +307,8 @@ impl Origin {
             return Err(ResumeError::OtherScene { parts, until });
         }
         for (part, before) in world.lasting(self.until).participants.iter().zip(&self.participants) {
-            if part.plan.step != before.step && part.plan.ends.is_none() {
-                return Err(ResumeError::OtherStep { checkpoint: before.step, scene: part.plan.step });
+            if part.plan.steps.step != before.step && part.plan.steps.ends.is_none() {
+                return Err(ResumeError::OtherStep { checkpoint: before.step, scene: part.plan.steps.step });
             }
         }
         Ok(())
@@ -424,52 +419,31 @@ impl Checkpoint {
         if time > until + 0.51 * step {
             return Err(ResumeError::BeyondTheEnd { time, until });
         }
-        if self.kept(world).is_none() || self.progressed.outputs.len() != world.scene.outputs.len() {
+        if self.state(world, &world.simulated()).is_none()
+            || self.progressed.outputs.len() != world.scene.outputs.len()
+        {
             return Err(ResumeError::Damaged { path: self.path.clone() });
         }
         let mut world = world.clone();
         let common = (until / step - 1e-9).ceil().max(1.0) as u64;
         for (part, own) in world.participants.iter_mut().zip(&self.origin.participants) {
-            if part.plan.ends.is_none() {
+            if part.plan.steps.ends.is_none() {
                 let ratio = (step / own.step).round().max(1.0) as u64;
-                (part.plan.step, part.plan.steps) = (own.step, common * ratio);
+                (part.plan.steps.step, part.plan.steps.number) = (own.step, common * ratio);
             }
         }
         Ok(world)
     }
 
-    /// The states with what a restart needs, if they have the sizes of the models'.
-    pub(crate) fn kept(&self, world: &World) -> Option<Vec<Kept>> {
+    /// The state of a world, which is given with and without its tables; `None` where it has other sizes.
+    pub(crate) fn state(&self, world: &World, simulated: &pliant_sim::World) -> Option<State> {
         let parts = &world.participants;
         let constraints: usize = parts.iter().map(|part| part.built.model.constraints.len()).sum();
         let whole = self.progressed.history.reactions.iter().all(|row| row.len() == constraints)
             && self.progressed.watched.len() == parts.len()
-            && self.participants.len() == parts.len()
             && self.origin.participants.len() == parts.len();
-        let all = parts.iter().zip(&self.participants).zip(&self.origin.participants);
-        if !whole {
-            return None;
-        }
-        all.map(|((part, bytes), own)| kept(&part.built, own.precision, bytes)).collect()
+        if whole { State::decode(simulated, &self.participants) } else { None }
     }
-}
-
-/// The state of a participant from its bytes, if it has the sizes of the model's.
-fn kept(built: &Built, precision: Precision, bytes: &[u8]) -> Option<Kept> {
-    if built.corotational.is_some() {
-        let snapshot: ShellSnapshot = postcard::from_bytes(bytes).ok()?;
-        let fits = snapshot.fits(built.model.node_count());
-        return fits.then(|| Kept::Shells(Box::new(snapshot)));
-    }
-    match precision {
-        Precision::Single => solids::<f32>(built, bytes),
-        Precision::Double => solids::<f64>(built, bytes),
-    }
-}
-
-fn solids<R: Numeric>(built: &Built, bytes: &[u8]) -> Option<Kept> {
-    let (state, memory): (State<R>, Memory<R>) = postcard::from_bytes(bytes).ok()?;
-    fits(&state, &memory, &built.model).then(|| R::keep(state, memory))
 }
 
 /// Writes the checkpoints of a run.
@@ -498,16 +472,10 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// Writes one, and removes those before the last two.
-    pub fn write(
-        &self,
-        progressed: &Progressed,
-        participants: &[Box<dyn Participant>],
-    ) -> Result<PathBuf, OutputError> {
+    pub fn write(&self, progressed: &Progressed, states: &[Vec<u8>]) -> Result<PathBuf, OutputError> {
         let path = self.folder.path().join(name(progressed.steps));
         let failed = |reason: &dyn std::fmt::Display| OutputError::new(&path, reason);
-        let states: Result<Vec<_>, _> = participants.iter().map(|participant| participant.encode()).collect();
-        let states = states.map_err(|error| failed(&error))?;
-        let bytes = encode(&self.origin, progressed, &states).map_err(|error| failed(&error))?;
+        let bytes = encode(&self.origin, progressed, states).map_err(|error| failed(&error))?;
         replace(&path, |file| file.write_all(&bytes).and_then(|()| file.sync_all()))
             .map_err(|error| failed(&error))?;
         let mut earlier = checkpoints_in(self.folder.path()).map_err(|error| failed(&error))?;
@@ -551,16 +519,13 @@ fn checkpoints_in(folder: &Path) -> std::io::Result<Vec<(u64, PathBuf)>> {
 
 #[cfg(test)]
 mod tests {
-    use pliant_explicit::Equilibrium;
-
     use super::*;
-    use crate::testing::{built, scene};
+    use crate::testing::{CUBE, read, scene};
 
-    const CHECKPOINTED: &str = "[run]\ncheckpoint = { every = 0.05 }\n";
+    const CHECKPOINTED: &str = "[run]\nprecision = 'single'\ncheckpoint = { every = 0.05 }\n";
 
     fn small() -> Vec<u8> {
         let world = World::new(&scene(CHECKPOINTED)).unwrap();
-        let state = State::<f32>::at_rest(&world.participants[0].built.model);
         let progressed = Progressed {
             time: 0.05,
             steps: 7,
@@ -570,8 +535,8 @@ mod tests {
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
         };
-        let participant = postcard::to_stdvec(&(state, Memory::<f32>::Nothing)).unwrap();
-        encode(&Origin::of(&world), &progressed, &[participant]).unwrap()
+        let states = world.simulation().unwrap().encode().unwrap();
+        encode(&Origin::of(&world), &progressed, &states).unwrap()
     }
 
     #[test]
@@ -613,7 +578,7 @@ mod tests {
             body[place - HEAD] = body[place - HEAD].wrapping_add(0x7f);
             let forged = Checkpoint::framed(&body);
             if let Ok(read) = Checkpoint::from_bytes(Path::new("x.pliant"), &forged) {
-                let _ = read.kept(&world);
+                let _ = read.state(&world, &world.simulated());
             }
         }
     }
@@ -622,10 +587,22 @@ mod tests {
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
     fn the_layout_of_format_7_is_as_it_was() {
-        let state = State::<f32>::at_rest(&built("").model);
-        let bytes = postcard::to_stdvec(&state).unwrap();
-        let memory = Memory::Equilibrium(Equilibrium::<f32>::default());
-        let memory = postcard::to_stdvec(&memory).unwrap();
-        assert_eq!((FORMAT, bytes.len(), memory.len()), (7, 1083, 61));
+        let bytes = |run: &str| {
+            let world = World::new(&scene(run)).unwrap();
+            world.simulation().unwrap().encode().unwrap()[0].len()
+        };
+        let shell = CUBE.replace(
+            "{ block = { size = [0.2, 0.1, 0.1], cells = [2, 2, 2] }, as = \"hexes\" }",
+            "{ plate = { size = [0.2, 0.1], cells = [2, 2] } }",
+        );
+        let shell = shell
+            .replace("density", "model = 'shell'\nthickness = 0.001\ndensity")
+            .replace("'z-min'", "'x-min'")
+            .replace("\"z-min\"", "\"x-min\"");
+        let shell = World::new(&read(&format!("{shell}[run]\nsolver = 'implicit'\n"))).unwrap();
+        let shell = shell.simulation().unwrap().encode().unwrap()[0].len();
+        let explicit = bytes("[run]\nprecision = 'single'\n");
+        let quasi_static = bytes("[run]\nprecision = 'single'\nsolver = 'quasi-static'\n");
+        assert_eq!((FORMAT, explicit, quasi_static, shell), (7, 1084, 1468, 1054));
     }
 }

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use miette::{
     LabeledSpan, MietteError, MietteSpanContents, NamedSource, SourceCode, SourceSpan, SpanContents,
 };
+use pliant_sim::counted;
 
 use crate::printable::{boundary_after, boundary_before, printable, shortened};
 
@@ -23,11 +24,6 @@ const LONGEST_PLACE: usize = 200;
 
 /// Bytes of the user's text that are shown before and after a place.
 const REACH: usize = 200;
-
-/// "1 element", "2 elements".
-pub(crate) fn counted(n: usize, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
-}
 
 /// The severity of a [`Diagnostic`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

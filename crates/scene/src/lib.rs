@@ -28,7 +28,7 @@
 //! let block = world.only().unwrap();
 //! assert_eq!(block.built.model.node_count(), 27);
 //! let limits = block.plan.limits.as_ref().unwrap();
-//! assert!(limits.bound.step <= limits.limit.step);
+//! assert!(limits.bound.step <= limits.assembled.step);
 //! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
 //! ```
 
@@ -38,15 +38,14 @@ mod bound;
 mod cache;
 pub mod checker;
 mod checkpoint;
-mod corotational;
 pub mod diagnostic;
 pub mod format;
 mod live;
+mod method;
 pub mod niftysim;
 mod of_mesh;
 mod output;
 mod overview;
-mod participant;
 mod participants;
 mod plan;
 mod plausible;
@@ -56,8 +55,6 @@ pub mod reference;
 pub mod registry;
 mod run;
 mod scene;
-mod simulation;
-mod solver;
 pub mod source;
 mod starter;
 mod sweep;
@@ -67,26 +64,22 @@ mod testing;
 mod view;
 mod world;
 
-pub use assemble::{
-    BodyCells, Built, BuiltBody, Control, Corotational, Meshing, SizeDoubt, Stop, build, build_watched,
-    build_with,
-};
+pub use assemble::{Built, BuiltBody, Meshing, SizeDoubt, build, build_watched, build_with};
 pub use bound::element_bound;
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
-pub use live::{Live, Snapshot, go_on, live};
+pub use live::{Live, go_on, live};
 pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
 pub use output::{
-    AddedMass, BodySummary, Column, FailureSummary, LoadStepSummary, OutputError, OutputFolder,
-    ParticipantSummary, StabilitySummary, Summary, failed_input, failed_output, number,
+    AddedMass, BodySummary, Column, OutputError, OutputFolder, ParticipantSummary, StabilitySummary, Summary,
+    failed_input, failed_output,
 };
 pub use overview::overview;
-pub use plan::{LimitingElement, Limits, Plan, SAFETY, plan};
+pub use plan::{LimitingElement, Limits, Plan, plan};
 pub use printable::printable;
 pub use reads::Reads;
 pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, open_within, scene_file};
-pub use solver::{Effort, Equilibria, LoadStepProgress};
 pub use starter::starter;
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;

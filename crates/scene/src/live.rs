@@ -3,17 +3,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use pliant_explicit::Clock;
 use pliant_geometry::Mesh;
 use pliant_gpu::{DeviceMapping, DevicePoints, PointValue, Wanted};
+use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
-use pliant_mechanics::{Energies, fingerprint};
+use pliant_sim::{Failure, Simulation, State};
 
-use crate::assemble::Built;
 use crate::format::VtuTable;
-use crate::output::{Column, FailureSummary, FieldMesh, Frame, Samples};
-use crate::participant::{Kept, participant_from};
-use crate::simulation::Simulation;
+use crate::output::{Column, FieldMesh, Frame, Samples};
 use crate::world::World;
 
 /// A world under way, in any numbers and with any solvers. After a failure it stays at the last good instant.
@@ -25,27 +22,19 @@ pub trait Live: Send {
     ///
     /// # Errors
     /// If the run can't go on; the state before it can still be looked at.
-    fn advance(&mut self, most: u64) -> Result<u64, FailureSummary>;
+    fn advance(&mut self, most: u64) -> Result<u64, Failure>;
 
     /// Goes up to `steps` steps on where the state lies on a graphics processor, as many as take about `within`: nothing comes back to
     /// ordinary memory, and what breaks is told by [`mesh`](Self::mesh). How many; `None` of a solver whose state lies there.
-    fn advance_without_read_back(
-        &mut self,
-        steps: u64,
-        within: Duration,
-    ) -> Option<Result<u64, FailureSummary>>;
+    fn advance_without_read_back(&mut self, steps: u64, within: Duration) -> Option<Result<u64, Failure>>;
 
     /// The points shown at the instant, found on the graphics processor where the state lies, with a value each; `given` takes the
     /// place of those given before. `None` of a solver whose state lies in ordinary memory.
-    fn place(
-        &mut self,
-        value: PointValue,
-        given: Option<&[f32]>,
-    ) -> Option<Result<DevicePoints, FailureSummary>>;
+    fn place(&mut self, value: PointValue, given: Option<&[f32]>) -> Option<Result<DevicePoints, Failure>>;
 
     /// Where it stands, for [`go_on`]. `None` where the instant was looked at, whose forces belong to the step to come; and of a
     /// device that was lost.
-    fn snapshot(&mut self) -> Option<Snapshot>;
+    fn state(&mut self) -> Option<State>;
 
     /// Takes hold of points: these grips and no others act from the next step on. False where a stepper knows none, or where a grip holds
     /// nodes of several participants.
@@ -73,7 +62,7 @@ pub trait Live: Send {
     ///
     /// # Errors
     /// If forces at the instant can't be found.
-    fn mesh(&mut self) -> Result<&Mesh, FailureSummary>;
+    fn mesh(&mut self) -> Result<&Mesh, Failure>;
 
     /// Energies at the instant last evaluated [J].
     fn energies(&self) -> Energies;
@@ -91,25 +80,12 @@ pub trait Live: Send {
     fn fingerprint(&self) -> u64;
 }
 
-/// Where a run stands between two steps: all that another one needs to go on from there.
-#[derive(Clone, Debug)]
-pub struct Snapshot(Vec<OwnSnapshot>);
-
-/// Where a participant stands.
-#[derive(Clone, Debug)]
-struct OwnSnapshot {
-    kept: Kept,
-    clock: Option<Clock>,
-    /// Length of its steps [s].
-    step: f64,
-}
-
 /// Begins to play a world.
 ///
 /// # Errors
 /// If a stepper can't be made.
-pub fn live(world: &Arc<World>) -> Result<Box<dyn Live>, FailureSummary> {
-    Ok(Box::new(Played::new(world, Simulation::new(world, None)?)))
+pub fn live(world: &Arc<World>) -> Result<Box<dyn Live>, Failure> {
+    Ok(Box::new(Played::new(world, world.simulation()?)))
 }
 
 /// Plays a world on from where a run of another one stands, with displacements, velocities and what relaxing laws remember. `None`
@@ -117,89 +93,29 @@ pub fn live(world: &Arc<World>) -> Result<Box<dyn Live>, FailureSummary> {
 ///
 /// # Errors
 /// If a stepper can't be made.
-pub fn go_on(
-    world: &Arc<World>,
-    Snapshot(snapshot): Snapshot,
-    before: &World,
-) -> Result<Option<Box<dyn Live>>, FailureSummary> {
-    if world.participants.len() != snapshot.len() || world.participants.len() != before.participants.len() {
-        return Ok(None);
-    }
-    let mut participants = Vec::new();
-    for ((part, own), before) in world.participants.iter().zip(snapshot).zip(&before.participants) {
-        if !same_mesh(&before.built, &part.built) {
-            return Ok(None);
-        }
-        let OwnSnapshot { kept, clock, step } = own;
-        match participant_from(part, kept, clock.map(|clock| (clock, step, &*before.built)))? {
-            Some(participant) => participants.push(participant),
-            None => return Ok(None),
-        }
-    }
-    Ok(Some(Box::new(Played::new(world, Simulation::of(world, participants)))))
-}
-
-/// Whether bodies of a model have the nodes and cells that those of another one have.
-fn same_mesh(a: &Built, b: &Built) -> bool {
-    let cells = |built: &Built| -> Vec<(String, u64)> {
-        let parts = built.model.fingerprints().into_iter();
-        parts.filter(|(part, _)| part.starts_with("mesh of")).collect()
-    };
-    let shells = |built: &Built| built.corotational.as_ref().map(|part| part.model.rest.len());
-    a.model.rest == b.model.rest && shells(a) == shells(b) && cells(a) == cells(b)
+pub fn go_on(world: &Arc<World>, state: State, before: &World) -> Result<Option<Box<dyn Live>>, Failure> {
+    let simulation = Simulation::continued(world.simulated(), state, &before.simulated())?;
+    Ok(simulation.map(|simulation| Box::new(Played::new(world, simulation)) as Box<dyn Live>))
 }
 
 struct Played {
     world: Arc<World>,
     simulation: Simulation,
-    /// First node of each participant, counted over all.
-    first_nodes: Vec<u32>,
     shown: FieldMesh,
     /// What finds the points of the snapshot where the state lies on a device.
     mapping: Option<DeviceMapping>,
     samples: Samples,
-    /// Whether forces, energies and reactions belong to the state's instant; all fields too with `Everything`.
-    evaluated: Option<Wanted>,
 }
 
 impl Played {
     fn new(world: &Arc<World>, simulation: Simulation) -> Self {
-        let nodes = world.participants.iter().map(|part| part.built.model.node_count() as u32);
-        let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes)));
         Self {
             shown: FieldMesh::new(world, &world.scene.shown(1.0)),
             samples: Samples::new(world, &world.scene.sampled()),
             world: Arc::clone(world),
             simulation,
-            first_nodes: first_nodes.collect(),
             mapping: None,
-            evaluated: None,
         }
-    }
-
-    fn evaluate(&mut self, wanted: Wanted) -> Result<(), FailureSummary> {
-        if self.evaluated.is_none() {
-            self.simulation.evaluate(wanted)?;
-            self.evaluated = Some(wanted);
-        }
-        Ok(())
-    }
-
-    /// The participant of a node, and the node's number there.
-    fn locate(&self, node: u32) -> (usize, u32) {
-        // The first node of the first participant is 0.
-        let part = self.first_nodes.partition_point(|&first| first <= node) - 1;
-        (part, node - self.first_nodes[part])
-    }
-
-    /// The participant of a grip, and the grip with the numbers of the nodes there; `None` where it holds nodes of several.
-    fn own(&self, grip: &Grip) -> Option<(usize, Grip)> {
-        let (part, _) = self.locate(grip.nodes.first().map_or(0, |&(node, _)| node));
-        let nodes = grip.nodes.iter().map(|&(node, weight)| {
-            let (own, node) = self.locate(node);
-            (own == part).then_some((node, weight))
-        });
-        Some((part, Grip { nodes: nodes.collect::<Option<_>>()?, ..grip.clone() }))
     }
 }
 
@@ -208,36 +124,24 @@ impl Live for Played {
         self.simulation.time()
     }
 
-    fn advance(&mut self, most: u64) -> Result<u64, FailureSummary> {
-        self.evaluate(Wanted::Everything)?;
+    fn advance(&mut self, most: u64) -> Result<u64, Failure> {
+        self.simulation.evaluate(Wanted::Everything)?;
         let steps = self.simulation.stride().min(most.max(1));
         self.simulation.advance(steps, &mut |_| {})?;
-        self.evaluated = None;
         Ok(steps)
     }
 
-    fn advance_without_read_back(
-        &mut self,
-        steps: u64,
-        within: Duration,
-    ) -> Option<Result<u64, FailureSummary>> {
-        let advanced = self.simulation.only()?.advance_without_read_back(steps, within)?;
-        self.evaluated = None;
-        Some(advanced)
+    fn advance_without_read_back(&mut self, steps: u64, within: Duration) -> Option<Result<u64, Failure>> {
+        self.simulation.advance_without_read_back(steps, within)
     }
 
-    fn place(
-        &mut self,
-        value: PointValue,
-        given: Option<&[f32]>,
-    ) -> Option<Result<DevicePoints, FailureSummary>> {
-        let only = self.simulation.only()?;
+    fn place(&mut self, value: PointValue, given: Option<&[f32]>) -> Option<Result<DevicePoints, Failure>> {
         if self.mapping.is_none() {
             let (world, shown) = (&self.world, &self.shown);
             let mut points = (0..)
                 .zip(&shown.mesh().points)
                 .map(|(point, place)| ([place.x, place.y, place.z], shown.nodes_of(world, point).1));
-            match only.map(&mut points)? {
+            match self.simulation.map(&mut points)? {
                 Ok(mapping) => self.mapping = Some(mapping),
                 Err(failure) => return Some(Err(failure)),
             }
@@ -246,53 +150,37 @@ impl Live for Played {
         if let Some(values) = given {
             mapping.give(values);
         }
-        only.apply(mapping, value);
+        self.simulation.apply(mapping, value);
         Some(Ok(mapping.points().clone()))
     }
 
-    fn snapshot(&mut self) -> Option<Snapshot> {
-        if self.evaluated.is_some() || self.simulation.bring_back().is_err() {
-            return None;
-        }
-        let parts = self.world.participants.iter().zip(self.simulation.participants());
-        let own = parts.map(|(part, now)| OwnSnapshot {
-            clock: now.clock(),
-            kept: now.kept(),
-            step: part.plan.step,
-        });
-        Some(Snapshot(own.collect()))
+    fn state(&mut self) -> Option<State> {
+        self.simulation.state().ok()
     }
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
-        let mut of_parts = vec![Vec::new(); self.world.participants.len()];
-        for grip in grips {
-            let Some((part, own)) = self.own(grip) else { return false };
-            of_parts[part].push(own);
-        }
-        self.simulation.hold(&of_parts)
+        self.simulation.hold(grips)
     }
 
     fn stiffest(&self, grip: &Grip) -> f64 {
-        self.own(grip).map_or(0.0, |(part, own)| self.simulation.participants()[part].stiffest(&own))
+        self.simulation.stiffest(grip)
     }
 
     fn rest(&self, node: u32) -> [f64; 3] {
-        let (part, node) = self.locate(node);
-        self.world.participants[part].built.model.rest[node as usize]
+        self.simulation.rest(node)
     }
 
     fn delay(&self) -> u64 {
-        u64::from(self.evaluated.is_some())
+        u64::from(self.simulation.is_evaluated())
     }
 
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
-        let pulled = self.own(grip).map(|(part, own)| self.simulation.participants()[part].pulled(&own));
-        pulled.unwrap_or([grip.place, [0.0; 3]])
+        self.simulation.pulled(grip)
     }
 
     fn nodes_of(&self, point: u32) -> Vec<(u32, f64)> {
         let (part, nodes) = self.shown.nodes_of(&self.world, point);
-        nodes.into_iter().map(|(node, weight)| (self.first_nodes[part] + node, weight)).collect()
+        nodes.into_iter().map(|(node, weight)| (self.simulation.node(part, node), weight)).collect()
     }
 
     fn show(&mut self, shown: &VtuTable) {
@@ -300,9 +188,9 @@ impl Live for Played {
         self.mapping = None;
     }
 
-    fn mesh(&mut self) -> Result<&Mesh, FailureSummary> {
-        self.evaluate(Wanted::Everything)?;
-        self.shown.fill(&self.simulation.frames(&self.world));
+    fn mesh(&mut self) -> Result<&Mesh, Failure> {
+        self.simulation.evaluate(Wanted::Everything)?;
+        self.shown.fill(&self.world.frames(&self.simulation));
         Ok(self.shown.mesh())
     }
 
@@ -311,7 +199,7 @@ impl Live for Played {
     }
 
     fn reactions(&self) -> Vec<[f64; 3]> {
-        self.simulation.frames(&self.world).iter().flat_map(Frame::reactions).collect()
+        self.world.frames(&self.simulation).iter().flat_map(Frame::reactions).collect()
     }
 
     fn columns(&self) -> Vec<Column> {
@@ -319,14 +207,11 @@ impl Live for Played {
     }
 
     fn sample(&mut self, row: &mut Vec<f64>) {
-        self.samples.read(&self.simulation.frames(&self.world), row);
+        self.samples.read(&self.world.frames(&self.simulation), row);
     }
 
     fn fingerprint(&self) -> u64 {
-        match self.simulation.participants() {
-            [only] => only.fingerprint(),
-            all => fingerprint(&all.iter().map(|one| one.fingerprint()).collect::<Vec<_>>()),
-        }
+        self.simulation.fingerprint()
     }
 }
 
@@ -394,12 +279,12 @@ mod tests {
         let mut whole = pulled_for(&stage, 300);
         let again = other(&[viscous]);
         let mut half = pulled_for(&stage, 150);
-        assert!(half.snapshot().is_some());
+        assert!(half.state().is_some());
         half.mesh().unwrap();
-        assert!(half.snapshot().is_none(), "the forces at this instant belong to the step to come");
+        assert!(half.state().is_none(), "the forces at this instant belong to the step to come");
         half.advance(1).unwrap();
-        let snapshot = half.snapshot().unwrap();
-        let mut half = go_on(&again, snapshot, &stage).unwrap().unwrap();
+        let state = half.state().unwrap();
+        let mut half = go_on(&again, state, &stage).unwrap().unwrap();
         hold_on(half.as_mut(), &again);
         for _ in 151..300 {
             half.advance(1).unwrap();
@@ -418,13 +303,13 @@ mod tests {
         let less = ("damping = 200", "damping = 5");
         let (soft, stiff) =
             (other(&[less]), other(&[less, ("young-modulus = 10e3", "young-modulus = 40e3")]));
-        let step = |world: &World| world.only().unwrap().plan.step;
+        let step = |world: &World| world.only().unwrap().plan.steps.step;
         assert!(step(&stiff) < 0.6 * step(&soft));
         let mut going = pulled_for(&soft, 4000);
         let pulled = height(going.as_mut());
         going.advance(1).unwrap();
-        let (snapshot, time) = (going.snapshot().unwrap(), going.time());
-        let mut going = go_on(&stiff, snapshot, &soft).unwrap().unwrap();
+        let (state, time) = (going.state().unwrap(), going.time());
+        let mut going = go_on(&stiff, state, &soft).unwrap().unwrap();
         assert_eq!(going.time(), time);
         hold_on(going.as_mut(), &stiff);
         going.advance(1).unwrap();
@@ -447,8 +332,8 @@ mod tests {
         let (coarse, fine) = (in_steps("0.002"), in_steps("0.001"));
         // It swings up; at its fastest the steps become shorter.
         let mut going = pulled_for(&coarse, 16);
-        let snapshot = going.snapshot().unwrap();
-        let mut going = go_on(&fine, snapshot, &coarse).unwrap().unwrap();
+        let state = going.state().unwrap();
+        let mut going = go_on(&fine, state, &coarse).unwrap().unwrap();
         hold_on(going.as_mut(), &fine);
         (0..68).for_each(|_| assert_eq!(going.advance(1).unwrap(), 1));
         let mut whole = pulled_for(&fine, 0);
@@ -471,8 +356,8 @@ mod tests {
     fn more_mass_unbalances_no_energy() {
         let (light, heavy) = (other(&[]), other(&[("density = 1000", "density = 3000")]));
         let mut going = pulled_for(&light, 60);
-        let snapshot = going.snapshot().unwrap();
-        let mut going = go_on(&heavy, snapshot, &light).unwrap().unwrap();
+        let state = going.state().unwrap();
+        let mut going = go_on(&heavy, state, &light).unwrap().unwrap();
         hold_on(going.as_mut(), &heavy);
         go(going.as_mut(), 400);
         assert!(going.energies().balance < 0.02, "{:?}", going.energies());
@@ -481,8 +366,8 @@ mod tests {
     #[test]
     fn another_mesh_goes_on_from_nothing() {
         let (coarse, fine) = (other(&[]), other(&[("cells = [2, 2, 2]", "cells = [2, 2, 3]")]));
-        let snapshot = pulled_for(&coarse, 10).snapshot().unwrap();
-        assert!(go_on(&fine, snapshot, &coarse).unwrap().is_none());
+        let state = pulled_for(&coarse, 10).state().unwrap();
+        assert!(go_on(&fine, state, &coarse).unwrap().is_none());
     }
 
     fn go(live: &mut dyn Live, steps: u64) {

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::Labels;
 use pliant_geometry::io::{self, Format, MeshFileError};
-
-use crate::output::number;
+use pliant_sim::number;
 
 /// A body whose longest side is longer than this [m] is taken to be in millimetres.
 const LARGEST: f64 = 2.0;

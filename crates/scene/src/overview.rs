@@ -6,10 +6,10 @@ use pliant_geometry::QualityReport;
 use pliant_implicit::Facet;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
+use pliant_sim::{BodyCells, ImplicitBodies, counted, number};
 
-use crate::assemble::{BodyCells, Built, Corotational};
-use crate::diagnostic::counted;
-use crate::output::{AddedMass, bodies, number, told_limit};
+use crate::assemble::Built;
+use crate::output::{AddedMass, bodies, told_limit};
 use crate::plan::{Limits, Plan};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
@@ -44,7 +44,7 @@ fn write_overview(page: &mut String, world: &World) -> fmt::Result {
     write_outputs(page, scene)?;
     match world.only() {
         Some(part) => write_step(page, &part.scene, &part.built, &part.plan)?,
-        None => writeln!(page, "common instants every {} s", number(world.slowest().plan.step))?,
+        None => writeln!(page, "common instants every {} s", number(world.slowest().plan.steps.step))?,
     }
     let notes = world.participants.iter().flat_map(|part| &part.built.notes);
     for remark in world.warnings().map(ToString::to_string).chain(notes.cloned()) {
@@ -77,8 +77,8 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
                 ),
             )?;
         }
-        if let Some(part) = &built.corotational {
-            write_corotational(page, part, &body.name, built)?;
+        if let Some(part) = &built.implicit {
+            write_implicit(page, part, &body.name, built)?;
         }
         if let Some([least, most]) = quality.dihedral {
             writeln!(page, "  dihedral angles {least:.1}° to {most:.1}°")?;
@@ -114,7 +114,7 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
             Motion::Displacement(..) | Motion::Displacements(..) | Motion::Velocity(..) => "moves",
             Motion::Rotation { .. } => "rotates",
         };
-        let own = built.corotational.iter().flat_map(|part| &part.model.constraints);
+        let own = built.implicit.iter().flat_map(|part| &part.model.constraints);
         let turns = own.filter(|own| own.name == constraint.name).flat_map(|own| &own.components[3..]);
         let rotations: Vec<&str> =
             ["rx", "ry", "rz"].into_iter().zip(turns).filter(|(_, on)| **on).map(|(axis, _)| axis).collect();
@@ -125,11 +125,10 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
     for load in &built.model.loads {
         writeln!(page, "load `{}`: {}", load.name, describe_load(built, load))?;
     }
-    for load in built.corotational.iter().flat_map(|part| &part.model.loads) {
-        writeln!(page, "load `{}`: {}", load.name, describe_corotational_load(&load.kind))?;
+    for load in built.implicit.iter().flat_map(|part| &part.model.loads) {
+        writeln!(page, "load `{}`: {}", load.name, describe_implicit_load(&load.kind))?;
     }
-    if let Some(springs) = built.corotational.as_ref().map(|part| part.model.springs.len()).filter(|&n| n > 0)
-    {
+    if let Some(springs) = built.implicit.as_ref().map(|part| part.model.springs.len()).filter(|&n| n > 0) {
         writeln!(page, "{} to points", counted(springs, "spring"))?;
     }
     Ok(())
@@ -170,7 +169,7 @@ fn describe_load(built: &Built, load: &Load) -> String {
 }
 
 /// What the triangles of a shell are.
-fn write_corotational(page: &mut String, part: &Corotational, name: &str, built: &Built) -> fmt::Result {
+fn write_implicit(page: &mut String, part: &ImplicitBodies, name: &str, built: &Built) -> fmt::Result {
     let body = built.bodies.iter().position(|body| body.name == name).unwrap_or(0);
     match &part.cells[body] {
         BodyCells::Facets(range) => {
@@ -193,7 +192,7 @@ fn write_corotational(page: &mut String, part: &Corotational, name: &str, built:
 }
 
 /// What a load does at its full size.
-fn describe_corotational_load(kind: &pliant_implicit::LoadKind) -> String {
+fn describe_implicit_load(kind: &pliant_implicit::LoadKind) -> String {
     use pliant_implicit::LoadKind;
     let vector = |v: &nalgebra::Vector3<f64>| format!("({})", [v.x, v.y, v.z].map(number).join(", "));
     match kind {
@@ -224,12 +223,13 @@ fn describe_corotational_load(kind: &pliant_implicit::LoadKind) -> String {
 }
 
 fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> fmt::Result {
-    let Some(Limits { bound, limit, limiting }) = &plan.limits else {
-        let (step, until, solver) = (number(plan.step), number(scene.scene.until), scene.run.solver.word());
-        let steps = counted(plan.steps as usize, "step");
+    let Some(Limits { bound, assembled: limit, limiting }) = &plan.limits else {
+        let (step, until, solver) =
+            (number(plan.steps.step), number(scene.scene.until), scene.run.solver.word());
+        let steps = counted(plan.steps.number as usize, "step");
         return writeln!(page, "\nsolver `{solver}`: {steps} of {step} s for {until} s");
     };
-    let seconds = plan.steps as f64 * limit.seconds_per_call;
+    let seconds = plan.steps.number as f64 * limit.seconds_per_call;
     writeln!(page, "\ncritical time step:")?;
     writeln!(page, "  element bound {} s, set by {limiting}", number(bound.step))?;
     let calls = limit.force_calls;
@@ -237,8 +237,8 @@ fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> f
     writeln!(
         page,
         "  step          {} s, {} steps for {} s",
-        number(plan.step),
-        plan.steps,
+        number(plan.steps.step),
+        plan.steps.number,
         number(scene.scene.until)
     )?;
     if let Some(note) = &plan.note {

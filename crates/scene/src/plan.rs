@@ -1,19 +1,17 @@
 //! The time step of a run: from the mesh and the laws, or as requested and then compared with the critical time step of the assembled
 //! model, the *true limit*.
 
-use pliant_explicit::critical_step::{ElementBound, TrueLimit, element_bound, true_limit};
+use pliant_explicit::critical_step::{ElementBound, TrueLimit};
 use pliant_implicit::Explicit;
+use pliant_sim::{Critical, ImplicitBodies, SAFETY, Steps, counted, number};
 use serde::Serialize;
 
-use crate::assemble::{Built, Corotational};
-use crate::diagnostic::{Diagnostic, SceneErrors, counted};
+use crate::assemble::Built;
+use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{SolverName, StepChoice};
-use crate::output::number;
 use crate::scene::Scene;
 use crate::target::Target;
 
-/// Fraction of the critical time step of the assembled model that an automatic step takes.
-pub const SAFETY: f64 = 0.9;
 /// A step that is shortened by more than this part is reported.
 const SHORTENED: f64 = 1e-3;
 /// Automatic step [s] of implicit runs.
@@ -22,12 +20,8 @@ pub const IMPLICIT_STEP: f64 = 0.01;
 /// The step of a run and what limits it.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Step [s]; a whole number of them makes the duration. Of unequal load steps the mean.
-    pub step: f64,
-    /// Where load steps end [s], if they are not equal.
-    pub ends: Option<Vec<f64>>,
-    /// Steps to take.
-    pub steps: u64,
+    /// Its steps; a whole number of them makes the duration.
+    pub steps: Steps,
     /// What limits explicit steps of solids; `None` of shells, and of solids whose equations are solved.
     pub limits: Option<Limits>,
     /// A remark about a requested step.
@@ -42,7 +36,7 @@ pub struct Limits {
     /// The smallest element bound.
     pub bound: ElementBound,
     /// The critical time step of the assembled model.
-    pub limit: TrueLimit,
+    pub assembled: TrueLimit,
     /// The cell that sets the bound.
     pub limiting: LimitingElement,
 }
@@ -58,6 +52,13 @@ pub struct LimitingElement {
     pub number: u32,
     /// Its centre at rest [m].
     pub centre: [f64; 3],
+}
+
+impl Limits {
+    /// The automatic step [s].
+    fn automatic(&self) -> f64 {
+        Critical { bound: self.bound, assembled: self.assembled }.automatic()
+    }
 }
 
 impl std::fmt::Display for LimitingElement {
@@ -77,7 +78,7 @@ impl std::fmt::Display for LimitingElement {
 /// If the requested step is above the critical time step of the assembled model, or the scene can't run on the requested device.
 pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
     let fail = |diagnostic| Err(scene.source.errors(vec![diagnostic]));
-    let (limits, note) = match &built.corotational {
+    let (limits, note) = match &built.implicit {
         Some(part) => (None, check_explicit_step(scene, part)),
         None => match limits(scene, built) {
             Ok((limits, note)) => (Some(limits), Ok(note)),
@@ -96,17 +97,17 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         (SolverName::QuasiStatic, StepChoice::Auto(_)) => scene.run.load_steps.ends(scene.scene.until),
         _ => None,
     };
-    let mut plan = Plan { step: 0.0, ends, steps: 0, limits, note, target };
-    (plan.steps, plan.step) = plan.steps_of(scene, built, scene.scene.until);
-    if let Some(ends) = &plan.ends {
+    let mut plan = Plan { steps: Steps { step: 0.0, number: 0, ends }, limits, note, target };
+    (plan.steps.number, plan.steps.step) = plan.steps_of(scene, built, scene.scene.until);
+    if let Some(ends) = &plan.steps.ends {
         let times: Vec<String> = ends.iter().map(|&end| number(end)).collect();
         plan.note = Some(format!("the load steps end at t = {} s", times.join(", ")));
     }
     if let StepChoice::Seconds(asked) = scene.run.step
-        && plan.step < asked * (1.0 - SHORTENED)
+        && plan.steps.step < asked * (1.0 - SHORTENED)
     {
-        let [asked, until, step] = [asked, scene.scene.until, plan.step].map(number);
-        let steps = counted(plan.steps as usize, "step");
+        let [asked, until, step] = [asked, scene.scene.until, plan.steps.step].map(number);
+        let steps = counted(plan.steps.number as usize, "step");
         let told = format!(
             "a step of {asked} s does not divide the {until} s of the scene: it takes {steps} of {step} s"
         );
@@ -116,7 +117,7 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
 }
 
 /// Compares an explicit step of shells with the critical one.
-fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<String>, Box<Diagnostic>> {
+fn check_explicit_step(scene: &Scene, part: &ImplicitBodies) -> Result<Option<String>, Box<Diagnostic>> {
     let StepChoice::Seconds(step) = scene.run.step else { return Ok(None) };
     let stable = Explicit::stable_step(&part.model);
     if scene.run.solver != SolverName::Explicit || step <= stable {
@@ -135,37 +136,37 @@ fn check_explicit_step(scene: &Scene, part: &Corotational) -> Result<Option<Stri
 /// What limits the steps of solids, and a remark about a requested step.
 fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<Diagnostic>> {
     let fail = |diagnostic| Err(Box::new(diagnostic));
-    let Some(bound) = element_bound(&built.model) else {
-        return fail(Diagnostic::error("the scene has no elements"));
-    };
-    let limit = match true_limit(&built.model) {
-        Ok(limit) => limit,
+    let critical = match Critical::of(&built.model) {
+        Ok(Some(critical)) => critical,
+        Ok(None) => return fail(Diagnostic::error("the scene has no elements")),
         Err(contradiction) => return fail(Diagnostic::error(contradiction.to_string())),
     };
+    let automatic = critical.automatic();
+    let Critical { bound, assembled } = critical;
     let limiting = limiting_element(built, bound);
     let note = match scene.run.step {
         StepChoice::Seconds(step) if scene.run.solver == SolverName::Explicit => {
-            if step > limit.step {
+            if step > assembled.step {
                 let message = format!(
                     "the step {} s is above the critical time step {} s of the assembled model: it would be unstable",
                     number(step),
-                    number(limit.step)
+                    number(assembled.step)
                 );
                 let help = format!(
                     "the element bound {} s is set by {limiting}; take `step = \"auto\"` ({} s), a step below {} s, or \
                      a mesh without small cells there",
                     number(bound.step),
-                    number(automatic(&bound, &limit)),
-                    number(limit.step)
+                    number(automatic),
+                    number(assembled.step)
                 );
                 let place = scene.source.span(&scene.run_at("step"));
                 return fail(Diagnostic::error(message).at(place, "too large").help(help));
             }
-            note_on_step(step, limit.step)
+            note_on_step(step, assembled.step)
         }
         _ => None,
     };
-    Ok((Limits { bound, limit, limiting }, note))
+    Ok((Limits { bound, assembled, limiting }, note))
 }
 
 impl Plan {
@@ -173,12 +174,12 @@ impl Plan {
     pub(crate) fn steps_of(&self, scene: &Scene, built: &Built, until: f64) -> (u64, f64) {
         let asked = match scene.run.step {
             StepChoice::Seconds(step) => step,
-            StepChoice::Auto(_) => match (scene.run.solver, &self.limits, &built.corotational) {
+            StepChoice::Auto(_) => match (scene.run.solver, &self.limits, &built.implicit) {
                 (SolverName::QuasiStatic, ..) if let Some(ends) = scene.run.load_steps.ends(until) => {
                     return (ends.len() as u64, until / ends.len() as f64);
                 }
                 (SolverName::QuasiStatic | SolverName::Static, ..) => scene.run.load_steps.first(until),
-                (SolverName::Explicit, Some(limits), _) => automatic(&limits.bound, &limits.limit),
+                (SolverName::Explicit, Some(limits), _) => limits.automatic(),
                 (SolverName::Explicit, None, Some(part)) => SAFETY * Explicit::stable_step(&part.model),
                 _ => IMPLICIT_STEP.min(until),
             },
@@ -186,35 +187,6 @@ impl Plan {
         let steps = (until / asked - 1e-9).ceil().max(1.0);
         (steps as u64, until / steps)
     }
-}
-
-impl Plan {
-    /// The end [s] of the step of a number, counted from 1.
-    pub(crate) fn end_of(&self, number: u64) -> f64 {
-        let own = self.ends.as_ref().and_then(|ends| ends.get(number as usize - 1));
-        own.copied().unwrap_or(number as f64 * self.step)
-    }
-
-    /// The number, counted from 1, of the step that begins at a time [s].
-    pub(crate) fn number_from(&self, time: f64) -> u64 {
-        match &self.ends {
-            Some(ends) => ends.partition_point(|&end| end <= time) as u64 + 1,
-            None => (time / self.step).round() as u64 + 1,
-        }
-    }
-
-    /// The length [s] of the step that begins at a time [s]; at the end, of the last one.
-    pub(crate) fn step_from(&self, time: f64) -> f64 {
-        let Some(ends) = &self.ends else { return self.step };
-        let number = self.number_from(time).min(ends.len() as u64);
-        let before = if number > 1 { self.end_of(number - 1) } else { 0.0 };
-        self.end_of(number) - before
-    }
-}
-
-/// The automatic step. If every node is held there is no limit, and the element bound replaces it.
-fn automatic(bound: &ElementBound, limit: &TrueLimit) -> f64 {
-    SAFETY * if limit.step.is_finite() { limit.step } else { bound.step }
 }
 
 fn note_on_step(step: f64, limit: f64) -> Option<String> {
@@ -257,10 +229,12 @@ mod tests {
     fn an_automatic_step_is_a_whole_part_of_the_duration_below_the_true_limit() {
         let plan = planned("").unwrap();
         let limits = plan.limits.as_ref().unwrap();
-        assert!(plan.step <= SAFETY * limits.limit.step && limits.bound.step <= limits.limit.step);
-        assert!((plan.step * plan.steps as f64 - 0.1).abs() < 1e-15);
         assert!(
-            0.1 / (plan.steps - 1) as f64 > SAFETY * limits.limit.step,
+            plan.steps.step <= SAFETY * limits.assembled.step && limits.bound.step <= limits.assembled.step
+        );
+        assert!((plan.steps.step * plan.steps.number as f64 - 0.1).abs() < 1e-15);
+        assert!(
+            0.1 / (plan.steps.number - 1) as f64 > SAFETY * limits.assembled.step,
             "one step fewer would be too large"
         );
         assert_eq!((limits.limiting.body.as_str(), limits.limiting.element.as_str()), ("cube", "hex8"));
@@ -271,12 +245,12 @@ mod tests {
     fn a_step_is_held_against_bound_and_true_limit() {
         let automatic = planned("").unwrap().limits.unwrap();
         let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
-        let close = asked(0.95 * automatic.limit.step).unwrap();
+        let close = asked(0.95 * automatic.assembled.step).unwrap();
         assert!(close.note.is_some_and(|note| note.contains("close to the critical time step")));
         // A whole part of the duration, or the note reports that it is shortened.
-        let below = automatic.bound.step.min(0.9 * automatic.limit.step);
+        let below = automatic.bound.step.min(0.9 * automatic.assembled.step);
         assert_eq!(asked(0.1 / (0.1 / below).ceil()).unwrap().note, None);
-        let refused = asked(1.001 * automatic.limit.step).unwrap_err().plain().to_string();
+        let refused = asked(1.001 * automatic.assembled.step).unwrap_err().plain().to_string();
         for piece in [
             "cube.toml:",
             "above the critical time step",
@@ -291,7 +265,7 @@ mod tests {
     fn a_step_that_does_not_divide_the_duration_is_told() {
         let with = |step: &str| planned(&format!("[run]\nsolver = 'quasi-static'\nstep = {step}\n")).unwrap();
         let told = with("0.03");
-        assert_eq!((told.steps, told.step), (4, 0.025));
+        assert_eq!((told.steps.number, told.steps.step), (4, 0.025));
         let note = told.note.unwrap();
         for piece in ["0.03", "does not divide", "4 steps of 0.025"] {
             assert!(note.contains(piece), "no `{piece}` in {note}");
@@ -303,17 +277,17 @@ mod tests {
     fn unequal_load_steps_end_where_they_are_told_to_and_with_the_scene() {
         let plan =
             planned("[run]\nsolver = 'quasi-static'\nload-steps = { times = [0.01, 0.04] }\n").unwrap();
-        assert_eq!(plan.ends.as_deref(), Some([0.01, 0.04, 0.1].as_slice()));
-        let of = |time: f64| (plan.number_from(time), plan.step_from(time));
+        assert_eq!(plan.steps.ends.as_deref(), Some([0.01, 0.04, 0.1].as_slice()));
+        let of = |time: f64| (plan.steps.number_from(time), plan.steps.step_from(time));
         assert_eq!([of(0.0), of(0.01)], [(1, 0.01), (2, 0.03)]);
         assert_eq!((of(0.04).0, of(0.1).1), (3, 0.1 - 0.04));
-        assert_eq!([1, 2, 3].map(|number| plan.end_of(number)), [0.01, 0.04, 0.1]);
+        assert_eq!([1, 2, 3].map(|number| plan.steps.end_of(number)), [0.01, 0.04, 0.1]);
     }
 
     #[test]
     fn a_duration_below_one_step_takes_one() {
         let scene = crate::testing::read(&crate::testing::CUBE.replace("until = 0.1", "until = 1e-6"));
         let plan = plan(&scene, &built("")).unwrap();
-        assert_eq!((plan.steps, plan.step), (1, 1e-6));
+        assert_eq!((plan.steps.number, plan.steps.step), (1, 1e-6));
     }
 }

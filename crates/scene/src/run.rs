@@ -7,19 +7,17 @@ use std::time::{Duration, Instant};
 use pliant_explicit::stability::Stability;
 use pliant_gpu::Wanted;
 use pliant_mechanics::Energies;
+use pliant_sim::{Effort, Equilibria, Failure, Instant as Now, LoadStepProgress, Simulation};
 use serde::{Deserialize, Serialize};
 
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::format::SolverName;
 use crate::output::{
-    CONVERGENCE, FailureSummary, FieldMesh, Frame, INTERRUPTED, OutputError, OutputFolder, PICTURE, PLOT,
-    SUMMARY, Schedule, Scheduled, ShellStrains, Summary, markdown, observers, plot, steps_to, summarise,
-    time_of,
+    CONVERGENCE, FieldMesh, Frame, INTERRUPTED, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY, Schedule,
+    Scheduled, ShellStrains, Summary, interrupted, markdown, observers, output_failure, plot, steps_to,
+    summarise, time_of,
 };
-use crate::participant::Participant;
-use crate::simulation::{Simulation, total};
-use crate::solver::{Effort, Equilibria, LoadStepProgress};
 use crate::view::Draw;
 use crate::world::{Part, World};
 
@@ -68,7 +66,7 @@ pub(crate) struct Watched {
 }
 
 impl Watched {
-    fn see(&mut self, participant: &dyn Participant) {
+    fn see(&mut self, participant: &dyn Now) {
         let (energies, floor) = (participant.energies(), participant.balance_floor());
         if participant.largest_energy() > floor {
             self.worst_balance = self.worst_balance.max(energies.balance);
@@ -83,7 +81,7 @@ impl Watched {
 /// The result of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Outcome {
-    pub failure: Option<FailureSummary>,
+    pub failure: Option<Failure>,
     /// Common instants after the start.
     pub steps: u64,
     pub time: f64,
@@ -122,7 +120,7 @@ pub(crate) struct PartOutcome {
 }
 
 impl PartOutcome {
-    fn new(part: &Part, participant: &dyn Participant, watched: Watched) -> Self {
+    fn new(part: &Part, participant: &dyn Now, watched: Watched) -> Self {
         let watches = part.plan.limits.is_some() && part.scene.run.solver == SolverName::Explicit;
         let frame = Frame { part, now: participant };
         Self {
@@ -141,7 +139,7 @@ impl PartOutcome {
 
 impl Outcome {
     /// Of a run whose steppers could not be made.
-    fn not_begun(failure: FailureSummary, world: &World) -> Self {
+    fn not_begun(failure: Failure, world: &World) -> Self {
         let part = |part: &Part| PartOutcome {
             reactions: vec![[0.0; 3]; part.built.model.constraints.len()],
             ..PartOutcome::default()
@@ -201,7 +199,7 @@ pub fn run_with(
     let mut outcome = pool.install(|| go(world, folder, options, report))?;
     if let Err(error) = write_pages(world, folder, &mut outcome) {
         let time = Some(outcome.time);
-        outcome.failure.get_or_insert_with(|| FailureSummary::output(&error, time));
+        outcome.failure.get_or_insert_with(|| output_failure(&error, time));
     }
     Ok(summarise(world, &outcome))
 }
@@ -235,14 +233,16 @@ fn go(
     options: Options<'_>,
     report: &mut (dyn FnMut(Progress) + Send),
 ) -> Result<Outcome, OutputError> {
-    let kept = match options.resume {
+    let begun = match options.resume {
         Some(checkpoint) => {
             let other = || OutputError::new(folder.path(), "the checkpoint is of another model");
-            Some(checkpoint.kept(world).ok_or_else(other)?)
+            let simulated = world.simulated();
+            let state = checkpoint.state(world, &simulated).ok_or_else(other)?;
+            Simulation::resumed(simulated, state)
         }
-        None => None,
+        None => world.simulation(),
     };
-    let simulation = match Simulation::new(world, kept) {
+    let simulation = match begun {
         Ok(simulation) => simulation,
         Err(failure) => return Ok(Outcome::not_begun(failure, world)),
     };
@@ -287,17 +287,17 @@ fn go(
     let picture = options.picture.filter(|_| failure.is_none());
     let (drawn, failure) = match picture.map(|picture| run.draw(picture, folder)).transpose() {
         Ok(drawn) => (drawn, failure),
-        Err(error) => (None, Some(FailureSummary::output(&error, Some(run.simulation.time())))),
+        Err(error) => (None, Some(output_failure(&error, Some(run.simulation.time())))),
     };
     let Run { simulation, watched, history, files, kept, .. } = run;
-    let parts = world.participants.iter().zip(simulation.participants()).zip(watched);
+    let parts = world.participants.iter().zip(simulation.instants()).zip(watched);
     Ok(Outcome {
         failure,
         steps: simulation.steps(),
         time: simulation.time(),
         wall_seconds: wall_seconds(),
         energies: simulation.energies(),
-        parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own.as_ref(), watched)).collect(),
+        parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own, watched)).collect(),
         ended: simulation.ended().map(ToOwned::to_owned),
         history,
         files: files.into_iter().chain(kept).chain(drawn.clone()).collect(),
@@ -370,24 +370,23 @@ impl<'a> Run<'a> {
     }
 
     /// Evaluates the current instant and shows it to all who look; whether it is the last.
-    fn see(&mut self) -> Result<bool, FailureSummary> {
+    fn see(&mut self) -> Result<bool, Failure> {
         let (time, last) = (self.simulation.time(), self.is_last());
         let step = self.world.step_from(time);
         let looked_at = self.watching.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
         let wanted = if looked_at || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies };
         self.simulation.evaluate(wanted)?;
-        let participants = self.simulation.participants();
-        self.watched.iter_mut().zip(participants).for_each(|(own, now)| own.see(now.as_ref()));
+        self.watched.iter_mut().zip(self.simulation.instants()).for_each(|(own, now)| own.see(now));
         if self.sampling.is_due(time, step, last) {
-            self.history.sample(&self.simulation.frames(self.world));
+            self.history.sample(&self.world.frames(&self.simulation));
             self.look_at_strains();
         }
         // Of steps that no output looks at nothing is made.
         if looked_at {
-            let frames = self.simulation.frames(self.world);
+            let frames = self.world.frames(&self.simulation);
             for (schedule, observer) in &mut self.watching {
                 if schedule.is_due(time, step, last) {
-                    observer.see(&frames).map_err(|error| FailureSummary::output(&error, Some(time)))?;
+                    observer.see(&frames).map_err(|error| output_failure(&error, Some(time)))?;
                 }
             }
         }
@@ -395,15 +394,15 @@ impl<'a> Run<'a> {
     }
 
     fn look_at_strains(&mut self) {
-        let parts = self.world.participants.iter().zip(self.simulation.participants());
+        let parts = self.world.participants.iter().zip(self.simulation.instants());
         for (own, (part, now)) in self.watched.iter_mut().zip(parts) {
             own.strains.look(&part.built, now.shells());
         }
     }
 
     /// A failure with a remedy that knows the run.
-    fn advised(&self, failure: FailureSummary) -> FailureSummary {
-        let mut parts = self.world.participants.iter().zip(self.simulation.participants());
+    fn advised(&self, failure: Failure) -> Failure {
+        let mut parts = self.world.participants.iter().zip(self.simulation.instants());
         let own = parts.find(|(part, _)| failure.body.as_ref().is_none_or(|body| part.scene.has(body)));
         match own.and_then(|(part, now)| remedy(&failure, part, &now.stability())) {
             Some(remedy) => failure.advised(&remedy),
@@ -420,13 +419,12 @@ impl<'a> Run<'a> {
     /// After a step that failed: shows what was found until then to those who have not looked at it.
     fn show_what_was_found(&mut self) {
         let seen = self.simulation.time();
-        let Some(only) = self.simulation.only() else { return };
-        if !only.keeps_what_it_found() || only.evaluate(Wanted::Everything).is_err() {
+        if !self.simulation.keeps_what_it_found() {
             return;
         }
         let (time, step) = (self.simulation.time(), self.world.step_from(seen));
         self.look_at_strains();
-        let frames = self.simulation.frames(self.world);
+        let frames = self.world.frames(&self.simulation);
         if time > seen {
             self.history.sample(&frames);
         }
@@ -456,14 +454,14 @@ impl<'a> Run<'a> {
         wall_seconds: f64,
         stop: bool,
         watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), FailureSummary> {
+    ) -> Result<(), Failure> {
         let steps = self.stride();
         self.simulation.advance(steps, watch)?;
         let (time, last) = (self.simulation.time(), self.is_last());
         let step = self.world.step_from(time);
         let due = self.checkpoints.as_mut().is_some_and(|all| all.is_due(time, step, last || stop));
         if due && let Some(checkpoints) = &self.checkpoints {
-            self.simulation.bring_back()?;
+            let states = self.simulation.encode()?;
             let progressed = Progressed {
                 time,
                 steps: self.simulation.steps(),
@@ -473,13 +471,13 @@ impl<'a> Run<'a> {
                 sampling: self.sampling,
                 outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
             };
-            let written = checkpoints.write(&progressed, self.simulation.participants());
-            self.kept = Some(written.map_err(|error| FailureSummary::output(&error, Some(time)))?);
+            let written = checkpoints.write(&progressed, &states);
+            self.kept = Some(written.map_err(|error| output_failure(&error, Some(time)))?);
         }
         // What is left of the last instant is quickly done.
         if stop && !last {
             let kept = due.then_some(self.kept.as_deref()).flatten();
-            return Err(FailureSummary::interrupted(time, kept));
+            return Err(interrupted(time, kept));
         }
         Ok(())
     }
@@ -488,24 +486,24 @@ impl<'a> Run<'a> {
     fn draw(&self, picture: &dyn Draw, folder: &OutputFolder) -> Result<PathBuf, OutputError> {
         let world = self.world;
         let mut shown = FieldMesh::new(world, &world.scene.shown(world.scene.scene.until));
-        shown.fill(&self.simulation.frames(world));
+        shown.fill(&world.frames(&self.simulation));
         let drawn = picture.draw(shown.mesh(), self.simulation.time());
         let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
         folder.write(PICTURE, &png)
     }
 
     /// Ends the outputs where this run ends.
-    fn finish(&mut self) -> Result<(), FailureSummary> {
+    fn finish(&mut self) -> Result<(), Failure> {
         (self.watching.iter_mut())
             .try_for_each(|(_, observer)| observer.finish())
-            .map_err(|error| FailureSummary::output(&error, Some(self.simulation.time())))
+            .map_err(|error| output_failure(&error, Some(self.simulation.time())))
     }
 }
 
 impl History {
     fn sample(&mut self, frames: &[Frame<'_>]) {
         self.times.push(time_of(frames));
-        self.energies.push(total(frames.iter().map(|frame| frame.now.energies())));
+        self.energies.push(Energies::total(frames.iter().map(|frame| frame.now.energies())));
         let size = |force: [f64; 3]| force.iter().map(|f| f * f).sum::<f64>().sqrt();
         self.reactions.push(frames.iter().flat_map(Frame::reactions).map(size).collect());
     }

@@ -8,10 +8,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use pliant_mechanics::Energies;
+use pliant_sim::number;
 
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
-use crate::output::{AXES, ENERGIES, OutputError, OutputFolder, Summary, check_own_folder, number};
+use crate::output::{AXES, ENERGIES, OutputError, OutputFolder, Summary, check_own_folder};
 use crate::registry::OutputTable;
 use crate::run::{Options, run_with};
 use crate::scene::Scene;

@@ -1,10 +1,11 @@
 //! The device of a run: the CPU or a GPU, as requested by the scene and available on the machine.
 
 use pliant_gpu::{Device, GpuError, Kind};
+use pliant_sim::Precision;
 
 use crate::assemble::Built;
 use crate::diagnostic::Diagnostic;
-use crate::format::{DeviceName, Precision, RunTable, SolverName};
+use crate::format::{DeviceName, RunTable, SolverName};
 use crate::scene::Scene;
 
 /// The device of a run, and its number type.
@@ -25,7 +26,7 @@ impl Target {
     /// If a GPU is requested, and there is none or it can't run the scene.
     pub(crate) fn choose(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
         let run = &scene.run;
-        let corotational = built.corotational.is_some();
+        let implicit = built.implicit.is_some();
         match run.device {
             DeviceName::Cpu => {
                 let given = [("adapter", run.adapter.is_some()), ("design", run.design.is_some())];
@@ -39,7 +40,7 @@ impl Target {
                     }
                 }
             }
-            DeviceName::Gpu => match processor_only(run, corotational) {
+            DeviceName::Gpu => match processor_only(run, implicit) {
                 None => match open(run) {
                     Ok(device) => {
                         let software = device.adapter().kind == Kind::Software;
@@ -64,7 +65,7 @@ impl Target {
                     Err(Box::new(error.help(help)))
                 }
             },
-            DeviceName::Auto => Ok(match processor_only(run, corotational) {
+            DeviceName::Auto => Ok(match processor_only(run, implicit) {
                 Some((_, what, _)) => Self::processor(run, Some(format!("{what} runs on the CPU only"))),
                 None => match open(run) {
                     Ok(device) if device.adapter().kind == Kind::Software => {
@@ -97,8 +98,8 @@ impl Target {
 }
 
 /// The key that a GPU can't support, in words, and a remedy.
-fn processor_only(run: &RunTable, corotational: bool) -> Option<(&'static str, &'static str, &'static str)> {
-    if corotational {
+fn processor_only(run: &RunTable, implicit: bool) -> Option<(&'static str, &'static str, &'static str)> {
+    if implicit {
         let help = "set `device = \"cpu\"`, or leave it out";
         return Some(("device", "the model of shells, `implicit` and `static`", help));
     }

@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use pliant_geometry::Labels;
 use pliant_gpu::Device;
+use pliant_sim::{Failure, Simulation};
 
 use crate::assemble::{Built, Meshing, build_watched};
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{FieldName, ViewTable};
+use crate::output::Frame;
 use crate::plan::{Plan, plan};
 use crate::scene::Scene;
 
@@ -82,7 +84,7 @@ impl World {
 
     /// Refuses unequal load steps of a participant beside others.
     fn check_load_steps(&self) -> Result<(), SceneErrors> {
-        let Some(part) = self.participants.iter().find(|part| part.plan.ends.is_some()) else {
+        let Some(part) = self.participants.iter().find(|part| part.plan.steps.ends.is_some()) else {
             return Ok(());
         };
         let place = self.scene.source.span(&part.scene.run_at("load-steps"));
@@ -104,7 +106,8 @@ impl World {
         let mut world = self.clone();
         world.scene.scene.until = until;
         for part in &mut world.participants {
-            (part.plan.steps, part.plan.step) = part.plan.steps_of(&part.scene, &part.built, until);
+            (part.plan.steps.number, part.plan.steps.step) =
+                part.plan.steps_of(&part.scene, &part.built, until);
         }
         world.meet();
         world
@@ -117,8 +120,8 @@ impl World {
         }
         let (until, common) = (self.scene.scene.until, self.steps());
         for part in &mut self.participants {
-            part.plan.steps = common * part.plan.steps.div_ceil(common);
-            part.plan.step = until / part.plan.steps as f64;
+            part.plan.steps.number = common * part.plan.steps.number.div_ceil(common);
+            part.plan.steps.step = until / part.plan.steps.number as f64;
         }
     }
 
@@ -132,34 +135,47 @@ impl World {
 
     /// The participant that has the least steps, and so the common instants of all.
     pub(crate) fn slowest(&self) -> &Part {
-        let steps = |part: &&Part| part.plan.steps;
+        let steps = |part: &&Part| part.plan.steps.number;
         // A world has a participant: a scene without bodies is refused when it is read.
         self.participants.iter().min_by_key(steps).unwrap_or(&self.participants[0])
     }
 
-    /// Steps of a participant between two common instants.
-    pub(crate) fn ratio(&self, part: &Part) -> u64 {
-        (part.plan.steps / self.slowest().plan.steps).max(1)
-    }
-
     /// Common instants after the start.
     pub fn steps(&self) -> u64 {
-        self.slowest().plan.steps
+        self.slowest().plan.steps.number
     }
 
     /// The time [s] from one common instant to the next, at a time.
     pub(crate) fn step_from(&self, time: f64) -> f64 {
-        self.slowest().plan.step_from(time)
+        self.slowest().plan.steps.step_from(time)
     }
 
     /// The time [s] from one common instant to the next; of unequal ones the mean.
     pub fn step(&self) -> f64 {
-        self.slowest().plan.step
+        self.slowest().plan.steps.step
     }
 
     /// The GPU of the scene, where all bodies go together on one.
     pub fn device(&self) -> Option<&Device> {
         self.only()?.plan.target.device.as_ref()
+    }
+
+    /// A simulation of it, at its start.
+    ///
+    /// # Errors
+    /// If a stepper can't be made.
+    pub fn simulation(&self) -> Result<Simulation, Failure> {
+        Simulation::new(self.simulated())
+    }
+
+    /// Its participants without their tables.
+    pub(crate) fn simulated(&self) -> pliant_sim::World {
+        pliant_sim::World { parts: self.participants.iter().map(Part::simulated).collect() }
+    }
+
+    /// All participants of a simulation of it as outputs read them.
+    pub(crate) fn frames<'a>(&'a self, simulation: &'a Simulation) -> Vec<Frame<'a>> {
+        self.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame { part, now }).collect()
     }
 
     /// Goes on on a device that is open, where that is the one it asks for.

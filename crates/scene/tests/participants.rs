@@ -167,7 +167,7 @@ fn without_tables_solids_and_shells_are_participants_of_the_run() {
     let two = world(&format!("{HEAD}{LAWS}{SOLID}{SHELL}"));
     let names: Vec<&str> = two.participants.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["solids", "shells"]);
-    let steps: Vec<u64> = two.participants.iter().map(|part| part.plan.steps).collect();
+    let steps: Vec<u64> = two.participants.iter().map(|part| part.plan.steps.number).collect();
     assert!(steps.iter().all(|own| own.is_multiple_of(two.steps())), "{steps:?}");
     assert!(steps.contains(&two.steps()));
 }

@@ -5,8 +5,9 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::{CellLabel, Vector3};
 use pliant_picture::{Subject, visible};
+use pliant_scene::Live;
 use pliant_scene::format::ViewTable;
-use pliant_scene::{Live, Snapshot};
+use pliant_sim::State;
 use serde::{Deserialize, Serialize};
 
 use crate::hand::{Hand, Hold};
@@ -220,13 +221,13 @@ fn subject_of(world: &World, view: &ViewTable, live: &mut dyn Live) -> Result<Su
 
 enum Ended<'r> {
     /// Numbers are others from here on.
-    Change(Option<Box<Snapshot>>, &'r [Number]),
+    Change(Option<Box<State>>, &'r [Number]),
     Whole(Replayed),
 }
 
 impl<'r> Replay<'r> {
     /// Goes on until numbers are others, or to the end.
-    fn play(&mut self, world: &World, from: Option<(World, Option<Snapshot>)>) -> Result<Ended<'r>, String> {
+    fn play(&mut self, world: &World, from: Option<(World, Option<State>)>) -> Result<Ended<'r>, String> {
         let (mut live, _) = crate::session::enter(world, from)?;
         if let Some(surface) = self.surface {
             live.show(&world.scene.shown_as(&surface.put_into(&world.scene.view), 1.0));
@@ -257,7 +258,7 @@ impl<'r> Replay<'r> {
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {
-                        let snapshot = live.snapshot().ok_or("numbers were changed within a step")?;
+                        let snapshot = live.state().ok_or("numbers were changed within a step")?;
                         return Ok(Ended::Change(Some(Box::new(snapshot)), numbers));
                     }
                 }

@@ -12,7 +12,8 @@ use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values, visible};
 use pliant_scene::format::ViewTable;
-use pliant_scene::{Column, Live, Snapshot, World, go_on, live};
+use pliant_scene::{Column, Live, World, go_on, live};
+use pliant_sim::{Failure, State};
 
 use crate::device::{Seen, point_value};
 use crate::hand::{Hand, Hold, Point, nodes_of};
@@ -119,9 +120,9 @@ pub struct Session {
 /// If a stepper can't be made.
 pub(crate) fn enter(
     world: &World,
-    from: Option<(World, Option<Snapshot>)>,
+    from: Option<(World, Option<State>)>,
 ) -> Result<(Box<dyn Live>, bool), String> {
-    let told = |failure: pliant_scene::FailureSummary| failure.message;
+    let told = |failure: Failure| failure.message;
     let world = Arc::new(world.clone());
     if let Some((before, Some(snapshot))) = from
         && let Some(live) = go_on(&world, snapshot, &before).map_err(told)?
@@ -301,7 +302,7 @@ fn play(
             let left = player.go(inbox, &mut frames, wake);
             let goes_on = matches!(left, Left::Change) && player.course.steps > 0;
             let snapshot =
-                if goes_on && player.course.failure.is_none() { player.live.snapshot() } else { None };
+                if goes_on && player.course.failure.is_none() { player.live.state() } else { None };
             let (subject, course) = player.end();
             (left, snapshot, subject, course)
         };
@@ -411,7 +412,7 @@ impl<'s> Player<'s> {
     /// Begins to play a world, or goes on as it from where a run of the world before stands.
     fn enter(
         world: &'s World,
-        from: Option<(World, Option<Snapshot>)>,
+        from: Option<(World, Option<State>)>,
         subject: Option<Arc<Subject>>,
         mut course: Playback,
     ) -> Result<Self, String> {

@@ -5,7 +5,8 @@
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_explicit::State;
 use pliant_scene::source::Source;
-use pliant_scene::{OutputFolder, SAFETY, Scene, World};
+use pliant_scene::{OutputFolder, Scene, World};
+use pliant_sim::SAFETY;
 use rayon::ThreadPoolBuilder;
 
 use crate::case::{Case, CaseError, Findings, Row};
@@ -52,7 +53,7 @@ impl Program {
         // The duration for the timed number of steps.
         let short = World::new(&short)?;
         let limits = short.participants[0].plan.limits.as_ref();
-        let step = SAFETY * limits.map_or(1e-3, |limits| limits.limit.step);
+        let step = SAFETY * limits.map_or(1e-3, |limits| limits.assembled.step);
         let scene = scene(cells, step * (ELEMENT_STEPS / cells.pow(3)) as f64)?;
         Ok(Self(World::new(&scene)?))
     }

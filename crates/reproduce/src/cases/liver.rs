@@ -96,7 +96,7 @@ fn compute() -> Result<Findings, CaseError> {
 
     let elastic = Stretched::elastic(&built, 1.0, until)?;
     let long_after = Stretched::elastic(&built, 0.5, until)?;
-    let (stepper, state) = run::<f32>(&built.model, plan.step, until, |_, _| ())?;
+    let (stepper, state) = run::<f32>(&built.model, plan.steps.step, until, |_, _| ())?;
     let relaxed = Stretched::new(&built.model, &state, &stepper);
 
     let mut findings = Findings::default();

@@ -64,7 +64,7 @@ fn play(text: &str, seconds: f64, set: &[(&[&str], Value)]) -> Result<Played, Ca
 
 /// Continues frame by frame; a GPU places the points without a read-back.
 fn go(world: &Arc<World>, seconds: f64) -> Result<Played, CaseError> {
-    let failed = |failure: pliant_scene::FailureSummary| CaseError::Run(failure.message);
+    let failed = |failure: pliant_sim::Failure| CaseError::Run(failure.message);
     let mut live = live(world).map_err(failed)?;
     let solids = world.participants.iter().flat_map(|part| &part.built.model.solids);
     let elements = solids.map(|solid| solid.cells.len()).sum();

@@ -7,9 +7,9 @@ use pliant_geometry::{
 };
 use pliant_mechanics::model::{Averaging, Body, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
+use pliant_sim::counted;
 
 use super::{Builder, BuiltBody, SCENE, suggestion};
-use crate::diagnostic::counted;
 use crate::format::{BodyModel, BodyTable, ByLabel, Density, Element, Hourglass, Thickness, ThicknessRule};
 use crate::registry::LawTable;
 

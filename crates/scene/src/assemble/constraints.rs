@@ -3,11 +3,11 @@
 use pliant_geometry::{Mesh, Selection, Vector3};
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::model::{Constraint, Motion};
+use pliant_sim::number;
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
 use crate::format::{MoveTable, RotateTable, SolverName, Vectors};
-use crate::output::number;
 use crate::registry::{ConstraintTable, LoadTable};
 
 impl Builder<'_> {
@@ -36,7 +36,7 @@ impl Builder<'_> {
                 _ => Some(Motion::Fixed),
             };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
-                self.constrain_corotational(name, table, &motion, &nodes, components);
+                self.constrain_implicit(name, table, &motion, &nodes, components);
                 let [x, y, z, ..] = components;
                 let components = [x, y, z];
                 self.model.constraints.push(Constraint { name: name.clone(), nodes, components, motion });
@@ -159,7 +159,7 @@ impl Builder<'_> {
         let flies =
             |name: &str| scene.bodies.iter().any(|(own, body)| own == name && body.velocity.is_some());
         for (index, body) in self.model.bodies.iter().enumerate() {
-            let springs = self.corotational.as_ref().map_or(&[][..], |part| &part.model.springs);
+            let springs = self.implicit.as_ref().map_or(&[][..], |part| &part.model.springs);
             let held =
                 self.model.constraints.iter().any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)))
                     || springs.iter().any(|spring| body.nodes.contains(&spring.node));

@@ -4,11 +4,12 @@
 
 use pliant_geometry::{CellBlock, CellId, CellKind, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::harmonic::Laplacian;
+use pliant_sim::counted;
 
 use super::bodies::{Draft, nodes};
 use super::meshes::list_cells;
 use super::{Builder, suggestion};
-use crate::diagnostic::{Diagnostic, counted};
+use crate::diagnostic::Diagnostic;
 use crate::format::{Fibre, FibreRule};
 use crate::registry::LawTable;
 

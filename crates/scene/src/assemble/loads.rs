@@ -14,8 +14,8 @@ use crate::registry::{LoadTable, OutputTable};
 impl Builder<'_> {
     pub(super) fn add_loads(&mut self) {
         let scene = self.scene;
-        if self.corotational.is_some() {
-            self.add_corotational_loads();
+        if self.implicit.is_some() {
+            self.add_implicit_loads();
             return;
         }
         if let Some(acceleration) = scene.scene.gravity {
@@ -382,7 +382,7 @@ impl Builder<'_> {
 
     /// Rejects fields that need cells: a carried surface has no cells with stresses.
     fn refuse_cell_fields(&mut self, fields: &[FieldName], surface: usize, path: &[&str], help: &str) {
-        let on_shell = self.corotational.as_ref().is_some_and(|part| part.carried.contains_key(&surface));
+        let on_shell = self.implicit.as_ref().is_some_and(|part| part.carried.contains_key(&surface));
         if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {
             let message = format!("surfaces on shells have a displacement and no `{}`", field.name());
             self.error(path, message, "not on a surface", "write it on the body");

@@ -1,11 +1,11 @@
 //! Mass scaling, and the keys of `[run]` that are for dynamics only.
 
 use pliant_explicit::critical_step;
+use pliant_sim::{counted, number};
 
 use super::Builder;
-use crate::diagnostic::{Diagnostic, counted};
+use crate::diagnostic::Diagnostic;
 use crate::format::{LoadSteps, LoadTimes, SolverName, StepChoice};
-use crate::output::number;
 
 /// Added mass, as a fraction, above which a scene gives a warning.
 const MUCH: f64 = 0.05;

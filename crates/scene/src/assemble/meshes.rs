@@ -8,12 +8,12 @@ use pliant_meshing::{
     Block, DEFAULT_CELL_LIMIT, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Phantom, Resolution,
     Stuffing, Tube, VolumeCell, Voxels, brain_label,
 };
+use pliant_sim::{counted, number};
 
 use super::Builder;
 use super::images::words;
-use crate::diagnostic::{Diagnostic, counted};
+use crate::diagnostic::Diagnostic;
 use crate::format::{BodyModel, BodyTable, Cells, Fix, MeshTable, Organ};
-use crate::output::number;
 
 /// A mesh and where it comes from.
 pub(crate) struct MeshOrigin {

@@ -3,10 +3,10 @@
 
 mod bodies;
 mod constraints;
-mod corotational;
 mod fibres;
 mod fractions;
 mod images;
+mod implicit;
 mod loads;
 mod mass;
 mod meshes;
@@ -19,6 +19,7 @@ use std::sync::Arc;
 use pliant_geometry::{Labels, Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_sim::ImplicitBodies;
 
 use crate::cache::MeshCache;
 use crate::checker::nearest;
@@ -27,7 +28,6 @@ use crate::format::{CurveShape, Timing};
 use crate::scene::Scene;
 use crate::source::Source;
 
-pub use corotational::{BodyCells, Control, Corotational, Stop};
 pub(crate) use meshes::MeshOrigin;
 pub use meshes::SizeDoubt;
 
@@ -37,7 +37,7 @@ pub struct Built {
     /// The model.
     pub model: Arc<Model>,
     /// The model of the implicit solvers: shells, and solids whose equations are solved. Loads are then there.
-    pub corotational: Option<Arc<Corotational>>,
+    pub implicit: Option<Arc<ImplicitBodies>>,
     /// The bodies' meshes, in the order of the model's bodies.
     pub bodies: Vec<BuiltBody>,
     /// The carried surfaces' meshes, in the order of the model's surfaces.
@@ -119,7 +119,7 @@ pub fn build_watched(
         cache,
         watch,
         model: Model::default(),
-        corotational: None,
+        implicit: None,
         bodies: Vec::new(),
         surfaces: Vec::new(),
         out: scene.doubts.clone(),
@@ -140,14 +140,14 @@ pub fn build_watched(
     builder.check_free_bodies();
     builder.check_held();
     if !builder.failed() {
-        builder.start_corotational();
+        builder.start_implicit();
     }
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }
-    let Builder { model, corotational, bodies, surfaces, out: warnings, notes, .. } = builder;
-    let (model, corotational) = (Arc::new(model), corotational.map(Arc::new));
-    Ok(Built { model, corotational, bodies, surfaces, warnings, notes })
+    let Builder { model, implicit, bodies, surfaces, out: warnings, notes, .. } = builder;
+    let (model, implicit) = (Arc::new(model), implicit.map(Arc::new));
+    Ok(Built { model, implicit, bodies, surfaces, warnings, notes })
 }
 
 /// The labels of a body or a surface by name, or of all bodies.
@@ -168,7 +168,7 @@ struct Builder<'s> {
     cache: &'s MeshCache,
     watch: &'s dyn Fn(Meshing<'_>),
     model: Model,
-    corotational: Option<Corotational>,
+    implicit: Option<ImplicitBodies>,
     bodies: Vec<BuiltBody>,
     surfaces: Vec<Mesh>,
     out: Vec<Diagnostic>,

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::read_limited;
 use pliant_geometry::{DataArray, Mesh};
+use pliant_sim::counted;
 
 use super::{Builder, suggestion};
-use crate::diagnostic::counted;
 use crate::format::{NodeVectorSource, NodeVectors};
 use crate::reads::LONGEST_TABLE;
 

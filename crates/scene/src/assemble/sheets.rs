@@ -4,11 +4,11 @@ use std::f64::consts::FRAC_PI_2;
 
 use pliant_geometry::Mesh;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Pattern, Sheet, sphere};
+use pliant_sim::number;
 
 use super::Builder;
 use super::meshes::MeshOrigin;
 use crate::format::{MeshTable, PatternName, SheetGrid};
-use crate::output::number;
 
 /// A shape on a grid, with the lengths [m] of its grid axes.
 struct OnGrid<'t> {
@@ -149,7 +149,7 @@ mod tests {
         ] {
             let built = built_alone(&shell(mesh));
             let own = &built.bodies[0].mesh;
-            let facets = built.corotational.as_ref().unwrap().model.facets.len();
+            let facets = built.implicit.as_ref().unwrap().model.facets.len();
             assert_eq!((facets, own.point_sets.len()), (triangles, sets), "{mesh}");
             assert!(built.warnings.is_empty(), "{:?}", built.warnings);
         }

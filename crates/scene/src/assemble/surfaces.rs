@@ -4,11 +4,11 @@ use pliant_geometry::{Locator, Mesh};
 use pliant_implicit::{Carried, CurvedSurface, EdgeRule, State};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::model::Surface;
+use pliant_sim::number;
 
 use super::meshes::surface_of;
 use super::{Builder, MeshOrigin};
 use crate::diagnostic::Diagnostic;
-use crate::output::number;
 
 /// A point farther from its body than this fraction of the body's size gives a warning.
 const FAR: f64 = 0.05;
@@ -51,7 +51,7 @@ impl Builder<'_> {
     /// The points of a surface carried by the curved surface of a shell, kept there; no linear mapping.
     fn carry_on_shell(&mut self, body: usize, cells: &[u32], name: &str, surface: &Mesh) -> Mapping {
         let mut farthest = 0.0_f64;
-        if let Some(part) = &mut self.corotational {
+        if let Some(part) = &mut self.implicit {
             let curved = part.surface.get_or_insert_with(|| CurvedSurface::new(&part.model, EdgeRule::Arc));
             let rest = State::at_rest(&part.model);
             let points = curved.carry_all(&part.model, &rest, cells, &surface.points).unwrap_or_default();

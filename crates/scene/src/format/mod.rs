@@ -33,6 +33,7 @@ pub use view::{
 use pliant_explicit::stability::OnUnstable;
 use pliant_gpu::Design;
 use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
+use pliant_sim::Precision;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -222,26 +223,6 @@ pub enum DeviceName {
     Gpu,
     /// A GPU where there is one and it can run the scene, else the CPU; the run says which and why.
     Auto,
-}
-
-/// Number type of the solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Precision {
-    /// 32-bit numbers: faster, about six digits.
-    Single,
-    /// 64-bit numbers: the reference.
-    Double,
-}
-
-impl Precision {
-    /// Its word in a scene file.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Single => "single",
-            Self::Double => "double",
-        }
-    }
 }
 
 /// A time step.

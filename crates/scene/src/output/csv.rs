@@ -9,13 +9,12 @@ use pliant_implicit::Carried;
 use pliant_mechanics::Energies;
 
 use crc32fast::Hasher;
+use pliant_sim::{BodyCells, CellsNow};
 
 use super::file::{create, reopen};
 use super::{Frame, Observer, OutputError, Written, fields, time_of};
-use crate::assemble::{BodyCells, Built};
+use crate::assemble::Built;
 use crate::format::{CsvTable, FieldName, ProbeTable};
-use crate::participant::CellsNow;
-use crate::simulation::total;
 use crate::world::{Part, World};
 
 pub(super) struct Rows {
@@ -69,7 +68,7 @@ impl Samples {
     /// Adds the sample of an instant to a row.
     pub(crate) fn read(&mut self, frames: &[Frame<'_>], row: &mut Vec<f64>) {
         if self.total {
-            row.extend(in_columns(&total(frames.iter().map(|frame| frame.now.energies()))));
+            row.extend(in_columns(&Energies::total(frames.iter().map(|frame| frame.now.energies()))));
         }
         self.parts.iter_mut().zip(frames).for_each(|(own, frame)| own.read(frame, row));
     }
@@ -144,14 +143,14 @@ impl Own {
             }
             (point, held(built, &reactions))
         });
-        let shells = built.corotational.as_ref().is_some_and(|part| !part.model.facets.is_empty());
+        let shells = built.implicit.as_ref().is_some_and(|part| !part.model.facets.is_empty());
         if table.energy {
             let of_shells = SHELL_ENERGIES.into_iter().filter(|_| shells);
             columns
                 .extend(ENERGIES.into_iter().chain(of_shells).map(|e| Column::of_energy(e, part.prefix())));
         }
         let mut add = |name: String, unit| columns.push(Column { name, unit });
-        if built.corotational.as_ref().is_some_and(|part| part.control.is_some()) {
+        if built.implicit.as_ref().is_some_and(|part| part.control.is_some()) {
             add(part.prefix().map_or("load-factor".into(), |part| format!("load-factor.{part}")), "");
         }
         let probes = || table.probes.iter().filter(|(_, probe)| part.shows(Some(&probe.on)));
@@ -183,7 +182,7 @@ impl Own {
         if self.energy {
             row.extend(in_columns(&frame.now.energies()));
         }
-        if let (Some(part), Some(state)) = (&frame.built().corotational, frame.now.shells()) {
+        if let (Some(part), Some(state)) = (&frame.built().implicit, frame.now.shells()) {
             if self.energy && !part.model.facets.is_empty() {
                 // An element that has no energy ends the run with a reason.
                 let parts = state.shell_energy(&part.model).unwrap_or_default();
@@ -198,9 +197,7 @@ impl Own {
         let cells_wanted = !of_cells.is_empty();
         let cells =
             cells_wanted.then(|| frame.now.cells(of_cells.contains(&FieldName::ElementStep))).flatten();
-        if let (true, Some(part), Some(state)) =
-            (cells_wanted, &frame.built().corotational, frame.now.shells())
-        {
+        if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built().implicit, frame.now.shells()) {
             self.shells.fill(&part.model, state, &of_cells);
         }
         for probe in &self.probes {
@@ -219,7 +216,7 @@ fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
     let owners = model.constrained_components().unwrap_or_default();
     let of = |&index: &usize| {
         let constraint = &model.constraints[index];
-        let mut of_model = built.corotational.iter().flat_map(|part| &part.model.constraints);
+        let mut of_model = built.implicit.iter().flat_map(|part| &part.model.constraints);
         let named = of_model.find(|own| own.name == constraint.name);
         let [.., rx, ry, rz] = named.map_or([false; 6], |own| own.components);
         let own = |node: u32| {
@@ -331,7 +328,7 @@ impl Rows {
 
 /// Where a point of a surface on a shell is [m].
 fn carried(frame: &Frame<'_>, point: &Carried) -> Vector3 {
-    let part = frame.built().corotational.as_ref();
+    let part = frame.built().implicit.as_ref();
     let found =
         part.and_then(|part| Some(part.surface.as_ref()?.carried(&part.model, frame.now.shells()?, point)));
     found.unwrap_or_else(|| Vector3::repeat(f64::NAN))
@@ -383,7 +380,7 @@ impl Probe {
             let nearest = (0..mesh.points.len())
                 .min_by(|&a, &b| distance(&mesh.points[a]).total_cmp(&distance(&mesh.points[b])))
                 .unwrap_or(0);
-            let carried = built.corotational.as_ref().and_then(|part| part.carried.get(&surface));
+            let carried = built.implicit.as_ref().and_then(|part| part.carried.get(&surface));
             if let Some(points) = carried {
                 let cell = Some(Place::Carried(points[nearest], mesh.points[nearest]));
                 return Self { weights: Vec::new(), cell, fields };
@@ -398,7 +395,7 @@ impl Probe {
         let body = built.bodies.iter().position(|body| body.name == table.on).unwrap_or(0);
         let mesh = &built.bodies[body].mesh;
         let first = built.model.bodies[body].nodes.start;
-        let cells = built.corotational.as_ref().map(|part| &part.cells[body]);
+        let cells = built.implicit.as_ref().map(|part| &part.cells[body]);
         if let Some(BodyCells::Facets(range)) = cells {
             let Some(found) = built.bodies[body].closest(&point) else {
                 return Self { weights: Vec::new(), cell: None, fields };
@@ -445,7 +442,7 @@ impl Probe {
                     }
                 }
             } else {
-                value = match (&recovered, &self.cell, &frame.built().corotational) {
+                value = match (&recovered, &self.cell, &frame.built().implicit) {
                     (Some(cell), ..) => fields::of_cell(cell, field),
                     (_, Some(Place::Facet(facet)), Some(part)) => shells.of(&part.model, *facet, field),
                     _ => [f64::NAN; 9],

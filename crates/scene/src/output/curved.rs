@@ -2,9 +2,10 @@
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 use pliant_implicit::{CurvedSurface, EdgeRule, Picture, PictureFields};
+use pliant_sim::{BodyCells, ImplicitBodies};
 
 use super::{Frame, fields};
-use crate::assemble::{BodyCells, Built, Corotational};
+use crate::assemble::Built;
 use crate::format::FieldName;
 
 /// The curved surface of one shell or of all.
@@ -21,7 +22,7 @@ pub(super) struct Curved {
 
 impl Curved {
     /// With each edge cut into `parts`; and the mesh at rest.
-    pub(super) fn new(built: &Built, part: &Corotational, on: Option<&str>, parts: u32) -> (Self, Mesh) {
+    pub(super) fn new(built: &Built, part: &ImplicitBodies, on: Option<&str>, parts: u32) -> (Self, Mesh) {
         let surface = CurvedSurface::new(&part.model, EdgeRule::Arc);
         let picture = surface.picture(&part.model, parts);
         let shown = |facet: u32| {
@@ -71,14 +72,14 @@ impl Curved {
     }
 
     /// The nodes of the facet of a point, with its weights: where the point is, but for the bulge of the curved surface.
-    pub(super) fn nodes_of(&self, part: &Corotational, point: u32) -> Vec<(u32, f64)> {
+    pub(super) fn nodes_of(&self, part: &ImplicitBodies, point: u32) -> Vec<(u32, f64)> {
         let place = &self.picture.places[self.points[point as usize] as usize];
         part.model.facets[place.facet as usize].nodes.into_iter().zip(place.weights).collect()
     }
 
     /// Puts the wanted fields and the normals of an instant into the mesh.
     pub(super) fn fill(&mut self, mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName]) {
-        let (Some(part), Some(state)) = (&frame.built().corotational, frame.now.shells()) else { return };
+        let (Some(part), Some(state)) = (&frame.built().implicit, frame.now.shells()) else { return };
         let model = &part.model;
         self.found.fill(&self.picture, &self.surface, model, state);
         self.cells.fill(model, state, wanted);
@@ -116,7 +117,7 @@ impl Curved {
 }
 
 /// The label of each facet of the model; 0 in a body without labels.
-fn labels_of_facets(built: &Built, part: &Corotational) -> Vec<f64> {
+fn labels_of_facets(built: &Built, part: &ImplicitBodies) -> Vec<f64> {
     let mut labels = vec![0.0; part.model.facets.len()];
     for (body, cells) in built.bodies.iter().zip(&part.cells) {
         let own = body.mesh.block(CellKind::Triangle).and_then(|block| block.data.get("label"));

@@ -1,11 +1,12 @@
 //! A body, all bodies or a carried surface as a mesh with the fields of an instant. Points are at rest.
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use pliant_sim::{BodyCells, ImplicitBodies};
 use rayon::prelude::*;
 
 use super::merged::merged;
 use super::{Frame, fields};
-use crate::assemble::{BodyCells, Built, Corotational};
+use crate::assemble::Built;
 use crate::format::{At, BodyModel, FieldName, VtuTable};
 use crate::world::World;
 
@@ -102,7 +103,7 @@ impl Own {
         if chosen(built, on, false).next().is_some() {
             all.push(own(merged_bodies(built, on), of(BodyModel::Solid)));
         }
-        if let Some(part) = &built.corotational
+        if let Some(part) = &built.implicit
             && chosen(built, on, true).next().is_some()
         {
             let shells = match curved {
@@ -142,7 +143,7 @@ impl Own {
                 vec![(nodes[point as usize], 1.0)]
             }
             Content::Curved(curved) => {
-                built.corotational.as_ref().map_or_else(Vec::new, |part| curved.nodes_of(part, point))
+                built.implicit.as_ref().map_or_else(Vec::new, |part| curved.nodes_of(part, point))
             }
         }
     }
@@ -165,7 +166,7 @@ impl Own {
             }
             Content::Shells { nodes, facets, fields } => {
                 fill_nodal(&mut self.mesh, frame, &self.fields, nodes);
-                if let (Some(part), Some(state)) = (&frame.built().corotational, frame.now.shells()) {
+                if let (Some(part), Some(state)) = (&frame.built().implicit, frame.now.shells()) {
                     fields.fill(&part.model, state, &self.fields);
                     fill_shells(&mut self.mesh, &part.model, fields, &self.fields, self.at, facets);
                 }
@@ -233,7 +234,7 @@ fn bare(mesh: &Mesh) -> Mesh {
 /// The bodies, one by name or all, that are shells or not.
 fn chosen<'b>(built: &'b Built, on: Option<&'b str>, shells: bool) -> impl Iterator<Item = usize> + 'b {
     let is_shell = |body: usize| {
-        let cells = built.corotational.as_ref().map(|part| &part.cells[body]);
+        let cells = built.implicit.as_ref().map(|part| &part.cells[body]);
         matches!(cells, Some(BodyCells::Facets(_)))
     };
     (0..built.bodies.len())
@@ -290,7 +291,7 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
 
 /// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
 pub(super) fn carried_on_shell(frame: &Frame<'_>, surface: usize) -> Option<Vec<Vector3>> {
-    let part = frame.built().corotational.as_ref()?;
+    let part = frame.built().implicit.as_ref()?;
     let (points, curved) = (part.carried.get(&surface)?, part.surface.as_ref()?);
     let mut positions = vec![Vector3::zeros(); points.len()];
     curved.carried_all(&part.model, frame.now.shells()?, points, &mut positions);
@@ -301,7 +302,7 @@ pub(super) fn carried_on_shell(frame: &Frame<'_>, surface: usize) -> Option<Vec<
 }
 
 /// The triangles of one shell or of all, with `label` and, for several bodies, the number of the `body`.
-fn merged_shells(built: &Built, part: &Corotational, on: Option<&str>) -> (Mesh, Content) {
+fn merged_shells(built: &Built, part: &ImplicitBodies, on: Option<&str>) -> (Mesh, Content) {
     let mut mesh = Mesh::default();
     let mut block = CellBlock::new(CellKind::Triangle, Vec::new());
     let (mut nodes, mut facets, mut labels, mut owners) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -487,7 +488,7 @@ nodes = { label = "left" }
         let source = Source::parse("wall.toml", WALL).unwrap();
         let scene = Scene::from_source(source, folder.path().to_owned()).unwrap();
         let built = crate::build(&scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
-        let model = &built.corotational.as_ref().unwrap().model;
+        let model = &built.implicit.as_ref().unwrap().model;
         assert_eq!([0, 1].map(|facet| model.facets[facet].thickness), [1e-3, 2e-3]);
         let labels = |on: Option<&str>, curved: Option<u32>| {
             let own = Own::all(&built, on, &[], At::Cells, curved).remove(0);

@@ -15,6 +15,7 @@ mod vtu;
 
 use std::path::{Path, PathBuf};
 
+use pliant_sim::Instant;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use file::{check_own_folder, replace};
@@ -23,19 +24,15 @@ pub(crate) use folder::{CONVERGENCE, PICTURE, PLOT, SUMMARY};
 pub use stability::{AddedMass, StabilitySummary};
 pub(crate) use strains::ShellStrains;
 pub use strains::StrainSummary;
-pub use summary::{
-    BodySummary, FailureSummary, LoadStepSummary, ParticipantSummary, Summary, failed_input, failed_output,
-    number,
-};
+pub use summary::{BodySummary, ParticipantSummary, Summary, failed_input, failed_output};
 
 pub use csv::Column;
 pub(crate) use csv::{AXES, ENERGIES, Samples};
 pub(crate) use field_mesh::FieldMesh;
 pub(crate) use plot::{constraints, plot};
-pub(crate) use summary::{INTERRUPTED, bodies, markdown, summarise, told_limit};
+pub(crate) use summary::{INTERRUPTED, bodies, interrupted, markdown, output_failure, summarise, told_limit};
 
 use crate::assemble::Built;
-use crate::participant::Instant;
 use crate::registry::OutputTable;
 use crate::world::{Part, World};
 

@@ -5,11 +5,10 @@ use std::fmt;
 use pliant_explicit::BALANCE_LIMIT;
 use pliant_explicit::stability::{Look, OnUnstable};
 use pliant_mechanics::Energies;
+use pliant_sim::{counted, number};
 use serde::Serialize;
 
-use super::number;
 use crate::assemble::Built;
-use crate::diagnostic::counted;
 use crate::run::PartOutcome;
 use crate::world::Part;
 
@@ -55,7 +54,7 @@ impl StabilitySummary {
             on_unstable: scene.run.on_unstable.unwrap_or_default(),
             checks: seen.checks,
             smallest_limit: of(|look| look.limit),
-            limit_over_step: of(|look| look.limit).map(|limit| limit / plan.step),
+            limit_over_step: of(|look| look.limit).map(|limit| limit / plan.steps.step),
             smallest_at: of(|look| look.time),
             steps_below: seen.steps_below,
             cuts: seen.cuts,
@@ -63,7 +62,7 @@ impl StabilitySummary {
             last_cut: seen.last_cut,
             most_substeps: seen.most_substeps,
             extra_steps: seen.extra_steps,
-            limited: plan.limits.as_ref().is_some_and(|limits| limits.limit.step.is_finite()),
+            limited: plan.limits.as_ref().is_some_and(|limits| limits.assembled.step.is_finite()),
         })
     }
 

@@ -1,10 +1,10 @@
 //! Largest strains of shells, and the warning where they exceed the range of small-strain elasticity.
 
 use pliant_implicit::State;
+use pliant_sim::{BodyCells, number};
 use serde::{Deserialize, Serialize};
 
-use super::number;
-use crate::assemble::{BodyCells, Built};
+use crate::assemble::Built;
 
 /// Strain above which a run of shells gives a warning.
 const MUCH: f64 = 0.1;
@@ -33,7 +33,7 @@ pub(crate) struct ShellStrains(pub Vec<StrainSummary>);
 impl ShellStrains {
     /// Looks at an instant.
     pub fn look(&mut self, built: &Built, state: Option<&State>) {
-        let (Some(part), Some(state)) = (&built.corotational, state) else { return };
+        let (Some(part), Some(state)) = (&built.implicit, state) else { return };
         if part.model.facets.is_empty() {
             return;
         }

@@ -3,9 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use pliant_explicit::{RelaxationError, StepError};
-use pliant_gpu::{GpuError, StepFailure};
 use pliant_mechanics::Energies;
+use pliant_sim::{Effort, Equilibria, Failure, number};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
@@ -15,7 +14,6 @@ use crate::assemble::Built;
 use crate::plan::{LimitingElement, Limits};
 use crate::printable::printable;
 use crate::run::{History, Outcome, PartOutcome};
-use crate::solver::{Effort, Equilibria};
 use crate::world::{Part, World};
 
 /// The status of a stopped run.
@@ -27,7 +25,7 @@ pub struct Summary {
     /// `done`, `failed` or `interrupted`.
     pub status: &'static str,
     /// Why it failed.
-    pub error: Option<FailureSummary>,
+    pub error: Option<Failure>,
     /// The bodies.
     pub bodies: Vec<BodySummary>,
     /// Number of nodes.
@@ -114,7 +112,7 @@ impl ParticipantSummary {
             name: part.name.clone(),
             bodies: part.scene.bodies.iter().map(|(name, _)| name.clone()).collect(),
             solver: part.scene.run.solver.word(),
-            step: part.plan.step,
+            step: part.plan.steps.step,
             steps: outcome.steps,
             device: part.plan.target.name().to_owned(),
             precision: part.plan.target.precision.word(),
@@ -146,67 +144,21 @@ pub struct BodySummary {
     pub mass: f64,
 }
 
-/// A load step that came to no equilibrium.
-#[derive(Clone, Debug, Serialize)]
-pub struct LoadStepSummary {
-    /// Its number, counted from 1.
-    pub number: u64,
-    /// How many there are.
-    pub of: u64,
-    /// Iterations spent on the last try.
-    pub iterations: usize,
-    /// The relative residual that was reached; none if an element or a displacement was lost on the way.
-    pub residual: Option<f64>,
-}
-
-/// Why a run failed or an input was rejected.
-#[derive(Clone, Debug, Serialize)]
-pub struct FailureSummary {
-    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `device`, `output`, `input` or `interrupted`.
-    pub kind: &'static str,
-    /// The body, where it is about one.
-    pub body: Option<String>,
-    /// The element, counted from 0.
-    pub element: Option<u32>,
-    /// The node, counted from 0.
-    pub node: Option<u32>,
-    /// Time [s].
-    pub time: Option<f64>,
-    /// The load step of a quasi-static run.
-    pub load_step: Option<Box<LoadStepSummary>>,
-    /// What happened and what to try.
-    pub message: String,
-    /// What to try, as the message says it at its end; empty where it says it otherwise.
-    #[serde(skip)]
-    pub remedy: &'static str,
-}
-
-impl FailureSummary {
-    /// The same with another remedy.
-    pub(crate) fn advised(mut self, remedy: &str) -> Self {
-        if let Some(told) = self.message.strip_suffix(self.remedy).filter(|_| !self.remedy.is_empty()) {
-            self.message = format!("{told}{remedy}");
-            self.remedy = "";
-        }
-        self
-    }
-}
-
 fn as_map<S: Serializer>(pairs: &[(String, [f64; 3])], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(pairs.iter().map(|(name, force)| (name, force)))
 }
 
 /// The JSON object of a rejected input: the keys of [`Summary`], empty where nothing was built.
 pub fn failed_input(message: &str) -> Json {
-    empty("invalid", FailureSummary::about("input", message.into(), None))
+    empty("invalid", Failure::new("input", message.into(), None))
 }
 
 /// The JSON object of a run whose outputs could not be opened or finished.
 pub fn failed_output(error: &OutputError) -> Json {
-    empty("failed", FailureSummary::output(error, None))
+    empty("failed", output_failure(error, None))
 }
 
-fn empty(status: &str, error: FailureSummary) -> Json {
+fn empty(status: &str, error: Failure) -> Json {
     json!({
         "status": status,
         "error": error,
@@ -216,111 +168,24 @@ fn empty(status: &str, error: FailureSummary) -> Json {
     })
 }
 
-impl FailureSummary {
-    /// An output that could not be written, at a time of the run.
-    pub(crate) fn output(error: &OutputError, time: Option<f64>) -> Self {
-        let message = format!("{error}; what was written before stays readable; {}", error.remedy);
-        Self::about("output", message, time)
-    }
-
-    /// A stopped run, and the checkpoint it left.
-    pub(crate) fn interrupted(time: f64, checkpoint: Option<&Path>) -> Self {
-        let way = match checkpoint {
-            Some(path) => format!("go on with `--resume {}`", path.display()),
-            None => "what was written before stays readable; with `checkpoint = { every = 1.0 }` in `[run]` it could \
-                     be resumed"
-                .into(),
-        };
-        let message = format!("the run was interrupted at t = {} s; {way}", number(time));
-        Self::about(INTERRUPTED, message, Some(time))
-    }
-
-    /// A device that failed, at a time of the run.
-    pub(crate) fn device(error: &GpuError, time: Option<f64>) -> Self {
-        Self::about("device", format!("{error}; {}", error.remedy()), time)
-    }
-
-    /// Steps on a device that could not be taken.
-    pub(crate) fn step(failure: &StepFailure, time: f64) -> Self {
-        match failure {
-            StepFailure::Step(error) => error.into(),
-            StepFailure::Device(error) => Self::device(error, Some(time)),
-        }
-    }
-
-    /// A scene that should have been rejected before.
-    pub(crate) fn input(error: &dyn std::fmt::Display) -> Self {
-        Self::about("input", error.to_string(), None)
-    }
-
-    /// A step of shells, or of the solvers `implicit` and `static`, that could not be taken.
-    pub(crate) fn of_solver(
-        kind: &'static str,
-        message: String,
-        body: Option<String>,
-        element: Option<u32>,
-        node: Option<u32>,
-        time: f64,
-    ) -> Self {
-        Self { body, element, node, ..Self::about(kind, message, Some(time)) }
-    }
-
-    fn about(kind: &'static str, message: String, time: Option<f64>) -> Self {
-        Self { kind, body: None, element: None, node: None, time, load_step: None, message, remedy: "" }
-    }
+/// The failure of an output that could not be written, at a time [s] of the run.
+pub(crate) fn output_failure(error: &OutputError, time: Option<f64>) -> Failure {
+    let message = format!("{error}; what was written before stays readable; {}", error.remedy);
+    Failure::new("output", message, time)
 }
 
-impl FailureSummary {
-    /// A load step, counted from 1 (0: what acts at the start), of so many that came to no equilibrium.
-    pub(crate) fn load_step(error: &RelaxationError, number: u64, of: u64) -> Self {
-        let which = match number {
-            0 => "the loads at t = 0".to_owned(),
-            _ => format!("load step {number} of {of}"),
-        };
-        let message = format!("{which}: {error}; {}", error.remedy());
-        let (kind, body, element, node, time, iterations, residual) = match error {
-            RelaxationError::NotFinite { body, node, iterations, time, .. } => {
-                ("not-finite", body, None, *node, *time, *iterations, None)
-            }
-            RelaxationError::Inverted { body, element, node, iterations, time, .. } => {
-                ("inverted", body, Some(*element), *node, *time, *iterations, None)
-            }
-            RelaxationError::NotConverged { body, node, residual, iterations, time, .. } => {
-                ("not-converged", body, None, *node, *time, *iterations, Some(*residual))
-            }
-        };
-        let of_body = Self {
-            body: Some(body.clone()),
-            element,
-            node: Some(node),
-            ..Self::about(kind, message, Some(time))
-        };
-        Self { load_step: Some(Box::new(LoadStepSummary { number, of, iterations, residual })), ..of_body }
-    }
-}
-
-impl From<&StepError> for FailureSummary {
-    fn from(error: &StepError) -> Self {
-        let message = format!("{error}; {}", error.remedy());
-        let (kind, body, element, node, time) = match error {
-            StepError::NotFinite { body, node, time } => ("not-finite", body, None, *node, *time),
-            StepError::Inverted { body, element, node, time, .. } => {
-                ("inverted", body, Some(*element), *node, *time)
-            }
-            StepError::BelowLimit { body, element, node, time, .. } => {
-                ("unstable", body, Some(*element), *node, *time)
-            }
-            StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
-        };
-        let remedy = error.remedy();
-        Self {
-            body: Some(body.clone()),
-            element,
-            node: Some(node),
-            remedy,
-            ..Self::about(kind, message, Some(time))
+/// That of a stopped run, and the checkpoint it left.
+pub(crate) fn interrupted(time: f64, checkpoint: Option<&Path>) -> Failure {
+    let way = match checkpoint {
+        Some(path) => format!("go on with `--resume {}`", path.display()),
+        None => {
+            "what was written before stays readable; with `checkpoint = { every = 1.0 }` in `[run]` it could \
+                 be resumed"
+                .into()
         }
-    }
+    };
+    let message = format!("the run was interrupted at t = {} s; {way}", number(time));
+    Failure::new(INTERRUPTED, message, Some(time))
 }
 
 /// The bodies of a model.
@@ -332,7 +197,7 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
             (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum()
         };
         let range = body.nodes.start as usize..body.nodes.end as usize;
-        let (elements, volume) = match built.corotational.as_ref().and_then(|part| part.size(index)) {
+        let (elements, volume) = match built.implicit.as_ref().and_then(|part| part.size(index)) {
             Some(size) => size,
             None => (solids.clone().map(|solid| solid.cells.len()).sum(), solids.map(volume).sum()),
         };
@@ -370,9 +235,9 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
         elements: bodies.iter().map(|body| body.elements).sum(),
         mass: parts().map(|(part, _)| part.built.model.mass.iter().sum::<f64>()).sum(),
         bodies,
-        step: world.slowest().plan.step,
+        step: world.slowest().plan.steps.step,
         element_bound: limits.map(|limits| limits.bound.step),
-        true_limit: limits.map(|limits| limits.limit.step),
+        true_limit: limits.map(|limits| limits.assembled.step),
         limiting_element: limits.map(|limits| limits.limiting.clone()),
         participants: match world.only() {
             Some(_) => Vec::new(),
@@ -488,8 +353,8 @@ fn write_part(page: &mut String, part: &Part, outcome: &PartOutcome) -> std::fmt
     if part.prefix().is_some() {
         writeln!(page, "| solver | {} |", part.scene.run.solver.word())?;
     }
-    writeln!(page, "| step | {} s |", number(plan.step))?;
-    if let Some(Limits { bound, limit, limiting }) = &plan.limits {
+    writeln!(page, "| step | {} s |", number(plan.steps.step))?;
+    if let Some(Limits { bound, assembled: limit, limiting }) = &plan.limits {
         writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
         writeln!(page, "| critical time step (assembled model) | {} |", told_limit(limit.step))?;
     }
@@ -631,19 +496,6 @@ fn write_reactions(page: &mut String, world: &World, outcome: &Outcome) -> std::
 
 fn short(file: &Path) -> String {
     file.file_name().map_or_else(|| file.display().to_string(), |name| name.to_string_lossy().into_owned())
-}
-
-/// A number for people: four significant digits.
-pub fn number(value: f64) -> String {
-    if !value.is_finite() {
-        return if value.is_nan() { "unknown" } else { "unlimited" }.into();
-    }
-    let size = value.abs();
-    if size != 0.0 && !(1e-3..1e5).contains(&size) {
-        return format!("{value:.3e}");
-    }
-    let digits = if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 6) };
-    format!("{value:.*}", digits as usize)
 }
 
 /// The critical time step of the assembled model [s] in words.

@@ -3,15 +3,14 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use pliant_implicit as corotational;
 use pliant_implicit::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
 use pliant_implicit::{Material, ModelError, Motion, Shell};
+use pliant_sim::{BodyCells, ImplicitBodies, counted};
 
-use super::{BodyCells, Corotational};
 use crate::assemble::bodies::{Draft, nodes};
 use crate::assemble::meshes::surface_of;
 use crate::assemble::{Builder, SCENE, bodies, suggestion};
-use crate::diagnostic::{Diagnostic, counted};
+use crate::diagnostic::Diagnostic;
 use crate::format::{BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
 
 /// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
@@ -78,12 +77,12 @@ impl Builder<'_> {
         add: impl FnOnce(&mut Self) -> Option<BodyCells>,
     ) {
         let rest = &self.model.rest;
-        let model = self.corotational.get_or_insert_with(Corotational::new).model_mut();
+        let model = self.implicit.get_or_insert_with(ImplicitBodies::none).model_mut();
         model.rest.extend(rest[model.rest.len()..].iter().map(|&p| Vector3::from(p)));
         model.mass.resize(rest.len(), 0.0);
         model.inertia.resize(rest.len(), 0.0);
         (model.mass_damping, model.stiffness_damping) = (draft.table.damping, draft.table.stiffness_damping);
-        let (Some(cells), Some(part)) = (add(self), &mut self.corotational) else { return };
+        let (Some(cells), Some(part)) = (add(self), &mut self.implicit) else { return };
         part.cells.push(cells);
         // What the scene's own model says of masses.
         self.model.mass.copy_from_slice(&part.model.mass);
@@ -93,7 +92,7 @@ impl Builder<'_> {
     pub(in crate::assemble) fn add_solids(&mut self, name: &str, first: usize) -> Option<BodyCells> {
         for index in first..self.model.solids.len() {
             let solid = self.model.solids[index].clone();
-            if let Err(error) = self.corotational.as_mut()?.model_mut().add_solid(name, solid) {
+            if let Err(error) = self.implicit.as_mut()?.model_mut().add_solid(name, solid) {
                 self.refuse_part(name, &error);
                 return None;
             }
@@ -126,20 +125,20 @@ impl Builder<'_> {
             normals,
             branches: table.branches,
         };
-        let part = self.corotational.as_mut()?;
+        let part = self.implicit.as_mut()?;
         let start = part.model.facets.len() as u32;
         match part.model_mut().add_shell(&shell) {
             Ok(notes) => {
                 self.tell_notes(name, notes, count);
                 self.tell_slack(name, table, formulation, start as usize);
                 if formulation.bending == Bending::None && formulation.membrane != Membrane::None {
-                    let held = corotational::Constraint {
+                    let held = pliant_implicit::Constraint {
                         name: format!("membrane {name}"),
                         nodes: (first..self.model.rest.len() as u32).collect(),
                         components: [false, false, false, true, true, true],
                         motion: Motion::Fixed,
                     };
-                    self.corotational.as_mut()?.model_mut().constraints.push(held);
+                    self.implicit.as_mut()?.model_mut().constraints.push(held);
                 }
                 Some(BodyCells::Facets(start..start + count as u32))
             }
@@ -410,7 +409,7 @@ impl Builder<'_> {
     /// Reports nodes of a membrane without transverse stiffness at the start of a static run.
     fn tell_slack(&mut self, name: &str, table: &BodyTable, formulation: Formulation, first: usize) {
         let slack = formulation.bending == Bending::None && formulation.membrane != Membrane::None;
-        let Some(part) = self.corotational.as_ref().filter(|_| slack && table.pre_tension == 0.0) else {
+        let Some(part) = self.implicit.as_ref().filter(|_| slack && table.pre_tension == 0.0) else {
             return;
         };
         if self.scene.run.solver != SolverName::Static {
@@ -437,7 +436,7 @@ impl Builder<'_> {
         }
     }
 
-    fn tell_notes(&mut self, name: &str, notes: corotational::Notes, count: usize) {
+    fn tell_notes(&mut self, name: &str, notes: pliant_implicit::Notes, count: usize) {
         if notes.turned > 0 {
             self.notes.push(format!(
                 "`{name}`: {} turned over, so that all face one side",

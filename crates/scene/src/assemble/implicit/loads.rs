@@ -3,26 +3,24 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::Vector3;
-use pliant_implicit as corotational;
 use pliant_implicit::element::Membrane;
 use pliant_implicit::{Resolution, Spread};
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_sim::{BodyCells, Control, Stop, counted, number};
 
-use super::{BodyCells, Control, Stop};
 use crate::assemble::{Builder, SCENE, Target, suggestion};
-use crate::diagnostic::{Diagnostic, counted};
+use crate::diagnostic::Diagnostic;
 use crate::format::{
     Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SolverName, SpreadName,
     StepChoice, StopTable,
 };
-use crate::output::number;
 use crate::registry::LoadTable;
 
 impl Builder<'_> {
-    pub(in crate::assemble) fn add_corotational_loads(&mut self) {
+    pub(in crate::assemble) fn add_implicit_loads(&mut self) {
         let scene = self.scene;
         if let Some(acceleration) = scene.scene.gravity {
-            let kind = corotational::LoadKind::Gravity { acceleration: Vector3::from(acceleration) };
+            let kind = pliant_implicit::LoadKind::Gravity { acceleration: Vector3::from(acceleration) };
             self.push_loads("gravity", vec![kind], constant(), false);
         }
         for (name, table) in &scene.loads {
@@ -32,7 +30,7 @@ impl Builder<'_> {
                 true => self.no_timing(table, &path),
                 false => self.curve(table.timing(), &path),
             };
-            let kinds = self.corotational_load(table, &path);
+            let kinds = self.implicit_load(table, &path);
             if let (Some(curve), Some(kinds)) = (curve, kinds) {
                 self.push_loads(name, kinds, curve, controlled);
             }
@@ -43,7 +41,13 @@ impl Builder<'_> {
     }
 
     /// Adds loads. What acts in full from the start grows within the first step of a static run, so that it can be halved.
-    fn push_loads(&mut self, name: &str, kinds: Vec<corotational::LoadKind>, curve: Curve, controlled: bool) {
+    fn push_loads(
+        &mut self,
+        name: &str,
+        kinds: Vec<pliant_implicit::LoadKind>,
+        curve: Curve,
+        controlled: bool,
+    ) {
         let run = &self.scene.run;
         let at_once = curve.shape == Shape::Hold && curve.from <= 0.0 && !controlled;
         let curve = match run.solver {
@@ -57,9 +61,9 @@ impl Builder<'_> {
             }
             _ => curve,
         };
-        let Some(part) = &mut self.corotational else { return };
+        let Some(part) = &mut self.implicit else { return };
         let load =
-            |kind| corotational::Load { name: name.to_owned(), kind, curve: curve.clone(), controlled };
+            |kind| pliant_implicit::Load { name: name.to_owned(), kind, curve: curve.clone(), controlled };
         part.model_mut().loads.extend(kinds.into_iter().map(load));
     }
 
@@ -74,10 +78,10 @@ impl Builder<'_> {
         Some(constant())
     }
 
-    fn corotational_load(&mut self, table: &LoadTable, path: &[&str]) -> Option<Vec<corotational::LoadKind>> {
+    fn implicit_load(&mut self, table: &LoadTable, path: &[&str]) -> Option<Vec<pliant_implicit::LoadKind>> {
         let at = |key| [path, &[key]].concat();
         if let LoadTable::Gravity(gravity) = table {
-            return self.corotational_gravity(gravity, path);
+            return self.implicit_gravity(gravity, path);
         }
         let body = match self.find_target(table.on()?, &at("on"))? {
             Target::Body(body) => body,
@@ -92,7 +96,7 @@ impl Builder<'_> {
             LoadTable::Moment(moment) => vec![self.moment(moment, body, shell, path)?],
             LoadTable::Traction(traction) if shell => {
                 let cells = self.facets(body, &traction.faces, &at("faces"))?;
-                vec![corotational::LoadKind::Area { cells, traction: Vector3::from(traction.traction) }]
+                vec![pliant_implicit::LoadKind::Area { cells, traction: Vector3::from(traction.traction) }]
             }
             LoadTable::Traction(traction) => {
                 let faces = self.faces(Target::Body(body), &traction.faces, &at("faces"))?;
@@ -101,7 +105,7 @@ impl Builder<'_> {
             LoadTable::Pressure(pressure) if shell => vec![self.shell_pressure(pressure, body, path)?],
             LoadTable::Pressure(pressure) => {
                 let faces = self.faces(Target::Body(body), &pressure.faces, &at("faces"))?;
-                vec![corotational::LoadKind::FacePressure { faces, pressure: pressure.pressure }]
+                vec![pliant_implicit::LoadKind::FacePressure { faces, pressure: pressure.pressure }]
             }
             LoadTable::Edge(edge) => {
                 if !shell {
@@ -125,7 +129,7 @@ impl Builder<'_> {
                     );
                     return None;
                 }
-                vec![corotational::LoadKind::Edge { edges, traction: Vector3::from(edge.traction) }]
+                vec![pliant_implicit::LoadKind::Edge { edges, traction: Vector3::from(edge.traction) }]
             }
             LoadTable::Gravity(_) => return None,
         })
@@ -137,7 +141,7 @@ impl Builder<'_> {
         table: &LoadTable,
         surface: usize,
         path: &[&str],
-    ) -> Option<Vec<corotational::LoadKind>> {
+    ) -> Option<Vec<pliant_implicit::LoadKind>> {
         let at = |key| [path, &[key]].concat();
         let target = Target::Surface(surface);
         let forces = match table {
@@ -155,11 +159,11 @@ impl Builder<'_> {
                 return None;
             }
         };
-        let part = self.corotational.as_ref()?;
+        let part = self.implicit.as_ref()?;
         if let Some(points) = part.carried.get(&surface) {
             let (points, forces) =
                 forces.iter().map(|&(node, force)| (points[node as usize], Vector3::from(force))).unzip();
-            return Some(vec![corotational::LoadKind::Carried { points, forces }]);
+            return Some(vec![pliant_implicit::LoadKind::Carried { points, forces }]);
         }
         let mapping = &self.model.surfaces[surface].mapping;
         let nodal = forces.iter().flat_map(|&(point, force)| {
@@ -168,16 +172,16 @@ impl Builder<'_> {
         Some(single_forces(&nodal.collect::<Vec<_>>()))
     }
 
-    fn corotational_gravity(
+    fn implicit_gravity(
         &mut self,
         table: &GravityTable,
         path: &[&str],
-    ) -> Option<Vec<corotational::LoadKind>> {
+    ) -> Option<Vec<pliant_implicit::LoadKind>> {
         let at = |key| [path, &[key]].concat();
         let acceleration = Vector3::from(table.acceleration);
         let body = match (&table.on, &table.nodes) {
             (Some(name), _) => self.find_body(name, &at("on"))?,
-            (None, None) => return Some(vec![corotational::LoadKind::Gravity { acceleration }]),
+            (None, None) => return Some(vec![pliant_implicit::LoadKind::Gravity { acceleration }]),
             (None, Some(_)) => {
                 let message = "`nodes` are nodes of one body, which `on` must name";
                 self.error(&at("nodes"), message, "of which body?", "add `on = \"BODY\"`");
@@ -198,7 +202,7 @@ impl Builder<'_> {
         body: usize,
         shell: bool,
         path: &[&str],
-    ) -> Option<corotational::LoadKind> {
+    ) -> Option<pliant_implicit::LoadKind> {
         let at = |key| [path, &[key]].concat();
         if !shell {
             let message = "only the nodes of shells take moments";
@@ -217,7 +221,7 @@ impl Builder<'_> {
                 return None;
             }
         };
-        Some(corotational::LoadKind::Moment { nodes, moment })
+        Some(pliant_implicit::LoadKind::Moment { nodes, moment })
     }
 
     fn shell_pressure(
@@ -225,9 +229,9 @@ impl Builder<'_> {
         table: &PressureTable,
         body: usize,
         path: &[&str],
-    ) -> Option<corotational::LoadKind> {
+    ) -> Option<pliant_implicit::LoadKind> {
         let cells = self.facets(body, &table.faces, &[path, &["faces"]].concat())?;
-        let model = &self.corotational.as_ref()?.model;
+        let model = &self.implicit.as_ref()?.model;
         let membrane = cells.first().map(|&cell| model.facets[cell as usize].membrane());
         let curved = matches!(membrane, Some(Membrane::Curved { .. }));
         let spread = match table.spread {
@@ -247,7 +251,7 @@ impl Builder<'_> {
         if curved {
             self.tell_resolution(resolution, cells.len(), body, path);
         }
-        Some(corotational::LoadKind::Pressure { cells, pressure: table.pressure, spread })
+        Some(pliant_implicit::LoadKind::Pressure { cells, pressure: table.pressure, spread })
     }
 
     /// Warns of a pressure and a membrane, curved or not, that are not of the same surface.
@@ -302,7 +306,7 @@ impl Builder<'_> {
 
     /// The facets of a shell, numbered in the model; `None` for another body.
     pub(in crate::assemble) fn shell_cells(&self, body: usize) -> Option<Vec<u32>> {
-        match self.corotational.as_ref()?.cells.get(body)? {
+        match self.implicit.as_ref()?.cells.get(body)? {
             BodyCells::Facets(range) => Some(range.clone().collect()),
             BodyCells::Solids => None,
         }
@@ -331,7 +335,7 @@ impl Builder<'_> {
 
     /// The edges of one triangle only both of whose ends are among some nodes of the model (increasing).
     fn border_edges(&self, body: usize, nodes: &[u32]) -> Vec<[u32; 2]> {
-        let (Some(part), Some(cells)) = (&self.corotational, self.shell_cells(body)) else {
+        let (Some(part), Some(cells)) = (&self.implicit, self.shell_cells(body)) else {
             return Vec::new();
         };
         let mut count: BTreeMap<[u32; 2], u32> = BTreeMap::new();
@@ -375,7 +379,7 @@ impl Builder<'_> {
             let message = "`stop` is for `arc-length`: other controls end where they are set to end";
             self.error(&[&path[..], &["stop"]].concat(), message, "has no effect here", "remove it");
         }
-        if let Some(part) = &mut self.corotational {
+        if let Some(part) = &mut self.implicit {
             part.control = control;
         }
     }
@@ -420,10 +424,10 @@ impl Builder<'_> {
     }
 
     fn controlled_volume(&mut self, load: &str, to: f64) -> Option<Control> {
-        let part = self.corotational.as_ref()?;
+        let part = self.implicit.as_ref()?;
         let pressed =
             part.model.loads.iter().filter(|known| known.name == load).find_map(|load| match &load.kind {
-                corotational::LoadKind::Pressure { cells, .. } => Some(cells),
+                pliant_implicit::LoadKind::Pressure { cells, .. } => Some(cells),
                 _ => None,
             });
         let scene = self.scene;
@@ -452,7 +456,7 @@ fn constant() -> Curve {
 }
 
 /// Forces node by node; those of the same size together.
-fn single_forces(forces: &[(u32, [f64; 3])]) -> Vec<corotational::LoadKind> {
+fn single_forces(forces: &[(u32, [f64; 3])]) -> Vec<pliant_implicit::LoadKind> {
     let mut all: Vec<(Vec<u32>, [f64; 3])> = Vec::new();
     let mut known: BTreeMap<[u64; 3], usize> = BTreeMap::new();
     for &(node, force) in forces {
@@ -462,6 +466,6 @@ fn single_forces(forces: &[(u32, [f64; 3])]) -> Vec<corotational::LoadKind> {
         });
         all[at].0.push(node);
     }
-    let kind = |(nodes, force)| corotational::LoadKind::Force { nodes, force: Vector3::from(force) };
+    let kind = |(nodes, force)| pliant_implicit::LoadKind::Force { nodes, force: Vector3::from(force) };
     all.into_iter().map(kind).collect()
 }

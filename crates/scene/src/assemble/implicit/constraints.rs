@@ -1,7 +1,6 @@
 //! Constraints and springs of the implicit solvers.
 
 use pliant_geometry::Vector3;
-use pliant_implicit as corotational;
 use pliant_implicit::{Motion, Spring};
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::model;
@@ -48,7 +47,7 @@ impl Builder<'_> {
     }
 
     /// Adds a constraint to the model of the implicit solvers, as the scene's own model has it in displacements.
-    pub(in crate::assemble) fn constrain_corotational(
+    pub(in crate::assemble) fn constrain_implicit(
         &mut self,
         name: &str,
         table: &ConstraintTable,
@@ -56,7 +55,7 @@ impl Builder<'_> {
         nodes: &[u32],
         components: [bool; 6],
     ) {
-        let Some(part) = &mut self.corotational else { return };
+        let Some(part) = &mut self.implicit else { return };
         let turn = match table {
             ConstraintTable::Move(moved) => moved.turn.unwrap_or_default(),
             _ => [0.0; 3],
@@ -75,8 +74,12 @@ impl Builder<'_> {
                 vec![(nodes.to_vec(), Motion::Displaced(motion.clone()))]
             }
         };
-        let constraint =
-            |(nodes, motion)| corotational::Constraint { name: name.to_owned(), nodes, components, motion };
+        let constraint = |(nodes, motion)| pliant_implicit::Constraint {
+            name: name.to_owned(),
+            nodes,
+            components,
+            motion,
+        };
         let all: Vec<_> = all.into_iter().map(constraint).collect();
         let clash = part
             .model
@@ -139,7 +142,7 @@ impl Builder<'_> {
         let path = ["constraint", name];
         let Some(body) = self.find_body(&table.body, &[path[0], path[1], "body"]) else { return };
         let Some(nodes) = self.body_nodes(body, &table.nodes, &[path[0], path[1], "nodes"]) else { return };
-        let Some(part) = &mut self.corotational else {
+        let Some(part) = &mut self.implicit else {
             let message = "springs are for shells and for the solvers `static` and `implicit`";
             self.error(&path, message, "not with this solver", "take `fix`, or change the solver");
             return;
@@ -152,7 +155,7 @@ impl Builder<'_> {
 }
 
 /// Whether two constraints prescribe the same rotation of a node, and not both that it stays.
-fn clash(a: &corotational::Constraint, b: &corotational::Constraint) -> bool {
+fn clash(a: &pliant_implicit::Constraint, b: &pliant_implicit::Constraint) -> bool {
     let shared = (3..6).any(|c| a.components[c] && b.components[c]);
     let still = matches!((&a.motion, &b.motion), (Motion::Fixed, Motion::Fixed));
     shared && !still && a.nodes.iter().any(|node| b.nodes.contains(node))

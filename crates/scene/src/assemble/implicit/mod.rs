@@ -5,84 +5,13 @@ mod cells;
 mod constraints;
 mod loads;
 
-use std::collections::BTreeMap;
-use std::ops::Range;
-use std::sync::Arc;
-
 use pliant_geometry::Vector3;
-use pliant_implicit as corotational;
-use pliant_implicit::{Carried, CurvedSurface, State};
-use pliant_mechanics::fingerprint;
+use pliant_implicit::State;
+use pliant_sim::{Precision, counted};
 
 use crate::assemble::Builder;
-use crate::diagnostic::counted;
 use crate::format::{BodyModel, BodyTable, Element, SolverName};
 use crate::registry::OutputTable;
-
-/// Shells of a scene, and solids whose equations are solved. Nodes are those of the scene's model.
-#[derive(Clone, Debug)]
-pub struct Corotational {
-    /// Their model.
-    pub model: Arc<corotational::Model>,
-    /// The cells of each body, in the order of the scene's bodies.
-    pub cells: Vec<BodyCells>,
-    /// What a static run prescribes instead of the size of a load.
-    pub control: Option<Control>,
-    /// The state that a run starts from.
-    pub start: State,
-    /// The curved surface of the shells, if something is carried by it.
-    pub surface: Option<CurvedSurface>,
-    /// The points of each of the scene's surfaces that a shell carries.
-    pub carried: BTreeMap<usize, Vec<Carried>>,
-}
-
-/// The cells of a body, in the order of its mesh.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum BodyCells {
-    /// Facets of the model.
-    Facets(Range<u32>),
-    /// Solids of the model that are of the body.
-    Solids,
-}
-
-/// A control of a whole static run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Control {
-    /// A component (0 to 2) of a node moves by a distance [m] in all.
-    Displacement {
-        /// The node.
-        node: u32,
-        /// x, y or z as 0, 1, 2.
-        component: usize,
-        /// The distance [m].
-        by: f64,
-    },
-    /// All translations together move by a length [m] in each load step.
-    ArcLength {
-        /// The length [m].
-        length: f64,
-        /// Where the path ends.
-        stop: Stop,
-    },
-    /// The pressurised facets enclose a volume [m³] in the end, and another at the start.
-    Volume {
-        /// At the start [m³].
-        from: f64,
-        /// At the end [m³].
-        to: f64,
-    },
-}
-
-/// Where a path by arc length ends: at the first state that meets one of these.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stop {
-    /// Size of the load factor.
-    pub load_factor: Option<f64>,
-    /// A node, a component (0 to 2) of its displacement, and how large that is [m], with its sign.
-    pub displacement: Option<(u32, usize, f64)>,
-    /// Limit points passed.
-    pub limit_points: Option<u32>,
-}
 
 impl Builder<'_> {
     /// Rejects scenes of both kinds of bodies without a common solver, and keys that do not go with the model of the implicit solvers.
@@ -113,7 +42,7 @@ impl Builder<'_> {
             Some(_) => "shells".to_owned(),
             None => format!("runs with `solver = \"{solver}\"`"),
         };
-        if scene.run.precision == Some(crate::format::Precision::Single) {
+        if scene.run.precision == Some(Precision::Single) {
             let message = format!("{what} are computed in double precision only");
             self.error(&scene.run_at("precision"), message, "not for these bodies", "leave `precision` out");
         }
@@ -235,9 +164,9 @@ impl Builder<'_> {
         if self.scene.run.solver != SolverName::Static {
             return;
         }
-        let Some(part) = &self.corotational else { return };
-        if let Err(corotational::SolveError::FreeBody { node, free_modes }) =
-            corotational::check_held(&part.model)
+        let Some(part) = &self.implicit else { return };
+        if let Err(pliant_implicit::SolveError::FreeBody { node, free_modes }) =
+            pliant_implicit::check_held(&part.model)
         {
             let owner = self.model.bodies.iter().find(|body| body.nodes.contains(&node));
             let Some((name, first)) = owner.map(|body| (body.name.clone(), body.nodes.start)) else { return };
@@ -269,10 +198,10 @@ impl Builder<'_> {
     }
 
     /// Sets the state that a run starts from.
-    pub(in crate::assemble) fn start_corotational(&mut self) {
+    pub(in crate::assemble) fn start_implicit(&mut self) {
         let displacement = self.initial_displacement();
         let velocity = std::mem::take(&mut self.model.initial_velocity);
-        let Some(part) = &mut self.corotational else {
+        let Some(part) = &mut self.implicit else {
             self.model.initial_velocity = velocity;
             return;
         };
@@ -285,70 +214,6 @@ impl Builder<'_> {
         for (own, given) in part.start.velocity.iter_mut().zip(velocity) {
             *own = Vector3::from(given);
         }
-    }
-}
-
-impl Corotational {
-    fn new() -> Self {
-        let model = corotational::Model::default();
-        Self {
-            start: State::at_rest(&model),
-            model: Arc::new(model),
-            cells: Vec::new(),
-            control: None,
-            surface: None,
-            carried: BTreeMap::new(),
-        }
-    }
-
-    /// The model, to be added to while it is built.
-    fn model_mut(&mut self) -> &mut corotational::Model {
-        Arc::make_mut(&mut self.model)
-    }
-
-    /// How many triangles a shell has, and their volume at rest [m³]; `None` of a solid.
-    pub(crate) fn size(&self, body: usize) -> Option<(usize, f64)> {
-        let BodyCells::Facets(range) = self.cells.get(body)? else { return None };
-        let facets = &self.model.facets[range.start as usize..range.end as usize];
-        Some((range.len(), facets.iter().map(|facet| facet.area * facet.thickness).sum()))
-    }
-
-    /// Whether only membranes hold a node.
-    pub(crate) fn is_slack(&self, node: u32) -> bool {
-        let mut facets = self.model.facets.iter().filter(|facet| facet.nodes.contains(&node)).peekable();
-        facets.peek().is_some() && facets.all(|facet| !facet.bends())
-    }
-
-    /// Each part of the model in words, with its [`fingerprint`].
-    pub(crate) fn fingerprints(&self) -> Vec<(String, u64)> {
-        let model = &self.model;
-        vec![
-            ("the mesh, thickness or material of shells".into(), fingerprint(&model.facets)),
-            ("constraints".into(), fingerprint(&(&model.constraints, &model.springs))),
-            ("loads or their control".into(), fingerprint(&(&model.loads, &self.control))),
-            ("creases".into(), fingerprint(&(&model.normals, &model.corner_normals))),
-            ("damping".into(), fingerprint(&[model.mass_damping, model.stiffness_damping])),
-        ]
-    }
-
-    /// The facet or the cell of a solid that an error names: its body and its number in the body's mesh.
-    pub(crate) fn cell(&self, number: usize) -> Option<(usize, u32)> {
-        let facets = self.model.facets.len();
-        if number < facets {
-            let own = number as u32;
-            return self.cells.iter().enumerate().find_map(|(body, cells)| match cells {
-                BodyCells::Facets(range) if range.contains(&own) => Some((body, own - range.start)),
-                _ => None,
-            });
-        }
-        let mut left = number - facets;
-        for solid in &self.model.solids {
-            if let Some(&original) = solid.original.get(left) {
-                return Some((solid.body, original));
-            }
-            left -= solid.original.len();
-        }
-        None
     }
 }
 
@@ -382,7 +247,7 @@ mod tests {
             build(&Scene::from_source(source, folder.path().into()).unwrap())
         };
         let off = |file: &str, more: &str| {
-            let part = built(file, more).unwrap().corotational.unwrap();
+            let part = built(file, more).unwrap().implicit.unwrap();
             let model = &part.model;
             assert_eq!(model.normals.len(), 12);
             let wanted = model.rest.iter().map(|p| Vector3::new(p.x, p.y, 2.0 * p.z).normalize());
@@ -423,7 +288,7 @@ mod tests {
                     initial-displacement = { csv = 'turn.csv' }\nvelocity = [1, 2, 3]\n";
         let source = Source::parse("plate.toml", text).unwrap();
         let scene = Scene::from_source(source, folder.path().into()).unwrap();
-        let part = build(&scene).unwrap().corotational.unwrap();
+        let part = build(&scene).unwrap().implicit.unwrap();
         let mut forces = Forces::new(part.model.clone());
         forces.evaluate(&part.start).unwrap();
         let moved = (part.start.position[8] - part.model.rest[8]).norm();

@@ -5,29 +5,22 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
-use pliant_explicit::State;
 use pliant_gpu::Wanted;
-use pliant_implicit as corotational;
 use pliant_implicit::{
-    BackwardEuler, DynamicSettings, Explicit, Forces, Integrator, LinearSolver, Phases, Preconditioner,
-    SolveError, Spring, StaticSettings, Statics,
+    BackwardEuler, DynamicSettings, Explicit, Forces, Model, Phases, SolveError, Spring, State, Statics,
 };
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::{Energies, fingerprint};
 use serde::{Deserialize, Serialize};
 
-use crate::assemble::{Built, Control, Corotational, Stop};
-use crate::diagnostic::counted;
-use crate::format::{
-    IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName,
-};
-use crate::output::{FailureSummary, number};
-use crate::participant::{CellsNow, Instant, Kept, Participant, SolidCells};
-use crate::plan::Plan;
-use crate::solver::{Effort, LoadStepProgress};
-
-/// Iterations from which on a lagged factorisation is made anew.
-const RENEW_AFTER: usize = 10;
+use crate::bodies::{Control, ImplicitBodies, Stop};
+use crate::failure::Failure;
+use crate::instant::{CellsNow, Instant};
+use crate::part::{self, Part};
+use crate::participant::{Kept, Participant};
+use crate::solids::SolidCells;
+use crate::solver::LoadStepProgress;
+use crate::words::{counted, number};
 
 /// Stiffness of the firmest grip over that of the stiffest cell.
 const FIRM: f64 = 10.0;
@@ -35,17 +28,42 @@ const FIRM: f64 = 10.0;
 /// Iterations of Newton's method whose residuals are kept: the last ones.
 const ITERATIONS_KEPT: usize = 10_000;
 
+/// What the equations of an implicit or a static run took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Effort {
+    /// Iterations of Newton's method in all.
+    pub newton_iterations: u64,
+    /// Linear equations solved.
+    pub solutions: u64,
+    /// Iterations of conjugate gradients in all; 0 with factors.
+    pub linear_iterations: u64,
+    /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
+    pub linear_residual: f64,
+    /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.
+    pub residual: Option<f64>,
+    /// Steps that were halved.
+    pub halved: u64,
+    /// Wall time of forces and stiffness of the cells [s].
+    pub seconds_cells: f64,
+    /// Wall time of factorising, or of making the preconditioner [s].
+    pub seconds_factors: f64,
+    /// Wall time of solving with them [s].
+    pub seconds_solution: f64,
+    /// Beginning of the first unstable equilibrium [s], seen from a negative pivot.
+    pub unstable_from: Option<f64>,
+}
+
 /// A run of shells, and of solids whose equations are solved.
-pub(crate) struct Corotated {
+pub(crate) struct Implicit {
     /// Bodies, and the constraints whose reactions are asked for.
     model: Arc<pliant_mechanics::Model>,
-    part: Arc<Corotational>,
+    bodies: Arc<ImplicitBodies>,
     method: Method,
     /// Step [s].
     step: f64,
     /// Steps of the whole run.
     planned: u64,
-    state: corotational::State,
+    state: State,
     /// Whole steps done, and the time [s] they end at.
     done: u64,
     time: f64,
@@ -54,7 +72,7 @@ pub(crate) struct Corotated {
     /// The constraint that has the reaction of each component: the first, where two prescribe the same.
     owners: Vec<[u32; 3]>,
     /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its positions and rotations.
-    before: Option<(Vec<f64>, corotational::State)>,
+    before: Option<(Vec<f64>, State)>,
     /// The same forces at the instant that is evaluated.
     outside: Vec<f64>,
     energies: Energies,
@@ -70,7 +88,7 @@ pub(crate) struct Corotated {
     grips: Vec<Grip>,
     springs: Vec<Spring>,
     /// Displacements of the solids at the instant last evaluated; `None` without solids.
-    solids: Option<State<f64>>,
+    solids: Option<pliant_explicit::State<f64>>,
 }
 
 /// An iteration of Newton's method.
@@ -103,7 +121,7 @@ struct Path {
 
 /// What a resumed run needs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct ShellSnapshot {
+pub(crate) struct ImplicitState {
     /// Whole steps done, and the time [s] they end at.
     done: u64,
     time: f64,
@@ -116,7 +134,7 @@ pub(crate) struct ShellSnapshot {
     convergence: VecDeque<Iterated>,
 }
 
-impl ShellSnapshot {
+impl ImplicitState {
     /// Whether it is of a model with so many nodes.
     pub(crate) fn fits(&self, nodes: usize) -> bool {
         let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
@@ -137,7 +155,7 @@ struct PlainState {
 }
 
 impl PlainState {
-    fn of(state: &corotational::State) -> Self {
+    fn of(state: &State) -> Self {
         let plain = |vectors: &[Vector3<f64>]| vectors.iter().map(|&v| v.into()).collect();
         Self {
             time: state.time,
@@ -153,10 +171,10 @@ impl PlainState {
         [self.position.len(), self.rotation.len(), self.velocity.len(), self.spin.len()] == [nodes; 4]
     }
 
-    fn state(&self) -> corotational::State {
+    fn state(&self) -> State {
         let vectors = |plain: &[[f64; 3]]| plain.iter().map(|&v| v.into()).collect();
         let rotation = |&q: &[f64; 4]| UnitQuaternion::new_unchecked(Quaternion::from(Vector4::from(q)));
-        corotational::State {
+        State {
             time: self.time,
             load_factor: self.load_factor,
             position: vectors(&self.position),
@@ -184,7 +202,7 @@ impl Method {
     }
 
     /// Finds the forces at a state.
-    fn evaluate(&mut self, state: &corotational::State) -> Result<(), SolveError> {
+    fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
         match self {
             Self::Static(_, forces) | Self::Implicit(_, forces) => forces.evaluate(state),
             Self::Explicit(solver) => solver.evaluate(state),
@@ -192,44 +210,27 @@ impl Method {
     }
 }
 
-impl Corotated {
-    /// The run that a scene asks for, at its start.
-    pub(crate) fn new(
-        run: &RunTable,
-        built: &Built,
-        part: &Arc<Corotational>,
-        plan: &Plan,
-    ) -> Result<Self, FailureSummary> {
-        let table = match &run.linear {
-            LinearWay::Named(name) => LinearTable::usual(*name),
-            LinearWay::Set(table) => table.clone(),
-        };
-        let linear = linear_solver(&table);
-        let model = &part.model;
-        let method = match run.solver {
-            SolverName::Static => {
-                let mut settings = StaticSettings { linear, ..StaticSettings::default() };
-                settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
-                settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
-                Statics::new(model.clone(), settings)
-                    .map(|solver| Method::Static(Box::new(solver), Forces::new(model.clone())))
-            }
-            SolverName::Implicit => {
-                let mut settings = DynamicSettings { linear, ..DynamicSettings::new(plan.step) };
-                settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
-                settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
-                settings.accept_stalled = table.accept_stalled;
-                if settings.iterations == 1 {
-                    settings = settings.real_time(linear);
-                }
-                settings.integrator = match run.integrator.unwrap_or_default() {
-                    IntegratorName::BackwardEuler => Integrator::BackwardEuler,
-                    IntegratorName::Bdf2 => Integrator::Bdf2,
-                };
+impl Implicit {
+    /// A participant at its start.
+    ///
+    /// # Errors
+    /// If its solver can't be made.
+    pub(crate) fn new(part: &Part, bodies: &Arc<ImplicitBodies>) -> Result<Self, Failure> {
+        let (model, own) = (&bodies.model, &part.model);
+        let forces = || Forces::new(model.clone());
+        let method = match &part.method {
+            part::Method::Static(_, settings) => Statics::new(model.clone(), *settings)
+                .map(|solver| Method::Static(Box::new(solver), forces())),
+            part::Method::Implicit(_, settings) => {
+                let settings = DynamicSettings { step: part.steps.step, ..*settings };
                 BackwardEuler::new(model.clone(), settings)
-                    .map(|solver| Method::Implicit(Box::new(solver), Forces::new(model.clone())))
+                    .map(|solver| Method::Implicit(Box::new(solver), forces()))
             }
-            _ => Explicit::new(model.clone(), plan.step).map(|solver| Method::Explicit(Box::new(solver))),
+            part::Method::Explicit(_)
+            | part::Method::QuasiStatic { .. }
+            | part::Method::ExplicitShells(_) => {
+                Explicit::new(model.clone(), part.steps.step).map(|solver| Method::Explicit(Box::new(solver)))
+            }
         };
         let mut prescribed = vec![false; 6 * model.rest.len()];
         for constraint in &model.constraints {
@@ -240,19 +241,19 @@ impl Corotated {
             }
         }
         Ok(Self {
-            method: method.map_err(|error| failure(&error, &built.model, part, 0.0))?,
-            step: plan.step,
-            planned: plan.steps,
-            time: part.start.time,
+            method: method.map_err(|error| failure(&error, own, bodies, 0.0))?,
+            step: part.steps.step,
+            planned: part.steps.number,
+            time: bodies.start.time,
             done: 0,
-            state: part.start.clone(),
+            state: bodies.start.clone(),
             outside: vec![0.0; prescribed.len()],
             prescribed,
             // Contradictions were reported when the model was built.
-            owners: built.model.constrained_components().unwrap_or_default(),
+            owners: own.constrained_components().unwrap_or_default(),
             before: None,
             energies: Energies::default(),
-            reactions: vec![[0.0; 3]; built.model.constraints.len()],
+            reactions: vec![[0.0; 3]; own.constraints.len()],
             evaluated: false,
             effort: Effort::default(),
             effort_before: Effort::default(),
@@ -260,9 +261,9 @@ impl Corotated {
             path: Path::default(),
             grips: Vec::new(),
             springs: Vec::new(),
-            solids: (!built.model.solids.is_empty()).then(|| State::at_rest(&built.model)),
-            model: Arc::clone(&built.model),
-            part: Arc::clone(part),
+            solids: (!own.solids.is_empty()).then(|| pliant_explicit::State::at_rest(own)),
+            model: Arc::clone(own),
+            bodies: Arc::clone(bodies),
         })
     }
 
@@ -288,7 +289,7 @@ impl Corotated {
     }
 
     fn kinetic(&self) -> f64 {
-        let model = &self.part.model;
+        let model = &self.bodies.model;
         let node = |node: usize| {
             model.mass[node] * self.state.velocity[node].norm_squared()
                 + model.inertia[node] * self.state.spin[node].norm_squared()
@@ -424,7 +425,7 @@ impl Corotated {
 
     fn go_statically(&mut self, number: u64) -> Result<(), SolveError> {
         let until = number as f64 * self.step;
-        let control = self.part.control.map(|control| part_of(control, number, self.planned));
+        let control = self.bodies.control.map(|control| part_of(control, number, self.planned));
         let Method::Static(solver, _) = &mut self.method else { return Ok(()) };
         let result = match control {
             Some(control) => solver.control(&mut self.state, control),
@@ -455,9 +456,9 @@ impl Corotated {
         if control.is_some() {
             self.state.time = until;
         }
-        if let Some(Control::ArcLength { stop, .. }) = self.part.control {
+        if let Some(Control::ArcLength { stop, .. }) = self.bodies.control {
             self.path.go_on(self.state.load_factor);
-            self.path.ended = self.path.end(&stop, &self.state, &self.part.model);
+            self.path.ended = self.path.end(&stop, &self.state, &self.bodies.model);
         }
         Ok(())
     }
@@ -478,7 +479,7 @@ impl Path {
     }
 
     /// Why it ends here, if it does.
-    fn end(&self, stop: &Stop, state: &corotational::State, model: &corotational::Model) -> Option<String> {
+    fn end(&self, stop: &Stop, state: &State, model: &Model) -> Option<String> {
         let limit = number(stop.load_factor.unwrap_or(f64::INFINITY));
         if stop.load_factor.is_some_and(|limit| self.factor.abs() >= limit) {
             return Some(format!("the load factor is {}, at least {limit} in size", number(self.factor)));
@@ -506,40 +507,22 @@ impl Effort {
 }
 
 /// What the load step of a number (counted from 1) prescribes.
-fn part_of(control: Control, number: u64, of: u64) -> corotational::Control {
+fn part_of(control: Control, number: u64, of: u64) -> pliant_implicit::Control {
     match control {
         Control::Displacement { node, component, by } => {
-            corotational::Control::Displacement { node, component, by: by / of as f64 }
+            pliant_implicit::Control::Displacement { node, component, by: by / of as f64 }
         }
-        Control::ArcLength { length, .. } => corotational::Control::ArcLength { length },
+        Control::ArcLength { length, .. } => pliant_implicit::Control::ArcLength { length },
         Control::Volume { from, to } => {
-            corotational::Control::Volume { volume: from + (to - from) * number as f64 / of as f64 }
+            pliant_implicit::Control::Volume { volume: from + (to - from) * number as f64 / of as f64 }
         }
     }
 }
 
-fn linear_solver(table: &LinearTable) -> LinearSolver {
-    match table.by {
-        LinearName::Direct => LinearSolver::Direct,
-        LinearName::Unsymmetric => LinearSolver::Unsymmetric,
-        LinearName::ConjugateGradients => LinearSolver::ConjugateGradients {
-            tolerance: table.tolerance,
-            iterations: table.iterations as usize,
-            preconditioner: match table.preconditioner {
-                PreconditionerName::BlockJacobi => Preconditioner::BlockJacobi,
-                PreconditionerName::Aggregates => Preconditioner::Aggregates,
-                PreconditionerName::LaggedFactors => {
-                    Preconditioner::LaggedFactors { renew_after: RENEW_AFTER }
-                }
-            },
-        },
-    }
-}
-
-impl Corotated {
+impl Implicit {
     /// Goes on from where a run of the same bodies stood.
-    pub(crate) fn resume(&mut self, remembered: ShellSnapshot) {
-        let ShellSnapshot { done, time, state, before, previous, energies, effort, convergence } = remembered;
+    pub(crate) fn resume(&mut self, remembered: ImplicitState) {
+        let ImplicitState { done, time, state, before, previous, energies, effort, convergence } = remembered;
         (self.done, self.time) = (done, time);
         self.convergence = convergence;
         self.state = state.state();
@@ -552,12 +535,12 @@ impl Corotated {
         self.evaluated = false;
     }
 
-    fn snapshot(&self) -> ShellSnapshot {
+    fn snapshot(&self) -> ImplicitState {
         let previous = match &self.method {
             Method::Implicit(solver, _) => solver.previous().map(PlainState::of),
             _ => None,
         };
-        ShellSnapshot {
+        ImplicitState {
             done: self.done,
             time: self.time,
             state: PlainState::of(&self.state),
@@ -570,13 +553,13 @@ impl Corotated {
     }
 }
 
-impl Instant for Corotated {
+impl Instant for Implicit {
     fn time(&self) -> f64 {
         self.time
     }
 
     fn displacement(&self, node: usize) -> [f64; 3] {
-        (self.state.position[node] - self.part.model.rest[node]).into()
+        (self.state.position[node] - self.bodies.model.rest[node]).into()
     }
 
     fn velocity(&self, node: usize) -> [f64; 3] {
@@ -607,31 +590,58 @@ impl Instant for Corotated {
         Some(Box::new(SolidCells::new(&self.model, self.solids.as_ref()?, steps)))
     }
 
-    fn shells(&self) -> Option<&corotational::State> {
+    fn shells(&self) -> Option<&State> {
         Some(&self.state)
     }
 
     fn is_single(&self) -> bool {
         false
     }
-}
 
-impl Participant for Corotated {
     fn steps(&self) -> u64 {
         self.done
     }
 
-    fn evaluate(&mut self, _wanted: Wanted) -> Result<(), FailureSummary> {
+    /// The balance is not judged.
+    fn balance_floor(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn effort(&self) -> Option<Effort> {
+        (!matches!(self.method, Method::Explicit(_))).then(|| self.effort.clone())
+    }
+
+    fn convergence(&self) -> Option<String> {
+        let mut table = String::from("step,attempt,time,iteration,residual,allowed,found\n");
+        for Iterated { step, attempt, time, iteration, residual, allowed, found } in &self.convergence {
+            let found = u8::from(*found);
+            // Writing to a String cannot fail.
+            let _ = writeln!(table, "{step},{attempt},{time},{iteration},{residual:e},{allowed:e},{found}");
+        }
+        (!self.convergence.is_empty()).then_some(table)
+    }
+
+    fn ended(&self) -> Option<&str> {
+        self.path.ended.as_deref()
+    }
+}
+
+impl Participant for Implicit {
+    fn instant(&self) -> &dyn Instant {
+        self
+    }
+
+    fn evaluate(&mut self, _wanted: Wanted) -> Result<(), Failure> {
         if self.evaluated {
             return Ok(());
         }
         self.put_springs();
         let found = self.method.evaluate(&self.state);
-        found.map_err(|error| failure(&error, &self.model, &self.part, self.time))?;
+        found.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))?;
         self.find_energies();
         self.find_reactions();
         if let Some(solids) = &mut self.solids {
-            let rest = &self.part.model.rest;
+            let rest = &self.bodies.model.rest;
             for (own, (now, rest)) in solids.displacement.iter_mut().zip(self.state.position.iter().zip(rest))
             {
                 *own = (now - rest).into();
@@ -641,14 +651,10 @@ impl Participant for Corotated {
         Ok(())
     }
 
-    fn advance(
-        &mut self,
-        _steps: u64,
-        _watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), FailureSummary> {
+    fn advance(&mut self, _steps: u64, _watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
         let number = self.done + 1;
         self.put_springs();
-        self.go(number).map_err(|error| failure(&error, &self.model, &self.part, self.state.time))?;
+        self.go(number).map_err(|error| failure(&error, &self.model, &self.bodies, self.state.time))?;
         (self.done, self.time) = (number, self.state.time);
         self.evaluated = false;
         Ok(())
@@ -665,9 +671,9 @@ impl Participant for Corotated {
     /// their equations stay well conditioned.
     fn stiffest(&self, grip: &Grip) -> f64 {
         if !matches!(self.method, Method::Explicit(_)) {
-            return FIRM * self.part.model.stiffest();
+            return FIRM * self.bodies.model.stiffest();
         }
-        let mass = |&(node, weight): &(u32, f64)| self.part.model.mass[node as usize] / weight;
+        let mass = |&(node, weight): &(u32, f64)| self.bodies.model.mass[node as usize] / weight;
         let lightest = grip.nodes.iter().map(mass).fold(f64::INFINITY, f64::min);
         ROOM * 4.0 * lightest / (self.step * self.step)
     }
@@ -678,13 +684,8 @@ impl Participant for Corotated {
         [point.into(), ((Vector3::from(grip.place) - point) * grip.stiffness).into()]
     }
 
-    /// The balance is not judged.
-    fn balance_floor(&self) -> f64 {
-        f64::INFINITY
-    }
-
     fn kept(&self) -> Kept {
-        Kept::Shells(Box::new(self.snapshot()))
+        Kept::Implicit(Box::new(self.snapshot()))
     }
 
     fn encode(&self) -> postcard::Result<Vec<u8>> {
@@ -698,10 +699,6 @@ impl Participant for Corotated {
         fingerprint(&(positions.collect::<Vec<_>>(), rotations.collect::<Vec<_>>()))
     }
 
-    fn ended(&self) -> Option<&str> {
-        self.path.ended.as_deref()
-    }
-
     /// A static state stands at the last equilibrium found, which may lie within the step that failed.
     fn keeps_what_it_found(&mut self) -> bool {
         let is_static = matches!(self.method, Method::Static(..));
@@ -711,29 +708,15 @@ impl Participant for Corotated {
         }
         is_static
     }
-
-    fn convergence(&self) -> Option<String> {
-        let mut table = String::from("step,attempt,time,iteration,residual,allowed,found\n");
-        for Iterated { step, attempt, time, iteration, residual, allowed, found } in &self.convergence {
-            let found = u8::from(*found);
-            // Writing to a String cannot fail.
-            let _ = writeln!(table, "{step},{attempt},{time},{iteration},{residual:e},{allowed:e},{found}");
-        }
-        (!self.convergence.is_empty()).then_some(table)
-    }
-
-    fn effort(&self) -> Option<Effort> {
-        (!matches!(self.method, Method::Explicit(_))).then(|| self.effort.clone())
-    }
 }
 
 /// The report of a step that failed after a time.
 fn failure(
     error: &SolveError,
     model: &pliant_mechanics::Model,
-    part: &Corotational,
+    bodies: &ImplicitBodies,
     time: f64,
-) -> FailureSummary {
+) -> Failure {
     let body_of = |node: u32| model.bodies.iter().find(|body| body.nodes.contains(&node));
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
@@ -742,7 +725,7 @@ fn failure(
             ("singular", Some(*node), None)
         }
         SolveError::Indefinite { .. } => ("unstable", None, None),
-        SolveError::Broken { cell, .. } => ("inverted", None, part.cell(*cell)),
+        SolveError::Broken { cell, .. } => ("inverted", None, bodies.cell(*cell)),
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
     };
     let owner = node.and_then(body_of);
@@ -750,24 +733,20 @@ fn failure(
     let body = owner.map(|body| body.name.clone()).or_else(|| Some(model.bodies[cell?.0].name.clone()));
     let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();
     let of_body =
-        |cell| part.cell(cell).filter(|(owner, _)| body.as_ref() == Some(&model.bodies[*owner].name));
+        |cell| bodies.cell(cell).filter(|(owner, _)| body.as_ref() == Some(&model.bodies[*owner].name));
     let told = numbered(error, own_node, |cell| of_body(cell).map(|(_, cell)| cell));
-    let slack = node.or_else(|| Some(part.model.facets.get(error.broken()?.0)?.nodes[0]));
-    let hint = match slack.is_some_and(|node| part.is_slack(node)) {
+    let slack = node.or_else(|| Some(bodies.model.facets.get(error.broken()?.0)?.nodes[0]));
+    let hint = match slack.is_some_and(|node| bodies.is_slack(node)) {
         true => {
             "; a membrane resists bending and compression across by nothing: hold it on all sides, give it `pre-tension`, or take \
              an element with bending"
         }
         false => "",
     };
-    FailureSummary::of_solver(
-        kind,
-        format!("after t = {} s{place}: {told}{hint}; what was written before stays readable", number(time)),
-        body,
-        cell.map(|(_, cell)| cell),
-        own_node,
-        time,
-    )
+    let message =
+        format!("after t = {} s{place}: {told}{hint}; what was written before stays readable", number(time));
+    let element = cell.map(|(_, cell)| cell);
+    Failure { body, element, node: own_node, ..Failure::new(kind, message, Some(time)) }
 }
 
 /// An error with the numbers that a node and a cell have in their body.

@@ -1,25 +1,21 @@
-//! The solvers of a scene behind one face, so that one run loop serves them all.
+//! The solvers of solids in large strain behind one trait.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use pliant_explicit::stability::Monitor;
 use pliant_explicit::{
     CentralDifference, Clock, DynamicRelaxation, Equilibrium, Iteration, Observable, RelaxationSettings,
     Scalar, State,
 };
-use pliant_gpu::{Device, DeviceMapping, GpuStepper, PointValue, Wanted};
+use pliant_gpu::{DeviceMapping, GpuStepper, PointValue, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
-
 use serde::{Deserialize, Serialize};
 
-use crate::assemble::Built;
-use crate::format::{RunTable, SolverName};
-use crate::output::FailureSummary;
-use crate::plan::Plan;
-
-/// The place of a point at rest [m], and its nodes with their weights.
-pub(crate) type MappedPoint = ([f64; 3], Vec<(u32, f64)>);
+use crate::failure::Failure;
+use crate::part::{Method, Part};
+use crate::participant::MappedPoint;
+use crate::steps::Steps;
 
 /// How far a load step is.
 #[derive(Clone, Copy, Debug)]
@@ -56,31 +52,6 @@ impl<R> Memory<R> {
     }
 }
 
-/// What the equations of an implicit or a static run took.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Effort {
-    /// Iterations of Newton's method in all.
-    pub newton_iterations: u64,
-    /// Linear equations solved.
-    pub solutions: u64,
-    /// Iterations of conjugate gradients in all; 0 with factors.
-    pub linear_iterations: u64,
-    /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
-    pub linear_residual: f64,
-    /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.
-    pub residual: Option<f64>,
-    /// Steps that were halved.
-    pub halved: u64,
-    /// Wall time of forces and stiffness of the cells [s].
-    pub seconds_cells: f64,
-    /// Wall time of factorising, or of making the preconditioner [s].
-    pub seconds_factors: f64,
-    /// Wall time of solving with them [s].
-    pub seconds_solution: f64,
-    /// Beginning of the first unstable equilibrium [s], seen from a negative pivot.
-    pub unstable_from: Option<f64>,
-}
-
 /// How good the equilibria of a quasi-static run are.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Equilibria {
@@ -95,7 +66,7 @@ pub struct Equilibria {
 /// Brings the state of solids in large strain from instant to instant.
 pub(crate) trait Solver<R>: Send {
     /// Makes what can be asked belong to the state's instant, and of the state what is wanted.
-    fn evaluate(&mut self, state: &mut State<R>, wanted: Wanted) -> Result<(), FailureSummary>;
+    fn evaluate(&mut self, state: &mut State<R>, wanted: Wanted) -> Result<(), Failure>;
 
     /// Goes so many steps on from an instant that was evaluated, not more than its stride; tells now and then how far it
     /// is, if that takes long.
@@ -104,7 +75,7 @@ pub(crate) trait Solver<R>: Send {
         state: &mut State<R>,
         steps: u64,
         watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), FailureSummary>;
+    ) -> Result<(), Failure>;
 
     /// The most steps it takes in one go: more than one where the state is far away.
     fn stride(&self) -> u64 {
@@ -118,16 +89,13 @@ pub(crate) trait Solver<R>: Send {
         _state: &mut State<R>,
         _steps: u64,
         _within: Duration,
-    ) -> Option<Result<u64, FailureSummary>> {
+    ) -> Option<Result<u64, Failure>> {
         None
     }
 
     /// What finds points on the device where the state lies, from their places at rest [m], nodes and weights; `None` of a solver
     /// whose state lies in ordinary memory.
-    fn map(
-        &self,
-        _points: &mut dyn Iterator<Item = MappedPoint>,
-    ) -> Option<Result<DeviceMapping, FailureSummary>> {
+    fn map(&self, _points: &mut dyn Iterator<Item = MappedPoint>) -> Option<Result<DeviceMapping, Failure>> {
         None
     }
 
@@ -140,7 +108,7 @@ pub(crate) trait Solver<R>: Send {
     }
 
     /// Makes the state complete, as a checkpoint needs it.
-    fn bring_back(&mut self, _state: &mut State<R>) -> Result<(), FailureSummary> {
+    fn bring_back(&mut self, _state: &mut State<R>) -> Result<(), Failure> {
         Ok(())
     }
 
@@ -173,72 +141,56 @@ pub(crate) trait Solver<R>: Send {
     }
 }
 
-/// Watches the largest stable step of an explicit run; where every node is held there is no limit to watch.
-fn monitor(run: &RunTable, built: &Built, plan: &Plan) -> Option<Monitor> {
-    let on_unstable = run.on_unstable.unwrap_or_default();
-    let limit = plan.limits.as_ref()?.limit.step;
-    limit.is_finite().then(|| Monitor::new(&built.model, limit, on_unstable))
-}
-
-/// The solver that a scene asks for, on the processor.
-pub(crate) fn on_processor<R: Scalar>(
-    run: &RunTable,
-    built: &Built,
-    plan: &Plan,
-) -> Result<Box<dyn Solver<R>>, FailureSummary> {
-    // Refused when the model was built.
-    let contradicting = |error: Contradiction| FailureSummary::input(&error);
-    Ok(match run.solver {
-        SolverName::Explicit => {
-            let stepper = CentralDifference::new(built.model.clone(), plan.step).map_err(contradicting)?;
-            match monitor(run, built, plan) {
+/// The solver of a participant on the CPU.
+pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failure> {
+    let model = || Arc::clone(&part.model);
+    let contradicting = |error: Contradiction| Failure::input(&error);
+    Ok(match &part.method {
+        Method::Explicit(settings) => {
+            let stepper = CentralDifference::new(model(), part.steps.step).map_err(contradicting)?;
+            match settings.monitor(&part.model) {
                 Some(monitor) => Box::new(stepper.watched(monitor)),
                 None => Box::new(stepper),
             }
         }
-        // Refused when the model was built.
-        SolverName::Implicit | SolverName::Static => {
-            return Err(FailureSummary::input(&"this solver has a participant of its own"));
-        }
-        SolverName::QuasiStatic => {
-            let settings = match run.tolerance {
+        Method::QuasiStatic { tolerance, .. } => {
+            let settings = match *tolerance {
                 Some(tolerance) => RelaxationSettings { tolerance, ..RelaxationSettings::default() },
                 None => RelaxationSettings::usual::<R>(),
             };
             let tolerance = settings.tolerance;
             Box::new(LoadSteps {
-                relaxation: DynamicRelaxation::new(built.model.clone(), settings).map_err(contradicting)?,
-                plan: plan.clone(),
+                relaxation: DynamicRelaxation::new(model(), settings).map_err(contradicting)?,
+                steps: part.steps.clone(),
                 tolerance,
             })
+        }
+        Method::ExplicitShells(_) | Method::Static(..) | Method::Implicit(..) => {
+            return Err(Failure::input(&"shells and solved equations have a participant of their own"));
         }
     })
 }
 
-/// The solver that a scene asks for, on a graphics processor, from a state on.
-pub(crate) fn on_device(
-    run: &RunTable,
-    built: &Built,
-    plan: &Plan,
-    device: &Device,
-    state: &State<f32>,
-) -> Result<Box<dyn Solver<f32>>, FailureSummary> {
-    let stepper = GpuStepper::new(device, built.model.clone(), plan.step, run.design);
-    let mut stepper = stepper.map_err(|error| FailureSummary::device(&error, None))?;
-    if let Some(monitor) = monitor(run, built, plan) {
-        stepper = stepper.watched(monitor);
-    }
-    stepper.upload(state);
-    Ok(Box::new(stepper))
+/// The solver of a participant on a GPU, from a state on; `None` of a participant on the CPU.
+pub(crate) fn on_device(part: &Part, state: &State<f32>) -> Option<Result<Box<dyn Solver<f32>>, Failure>> {
+    let Method::Explicit(settings) = &part.method else { return None };
+    let device = settings.device.as_ref()?;
+    let stepper = GpuStepper::new(device, Arc::clone(&part.model), part.steps.step, settings.design);
+    Some(stepper.map_err(|error| Failure::device(&error, None)).map(|mut stepper| {
+        if let Some(monitor) = settings.monitor(&part.model) {
+            stepper = stepper.watched(monitor);
+        }
+        stepper.upload(state);
+        Box::new(stepper) as Box<dyn Solver<f32>>
+    }))
 }
 
-/// Most steps in one go on a graphics processor, so that a run can be stopped and shows how far it is.
+/// Most steps in one go on a GPU, so that a run can be stopped and shows how far it is.
 const STRIDE: u64 = 1024;
 
 impl Solver<f32> for GpuStepper {
-    fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), FailureSummary> {
-        GpuStepper::evaluate(self, state, wanted)
-            .map_err(|failure| FailureSummary::step(&failure, state.time))
+    fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), Failure> {
+        GpuStepper::evaluate(self, state, wanted).map_err(|failure| Failure::step(&failure, state.time))
     }
 
     fn advance(
@@ -246,8 +198,8 @@ impl Solver<f32> for GpuStepper {
         state: &mut State<f32>,
         steps: u64,
         _watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), FailureSummary> {
-        GpuStepper::advance(self, state, steps).map_err(|failure| FailureSummary::step(&failure, state.time))
+    ) -> Result<(), Failure> {
+        GpuStepper::advance(self, state, steps).map_err(|failure| Failure::step(&failure, state.time))
     }
 
     fn stride(&self) -> u64 {
@@ -259,16 +211,13 @@ impl Solver<f32> for GpuStepper {
         state: &mut State<f32>,
         steps: u64,
         within: Duration,
-    ) -> Option<Result<u64, FailureSummary>> {
+    ) -> Option<Result<u64, Failure>> {
         let advanced = GpuStepper::advance_without_read_back(self, state, steps, within);
-        Some(advanced.map_err(|failure| FailureSummary::step(&failure, state.time)))
+        Some(advanced.map_err(|failure| Failure::step(&failure, state.time)))
     }
 
-    fn map(
-        &self,
-        points: &mut dyn Iterator<Item = MappedPoint>,
-    ) -> Option<Result<DeviceMapping, FailureSummary>> {
-        Some(GpuStepper::map(self, points).map_err(|error| FailureSummary::device(&error, None)))
+    fn map(&self, points: &mut dyn Iterator<Item = MappedPoint>) -> Option<Result<DeviceMapping, Failure>> {
+        Some(GpuStepper::map(self, points).map_err(|error| Failure::device(&error, None)))
     }
 
     fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
@@ -279,8 +228,8 @@ impl Solver<f32> for GpuStepper {
         GpuStepper::hold(self, grips).is_ok()
     }
 
-    fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), FailureSummary> {
-        GpuStepper::bring_back(self, state).map_err(|failure| FailureSummary::step(&failure, state.time))
+    fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), Failure> {
+        GpuStepper::bring_back(self, state).map_err(|failure| Failure::step(&failure, state.time))
     }
 
     fn clock(&self, state: &State<f32>) -> Option<Clock> {
@@ -301,8 +250,8 @@ impl Solver<f32> for GpuStepper {
 }
 
 impl<R: Scalar> Solver<R> for CentralDifference<R> {
-    fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
-        CentralDifference::evaluate(self, state).map_err(|error| FailureSummary::from(&error))
+    fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), Failure> {
+        CentralDifference::evaluate(self, state).map_err(|error| Failure::from(&error))
     }
 
     /// A whole step, in its parts.
@@ -311,7 +260,7 @@ impl<R: Scalar> Solver<R> for CentralDifference<R> {
         state: &mut State<R>,
         _steps: u64,
         _watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), FailureSummary> {
+    ) -> Result<(), Failure> {
         CentralDifference::advance(self, state);
         while !state.is_between_steps() {
             Solver::evaluate(self, state, Wanted::Energies)?;
@@ -346,16 +295,16 @@ impl<R: Scalar> Solver<R> for CentralDifference<R> {
 struct LoadSteps<R> {
     relaxation: DynamicRelaxation<R>,
     /// Where they end.
-    plan: Plan,
+    steps: Steps,
     /// Relative residual of an equilibrium.
     tolerance: f64,
 }
 
 impl<R: Scalar> Solver<R> for LoadSteps<R> {
     /// At the start the equilibrium of what acts there already; others are found when they are gone to.
-    fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), FailureSummary> {
+    fn evaluate(&mut self, state: &mut State<R>, _wanted: Wanted) -> Result<(), Failure> {
         let begun = self.relaxation.begin(state);
-        begun.map_err(|error| FailureSummary::load_step(&error, 0, self.plan.steps))
+        begun.map_err(|error| Failure::load_step(&error, 0, self.steps.number))
     }
 
     fn advance(
@@ -363,14 +312,14 @@ impl<R: Scalar> Solver<R> for LoadSteps<R> {
         state: &mut State<R>,
         _steps: u64,
         watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), FailureSummary> {
-        let number = self.plan.number_from(state.time);
-        let (of, tolerance) = (self.plan.steps, self.tolerance);
+    ) -> Result<(), Failure> {
+        let number = self.steps.number_from(state.time);
+        let (of, tolerance) = (self.steps.number, self.tolerance);
         let mut told = |iteration: Iteration| watch(LoadStepProgress { number, of, iteration, tolerance });
         self.relaxation
-            .solve_watched(state, self.plan.end_of(number), &mut told)
+            .solve_watched(state, self.steps.end_of(number), &mut told)
             .map(|_| ())
-            .map_err(|error| FailureSummary::load_step(&error, number, of))
+            .map_err(|error| Failure::load_step(&error, number, of))
     }
 
     fn balance_floor(&self) -> f64 {
@@ -397,35 +346,6 @@ impl<R: Scalar> Solver<R> for LoadSteps<R> {
     fn resume(&mut self, memory: Memory<R>) {
         if let Memory::Equilibrium(equilibrium) = memory {
             self.relaxation.resume(equilibrium);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::{built, scene};
-
-    #[test]
-    fn a_load_step_tells_how_far_it_is() {
-        let more = "[run]\nsolver = 'quasi-static'\nload-steps = 2\n[constraint.top]\ntype = 'move'\nbody = 'cube'\n\
-                    nodes = { set = 'z-max' }\nby = [0, 0, 0.01]\n";
-        let (scene, built) = (scene(more), built(more));
-        let plan = crate::plan(&scene, &built).unwrap();
-        let mut solver = on_processor::<f64>(&scene.run, &built, &plan).unwrap();
-        let mut state = State::at_rest(&built.model);
-        for number in [1, 2] {
-            let mut told = Vec::new();
-            solver.advance(&mut state, 1, &mut |progress| told.push(progress)).unwrap();
-            assert!(told.len() > 10 && told.iter().all(|p| (p.number, p.of) == (number, 2)));
-            let fractions: Vec<f64> = told.iter().map(|p| p.iteration.fraction).collect();
-            assert!(fractions.is_sorted() && fractions[0] == 0.0, "{fractions:?}");
-            let last = told.last().unwrap();
-            assert!(last.iteration.fraction > 0.5 && last.iteration.fraction < 1.0, "{last:?}");
-            assert!(
-                (last.iteration.span[1] - state.time).abs() < 1e-15
-                    && last.iteration.residual > last.tolerance
-            );
         }
     }
 }

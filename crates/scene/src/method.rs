@@ -1,0 +1,92 @@
+//! How a participant is stepped, from the tables of its scene.
+
+use std::sync::Arc;
+
+use pliant_implicit::{DynamicSettings, Integrator, LinearSolver, Preconditioner, StaticSettings};
+use pliant_sim::{Explicit, ImplicitBodies, Method};
+
+use crate::format::{
+    IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName,
+};
+use crate::world::Part;
+
+/// Iterations from which on a lagged factorisation is made anew.
+const RENEW_AFTER: usize = 10;
+
+impl Part {
+    /// The same without its tables.
+    pub(crate) fn simulated(&self) -> pliant_sim::Part {
+        let Self { name, scene, built, plan } = self;
+        let (run, precision) = (&scene.run, plan.target.precision);
+        let method = match &built.implicit {
+            Some(bodies) => method_of(bodies, run, plan.steps.step),
+            None if run.solver == SolverName::QuasiStatic => {
+                Method::QuasiStatic { precision, tolerance: run.tolerance }
+            }
+            None => Method::Explicit(Explicit {
+                precision,
+                on_unstable: run.on_unstable.unwrap_or_default(),
+                critical_step: plan.limits.as_ref().map_or(f64::INFINITY, |limits| limits.assembled.step),
+                device: plan.target.device.clone(),
+                design: run.design,
+            }),
+        };
+        pliant_sim::Part {
+            name: name.clone(),
+            model: Arc::clone(&built.model),
+            method,
+            steps: plan.steps.clone(),
+        }
+    }
+}
+
+/// How shells, and solids whose equations are solved, are stepped.
+fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, step: f64) -> Method {
+    let bodies = Arc::clone(bodies);
+    let table = match &run.linear {
+        LinearWay::Named(name) => LinearTable::usual(*name),
+        LinearWay::Set(table) => table.clone(),
+    };
+    let linear = linear_solver(&table);
+    match run.solver {
+        SolverName::Static => {
+            let mut settings = StaticSettings { linear, ..StaticSettings::default() };
+            settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
+            settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
+            Method::Static(bodies, settings)
+        }
+        SolverName::Implicit => {
+            let mut settings = DynamicSettings { linear, ..DynamicSettings::new(step) };
+            settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
+            settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
+            settings.accept_stalled = table.accept_stalled;
+            if settings.iterations == 1 {
+                settings = settings.real_time(linear);
+            }
+            settings.integrator = match run.integrator.unwrap_or_default() {
+                IntegratorName::BackwardEuler => Integrator::BackwardEuler,
+                IntegratorName::Bdf2 => Integrator::Bdf2,
+            };
+            Method::Implicit(bodies, settings)
+        }
+        SolverName::Explicit | SolverName::QuasiStatic => Method::ExplicitShells(bodies),
+    }
+}
+
+fn linear_solver(table: &LinearTable) -> LinearSolver {
+    match table.by {
+        LinearName::Direct => LinearSolver::Direct,
+        LinearName::Unsymmetric => LinearSolver::Unsymmetric,
+        LinearName::ConjugateGradients => LinearSolver::ConjugateGradients {
+            tolerance: table.tolerance,
+            iterations: table.iterations as usize,
+            preconditioner: match table.preconditioner {
+                PreconditionerName::BlockJacobi => Preconditioner::BlockJacobi,
+                PreconditionerName::Aggregates => Preconditioner::Aggregates,
+                PreconditionerName::LaggedFactors => {
+                    Preconditioner::LaggedFactors { renew_after: RENEW_AFTER }
+                }
+            },
+        },
+    }
+}

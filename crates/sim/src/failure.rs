@@ -1,0 +1,135 @@
+//! Why a simulation could not go on.
+
+use std::fmt;
+
+use pliant_explicit::{RelaxationError, StepError};
+use pliant_gpu::{GpuError, StepFailure};
+use serde::Serialize;
+
+/// A failure, with its place and time.
+#[derive(Clone, Debug, Serialize)]
+pub struct Failure {
+    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `device`, `output`, `input` or `interrupted`.
+    pub kind: &'static str,
+    /// The body, where it is about one.
+    pub body: Option<String>,
+    /// The element, counted from 0.
+    pub element: Option<u32>,
+    /// The node, counted from 0.
+    pub node: Option<u32>,
+    /// Time [s].
+    pub time: Option<f64>,
+    /// The load step of a quasi-static run.
+    pub load_step: Option<Box<FailedLoadStep>>,
+    /// What happened and what to try.
+    pub message: String,
+    /// What to try, as the message says it at its end; empty where it says it otherwise.
+    #[serde(skip)]
+    pub remedy: &'static str,
+}
+
+/// A load step that came to no equilibrium.
+#[derive(Clone, Debug, Serialize)]
+pub struct FailedLoadStep {
+    /// Its number, counted from 1.
+    pub number: u64,
+    /// How many there are.
+    pub of: u64,
+    /// Iterations spent on the last try.
+    pub iterations: usize,
+    /// The relative residual that was reached; none if an element or a displacement was lost on the way.
+    pub residual: Option<f64>,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl Failure {
+    /// A failure of a kind, at a time [s] of the simulation.
+    pub fn new(kind: &'static str, message: String, time: Option<f64>) -> Self {
+        Self { kind, body: None, element: None, node: None, time, load_step: None, message, remedy: "" }
+    }
+
+    /// An input that can't be simulated.
+    pub fn input(error: &dyn fmt::Display) -> Self {
+        Self::new("input", error.to_string(), None)
+    }
+
+    /// The same failure with another remedy.
+    #[must_use]
+    pub fn advised(mut self, remedy: &str) -> Self {
+        if let Some(told) = self.message.strip_suffix(self.remedy).filter(|_| !self.remedy.is_empty()) {
+            self.message = format!("{told}{remedy}");
+            self.remedy = "";
+        }
+        self
+    }
+
+    /// A device that failed, at a time of the simulation.
+    pub(crate) fn device(error: &GpuError, time: Option<f64>) -> Self {
+        Self::new("device", format!("{error}; {}", error.remedy()), time)
+    }
+
+    /// Steps on a device that could not be taken.
+    pub(crate) fn step(failure: &StepFailure, time: f64) -> Self {
+        match failure {
+            StepFailure::Step(error) => error.into(),
+            StepFailure::Device(error) => Self::device(error, Some(time)),
+        }
+    }
+
+    /// A load step, counted from 1 (0: what acts at the start), of so many that came to no equilibrium.
+    pub(crate) fn load_step(error: &RelaxationError, number: u64, of: u64) -> Self {
+        let which = match number {
+            0 => "the loads at t = 0".to_owned(),
+            _ => format!("load step {number} of {of}"),
+        };
+        let message = format!("{which}: {error}; {}", error.remedy());
+        let (kind, body, element, node, time, iterations, residual) = match error {
+            RelaxationError::NotFinite { body, node, iterations, time, .. } => {
+                ("not-finite", body, None, *node, *time, *iterations, None)
+            }
+            RelaxationError::Inverted { body, element, node, iterations, time, .. } => {
+                ("inverted", body, Some(*element), *node, *time, *iterations, None)
+            }
+            RelaxationError::NotConverged { body, node, residual, iterations, time, .. } => {
+                ("not-converged", body, None, *node, *time, *iterations, Some(*residual))
+            }
+        };
+        Self {
+            body: Some(body.clone()),
+            element,
+            node: Some(node),
+            load_step: Some(Box::new(FailedLoadStep { number, of, iterations, residual })),
+            ..Self::new(kind, message, Some(time))
+        }
+    }
+}
+
+impl From<&StepError> for Failure {
+    fn from(error: &StepError) -> Self {
+        let message = format!("{error}; {}", error.remedy());
+        let (kind, body, element, node, time) = match error {
+            StepError::NotFinite { body, node, time } => ("not-finite", body, None, *node, *time),
+            StepError::Inverted { body, element, node, time, .. } => {
+                ("inverted", body, Some(*element), *node, *time)
+            }
+            StepError::BelowLimit { body, element, node, time, .. } => {
+                ("unstable", body, Some(*element), *node, *time)
+            }
+            StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
+        };
+        Self {
+            body: Some(body.clone()),
+            element,
+            node: Some(node),
+            remedy: error.remedy(),
+            ..Self::new(kind, message, Some(time))
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! A participant as observers read it. Numbers of any precision come out as `f64`.
+
+use pliant_explicit::recover::CellFields;
+use pliant_explicit::stability::Stability;
+use pliant_mechanics::Energies;
+
+use crate::implicit::Effort;
+use crate::solver::Equilibria;
+
+/// A participant at the instant last evaluated. Nodes and constraints are numbered in its model.
+pub trait Instant {
+    /// Time [s].
+    fn time(&self) -> f64;
+
+    /// Whole steps done.
+    fn steps(&self) -> u64;
+
+    /// Displacement [m] of a node.
+    fn displacement(&self, node: usize) -> [f64; 3];
+
+    /// Velocity [m/s] of a node.
+    fn velocity(&self, node: usize) -> [f64; 3];
+
+    /// Rotation vector [rad] of a node.
+    fn rotation(&self, _node: usize) -> [f64; 3] {
+        [0.0; 3]
+    }
+
+    /// Force [N] by which constraints hold or move a node; zero along components that are free.
+    fn nodal_reaction(&self, node: usize) -> [f64; 3];
+
+    /// Moment [N m] by which constraints hold or turn a node.
+    fn nodal_reaction_moment(&self, node: usize) -> [f64; 3];
+
+    /// Force [N] that holds or moves the nodes of a constraint, summed.
+    fn reaction(&self, constraint: usize) -> [f64; 3];
+
+    /// Energies [J].
+    fn energies(&self) -> Energies;
+
+    /// Finds the fields of cells of solids, where there are some; their stable steps, too, if these are wanted.
+    fn cells(&self, _steps: bool) -> Option<Box<dyn CellsNow + '_>> {
+        None
+    }
+
+    /// The state of shells, and of solids whose equations are solved.
+    fn shells(&self) -> Option<&pliant_implicit::State> {
+        None
+    }
+
+    /// Whether it is computed in single precision.
+    fn is_single(&self) -> bool;
+
+    /// Energy [J] above which the balance of energies is judged; infinite where it never is.
+    fn balance_floor(&self) -> f64;
+
+    /// The largest energy so far [J].
+    fn largest_energy(&self) -> f64 {
+        0.0
+    }
+
+    /// The critical time step as it was monitored.
+    fn stability(&self) -> Stability {
+        Stability::default()
+    }
+
+    /// How good its equilibria are; `None` of a participant that finds none by dynamic relaxation.
+    fn equilibria(&self) -> Option<Equilibria> {
+        None
+    }
+
+    /// Cost of its equations; `None` of a participant that solves none.
+    fn effort(&self) -> Option<Effort> {
+        None
+    }
+
+    /// Residuals of its last iterations, as a table; `None` of a participant that solves no equations.
+    fn convergence(&self) -> Option<String> {
+        None
+    }
+
+    /// Why it has ended before its last step.
+    fn ended(&self) -> Option<&str> {
+        None
+    }
+}
+
+/// Finds fields of cells at an instant.
+pub trait CellsNow: Sync {
+    /// The fields of a cell of a solid, and its stable step [s] if it is wanted.
+    fn at(&self, solid: usize, cell: usize) -> (CellFields, Option<f64>);
+}

@@ -1,0 +1,65 @@
+//! A simulation of many bodies. A [`World`] holds participants: bodies that one stepper advances together, with explicit, quasi-static,
+//! static or implicit steps, on the CPU or a GPU. A [`Simulation`] owns a world and its state, and knows nothing of files or windows.
+//! SI units throughout.
+//!
+//! Two participants, each at its own step:
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use pliant_implicit::element::Elasticity;
+//! use pliant_implicit::{Load, LoadKind, Material, Shell};
+//! use pliant_mechanics::curve::{Curve, Shape};
+//! use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+//! use pliant_mechanics::load::Load as SolidLoad;
+//! use pliant_mechanics::model::{Cells, Material as SolidMaterial, Model, Solid};
+//! use pliant_sim::{Part, Simulation, World};
+//!
+//! let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
+//! let mut tissue = Model::default();
+//! let tet = tissue.add_body("tissue", &corners);
+//! let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
+//! let cells = Cells::tet4(vec![[0, 1, 2, 3]], &tissue.rest);
+//! tissue.add_solid(Solid::new(tet, SolidMaterial::elastic(law, 1000.0), cells));
+//! tissue.loads.push(SolidLoad::gravity(tet, [0.0, 0.0, -9.81]));
+//!
+//! let mut wall = pliant_implicit::Model::new(corners[..3].iter().map(|&corner| corner.into()).collect());
+//! let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+//! wall.add_shell(&Shell::new("wall", vec![[0, 1, 2]], 0.001, material))?;
+//! let kind = LoadKind::Gravity { acceleration: Vector3::new(0.0, 0.0, -9.81) };
+//! let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.1 };
+//! wall.loads.push(Load { name: "gravity".into(), kind, curve, controlled: false });
+//!
+//! let parts = vec![Part::explicit("tissue", tissue, 0.1)?, Part::implicit("wall", wall, 0.1, 0.01)];
+//! let mut simulation = Simulation::new(World::new(parts))?;
+//! simulation.run(0.1, |_| ())?;
+//! let frame = simulation.frame()?;
+//! for body in ["tissue", "wall"] {
+//!     let down = frame.displacements(body).unwrap()[0][2];
+//!     // ½ g t²; backward Euler falls by ½ g t² (1 + h/t).
+//!     assert!((-down / 0.049_05 - 1.0).abs() < 0.11, "{body}: {down} m");
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod bodies;
+mod failure;
+mod implicit;
+mod instant;
+mod part;
+mod participant;
+mod simulation;
+mod solids;
+mod solver;
+mod steps;
+mod words;
+
+pub use bodies::{BodyCells, Control, ImplicitBodies, Stop};
+pub use failure::{FailedLoadStep, Failure};
+pub use implicit::Effort;
+pub use instant::{CellsNow, Instant};
+pub use part::{Explicit, Method, Part, Precision};
+pub use participant::MappedPoint;
+pub use simulation::{Frame, Simulation, State, World};
+pub use solver::{Equilibria, LoadStepProgress};
+pub use steps::{Critical, SAFETY, Steps};
+pub use words::{counted, number};

@@ -1,0 +1,164 @@
+//! Participants of a simulation, and how each is stepped.
+
+use std::sync::Arc;
+
+use pliant_explicit::stability::{Monitor, OnUnstable};
+use pliant_gpu::{Design, Device};
+use pliant_implicit::{DynamicSettings, StaticSettings};
+use pliant_mechanics::Model;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::bodies::ImplicitBodies;
+use crate::failure::Failure;
+use crate::steps::{Critical, Steps};
+
+/// Number type of the solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// 32-bit numbers: faster, about six digits.
+    Single,
+    /// 64-bit numbers: the reference.
+    Double,
+}
+
+impl Precision {
+    /// Its word in a scene file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Double => "double",
+        }
+    }
+}
+
+/// A participant: bodies that one stepper advances together, and how it does so.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Its name.
+    pub name: String,
+    /// Nodes, bodies, names of constraints and carried surfaces; solids, too.
+    pub model: Arc<Model>,
+    /// How it is stepped.
+    pub method: Method,
+    /// Its steps.
+    pub steps: Steps,
+}
+
+/// How the state of a participant goes from instant to instant.
+#[derive(Clone, Debug)]
+pub enum Method {
+    /// Solids with inertia, by central differences.
+    Explicit(Explicit),
+    /// Equilibria of solids at the ends of load steps, by dynamic relaxation.
+    QuasiStatic {
+        /// The number type.
+        precision: Precision,
+        /// Relative residual of an equilibrium; `None`: that of the number type.
+        tolerance: Option<f64>,
+    },
+    /// Shells with inertia, by central differences.
+    ExplicitShells(Arc<ImplicitBodies>),
+    /// Equilibria of shells and solids at the ends of load steps, by Newton's method.
+    Static(Arc<ImplicitBodies>, StaticSettings),
+    /// Shells and solids with inertia in long steps; the length of [`Part::steps`] counts.
+    Implicit(Arc<ImplicitBodies>, DynamicSettings),
+}
+
+/// Settings of central differences.
+#[derive(Clone, Debug)]
+pub struct Explicit {
+    /// The number type; single on a GPU.
+    pub precision: Precision,
+    /// What happens when the critical time step falls below the step.
+    pub on_unstable: OnUnstable,
+    /// The critical time step of the assembled model at rest [s]; where it is infinite it is not monitored.
+    pub critical_step: f64,
+    /// The GPU; `None`: the CPU.
+    pub device: Option<Device>,
+    /// How its kernels bring forces from cells to nodes; `None`: the way that measured best.
+    pub design: Option<Design>,
+}
+
+impl Explicit {
+    /// The monitor of the critical time step; `None` where every node is held.
+    pub(crate) fn monitor(&self, model: &Model) -> Option<Monitor> {
+        self.critical_step.is_finite().then(|| Monitor::new(model, self.critical_step, self.on_unstable))
+    }
+}
+
+impl Method {
+    /// Shells, and solids whose equations are solved, with all they need beside the model.
+    pub fn bodies(&self) -> Option<&Arc<ImplicitBodies>> {
+        match self {
+            Self::ExplicitShells(bodies) | Self::Static(bodies, _) | Self::Implicit(bodies, _) => {
+                Some(bodies)
+            }
+            Self::Explicit(_) | Self::QuasiStatic { .. } => None,
+        }
+    }
+
+    /// The number type.
+    pub fn precision(&self) -> Precision {
+        match self {
+            Self::Explicit(Explicit { precision, .. }) | Self::QuasiStatic { precision, .. } => *precision,
+            Self::ExplicitShells(_) | Self::Static(..) | Self::Implicit(..) => Precision::Double,
+        }
+    }
+}
+
+impl Part {
+    /// Solids by central differences in double precision on the CPU, for a duration [s]. Steps take 0.9 of the critical time step, which is
+    /// monitored: steps are cut where it falls.
+    ///
+    /// # Errors
+    /// If the model has no cells, or constraints that contradict one another.
+    pub fn explicit(name: &str, model: impl Into<Arc<Model>>, duration: f64) -> Result<Self, Failure> {
+        let model = model.into();
+        let critical = Critical::of(&model).map_err(|error| Failure::input(&error))?;
+        let critical = critical.ok_or_else(|| Failure::input(&"the model has no cells"))?;
+        let settings = Explicit {
+            precision: Precision::Double,
+            on_unstable: OnUnstable::default(),
+            critical_step: critical.assembled.step,
+            device: None,
+            design: None,
+        };
+        let steps = Steps::within(duration, critical.automatic());
+        Ok(Self { name: name.into(), model, method: Method::Explicit(settings), steps })
+    }
+
+    /// Equilibria of solids in double precision at the ends of so many equal load steps within a duration [s].
+    pub fn quasi_static(name: &str, model: impl Into<Arc<Model>>, duration: f64, load_steps: u64) -> Self {
+        let method = Method::QuasiStatic { precision: Precision::Double, tolerance: None };
+        let steps = Steps::within(duration, duration / load_steps.max(1) as f64);
+        Self { name: name.into(), model: model.into(), method, steps }
+    }
+
+    /// Equilibria of shells and solids by Newton's method, at the ends of so many equal load steps within a duration [s].
+    pub fn equilibria(
+        name: &str,
+        model: impl Into<Arc<pliant_implicit::Model>>,
+        duration: f64,
+        load_steps: u64,
+    ) -> Self {
+        let (model, bodies) = ImplicitBodies::alone(name, model.into());
+        let steps = Steps::within(duration, duration / load_steps.max(1) as f64);
+        let method = Method::Static(Arc::new(bodies), StaticSettings::default());
+        Self { name: name.into(), model: Arc::new(model), method, steps }
+    }
+
+    /// Shells and solids with inertia by backward Euler, in steps of a length [s] within a duration [s].
+    pub fn implicit(
+        name: &str,
+        model: impl Into<Arc<pliant_implicit::Model>>,
+        duration: f64,
+        step: f64,
+    ) -> Self {
+        let (model, bodies) = ImplicitBodies::alone(name, model.into());
+        let steps = Steps::within(duration, step);
+        let method = Method::Implicit(Arc::new(bodies), DynamicSettings::new(steps.step));
+        Self { name: name.into(), model: Arc::new(model), method, steps }
+    }
+}

@@ -1,0 +1,541 @@
+//! A simulation: a world and its state, brought from one common instant of all participants to the next, each at its own step.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use pliant_explicit::Clock;
+use pliant_gpu::{DeviceMapping, PointValue, Wanted};
+use pliant_mechanics::grip::Grip;
+use pliant_mechanics::{Energies, Model, fingerprint};
+
+use crate::failure::Failure;
+use crate::instant::Instant;
+use crate::part::Part;
+use crate::participant::{Before, Kept, MappedPoint, Participant, begin, go_on};
+use crate::solver::LoadStepProgress;
+
+/// The participants of a simulation: constant while it runs.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// Bodies that one stepper advances together: at least one participant.
+    pub parts: Vec<Part>,
+}
+
+impl World {
+    /// Participants that meet at common instants: the steps of each become a multiple of those of the participant with the fewest.
+    /// All have the same duration.
+    pub fn new(mut parts: Vec<Part>) -> Self {
+        let common = parts.iter().map(|part| part.steps.number).min().unwrap_or(1);
+        for part in &mut parts {
+            let steps = &mut part.steps;
+            if !steps.number.is_multiple_of(common) {
+                let duration = steps.step * steps.number as f64;
+                steps.number = common * steps.number.div_ceil(common);
+                steps.step = duration / steps.number as f64;
+            }
+        }
+        Self { parts }
+    }
+
+    /// Steps of each participant between two common instants.
+    fn ratios(&self) -> Vec<u64> {
+        let numbers = || self.parts.iter().map(|part| part.steps.number.max(1));
+        let common = numbers().min().unwrap_or(1);
+        numbers().map(|number| number / common).collect()
+    }
+
+    /// Length [s] of the step of all from a time [s] on.
+    fn step_from(&self, time: f64) -> f64 {
+        let slowest = self.parts.iter().min_by_key(|part| part.steps.number);
+        slowest.map_or(0.0, |part| part.steps.step_from(time))
+    }
+}
+
+impl From<Part> for World {
+    fn from(part: Part) -> Self {
+        Self { parts: vec![part] }
+    }
+}
+
+impl From<Part> for Arc<World> {
+    fn from(part: Part) -> Self {
+        Self::new(part.into())
+    }
+}
+
+/// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
+#[derive(Clone, Debug)]
+pub struct State(Vec<OwnState>);
+
+/// That of a participant.
+#[derive(Clone, Debug)]
+struct OwnState {
+    kept: Kept,
+    clock: Option<Clock>,
+    /// Length of its steps [s].
+    step: f64,
+}
+
+impl State {
+    /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
+    pub fn decode<B: AsRef<[u8]>>(world: &World, participants: &[B]) -> Option<Self> {
+        if participants.len() != world.parts.len() {
+            return None;
+        }
+        let of = |(part, bytes): (&Part, &B)| {
+            let kept = Kept::decode(part, bytes.as_ref())?;
+            Some(OwnState { kept, clock: None, step: part.steps.step })
+        };
+        world.parts.iter().zip(participants).map(of).collect::<Option<_>>().map(Self)
+    }
+}
+
+/// A world under way. It owns all it needs, so it can be kept anywhere and moved to another thread. After a failure it stays at the last
+/// good instant.
+///
+/// ```
+/// use pliant_mechanics::Model;
+/// use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+/// use pliant_mechanics::load::Load;
+/// use pliant_mechanics::model::{Cells, Material, Solid};
+/// use pliant_sim::{Part, Simulation};
+///
+/// // One tetrahedron, one face held, falling under its own weight.
+/// let mut model = Model::default();
+/// let tet = model.add_body("tet", &[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
+/// let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
+/// let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
+/// model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
+/// model.fix("base", vec![0, 1, 2]);
+/// model.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
+///
+/// let mut simulation = Simulation::new(Part::explicit("tet", model, 0.1)?)?;
+/// let start = simulation.state()?;
+/// simulation.run(0.1, |_| ())?;
+/// let down = simulation.frame()?.displacements("tet").unwrap()[3][2];
+/// assert!(down < 0.0);
+/// simulation.restore(start)?;
+/// assert_eq!(simulation.time(), 0.0);
+/// # Ok::<(), pliant_sim::Failure>(())
+/// ```
+pub struct Simulation {
+    world: Arc<World>,
+    participants: Vec<Box<dyn Participant>>,
+    /// Steps of each participant between two common instants.
+    ratios: Vec<u64>,
+    /// First node of each participant, counted over all.
+    first_nodes: Vec<u32>,
+    /// Whether forces, energies and reactions belong to the instant.
+    evaluated: bool,
+}
+
+impl Simulation {
+    /// At the start of a world.
+    ///
+    /// # Errors
+    /// If a stepper can't be made, or the world has no participants.
+    pub fn new(world: impl Into<Arc<World>>) -> Result<Self, Failure> {
+        let world = world.into();
+        let participants = world.parts.iter().map(begin).collect::<Result<Vec<_>, _>>()?;
+        if participants.is_empty() {
+            return Err(Failure::input(&"the world has no participants"));
+        }
+        Ok(Self::of(world, participants))
+    }
+
+    /// From a state of this world on.
+    ///
+    /// # Errors
+    /// If a stepper can't be made, or the state is of another world.
+    pub fn resumed(world: impl Into<Arc<World>>, State(state): State) -> Result<Self, Failure> {
+        let (world, other) = (world.into(), || Failure::input(&"the state is of another model"));
+        if state.is_empty() || state.len() != world.parts.len() {
+            return Err(other());
+        }
+        let mut participants = Vec::new();
+        for (part, own) in world.parts.iter().zip(state) {
+            participants.push(go_on(part, own.kept, None)?.ok_or_else(other)?);
+        }
+        Ok(Self::of(world, participants))
+    }
+
+    /// From a state that another world was in, with displacements, velocities and the history of relaxing laws. `None` where this world
+    /// has other meshes, solvers or number types.
+    ///
+    /// # Errors
+    /// If a stepper can't be made.
+    pub fn continued(
+        world: impl Into<Arc<World>>,
+        State(state): State,
+        before: &World,
+    ) -> Result<Option<Self>, Failure> {
+        let world = world.into();
+        if state.is_empty() || [state.len(), before.parts.len()] != [world.parts.len(); 2] {
+            return Ok(None);
+        }
+        let mut participants = Vec::new();
+        for ((part, own), before) in world.parts.iter().zip(state).zip(&before.parts) {
+            if !same_mesh(before, part) {
+                return Ok(None);
+            }
+            let OwnState { kept, clock, step } = own;
+            let steps = clock.map(|clock| Before { clock, step, model: &before.model });
+            match go_on(part, kept, steps)? {
+                Some(participant) => participants.push(participant),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(Self::of(world, participants)))
+    }
+
+    fn of(world: Arc<World>, participants: Vec<Box<dyn Participant>>) -> Self {
+        let ratios = world.ratios();
+        let nodes = world.parts.iter().map(|part| part.model.node_count() as u32);
+        let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes))).collect();
+        Self { world, participants, ratios, first_nodes, evaluated: false }
+    }
+
+    /// The world.
+    pub fn world(&self) -> &Arc<World> {
+        &self.world
+    }
+
+    /// Time of the common instant [s].
+    pub fn time(&self) -> f64 {
+        self.participants[0].time()
+    }
+
+    /// Common instants since the start.
+    pub fn steps(&self) -> u64 {
+        self.participants[0].steps() / self.ratios[0]
+    }
+
+    /// Length [s] of the next step from one common instant to the next.
+    pub fn step_length(&self) -> f64 {
+        self.world.step_from(self.time())
+    }
+
+    /// Goes on to the next common instant; on a GPU to the end of its stride.
+    ///
+    /// # Errors
+    /// If forces can't be found or a step can't be taken.
+    pub fn step(&mut self) -> Result<(), Failure> {
+        self.evaluate(Wanted::Energies)?;
+        self.advance(self.stride(), &mut |_| {})
+    }
+
+    /// Steps until a time [s], the nearest instant to it; `look` sees each instant, the last one, too.
+    ///
+    /// # Errors
+    /// If forces can't be found or a step can't be taken. The simulation stays at the last good instant.
+    pub fn run(&mut self, until: f64, mut look: impl FnMut(&Frame<'_>)) -> Result<(), Failure> {
+        loop {
+            look(&self.frame()?);
+            if self.time() + 0.5 * self.step_length() >= until || self.ended().is_some() {
+                return Ok(());
+            }
+            self.advance(1, &mut |_| {})?;
+        }
+    }
+
+    /// All that can be read at the instant; its forces are found. The next step goes on from it.
+    ///
+    /// # Errors
+    /// If forces can't be found.
+    pub fn frame(&mut self) -> Result<Frame<'_>, Failure> {
+        self.evaluate(Wanted::Everything)?;
+        Ok(Frame { simulation: self })
+    }
+
+    /// Finds forces of all participants at the instant, and reads back from devices what is wanted. It does nothing where they are found.
+    ///
+    /// # Errors
+    /// If those of a participant can't be found.
+    pub fn evaluate(&mut self, wanted: Wanted) -> Result<(), Failure> {
+        if !self.evaluated {
+            self.participants.iter_mut().try_for_each(|participant| participant.evaluate(wanted))?;
+            self.evaluated = true;
+        }
+        Ok(())
+    }
+
+    /// Whether forces, energies and reactions belong to the instant.
+    pub fn is_evaluated(&self) -> bool {
+        self.evaluated
+    }
+
+    /// Goes so many common instants on from an evaluated one, not more than the stride. `watch` hears how far load steps are.
+    ///
+    /// # Errors
+    /// If a step of a participant can't be taken.
+    pub fn advance(&mut self, steps: u64, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
+        for (participant, ratio) in self.participants.iter_mut().zip(&self.ratios) {
+            let mut left = steps * ratio;
+            loop {
+                let now = left.min(participant.stride());
+                participant.advance(now, watch)?;
+                left -= now;
+                if left == 0 {
+                    break;
+                }
+                participant.evaluate(Wanted::Energies)?;
+            }
+        }
+        self.evaluated = false;
+        Ok(())
+    }
+
+    /// The most common instants that it passes in one go: more than one where the state lies on a GPU.
+    pub fn stride(&self) -> u64 {
+        let of = self.participants.iter().zip(&self.ratios);
+        of.map(|(participant, ratio)| participant.stride() / ratio).min().unwrap_or(1).max(1)
+    }
+
+    /// The state. It can be taken until the forces of the instant are found, which belong to the step to come.
+    ///
+    /// # Errors
+    /// If the forces of the instant are found, or a device fails.
+    pub fn state(&mut self) -> Result<State, Failure> {
+        if self.evaluated {
+            return Err(Failure::input(
+                &"the forces of this instant are found and belong to the step to come: take the state before its frame, or after a step",
+            ));
+        }
+        self.bring_back()?;
+        let parts = self.world.parts.iter().zip(&self.participants);
+        let own =
+            parts.map(|(part, now)| OwnState { clock: now.clock(), kept: now.kept(), step: part.steps.step });
+        Ok(State(own.collect()))
+    }
+
+    /// Goes back, or on, to a state of this world.
+    ///
+    /// # Errors
+    /// If it is of another world, or a device fails. The simulation then stays as it was.
+    pub fn restore(&mut self, state: State) -> Result<(), Failure> {
+        *self = Self::resumed(Arc::clone(&self.world), state)?;
+        Ok(())
+    }
+
+    /// Goes on with other numbers (laws, loads, steps) from the present state. False, and nothing changes, where the other world has other
+    /// meshes, solvers or number types.
+    ///
+    /// # Errors
+    /// Those of [`state`](Self::state), or if a stepper can't be made. The simulation then stays as it was.
+    pub fn exchange(&mut self, world: impl Into<Arc<World>>) -> Result<bool, Failure> {
+        let state = self.state()?;
+        match Self::continued(world, state, &self.world)? {
+            Some(other) => {
+                *self = other;
+                Ok(true)
+            }
+            None => Ok(false),
+        }
+    }
+
+    /// The state of each participant as bytes of a checkpoint, after a step.
+    ///
+    /// # Errors
+    /// If a device fails, or a state can't be encoded.
+    pub fn encode(&mut self) -> Result<Vec<Vec<u8>>, Failure> {
+        self.bring_back()?;
+        let bytes = self.participants.iter().map(|participant| participant.encode());
+        let failed = |error: postcard::Error| Failure::new("output", error.to_string(), Some(self.time()));
+        bytes.collect::<postcard::Result<_>>().map_err(failed)
+    }
+
+    fn bring_back(&mut self) -> Result<(), Failure> {
+        self.participants.iter_mut().try_for_each(|participant| participant.bring_back())
+    }
+
+    /// The participants as observers read them, in the order of the world, at the instant last evaluated.
+    pub fn instants(&self) -> impl Iterator<Item = &dyn Instant> {
+        self.participants.iter().map(|participant| participant.instant())
+    }
+
+    /// Energies of all participants together [J]; the worst of their balances.
+    pub fn energies(&self) -> Energies {
+        Energies::total(self.instants().map(|now| now.energies()))
+    }
+
+    /// Why it is at its end before its last step.
+    pub fn ended(&self) -> Option<&str> {
+        self.participants.iter().find_map(|participant| participant.ended())
+    }
+
+    /// After a step that failed: whether a state was found on the way that is worth showing. Its forces are then found.
+    pub fn keeps_what_it_found(&mut self) -> bool {
+        let Some(only) = self.only_mut() else { return false };
+        self.evaluated = only.keeps_what_it_found() && only.evaluate(Wanted::Everything).is_ok();
+        self.evaluated
+    }
+
+    /// A fingerprint of the motion: the same bits have the same one.
+    pub fn fingerprint(&self) -> u64 {
+        match &self.participants[..] {
+            [only] => only.fingerprint(),
+            all => fingerprint(&all.iter().map(|one| one.fingerprint()).collect::<Vec<_>>()),
+        }
+    }
+}
+
+/// Hands on points. Nodes are counted over the models of all participants.
+impl Simulation {
+    /// The participant of a node, and the node's number there.
+    pub fn locate(&self, node: u32) -> (usize, u32) {
+        // The first node of the first participant is 0.
+        let part = self.first_nodes.partition_point(|&first| first <= node) - 1;
+        (part, node - self.first_nodes[part])
+    }
+
+    /// The number, over all participants, of a node of one of them.
+    pub fn node(&self, part: usize, node: u32) -> u32 {
+        self.first_nodes[part] + node
+    }
+
+    /// The place of a node at rest [m].
+    pub fn rest(&self, node: u32) -> [f64; 3] {
+        let (part, node) = self.locate(node);
+        self.world.parts[part].model.rest[node as usize]
+    }
+
+    /// Takes hold of points: these grips and no others act from the next evaluation on. False where a stepper knows none, or where a grip
+    /// holds nodes of several participants.
+    pub fn hold(&mut self, grips: &[Grip]) -> bool {
+        let mut of_parts = vec![Vec::new(); self.participants.len()];
+        for grip in grips {
+            let Some((part, own)) = self.own(grip) else { return false };
+            of_parts[part].push(own);
+        }
+        let mut all = true;
+        for (participant, own) in self.participants.iter_mut().zip(&of_parts) {
+            all &= participant.hold(own);
+        }
+        all
+    }
+
+    /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where steps are stable with any.
+    pub fn stiffest(&self, grip: &Grip) -> f64 {
+        self.own(grip).map_or(0.0, |(part, own)| self.participants[part].stiffest(&own))
+    }
+
+    /// The point of a grip now [m], and its force on the body [N].
+    pub fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
+        let pulled = self.own(grip).map(|(part, own)| self.participants[part].pulled(&own));
+        pulled.unwrap_or([grip.place, [0.0; 3]])
+    }
+
+    /// The participant of a grip, and the grip with the numbers of the nodes there; `None` where it holds nodes of several.
+    fn own(&self, grip: &Grip) -> Option<(usize, Grip)> {
+        let (part, _) = self.locate(grip.nodes.first().map_or(0, |&(node, _)| node));
+        let nodes = grip.nodes.iter().map(|&(node, weight)| {
+            let (own, node) = self.locate(node);
+            (own == part).then_some((node, weight))
+        });
+        Some((part, Grip { nodes: nodes.collect::<Option<_>>()?, ..grip.clone() }))
+    }
+}
+
+/// A state on a GPU, where all bodies go together on one.
+impl Simulation {
+    /// Goes up to `steps` steps on without reading anything back, as many as take about `within`. How many; `None` of a state in
+    /// ordinary memory.
+    pub fn advance_without_read_back(
+        &mut self,
+        steps: u64,
+        within: Duration,
+    ) -> Option<Result<u64, Failure>> {
+        let advanced = self.only_mut()?.advance_without_read_back(steps, within)?;
+        self.evaluated = false;
+        Some(advanced)
+    }
+
+    /// The mapping that finds points, from their places at rest [m], nodes and weights, on the device of the state; `None` of a state in
+    /// ordinary memory.
+    pub fn map(
+        &self,
+        points: &mut dyn Iterator<Item = MappedPoint>,
+    ) -> Option<Result<DeviceMapping, Failure>> {
+        self.only()?.map(points)
+    }
+
+    /// Brings points on the device to the instant.
+    pub fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
+        if let Some(only) = self.only() {
+            only.apply(mapping, value);
+        }
+    }
+
+    fn only(&self) -> Option<&dyn Participant> {
+        match &self.participants[..] {
+            [one] => Some(one.as_ref()),
+            _ => None,
+        }
+    }
+
+    fn only_mut(&mut self) -> Option<&mut dyn Participant> {
+        match &mut self.participants[..] {
+            [one] => Some(one.as_mut()),
+            _ => None,
+        }
+    }
+}
+
+/// Whether a participant has the nodes and cells that another one has.
+fn same_mesh(a: &Part, b: &Part) -> bool {
+    let cells = |model: &Model| -> Vec<(String, u64)> {
+        model.fingerprints().into_iter().filter(|(part, _)| part.starts_with("mesh of")).collect()
+    };
+    let shells = |part: &Part| part.method.bodies().map(|bodies| bodies.model.rest.len());
+    a.model.rest == b.model.rest && shells(a) == shells(b) && cells(&a.model) == cells(&b.model)
+}
+
+/// A simulation at an instant whose forces are found.
+#[derive(Clone, Copy)]
+pub struct Frame<'a> {
+    simulation: &'a Simulation,
+}
+
+impl<'a> Frame<'a> {
+    /// Time [s].
+    pub fn time(&self) -> f64 {
+        self.simulation.time()
+    }
+
+    /// The participants.
+    pub fn parts(&self) -> impl Iterator<Item = (&'a Part, &'a dyn Instant)> {
+        self.simulation.world.parts.iter().zip(self.simulation.instants())
+    }
+
+    /// Energies of all participants together [J].
+    pub fn energies(&self) -> Energies {
+        self.simulation.energies()
+    }
+
+    /// Displacements [m] of the nodes of a body; `None` without a body of this name.
+    pub fn displacements(&self, body: &str) -> Option<Vec<[f64; 3]>> {
+        self.nodal(body, |now, node| now.displacement(node))
+    }
+
+    /// Velocities [m/s] of the nodes of a body; `None` without a body of this name.
+    pub fn velocities(&self, body: &str) -> Option<Vec<[f64; 3]>> {
+        self.nodal(body, |now, node| now.velocity(node))
+    }
+
+    fn nodal(&self, body: &str, value: impl Fn(&dyn Instant, usize) -> [f64; 3]) -> Option<Vec<[f64; 3]>> {
+        let (now, nodes) = self.parts().find_map(|(part, now)| {
+            let found = part.model.bodies.iter().find(|own| own.name == body)?;
+            Some((now, found.nodes.clone()))
+        })?;
+        Some(nodes.map(|node| value(now, node as usize)).collect())
+    }
+
+    /// Force [N] by which a constraint holds or moves its nodes; `None` without one of this name.
+    pub fn reaction(&self, constraint: &str) -> Option<[f64; 3]> {
+        let forces = self.parts().flat_map(|(part, now)| {
+            let own = part.model.constraints.iter().enumerate().filter(|(_, own)| own.name == constraint);
+            own.map(|(index, _)| now.reaction(index))
+        });
+        forces.reduce(|a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
+    }
+}

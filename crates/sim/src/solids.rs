@@ -1,0 +1,242 @@
+//! Solids in large strain as a participant: central differences on the CPU or a GPU, or dynamic relaxation.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use pliant_explicit::recover::{CellFields, Recovery};
+use pliant_explicit::stability::{Stability, cell_limit};
+use pliant_explicit::{Clock, Scalar, State};
+use pliant_gpu::{DeviceMapping, PointValue, Wanted};
+use pliant_mechanics::grip::Grip;
+use pliant_mechanics::{Energies, Model, fingerprint};
+
+use crate::failure::Failure;
+use crate::instant::{CellsNow, Instant};
+use crate::part::{Method, Part};
+use crate::participant::{Kept, MappedPoint, Participant};
+use crate::solver::{Equilibria, LoadStepProgress, Memory, Solver, on_cpu, on_device};
+
+/// The number types that solids in large strain are computed in.
+pub(crate) trait Numeric: Scalar {
+    /// A state with its memory, kept.
+    fn keep(state: State<Self>, memory: Memory<Self>) -> Kept;
+
+    /// The stepper of a participant, from a state on.
+    ///
+    /// # Errors
+    /// If it can't be made.
+    fn solver(part: &Part, state: &State<Self>) -> Result<Box<dyn Solver<Self>>, Failure>;
+}
+
+impl Numeric for f32 {
+    fn keep(state: State<f32>, memory: Memory<f32>) -> Kept {
+        Kept::Single(state, memory)
+    }
+
+    fn solver(part: &Part, state: &State<f32>) -> Result<Box<dyn Solver<f32>>, Failure> {
+        match on_device(part, state) {
+            Some(solver) => solver,
+            None => on_cpu(part),
+        }
+    }
+}
+
+impl Numeric for f64 {
+    fn keep(state: State<f64>, memory: Memory<f64>) -> Kept {
+        Kept::Double(state, memory)
+    }
+
+    fn solver(part: &Part, _state: &State<f64>) -> Result<Box<dyn Solver<f64>>, Failure> {
+        on_cpu(part)
+    }
+}
+
+/// Solids in large strain, with the stepper that advances them.
+pub(crate) struct Solids<R> {
+    model: Arc<Model>,
+    /// Length of a step [s].
+    step: f64,
+    state: State<R>,
+    solver: Box<dyn Solver<R>>,
+}
+
+impl<R: Numeric> Solids<R> {
+    /// From a state on.
+    ///
+    /// # Errors
+    /// If the stepper can't be made.
+    pub(crate) fn new(part: &Part, state: State<R>) -> Result<Self, Failure> {
+        let solver = R::solver(part, &state)?;
+        Ok(Self { model: Arc::clone(&part.model), step: part.steps.step, state, solver })
+    }
+
+    /// Takes up what a restart needs beside the state; of a run with other steps how these were counted, and their length [s].
+    pub(crate) fn resume(&mut self, memory: Memory<R>, steps: Option<(Clock, f64)>) {
+        if let Some((clock, step)) = steps {
+            self.solver.go_on(&clock, step, &self.state);
+        }
+        self.solver.resume(memory);
+    }
+}
+
+impl<R: Numeric> Instant for Solids<R> {
+    fn time(&self) -> f64 {
+        self.state.time
+    }
+
+    fn displacement(&self, node: usize) -> [f64; 3] {
+        self.state.displacement[node].map(R::to_f64)
+    }
+
+    fn velocity(&self, node: usize) -> [f64; 3] {
+        self.solver.observable().velocity(&self.state, node)
+    }
+
+    fn nodal_reaction(&self, node: usize) -> [f64; 3] {
+        self.solver.observable().nodal_reaction(node)
+    }
+
+    fn nodal_reaction_moment(&self, node: usize) -> [f64; 3] {
+        self.solver.observable().nodal_reaction_moment(node)
+    }
+
+    fn reaction(&self, constraint: usize) -> [f64; 3] {
+        self.solver.observable().reaction(constraint)
+    }
+
+    fn energies(&self) -> Energies {
+        *self.solver.observable().energies()
+    }
+
+    fn cells(&self, steps: bool) -> Option<Box<dyn CellsNow + '_>> {
+        Some(Box::new(SolidCells::new(&self.model, &self.state, steps)))
+    }
+
+    fn is_single(&self) -> bool {
+        R::PRECISION == "single"
+    }
+
+    fn steps(&self) -> u64 {
+        self.state.steps
+    }
+
+    fn balance_floor(&self) -> f64 {
+        self.solver.balance_floor()
+    }
+
+    fn largest_energy(&self) -> f64 {
+        self.state.work.largest
+    }
+
+    fn stability(&self) -> Stability {
+        self.state.stability
+    }
+
+    fn equilibria(&self) -> Option<Equilibria> {
+        self.solver.equilibria()
+    }
+}
+
+/// Fields of the cells of solids at a state.
+pub(crate) struct SolidCells<'a, R> {
+    recovery: Recovery<'a, R>,
+    model: &'a Model,
+    displacement: &'a [[R; 3]],
+    /// Whether stable steps are wanted, which cost far more than the rest.
+    steps: bool,
+}
+
+impl<'a, R: Scalar> SolidCells<'a, R> {
+    pub(crate) fn new(model: &'a Model, state: &'a State<R>, steps: bool) -> Self {
+        Self { recovery: Recovery::new(model, state), model, displacement: &state.displacement, steps }
+    }
+}
+
+impl<R: Scalar> CellsNow for SolidCells<'_, R> {
+    fn at(&self, solid: usize, cell: usize) -> (CellFields, Option<f64>) {
+        let step = self.steps.then(|| cell_limit(self.model, solid, cell, self.displacement));
+        (self.recovery.cell(solid, cell), step)
+    }
+}
+
+impl<R: Numeric> Participant for Solids<R> {
+    fn instant(&self) -> &dyn Instant {
+        self
+    }
+
+    fn evaluate(&mut self, wanted: Wanted) -> Result<(), Failure> {
+        self.solver.evaluate(&mut self.state, wanted)
+    }
+
+    fn advance(&mut self, steps: u64, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
+        self.solver.advance(&mut self.state, steps, watch)
+    }
+
+    fn stride(&self) -> u64 {
+        self.solver.stride()
+    }
+
+    fn advance_without_read_back(&mut self, steps: u64, within: Duration) -> Option<Result<u64, Failure>> {
+        self.solver.advance_without_read_back(&mut self.state, steps, within)
+    }
+
+    fn map(&self, points: &mut dyn Iterator<Item = MappedPoint>) -> Option<Result<DeviceMapping, Failure>> {
+        self.solver.map(points)
+    }
+
+    fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
+        self.solver.apply(mapping, value);
+    }
+
+    fn hold(&mut self, grips: &[Grip]) -> bool {
+        self.solver.hold(grips)
+    }
+
+    fn stiffest(&self, grip: &Grip) -> f64 {
+        grip.stiffest(&self.model, self.step)
+    }
+
+    fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
+        let displacement = &self.state.displacement;
+        [grip.point(&self.model, displacement), grip.force(&self.model, displacement)]
+    }
+
+    fn bring_back(&mut self) -> Result<(), Failure> {
+        self.solver.bring_back(&mut self.state)
+    }
+
+    fn kept(&self) -> Kept {
+        R::keep(self.state.clone(), self.solver.memory())
+    }
+
+    fn encode(&self) -> postcard::Result<Vec<u8>> {
+        postcard::to_stdvec(&(&self.state, self.solver.memory()))
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.solver.clock(&self.state)
+    }
+
+    fn fingerprint(&self) -> u64 {
+        let bits = |vectors: &[[R; 3]]| -> Vec<u64> {
+            vectors.iter().flatten().map(|x| x.to_f64().to_bits()).collect()
+        };
+        fingerprint(&(bits(&self.state.displacement), bits(&self.state.increment)))
+    }
+}
+
+/// Whether a state and its memory have the sizes of a participant's, and are of its method.
+pub(crate) fn fits<R: Numeric>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
+    let model: &Model = &part.model;
+    let found = matches!(memory, Memory::Equilibrium(_));
+    if found != matches!(part.method, Method::QuasiStatic { .. }) {
+        return false;
+    }
+    let rest = State::<R>::at_rest(model);
+    let sizes = |state: &State<R>| {
+        let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
+        let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
+        (nodes, history.collect::<Vec<_>>())
+    };
+    sizes(state) == sizes(&rest) && state.stability.fits(model) && memory.fits(model.node_count())
+}

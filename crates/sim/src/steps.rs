@@ -1,0 +1,75 @@
+//! The steps of a participant.
+
+use pliant_explicit::critical_step::{ElementBound, TrueLimit, element_bound, true_limit};
+use pliant_mechanics::Model;
+use pliant_mechanics::model::Contradiction;
+
+/// Fraction of the critical time step of the assembled model that an automatic step takes.
+pub const SAFETY: f64 = 0.9;
+
+/// Steps from the start on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Steps {
+    /// Length of a step [s]. Of unequal load steps the mean.
+    pub step: f64,
+    /// How many there are: for the numbers of load steps, and the parts of a load that is controlled.
+    pub number: u64,
+    /// Where load steps end [s], if they are not equal.
+    pub ends: Option<Vec<f64>>,
+}
+
+impl Steps {
+    /// So many equal steps of a duration [s], each as long as `longest` [s] or shorter.
+    pub fn within(duration: f64, longest: f64) -> Self {
+        let number = (duration / longest - 1e-9).ceil().max(1.0);
+        Self { step: duration / number, number: number as u64, ends: None }
+    }
+
+    /// The end [s] of the step of a number, counted from 1.
+    pub fn end_of(&self, number: u64) -> f64 {
+        let own = self.ends.as_ref().and_then(|ends| ends.get(number as usize - 1));
+        own.copied().unwrap_or(number as f64 * self.step)
+    }
+
+    /// The number, counted from 1, of the step that begins at a time [s].
+    pub fn number_from(&self, time: f64) -> u64 {
+        match &self.ends {
+            Some(ends) => ends.partition_point(|&end| end <= time) as u64 + 1,
+            None => (time / self.step).round() as u64 + 1,
+        }
+    }
+
+    /// The length [s] of the step that begins at a time [s]; at the end, of the last one.
+    pub fn step_from(&self, time: f64) -> f64 {
+        let Some(ends) = &self.ends else { return self.step };
+        let number = self.number_from(time).min(ends.len() as u64);
+        let before = if number > 1 { self.end_of(number - 1) } else { 0.0 };
+        self.end_of(number) - before
+    }
+}
+
+/// The critical time step of the solids of a model at rest.
+#[derive(Clone, Debug)]
+pub struct Critical {
+    /// The smallest element bound.
+    pub bound: ElementBound,
+    /// That of the assembled model.
+    pub assembled: TrueLimit,
+}
+
+impl Critical {
+    /// Of a model; `None` without cells.
+    ///
+    /// # Errors
+    /// If constraints contradict one another.
+    pub fn of(model: &Model) -> Result<Option<Self>, Contradiction> {
+        let Some(bound) = element_bound(model) else { return Ok(None) };
+        Ok(Some(Self { bound, assembled: true_limit(model)? }))
+    }
+
+    /// The automatic step [s]: [`SAFETY`] of the critical one. If every node is held there is no limit, and the element bound replaces it.
+    pub fn automatic(&self) -> f64 {
+        let limit = self.assembled.step;
+        SAFETY * if limit.is_finite() { limit } else { self.bound.step }
+    }
+}

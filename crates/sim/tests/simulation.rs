@@ -1,0 +1,196 @@
+//! The one driver: steps, snapshots, restarts and changes of numbers with every solver, without a scene file.
+
+use nalgebra::Vector3;
+use pliant_gpu::Wanted;
+use pliant_implicit::element::Elasticity;
+use pliant_implicit::{Constraint, Load, LoadKind, Material as Wall, Motion as WallMotion, Shell};
+use pliant_mechanics::Model;
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::grip::Grip;
+use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+use pliant_mechanics::model::{Cells, Material, Motion, Solid};
+use pliant_sim::{Method, Part, Precision, Simulation, State, World};
+
+/// Duration of a run [s].
+const DURATION: f64 = 0.1;
+
+/// A cube of one hexahedron whose top moves up by 1 mm.
+fn cube(shear: f64) -> Model {
+    let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+    let points = corners.map(|corner| corner.map(|x| 0.1 * f64::from(x)));
+    let mut model = Model::default();
+    let body = model.add_body("cube", &points);
+    let law = AnyLaw::NeoHookean(NeoHookean { shear, volumetric: Volumetric::quadratic(5.0 * shear) });
+    let cells = Cells::full_hex8(vec![[0, 1, 2, 3, 4, 5, 6, 7]], &model.rest);
+    model.add_solid(Solid::new(body, Material::elastic(law, 1000.0), cells));
+    model.fix("base", vec![0, 1, 2, 3]);
+    model.constrain("top", vec![4, 5], Motion::Displacement([0.0, 0.0, 0.001], rising()));
+    model
+}
+
+fn rising() -> Curve {
+    Curve { shape: Shape::Ramp, from: 0.0, to: DURATION }
+}
+
+/// A square of two triangles, clamped at one edge, pressed at the other.
+fn strip() -> pliant_implicit::Model {
+    let corner = |i: u32| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0);
+    let mut model = pliant_implicit::Model::new((0..4).map(corner).collect());
+    let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+    model.add_shell(&Shell::new("strip", vec![[0, 2, 3], [0, 3, 1]], 0.002, material)).unwrap();
+    let (nodes, components) = (vec![0, 1], [true; 6]);
+    model.constraints.push(Constraint { name: "clamp".into(), nodes, components, motion: WallMotion::Fixed });
+    let kind = LoadKind::Force { nodes: vec![2, 3], force: Vector3::new(0.0, 0.0, 1e-3) };
+    model.loads.push(Load { name: "press".into(), kind, curve: rising(), controlled: false });
+    model
+}
+
+/// A part of every method, with a cube of a shear modulus [Pa] where it holds solids.
+fn parts(shear: f64) -> Vec<Part> {
+    let explicit = Part::explicit("cube", cube(shear), DURATION).unwrap();
+    let mut single = explicit.clone();
+    let Method::Explicit(settings) = &mut single.method else { unreachable!("an explicit part") };
+    settings.precision = Precision::Single;
+    let quasi_static = Part::quasi_static("cube", cube(shear), DURATION, 4);
+    let equilibria = Part::equilibria("strip", strip(), DURATION, 4);
+    let implicit = Part::implicit("strip", strip(), DURATION, 0.01);
+    let Method::Implicit(bodies, _) = &implicit.method else { unreachable!("an implicit part") };
+    let shells = Part { method: Method::ExplicitShells(bodies.clone()), ..implicit.clone() };
+    let stable = pliant_implicit::Explicit::stable_step(&bodies.model);
+    let shells = Part { steps: pliant_sim::Steps::within(DURATION, 0.9 * stable), ..shells };
+    vec![explicit, single, quasi_static, equilibria, implicit, shells]
+}
+
+fn ended(mut simulation: Simulation) -> u64 {
+    simulation.run(DURATION, |_| ()).unwrap();
+    simulation.fingerprint()
+}
+
+#[test]
+fn a_simulation_owns_itself() {
+    fn owned<T: Send + 'static>(_: &T) {}
+    let simulation = Simulation::new(parts(1e5).remove(0)).unwrap();
+    owned(&simulation);
+    let there = std::thread::spawn(move || ended(simulation)).join().unwrap();
+    assert_eq!(there, ended(Simulation::new(parts(1e5).remove(0)).unwrap()));
+}
+
+#[test]
+fn a_state_goes_on_with_the_same_bits_in_every_method() {
+    for part in parts(1e5) {
+        let whole = ended(Simulation::new(part.clone()).unwrap());
+        let mut simulation = Simulation::new(part.clone()).unwrap();
+        while simulation.time() < 0.3 * DURATION {
+            simulation.step().unwrap();
+        }
+        let (time, state) = (simulation.time(), simulation.state().unwrap());
+        let bytes = simulation.encode().unwrap();
+        simulation.run(DURATION, |_| ()).unwrap();
+        assert_eq!(simulation.fingerprint(), whole, "{part:?}");
+        simulation.restore(state.clone()).unwrap();
+        assert_eq!(simulation.time(), time);
+        assert_eq!(ended(simulation), whole);
+        let world = World::from(part);
+        let read = State::decode(&world, &bytes).unwrap();
+        assert_eq!(ended(Simulation::resumed(world, read).unwrap()), whole);
+    }
+}
+
+#[test]
+fn a_state_is_of_its_model_and_between_two_steps() {
+    let parts = parts(1e5);
+    let [explicit, _, quasi_static, equilibria, ..] = &parts[..] else { unreachable!("six parts") };
+    let mut simulation = Simulation::new(explicit.clone()).unwrap();
+    let state = simulation.state().unwrap();
+    let bytes = simulation.encode().unwrap();
+    for other in [quasi_static, equilibria] {
+        let world = World::from(other.clone());
+        let refused = Simulation::resumed(world.clone(), state.clone()).err().unwrap();
+        assert!(refused.message.contains("of another model"), "{refused}");
+        assert!(State::decode(&world, &bytes).is_none_or(|read| Simulation::resumed(world, read).is_err()));
+    }
+    assert!(State::decode(simulation.world(), &[&bytes[0][..bytes[0].len() / 2]]).is_none());
+    assert!(State::decode::<Vec<u8>>(simulation.world(), &[]).is_none());
+    simulation.frame().unwrap();
+    let refused = simulation.state().unwrap_err();
+    assert!(refused.message.contains("belong to the step to come"), "{refused}");
+    simulation.step().unwrap();
+    simulation.state().unwrap();
+    assert!(Simulation::new(World { parts: Vec::new() }).is_err());
+}
+
+#[test]
+fn numbers_change_on_the_way() {
+    let mut simulation = Simulation::new(Part::explicit("cube", cube(1e5), DURATION).unwrap()).unwrap();
+    while simulation.time() < 0.5 * DURATION {
+        simulation.step().unwrap();
+    }
+    let soft = simulation.frame().unwrap().reaction("top").unwrap()[2];
+    simulation.step().unwrap();
+    let (time, stiffer) = (simulation.time(), Part::explicit("cube", cube(4e5), DURATION).unwrap());
+    assert!(simulation.exchange(stiffer).unwrap());
+    assert_eq!(simulation.time(), time);
+    let stiff = simulation.frame().unwrap().reaction("top").unwrap()[2];
+    assert!(stiff > 2.0 * soft, "{soft} N, then {stiff} N");
+    simulation.step().unwrap();
+    let other = Part::equilibria("strip", strip(), DURATION, 4);
+    assert!(!simulation.exchange(other).unwrap());
+    simulation.run(DURATION, |_| ()).unwrap();
+}
+
+#[test]
+fn participants_meet_at_common_instants() {
+    let parts = vec![
+        Part::explicit("cube", cube(1e5), DURATION).unwrap(),
+        Part::implicit("strip", strip(), DURATION, 0.03),
+    ];
+    let alone: Vec<u64> = parts.iter().map(|part| part.steps.number).collect();
+    let mut simulation = Simulation::new(World::new(parts)).unwrap();
+    let numbers: Vec<u64> = simulation.world().parts.iter().map(|part| part.steps.number).collect();
+    assert_eq!((numbers[1], numbers[0] % numbers[1]), (alone[1], 0));
+    assert!(numbers[0] >= alone[0] && numbers[0] < alone[0] + numbers[1]);
+    let mut times = Vec::new();
+    simulation.run(DURATION, |frame| times.push(frame.time())).unwrap();
+    assert_eq!(times.len() as u64, numbers[1] + 1);
+    let frame = simulation.frame().unwrap();
+    assert!((frame.displacements("cube").unwrap()[4][2] - 0.001).abs() < 1e-12);
+    assert!(frame.displacements("strip").unwrap()[3][2] > 0.0 && frame.displacements("other").is_none());
+    let energies: f64 = frame.parts().map(|(_, now)| now.energies().internal).sum();
+    assert_eq!(frame.energies().internal, energies);
+}
+
+#[test]
+fn a_grip_pulls_at_nodes_of_any_participant() {
+    let parts = vec![
+        Part::explicit("cube", cube(1e5), DURATION).unwrap(),
+        Part::implicit("strip", strip(), DURATION, 0.01),
+    ];
+    let mut simulation = Simulation::new(World::new(parts)).unwrap();
+    let node = simulation.node(1, 3);
+    assert_eq!((node, simulation.locate(node)), (11, (1, 3)));
+    let [x, y, z] = simulation.rest(node);
+    let grip = Grip { nodes: vec![(node, 1.0)], place: [x, y, z + 0.01], stiffness: 1.0 };
+    assert!(simulation.stiffest(&grip) > 1.0);
+    assert!(simulation.hold(std::slice::from_ref(&grip)));
+    simulation.run(DURATION, |_| ()).unwrap();
+    let [place, force] = simulation.pulled(&grip);
+    assert!(place[2] > z + 1e-3 && force[2] > 0.0, "{place:?} m, {force:?} N");
+    let both = Grip { nodes: vec![(0, 0.5), (node, 0.5)], ..grip };
+    assert!(!simulation.hold(&[both]));
+}
+
+#[test]
+fn a_load_step_tells_how_far_it_is() {
+    let mut simulation = Simulation::new(Part::quasi_static("cube", cube(1e5), DURATION, 2)).unwrap();
+    for number in [1, 2] {
+        let mut told = Vec::new();
+        simulation.evaluate(Wanted::Energies).unwrap();
+        simulation.advance(1, &mut |progress| told.push(progress)).unwrap();
+        assert!(told.len() > 3 && told.iter().all(|p| (p.number, p.of) == (number, 2)));
+        let fractions: Vec<f64> = told.iter().map(|p| p.iteration.fraction).collect();
+        assert!(fractions.is_sorted() && fractions[0] == 0.0, "{fractions:?}");
+        let last = told.last().unwrap();
+        assert!((last.iteration.span[1] - simulation.time()).abs() < 1e-15, "{last:?}");
+        assert!(last.iteration.residual > last.tolerance);
+    }
+}
