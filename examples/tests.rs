@@ -28,3 +28,8 @@ fn a_step_loop_reads_displacements_and_reactions() {
 fn shells_are_solved() {
     runs(env!("CARGO_BIN_EXE_shells"), &[]);
 }
+
+#[test]
+fn a_law_of_ones_own_is_computed() {
+    runs(env!("CARGO_BIN_EXE_own-law"), &[]);
+}

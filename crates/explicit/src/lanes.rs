@@ -474,6 +474,22 @@ macro_rules! wide {
                 let sign = simd.$and(sign.0, Self::splat(-0.0).0);
                 Self(simd.$or(simd.$abs(self.0), sign))
             }
+            fn lane_by_lane<const N: usize, const M: usize>(
+                given: [Self; N],
+                find: impl Fn([f64; N]) -> [f64; M],
+            ) -> [Self; M] {
+                let given = given.map(|number| {
+                    let mut pack = Pack([0.0; PACK]);
+                    number.store(&mut pack, 0);
+                    pack
+                });
+                let mut found = [Pack([0.0; PACK]); M];
+                for lane in 0..Self::WIDTH {
+                    let numbers = find(given.map(|pack| f64::from(pack.0[lane])));
+                    found.iter_mut().zip(numbers).for_each(|(pack, number)| pack.0[lane] = number as $type);
+                }
+                found.map(|pack| Self::load(&pack, 0))
+            }
         }
 
         wide!(@operator $wide, Add, add, $add);

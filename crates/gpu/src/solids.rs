@@ -59,7 +59,9 @@ impl DeviceSolid {
             return Err(GpuError::Unsupported { what });
         }
         let prony = &solid.material.prony;
-        let shader = law.shader();
+        let own =
+            || GpuError::Unsupported { what: format!("`{}`, a law that the program gives,", law.name()) };
+        let shader = law.shader().ok_or_else(own)?;
         let parameters: Vec<Four> = shader
             .parameters
             .chunks(4)

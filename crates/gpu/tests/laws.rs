@@ -30,7 +30,7 @@ fn laws() -> Vec<AnyLaw> {
         law("ogden", json!({ "terms": six, "bulk-modulus": 5.0 })),
         law("ogden", json!({ "terms": [term(0.7, 2.0)], "poisson-ratio": 0.49 })),
     ];
-    every_law().into_iter().chain(more).collect()
+    every_law().into_iter().filter(|law| law.shader().is_some()).chain(more).collect()
 }
 
 /// A number of a magnitude between the two, every order of magnitude as likely as another.
@@ -164,7 +164,7 @@ fn at_samples<const N: usize>(
     samples: &[Sample],
     invocation: &str,
 ) -> Vec<[f32; N]> {
-    let shader = law.shader();
+    let shader = law.shader().unwrap();
     let given: Vec<f32> = samples
         .iter()
         .flat_map(|sample| [sample.h.as_flattened(), sample.fibres.as_flattened()].concat())
@@ -251,7 +251,7 @@ fn stresses_follow_double_precision_as_closely_as_single_precision_does() {
 
 /// What the expression is at every one of the given numbers, `x`.
 fn values(device: &Device, law: &AnyLaw, expression: &str, given: &[f32]) -> Vec<f32> {
-    let shader = law.shader();
+    let shader = law.shader().unwrap();
     let invocation = format!("let x = given[index];\n        results[index] = {expression};");
     let source = module(&shader.source, "f32", &invocation);
     compute(device, &source, given.len(), &[&shader.parameters, given], given.len())
@@ -331,7 +331,7 @@ fn every_law_is_valid_without_any_optional_feature() {
     for law in laws() {
         let pressure = if law.has_volumetric_energy() { "law_pressure(given[index])" } else { "0.0" };
         let invocation = format!("{STRESS}\n        results[index][0] += {pressure};");
-        let source = module(&law.shader().source, "array<f32, 12>", &invocation);
+        let source = module(&law.shader().unwrap().source, "array<f32, 12>", &invocation);
         let parsed =
             naga::front::wgsl::parse_str(&source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)));
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());

@@ -51,6 +51,11 @@ pub trait Number:
     fn max(self, other: Self) -> Self;
     /// The magnitude of self with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
+    /// Numbers found from others lane by lane in double precision.
+    fn lane_by_lane<const N: usize, const M: usize>(
+        given: [Self; N],
+        find: impl Fn([f64; N]) -> [f64; M],
+    ) -> [Self; M];
 }
 
 /// A real number: single or double precision.
@@ -126,6 +131,12 @@ macro_rules! real {
             #[inline(always)]
             fn copysign(self, sign: Self) -> Self {
                 self.copysign(sign)
+            }
+            fn lane_by_lane<const N: usize, const M: usize>(
+                given: [Self; N],
+                find: impl Fn([f64; N]) -> [f64; M],
+            ) -> [Self; M] {
+                find(given.map(f64::from)).map(|number| number as Self)
             }
         }
     };

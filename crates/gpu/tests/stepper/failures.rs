@@ -6,6 +6,7 @@ use std::time::Duration;
 use pliant_explicit::{CentralDifference, State, StepError, critical_step};
 use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure, Wanted};
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::law::samples::own;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Model, Motion};
 
@@ -103,9 +104,10 @@ fn contradictions_and_elements_without_their_law_are_refused_by_name() {
     let refused = GpuStepper::new(&device, model.clone(), 1e-3, None).err();
     assert!(matches!(refused, Some(GpuError::Contradiction(_))), "{refused:?}");
     let law = every_law().into_iter().find(|law| !law.has_volumetric_energy()).unwrap();
-    let model = moved_cube("tet4-anp", elastic(law));
-    let refused = GpuStepper::new(&device, model.clone(), 1e-3, None).err();
-    assert!(matches!(refused, Some(GpuError::Unsupported { .. })), "{refused:?}");
+    for (element, law) in [("tet4-anp", law), ("tet4", own())] {
+        let refused = GpuStepper::new(&device, moved_cube(element, elastic(law)), 1e-3, None).err();
+        assert!(matches!(refused, Some(GpuError::Unsupported { .. })), "{refused:?}");
+    }
 }
 
 /// The device as if it had less than it has.

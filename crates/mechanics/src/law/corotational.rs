@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::principal::principal;
-use super::{Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split};
+use super::{Deformation, ElasticConstants, Law, NamedLaw, ParameterError, Shader, SmallStrainModuli, Split};
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
@@ -45,16 +45,18 @@ fn stretches_minus_1<R: Number>(strains: [R; 3]) -> [R; 3] {
     [minus_1(strains[0]), minus_1(strains[1]), minus_1(strains[2])]
 }
 
-impl Law for Corotational {
+impl NamedLaw for Corotational {
     type Parameters = CorotationalParameters;
-
-    // tr(U − I) is no function of J.
-    const VOLUMETRIC_ENERGY: bool = false;
 
     fn new(parameters: &CorotationalParameters) -> Result<Self, ParameterError> {
         let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
         Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
     }
+}
+
+impl Law for Corotational {
+    // tr(U − I) is no function of J.
+    const VOLUMETRIC_ENERGY: bool = false;
 
     #[inline(always)]
     fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
@@ -80,11 +82,9 @@ impl Law for Corotational {
         stress
     }
 
-    fn shader(&self) -> Shader {
-        Shader::new(
-            &[include_str!("principal.wgsl"), include_str!("corotational.wgsl")],
-            &[2.0 * self.shear, self.lame],
-        )
+    fn shader(&self) -> Option<Shader> {
+        let snippets = &[include_str!("principal.wgsl"), include_str!("corotational.wgsl")];
+        Some(Shader::new(snippets, &[2.0 * self.shear, self.lame]))
     }
 
     fn small_strain(&self) -> SmallStrainModuli {

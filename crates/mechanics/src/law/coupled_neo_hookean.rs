@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split};
+use super::{Deformation, ElasticConstants, Law, NamedLaw, ParameterError, Shader, SmallStrainModuli, Split};
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
@@ -26,14 +26,16 @@ pub struct CoupledNeoHookeanParameters {
     pub elastic: ElasticConstants,
 }
 
-impl Law for CoupledNeoHookean {
+impl NamedLaw for CoupledNeoHookean {
     type Parameters = CoupledNeoHookeanParameters;
 
     fn new(parameters: &CoupledNeoHookeanParameters) -> Result<Self, ParameterError> {
         let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
         Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
     }
+}
 
+impl Law for CoupledNeoHookean {
     #[inline(always)]
     fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
         let x = deformation.volume_change;
@@ -53,8 +55,8 @@ impl Law for CoupledNeoHookean {
         }
     }
 
-    fn shader(&self) -> Shader {
-        Shader::new(&[include_str!("coupled_neo_hookean.wgsl")], &[self.shear, self.lame])
+    fn shader(&self) -> Option<Shader> {
+        Some(Shader::new(&[include_str!("coupled_neo_hookean.wgsl")], &[self.shear, self.lame]))
     }
 
     fn small_strain(&self) -> SmallStrainModuli {

@@ -8,7 +8,8 @@ use serde::Deserialize;
 
 use super::principal::principal;
 use super::{
-    Deformation, Law, ParameterError, Shader, SmallStrainModuli, Split, Volumetric, VolumetricEnergy, check,
+    Deformation, Law, NamedLaw, ParameterError, Shader, SmallStrainModuli, Split, Volumetric,
+    VolumetricEnergy, check,
 };
 use crate::Number;
 use crate::tensor::{Symmetric, Tensor, Vector, cast, dot};
@@ -108,7 +109,7 @@ fn positive_form(rows: [[f64; 3]; 3]) -> Result<Symmetric<f64>, ParameterError> 
     error(format!("`normal` must be positive definite, but has the principal value {smallest}"))
 }
 
-impl Law for FungOrthotropic {
+impl NamedLaw for FungOrthotropic {
     type Parameters = FungOrthotropicParameters;
 
     fn new(parameters: &FungOrthotropicParameters) -> Result<Self, ParameterError> {
@@ -125,7 +126,9 @@ impl Law for FungOrthotropic {
         let volumetric = Volumetric { energy: parameters.volumetric, bulk };
         Ok(Self { modulus, normal, shear: parameters.shear, axes, volumetric })
     }
+}
 
+impl Law for FungOrthotropic {
     #[inline(always)]
     fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
         let (q, _) = self.exponent(deformation);
@@ -145,9 +148,9 @@ impl Law for FungOrthotropic {
         }
     }
 
-    fn shader(&self) -> Shader {
+    fn shader(&self) -> Option<Shader> {
         let own = [&[self.modulus], &self.normal.0[..], &self.shear, self.axes.0.as_flattened()].concat();
-        self.volumetric.shader(&[include_str!("fung_orthotropic.wgsl")], &own)
+        Some(self.volumetric.shader(&[include_str!("fung_orthotropic.wgsl")], &own))
     }
 
     /// The shear modulus is the largest over all shears at rest, the bulk modulus that of a pure dilation.

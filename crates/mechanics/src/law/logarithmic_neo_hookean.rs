@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split};
+use super::{Deformation, ElasticConstants, Law, NamedLaw, ParameterError, Shader, SmallStrainModuli, Split};
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
@@ -26,14 +26,16 @@ pub struct LogarithmicNeoHookeanParameters {
     pub elastic: ElasticConstants,
 }
 
-impl Law for LogarithmicNeoHookean {
+impl NamedLaw for LogarithmicNeoHookean {
     type Parameters = LogarithmicNeoHookeanParameters;
 
     fn new(parameters: &LogarithmicNeoHookeanParameters) -> Result<Self, ParameterError> {
         let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
         Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
     }
+}
 
+impl Law for LogarithmicNeoHookean {
     #[inline(always)]
     fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
         let ln_j = deformation.volume_change.ln_1p();
@@ -51,8 +53,8 @@ impl Law for LogarithmicNeoHookean {
         }
     }
 
-    fn shader(&self) -> Shader {
-        Shader::new(&[include_str!("logarithmic_neo_hookean.wgsl")], &[self.shear, self.lame])
+    fn shader(&self) -> Option<Shader> {
+        Some(Shader::new(&[include_str!("logarithmic_neo_hookean.wgsl")], &[self.shear, self.lame]))
     }
 
     fn small_strain(&self) -> SmallStrainModuli {

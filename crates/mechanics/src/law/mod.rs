@@ -21,6 +21,7 @@ mod mooney_rivlin;
 mod neo_hookean;
 mod ogden;
 mod orthotropic;
+mod own;
 mod polynomial;
 mod principal;
 mod shader;
@@ -51,6 +52,7 @@ pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
 pub use ogden::{MOST_TERMS, Ogden, OgdenTerm};
 pub use orthotropic::Orthotropic;
+pub use own::{Own, OwnLaw};
 pub use polynomial::Polynomial;
 pub use shader::Shader;
 pub use split::{Compressibility, Matrix, SplitLaw};
@@ -99,17 +101,23 @@ pub struct ParameterError {
     pub help: String,
 }
 
-/// A hyperelastic law.
-pub trait Law: Copy + Send + Sync + 'static {
+/// A law that a scene can name.
+pub trait NamedLaw: Law {
     /// What a user gives, each parameter with unit and range.
     type Parameters: DeserializeOwned + JsonSchema;
 
+    /// Checks and converts the user's parameters.
+    ///
+    /// # Errors
+    /// If one is out of range.
+    fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
+}
+
+/// A hyperelastic law.
+pub trait Law: Copy + Send + Sync + 'static {
     /// True if the volumetric stress is J U′(J) C⁻¹, of an energy of J alone. Elements that average the change of
     /// volume stand on it: without it they compute another law.
     const VOLUMETRIC_ENERGY: bool = true;
-
-    /// Checks and converts the user's parameters.
-    fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
 
     /// Strain energy per reference volume [J/m³]. `fibres` are the unit directions of the families at rest.
     fn energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R>;
@@ -117,8 +125,8 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Second Piola–Kirchhoff stress [Pa].
     fn stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>>;
 
-    /// The stress in WGSL, its text in the file beside the law's.
-    fn shader(&self) -> Shader;
+    /// The stress in WGSL, its text in the file beside the law's; `None` of a law for the CPU only.
+    fn shader(&self) -> Option<Shader>;
 
     /// Families of fibres, each with a direction in every cell.
     fn families(&self) -> usize {
@@ -145,10 +153,12 @@ pub trait Law: Copy + Send + Sync + 'static {
 /// Declares the laws a scene can name: the one place where a name meets a type.
 macro_rules! registry {
     ($($(#[$doc:meta])* $name:literal => $law:ident,)*) => {
-        /// Any law of the registry.
+        /// Any law of the registry, or [one's own](OwnLaw).
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum AnyLaw {
             $($(#[$doc])* $law($law),)*
+            /// A law that a program gives.
+            Own(Own),
         }
 
         impl AnyLaw {
@@ -158,7 +168,7 @@ macro_rules! registry {
             /// The schema of a law's parameters; `None` for an unknown name.
             pub fn schema(name: &str) -> Option<Schema> {
                 match name {
-                    $($name => Some(schemars::schema_for!(<$law as Law>::Parameters)),)*
+                    $($name => Some(schemars::schema_for!(<$law as NamedLaw>::Parameters)),)*
                     _ => None,
                 }
             }
@@ -173,22 +183,25 @@ macro_rules! registry {
                 };
                 match name {
                     $($name => {
-                        let parameters = serde_json::from_value::<<$law as Law>::Parameters>(parameters)
+                        let parameters = serde_json::from_value::<<$law as NamedLaw>::Parameters>(parameters)
                             .map_err(|error| unreadable(error.to_string()))?;
-                        <$law as Law>::new(&parameters).map(Self::$law)
+                        <$law as NamedLaw>::new(&parameters).map(Self::$law)
                     })*
                     _ => Err(unreadable(format!("there is no law `{name}`"))),
                 }
             }
 
-            /// The name in a scene file.
+            /// The name in a scene file, or that of one's own law.
             pub fn name(&self) -> &'static str {
-                match self { $(Self::$law(_) => $name,)* }
+                match self { $(Self::$law(_) => $name,)* Self::Own(own) => own.name() }
             }
 
             /// True if an element may average the change of volume; see [`Law::VOLUMETRIC_ENERGY`].
             pub fn has_volumetric_energy(&self) -> bool {
-                match self { $(Self::$law(_) => <$law as Law>::VOLUMETRIC_ENERGY,)* }
+                match self {
+                    $(Self::$law(_) => <$law as Law>::VOLUMETRIC_ENERGY,)*
+                    Self::Own(own) => own.has_volumetric_energy(),
+                }
             }
         }
 
@@ -197,7 +210,10 @@ macro_rules! registry {
         #[macro_export]
         macro_rules! with_law {
             ($any:expr, $bound:ident => $body:expr) => {
-                match $any { $($crate::law::AnyLaw::$law($bound) => $body,)* }
+                match $any {
+                    $($crate::law::AnyLaw::$law($bound) => $body,)*
+                    $crate::law::AnyLaw::Own($bound) => $body,
+                }
             };
         }
         pub use with_law;
@@ -257,7 +273,7 @@ impl AnyLaw {
     }
 
     /// The stress in WGSL; see [`Law::shader`].
-    pub fn shader(&self) -> Shader {
+    pub fn shader(&self) -> Option<Shader> {
         with_law!(self, law => law.shader())
     }
 

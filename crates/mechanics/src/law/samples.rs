@@ -2,7 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::AnyLaw;
+use super::{AnyLaw, Deformation, Law, Orthotropic, OwnLaw, SmallStrainModuli, Split};
+use crate::tensor::{Symmetric, Vector};
 
 /// The law of a name with its parameters.
 ///
@@ -60,7 +61,46 @@ pub fn every_law() -> Vec<AnyLaw> {
         let with = |energy: &&str| merged(parameters.clone(), json!({ "volumetric": energy }));
         energies.iter().map(|energy| law(name, with(energy))).collect()
     };
-    parameters.iter().flat_map(with_every_volume).collect()
+    parameters.iter().flat_map(with_every_volume).chain([own()]).collect()
+}
+
+/// A law that a program gives: one of the registry, with two families of fibres, under a name of its own.
+///
+/// # Panics
+/// Never: its parameters are fixed.
+pub fn own() -> AnyLaw {
+    #[derive(Debug)]
+    struct Given(Orthotropic);
+
+    impl OwnLaw for Given {
+        fn name(&self) -> &'static str {
+            "own"
+        }
+        fn energy(&self, deformation: &Deformation<f64>, fibres: &[Vector<f64>]) -> Split<f64> {
+            self.0.energy(deformation, fibres)
+        }
+        fn stress(&self, deformation: &Deformation<f64>, fibres: &[Vector<f64>]) -> Split<Symmetric<f64>> {
+            self.0.stress(deformation, fibres)
+        }
+        fn small_strain(&self) -> SmallStrainModuli {
+            self.0.small_strain()
+        }
+        fn families(&self) -> usize {
+            Law::families(&self.0)
+        }
+        fn has_volumetric_energy(&self) -> bool {
+            true
+        }
+        fn longitudinal_modulus(&self) -> f64 {
+            self.0.longitudinal_modulus()
+        }
+    }
+
+    let parameters = json!({
+        "shear-modulus": 0.7, "bulk-modulus": 5.0, "e4": 1.1, "e5": 0.3, "e6": 0.6, "e7": 0.2
+    });
+    let AnyLaw::Orthotropic(law) = law("orthotropic", parameters) else { unreachable!("it has this name") };
+    AnyLaw::own(Given(law))
 }
 
 /// Two tables in one.

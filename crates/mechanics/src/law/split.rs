@@ -6,8 +6,8 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::{
-    Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split, Volumetric,
-    VolumetricEnergy,
+    Deformation, ElasticConstants, Law, NamedLaw, ParameterError, Shader, SmallStrainModuli, Split,
+    Volumetric, VolumetricEnergy,
 };
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
@@ -57,13 +57,15 @@ pub(super) fn fibre_stiffness(modulus: f64) -> f64 {
     16.0 / 9.0 * modulus
 }
 
-impl<L: SplitLaw> Law for L {
+impl<L: SplitLaw> NamedLaw for L {
     type Parameters = L::Parameters;
 
     fn new(parameters: &L::Parameters) -> Result<Self, ParameterError> {
         <L as SplitLaw>::new(parameters)
     }
+}
 
+impl<L: SplitLaw> Law for L {
     #[inline(always)]
     fn energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R> {
         Split {
@@ -80,8 +82,8 @@ impl<L: SplitLaw> Law for L {
         }
     }
 
-    fn shader(&self) -> Shader {
-        self.volumetric().shader(&[L::WGSL, include_str!("split.wgsl")], &self.shader_parameters())
+    fn shader(&self) -> Option<Shader> {
+        Some(self.volumetric().shader(&[L::WGSL, include_str!("split.wgsl")], &self.shader_parameters()))
     }
 
     fn small_strain(&self) -> SmallStrainModuli {

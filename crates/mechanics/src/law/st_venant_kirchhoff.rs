@@ -5,7 +5,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Deformation, ElasticConstants, Law, ParameterError, Shader, SmallStrainModuli, Split};
+use super::{Deformation, ElasticConstants, Law, NamedLaw, ParameterError, Shader, SmallStrainModuli, Split};
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
@@ -27,16 +27,18 @@ pub struct StVenantKirchhoffParameters {
     pub elastic: ElasticConstants,
 }
 
-impl Law for StVenantKirchhoff {
+impl NamedLaw for StVenantKirchhoff {
     type Parameters = StVenantKirchhoffParameters;
-
-    // tr E is no function of J.
-    const VOLUMETRIC_ENERGY: bool = false;
 
     fn new(parameters: &StVenantKirchhoffParameters) -> Result<Self, ParameterError> {
         let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
         Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
     }
+}
+
+impl Law for StVenantKirchhoff {
+    // tr E is no function of J.
+    const VOLUMETRIC_ENERGY: bool = false;
 
     #[inline(always)]
     fn energy<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<R> {
@@ -57,8 +59,8 @@ impl Law for StVenantKirchhoff {
         }
     }
 
-    fn shader(&self) -> Shader {
-        Shader::new(&[include_str!("st_venant_kirchhoff.wgsl")], &[self.shear, 0.5 * self.lame])
+    fn shader(&self) -> Option<Shader> {
+        Some(Shader::new(&[include_str!("st_venant_kirchhoff.wgsl")], &[self.shear, 0.5 * self.lame]))
     }
 
     fn small_strain(&self) -> SmallStrainModuli {
