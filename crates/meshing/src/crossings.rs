@@ -85,6 +85,16 @@ impl TriangleMesh {
     /// Whether new triangles would intersect each other or existing ones, except some that would be
     /// removed.
     pub(crate) fn would_cross(&self, new: &[[u32; 3]], gone: &[u32]) -> bool {
+        self.would_cross_among(new, gone, self.alive())
+    }
+
+    /// The same with some of the existing triangles.
+    pub(crate) fn would_cross_among(
+        &self,
+        new: &[[u32; 3]],
+        gone: &[u32],
+        existing: impl Iterator<Item = u32>,
+    ) -> bool {
         let corners = || new.as_flattened().iter().map(|&n| self.points[n as usize]);
         let Some(start) = corners().next() else { return false };
         let (low, high) = corners().fold((start, start), |(low, high), x| (low.inf(&x), high.sup(&x)));
@@ -94,8 +104,8 @@ impl TriangleMesh {
                 && !gone.contains(t)
         };
         let cross = |s: [u32; 3], t: [u32; 3]| meet(&self.points, s, t).is_some();
-        let others = self.alive().filter(near).map(|t| self.triangles[t as usize]);
-        others.into_iter().any(|other| new.iter().any(|&own| cross(own, other)))
+        let mut others = existing.filter(near).map(|t| self.triangles[t as usize]);
+        others.any(|other| new.iter().any(|&own| cross(own, other)))
             || new.iter().enumerate().any(|(k, &s)| new[..k].iter().any(|&t| cross(s, t)))
     }
 }

@@ -20,6 +20,9 @@ const PLACE_WEIGHT: f64 = 1e-3;
 /// Collapses leave no triangle of a worse shape, unless it was worse before.
 const LEAST_SHAPE: f64 = 0.1;
 
+/// From so many triangles down, collapses that make triangles cross are refused. Among more, looking would take too long.
+const UNCROSSED: usize = 20_000;
+
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fewer {
@@ -104,6 +107,10 @@ struct Decimation<'m> {
     quadrics: Vec<[Quadric; 2]>,
     changes: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
+    /// Whether the surface is kept from crossing itself.
+    uncrossed: bool,
+    /// Its triangles while it is, some of which may be gone.
+    listed: Vec<u32>,
     /// Origin of the points, so that sums of squares keep their digits [m].
     origin: Vector3,
 }
@@ -111,6 +118,15 @@ struct Decimation<'m> {
 impl TriangleMesh {
     /// Reduces the number of triangles and returns it. It exceeds the requested number if nothing more can collapse.
     pub fn decimate(&mut self, until: Fewer) -> Result<usize, MeshingError> {
+        self.decimate_with(until, false)
+    }
+
+    /// The same without making triangles cross each other, from [`UNCROSSED`] down.
+    pub(crate) fn decimate_uncrossed(&mut self, until: Fewer) -> Result<usize, MeshingError> {
+        self.decimate_with(until, true)
+    }
+
+    fn decimate_with(&mut self, until: Fewer, uncrossed: bool) -> Result<usize, MeshingError> {
         let (least, limit) = match until {
             Fewer::Triangles(number) => {
                 require_positive("the number of triangles", number as f64)?;
@@ -123,6 +139,7 @@ impl TriangleMesh {
         };
         let origin = self.alive().next().map_or(Vector3::zeros(), |t| self.corners(t)[0]);
         let mut work = Decimation::new(self, origin);
+        work.uncrossed = uncrossed;
         Ok(work.run(least, limit))
     }
 }
@@ -152,7 +169,15 @@ impl<'m> Decimation<'m> {
             }
         }
         let changes = vec![0; mesh.points.len()];
-        let mut work = Self { mesh, quadrics, changes, queue: BinaryHeap::new(), origin };
+        let mut work = Self {
+            mesh,
+            quadrics,
+            changes,
+            queue: BinaryHeap::new(),
+            listed: Vec::new(),
+            uncrossed: false,
+            origin,
+        };
         for edge in work.mesh.edges() {
             work.consider(edge);
         }
@@ -208,6 +233,14 @@ impl<'m> Decimation<'m> {
             if !self.mesh.keeps_sides(keep, gone, &position, LEAST_SHAPE) {
                 continue;
             }
+            if self.uncrossed && count <= UNCROSSED {
+                if self.listed.is_empty() || self.listed.len() > 2 * count {
+                    self.listed = self.mesh.alive().collect();
+                }
+                if self.makes_cross(keep, gone, position) {
+                    continue;
+                }
+            }
             count -= self.mesh.sides(a, b).iter().flatten().count();
             self.mesh.collapse(keep, gone, position);
             let moved = self.quadrics[gone as usize];
@@ -220,11 +253,33 @@ impl<'m> Decimation<'m> {
         }
         count
     }
+
+    /// The listed triangles that are not gone.
+    fn existing(&self) -> impl Iterator<Item = u32> {
+        self.listed.iter().copied().filter(|&t| self.mesh.exists(t))
+    }
+
+    /// Whether triangles cross after a collapse where none did before.
+    fn makes_cross(&mut self, keep: u32, gone: u32, position: Vector3) -> bool {
+        let mut old: Vec<u32> =
+            [keep, gone].iter().flat_map(|&n| &self.mesh.star[n as usize]).copied().collect();
+        old.sort_unstable();
+        old.dedup();
+        let before: Vec<[u32; 3]> = old.iter().map(|&t| self.mesh.triangles[t as usize]).collect();
+        let stay = before.iter().filter(|nodes| !(nodes.contains(&keep) && nodes.contains(&gone)));
+        let after: Vec<[u32; 3]> =
+            stay.map(|nodes| nodes.map(|n| if n == gone { keep } else { n })).collect();
+        let here = std::mem::replace(&mut self.mesh.points[keep as usize], position);
+        let cross = self.mesh.would_cross_among(&after, &old, self.existing());
+        self.mesh.points[keep as usize] = here;
+        cross && !self.mesh.would_cross_among(&before, &old, self.existing())
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::crossings::crossings;
     use crate::hausdorff::Hausdorff;
     use crate::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 
@@ -239,6 +294,29 @@ mod tests {
         assert_eq!(coarse.compact().0.len() + 500 - coarse.edges().len(), 2);
         let apart = Hausdorff::between(&coarse, &fine, 0.02);
         assert!(apart.largest_forward < 0.015 && apart.largest_backward < 0.015, "{apart:?}");
+    }
+
+    /// A ball with a cavity, whose wall is thinner than flat triangles of the last size are off it: the faces of the wall do not cross.
+    #[test]
+    fn the_faces_of_a_thin_wall_do_not_cross() {
+        let mut ball = sphere(1.0, 4, DEFAULT_CELL_LIMIT).unwrap();
+        let cavity = sphere(0.95, 4, DEFAULT_CELL_LIMIT).unwrap();
+        let first = ball.points.len() as u32;
+        ball.points.extend(&cavity.points);
+        for block in &cavity.blocks {
+            ball.block_mut(block.kind).nodes.extend(block.nodes.iter().map(|node| first + node));
+        }
+        let (fine, _) = TriangleMesh::from_mesh(&ball).unwrap();
+        let crossing = |mesh: &TriangleMesh| {
+            let (points, triangles) = mesh.compact();
+            crossings(&points, &triangles).0.len()
+        };
+        let (mut plain, mut uncrossed) = (fine.clone(), fine);
+        plain.decimate(Fewer::Triangles(120)).unwrap();
+        let number = uncrossed.decimate_uncrossed(Fewer::Triangles(120)).unwrap();
+        assert!(crossing(&plain) > 0);
+        assert_eq!(crossing(&uncrossed), 0);
+        assert!(number < 500, "{number}");
     }
 
     /// A square needs two triangles, and its border doesn't move.

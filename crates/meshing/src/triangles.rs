@@ -187,6 +187,10 @@ impl TriangleMesh {
         (0_u32..).zip(&self.triangles).filter(|(_, nodes)| **nodes != GONE).map(|(triangle, _)| triangle)
     }
 
+    pub(crate) fn exists(&self, triangle: u32) -> bool {
+        self.triangles[triangle as usize] != GONE
+    }
+
     pub(crate) fn corners(&self, triangle: u32) -> [Vector3; 3] {
         self.triangles[triangle as usize].map(|node| self.points[node as usize])
     }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use rstar::{AABB, RTree, primitives::Rectangle};
 
 use super::Shells;
+use super::effort::Effort;
 use super::measure::pieces;
 use crate::crossings::crossing_groups;
 use crate::hausdorff::lattice;
@@ -49,23 +50,27 @@ impl Shells {
     }
 
     /// Parts of an edge in which all are looked at in the end.
-    fn parts_in_the_end(&self) -> usize {
+    pub(super) fn parts_in_the_end(&self) -> usize {
         if self.mesh.len() * FINE * FINE <= MOST_PIECES { FINE } else { COARSE }
     }
 
     /// Shells that cross among those that move and what is near them, looked at in pieces of so many parts of an edge.
-    pub(super) fn crossing_near_moving(&self, parts: usize) -> Vec<u32> {
-        self.crossing_of(self.near(|shell| self.moves(shell)), parts, |_| true).shells()
+    pub(super) fn crossing_near_moving(&self, parts: usize, effort: &mut Effort) -> Vec<u32> {
+        let near = self.near(|shell| self.moves(shell));
+        effort.search(near.len(), parts * parts);
+        self.crossing_of(near, parts, |_| true).shells()
     }
 
-    /// How many pairs cross of which one at least moves, looked at as in the end.
-    pub(super) fn crossing_with_moving(&self) -> usize {
+    /// How many pairs cross of which one at least moves, looked at in pieces of so many parts of an edge.
+    pub(super) fn crossing_with_moving(&self, parts: usize, effort: &mut Effort) -> usize {
         let moves = |shell: u32| self.moves(shell);
-        self.crossing_of(self.near(moves), self.parts_in_the_end(), moves).pairs.len()
+        let near = self.near(moves);
+        effort.search(near.len(), parts * parts);
+        self.crossing_of(near, parts, moves).pairs.len()
     }
 
     /// Some shells and those that may touch them.
-    fn near(&self, is_one: impl Fn(u32) -> bool) -> Vec<u32> {
+    pub(super) fn near(&self, is_one: impl Fn(u32) -> bool) -> Vec<u32> {
         let alive: Vec<u32> = self.mesh.alive().collect();
         let boxed = |&t: &u32| {
             let patch = self.patch(t);
@@ -122,10 +127,11 @@ impl Shells {
 
     /// Turns normals of shells that cross towards the mean of their flat triangles, which do not cross, as far as it takes and as long as
     /// fewer do.
-    pub(super) fn uncross(&mut self) {
-        if self.crossing_near_moving(COARSE).is_empty() {
+    pub(super) fn uncross(&mut self, effort: &mut Effort) {
+        if self.crossing_near_moving(COARSE, effort).is_empty() {
             return;
         }
+        let pieces = self.parts_in_the_end().pow(2);
         let mut now = self.crossing();
         for step in 1..=STEPS {
             if now.pairs.is_empty() {
@@ -144,6 +150,7 @@ impl Shells {
                 tried.stand(node);
             }
             let then = tried.crossing();
+            effort.search(self.mesh.len(), pieces);
             if then.shells().len() < now.shells().len() {
                 (*self, now) = (tried, then);
             }

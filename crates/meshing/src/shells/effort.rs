@@ -4,7 +4,7 @@
 /// A search for the nearest place of the shells weighs as much as this many for the nearest point of the target.
 pub(super) const LANDING: usize = 4;
 
-/// So does a row of the least-squares step.
+/// So does a row of the least-squares step. A piece of a shell that is looked at for crossings weighs as much as one.
 pub(super) const ROW: usize = 4;
 
 /// Work done so far.
@@ -16,10 +16,10 @@ pub(super) struct Effort {
 
 impl Effort {
     /// Searches of a fit to a distance: 15 to 30 s of one core.
-    pub(super) const MOST: usize = 17_000_000;
+    pub(super) const MOST: usize = 12_000_000;
 
     /// The same to a number of shells, whose last round needs its time to settle.
-    pub(super) const MOST_TO_A_NUMBER: usize = 25_000_000;
+    pub(super) const MOST_TO_A_NUMBER: usize = 32_000_000;
 
     pub(super) fn new(most: usize) -> Self {
         Self { done: 0, most }

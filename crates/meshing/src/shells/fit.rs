@@ -46,6 +46,9 @@ const TRIES: [(f64, bool); 8] = [
 /// Normals that need not stand on their triangles are not turned below this cosine, either.
 const LEAST_ALONG: f64 = 0.2;
 
+/// Shells that crossed before a step, flat and curved, where that was asked.
+type Crossed = [Option<Vec<u32>>; 2];
+
 /// A shell that moves, and the points of the target that count at it.
 struct Moving {
     shell: u32,
@@ -81,6 +84,7 @@ impl Shells {
         let before = self.powers_round(&moving, &sums);
         let step = solve(&blocks, self.mesh.points.len());
         let (worth, upright) = (self.worth_of_all(), self.upright_of_all());
+        let mut crossed = Crossed::default();
         let mut parts: Vec<f64> = self.active.iter().map(|&active| f64::from(u8::from(active))).collect();
         for (reduction, is_last) in TRIES {
             let tried = self.stepped(&step, &sizes, &parts);
@@ -95,7 +99,7 @@ impl Shells {
             let tilts =
                 |v: &usize| self.tilts(upright[*v], stands[*v]) || tried.creased[*v] && !self.creased[*v];
             let mut tilted: Vec<usize> = (0..parts.len()).filter(tilts).collect();
-            tilted.extend(tried.newly_crossed(self));
+            tilted.extend(tried.newly_crossed(self, &mut crossed, effort));
             let falls = || after.iter().sum::<f64>() < before.iter().sum::<f64>();
             if tilted.is_empty() && (worse.is_empty() || is_last && falls()) {
                 *self = tried;
@@ -118,12 +122,12 @@ impl Shells {
     }
 
     /// Corners that move of shells that cross others and did not before: of flat triangles, and once normals stand of curved ones.
-    fn newly_crossed(&self, before: &Self) -> Vec<usize> {
+    fn newly_crossed(&self, before: &Self, crossed: &mut Crossed, effort: &mut Effort) -> Vec<usize> {
         let mut nodes = Vec::new();
-        for parts in [1, COARSE].into_iter().take(if self.strict { 2 } else { 1 }) {
-            let now = self.crossing_near_moving(parts);
+        for (parts, old) in [1, COARSE].into_iter().zip(crossed).take(if self.strict { 2 } else { 1 }) {
+            let now = self.crossing_near_moving(parts, effort);
             if !now.is_empty() {
-                let old = before.crossing_near_moving(parts);
+                let old = old.get_or_insert_with(|| before.crossing_near_moving(parts, effort));
                 let fresh = now.into_iter().filter(|shell| old.binary_search(shell).is_err());
                 nodes.extend(fresh.flat_map(|t| self.mesh.triangles[t as usize]).map(|n| n as usize));
             }

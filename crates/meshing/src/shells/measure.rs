@@ -55,9 +55,24 @@ impl Distances {
         }
         far
     }
+
+    /// Those of some shells, increasing, which are numbered anew, and of points of the target that are nearest to those that move.
+    pub(super) fn part(&self, own: &[u32], moves: impl Fn(u32) -> bool) -> Self {
+        let there = own.iter().map(|&t| self.there[t as usize]).collect();
+        let landings = self.landings.iter().filter(|landing| moves(landing.shell)).filter_map(|landing| {
+            Some(Landing { shell: own.binary_search(&landing.shell).ok()? as u32, ..*landing })
+        });
+        Self { there, parts: self.parts, landings: landings.collect() }
+    }
 }
 
 impl Shells {
+    /// The largest distance of the shells that move [m].
+    pub(super) fn farthest_moving(&self, distances: &Distances) -> f64 {
+        let far = distances.far();
+        self.mesh.alive().filter(|&t| self.moves(t)).map(|t| far[t as usize]).fold(0.0, f64::max)
+    }
+
     /// All distances.
     pub(super) fn distances(&self, detail: &Detail, target: &Target) -> Distances {
         let shells: Vec<u32> = self.mesh.alive().collect();

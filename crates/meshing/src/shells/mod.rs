@@ -48,6 +48,9 @@ const CLOSELY: f64 = 0.9;
 /// Part of the way to the goal after which normals stand on their triangles.
 const UPRIGHT_FROM: f64 = 0.7;
 
+/// Part of the work allowed after which they do where the goal is farther.
+const UPRIGHT_AFTER: f64 = 0.6;
+
 /// Rounds more in which shells are mended that cross or have a crease.
 const MENDING_ROUNDS: usize = 4;
 
@@ -122,7 +125,7 @@ impl FittedShells {
             ShellGoal::Error(error) => {
                 require_positive("the error", error)?;
                 let start = if mesh.len() > LARGE {
-                    mesh.decimate(Fewer::Distance(error * target.diagonal()))? / 2
+                    mesh.decimate_uncrossed(Fewer::Distance(error * target.diagonal()))? / 2
                 } else {
                     0
                 };
@@ -133,7 +136,7 @@ impl FittedShells {
                 (number.div_ceil(2), Effort::MOST_TO_A_NUMBER)
             }
         };
-        mesh.decimate(Fewer::Triangles(start))?;
+        mesh.decimate_uncrossed(Fewer::Triangles(start))?;
         Ok(Fit::new(&Target::new(target), &mesh, goal, most).run(progress))
     }
 
@@ -193,9 +196,11 @@ impl<'t> Fit<'t> {
             let far = now.far();
             let (part, bound, room) = self.bounds(&far);
             progress(self.progress(&far, part));
-            if !self.shells.strict && part >= UPRIGHT_FROM {
+            if !self.shells.strict && (part >= UPRIGHT_FROM || self.effort.part() >= UPRIGHT_AFTER) {
+                // Those before may cross.
+                self.best = None;
                 self.shells.require_upright();
-                self.shells.uncross();
+                self.shells.uncross(&mut self.effort);
                 now = self.shells.distances(&target.coarse, target);
                 self.effort.search(target.coarse.samples.len(), effort::LANDING);
                 self.shells.activate(self.shells.corners_of(&now.far(), bound));
@@ -239,14 +244,14 @@ impl<'t> Fit<'t> {
             }
             self.shells.even_out(target, 3, &mut self.effort);
             if self.shells.strict {
-                self.shells.uncross();
+                self.shells.uncross(&mut self.effort);
             }
             now = self.shells.distances_after(&now, target, &mut self.effort);
         }
         let mut shells = self.best.map_or(self.shells, |(_, best)| best);
         shells.require_upright();
         shells.activate((0..shells.mesh.points.len() as u32).collect());
-        shells.uncross();
+        shells.uncross(&mut self.effort);
         shells.repair(target);
         shells.finished(target, self.rounds, self.goal, !ended)
     }
@@ -324,6 +329,28 @@ impl Shells {
             creased: vec![false; mesh.points.len()],
             mesh,
         }
+    }
+
+    /// Some of the shells, numbered anew, and the numbers of their points, increasing.
+    fn part(&self, shells: &[u32]) -> (Self, Vec<u32>) {
+        let own = shells.iter().map(|&t| self.mesh.triangles[t as usize]);
+        let mut nodes: Vec<u32> = own.clone().flatten().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let mut number = vec![0; self.mesh.points.len()];
+        (0..).zip(&nodes).for_each(|(at, &node)| number[node as usize] = at);
+        let triangles = own.map(|nodes| nodes.map(|n| number[n as usize])).collect();
+        let points = nodes.iter().map(|&n| self.mesh.points[n as usize]).collect();
+        let some = |all: &[bool]| nodes.iter().map(|&n| all[n as usize]).collect();
+        let part = Self {
+            mesh: TriangleMesh::new(points, triangles),
+            normals: nodes.iter().map(|&n| self.normals[n as usize]).collect(),
+            on_border: some(&self.on_border),
+            active: some(&self.active),
+            strict: self.strict,
+            creased: some(&self.creased),
+        };
+        (part, nodes)
     }
 
     /// Corners of the shells that are farther off than a bound.

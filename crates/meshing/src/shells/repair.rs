@@ -3,6 +3,8 @@
 //! shells. A fit without crossings stays as it is, bit by bit.
 //! Leaves out: knots that no step of this list loosens. The report counts them.
 
+use std::cmp::Reverse;
+
 use pliant_geometry::Vector3;
 
 use super::effort::Effort;
@@ -10,11 +12,8 @@ use super::measure::Distances;
 use super::target::Target;
 use super::{POOR, Shells};
 
-/// Steps at most that are tried.
-const MOST_TRIES: usize = 4000;
-
-/// A try looks at all shells: so many shells at most in all tries together.
-const MOST_SHELLS_TRIED: usize = 4_000_000;
+/// Pieces of shells at most that all tries together look at: about 3 s of one core.
+const MOST_PIECES_TRIED: usize = 1_000_000;
 
 /// Where corners go in a step.
 #[derive(Clone, Copy, Debug)]
@@ -49,17 +48,83 @@ const STEPS: [Step; 14] = [
     Step::Evener(1.0),
 ];
 
+/// How good a step is; the least is best. Whether it takes shells farther off, how many pairs it parts, and how far off they are [m].
+type Rank = (bool, Reverse<usize>, f64);
+
+/// The shells that the corners of a knot may change, and what is near. A step of one corner costs no more on a large organ.
+struct Part {
+    shells: Shells,
+    distances: Distances,
+    /// The numbers of its points in the whole, increasing.
+    nodes: Vec<u32>,
+    /// Those of the knot in the part.
+    knot: Vec<u32>,
+}
+
+impl Part {
+    /// `None` if none of the shells is there.
+    fn new(whole: &mut Shells, knot: &[u32], distances: &Distances) -> Option<Self> {
+        // Normals of their neighbours turn, too.
+        whole.activate(knot.to_vec());
+        let mut inner = vec![false; whole.mesh.points.len()];
+        let near = whole.near(|shell| whole.moves(shell));
+        near.iter().flat_map(|&t| whole.mesh.triangles[t as usize]).for_each(|n| inner[n as usize] = true);
+        let has_inner = |t: &u32| whole.mesh.triangles[*t as usize].iter().any(|&n| inner[n as usize]);
+        let own: Vec<u32> = whole.mesh.alive().filter(has_inner).collect();
+        let (shells, nodes) = whole.part(&own);
+        let distances = distances.part(&own, |t| whole.moves(t));
+        let knot = knot.iter().filter_map(|node| Some(nodes.binary_search(node).ok()? as u32)).collect();
+        Some(Self { shells, distances, nodes, knot })
+    }
+
+    /// The part after the best step, if there is one.
+    fn best_step(&self, target: &Target, parts: usize, effort: &mut Effort) -> Option<Shells> {
+        let mut best: Option<(Rank, Shells)> = None;
+        let singles = self.knot.iter().map(std::slice::from_ref);
+        for nodes in std::iter::once(&self.knot[..]).chain(singles) {
+            let mut start = self.shells.clone();
+            start.activate(nodes.to_vec());
+            let before = start.crossing_with_moving(parts, effort);
+            let close = start.farthest_moving(&self.distances);
+            if before == 0 {
+                continue;
+            }
+            for step in STEPS {
+                if effort.is_spent() {
+                    break;
+                }
+                let Some(tried) = start.with(step, nodes, target) else { continue };
+                let left = tried.crossing_with_moving(parts, effort);
+                if left < before {
+                    let after = tried.distances_after(&self.distances, target, &mut Effort::new(usize::MAX));
+                    let then = tried.farthest_moving(&after);
+                    let standing = (then > close, Reverse(before - left), then);
+                    if best.as_ref().is_none_or(|(best, _)| standing < *best) {
+                        best = Some((standing, tried));
+                    }
+                }
+            }
+        }
+        best.map(|(_, found)| found)
+    }
+}
+
 impl Shells {
     /// Loosens knots of shells that cross. The result counts only if fewer shells cross than before.
     pub(super) fn repair(&mut self, target: &Target) {
         let before = self.crossing();
-        let mut tries = MOST_TRIES.min(MOST_SHELLS_TRIED / self.mesh.len().max(1));
+        if before.pairs.is_empty() {
+            return;
+        }
+        let parts = self.parts_in_the_end();
+        let mut effort = Effort::new(MOST_PIECES_TRIED);
         let mut tried = self.clone();
+        let mut distances = self.distances(&target.coarse, target);
         let mut now = before.clone();
         while !now.pairs.is_empty() {
             let mut loosened = false;
             for knot in knots(&tried, &now.pairs) {
-                loosened |= tried.loosen(&knot, target, &mut tries);
+                loosened |= tried.loosen(&knot, &mut distances, target, parts, &mut effort);
             }
             if !loosened {
                 break;
@@ -73,31 +138,26 @@ impl Shells {
 
     /// Takes the step of one knot's corners, or of one of them, after which fewer pairs cross. Steps that take nothing farther off come
     /// first, then those that leave the fewest pairs, then the closest. Returns whether there is one.
-    fn loosen(&mut self, knot: &[u32], target: &Target, tries: &mut usize) -> bool {
-        // Normals of their neighbours turn, too.
+    fn loosen(
+        &mut self,
+        knot: &[u32],
+        distances: &mut Distances,
+        target: &Target,
+        parts: usize,
+        effort: &mut Effort,
+    ) -> bool {
+        let Some(part) = Part::new(self, knot, distances) else { return false };
+        let Some(found) = part.best_step(target, parts, effort) else { return false };
+        // Normals of neighbours turn, too.
         self.activate(knot.to_vec());
-        let before = self.distances(&target.coarse, target);
-        let off = |distances: &Distances| {
-            let far = distances.far();
-            self.mesh.alive().filter(|&t| self.moves(t)).map(|t| far[t as usize]).fold(0.0, f64::max)
-        };
-        let (pairs, close) = (self.crossing_with_moving(), off(&before));
-        let mut best: Option<((bool, usize, f64), Self)> = None;
-        let singles = knot.iter().map(std::slice::from_ref);
-        let choices = std::iter::once(knot).chain(singles).flat_map(|nodes| STEPS.map(|step| (nodes, step)));
-        for (nodes, step) in choices.take(*tries) {
-            *tries -= 1;
-            let Some(tried) = self.with(step, nodes, target) else { continue };
-            let left = tried.crossing_with_moving();
-            if left < pairs {
-                let then = off(&tried.distances_after(&before, target, &mut Effort::new(usize::MAX)));
-                let standing = (then > close, left, then);
-                if best.as_ref().is_none_or(|(best, _)| standing < *best) {
-                    best = Some((standing, tried));
-                }
-            }
+        for (own, &node) in part.nodes.iter().enumerate().filter(|(_, node)| self.active[**node as usize]) {
+            let node = node as usize;
+            self.mesh.points[node] = found.mesh.points[own];
+            self.normals[node] = found.normals[own];
+            self.creased[node] = found.creased[own];
         }
-        best.map(|(_, found)| *self = found).is_some()
+        *distances = self.distances_after(distances, target, &mut Effort::new(usize::MAX));
+        true
     }
 
     /// The shells after a step of some corners; `None` if a triangle loses its shape or a corner its normal.
