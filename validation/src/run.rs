@@ -1,6 +1,6 @@
 //! Running a model, as a test does it: what fails, panics.
 
-use pliant_explicit::critical_step::true_limit;
+use pliant_explicit::critical_step::assembled;
 use pliant_explicit::stability::{Monitor, OnUnstable};
 use pliant_explicit::{CentralDifference, DynamicRelaxation, Scalar, State, StepError};
 use pliant_mechanics::Model;
@@ -47,7 +47,7 @@ pub fn run_watched<R: Scalar>(
 /// # Panics
 /// If constraints contradict each other.
 pub fn watched<R: Scalar>(model: &Model, step: f64, on_unstable: OnUnstable) -> CentralDifference<R> {
-    let limit = true_limit(model).unwrap_or_else(|error| panic!("{error}")).step;
+    let limit = assembled(model).unwrap_or_else(|error| panic!("{error}")).step;
     let stepper = CentralDifference::new(model.clone(), step).unwrap_or_else(|error| panic!("{error}"));
     stepper.watched(Monitor::new(model, limit, on_unstable))
 }

@@ -1,5 +1,5 @@
 //! Immersed hexahedra: every cube that an organ touches, with its stiffness and mass by the part that the organ fills, against
-//! cubes by majority and against tetrahedra, on the analytic liver: volume, the true limit of the step, and how it hangs under its
+//! cubes by majority and against tetrahedra, on the analytic liver: volume, the critical time step of the step, and how it hangs under its
 //! weight from a plane that is one of every grid. τ = Δt c / h with h = (V / nodes)^(1/3).
 
 use pliant_geometry::{Locator, Mesh, Vector3};
@@ -56,11 +56,11 @@ impl Hanging {
         solids.flat_map(|solid| (0..solid.cells.len()).map(|cell| solid.cells.volume(cell))).sum()
     }
 
-    /// τ by the true limit of the body without anything that holds it.
+    /// τ by the critical time step of the body without anything that holds it.
     fn tau(&self) -> f64 {
         let mut free = self.specimen.model.clone();
         free.constraints.clear();
-        let limit = pliant_explicit::critical_step::true_limit(&free).expect("nothing contradicts").step;
+        let limit = pliant_explicit::critical_step::assembled(&free).expect("nothing contradicts").step;
         let modulus = YOUNG * (1.0 - POISSON) / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON));
         limit * (modulus / DENSITY).sqrt() / (self.volume() / free.node_count() as f64).cbrt()
     }

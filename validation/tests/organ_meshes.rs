@@ -1,5 +1,5 @@
 //! Meshes of the label images of the analytic organs, made for the time step: the meshing specification's T2, T3 and T5.
-//! τ = Δt c / h with h = (V / nodes)^(1/3) compares meshes of different density; Δt is the true limit. Of the same organs,
+//! τ = Δt c / h with h = (V / nodes)^(1/3) compares meshes of different density; Δt is the critical time step. Of the same organs,
 //! TetGen gives τ = 0.02 to 0.29, fTetWild 0.19, Gmsh 0.29 to 0.52, and the ideal lattice 0.73.
 
 use pliant_geometry::{Mesh, Vector3};
@@ -28,9 +28,9 @@ fn organ(image: &LabelImage, labels: &[i32], edge: f64, origin: Vector3) -> Orga
     request.mesh(&anatomy, &|_| {}).unwrap()
 }
 
-/// The true limit [s] and τ.
+/// The critical time step [s] and τ.
 fn limit(made: &OrganMesh) -> [f64; 2] {
-    let limit = specimen(made.mesh.clone()).true_limit();
+    let limit = specimen(made.mesh.clone()).critical_step();
     let modulus = YOUNG * (1.0 - POISSON) / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON));
     let volume: f64 = made.report.materials.iter().map(|material| material.volume).sum();
     let h = (volume / made.report.nodes as f64).cbrt();
@@ -41,7 +41,7 @@ fn check(name: &str, image: &LabelImage, labels: &[i32], edge: f64, least: f64) 
     let made = organ(image, labels, edge, Vector3::zeros());
     let [step, tau] = limit(&made);
     println!(
-        "{name} at {:.0} mm: {} nodes, {} tets, least acoustic length {:.3} of ideal, true limit {:.3} ms, τ {tau:.3}",
+        "{name} at {:.0} mm: {} nodes, {} tets, least acoustic length {:.3} of ideal, critical time step {:.3} ms, τ {tau:.3}",
         edge * 1e3,
         made.report.nodes,
         made.report.tets,
@@ -133,19 +133,19 @@ fn table_of_organ_meshes() {
     }
 }
 
-/// T5: 0.95 of the true limit runs 10⁴ steps, 1.1 of it diverges.
+/// T5: 0.95 of the critical time step runs 10⁴ steps, 1.1 of it diverges.
 #[test]
 #[ignore = "slow: 10⁴ steps"]
-fn the_true_limit_of_an_organ_is_sharp() {
+fn the_critical_step_of_an_organ_is_sharp() {
     let mesh = organ(&images::liver(), &[1], 0.010, Vector3::zeros()).mesh;
     let held = specimen(mesh).fix("z-min", [true; 3]).falling([1e-3, 2e-3, -3e-3]);
-    let limit = held.true_limit();
+    let limit = held.critical_step();
     let mut steps = 0;
     run::<f64>(&held.model, 0.95 * limit, 1e4 * 0.95 * limit, |_, state| steps = state.steps)
-        .unwrap_or_else(|error| panic!("0.95 of the true limit: {error}"));
-    println!("0.95 of the true limit {:.4} ms: {steps} steps", limit * 1e3);
+        .unwrap_or_else(|error| panic!("0.95 of the critical time step: {error}"));
+    println!("0.95 of the critical time step {:.4} ms: {steps} steps", limit * 1e3);
     assert!(steps >= 10_000);
     let failure = run::<f64>(&held.model, 1.1 * limit, 1e4 * limit, |_, state| steps = state.steps);
-    let failure = failure.err().expect("1.1 of the true limit diverges");
-    println!("1.1 of the true limit fails after {steps} steps: {failure}");
+    let failure = failure.err().expect("1.1 of the critical time step diverges");
+    println!("1.1 of the critical time step fails after {steps} steps: {failure}");
 }

@@ -1,6 +1,6 @@
 //! The largest stable step of deformed states, and runs whose steps are cut when it falls below them.
 
-use pliant_explicit::critical_step::true_limit_at;
+use pliant_explicit::critical_step::assembled_at;
 use pliant_explicit::stability::{KEEP, Monitor, OnUnstable};
 use pliant_explicit::{CentralDifference, Observable, State, StepError};
 use pliant_mechanics::Model;
@@ -82,12 +82,12 @@ fn the_limit_of_a_cell_alone_is_exact_on_147_random_states_of_every_kind_of_law(
             // With a limit of the assembly of almost nothing the cell counts alone.
             let monitor = Monitor::new(&model, 1e-9, OnUnstable::Report);
             let (mut worst, mut least) = (0.0, f64::INFINITY);
-            let rest = true_limit_at(&model, &at_rest).unwrap().step;
+            let rest = assembled_at(&model, &at_rest).unwrap().step;
             for h in random_deformations(147) {
                 let u = homogeneous(&model, &h);
                 // A law that locks is not defined everywhere.
                 let Some((estimate, ..)) = monitor.limit_of_all(&model, &u, &at_rest) else { continue };
-                let now = true_limit_at(&model, &u).unwrap().step;
+                let now = assembled_at(&model, &u).unwrap().step;
                 worst = largest([worst, (estimate / now - 1.0).abs()]);
                 least = least.min(now / rest);
             }
@@ -116,11 +116,11 @@ fn pressed(law: AnyLaw, element: (VolumeCell, Tets, Hexes)) -> Specimen {
     cube
 }
 
-/// The estimate over the true limit of the deformed states of a run: the least and the largest, and the largest over
+/// The estimate over the critical time step of the deformed states of a run: the least and the largest, and the largest over
 /// what looking closely at every cell gives.
 fn estimates(what: &str, specimen: &Specimen, until: f64) -> [f64; 3] {
     let model = &specimen.model;
-    let (limit, at_rest) = (specimen.true_limit(), vec![[0.0; 3]; model.node_count()]);
+    let (limit, at_rest) = (specimen.critical_step(), vec![[0.0; 3]; model.node_count()]);
     let mut monitor = Monitor::new(model, limit, OnUnstable::Report);
     let mut found = [f64::INFINITY, 0.0_f64, 0.0_f64];
     let (mut due, mut truth) = (0.0, f64::INFINITY);
@@ -129,7 +129,7 @@ fn estimates(what: &str, specimen: &Specimen, until: f64) -> [f64; 3] {
             due += until / 10.0;
             let (estimate, ..) = monitor.limit(model, &state.displacement, &at_rest).unwrap();
             let (of_all, ..) = monitor.limit_of_all(model, &state.displacement, &at_rest).unwrap();
-            let now = true_limit_at(model, &state.displacement).unwrap().step;
+            let now = assembled_at(model, &state.displacement).unwrap().step;
             truth = truth.min(now / limit);
             let ratio = estimate / now;
             found = [found[0].min(ratio), found[1].max(ratio), found[2].max(estimate / of_all)];
@@ -137,7 +137,7 @@ fn estimates(what: &str, specimen: &Specimen, until: f64) -> [f64; 3] {
     })
     .unwrap_or_else(|error| panic!("{what}: {error}"));
     println!(
-        "{what}: true limit falls to {truth:.3} of that at rest; estimate over truth {:.3} to {:.3}, over that of all \
+        "{what}: critical time step falls to {truth:.3} of that at rest; estimate over truth {:.3} to {:.3}, over that of all \
          cells up to {:.3}",
         found[0], found[1], found[2]
     );
@@ -145,7 +145,7 @@ fn estimates(what: &str, specimen: &Specimen, until: f64) -> [f64; 3] {
 }
 
 #[test]
-fn the_estimate_stays_within_its_reserve_of_the_true_limit_of_deformed_bodies() {
+fn the_estimate_stays_within_its_reserve_of_the_critical_step_of_deformed_bodies() {
     let uniform = Hexes::UniformStrain(HOURGLASS);
     let averaged = Tets::Averaged(Averaging::Nodal);
     for (name, law) in laws() {
@@ -188,10 +188,10 @@ fn tip_course(block: &Specimen, step: f64, until: f64) -> (Vec<(f64, f64)>, Stat
 }
 
 #[test]
-fn soft_tissue_stretched_by_38_percent_survives_at_0_9_of_the_true_limit_only_with_cut_steps() {
+fn soft_tissue_stretched_by_38_percent_survives_at_0_9_of_the_critical_step_only_with_cut_steps() {
     for cells in CELLS {
         let block = hanging(soft_tissue(), cells, 9.81);
-        let limit = block.true_limit();
+        let limit = block.critical_step();
         let alone = run::<f64>(&block.model, 0.9 * limit, 0.4, |_, _| ()).err();
         println!("{cells:?}, whole steps only: {alone:?}");
         assert!(alone.is_some());
@@ -216,7 +216,7 @@ fn soft_tissue_stretched_by_38_percent_survives_at_0_9_of_the_true_limit_only_wi
 #[test]
 fn below_the_step_a_run_can_stop_or_just_report() {
     let block = hanging(soft_tissue(), VolumeCell::Hex, 9.81);
-    let step = 0.9 * block.true_limit();
+    let step = 0.9 * block.critical_step();
     let stopped = run_watched::<f64>(&block.model, step, OnUnstable::Stop, 0.4, |_, _| ()).err();
     println!("{stopped:?}");
     let Some(StepError::BelowLimit { body, limit, step: running, time, .. }) = stopped else {
@@ -236,9 +236,9 @@ fn below_the_step_a_run_can_stop_or_just_report() {
 #[test]
 fn a_limit_below_a_hundredth_of_the_step_ends_the_run() {
     let block = hanging(soft_tissue(), VolumeCell::Tet, 9.81);
-    // Nobody is asked for the true limit when a run begins above it.
+    // Nobody is asked for the critical time step when a run begins above it.
     let monitor = Monitor::new(&block.model, 1e-7, OnUnstable::Substep);
-    let step = 500.0 * block.true_limit();
+    let step = 500.0 * block.critical_step();
     let stepper = CentralDifference::new(block.model.clone(), step).unwrap().watched(monitor);
     let ended = run_on::<f64>(stepper, State::at_rest(&block.model), 1.0, |_, _| ()).err();
     assert!(matches!(ended, Some(StepError::BelowLimit { .. })), "{ended:?}");
@@ -258,7 +258,7 @@ fn swinging() -> Specimen {
 #[test]
 fn cut_steps_have_the_same_bits_on_any_number_of_threads_and_after_a_restart() {
     let block = swinging();
-    let step = 0.9 * block.true_limit();
+    let step = 0.9 * block.critical_step();
     let fresh = || watched::<f64>(&block.model, step, OnUnstable::Substep);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -267,7 +267,7 @@ fn cut_steps_have_the_same_bits_on_any_number_of_threads_and_after_a_restart() {
     };
     let alone = on(1);
     println!("{:?}", alone.stability);
-    assert!(alone.stability.cuts > 0 && alone.stability.true_limits > 0, "the test needs changes");
+    assert!(alone.stability.cuts > 0 && alone.stability.critical_steps > 0, "the test needs changes");
     assert!(alone == on(2) && alone == on(8));
 
     // A copy of the state, taken anywhere between two instants, goes on alike on a stepper of its own.
@@ -291,7 +291,7 @@ fn a_free_fall_in_cut_steps_is_exact() {
     // Nothing holds it: after steps of any lengths x = ½ g t².
     let block = Specimen::block([0.1; 3], [2; 3], VolumeCell::Hex, &elastic(soft_tissue()), [0.0; 3])
         .falling([0.0, 0.0, -9.81]);
-    let limit = block.true_limit();
+    let limit = block.critical_step();
     let monitor = Monitor::new(&block.model, limit, OnUnstable::Substep);
     // Twice the limit: cut from the first step.
     let stepper = CentralDifference::new(block.model.clone(), 2.0 * limit).unwrap().watched(monitor);

@@ -17,7 +17,7 @@ pub enum Limit {
     /// The smallest element bound.
     ElementBound,
     /// The critical time step of the assembled model.
-    #[serde(rename = "true-limit")]
+    #[serde(rename = "critical-step")]
     True,
 }
 

@@ -204,8 +204,8 @@ impl Specimen {
     ///
     /// # Panics
     /// If constraints contradict each other.
-    pub fn true_limit(&self) -> f64 {
-        critical_step::true_limit(&self.model).unwrap_or_else(|error| panic!("{error}")).step
+    pub fn critical_step(&self) -> f64 {
+        critical_step::assembled(&self.model).unwrap_or_else(|error| panic!("{error}")).step
     }
 
     /// The node closest to a point [m] at rest.

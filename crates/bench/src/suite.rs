@@ -237,7 +237,7 @@ impl Bench {
         let key = (case.element, case.law.has_fibres(), case.edge);
         let known = self.limits.iter().find(|(of, _)| *of == key).map(|(_, limit)| *limit);
         let limit = known.unwrap_or_else(|| {
-            let limit = specimen.true_limit();
+            let limit = specimen.critical_step();
             self.limits.push((key, limit));
             limit
         });

@@ -635,10 +635,10 @@ fn a_motion_after_the_end_is_doubted() {
 }
 
 #[test]
-fn a_step_above_the_true_limit_is_refused_and_one_below_it_runs() {
+fn a_step_above_the_critical_step_is_refused_and_one_below_it_runs() {
     let object = Workshop::new(BLOCK).run(&[]).done();
     let number = |key: &str| object[key].as_f64().unwrap();
-    let (bound, limit) = (number("element_bound"), number("true_limit"));
+    let (bound, limit) = (number("element_bound"), number("critical_step"));
     assert!(number("step") <= 0.9 * limit && bound < limit, "{object}");
     let says = [
         "above the critical time step",

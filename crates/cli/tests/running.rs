@@ -37,7 +37,7 @@ const KEYS: [&str; 26] = [
     "mass",
     "step",
     "element_bound",
-    "true_limit",
+    "critical_step",
     "limiting_element",
     "participants",
     "solver",
@@ -422,7 +422,7 @@ fn mass_scaling_enlarges_the_step_tells_the_added_mass_and_leaves_forces_at_rest
         "mass of the material",
     );
     assert_close(
-        done["true_limit"].as_f64().unwrap() / plain["true_limit"].as_f64().unwrap(),
+        done["critical_step"].as_f64().unwrap() / plain["critical_step"].as_f64().unwrap(),
         1.02,
         1e-4,
         "limit",

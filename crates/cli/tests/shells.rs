@@ -579,7 +579,7 @@ fn json_tells_a_run_of_shells() {
     assert_eq!(done["steps"], 2);
     assert!(done["solver"]["newton_iterations"].as_u64().unwrap() >= 2, "{done}");
     assert_eq!(done["solver"]["linear_iterations"], 0, "{done}");
-    for key in ["element_bound", "true_limit", "limiting_element", "stability"] {
+    for key in ["element_bound", "critical_step", "limiting_element", "stability"] {
         assert!(done[key].is_null(), "{key}: {done}");
     }
     // A pressure of 1 mPa on 0.02 m², which hardly turns.

@@ -86,9 +86,9 @@ pub(crate) fn limit_alone(model: &Model, solid: &Solid, cell: usize, stiffness: 
     2.0 / (solid.cells.nodes_per_cell() as f64 * stiffness / density).sqrt()
 }
 
-/// The true limit of the assembled operator.
+/// The critical time step of the assembled operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrueLimit {
+pub struct CriticalStep {
     /// Step [s].
     pub step: f64,
     /// Relative error bound of the largest eigenvalue (residual of its Ritz vector); it is counted in, on the safe side.
@@ -102,29 +102,29 @@ pub struct TrueLimit {
 const LARGEST_SUBSPACE: usize = 200;
 const TOLERANCE: f64 = 1e-4;
 
-/// The true limit at rest; infinite if every node is held.
+/// The critical time step at rest; infinite if every node is held.
 ///
 /// # Errors
 /// If constraints contradict each other.
-pub fn true_limit(model: &Model) -> Result<TrueLimit, Contradiction> {
-    true_limit_at(model, &vec![[0.0; 3]; model.node_count()])
+pub fn assembled(model: &Model) -> Result<CriticalStep, Contradiction> {
+    assembled_at(model, &vec![[0.0; 3]; model.node_count()])
 }
 
-/// The true limit of small vibrations about a deformed state; infinite if every node is held.
+/// The critical time step of small vibrations about a deformed state; infinite if every node is held.
 ///
 /// # Errors
 /// If constraints contradict each other.
-pub fn true_limit_at(model: &Model, displacement: &[Vector<f64>]) -> Result<TrueLimit, Contradiction> {
+pub fn assembled_at(model: &Model, displacement: &[Vector<f64>]) -> Result<CriticalStep, Contradiction> {
     Ok(limit_about(model, &model.constrained_components()?, displacement))
 }
 
 /// The same where the owner of each component is known.
-pub(crate) fn limit_about(model: &Model, owners: &[[u32; 3]], displacement: &[Vector<f64>]) -> TrueLimit {
+pub(crate) fn limit_about(model: &Model, owners: &[[u32; 3]], displacement: &[Vector<f64>]) -> CriticalStep {
     let mut operator = Operator::new(model, owners, displacement);
     let started = std::time::Instant::now();
     let (eigenvalue, error) = largest_eigenvalue(&mut operator, model.node_count());
     let seconds_per_call = started.elapsed().as_secs_f64() / operator.calls.max(1) as f64;
-    TrueLimit { step: 2.0 / eigenvalue.sqrt(), error, force_calls: operator.calls, seconds_per_call }
+    CriticalStep { step: 2.0 / eigenvalue.sqrt(), error, force_calls: operator.calls, seconds_per_call }
 }
 
 /// The symmetric operator M^(−1/2) K M^(−1/2) on the free components.

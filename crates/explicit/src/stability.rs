@@ -1,13 +1,13 @@
-//! The critical time step of a deformed state, monitored during a run. A run takes 0.9 of that at rest. The *true limit* is the critical
-//! time step of the assembled model, 2/ω_max.
+//! The critical time step of a deformed state, monitored during a run. A run takes 0.9 of that at rest. It is that of
+//! the assembled model, 2/ω_max, where nothing else is said.
 //!
 //! A cell's own limit is Δt_e = 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
-//! (`tangent.rs`); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the true
-//! limit L of a reference state, at first rest, the current limit is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e).
+//! (`tangent.rs`); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the critical
+//! time step L of a reference state, at first rest, the current limit is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e).
 //! r_e² is the stiffness of the cell in the reference state over the current one, the smaller of two ratios: over all
 //! modes, and over plane waves n⊗y. The first ratio alone misses a compression along one axis, as does any bound V M Σ|b_a|²:
-//! on the glued cube it stays at 0.94 where the true limit falls to 0.83. A cell slower than the assembly thus counts with its own
-//! limit, and one that the assembly holds back, with its change. Compared with the true limit of deformed bodies, the estimate is 0 to
+//! on the glued cube it stays at 0.94 where the critical time step falls to 0.83. A cell slower than the assembly thus counts with its own
+//! limit, and one that the assembly holds back, with its change. Compared with the critical time step of deformed bodies, the estimate is 0 to
 //! 25 % too small; with fibres that carry tension only, whose stiffness jumps at rest, up to 4.3 % too large:
 //! `validation/tests/stability.rs`.
 //!
@@ -19,7 +19,7 @@
 //! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control
 //! does not change with deformation. Loads that follow the surface do not count.
 //!
-//! *Then.* If the estimate would change the steps, the true limit of the current state is computed, by Lanczos' iteration of many force
+//! *Then.* If the estimate would change the steps, the critical time step of the current state is computed, by Lanczos' iteration of many force
 //! evaluations, and the current state becomes the reference. This happens once in [`REFERENCE_EVERY`] steps at most, and always before
 //! [`OnUnstable::Stop`] ends a run. If a part of a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that
 //! take [`RESERVE`] at most. Fewer parts are used again once they keep this reserve. Velocities continue (formula in `stepper.rs`), and
@@ -48,7 +48,7 @@ pub const CHANGE: f64 = 1.1;
 pub const RESERVE: f64 = 0.95;
 /// They are kept up to this part: the limit may fall before the next look.
 pub const KEEP: f64 = 0.97;
-/// Steps between two true limits, except where a run would stop.
+/// Steps between two critical time steps, except where a run would stop.
 pub const REFERENCE_EVERY: u64 = 1000;
 /// The most substeps a step is cut into.
 pub const MOST_SUBSTEPS: u32 = 100;
@@ -80,7 +80,7 @@ pub struct Stability {
     /// Looks taken at the limit.
     pub checks: u64,
     /// True limits found since the beginning.
-    pub true_limits: u32,
+    pub critical_steps: u32,
     /// The last look.
     pub last: Option<Look>,
     /// The look with the smallest limit.
@@ -97,7 +97,7 @@ pub struct Stability {
     pub most_substeps: u32,
     /// Substeps beyond one a step, in all.
     pub extra_steps: u64,
-    /// The last true limit and the steps done then; its state is [`State::reference`](crate::State::reference).
+    /// The last critical time step and the steps done then; its state is [`State::reference`](crate::State::reference).
     pub(crate) reference: Option<(f64, u64)>,
     /// Deformation at the last look.
     pub(crate) deformed: Deformed,
@@ -111,7 +111,7 @@ impl Default for Stability {
             substeps: 1,
             done: 0,
             checks: 0,
-            true_limits: 0,
+            critical_steps: 0,
             reference: None,
             last: None,
             smallest: None,
@@ -243,7 +243,7 @@ impl Monitor {
         self.reference = reference;
     }
 
-    /// Whether an estimate needs the true limit: it asks for other than whole steps, and the last one is long past.
+    /// Whether an estimate needs the critical time step: it asks for other than whole steps, and the last one is long past.
     pub(crate) fn doubts<R>(&self, state: &State<R>, limit: f64, step: f64, now: u32) -> bool {
         let rested = state
             .stability
@@ -257,7 +257,7 @@ impl Monitor {
     }
 
     /// The limit of a deformed state: the estimate [s], the solid and the cell that set it; `None` without cells or
-    /// where no cell's stiffness is a number. `reference` is the state whose true limit is known.
+    /// where no cell's stiffness is a number. `reference` is the state whose critical time step is known.
     pub fn limit<R: Scalar>(
         &mut self,
         model: &Model,

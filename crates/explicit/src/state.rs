@@ -25,7 +25,7 @@ pub struct State<R> {
     pub work: Work,
     /// How steps are cut, and what was seen of the largest stable one.
     pub stability: Stability,
-    /// Displacements [m] of the state whose true limit is known, at first rest; see [`Monitor`](crate::stability::Monitor).
+    /// Displacements [m] of the state whose critical time step is known, at first rest; see [`Monitor`](crate::stability::Monitor).
     pub reference: Vec<Vector<R>>,
 }
 

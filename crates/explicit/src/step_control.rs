@@ -173,12 +173,12 @@ impl StepControl {
     }
 }
 
-/// Finds the true limit [s] of a state and makes it the reference of what follows.
+/// Finds the critical time step [s] of a state and makes it the reference of what follows.
 fn take_as_reference<R: Scalar>(model: &Model, owners: &[[u32; 3]], state: &mut State<R>) -> f64 {
     let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
     let limit = limit_about(model, owners, &displacement).step;
     state.reference.clone_from(&state.displacement);
     state.stability.reference = Some((limit, state.steps));
-    state.stability.true_limits += 1;
+    state.stability.critical_steps += 1;
     limit
 }

@@ -18,7 +18,7 @@ pub struct Grip {
     pub stiffness: f64,
 }
 
-/// Part of the room between a step of 0.9 of the true limit and the limit that a grip may take.
+/// Part of the room between a step of 0.9 of the critical time step and the limit that a grip may take.
 pub const ROOM: f64 = 0.15;
 
 impl Grip {
@@ -35,7 +35,7 @@ impl Grip {
         scale(sub(self.place, self.point(model, displacement)), self.stiffness)
     }
 
-    /// The stiffness [N/m] up to which such a spring leaves explicit steps [s] of 0.9 of the true limit stable. It adds at most
+    /// The stiffness [N/m] up to which such a spring leaves explicit steps [s] of 0.9 of the critical time step stable. It adds at most
     /// k Σ wᵢ²/mᵢ to the squares of the angular frequencies (Weyl), whose limit is 4/Δt² and of which 0.81 are taken.
     pub fn stiffest(&self, model: &Model, step: f64) -> f64 {
         let mobility: f64 = self.nodes.iter().map(|&(node, w)| w * w / model.inertia(node as usize)).sum();

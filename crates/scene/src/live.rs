@@ -18,17 +18,17 @@ pub trait Live: Send {
     /// Time [s].
     fn time(&self) -> f64;
 
-    /// Goes one step on (on a graphics processor as many as it takes at once, up to `most`); how many.
+    /// Goes one step on (on a GPU as many as it takes at once, up to `most`); how many.
     ///
     /// # Errors
     /// If the run can't go on; the state before it can still be looked at.
     fn advance(&mut self, most: u64) -> Result<u64, Failure>;
 
-    /// Goes up to `steps` steps on where the state lies on a graphics processor, as many as take about `within`: nothing comes back to
+    /// Goes up to `steps` steps on where the state lies on a GPU, as many as take about `within`: nothing comes back to
     /// ordinary memory, and what breaks is told by [`mesh`](Self::mesh). How many; `None` of a solver whose state lies there.
     fn advance_without_read_back(&mut self, steps: u64, within: Duration) -> Option<Result<u64, Failure>>;
 
-    /// The points shown at the instant, found on the graphics processor where the state lies, with a value each; `given` takes the
+    /// The points shown at the instant, found on the GPU where the state lies, with a value each; `given` takes the
     /// place of those given before. `None` of a solver whose state lies in ordinary memory.
     fn place(&mut self, value: PointValue, given: Option<&[f32]>) -> Option<Result<DevicePoints, Failure>>;
 

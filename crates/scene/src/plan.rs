@@ -1,7 +1,7 @@
 //! The time step of a run: from the mesh and the laws, or as requested and then compared with the critical time step of the assembled
-//! model, the *true limit*.
+//! model.
 
-use pliant_explicit::critical_step::{ElementBound, TrueLimit};
+use pliant_explicit::critical_step::{CriticalStep, ElementBound};
 use pliant_implicit::Explicit;
 use pliant_sim::{Critical, ImplicitBodies, SAFETY, Steps, counted, number};
 use serde::Serialize;
@@ -36,7 +36,7 @@ pub struct Limits {
     /// The smallest element bound.
     pub bound: ElementBound,
     /// The critical time step of the assembled model.
-    pub assembled: TrueLimit,
+    pub assembled: CriticalStep,
     /// The cell that sets the bound.
     pub limiting: LimitingElement,
 }
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn an_automatic_step_is_a_whole_part_of_the_duration_below_the_true_limit() {
+    fn an_automatic_step_is_a_whole_part_of_the_duration_below_the_critical_step() {
         let plan = planned("").unwrap();
         let limits = plan.limits.as_ref().unwrap();
         assert!(
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_held_against_bound_and_true_limit() {
+    fn a_step_is_held_against_bound_and_critical_step() {
         let automatic = planned("").unwrap().limits.unwrap();
         let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
         let close = asked(0.95 * automatic.assembled.step).unwrap();

@@ -1,6 +1,6 @@
 //! The steps of a participant.
 
-use pliant_explicit::critical_step::{ElementBound, TrueLimit, element_bound, true_limit};
+use pliant_explicit::critical_step::{CriticalStep, ElementBound, assembled, element_bound};
 use pliant_mechanics::Model;
 use pliant_mechanics::model::Contradiction;
 
@@ -54,7 +54,7 @@ pub struct Critical {
     /// The smallest element bound.
     pub bound: ElementBound,
     /// That of the assembled model.
-    pub assembled: TrueLimit,
+    pub assembled: CriticalStep,
 }
 
 impl Critical {
@@ -64,7 +64,7 @@ impl Critical {
     /// If constraints contradict one another.
     pub fn of(model: &Model) -> Result<Option<Self>, Contradiction> {
         let Some(bound) = element_bound(model) else { return Ok(None) };
-        Ok(Some(Self { bound, assembled: true_limit(model)? }))
+        Ok(Some(Self { bound, assembled: assembled(model)? }))
     }
 
     /// The automatic step [s]: [`SAFETY`] of the critical one. If every node is held there is no limit, and the element bound replaces it.

@@ -1,4 +1,4 @@
-//! Scenes whose state lies on a graphics processor: their points are found and drawn there. What needs ordinary memory (energies,
+//! Scenes whose state lies on a GPU: their points are found and drawn there. What needs ordinary memory (energies,
 //! forces, the range of colours, whether all is sound, fields other than displacements) is looked at now and then.
 
 use std::time::{Duration, Instant};

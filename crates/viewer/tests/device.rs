@@ -1,4 +1,4 @@
-//! A scene on a graphics processor, played and drawn there: nothing comes back to ordinary memory but at the looks. Without any
+//! A scene on a GPU, played and drawn there: nothing comes back to ordinary memory but at the looks. Without any
 //! the tests are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
 mod support;
@@ -14,7 +14,7 @@ use pliant_scene::format::{ColourBy, FieldName, ViewTable};
 use pliant_viewer::{Frame, Hand, Order, Point, Session};
 use support::{BALL, subject, wait, world};
 
-/// The ball on a graphics processor, pulled down, if there is one.
+/// The ball on a GPU, pulled down, if there is one.
 fn on_device() -> Option<World> {
     let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
     if let Err(error) = Device::open(None) {

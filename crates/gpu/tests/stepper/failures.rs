@@ -91,7 +91,7 @@ fn a_displacement_that_is_not_finite_is_told_with_its_node_and_an_unstable_run_a
     assert_eq!(a, b);
     let mut model = moved_cube("hex8", elastic(neo_hookean()));
     model.constraints[1].motion = Motion::Displacement([0.0, 0.0, 1e-4], smooth(0.2));
-    let limit = critical_step::true_limit(&model).unwrap().step;
+    let limit = critical_step::assembled(&model).unwrap().step;
     let (error, _) = failure_on(&device, &model, 1.02 * limit, Design::Gather);
     assert!(matches!(error, StepFailure::Step(_)), "{error:?}");
 }

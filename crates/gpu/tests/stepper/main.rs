@@ -218,7 +218,7 @@ fn steps_are_cut_where_the_limit_falls_and_end_a_run_where_they_must_not_be() {
     };
     model.constraints.push(hold("base", 0, Motion::Fixed));
     model.constraints.push(hold("top", CELLS, Motion::Displacement([0.0, 0.0, -0.4 * EDGE], smooth(1.0))));
-    let limit = critical_step::true_limit(&model).unwrap().step;
+    let limit = critical_step::assembled(&model).unwrap().step;
     let step = 0.9 * limit;
     let run = |on_unstable| {
         let mut state = State::<f32>::at_rest(&model);

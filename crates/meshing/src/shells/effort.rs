@@ -15,7 +15,7 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// Searches of a fit to a distance: 15 to 30 s of one core.
+    /// Searches of a fit to a distance: 5 to 50 s of one core, by the surface.
     pub(super) const MOST: usize = 12_000_000;
 
     /// The same to a number of shells, whose last round needs its time to settle.

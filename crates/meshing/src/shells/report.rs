@@ -97,7 +97,7 @@ impl ShellReport {
         let off = self.distances.largest();
         format!(
             "not reached: {} % was asked for; the best so far is {:.3} % ({:.2} mm off) at {}. {}",
-            100.0 * asked,
+            (1e8 * asked).round() / 1e6,
             100.0 * off / self.diagonal,
             1e3 * off,
             millimetres(&self.farthest),

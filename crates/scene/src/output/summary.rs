@@ -38,8 +38,8 @@ pub struct Summary {
     pub step: f64,
     /// Smallest element bound of the critical step [s]; `null` of shells and with `implicit` and `static`, as the two below.
     pub element_bound: Option<f64>,
-    /// Limit of the assembled operator [s].
-    pub true_limit: Option<f64>,
+    /// The critical time step of the assembled model [s].
+    pub critical_step: Option<f64>,
     /// The element that sets the bound.
     pub limiting_element: Option<LimitingElement>,
     /// Each participant, of a scene with several; what follows is then of the first participant that has it.
@@ -163,7 +163,7 @@ fn empty(status: &str, error: Failure) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "true_limit": null, "limiting_element": null, "participants": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "critical_step": null, "limiting_element": null, "participants": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
@@ -237,7 +237,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
         bodies,
         step: world.slowest().plan.steps.step,
         element_bound: limits.map(|limits| limits.bound.step),
-        true_limit: limits.map(|limits| limits.assembled.step),
+        critical_step: limits.map(|limits| limits.assembled.step),
         limiting_element: limits.map(|limits| limits.limiting.clone()),
         participants: match world.only() {
             Some(_) => Vec::new(),

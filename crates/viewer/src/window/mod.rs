@@ -55,7 +55,7 @@ pub struct Opening {
 /// A window that could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
-    /// Neither a screen nor a graphics processor, or no thread.
+    /// Neither a screen nor a GPU, or no thread.
     #[error("no window can be opened: {0}")]
     Window(String),
     /// A self-test that went wrong.
