@@ -42,6 +42,7 @@ pub mod diagnostic;
 pub mod format;
 mod live;
 mod method;
+mod nearest;
 pub mod niftysim;
 mod of_mesh;
 mod output;

@@ -8,13 +8,14 @@ use schemars::{JsonSchema, Schema, schema_for};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value as Json, json};
 
-use crate::checker::{check_skipping, nearest, read_table};
+use crate::checker::{check_skipping, read_table};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
     BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MomentTable,
     MoveTable, ParticipantTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable,
     TractionTable, ViewTable, VtuTable,
 };
+use crate::nearest::nearest;
 use crate::source::{Source, Value};
 
 /// A kind of table whose parameters depend on its `type`.

@@ -3,9 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::checker::{nearest, read_table};
+use crate::checker::read_table;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{BodyTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, ViewTable};
+use crate::nearest::nearest;
 use crate::reads::{LONGEST_SCENE, Reads};
 use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
 use crate::source::{Node, Source, Value};

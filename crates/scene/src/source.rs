@@ -9,8 +9,8 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::checker::nearest;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
+use crate::nearest::nearest;
 use crate::reads::Reads;
 
 /// Syntax errors shown of one file: what follows the first is often a consequence of it.

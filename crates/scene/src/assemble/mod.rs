@@ -22,9 +22,9 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_sim::ImplicitBodies;
 
 use crate::cache::MeshCache;
-use crate::checker::nearest;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{CurveShape, Timing};
+use crate::nearest::nearest;
 use crate::scene::Scene;
 use crate::source::Source;
 

@@ -1,0 +1,50 @@
+//! The known name that a misspelt word was meant to be.
+
+/// The known name that `word` was most likely meant to be, if any is near.
+///
+/// Near is a third of the letters added, left out, changed or swapped, or one name at the beginning of the other; case,
+/// `-`, `_` and spaces don't count.
+pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let plain = |name: &str| name.to_lowercase().replace(['_', ' '], "-");
+    let word = plain(word);
+    // What the distance costs grows with the square of the length; no name is as long as this.
+    if word.len() > 100 {
+        return None;
+    }
+    let mut best: Option<(usize, &str)> = None;
+    let mut beginning = None;
+    for name in known {
+        let other = plain(name);
+        let distance = strsim::damerau_levenshtein(&word, &other);
+        let longest = word.chars().count().max(other.chars().count());
+        if distance <= (longest / 3).max(1)
+            && distance < longest
+            && best.is_none_or(|(least, _)| distance < least)
+        {
+            best = Some((distance, name));
+        }
+        let shortest = word.chars().count().min(other.chars().count());
+        if shortest >= 3 && (other.starts_with(&word) || word.starts_with(&other)) && beginning.is_none() {
+            beginning = Some(name);
+        }
+    }
+    best.map(|(_, name)| name).or(beginning)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_name_is_near() {
+        let known = ["shear-modulus", "bulk-modulus", "fibre", "to"];
+        assert_eq!(nearest("Shear_Modulus", known), Some("shear-modulus"));
+        assert_eq!(nearest("bulk", known), Some("bulk-modulus"));
+        assert_eq!(nearest("fiber", known), Some("fibre"));
+        assert_eq!(nearest("ot", known), Some("to"));
+        assert_eq!(nearest("x", known), None);
+        assert_eq!(nearest("density", known), None);
+        assert_eq!(nearest("", known), None);
+        assert_eq!(nearest(&"x".repeat(100_000), known), None);
+    }
+}
