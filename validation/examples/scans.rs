@@ -200,7 +200,7 @@ impl Scan {
         let volume: f64 =
             model.solids.iter().flat_map(|solid| (0..solid.cells.len()).map(|c| solid.cells.volume(c))).sum();
         let spacing = (volume / model.node_count() as f64).cbrt();
-        let tau = limits.assembled.step * (modulus / DENSITY).sqrt() / spacing;
+        let tau = limits.critical.assembled.step * (modulus / DENSITY).sqrt() / spacing;
         // What is seen of tets is their own surface, of hexes the one they carry.
         let seen = if self.cells == "tets" { &built.bodies[0].mesh } else { &built.surfaces[0] };
         let [seen, voxels] =
@@ -222,8 +222,8 @@ impl Scan {
             off.largest() * 1e3,
             off.rms_forward.max(off.rms_backward) * 1e3,
             self.tissue.word(),
-            limits.bound.step * 1e3,
-            limits.assembled.step * 1e3,
+            limits.critical.bound.step * 1e3,
+            limits.critical.assembled.step * 1e3,
             seconds,
             summary.status,
             summary.wall_seconds,

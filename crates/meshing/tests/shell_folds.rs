@@ -107,7 +107,7 @@ impl ImplicitField for Vessels {
 }
 
 /// 145,000 triangles. 0.35 % of the diagonal is out of reach of the work allowed, which ends the fit; vessels are not lost on the way.
-/// Where shells cross is told.
+/// The report says where shells cross.
 #[test]
 #[ignore = "about a minute"]
 fn the_work_for_a_large_organ_with_vessels_is_bounded() {

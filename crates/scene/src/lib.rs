@@ -28,7 +28,7 @@
 //! let block = world.only().unwrap();
 //! assert_eq!(block.built.model.node_count(), 27);
 //! let limits = block.plan.limits.as_ref().unwrap();
-//! assert!(limits.bound.step <= limits.assembled.step);
+//! assert!(limits.critical.bound.step <= limits.critical.assembled.step);
 //! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
 //! ```
 

@@ -26,7 +26,10 @@ impl Part {
             None => Method::Explicit(Explicit {
                 precision,
                 on_unstable: run.on_unstable.unwrap_or_default(),
-                critical_step: plan.limits.as_ref().map_or(f64::INFINITY, |limits| limits.assembled.step),
+                critical_step: plan
+                    .limits
+                    .as_ref()
+                    .map_or(f64::INFINITY, |limits| limits.critical.assembled.step),
                 device: plan.target.device.clone(),
                 design: run.design,
             }),

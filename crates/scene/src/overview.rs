@@ -6,7 +6,7 @@ use pliant_geometry::QualityReport;
 use pliant_implicit::Facet;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
-use pliant_sim::{BodyCells, ImplicitBodies, counted, number};
+use pliant_sim::{BodyCells, Critical, ImplicitBodies, counted, number};
 
 use crate::assemble::Built;
 use crate::output::{AddedMass, bodies, told_limit};
@@ -223,7 +223,7 @@ fn describe_implicit_load(kind: &pliant_implicit::LoadKind) -> String {
 }
 
 fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> fmt::Result {
-    let Some(Limits { bound, assembled: limit, limiting }) = &plan.limits else {
+    let Some(Limits { critical: Critical { bound, assembled: limit }, limiting }) = &plan.limits else {
         let (step, until, solver) =
             (number(plan.steps.step), number(scene.scene.until), scene.run.solver.word());
         let steps = counted(plan.steps.number as usize, "step");

@@ -1,7 +1,7 @@
 //! The time step of a run: from the mesh and the laws, or as requested and then compared with the critical time step of the assembled
 //! model.
 
-use pliant_explicit::critical_step::{CriticalStep, ElementBound};
+use pliant_explicit::critical_step::ElementBound;
 use pliant_implicit::Explicit;
 use pliant_sim::{Critical, ImplicitBodies, SAFETY, Steps, counted, number};
 use serde::Serialize;
@@ -33,10 +33,8 @@ pub struct Plan {
 /// What limits explicit steps.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// The smallest element bound.
-    pub bound: ElementBound,
-    /// The critical time step of the assembled model.
-    pub assembled: CriticalStep,
+    /// The critical time step, and the element bound below it.
+    pub critical: Critical,
     /// The cell that sets the bound.
     pub limiting: LimitingElement,
 }
@@ -52,13 +50,6 @@ pub struct LimitingElement {
     pub number: u32,
     /// Its centre at rest [m].
     pub centre: [f64; 3],
-}
-
-impl Limits {
-    /// The automatic step [s].
-    fn automatic(&self) -> f64 {
-        Critical { bound: self.bound, assembled: self.assembled }.automatic()
-    }
 }
 
 impl std::fmt::Display for LimitingElement {
@@ -93,12 +84,8 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         Ok(target) => target,
         Err(diagnostic) => return fail(*diagnostic),
     };
-    let ends = match (scene.run.solver, scene.run.step) {
-        (SolverName::QuasiStatic, StepChoice::Auto(_)) => scene.run.load_steps.ends(scene.scene.until),
-        _ => None,
-    };
-    let mut plan = Plan { steps: Steps { step: 0.0, number: 0, ends }, limits, note, target };
-    (plan.steps.number, plan.steps.step) = plan.steps_of(scene, built, scene.scene.until);
+    let steps = steps(limits.as_ref(), scene, built, scene.scene.until);
+    let mut plan = Plan { steps, limits, note, target };
     if let Some(ends) = &plan.steps.ends {
         let times: Vec<String> = ends.iter().map(|&end| number(end)).collect();
         plan.note = Some(format!("the load steps end at t = {} s", times.join(", ")));
@@ -141,8 +128,7 @@ fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<
         Ok(None) => return fail(Diagnostic::error("the scene has no elements")),
         Err(contradiction) => return fail(Diagnostic::error(contradiction.to_string())),
     };
-    let automatic = critical.automatic();
-    let Critical { bound, assembled } = critical;
+    let Critical { bound, assembled } = &critical;
     let limiting = limiting_element(built, bound);
     let note = match scene.run.step {
         StepChoice::Seconds(step) if scene.run.solver == SolverName::Explicit => {
@@ -156,7 +142,7 @@ fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<
                     "the element bound {} s is set by {limiting}; take `step = \"auto\"` ({} s), a step below {} s, or \
                      a mesh without small cells there",
                     number(bound.step),
-                    number(automatic),
+                    number(critical.automatic()),
                     number(assembled.step)
                 );
                 let place = scene.source.span(&scene.run_at("step"));
@@ -166,27 +152,25 @@ fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<
         }
         _ => None,
     };
-    Ok((Limits { bound, assembled, limiting }, note))
+    Ok((Limits { critical, limiting }, note))
 }
 
-impl Plan {
-    /// How many steps of which size [s] a scene of this duration [s] takes.
-    pub(crate) fn steps_of(&self, scene: &Scene, built: &Built, until: f64) -> (u64, f64) {
-        let asked = match scene.run.step {
-            StepChoice::Seconds(step) => step,
-            StepChoice::Auto(_) => match (scene.run.solver, &self.limits, &built.implicit) {
-                (SolverName::QuasiStatic, ..) if let Some(ends) = scene.run.load_steps.ends(until) => {
-                    return (ends.len() as u64, until / ends.len() as f64);
-                }
-                (SolverName::QuasiStatic | SolverName::Static, ..) => scene.run.load_steps.first(until),
-                (SolverName::Explicit, Some(limits), _) => limits.automatic(),
-                (SolverName::Explicit, None, Some(part)) => SAFETY * Explicit::stable_step(&part.model),
-                _ => IMPLICIT_STEP.min(until),
-            },
-        };
-        let steps = (until / asked - 1e-9).ceil().max(1.0);
-        (steps as u64, until / steps)
-    }
+/// The steps of a scene of a duration [s].
+pub(crate) fn steps(limits: Option<&Limits>, scene: &Scene, built: &Built, until: f64) -> Steps {
+    let longest = match scene.run.step {
+        StepChoice::Seconds(step) => step,
+        StepChoice::Auto(_) => match (scene.run.solver, limits, &built.implicit) {
+            (SolverName::QuasiStatic, ..) if let Some(ends) = scene.run.load_steps.ends(until) => {
+                let number = ends.len() as u64;
+                return Steps { step: until / number as f64, number, ends: Some(ends) };
+            }
+            (SolverName::QuasiStatic | SolverName::Static, ..) => scene.run.load_steps.first(until),
+            (SolverName::Explicit, Some(limits), _) => limits.critical.automatic(),
+            (SolverName::Explicit, None, Some(part)) => SAFETY * Explicit::stable_step(&part.model),
+            _ => IMPLICIT_STEP.min(until),
+        },
+    };
+    Steps::within(until, longest)
 }
 
 fn note_on_step(step: f64, limit: f64) -> Option<String> {
@@ -199,7 +183,7 @@ fn note_on_step(step: f64, limit: f64) -> Option<String> {
     })
 }
 
-fn limiting_element(built: &Built, bound: ElementBound) -> LimitingElement {
+fn limiting_element(built: &Built, bound: &ElementBound) -> LimitingElement {
     let solid = &built.model.solids[bound.solid];
     let nodes = solid.cells.nodes(bound.cell);
     let mut centre = [0.0; 3];
@@ -230,11 +214,12 @@ mod tests {
         let plan = planned("").unwrap();
         let limits = plan.limits.as_ref().unwrap();
         assert!(
-            plan.steps.step <= SAFETY * limits.assembled.step && limits.bound.step <= limits.assembled.step
+            plan.steps.step <= SAFETY * limits.critical.assembled.step
+                && limits.critical.bound.step <= limits.critical.assembled.step
         );
         assert!((plan.steps.step * plan.steps.number as f64 - 0.1).abs() < 1e-15);
         assert!(
-            0.1 / (plan.steps.number - 1) as f64 > SAFETY * limits.assembled.step,
+            0.1 / (plan.steps.number - 1) as f64 > SAFETY * limits.critical.assembled.step,
             "one step fewer would be too large"
         );
         assert_eq!((limits.limiting.body.as_str(), limits.limiting.element.as_str()), ("cube", "hex8"));
@@ -245,12 +230,12 @@ mod tests {
     fn a_step_is_held_against_bound_and_critical_step() {
         let automatic = planned("").unwrap().limits.unwrap();
         let asked = |step: f64| planned(&format!("[run]\nstep = {step:e}\n"));
-        let close = asked(0.95 * automatic.assembled.step).unwrap();
+        let close = asked(0.95 * automatic.critical.assembled.step).unwrap();
         assert!(close.note.is_some_and(|note| note.contains("close to the critical time step")));
         // A whole part of the duration, or the note reports that it is shortened.
-        let below = automatic.bound.step.min(0.9 * automatic.assembled.step);
+        let below = automatic.critical.bound.step.min(0.9 * automatic.critical.assembled.step);
         assert_eq!(asked(0.1 / (0.1 / below).ceil()).unwrap().note, None);
-        let refused = asked(1.001 * automatic.assembled.step).unwrap_err().plain().to_string();
+        let refused = asked(1.001 * automatic.critical.assembled.step).unwrap_err().plain().to_string();
         for piece in [
             "cube.toml:",
             "above the critical time step",

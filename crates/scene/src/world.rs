@@ -11,7 +11,7 @@ use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{FieldName, ViewTable};
 use crate::output::Frame;
-use crate::plan::{Plan, plan};
+use crate::plan::{Plan, plan, steps};
 use crate::scene::Scene;
 
 /// A scene with its participants.
@@ -106,8 +106,7 @@ impl World {
         let mut world = self.clone();
         world.scene.scene.until = until;
         for part in &mut world.participants {
-            (part.plan.steps.number, part.plan.steps.step) =
-                part.plan.steps_of(&part.scene, &part.built, until);
+            part.plan.steps = steps(part.plan.limits.as_ref(), &part.scene, &part.built, until);
         }
         world.meet();
         world
@@ -115,14 +114,8 @@ impl World {
 
     /// Makes the steps of each participant a multiple of those of the participant with the fewest.
     fn meet(&mut self) {
-        if self.only().is_some() {
-            return;
-        }
         let (until, common) = (self.scene.scene.until, self.steps());
-        for part in &mut self.participants {
-            part.plan.steps.number = common * part.plan.steps.number.div_ceil(common);
-            part.plan.steps.step = until / part.plan.steps.number as f64;
-        }
+        self.participants.iter_mut().for_each(|part| part.plan.steps.meet(common, until));
     }
 
     /// The participant where all bodies go together.

@@ -1,4 +1,4 @@
-//! Why a simulation could not go on.
+//! Failures of a simulation.
 
 use std::fmt;
 

@@ -627,10 +627,6 @@ impl Instant for Implicit {
 }
 
 impl Participant for Implicit {
-    fn instant(&self) -> &dyn Instant {
-        self
-    }
-
     fn evaluate(&mut self, _wanted: Wanted) -> Result<(), Failure> {
         if self.evaluated {
             return Ok(());

@@ -55,9 +55,6 @@ impl Kept {
 
 /// Bodies that one stepper advances together.
 pub(crate) trait Participant: Instant + Send {
-    /// The same as observers read it.
-    fn instant(&self) -> &dyn Instant;
-
     /// Finds forces, and with them all that can be asked, at the instant.
     ///
     /// # Errors

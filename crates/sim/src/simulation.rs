@@ -27,12 +27,8 @@ impl World {
     pub fn new(mut parts: Vec<Part>) -> Self {
         let common = parts.iter().map(|part| part.steps.number).min().unwrap_or(1);
         for part in &mut parts {
-            let steps = &mut part.steps;
-            if !steps.number.is_multiple_of(common) {
-                let duration = steps.step * steps.number as f64;
-                steps.number = common * steps.number.div_ceil(common);
-                steps.step = duration / steps.number as f64;
-            }
+            let duration = part.steps.step * part.steps.number as f64;
+            part.steps.meet(common, duration);
         }
         Self { parts }
     }
@@ -350,7 +346,7 @@ impl Simulation {
 
     /// The participants as observers read them, in the order of the world, at the instant last evaluated.
     pub fn instants(&self) -> impl Iterator<Item = &dyn Instant> {
-        self.participants.iter().map(|participant| participant.instant())
+        self.participants.iter().map(|participant| participant.as_ref() as &dyn Instant)
     }
 
     /// Energies of all participants together [J]; the worst of their balances.

@@ -160,10 +160,6 @@ impl<R: Scalar> CellsNow for SolidCells<'_, R> {
 }
 
 impl<R: Numeric> Participant for Solids<R> {
-    fn instant(&self) -> &dyn Instant {
-        self
-    }
-
     fn evaluate(&mut self, wanted: Wanted) -> Result<(), Failure> {
         self.solver.evaluate(&mut self.state, wanted)
     }

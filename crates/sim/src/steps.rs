@@ -25,6 +25,14 @@ impl Steps {
         Self { step: duration / number, number: number as u64, ends: None }
     }
 
+    /// Makes their number a multiple of a common one, within the same duration [s].
+    pub fn meet(&mut self, common: u64, duration: f64) {
+        if !self.number.is_multiple_of(common) {
+            self.number = common * self.number.div_ceil(common);
+            self.step = duration / self.number as f64;
+        }
+    }
+
     /// The end [s] of the step of a number, counted from 1.
     pub fn end_of(&self, number: u64) -> f64 {
         let own = self.ends.as_ref().and_then(|ends| ends.get(number as usize - 1));

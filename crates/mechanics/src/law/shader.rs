@@ -1,4 +1,4 @@
-//! Laws for GPUs: each is a snippet of WGSL beside its Rust twin, put together here with what it stands on.
+//! Laws for GPUs: each is a snippet of WGSL beside its Rust twin. This file joins a law with the functions that it calls.
 
 /// The stress of a law in WGSL.
 ///

@@ -4,7 +4,7 @@
 /// A search for the nearest place of the shells weighs as much as this many for the nearest point of the target.
 pub(super) const LANDING: usize = 4;
 
-/// So does a row of the least-squares step. A piece of a shell that is looked at for crossings weighs as much as one.
+/// A row of the least-squares step weighs as much. A check of one piece of a shell for crossings weighs 1.
 pub(super) const ROW: usize = 4;
 
 /// Work done so far.

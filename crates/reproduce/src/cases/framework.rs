@@ -53,7 +53,7 @@ impl Program {
         // The duration for the timed number of steps.
         let short = World::new(&short)?;
         let limits = short.participants[0].plan.limits.as_ref();
-        let step = SAFETY * limits.map_or(1e-3, |limits| limits.assembled.step);
+        let step = SAFETY * limits.map_or(1e-3, |limits| limits.critical.assembled.step);
         let scene = scene(cells, step * (ELEMENT_STEPS / cells.pow(3)) as f64)?;
         Ok(Self(World::new(&scene)?))
     }

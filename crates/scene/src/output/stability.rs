@@ -62,7 +62,7 @@ impl StabilitySummary {
             last_cut: seen.last_cut,
             most_substeps: seen.most_substeps,
             extra_steps: seen.extra_steps,
-            limited: plan.limits.as_ref().is_some_and(|limits| limits.assembled.step.is_finite()),
+            limited: plan.limits.as_ref().is_some_and(|limits| limits.critical.assembled.step.is_finite()),
         })
     }
 

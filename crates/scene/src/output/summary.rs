@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use pliant_mechanics::Energies;
-use pliant_sim::{Effort, Equilibria, Failure, number};
+use pliant_sim::{Critical, Effort, Equilibria, Failure, number};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
@@ -236,8 +236,8 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
         mass: parts().map(|(part, _)| part.built.model.mass.iter().sum::<f64>()).sum(),
         bodies,
         step: world.slowest().plan.steps.step,
-        element_bound: limits.map(|limits| limits.bound.step),
-        critical_step: limits.map(|limits| limits.assembled.step),
+        element_bound: limits.map(|limits| limits.critical.bound.step),
+        critical_step: limits.map(|limits| limits.critical.assembled.step),
         limiting_element: limits.map(|limits| limits.limiting.clone()),
         participants: match world.only() {
             Some(_) => Vec::new(),
@@ -354,7 +354,7 @@ fn write_part(page: &mut String, part: &Part, outcome: &PartOutcome) -> std::fmt
         writeln!(page, "| solver | {} |", part.scene.run.solver.word())?;
     }
     writeln!(page, "| step | {} s |", number(plan.steps.step))?;
-    if let Some(Limits { bound, assembled: limit, limiting }) = &plan.limits {
+    if let Some(Limits { critical: Critical { bound, assembled: limit }, limiting }) = &plan.limits {
         writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
         writeln!(page, "| critical time step (assembled model) | {} |", told_limit(limit.step))?;
     }
