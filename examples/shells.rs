@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
 
     let mut simulation = Simulation::new(Part::equilibria("strip", model, 1.0, 1))?;
-    simulation.step()?;
+    simulation.step(1)?;
     let up = simulation.frame()?.displacements("strip").ok_or("no strip")?[20][2];
     // F L³/3EI of a beam.
     let beam = force / (3.0 * 1e6 * 0.1 * 0.01_f64.powi(3) / 12.0);

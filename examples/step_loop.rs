@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("t = {:.2} s: top at {:.3} mm, pulled with {force:.4} N", now.time(), 1e3 * up);
             next += 0.25;
         }
-        simulation.step()?;
+        simulation.step(1)?;
     }
     // Both faces are held: strain along one axis alone, of modulus K + 4μ/3.
     let expected = (bulk + 4.0 / 3.0 * shear) * 0.01 * 0.01;

@@ -4,7 +4,6 @@ use std::cell::OnceCell;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use pliant_geometry::io;
@@ -302,10 +301,10 @@ fn days(seconds: f64) -> String {
 /// Wall time [s] of a step, from the first steps; `None` if they fail.
 fn seconds_of_a_step(world: &World) -> Option<f64> {
     const ENOUGH: Duration = Duration::from_millis(100);
-    let mut live = pliant_scene::live(&Arc::new(world.clone())).ok()?;
+    let mut simulation = world.simulation().ok()?;
     let (started, mut steps) = (Instant::now(), 0);
     while started.elapsed() < ENOUGH {
-        steps += live.advance(u64::MAX).ok()?.max(1);
+        steps += simulation.step(u64::MAX).ok()?;
     }
     Some(started.elapsed().as_secs_f64() / steps as f64)
 }

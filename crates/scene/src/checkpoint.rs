@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::read_limited;
 use pliant_mechanics::fingerprint;
-use pliant_sim::{Precision, State, counted, number};
+use pliant_sim::{Precision, Schedule, State, counted, number};
 use serde::{Deserialize, Serialize};
 
 use crate::format::{LoadSteps, SolverName};
-use crate::output::{OutputError, OutputFolder, Schedule, Written, replace};
+use crate::output::{OutputError, OutputFolder, Written, replace};
 use crate::run::{History, Watched};
 use crate::world::{Part, World};
 

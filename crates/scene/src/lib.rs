@@ -69,7 +69,7 @@ pub use assemble::{Built, BuiltBody, Meshing, SizeDoubt, build, build_watched, b
 pub use bound::element_bound;
 pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
-pub use live::{Live, go_on, live};
+pub use live::Live;
 pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
 pub use output::{
     AddedMass, BodySummary, Column, OutputError, OutputFolder, ParticipantSummary, StabilitySummary, Summary,

@@ -1,4 +1,4 @@
-//! The run loop: step, look, write, until the end or a failure.
+//! What a run writes and keeps while it goes: outputs, samples, checkpoints, reports of progress.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,16 +7,17 @@ use std::time::{Duration, Instant};
 use pliant_explicit::stability::Stability;
 use pliant_gpu::Wanted;
 use pliant_mechanics::Energies;
-use pliant_sim::{Effort, Equilibria, Failure, Instant as Now, LoadStepProgress, Simulation};
+use pliant_sim::{
+    Effort, Equilibria, Failure, Instant as Now, LoadStepProgress, Observer, Schedule, Simulation,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::format::SolverName;
 use crate::output::{
-    CONVERGENCE, FieldMesh, Frame, INTERRUPTED, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY, Schedule,
-    Scheduled, ShellStrains, Summary, interrupted, markdown, observers, output_failure, plot, steps_to,
-    summarise, time_of,
+    CONVERGENCE, FieldMesh, Frame, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY, Scheduled,
+    ShellStrains, Summary, interrupted, markdown, output_failure, outputs, plot, summarise, time_of,
 };
 use crate::view::Draw;
 use crate::world::{Part, World};
@@ -242,60 +243,26 @@ fn go(
         }
         None => world.simulation(),
     };
-    let simulation = match begun {
+    let mut simulation = match begun {
         Ok(simulation) => simulation,
         Err(failure) => return Ok(Outcome::not_begun(failure, world)),
     };
-    let mut run = Run::new(world, folder, options, simulation)?;
-    let until = world.scene.scene.until;
-    let before = options.resume.map_or(0.0, |checkpoint| checkpoint.progressed.wall_seconds);
-    let started = Instant::now();
-    let wall_seconds = || before + started.elapsed().as_secs_f64();
-    let wall = || Duration::try_from_secs_f64(wall_seconds()).unwrap_or_default();
-    let mut reported = started;
-    let failure = loop {
-        match run.see() {
-            Ok(last) => {
-                if reported.elapsed() >= REPORT || last {
-                    reported = Instant::now();
-                    let time = run.simulation.time();
-                    report(Progress { time, until, wall: wall(), load_step: None });
-                }
-                if last {
-                    break run.finish().err();
-                }
-            }
-            Err(failure) => break Some(failure),
-        }
-        let stop = options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
-        let mut watch = |step: LoadStepProgress| {
-            if reported.elapsed() >= REPORT {
-                reported = Instant::now();
-                let [from, to] = step.iteration.span;
-                let time = from + step.iteration.fraction * (to - from);
-                report(Progress { time, until, wall: wall(), load_step: Some(step) });
-            }
-        };
-        if let Err(failure) = run.step(wall_seconds(), stop, &mut watch) {
-            if failure.kind != INTERRUPTED {
-                run.show_what_was_found();
-            }
-            break Some(failure);
-        }
-    };
-    let failure = failure.map(|failure| run.advised(failure));
+    let mut run = Run::new(world, folder, options, &simulation, report)?;
+    let failure = simulation.observe(world.scene.scene.until, &mut run).err();
+    let failure = failure.map(|failure| run.advised(failure, &simulation));
     let picture = options.picture.filter(|_| failure.is_none());
-    let (drawn, failure) = match picture.map(|picture| run.draw(picture, folder)).transpose() {
+    let (drawn, failure) = match picture.map(|picture| run.draw(&simulation, picture, folder)).transpose() {
         Ok(drawn) => (drawn, failure),
-        Err(error) => (None, Some(output_failure(&error, Some(run.simulation.time())))),
+        Err(error) => (None, Some(output_failure(&error, Some(simulation.time())))),
     };
-    let Run { simulation, watched, history, files, kept, .. } = run;
+    let wall_seconds = run.wall_seconds();
+    let Run { watched, history, files, kept, .. } = run;
     let parts = world.participants.iter().zip(simulation.instants()).zip(watched);
     Ok(Outcome {
         failure,
         steps: simulation.steps(),
         time: simulation.time(),
-        wall_seconds: wall_seconds(),
+        wall_seconds,
         energies: simulation.energies(),
         parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own, watched)).collect(),
         ended: simulation.ended().map(ToOwned::to_owned),
@@ -318,11 +285,10 @@ fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
     }
 }
 
-/// A run under way.
+/// What is seen, written and kept of a run.
 struct Run<'a> {
     world: &'a World,
-    simulation: Simulation,
-    watching: Vec<Scheduled>,
+    outputs: Vec<Scheduled>,
     history: History,
     sampling: Schedule,
     /// The worst of each participant.
@@ -330,6 +296,14 @@ struct Run<'a> {
     checkpoints: Option<Checkpoints<'a>>,
     /// Whether the last instant becomes a picture.
     pictured: bool,
+    /// Ends the run after the current step once it is true.
+    stop: Option<&'a AtomicBool>,
+    report: &'a mut (dyn FnMut(Progress) + Send),
+    /// When progress was last reported.
+    reported: Instant,
+    started: Instant,
+    /// Wall time [s] of the run that this one resumes.
+    seconds_before: f64,
     /// Files written, without checkpoints.
     files: Vec<PathBuf>,
     /// The last checkpoint written.
@@ -341,8 +315,9 @@ impl<'a> Run<'a> {
     fn new(
         world: &'a World,
         folder: &'a OutputFolder,
-        options: Options<'_>,
-        simulation: Simulation,
+        options: Options<'a>,
+        simulation: &Simulation,
+        report: &'a mut (dyn FnMut(Progress) + Send),
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
@@ -353,56 +328,56 @@ impl<'a> Run<'a> {
         if before.is_some() {
             folder.go_on(&world.scene)?;
         }
-        let watching = observers(world, folder.path(), &mut files, written)?;
+        let outputs = outputs(world, folder.path(), &mut files, written)?;
         let fresh = || vec![Watched::default(); world.participants.len()];
+        let started = Instant::now();
         Ok(Self {
             world,
-            watching,
+            outputs,
             history: before.map_or_else(History::default, |before| before.history.clone()),
             sampling: before.map_or(sampling, |before| before.sampling),
             watched: before.map_or_else(fresh, |before| before.watched.clone()),
             checkpoints: Checkpoints::new(world, folder, simulation.time()),
-            simulation,
             pictured: options.picture.is_some(),
+            stop: options.stop,
+            report,
+            reported: started,
+            started,
+            seconds_before: before.map_or(0.0, |before| before.wall_seconds),
             files,
             kept: None,
         })
     }
 
-    /// Evaluates the current instant and shows it to all who look; whether it is the last.
-    fn see(&mut self) -> Result<bool, Failure> {
-        let (time, last) = (self.simulation.time(), self.is_last());
-        let step = self.world.step_from(time);
-        let looked_at = self.watching.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
-        let wanted = if looked_at || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies };
-        self.simulation.evaluate(wanted)?;
-        self.watched.iter_mut().zip(self.simulation.instants()).for_each(|(own, now)| own.see(now));
-        if self.sampling.is_due(time, step, last) {
-            self.history.sample(&self.world.frames(&self.simulation));
-            self.look_at_strains();
-        }
-        // Of steps that no output looks at nothing is made.
-        if looked_at {
-            let frames = self.world.frames(&self.simulation);
-            for (schedule, observer) in &mut self.watching {
-                if schedule.is_due(time, step, last) {
-                    observer.see(&frames).map_err(|error| output_failure(&error, Some(time)))?;
-                }
-            }
-        }
-        Ok(last)
+    fn wall_seconds(&self) -> f64 {
+        self.seconds_before + self.started.elapsed().as_secs_f64()
     }
 
-    fn look_at_strains(&mut self) {
-        let parts = self.world.participants.iter().zip(self.simulation.instants());
+    /// Reports progress, unless a report is recent.
+    fn tell(&mut self, time: f64, load_step: Option<LoadStepProgress>, last: bool) {
+        if last || self.reported.elapsed() >= REPORT {
+            self.reported = Instant::now();
+            let wall = Duration::try_from_secs_f64(self.wall_seconds()).unwrap_or_default();
+            (self.report)(Progress { time, until: self.world.scene.scene.until, wall, load_step });
+        }
+    }
+
+    /// Whether an output reads an instant.
+    fn is_awaited(&self, simulation: &Simulation, last: bool) -> bool {
+        let (time, step) = (simulation.time(), simulation.step_length());
+        self.outputs.iter().any(|(schedule, _)| schedule.awaits(time, step, last))
+    }
+
+    fn look_at_strains(&mut self, simulation: &Simulation) {
+        let parts = self.world.participants.iter().zip(simulation.instants());
         for (own, (part, now)) in self.watched.iter_mut().zip(parts) {
             own.strains.look(&part.built, now.shells());
         }
     }
 
     /// A failure with a remedy that knows the run.
-    fn advised(&self, failure: Failure) -> Failure {
-        let mut parts = self.world.participants.iter().zip(self.simulation.instants());
+    fn advised(&self, failure: Failure, simulation: &Simulation) -> Failure {
+        let mut parts = self.world.participants.iter().zip(simulation.instants());
         let own = parts.find(|(part, _)| failure.body.as_ref().is_none_or(|body| part.scene.has(body)));
         match own.and_then(|(part, now)| remedy(&failure, part, &now.stability())) {
             Some(remedy) => failure.advised(&remedy),
@@ -410,66 +385,78 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn is_last(&self) -> bool {
-        let time = self.simulation.time();
-        let over = time + 0.5 * self.world.step_from(time) >= self.world.scene.scene.until;
-        over || self.simulation.ended().is_some()
+    /// Draws the instant last seen.
+    fn draw(
+        &self,
+        simulation: &Simulation,
+        picture: &dyn Draw,
+        folder: &OutputFolder,
+    ) -> Result<PathBuf, OutputError> {
+        let world = self.world;
+        let mut shown = FieldMesh::new(world, &world.scene.shown(world.scene.scene.until));
+        shown.fill(&world.frames(simulation));
+        let drawn = picture.draw(shown.mesh(), simulation.time());
+        let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
+        folder.write(PICTURE, &png)
     }
+}
 
-    /// After a step that failed: shows what was found until then to those who have not looked at it.
-    fn show_what_was_found(&mut self) {
-        let seen = self.simulation.time();
-        if !self.simulation.keeps_what_it_found() {
-            return;
-        }
-        let (time, step) = (self.simulation.time(), self.world.step_from(seen));
-        self.look_at_strains();
-        let frames = self.world.frames(&self.simulation);
-        if time > seen {
-            self.history.sample(&frames);
-        }
-        for (schedule, observer) in &mut self.watching {
-            if (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true) {
-                // The failure of the step is reported.
-                let _ = observer.see(&frames);
-            }
-        }
-    }
-
+impl Observer for Run<'_> {
     /// The steps to the next instant at which there is something to do.
-    fn stride(&self) -> u64 {
-        let time = self.simulation.time();
-        let step = self.world.step_from(time);
-        (self.watching.iter().map(|(schedule, _)| schedule))
+    fn stride(&self, simulation: &Simulation) -> u64 {
+        let (time, step) = (simulation.time(), simulation.step_length());
+        (self.outputs.iter().map(|(schedule, _)| schedule))
             .chain([&self.sampling])
             .map(|schedule| schedule.stride(time, step))
             .chain(self.checkpoints.as_ref().map(|checkpoints| checkpoints.stride(time, step)))
-            .chain([steps_to(self.world.scene.scene.until, time, step), self.simulation.stride()])
             .fold(u64::MAX, u64::min)
     }
 
-    /// Goes to the next instant, with a checkpoint there if one is due or the run is to `stop`.
-    fn step(
-        &mut self,
-        wall_seconds: f64,
-        stop: bool,
-        watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), Failure> {
-        let steps = self.stride();
-        self.simulation.advance(steps, watch)?;
-        let (time, last) = (self.simulation.time(), self.is_last());
-        let step = self.world.step_from(time);
+    fn wanted(&self, simulation: &Simulation, last: bool) -> Wanted {
+        let everything = self.is_awaited(simulation, last) || (last && self.pictured);
+        if everything { Wanted::Everything } else { Wanted::Energies }
+    }
+
+    /// Shows an instant to all outputs that await it.
+    fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure> {
+        let (time, step) = (simulation.time(), simulation.step_length());
+        self.watched.iter_mut().zip(simulation.instants()).for_each(|(own, now)| own.see(now));
+        if self.sampling.is_due(time, step, last) {
+            self.history.sample(&self.world.frames(simulation));
+            self.look_at_strains(simulation);
+        }
+        let failed = |error| output_failure(&error, Some(time));
+        // Of steps that no output looks at nothing is made.
+        if self.is_awaited(simulation, last) {
+            let frames = self.world.frames(simulation);
+            for (schedule, output) in &mut self.outputs {
+                if schedule.is_due(time, step, last) {
+                    output.see(&frames).map_err(failed)?;
+                }
+            }
+        }
+        self.tell(time, None, last);
+        if last {
+            self.outputs.iter_mut().try_for_each(|(_, output)| output.finish()).map_err(failed)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a checkpoint where one is due or the run is to stop.
+    fn stepped(&mut self, simulation: &mut Simulation, last: bool) -> Result<(), Failure> {
+        let (time, step) = (simulation.time(), simulation.step_length());
+        let stop = self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
         let due = self.checkpoints.as_mut().is_some_and(|all| all.is_due(time, step, last || stop));
         if due && let Some(checkpoints) = &self.checkpoints {
-            let states = self.simulation.encode()?;
+            let states = simulation.encode()?;
             let progressed = Progressed {
                 time,
-                steps: self.simulation.steps(),
-                wall_seconds,
+                steps: simulation.steps(),
+                wall_seconds: self.wall_seconds(),
                 watched: self.watched.clone(),
                 history: self.history.clone(),
                 sampling: self.sampling,
-                outputs: self.watching.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
+                outputs: self.outputs.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
             };
             let written = checkpoints.write(&progressed, &states);
             self.kept = Some(written.map_err(|error| output_failure(&error, Some(time)))?);
@@ -482,21 +469,30 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Draws the instant last seen.
-    fn draw(&self, picture: &dyn Draw, folder: &OutputFolder) -> Result<PathBuf, OutputError> {
-        let world = self.world;
-        let mut shown = FieldMesh::new(world, &world.scene.shown(world.scene.scene.until));
-        shown.fill(&world.frames(&self.simulation));
-        let drawn = picture.draw(shown.mesh(), self.simulation.time());
-        let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
-        folder.write(PICTURE, &png)
+    /// Shows what was found until then to those who have not looked at it.
+    fn step_failed(&mut self, simulation: &mut Simulation) {
+        let (seen, step) = (simulation.time(), simulation.step_length());
+        if !simulation.keeps_what_it_found() {
+            return;
+        }
+        let time = simulation.time();
+        self.look_at_strains(simulation);
+        let frames = self.world.frames(simulation);
+        if time > seen {
+            self.history.sample(&frames);
+        }
+        for (schedule, output) in &mut self.outputs {
+            if (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true) {
+                // The failure of the step is reported.
+                let _ = output.see(&frames);
+            }
+        }
     }
 
-    /// Ends the outputs where this run ends.
-    fn finish(&mut self) -> Result<(), Failure> {
-        (self.watching.iter_mut())
-            .try_for_each(|(_, observer)| observer.finish())
-            .map_err(|error| output_failure(&error, Some(self.simulation.time())))
+    fn watch(&mut self, progress: LoadStepProgress) {
+        let [from, to] = progress.iteration.span;
+        let time = from + progress.iteration.fraction * (to - from);
+        self.tell(time, Some(progress), false);
     }
 }
 

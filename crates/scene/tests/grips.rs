@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use pliant_mechanics::grip::Grip;
 use pliant_scene::source::Source;
-use pliant_scene::{Live, Scene, World, live};
+use pliant_scene::{Live, Scene, World};
 
 const STRIP: &str = r#"
 [scene]
@@ -42,13 +42,13 @@ fn world(body: &str, solver: &str) -> Arc<World> {
 }
 
 /// The free end of the strip, lifted by a spring from where it is.
-fn lifted(world: &World, live: &dyn Live, stiffness: f64, by: f64) -> Grip {
+fn lifted(world: &World, live: &Live, stiffness: f64, by: f64) -> Grip {
     let rest = &world.only().unwrap().built.model.rest;
     let tip: Vec<u32> = (0..rest.len() as u32).filter(|&node| rest[node as usize][0] > 0.0999).collect();
     let nodes = tip.iter().map(|&node| (node, 1.0 / tip.len() as f64)).collect();
     let mut grip = Grip { nodes, ..Grip::default() };
-    grip.stiffness = stiffness.min(live.stiffest(&grip));
-    let [[x, y, z], _] = live.pulled(&grip);
+    grip.stiffness = stiffness.min(live.simulation.stiffest(&grip));
+    let [[x, y, z], _] = live.simulation.pulled(&grip);
     grip.place = [x, y, z + by];
     grip
 }
@@ -64,14 +64,14 @@ fn the_clamp_holds_against_hand_and_weight() {
         (SOLID, still, 10),
     ] {
         let world = world(body, solver);
-        let mut live = live(&world).unwrap();
-        let grip = lifted(&world, live.as_ref(), 5.0, 0.01);
-        assert!(live.hold(std::slice::from_ref(&grip)), "{solver}");
+        let mut live = Live::new(&world).unwrap();
+        let grip = lifted(&world, &live, 5.0, 0.01);
+        assert!(live.simulation.hold(std::slice::from_ref(&grip)), "{solver}");
         for _ in 0..steps {
-            live.advance(1).unwrap_or_else(|failure| panic!("{solver}: {}", failure.message));
+            live.simulation.step(1).unwrap_or_else(|failure| panic!("{solver}: {}", failure.message));
         }
         live.mesh().unwrap();
-        let [point, force] = live.pulled(&grip).map(Vector3::from);
+        let [point, force] = live.simulation.pulled(&grip).map(Vector3::from);
         let spring = (Vector3::from(grip.place) - point) * grip.stiffness;
         assert!((force - spring).norm() < 1e-12, "{solver}");
         let clamp = Vector3::from(live.reactions()[0]);
@@ -87,17 +87,17 @@ fn the_clamp_holds_against_hand_and_weight() {
 #[test]
 fn what_is_let_go_of_comes_back() {
     let world = world(SHELL, "solver = 'implicit'\nstep = 0.01");
-    let settle = |live: &mut dyn Live| {
-        (0..400).for_each(|_| assert_eq!(live.advance(1).unwrap(), 1));
+    let settle = |live: &mut Live| {
+        (0..400).for_each(|_| assert_eq!(live.simulation.step(1).unwrap(), 1));
         live.mesh().unwrap().point_data["displacement"].values.clone()
     };
-    let mut free = live(&world).unwrap();
-    let hanging = settle(free.as_mut());
-    let grip = lifted(&world, free.as_ref(), 5.0, 0.02);
-    assert!(free.hold(&[grip]));
-    let held = settle(free.as_mut());
-    assert!(free.hold(&[]));
-    let let_go = settle(free.as_mut());
+    let mut free = Live::new(&world).unwrap();
+    let hanging = settle(&mut free);
+    let grip = lifted(&world, &free, 5.0, 0.02);
+    assert!(free.simulation.hold(&[grip]));
+    let held = settle(&mut free);
+    assert!(free.simulation.hold(&[]));
+    let let_go = settle(&mut free);
     let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart(&hanging, &held) > 0.01 && apart(&hanging, &let_go) < 1e-6);
 }

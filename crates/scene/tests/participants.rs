@@ -8,7 +8,7 @@ use std::sync::Arc;
 use pliant_geometry::CellKind;
 use pliant_geometry::io;
 use pliant_scene::source::Source;
-use pliant_scene::{Checkpoint, Options, OutputFolder, Scene, Summary, World, live};
+use pliant_scene::{Checkpoint, Live, Options, OutputFolder, Scene, Summary, World};
 
 const LAWS: &str = r#"
 [law.tissue]
@@ -135,10 +135,10 @@ fn outputs_show_all_bodies_together() {
     for block in [hexes, triangles] {
         assert!(block.data["von-mises"].values.iter().all(|value| value.is_finite() && *value >= 0.0));
     }
-    let mut playing = live(&Arc::new(world)).unwrap();
-    playing.advance(1).unwrap();
+    let mut playing = Live::new(&Arc::new(world)).unwrap();
+    playing.simulation.step(1).unwrap();
     assert_eq!(playing.mesh().unwrap().points.len(), nodes);
-    assert!((playing.time() - 0.01).abs() < 1e-12);
+    assert!((playing.simulation.time() - 0.01).abs() < 1e-12);
 }
 
 #[test]

@@ -10,6 +10,7 @@ use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::failure::Failure;
 use crate::instant::Instant;
+use crate::observer::{Observer, steps_to};
 use crate::part::Part;
 use crate::participant::{Before, Kept, MappedPoint, Participant, begin, go_on};
 use crate::solver::LoadStepProgress;
@@ -211,27 +212,59 @@ impl Simulation {
         self.world.step_from(self.time())
     }
 
-    /// Goes on to the next common instant; on a GPU to the end of its stride.
+    /// Goes on to the next common instant; on a GPU as many as it takes at once, up to `most`. How many.
     ///
     /// # Errors
-    /// If forces can't be found or a step can't be taken.
-    pub fn step(&mut self) -> Result<(), Failure> {
+    /// If forces can't be found or a step can't be taken. The simulation stays at the last good instant.
+    pub fn step(&mut self, most: u64) -> Result<u64, Failure> {
         self.evaluate(Wanted::Energies)?;
-        self.advance(self.stride(), &mut |_| {})
+        let steps = self.stride().min(most.max(1));
+        self.advance(steps, &mut |_| {})?;
+        Ok(steps)
     }
 
     /// Steps until a time [s], the nearest instant to it; `look` sees each instant, the last one, too.
     ///
     /// # Errors
     /// If forces can't be found or a step can't be taken. The simulation stays at the last good instant.
-    pub fn run(&mut self, until: f64, mut look: impl FnMut(&Frame<'_>)) -> Result<(), Failure> {
+    pub fn run(&mut self, until: f64, look: impl FnMut(&Frame<'_>)) -> Result<(), Failure> {
+        struct Looking<F>(F);
+        impl<F: FnMut(&Frame<'_>)> Observer for Looking<F> {
+            fn see(&mut self, simulation: &Simulation, _last: bool) -> Result<(), Failure> {
+                self.0(&Frame { simulation });
+                Ok(())
+            }
+        }
+        self.observe(until, &mut Looking(look))
+    }
+
+    /// Steps until a time [s], the nearest instant to it. The observer sees all instants that its strides do not pass, the first and the
+    /// last ones, too.
+    ///
+    /// # Errors
+    /// If forces can't be found, a step can't be taken, or the observer ends the run. The simulation stays at the last good instant.
+    pub fn observe(&mut self, until: f64, observer: &mut dyn Observer) -> Result<(), Failure> {
         loop {
-            look(&self.frame()?);
-            if self.time() + 0.5 * self.step_length() >= until || self.ended().is_some() {
+            let last = self.is_last(until);
+            self.evaluate(observer.wanted(self, last))?;
+            observer.see(self, last)?;
+            if last {
                 return Ok(());
             }
-            self.advance(1, &mut |_| {})?;
+            let to_the_end = steps_to(until, self.time(), self.step_length());
+            let steps = observer.stride(self).min(to_the_end).min(self.stride());
+            if let Err(failure) = self.advance(steps, &mut |progress| observer.watch(progress)) {
+                observer.step_failed(self);
+                return Err(failure);
+            }
+            let last = self.is_last(until);
+            observer.stepped(self, last)?;
         }
+    }
+
+    /// Whether a run until a time [s] ends here.
+    fn is_last(&self, until: f64) -> bool {
+        self.time() + 0.5 * self.step_length() >= until || self.ended().is_some()
     }
 
     /// All that can be read at the instant; its forces are found. The next step goes on from it.

@@ -81,7 +81,7 @@ fn a_state_goes_on_with_the_same_bits_in_every_method() {
         let whole = ended(Simulation::new(part.clone()).unwrap());
         let mut simulation = Simulation::new(part.clone()).unwrap();
         while simulation.time() < 0.3 * DURATION {
-            simulation.step().unwrap();
+            simulation.step(1).unwrap();
         }
         let (time, state) = (simulation.time(), simulation.state().unwrap());
         let bytes = simulation.encode().unwrap();
@@ -114,7 +114,7 @@ fn a_state_is_of_its_model_and_between_two_steps() {
     simulation.frame().unwrap();
     let refused = simulation.state().unwrap_err();
     assert!(refused.message.contains("belong to the step to come"), "{refused}");
-    simulation.step().unwrap();
+    simulation.step(1).unwrap();
     simulation.state().unwrap();
     assert!(Simulation::new(World { parts: Vec::new() }).is_err());
 }
@@ -123,16 +123,16 @@ fn a_state_is_of_its_model_and_between_two_steps() {
 fn numbers_change_on_the_way() {
     let mut simulation = Simulation::new(Part::explicit("cube", cube(1e5), DURATION).unwrap()).unwrap();
     while simulation.time() < 0.5 * DURATION {
-        simulation.step().unwrap();
+        simulation.step(1).unwrap();
     }
     let soft = simulation.frame().unwrap().reaction("top").unwrap()[2];
-    simulation.step().unwrap();
+    simulation.step(1).unwrap();
     let (time, stiffer) = (simulation.time(), Part::explicit("cube", cube(4e5), DURATION).unwrap());
     assert!(simulation.exchange(stiffer).unwrap());
     assert_eq!(simulation.time(), time);
     let stiff = simulation.frame().unwrap().reaction("top").unwrap()[2];
     assert!(stiff > 2.0 * soft, "{soft} N, then {stiff} N");
-    simulation.step().unwrap();
+    simulation.step(1).unwrap();
     let other = Part::equilibria("strip", strip(), DURATION, 4);
     assert!(!simulation.exchange(other).unwrap());
     simulation.run(DURATION, |_| ()).unwrap();

@@ -66,7 +66,7 @@ fn add(nodes: &mut Nodes, more: Nodes, weight: f64) {
 }
 
 /// A point as a combination of nodes; `None` of one that there is not.
-pub(crate) fn nodes_of(point: &Point, subject: &Subject, live: &dyn Live) -> Option<Nodes> {
+pub(crate) fn nodes_of(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
     let corners = subject.triangles().nth(point.triangle as usize)?;
     let mut nodes = Nodes::new();
     for (corner, weight) in corners.into_iter().zip(point.weights) {
@@ -76,10 +76,10 @@ pub(crate) fn nodes_of(point: &Point, subject: &Subject, live: &dyn Live) -> Opt
 }
 
 /// The mean length [m] of the edges between the nodes that carry a triangle.
-fn edge(corners: [u32; 3], live: &dyn Live) -> f64 {
+fn edge(corners: [u32; 3], live: &Live) -> f64 {
     let mut nodes = Nodes::new();
     corners.into_iter().for_each(|corner| add(&mut nodes, live.nodes_of(corner), 1.0));
-    let places: Vec<Vector3> = nodes.iter().map(|&(node, _)| live.rest(node).into()).collect();
+    let places: Vec<Vector3> = nodes.iter().map(|&(node, _)| live.simulation.rest(node).into()).collect();
     let (mut sum, mut count) = (0.0, 0);
     for (first, a) in places.iter().enumerate() {
         for b in &places[..first] {
@@ -90,7 +90,7 @@ fn edge(corners: [u32; 3], live: &dyn Live) -> f64 {
 }
 
 /// The surface around a point, as a combination of nodes: what lies within two edges of it at rest and hangs together with it.
-fn around(point: &Point, subject: &Subject, live: &dyn Live) -> Option<Nodes> {
+fn around(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
     let corners = subject.triangles().nth(point.triangle as usize)?;
     let middle: Vector3 =
         corners.into_iter().zip(point.weights).map(|(corner, w)| subject.points[corner as usize] * w).sum();
@@ -129,15 +129,15 @@ impl Hold {
     }
 
     /// Of each grip the point [m], and its force on the body [N].
-    pub fn shown<'h>(&'h self, live: &'h dyn Live) -> impl Iterator<Item = [[f64; 3]; 2]> + 'h {
+    pub fn shown<'h>(&'h self, live: &'h Live) -> impl Iterator<Item = [[f64; 3]; 2]> + 'h {
         self.grips.iter().zip(&self.taken).map(|(grip, taken)| {
-            let [middle, force] = live.pulled(grip);
+            let [middle, force] = live.simulation.pulled(grip);
             [(Vector3::from(middle) + taken.offset).into(), force]
         })
     }
 
     /// Does what hand and pins do; the stiffness stays below the bound of stable steps. False where the solver knows no hand.
-    pub fn take(&mut self, hand: &Hand, subject: &Subject, live: &mut dyn Live) -> bool {
+    pub fn take(&mut self, hand: &Hand, subject: &Subject, live: &mut Live) -> bool {
         let grip = |point: &Point, stiffness| grip(point, stiffness, subject, &*live);
         let mut found = true;
         match hand {
@@ -176,15 +176,15 @@ impl Hold {
     }
 
     /// Holds the same in another run.
-    pub fn hold_on(&mut self, live: &mut dyn Live) -> bool {
+    pub fn hold_on(&mut self, live: &mut Live) -> bool {
         for (grip, taken) in self.grips.iter_mut().zip(&self.taken) {
-            grip.stiffness = taken.stiffness.min(live.stiffest(grip));
+            grip.stiffness = taken.stiffness.min(live.simulation.stiffest(grip));
         }
         self.hold(live)
     }
 
-    fn hold(&mut self, live: &mut dyn Live) -> bool {
-        let held = live.hold(&self.grips);
+    fn hold(&mut self, live: &mut Live) -> bool {
+        let held = live.simulation.hold(&self.grips);
         if !held {
             *self = Self::default();
         }
@@ -200,13 +200,13 @@ impl Hold {
 }
 
 /// A grip where its point is, as stiff as asked for or as steps allow.
-fn grip(point: &Point, stiffness: f64, subject: &Subject, live: &dyn Live) -> Option<(Grip, Taken)> {
+fn grip(point: &Point, stiffness: f64, subject: &Subject, live: &Live) -> Option<(Grip, Taken)> {
     let nodes = around(point, subject, live)?;
     let at = Grip { nodes: nodes_of(point, subject, live)?, ..Grip::default() };
     let mut grip = Grip { nodes, ..Grip::default() };
-    grip.stiffness = stiffness.min(live.stiffest(&grip));
-    [grip.place, _] = live.pulled(&grip);
-    let offset = Vector3::from(live.pulled(&at)[0]) - Vector3::from(grip.place);
+    grip.stiffness = stiffness.min(live.simulation.stiffest(&grip));
+    [grip.place, _] = live.simulation.pulled(&grip);
+    let offset = Vector3::from(live.simulation.pulled(&at)[0]) - Vector3::from(grip.place);
     Some((grip, Taken { stiffness, offset }))
 }
 

@@ -214,7 +214,7 @@ struct Replay<'r> {
 }
 
 /// What a view shows of a run.
-fn subject_of(world: &World, view: &ViewTable, live: &mut dyn Live) -> Result<Subject, String> {
+fn subject_of(world: &World, view: &ViewTable, live: &mut Live) -> Result<Subject, String> {
     let mesh = live.mesh().map_err(|failure| failure.message)?;
     Ok(Subject::new(&visible(mesh, &world.hidden(view))))
 }
@@ -234,10 +234,10 @@ impl<'r> Replay<'r> {
         }
         let subject = match self.subject.take() {
             Some(subject) => subject,
-            None => subject_of(world, &world.scene.view, live.as_mut())?,
+            None => subject_of(world, &world.scene.view, &mut live)?,
         };
         let subject = self.subject.insert(subject);
-        self.hold.hold_on(live.as_mut());
+        self.hold.hold_on(&mut live);
         loop {
             while let Some((then, rest)) =
                 self.moves.split_first().filter(|(then, _)| then.steps <= self.steps)
@@ -248,34 +248,34 @@ impl<'r> Replay<'r> {
                         if then.looked {
                             live.mesh().map_err(|failure| failure.message)?;
                         }
-                        self.hold.take(hand, subject, live.as_mut());
+                        self.hold.take(hand, subject, &mut live);
                     }
                     Done::Surface(surface) => {
                         self.surface = Some(surface);
                         let view = surface.put_into(&world.scene.view);
                         live.show(&world.scene.shown_as(&view, 1.0));
-                        *subject = subject_of(world, &view, live.as_mut())?;
+                        *subject = subject_of(world, &view, &mut live)?;
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {
-                        let snapshot = live.state().ok_or("numbers were changed within a step")?;
+                        let snapshot = live.simulation.state().map_err(|failure| failure.message)?;
                         return Ok(Ended::Change(Some(Box::new(snapshot)), numbers));
                     }
                 }
             }
             if self.steps >= self.of {
-                return self.end(live.as_mut()).map(Ended::Whole);
+                return self.end(&mut live).map(Ended::Whole);
             }
             let next = self.moves.first().map_or(self.of, |then| then.steps.min(self.of));
-            self.steps += live.advance(next - self.steps).map_err(|failure| failure.message)?;
-            if let Some([_, force]) = self.hold.shown(live.as_ref()).next().filter(|_| self.hold.by_hand()) {
+            self.steps += live.simulation.step(next - self.steps).map_err(|failure| failure.message)?;
+            if let Some([_, force]) = self.hold.shown(&live).next().filter(|_| self.hold.by_hand()) {
                 self.largest_force = self.largest_force.max(Vector3::from(force).norm());
             }
         }
     }
 
-    fn end(&self, live: &mut dyn Live) -> Result<Replayed, String> {
-        let (time, fingerprint) = (live.time(), live.fingerprint());
+    fn end(&self, live: &mut Live) -> Result<Replayed, String> {
+        let (time, fingerprint) = (live.simulation.time(), live.simulation.fingerprint());
         // Reactions belong to the instant at which forces are found.
         live.mesh().map_err(|failure| failure.message)?;
         Ok(Replayed {

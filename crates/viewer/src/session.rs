@@ -12,7 +12,7 @@ use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values, visible};
 use pliant_scene::format::ViewTable;
-use pliant_scene::{Column, Live, World, go_on, live};
+use pliant_scene::{Column, Live, World};
 use pliant_sim::{Failure, State};
 
 use crate::device::{Seen, point_value};
@@ -118,18 +118,15 @@ pub struct Session {
 ///
 /// # Errors
 /// If a stepper can't be made.
-pub(crate) fn enter(
-    world: &World,
-    from: Option<(World, Option<State>)>,
-) -> Result<(Box<dyn Live>, bool), String> {
+pub(crate) fn enter(world: &World, from: Option<(World, Option<State>)>) -> Result<(Live, bool), String> {
     let told = |failure: Failure| failure.message;
     let world = Arc::new(world.clone());
     if let Some((before, Some(snapshot))) = from
-        && let Some(live) = go_on(&world, snapshot, &before).map_err(told)?
+        && let Some(live) = Live::go_on(&world, snapshot, &before).map_err(told)?
     {
         return Ok((live, true));
     }
-    Ok((live(&world).map_err(told)?, false))
+    Ok((Live::new(&world).map_err(told)?, false))
 }
 
 impl Session {
@@ -270,7 +267,7 @@ struct Player<'s> {
     subject: Arc<Subject>,
     /// Labels whose cells are not shown.
     hidden: Vec<i32>,
-    live: Box<dyn Live>,
+    live: Live,
     /// Whether the state lies on a device.
     on_device: bool,
     course: Playback,
@@ -301,8 +298,11 @@ fn play(
             wake();
             let left = player.go(inbox, &mut frames, wake);
             let goes_on = matches!(left, Left::Change) && player.course.steps > 0;
-            let snapshot =
-                if goes_on && player.course.failure.is_none() { player.live.state() } else { None };
+            let snapshot = if goes_on && player.course.failure.is_none() {
+                player.live.simulation.state().ok()
+            } else {
+                None
+            };
             let (subject, course) = player.end();
             (left, snapshot, subject, course)
         };
@@ -421,7 +421,7 @@ impl<'s> Player<'s> {
             course.start_anew();
             course.note = Some("the mesh or the solver is another one: it starts anew".into());
         }
-        course.hold.hold_on(live.as_mut());
+        course.hold.hold_on(&mut live);
         let on_device = world.device().is_some();
         let known = subject.filter(|_| goes_on);
         let is_known = known.is_some();
@@ -474,7 +474,8 @@ impl<'s> Player<'s> {
             if self.is_due_to_change() {
                 return Left::Change;
             }
-            if self.course.owed > 0 || (self.course.is_going() && self.live.time() < self.course.pace.goal())
+            if self.course.owed > 0
+                || (self.course.is_going() && self.live.simulation.time() < self.course.pace.goal())
             {
                 self.step();
                 changed = true;
@@ -495,7 +496,8 @@ impl<'s> Player<'s> {
     /// Whether another world waits, and the run stands between two steps.
     fn is_due_to_change(&self) -> bool {
         let course = &self.course;
-        course.change.is_some() && (course.steps == 0 || course.failure.is_some() || self.live.delay() == 0)
+        course.change.is_some()
+            && (course.steps == 0 || course.failure.is_some() || !self.live.simulation.is_evaluated())
     }
 
     /// How long it may wait for orders: until the simulation is due to go on, or the frame of what has changed is.
@@ -506,7 +508,7 @@ impl<'s> Player<'s> {
             return long;
         }
         let due = if changed { course.interval().saturating_sub(course.shown.elapsed()) } else { long };
-        let ahead = (self.live.time() - course.pace.goal()) / course.pace.speed.max(1e-9);
+        let ahead = (self.live.simulation.time() - course.pace.goal()) / course.pace.speed.max(1e-9);
         Duration::try_from_secs_f64(ahead.max(0.0)).unwrap_or(due).min(due)
     }
 
@@ -515,13 +517,13 @@ impl<'s> Player<'s> {
         match order {
             Order::Play(playing) => {
                 course.playing = playing;
-                course.pace.anchor(self.live.time());
+                course.pace.anchor(self.live.simulation.time());
             }
             Order::Step(steps) => (course.playing, course.owed) = (false, steps),
             Order::Reset => return Some(Left::Reset),
             Order::Speed(speed) => {
                 course.pace.speed = speed.clamp(1e-6, 1e6);
-                course.pace.anchor(self.live.time());
+                course.pace.anchor(self.live.simulation.time());
             }
             Order::Hand(hand) => self.hold(sent, &hand),
             Order::Change(world, numbers) => course.change = Some((world, numbers)),
@@ -546,8 +548,8 @@ impl<'s> Player<'s> {
         if !matches!(hand, Hand::Pull(_)) {
             self.course.seen.at = None;
         }
-        let looked = self.live.delay() > 0;
-        let held = self.course.hold.take(hand, &self.subject, self.live.as_mut());
+        let looked = self.live.simulation.is_evaluated();
+        let held = self.course.hold.take(hand, &self.subject, &mut self.live);
         let course = &mut self.course;
         course.note = (!held).then(|| "this solver knows no hand: it does not pull".into());
         let number = course.recording.as_ref().map_or(0, |recording| recording.moves.len());
@@ -558,9 +560,9 @@ impl<'s> Player<'s> {
     }
 
     fn follow(&mut self, point: &Point) {
-        let Some(nodes) = nodes_of(point, &self.subject, self.live.as_ref()) else { return };
+        let Some(nodes) = nodes_of(point, &self.subject, &self.live) else { return };
         let point = Grip { nodes, ..Grip::default() };
-        let rest = |&(node, weight): &(u32, f64)| Vector3::from(self.live.rest(node)) * weight;
+        let rest = |&(node, weight): &(u32, f64)| Vector3::from(self.live.simulation.rest(node)) * weight;
         let rest = point.nodes.iter().map(rest).sum();
         self.course.followed.push(Followed { point, rest });
         self.name_columns();
@@ -570,7 +572,7 @@ impl<'s> Player<'s> {
         let axes =
             |name: String, unit| ["x", "y", "z"].map(|axis| Column { name: format!("{name}.{axis}"), unit });
         let mut columns = axes("hand".into(), "N").to_vec();
-        columns.extend(self.live.columns());
+        columns.extend_from_slice(self.live.columns());
         for number in 1..=self.course.followed.len() {
             columns.extend(axes(format!("point.{number}.displacement"), "m"));
         }
@@ -583,7 +585,7 @@ impl<'s> Player<'s> {
         self.course.view = view;
         self.show_as_viewed();
         if before != now {
-            self.course.record(self.live.delay() > 0, sent, Done::Surface(now));
+            self.course.record(self.live.simulation.is_evaluated(), sent, Done::Surface(now));
             if let Err(message) = self.renew_subject() {
                 self.course.failure.get_or_insert(message);
             }
@@ -612,12 +614,12 @@ impl<'s> Player<'s> {
             course.owed = 0;
             return;
         }
-        let left = (course.pace.goal() - self.live.time()) / self.world.step();
+        let left = (course.pace.goal() - self.live.simulation.time()) / self.world.step();
         let advanced = match self.on_device && course.is_going() {
-            true => self.live.advance_without_read_back(left.ceil().max(1.0) as u64, FRAME / 2),
+            true => self.live.simulation.advance_without_read_back(left.ceil().max(1.0) as u64, FRAME / 2),
             false => None,
         };
-        match advanced.unwrap_or_else(|| self.live.advance(1)) {
+        match advanced.unwrap_or_else(|| self.live.simulation.step(1)) {
             Ok(steps) => {
                 course.steps += steps;
                 course.batch = (course.batch.0 + steps, course.batch.1 + started.elapsed());
@@ -625,8 +627,8 @@ impl<'s> Player<'s> {
             }
             Err(failure) => course.failure = Some(failure.message),
         }
-        if course.pace.goal() - self.live.time() > BEHIND * course.pace.speed {
-            course.pace.anchor = (Instant::now(), self.live.time());
+        if course.pace.goal() - self.live.simulation.time() > BEHIND * course.pace.speed {
+            course.pace.anchor = (Instant::now(), self.live.simulation.time());
         }
     }
 
@@ -645,7 +647,7 @@ impl<'s> Player<'s> {
                 seen.values = course.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
                 let critical = || critical_cell(&visible(mesh, &self.hidden));
                 seen.critical = course.view.critical.then(critical).flatten().map(|(cell, _)| cell);
-                seen.energies = self.live.energies();
+                seen.energies = self.live.simulation.energies();
             }
             // The last good picture stays.
             Err(failure) => {
@@ -653,14 +655,14 @@ impl<'s> Player<'s> {
             }
         }
         seen.held.clear();
-        seen.held.extend(course.hold.shown(self.live.as_ref()));
+        seen.held.extend(course.hold.shown(&self.live));
         let [x, y, z] =
             seen.held.first().filter(|_| course.hold.by_hand()).map_or([0.0; 3], |[_, force]| *force);
         seen.sample.clear();
         seen.sample.extend([x, y, z]);
         self.live.sample(&mut seen.sample);
         for followed in &course.followed {
-            let [place, _] = self.live.pulled(&followed.point);
+            let [place, _] = self.live.simulation.pulled(&followed.point);
             seen.sample.extend((Vector3::from(place) - followed.rest).iter());
         }
         seen.number += 1;
@@ -713,7 +715,7 @@ impl<'s> Player<'s> {
         frame.number = course.frames;
         frame.subject = self.subject.clone();
         frame.critical = course.seen.critical;
-        frame.time = self.live.time();
+        frame.time = self.live.simulation.time();
         frame.steps = course.steps;
         frame.playing = course.is_going();
         frame.steps_a_frame = steps;

@@ -141,7 +141,7 @@ impl Screen {
 }
 
 /// Positions and sizes of displacements in ordinary memory.
-fn in_memory(live: &mut dyn Live) -> (Vec<Vector3>, Vec<f64>) {
+fn in_memory(live: &mut Live) -> (Vec<Vector3>, Vec<f64>) {
     let mesh = live.mesh().unwrap();
     let moved = mesh.point_data["displacement"].values.chunks_exact(3);
     let moved: Vec<_> = moved.map(|u| Vector3::new(u[0], u[1], u[2])).collect();
@@ -153,7 +153,7 @@ fn in_memory(live: &mut dyn Live) -> (Vec<Vector3>, Vec<f64>) {
 fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
     let Some(world) = on_device() else { return };
     let device = world.device().cloned().unwrap();
-    let mut live = pliant_scene::live(&std::sync::Arc::new(world.clone())).unwrap();
+    let mut live = Live::new(&std::sync::Arc::new(world.clone())).unwrap();
     let subject = Subject::new(live.mesh().unwrap());
     let mut screen = Screen::new(&device, &subject);
     let style = Style { range: Some([0.0, 0.02]), ..Style::default() };
@@ -163,7 +163,7 @@ fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
     let mut steps = 0;
     // A quarter of a second, as between two looks.
     for _ in 0..30 {
-        steps += live.advance_without_read_back(8, Duration::from_secs(1)).unwrap().unwrap();
+        steps += live.simulation.advance_without_read_back(8, Duration::from_secs(1)).unwrap().unwrap();
         let points = live.place(PointValue::Size, None).unwrap().unwrap();
         if !std::mem::replace(&mut bound, true) {
             screen.bind(&points);
@@ -174,7 +174,7 @@ fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
     assert_eq!(device.read_backs(), before, "something came back");
     assert!(steps >= 30);
     let drawn = live.place(PointValue::Size, None).unwrap().unwrap().read().unwrap();
-    let (places, sizes) = in_memory(live.as_mut());
+    let (places, sizes) = in_memory(&mut live);
     assert!(sizes.iter().any(|size| *size > 1e-4), "it moves");
     assert_eq!(drawn.len(), places.len());
     for ((drawn, place), size) in drawn.iter().zip(&places).zip(&sizes) {
@@ -182,21 +182,21 @@ fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
         assert!((Vector3::new(x, y, z) - place).norm() < 1e-8, "{drawn:?} {place:?}");
         assert!((value - size).abs() < 1e-6 * size.max(1e-4));
     }
-    assert!((live.time() - steps as f64 * world.step()).abs() < 1e-9);
+    assert!((live.simulation.time() - steps as f64 * world.step()).abs() < 1e-9);
 }
 
 #[test]
 fn pictures_from_the_device_are_those_from_memory_with_and_without_a_section() {
     let Some(world) = on_device() else { return };
     let device = world.device().cloned().unwrap();
-    let mut live = pliant_scene::live(&std::sync::Arc::new(world.clone())).unwrap();
+    let mut live = Live::new(&std::sync::Arc::new(world.clone())).unwrap();
     let subject = Subject::new(live.mesh().unwrap());
     let (mut one, mut other) = (Screen::new(&device, &subject), Screen::new(&device, &subject));
-    while live.time() < 0.05 {
-        live.advance_without_read_back(100, Duration::from_secs(1)).unwrap().unwrap();
+    while live.simulation.time() < 0.05 {
+        live.simulation.advance_without_read_back(100, Duration::from_secs(1)).unwrap().unwrap();
     }
     let points = live.place(PointValue::Size, None).unwrap().unwrap();
-    let (places, sizes) = in_memory(live.as_mut());
+    let (places, sizes) = in_memory(&mut live);
     let plain = Style { range: Some([0.0, 0.02]), edges: true, ..Style::default() };
     let plane = Plane { normal: Vector3::new(0.0, 1.0, 0.0), offset: 0.0 };
     let cut = Style { clip: Some(plane), ..plain };

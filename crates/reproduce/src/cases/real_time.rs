@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError, PointValue};
 use pliant_scene::source::{Source, Value};
-use pliant_scene::{Scene, World, live};
+use pliant_scene::{Live, Scene, World};
 
 use crate::CaseError;
 use crate::case::{Case, Findings, Row};
@@ -65,20 +65,20 @@ fn play(text: &str, seconds: f64, set: &[(&[&str], Value)]) -> Result<Played, Ca
 /// Continues frame by frame; a GPU places the points without a read-back.
 fn go(world: &Arc<World>, seconds: f64) -> Result<Played, CaseError> {
     let failed = |failure: pliant_sim::Failure| CaseError::Run(failure.message);
-    let mut live = live(world).map_err(failed)?;
+    let mut live = Live::new(world).map_err(failed)?;
     let solids = world.participants.iter().flat_map(|part| &part.built.model.solids);
     let elements = solids.map(|solid| solid.cells.len()).sum();
     let step = world.step();
     let (mut stepping, mut preparing, mut frames) = (0.0, 0.0, 0);
     let mut farthest = Default::default();
-    while live.time() < seconds {
+    while live.simulation.time() < seconds {
         let started = Instant::now();
         let next = (frames + 1) as f64 / FRAMES;
-        while live.time() < next {
-            let most = ((next - live.time()) / step).ceil().max(1.0) as u64;
-            match live.advance_without_read_back(most, Duration::MAX) {
+        while live.simulation.time() < next {
+            let most = ((next - live.simulation.time()) / step).ceil().max(1.0) as u64;
+            match live.simulation.advance_without_read_back(most, Duration::MAX) {
                 Some(steps) => steps.map_err(failed)?,
-                None => live.advance(most).map_err(failed)?,
+                None => live.simulation.step(most).map_err(failed)?,
             };
         }
         stepping += started.elapsed().as_secs_f64();

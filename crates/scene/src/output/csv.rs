@@ -12,7 +12,7 @@ use crc32fast::Hasher;
 use pliant_sim::{BodyCells, CellsNow};
 
 use super::file::{create, reopen};
-use super::{Frame, Observer, OutputError, Written, fields, time_of};
+use super::{Frame, Output, OutputError, Written, fields, time_of};
 use crate::assemble::Built;
 use crate::format::{CsvTable, FieldName, ProbeTable};
 use crate::world::{Part, World};
@@ -352,7 +352,7 @@ pub(super) fn last_time(path: &Path) -> Option<f64> {
     text.strip_suffix('\n')?.lines().next_back()?.split(',').next()?.parse().ok()
 }
 
-impl Observer for Rows {
+impl Output for Rows {
     fn see(&mut self, frames: &[Frame<'_>]) -> Result<(), OutputError> {
         self.row.clear();
         self.row.push(time_of(frames));

@@ -9,7 +9,7 @@ use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_
 
 use super::field_mesh::FieldMesh;
 use super::file::{check_own_folder, replace};
-use super::{Frame, Observer, OutputError, Written, time_of};
+use super::{Frame, Output, OutputError, Written, time_of};
 use crate::format::VtuTable;
 use crate::world::World;
 
@@ -66,7 +66,7 @@ impl Series {
     }
 }
 
-impl Observer for Series {
+impl Output for Series {
     fn see(&mut self, frames: &[Frame<'_>]) -> Result<(), OutputError> {
         self.shown.fill(frames);
         let time = time_of(frames);

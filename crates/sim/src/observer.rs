@@ -1,0 +1,180 @@
+//! Observers of a run, and when they look.
+
+use pliant_gpu::Wanted;
+use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
+use crate::simulation::Simulation;
+use crate::solver::LoadStepProgress;
+
+/// Looks at a run ([`Simulation::observe`]) and changes nothing.
+///
+/// An observer that samples the height of a body every tenth of a second:
+///
+/// ```
+/// use pliant_sim::{Failure, Observer, Schedule, Simulation};
+///
+/// struct Height {
+///     schedule: Schedule,
+///     samples: Vec<f64>,
+/// }
+///
+/// impl Observer for Height {
+///     fn stride(&self, simulation: &Simulation) -> u64 {
+///         self.schedule.stride(simulation.time(), simulation.step_length())
+///     }
+///
+///     fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure> {
+///         if self.schedule.is_due(simulation.time(), simulation.step_length(), last) {
+///             self.samples.extend(simulation.instants().map(|now| now.displacement(3)[2]));
+///         }
+///         Ok(())
+///     }
+/// }
+/// # use pliant_mechanics::Model;
+/// # use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+/// # use pliant_mechanics::load::Load;
+/// # use pliant_mechanics::model::{Cells, Material, Solid};
+/// # let mut model = Model::default();
+/// # let tet = model.add_body("tet", &[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
+/// # let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
+/// # let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
+/// # model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
+/// # model.fix("base", vec![0, 1, 2]);
+/// # model.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
+/// # let part = pliant_sim::Part::explicit("tet", model, 0.5)?;
+///
+/// let mut height = Height { schedule: Schedule::new(0.1), samples: Vec::new() };
+/// Simulation::new(part)?.observe(0.5, &mut height)?;
+/// assert_eq!(height.samples.len(), 6);
+/// # Ok::<(), Failure>(())
+/// ```
+pub trait Observer {
+    /// The most common steps from here that miss no instant it has to see; at least one.
+    fn stride(&self, _simulation: &Simulation) -> u64 {
+        1
+    }
+
+    /// What it reads at an instant, the last or not.
+    fn wanted(&self, _simulation: &Simulation, _last: bool) -> Wanted {
+        Wanted::Everything
+    }
+
+    /// Reads an instant whose forces are found.
+    ///
+    /// # Errors
+    /// Whatever shall end the run.
+    fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure>;
+
+    /// Follows a step. Forces are not found yet, so the state can be taken.
+    ///
+    /// # Errors
+    /// Whatever shall end the run.
+    fn stepped(&mut self, _simulation: &mut Simulation, _last: bool) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Follows a step that failed.
+    fn step_failed(&mut self, _simulation: &mut Simulation) {}
+
+    /// Hears how far a load step is.
+    fn watch(&mut self, _progress: LoadStepProgress) {}
+}
+
+/// When an observer looks: at the first instant, at the one nearest to each multiple of an interval, and at the last.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Schedule {
+    every: f64,
+    seen: u64,
+    /// The last instant that it was due at; before the first, none is.
+    last: f64,
+}
+
+impl Schedule {
+    /// One that looks every so many seconds, from the start on.
+    pub fn new(every: f64) -> Self {
+        Self { every, seen: 0, last: f64::NEG_INFINITY }
+    }
+
+    /// One that has seen all up to an instant, that included.
+    pub fn after(every: f64, time: f64, step: f64) -> Self {
+        let mut schedule = Self::new(every);
+        schedule.is_due(time, step, true);
+        schedule
+    }
+
+    /// Whether the observer has yet to see an instant.
+    pub fn awaits(&self, time: f64, step: f64, last: bool) -> bool {
+        last || time + 0.5 * step >= self.seen as f64 * self.every
+    }
+
+    /// How many steps from a time miss no instant that the observer has to see; at least one.
+    pub fn stride(&self, time: f64, step: f64) -> u64 {
+        steps_to(self.seen as f64 * self.every, time, step)
+    }
+
+    /// Whether the observer has to see an instant; it then counts as seen.
+    pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
+        let due = self.awaits(time, step, last);
+        if due {
+            self.seen = (((time + 0.5 * step) / self.every).floor() as u64).saturating_add(1);
+            self.last = time;
+        }
+        due
+    }
+
+    /// Whether it was due at this instant.
+    pub fn has_seen(&self, time: f64) -> bool {
+        self.last == time
+    }
+}
+
+/// Steps from a time to the instant nearest to another time, at least one; rather one too few than one too many.
+pub fn steps_to(goal: f64, time: f64, step: f64) -> u64 {
+    (((goal - time) / step - 0.5 - 1e-6).ceil()).max(1.0) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_schedule_sees_the_first_the_nearest_and_the_last_instant() {
+        let mut schedule = Schedule::new(0.1);
+        let step = 0.03;
+        let seen: Vec<u32> =
+            (0..=10).filter(|&n| schedule.is_due(f64::from(n) * step, step, n == 10)).collect();
+        // 0.00, 0.09, 0.21, 0.30.
+        assert_eq!(seen, [0, 3, 7, 10]);
+    }
+
+    #[test]
+    fn strides_miss_no_instant() {
+        for (every, step) in [(0.1, 0.03), (0.1, 0.1), (0.1, 0.02), (0.01, 0.05), (1.0, 1e-4)] {
+            let end = 20_000_u64;
+            let mut one_by_one = Schedule::new(every);
+            let mut in_strides = one_by_one;
+            let seen: Vec<u64> =
+                (0..end).filter(|&n| one_by_one.is_due(n as f64 * step, step, false)).collect();
+            let (mut found, mut looks, mut n) = (Vec::new(), 0, 0);
+            while n < end {
+                looks += 1;
+                if in_strides.is_due(n as f64 * step, step, false) {
+                    found.push(n);
+                }
+                n += in_strides.stride(n as f64 * step, step);
+            }
+            assert_eq!(seen, found, "every {every} s in steps of {step} s");
+            assert!(looks <= 2 * seen.len(), "{looks} looks for {} instants", seen.len());
+        }
+    }
+
+    #[test]
+    fn an_interval_below_the_step_sees_every_instant_once() {
+        let mut schedule = Schedule::new(0.01);
+        assert!((0..20).all(|n| schedule.is_due(f64::from(n) * 0.05, 0.05, false)));
+        // More intervals than an integer counts.
+        let mut schedule = Schedule::new(1e-300);
+        assert!((0..20).all(|n| schedule.is_due(f64::from(n) * 0.05, 0.05, false)));
+    }
+}
