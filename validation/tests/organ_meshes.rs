@@ -5,12 +5,9 @@
 use pliant_geometry::{Mesh, Vector3};
 use pliant_imaging::{Cleaning, LabelImage, Smoothing};
 use pliant_meshing::{Anatomy, Organ, OrganMesh, OrganTets};
+use pliant_testing::organs;
 use pliant_validation::{Specimen, elastic, law, run};
 use serde_json::json;
-
-#[allow(dead_code)]
-#[path = "../../crates/meshing/tests/meshing/images.rs"]
-mod images;
 
 const YOUNG: f64 = 3000.0;
 const POISSON: f64 = 0.45;
@@ -54,24 +51,24 @@ fn check(name: &str, image: &LabelImage, labels: &[i32], edge: f64, least: f64) 
 
 #[test]
 fn the_liver_at_10_mm_has_the_step_of_the_specification() {
-    check("liver", &images::liver(), &[1], 0.010, 0.58);
+    check("liver", &organs::liver(), &[1], 0.010, 0.58);
 }
 
 #[test]
 fn the_brain_at_10_mm_has_the_step_of_the_specification() {
-    check("brain", &images::whole_brain(), &[1], 0.010, 0.58);
+    check("brain", &organs::whole_brain(), &[1], 0.010, 0.58);
 }
 
 #[test]
 fn inner_materials_do_not_cost_the_step() {
-    check("brain with ventricles and tumour", &images::brain(), &[1, 2, 3], 0.010, 0.58);
+    check("brain with ventricles and tumour", &organs::brain(), &[1, 2, 3], 0.010, 0.58);
 }
 
 /// The brain at 5 mm, with its materials, misses 0.56: τ = 0.545.
 #[test]
 #[ignore = "slow: 20 s in release"]
 fn the_liver_at_5_mm_has_the_step_of_the_specification() {
-    check("liver", &images::liver(), &[1], 0.005, 0.56);
+    check("liver", &organs::liver(), &[1], 0.005, 0.56);
 }
 
 /// Everything that the specification asks of meshes of the organs, lattice by lattice, as a table:
@@ -85,13 +82,13 @@ fn table_of_organ_meshes() {
         "organ edge[mm] lattice | tets | acoustic raw τ | RMS H→ H← | interfaces | volumes[%] | time[s]"
     );
     for (name, image, labels, edge, lattices) in [
-        ("liver", images::liver(), &[1][..], 0.010, 8),
-        ("brain", images::whole_brain(), &[1], 0.010, 8),
-        ("brain+inner", images::brain(), &[1, 2, 3], 0.010, 8),
-        ("liver", images::liver(), &[1], 0.005, 2),
-        ("brain+inner", images::brain(), &[1, 2, 3], 0.005, 2),
+        ("liver", organs::liver(), &[1][..], 0.010, 8),
+        ("brain", organs::whole_brain(), &[1], 0.010, 8),
+        ("brain+inner", organs::brain(), &[1, 2, 3], 0.010, 8),
+        ("liver", organs::liver(), &[1], 0.005, 2),
+        ("brain+inner", organs::brain(), &[1, 2, 3], 0.005, 2),
     ] {
-        let truth = images::truth(name);
+        let truth = organs::truth(name);
         let cleaning = Cleaning { keep_largest: true, ..Cleaning::default() };
         let (anatomy, _) =
             Anatomy::from_image(&image, labels, &cleaning, &Smoothing::default(), &|_| {}).unwrap();
@@ -109,12 +106,12 @@ fn table_of_organ_meshes() {
             runs.sort_by(|a, b| a.0.total_cmp(&b.0));
             let (seconds, made) = &runs[1];
             let [_, tau] = limit(made);
-            let [forth, back, rms] = images::distances(&made.mesh, &truth).map(|x| x / edge);
+            let [forth, back, rms] = organs::distances(&made.mesh, &truth).map(|x| x / edge);
             let inner =
                 [(2, Organ::Ventricles), (3, Organ::Tumour)].into_iter().filter(|(l, _)| labels.contains(l));
             let interfaces: Vec<String> = inner
                 .map(|(label, organ)| {
-                    format!("{:.3}", images::interface_rms(&made.mesh, label, organ) / edge)
+                    format!("{:.3}", organs::interface_rms(&made.mesh, label, organ) / edge)
                 })
                 .collect();
             let volumes: Vec<String> = (made.report.materials.iter())
@@ -137,7 +134,7 @@ fn table_of_organ_meshes() {
 #[test]
 #[ignore = "slow: 10⁴ steps"]
 fn the_critical_step_of_an_organ_is_sharp() {
-    let mesh = organ(&images::liver(), &[1], 0.010, Vector3::zeros()).mesh;
+    let mesh = organ(&organs::liver(), &[1], 0.010, Vector3::zeros()).mesh;
     let held = specimen(mesh).fix("z-min", [true; 3]).falling([1e-3, 2e-3, -3e-3]);
     let limit = held.critical_step();
     let mut steps = 0;

@@ -7,10 +7,7 @@ use std::time::Instant;
 use pliant_geometry::io;
 use pliant_imaging::{Cleaning, Smoothing};
 use pliant_meshing::{Anatomy, DEFAULT_CELL_LIMIT, Fewer, FittedShells, ShellGoal, TriangleMesh};
-
-#[allow(dead_code)]
-#[path = "../../crates/meshing/tests/meshing/images.rs"]
-mod images;
+use pliant_testing::organs;
 
 fn organ(path: &str) -> Option<TriangleMesh> {
     let Some(data) = std::env::var_os("PLIANT_DATA") else {
@@ -45,7 +42,7 @@ fn two_errors(name: &str, target: &TriangleMesh) {
 fn the_phantom_liver_of_its_image() {
     let cleaning = Cleaning { keep_largest: true, ..Cleaning::default() };
     let (anatomy, _) =
-        Anatomy::from_image(&images::liver(), &[1], &cleaning, &Smoothing::default(), &|_| {}).unwrap();
+        Anatomy::from_image(&organs::liver(), &[1], &cleaning, &Smoothing::default(), &|_| {}).unwrap();
     let surface = TriangleMesh::of_field(anatomy.field(), 0.205 / 128.0, DEFAULT_CELL_LIMIT).unwrap();
     two_errors("phantom liver", &surface);
 }

@@ -3,14 +3,11 @@
 mod support;
 
 #[allow(dead_code)]
-#[path = "../../imaging/tests/imaging/write.rs"]
-mod write;
-
 use std::fs;
 use std::path::Path;
 
+use pliant_testing::image_files::{Form, Syntax, Volume, dicom, nifti1, nifti2};
 use support::{BLOCK, Told, Workshop};
-use write::{Form, Syntax, Volume, dicom, nifti1, nifti2};
 
 fn assert_refused(workshop: &Workshop, image: &str, says: &[&str]) {
     let mesh = ["mesh", image, "--label", "1", "--edge", "5mm", "-o", "out.vtu", "--json"];

@@ -3,13 +3,12 @@
 mod support;
 
 #[allow(dead_code)]
-#[path = "../../imaging/tests/imaging/write.rs"]
-mod write;
-
 use pliant_geometry::io;
 use pliant_meshing::sphere;
+use pliant_testing::image_files::{
+    Form, Segments, Syntax, Volume, metaimage, nifti1, segmentation, structure_set,
+};
 use support::{BLOCK, Told, Workshop};
-use write::{Form, Segments, Syntax, Volume, metaimage, nifti1, segmentation, structure_set};
 
 /// Voxels of 2 mm along each side.
 const SIDE: usize = 20;

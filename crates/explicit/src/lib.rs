@@ -55,4 +55,4 @@ pub use relaxation::{Relaxation, Series};
 pub use state::{History, State, Work};
 pub use step_control::{Clock, Lengths, StepControl};
 pub use step_error::StepError;
-pub use stepper::{CentralDifference, Observable};
+pub use stepper::{CentralDifference, Observable, Wanted};

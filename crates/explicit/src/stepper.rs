@@ -30,6 +30,15 @@ use crate::step_error::StepError;
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
 
+/// What is read of an evaluated instant, and read back where the state lies on a GPU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// Energies and reactions.
+    Energies,
+    /// Also displacements, increments and what relaxing laws remember.
+    Everything,
+}
+
 /// What can be asked about the instant a state stands at, of whatever brought it there.
 pub trait Observable<R> {
     /// Energies [J].

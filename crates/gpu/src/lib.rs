@@ -9,7 +9,7 @@
 //! [`GpuStepper`] advances a state of a model as `CentralDifference` does on the CPU, hundreds of steps at a time:
 //!
 //! ```
-//! use pliant_gpu::{Device, GpuStepper, StepFailure, Wanted};
+//! use pliant_gpu::{Device, GpuStepper, StepFailure};
 //! use pliant_explicit::{Observable, State};
 //! use pliant_mechanics::Model;
 //!
@@ -72,7 +72,7 @@
 //!
 //! # Tests
 //!
-//! `tests/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
+//! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
 //! and load on unordered meshes deformed at random. Tests also run devices opened with
 //! lower limits (`Device::open_within`) and devices destroyed during a run. The gate runs
 //! all of them on Mesa's software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
@@ -99,4 +99,4 @@ pub use error::GpuError;
 pub use mapping::{DeviceMapping, DevicePoints, PointValue};
 pub use rates::DeviceRates;
 pub use run::StepFailure;
-pub use stepper::{GpuStepper, Wanted};
+pub use stepper::GpuStepper;

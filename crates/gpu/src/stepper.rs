@@ -5,7 +5,7 @@ use std::time::{Duration, Instant as Clock};
 
 use pliant_explicit::stability::{Monitor, Stability};
 use pliant_explicit::{
-    CentralDifference, Deformed, Lengths, Observable, State, StepControl, StepError, Sums,
+    CentralDifference, Deformed, Lengths, Observable, State, StepControl, StepError, Sums, Wanted,
     model_balance_floor,
 };
 use pliant_mechanics::Energies;
@@ -37,15 +37,6 @@ const LIMIT_EVERY: u64 = 1000;
 
 /// A submission takes at most this long [s]: systems reset a device that a program occupies for seconds.
 const LONGEST_SUBMISSION: f64 = 0.2;
-
-/// What is read back of an evaluated instant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
-    /// Energies and reactions.
-    Energies,
-    /// Also displacements, increments and what relaxing laws remember.
-    Everything,
-}
 
 /// Where a state was when it was evaluated.
 #[derive(Clone, Copy)]

@@ -4,11 +4,7 @@
 use std::time::Instant;
 
 use pliant_meshing::{MeshingError, Organ, Phantom, Stuffing, Voxels};
-use pliant_testing::Random;
-
-#[allow(dead_code)]
-#[path = "../tests/meshing/checks.rs"]
-mod checks;
+use pliant_testing::{Random, mesh_checks};
 
 fn main() -> Result<(), MeshingError> {
     for (organ, edge) in [
@@ -35,14 +31,14 @@ fn default_lattice(phantom: &Phantom, edge: f64) -> Result<(), MeshingError> {
         best = best.min(start.elapsed().as_secs_f64());
     }
     let filled = Stuffing::new(edge).mesh(phantom)?;
-    let [sharpest, bluntest] = checks::dihedral_range(&filled.mesh);
+    let [sharpest, bluntest] = mesh_checks::dihedral_range(&filled.mesh);
     println!(
         "  tets: {} nodes, {} tets, {:.1} ml, dihedral {sharpest:.1} to {bluntest:.1} degrees, \
          least acoustic length {:.3} of ideal, {} non-manifold edges, {} cells dropped, {:.1} ms (best of 5)",
         filled.mesh.points.len(),
         filled.mesh.blocks[0].len(),
-        checks::tet_volume(&filled.mesh) * 1e6,
-        checks::least_acoustic_length(&filled.mesh) / checks::ideal_acoustic_length(edge),
+        mesh_checks::tet_volume(&filled.mesh) * 1e6,
+        mesh_checks::least_acoustic_length(&filled.mesh) / mesh_checks::ideal_acoustic_length(edge),
         filled.non_manifold_edges,
         filled.dropped_cells,
         best * 1e3
@@ -54,11 +50,13 @@ fn worst_lattice(phantom: &Phantom, edge: f64) -> Result<(), MeshingError> {
     let mut random = Random::new(9);
     let (mut sharpest, mut bluntest, mut shortest) = (180.0_f64, 0.0_f64, f64::INFINITY);
     for _ in 0..8 {
-        let stuffing = Stuffing { origin: Some(checks::offset(&mut random, edge)), ..Stuffing::new(edge) };
+        let stuffing =
+            Stuffing { origin: Some(mesh_checks::offset(&mut random, edge)), ..Stuffing::new(edge) };
         let mesh = stuffing.mesh(phantom)?.mesh;
-        let [low, high] = checks::dihedral_range(&mesh);
+        let [low, high] = mesh_checks::dihedral_range(&mesh);
         (sharpest, bluntest) = (sharpest.min(low), bluntest.max(high));
-        shortest = shortest.min(checks::least_acoustic_length(&mesh) / checks::ideal_acoustic_length(edge));
+        shortest = shortest
+            .min(mesh_checks::least_acoustic_length(&mesh) / mesh_checks::ideal_acoustic_length(edge));
     }
     println!(
         "  8 offsets: dihedral {sharpest:.1} to {bluntest:.1} degrees, least acoustic length {shortest:.3}"

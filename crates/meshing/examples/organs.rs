@@ -6,36 +6,30 @@ use std::time::Instant;
 use pliant_geometry::Vector3;
 use pliant_imaging::{Cleaning, Smoothing};
 use pliant_meshing::{Anatomy, OrganTets};
-use pliant_testing::Random;
-
-#[allow(dead_code)]
-#[path = "../tests/meshing/checks.rs"]
-mod checks;
-#[allow(dead_code)]
-#[path = "../tests/meshing/images.rs"]
-mod images;
+use pliant_testing::{Random, mesh_checks, organs};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let lattices: usize = std::env::args().nth(1).map_or(Ok(8), |text| text.parse())?;
     let cleaning = Cleaning { keep_largest: true, ..Cleaning::default() };
     for (name, image, labels, edges) in [
-        ("liver", images::liver(), vec![1], vec![0.010, 0.005]),
-        ("brain", images::brain(), vec![1, 2, 3], vec![0.010, 0.005]),
-        ("brain of one label", images::whole_brain(), vec![1], vec![0.010, 0.008]),
+        ("liver", organs::liver(), vec![1], vec![0.010, 0.005]),
+        ("brain", organs::brain(), vec![1, 2, 3], vec![0.010, 0.005]),
+        ("brain of one label", organs::whole_brain(), vec![1], vec![0.010, 0.008]),
     ] {
         let start = Instant::now();
         let (anatomy, _) = Anatomy::from_image(&image, &labels, &cleaning, &Smoothing::default(), &|_| {})?;
         println!("{name}: field in {:.3} s", start.elapsed().as_secs_f64());
-        let truth = images::truth(name);
+        let truth = organs::truth(name);
         for edge in edges {
             let mut random = Random::new(5);
             for number in 0..lattices {
-                let origin = if number == 0 { Vector3::zeros() } else { checks::offset(&mut random, edge) };
+                let origin =
+                    if number == 0 { Vector3::zeros() } else { mesh_checks::offset(&mut random, edge) };
                 let start = Instant::now();
                 let request = OrganTets { origin: Some(origin), ..OrganTets::new(edge) };
                 let made = request.mesh(&anatomy, &|_| {})?;
                 let seconds = start.elapsed().as_secs_f64();
-                let [forth, back, rms] = images::distances(&made.mesh, &truth);
+                let [forth, back, rms] = organs::distances(&made.mesh, &truth);
                 if number > 0 {
                     let r = &made.report;
                     println!(

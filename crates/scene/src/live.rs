@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use pliant_explicit::Wanted;
 use pliant_geometry::Mesh;
-use pliant_gpu::{DeviceMapping, DevicePoints, PointValue, Wanted};
+#[cfg(feature = "gpu")]
+use pliant_sim::gpu::{DeviceMapping, DevicePoints, PointValue};
 use pliant_sim::{Failure, Simulation, State};
 
 use crate::format::VtuTable;
@@ -17,6 +19,7 @@ pub struct Live {
     world: Arc<World>,
     shown: FieldMesh,
     /// What finds the points of the snapshot where the state lies on a device.
+    #[cfg(feature = "gpu")]
     mapping: Option<DeviceMapping>,
     samples: Samples,
 }
@@ -46,23 +49,26 @@ impl Live {
             shown: FieldMesh::new(world, &world.scene.shown(1.0)),
             samples: Samples::new(world, &world.scene.sampled()),
             world: Arc::clone(world),
+            #[cfg(feature = "gpu")]
             mapping: None,
         }
     }
 
     /// The points shown at the instant, found on the GPU where the state lies, with a value each; `given` takes the
     /// place of those given before. `None` of a solver whose state lies in ordinary memory.
+    #[cfg(feature = "gpu")]
     pub fn place(
         &mut self,
         value: PointValue,
         given: Option<&[f32]>,
     ) -> Option<Result<DevicePoints, Failure>> {
+        let (world, shown) = (&self.world, &self.shown);
+        let on_device = self.simulation.on_device()?;
         if self.mapping.is_none() {
-            let (world, shown) = (&self.world, &self.shown);
-            let mut points = (0..)
+            let points = (0..)
                 .zip(&shown.mesh().points)
                 .map(|(point, place)| ([place.x, place.y, place.z], shown.nodes_of(world, point).1));
-            match self.simulation.map(&mut points)? {
+            match on_device.map(points) {
                 Ok(mapping) => self.mapping = Some(mapping),
                 Err(failure) => return Some(Err(failure)),
             }
@@ -71,7 +77,7 @@ impl Live {
         if let Some(values) = given {
             mapping.give(values);
         }
-        self.simulation.apply(mapping, value);
+        on_device.apply(mapping, value);
         Some(Ok(mapping.points().clone()))
     }
 
@@ -84,7 +90,10 @@ impl Live {
     /// Shows another series.
     pub fn show(&mut self, shown: &VtuTable) {
         self.shown = FieldMesh::new(&self.world, shown);
-        self.mapping = None;
+        #[cfg(feature = "gpu")]
+        {
+            self.mapping = None;
+        }
     }
 
     /// What is shown, at rest, with the fields of the instant, whose forces are then found.

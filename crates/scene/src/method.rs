@@ -30,7 +30,9 @@ impl Part {
                     .limits
                     .as_ref()
                     .map_or(f64::INFINITY, |limits| limits.critical.assembled.step),
+                #[cfg(feature = "gpu")]
                 device: plan.target.device.clone(),
+                #[cfg(feature = "gpu")]
                 design: run.design,
             }),
         };

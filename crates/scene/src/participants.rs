@@ -261,7 +261,11 @@ impl Scene {
             (run.on_unstable, run.mass_scaling) = (None, None);
         }
         if !total_lagrangian {
-            run = RunTable { precision: None, device: DeviceName::Cpu, adapter: None, design: None, ..run };
+            (run.precision, run.device, run.adapter) = (None, DeviceName::Cpu, None);
+            #[cfg(feature = "gpu")]
+            {
+                run.design = None;
+            }
         }
         if !solver.solves_equations() {
             run =

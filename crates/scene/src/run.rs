@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use pliant_explicit::Wanted;
 use pliant_explicit::stability::Stability;
-use pliant_gpu::Wanted;
 use pliant_mechanics::Energies;
 use pliant_sim::{
     Effort, Equilibria, Failure, Instant as Now, LoadStepProgress, Observer, Schedule, Simulation,
@@ -321,7 +321,7 @@ impl<'a> Run<'a> {
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
-        let on_device = world.participants.iter().any(|part| part.plan.target.device.is_some());
+        let on_device = world.participants.iter().any(|part| part.plan.target.is_gpu());
         let samples = if on_device { SAMPLES_ON_DEVICE } else { SAMPLES };
         let sampling = Schedule::new(world.scene.scene.until / samples);
         let written = before.map(|before| before.outputs.as_slice());

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use pliant_geometry::Labels;
-use pliant_gpu::Device;
+#[cfg(feature = "gpu")]
+use pliant_sim::gpu::Device;
 use pliant_sim::{Failure, Simulation};
 
 use crate::assemble::{Built, Meshing, build_watched};
@@ -148,11 +149,6 @@ impl World {
         self.slowest().plan.steps.step
     }
 
-    /// The GPU of the scene, where all bodies go together on one.
-    pub fn device(&self) -> Option<&Device> {
-        self.only()?.plan.target.device.as_ref()
-    }
-
     /// A simulation of it, at its start.
     ///
     /// # Errors
@@ -169,18 +165,6 @@ impl World {
     /// All participants of a simulation of it as outputs read them.
     pub(crate) fn frames<'a>(&'a self, simulation: &'a Simulation) -> Vec<Frame<'a>> {
         self.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame { part, now }).collect()
-    }
-
-    /// Goes on on a device that is open, where that is the one it asks for.
-    pub fn share(&mut self, open: Option<&Device>) {
-        for part in &mut self.participants {
-            if let (Some(open), Some(asked)) = (open, &mut part.plan.target.device)
-                && open.adapter() == asked.adapter()
-                && open.check().is_ok()
-            {
-                *asked = open.clone();
-            }
-        }
     }
 
     /// Adds a doubt to those that did not keep the models from being built.
@@ -215,6 +199,26 @@ impl World {
     /// The labels that a view hides.
     pub fn hidden(&self, view: &ViewTable) -> Vec<i32> {
         if view.hide.is_empty() { Vec::new() } else { view.hidden(&self.labels(view.on.as_deref())) }
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl World {
+    /// The GPU of the scene, where all bodies go together on one.
+    pub fn device(&self) -> Option<&Device> {
+        self.only()?.plan.target.device.as_ref()
+    }
+
+    /// Goes on on a device that is open, where that is the one it asks for.
+    pub fn share(&mut self, open: Option<&Device>) {
+        for part in &mut self.participants {
+            if let (Some(open), Some(asked)) = (open, &mut part.plan.target.device)
+                && open.adapter() == asked.adapter()
+                && open.check().is_ok()
+            {
+                *asked = open.clone();
+            }
+        }
     }
 }
 

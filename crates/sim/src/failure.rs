@@ -3,7 +3,6 @@
 use std::fmt;
 
 use pliant_explicit::{RelaxationError, StepError};
-use pliant_gpu::{GpuError, StepFailure};
 use serde::Serialize;
 
 /// A failure, with its place and time.
@@ -68,19 +67,6 @@ impl Failure {
             self.remedy = "";
         }
         self
-    }
-
-    /// A device that failed, at a time of the simulation.
-    pub(crate) fn device(error: &GpuError, time: Option<f64>) -> Self {
-        Self::new("device", format!("{error}; {}", error.remedy()), time)
-    }
-
-    /// Steps on a device that could not be taken.
-    pub(crate) fn step(failure: &StepFailure, time: f64) -> Self {
-        match failure {
-            StepFailure::Step(error) => error.into(),
-            StepFailure::Device(error) => Self::device(error, Some(time)),
-        }
     }
 
     /// A load step, counted from 1 (0: what acts at the start), of so many that came to no equilibrium.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
-use pliant_gpu::Wanted;
+use pliant_explicit::Wanted;
 use pliant_implicit::{
     BackwardEuler, DynamicSettings, Explicit, Forces, Model, Phases, SolveError, Spring, State, Statics,
 };

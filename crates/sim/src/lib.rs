@@ -1,5 +1,5 @@
 //! A simulation of many bodies. A [`World`] holds participants: bodies that one stepper advances together, with explicit, quasi-static,
-//! static or implicit steps, on the CPU or a GPU. A [`Simulation`] owns a world and its state, and knows nothing of files or windows.
+//! static or implicit steps, on the CPU or (feature `gpu`, on by default) a GPU. A [`Simulation`] owns a world and its state, and knows nothing of files or windows.
 //! SI units throughout.
 //!
 //! Two participants, each at its own step:
@@ -42,6 +42,8 @@
 //! ```
 
 mod bodies;
+#[cfg(feature = "gpu")]
+mod device;
 mod failure;
 mod implicit;
 mod instant;
@@ -55,13 +57,18 @@ mod steps;
 mod words;
 
 pub use bodies::{BodyCells, Control, ImplicitBodies, Stop};
+#[cfg(feature = "gpu")]
+pub use device::{MappedPoint, OnDevice};
 pub use failure::{FailedLoadStep, Failure};
 pub use implicit::Effort;
 pub use instant::{CellsNow, Instant};
 pub use observer::{Observer, Schedule};
 pub use part::{Explicit, Method, Part, Precision};
-pub use participant::MappedPoint;
 pub use simulation::{Frame, Simulation, State, World};
 pub use solver::{Equilibria, LoadStepProgress};
 pub use steps::{Critical, SAFETY, Steps};
 pub use words::{counted, number};
+
+/// Devices, and points on them.
+#[cfg(feature = "gpu")]
+pub use pliant_gpu as gpu;

@@ -1,6 +1,6 @@
 //! Observers of a run, and when they look.
 
-use pliant_gpu::Wanted;
+use pliant_explicit::Wanted;
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use pliant_explicit::stability::{Monitor, OnUnstable};
+#[cfg(feature = "gpu")]
 use pliant_gpu::{Design, Device};
 use pliant_implicit::{DynamicSettings, StaticSettings};
 use pliant_mechanics::Model;
@@ -76,8 +77,10 @@ pub struct Explicit {
     /// The critical time step of the assembled model at rest [s]; where it is infinite it is not monitored.
     pub critical_step: f64,
     /// The GPU; `None`: the CPU.
+    #[cfg(feature = "gpu")]
     pub device: Option<Device>,
     /// How its kernels bring forces from cells to nodes; `None`: the way that measured best.
+    #[cfg(feature = "gpu")]
     pub design: Option<Design>,
 }
 
@@ -122,7 +125,9 @@ impl Part {
             precision: Precision::Double,
             on_unstable: OnUnstable::default(),
             critical_step: critical.assembled.step,
+            #[cfg(feature = "gpu")]
             device: None,
+            #[cfg(feature = "gpu")]
             design: None,
         };
         let steps = Steps::within(duration, critical.automatic());

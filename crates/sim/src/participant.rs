@@ -1,9 +1,8 @@
 //! A participant under way: bodies that one stepper advances together, with their state. Its stepper and number type stay hidden here.
 
-use std::time::Duration;
-
-use pliant_explicit::{Clock, State};
-use pliant_gpu::{DeviceMapping, PointValue, Wanted};
+use pliant_explicit::{Clock, State, Wanted};
+#[cfg(feature = "gpu")]
+use pliant_gpu::GpuStepper;
 use pliant_mechanics::Model;
 use pliant_mechanics::grip::Grip;
 use serde::de::DeserializeOwned;
@@ -14,9 +13,6 @@ use crate::instant::Instant;
 use crate::part::{Part, Precision};
 use crate::solids::{Numeric, Solids, fits};
 use crate::solver::{LoadStepProgress, Memory};
-
-/// The place of a point at rest [m], and its nodes with their weights.
-pub type MappedPoint = ([f64; 3], Vec<(u32, f64)>);
 
 /// The state of a participant with all that a restart needs beside it.
 #[derive(Clone, Debug)]
@@ -72,20 +68,11 @@ pub(crate) trait Participant: Instant + Send {
         1
     }
 
-    /// Goes up to `steps` steps on without reading anything back, as many as take about `within`. How many; `None` of a state in
-    /// ordinary memory.
-    fn advance_without_read_back(&mut self, _steps: u64, _within: Duration) -> Option<Result<u64, Failure>> {
+    /// The stepper of a state on a GPU, and the state; `None` of a state in ordinary memory.
+    #[cfg(feature = "gpu")]
+    fn on_device(&mut self) -> Option<(&mut GpuStepper, &mut State<f32>)> {
         None
     }
-
-    /// The mapping that finds points, from their places at rest [m], nodes and weights, on the device of the state; `None` of a state in
-    /// ordinary memory.
-    fn map(&self, _points: &mut dyn Iterator<Item = MappedPoint>) -> Option<Result<DeviceMapping, Failure>> {
-        None
-    }
-
-    /// Brings points on the device to the instant.
-    fn apply(&self, _mapping: &DeviceMapping, _value: PointValue) {}
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a stepper that knows none.
     fn hold(&mut self, grips: &[Grip]) -> bool;

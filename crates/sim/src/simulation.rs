@@ -1,10 +1,8 @@
 //! A simulation: a world and its state, brought from one common instant of all participants to the next, each at its own step.
 
 use std::sync::Arc;
-use std::time::Duration;
 
-use pliant_explicit::Clock;
-use pliant_gpu::{DeviceMapping, PointValue, Wanted};
+use pliant_explicit::{Clock, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::{Energies, Model, fingerprint};
 
@@ -12,7 +10,7 @@ use crate::failure::Failure;
 use crate::instant::Instant;
 use crate::observer::{Observer, steps_to};
 use crate::part::Part;
-use crate::participant::{Before, Kept, MappedPoint, Participant, begin, go_on};
+use crate::participant::{Before, Kept, Participant, begin, go_on};
 use crate::solver::LoadStepProgress;
 
 /// The participants of a simulation: constant while it runs.
@@ -117,13 +115,13 @@ impl State {
 /// ```
 pub struct Simulation {
     world: Arc<World>,
-    participants: Vec<Box<dyn Participant>>,
+    pub(crate) participants: Vec<Box<dyn Participant>>,
     /// Steps of each participant between two common instants.
     ratios: Vec<u64>,
     /// First node of each participant, counted over all.
     first_nodes: Vec<u32>,
     /// Whether forces, energies and reactions belong to the instant.
-    evaluated: bool,
+    pub(crate) evaluated: bool,
 }
 
 impl Simulation {
@@ -394,7 +392,7 @@ impl Simulation {
 
     /// After a step that failed: whether a state was found on the way that is worth showing. Its forces are then found.
     pub fn keeps_what_it_found(&mut self) -> bool {
-        let Some(only) = self.only_mut() else { return false };
+        let [only] = &mut self.participants[..] else { return false };
         self.evaluated = only.keeps_what_it_found() && only.evaluate(Wanted::Everything).is_ok();
         self.evaluated
     }
@@ -462,51 +460,6 @@ impl Simulation {
             (own == part).then_some((node, weight))
         });
         Some((part, Grip { nodes: nodes.collect::<Option<_>>()?, ..grip.clone() }))
-    }
-}
-
-/// A state on a GPU, where all bodies go together on one.
-impl Simulation {
-    /// Goes up to `steps` steps on without reading anything back, as many as take about `within`. How many; `None` of a state in
-    /// ordinary memory.
-    pub fn advance_without_read_back(
-        &mut self,
-        steps: u64,
-        within: Duration,
-    ) -> Option<Result<u64, Failure>> {
-        let advanced = self.only_mut()?.advance_without_read_back(steps, within)?;
-        self.evaluated = false;
-        Some(advanced)
-    }
-
-    /// The mapping that finds points, from their places at rest [m], nodes and weights, on the device of the state; `None` of a state in
-    /// ordinary memory.
-    pub fn map(
-        &self,
-        points: &mut dyn Iterator<Item = MappedPoint>,
-    ) -> Option<Result<DeviceMapping, Failure>> {
-        self.only()?.map(points)
-    }
-
-    /// Brings points on the device to the instant.
-    pub fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
-        if let Some(only) = self.only() {
-            only.apply(mapping, value);
-        }
-    }
-
-    fn only(&self) -> Option<&dyn Participant> {
-        match &self.participants[..] {
-            [one] => Some(one.as_ref()),
-            _ => None,
-        }
-    }
-
-    fn only_mut(&mut self) -> Option<&mut dyn Participant> {
-        match &mut self.participants[..] {
-            [one] => Some(one.as_mut()),
-            _ => None,
-        }
     }
 }
 

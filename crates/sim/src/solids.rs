@@ -1,20 +1,20 @@
 //! Solids in large strain as a participant: central differences on the CPU or a GPU, or dynamic relaxation.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use pliant_explicit::recover::{CellFields, Recovery};
 use pliant_explicit::stability::{Stability, cell_limit};
-use pliant_explicit::{Clock, Scalar, State};
-use pliant_gpu::{DeviceMapping, PointValue, Wanted};
+use pliant_explicit::{Clock, Scalar, State, Wanted};
+#[cfg(feature = "gpu")]
+use pliant_gpu::GpuStepper;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::failure::Failure;
 use crate::instant::{CellsNow, Instant};
 use crate::part::{Method, Part};
-use crate::participant::{Kept, MappedPoint, Participant};
-use crate::solver::{Equilibria, LoadStepProgress, Memory, Solver, on_cpu, on_device};
+use crate::participant::{Kept, Participant};
+use crate::solver::{Equilibria, LoadStepProgress, Memory, Solver, on_cpu};
 
 /// The number types that solids in large strain are computed in.
 pub(crate) trait Numeric: Scalar {
@@ -26,6 +26,12 @@ pub(crate) trait Numeric: Scalar {
     /// # Errors
     /// If it can't be made.
     fn solver(part: &Part, state: &State<Self>) -> Result<Box<dyn Solver<Self>>, Failure>;
+
+    /// The stepper of a state on a GPU, and the state; `None` of a state in ordinary memory.
+    #[cfg(feature = "gpu")]
+    fn on_device(_solids: &mut Solids<Self>) -> Option<(&mut GpuStepper, &mut State<f32>)> {
+        None
+    }
 }
 
 impl Numeric for f32 {
@@ -33,11 +39,21 @@ impl Numeric for f32 {
         Kept::Single(state, memory)
     }
 
+    #[cfg_attr(
+        not(feature = "gpu"),
+        expect(unused_variables, reason = "only a GPU takes up a state when it is made")
+    )]
     fn solver(part: &Part, state: &State<f32>) -> Result<Box<dyn Solver<f32>>, Failure> {
-        match on_device(part, state) {
-            Some(solver) => solver,
-            None => on_cpu(part),
+        #[cfg(feature = "gpu")]
+        if let Some(solver) = crate::device::on_device(part, state) {
+            return solver;
         }
+        on_cpu(part)
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_device(solids: &mut Solids<f32>) -> Option<(&mut GpuStepper, &mut State<f32>)> {
+        Some((solids.solver.on_device()?, &mut solids.state))
     }
 }
 
@@ -172,16 +188,9 @@ impl<R: Numeric> Participant for Solids<R> {
         self.solver.stride()
     }
 
-    fn advance_without_read_back(&mut self, steps: u64, within: Duration) -> Option<Result<u64, Failure>> {
-        self.solver.advance_without_read_back(&mut self.state, steps, within)
-    }
-
-    fn map(&self, points: &mut dyn Iterator<Item = MappedPoint>) -> Option<Result<DeviceMapping, Failure>> {
-        self.solver.map(points)
-    }
-
-    fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
-        self.solver.apply(mapping, value);
+    #[cfg(feature = "gpu")]
+    fn on_device(&mut self) -> Option<(&mut GpuStepper, &mut State<f32>)> {
+        R::on_device(self)
     }
 
     fn hold(&mut self, grips: &[Grip]) -> bool {

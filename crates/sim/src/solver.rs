@@ -1,20 +1,19 @@
 //! The solvers of solids in large strain behind one trait.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use pliant_explicit::{
     CentralDifference, Clock, DynamicRelaxation, Equilibrium, Iteration, Observable, RelaxationSettings,
-    Scalar, State,
+    Scalar, State, Wanted,
 };
-use pliant_gpu::{DeviceMapping, GpuStepper, PointValue, Wanted};
+#[cfg(feature = "gpu")]
+use pliant_gpu::GpuStepper;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 use crate::part::{Method, Part};
-use crate::participant::MappedPoint;
 use crate::steps::Steps;
 
 /// How far a load step is.
@@ -82,25 +81,11 @@ pub(crate) trait Solver<R>: Send {
         1
     }
 
-    /// Goes up to `steps` steps on without looking, as many as take about `within`: nothing comes back to ordinary memory. How many;
-    /// `None` of a solver whose state lies there.
-    fn advance_without_read_back(
-        &mut self,
-        _state: &mut State<R>,
-        _steps: u64,
-        _within: Duration,
-    ) -> Option<Result<u64, Failure>> {
+    /// The stepper itself, where the state lies on a GPU.
+    #[cfg(feature = "gpu")]
+    fn on_device(&mut self) -> Option<&mut GpuStepper> {
         None
     }
-
-    /// What finds points on the device where the state lies, from their places at rest [m], nodes and weights; `None` of a solver
-    /// whose state lies in ordinary memory.
-    fn map(&self, _points: &mut dyn Iterator<Item = MappedPoint>) -> Option<Result<DeviceMapping, Failure>> {
-        None
-    }
-
-    /// Brings points on the device to the state's instant.
-    fn apply(&self, _mapping: &DeviceMapping, _value: PointValue) {}
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a solver that knows none.
     fn hold(&mut self, grips: &[Grip]) -> bool {
@@ -169,84 +154,6 @@ pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failu
             return Err(Failure::input(&"shells and solved equations have a participant of their own"));
         }
     })
-}
-
-/// The solver of a participant on a GPU, from a state on; `None` of a participant on the CPU.
-pub(crate) fn on_device(part: &Part, state: &State<f32>) -> Option<Result<Box<dyn Solver<f32>>, Failure>> {
-    let Method::Explicit(settings) = &part.method else { return None };
-    let device = settings.device.as_ref()?;
-    let stepper = GpuStepper::new(device, Arc::clone(&part.model), part.steps.step, settings.design);
-    Some(stepper.map_err(|error| Failure::device(&error, None)).map(|mut stepper| {
-        if let Some(monitor) = settings.monitor(&part.model) {
-            stepper = stepper.watched(monitor);
-        }
-        stepper.upload(state);
-        Box::new(stepper) as Box<dyn Solver<f32>>
-    }))
-}
-
-/// Most steps in one go on a GPU, so that a run can be stopped and shows how far it is.
-const STRIDE: u64 = 1024;
-
-impl Solver<f32> for GpuStepper {
-    fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), Failure> {
-        GpuStepper::evaluate(self, state, wanted).map_err(|failure| Failure::step(&failure, state.time))
-    }
-
-    fn advance(
-        &mut self,
-        state: &mut State<f32>,
-        steps: u64,
-        _watch: &mut dyn FnMut(LoadStepProgress),
-    ) -> Result<(), Failure> {
-        GpuStepper::advance(self, state, steps).map_err(|failure| Failure::step(&failure, state.time))
-    }
-
-    fn stride(&self) -> u64 {
-        STRIDE
-    }
-
-    fn advance_without_read_back(
-        &mut self,
-        state: &mut State<f32>,
-        steps: u64,
-        within: Duration,
-    ) -> Option<Result<u64, Failure>> {
-        let advanced = GpuStepper::advance_without_read_back(self, state, steps, within);
-        Some(advanced.map_err(|failure| Failure::step(&failure, state.time)))
-    }
-
-    fn map(&self, points: &mut dyn Iterator<Item = MappedPoint>) -> Option<Result<DeviceMapping, Failure>> {
-        Some(GpuStepper::map(self, points).map_err(|error| Failure::device(&error, None)))
-    }
-
-    fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
-        GpuStepper::apply(self, mapping, value);
-    }
-
-    fn hold(&mut self, grips: &[Grip]) -> bool {
-        GpuStepper::hold(self, grips).is_ok()
-    }
-
-    fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), Failure> {
-        GpuStepper::bring_back(self, state).map_err(|failure| Failure::step(&failure, state.time))
-    }
-
-    fn clock(&self, state: &State<f32>) -> Option<Clock> {
-        Some(GpuStepper::clock(self, state))
-    }
-
-    fn go_on(&mut self, clock: &Clock, step: f64, state: &State<f32>) {
-        GpuStepper::go_on(self, clock, step, state);
-    }
-
-    fn balance_floor(&self) -> f64 {
-        GpuStepper::balance_floor(self)
-    }
-
-    fn observable(&self) -> &dyn Observable<f32> {
-        self
-    }
 }
 
 impl<R: Scalar> Solver<R> for CentralDifference<R> {

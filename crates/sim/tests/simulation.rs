@@ -1,7 +1,7 @@
 //! The one driver: steps, snapshots, restarts and changes of numbers with every solver, without a scene file.
 
 use nalgebra::Vector3;
-use pliant_gpu::Wanted;
+use pliant_explicit::Wanted;
 use pliant_implicit::element::Elasticity;
 use pliant_implicit::{Constraint, Load, LoadKind, Material as Wall, Motion as WallMotion, Shell};
 use pliant_mechanics::Model;

@@ -1,9 +1,17 @@
-//! Helpers of tests: numbers at random that are the same in every run, files damaged by them, and the memory of the process.
+//! Helpers of tests: numbers at random that are the same in every run, files damaged by them, and the memory of the process; with the
+//! features `images` and `organs` image files, and label images and meshes of analytic organs.
 //!
 //! ```
 //! let mut random = pliant_testing::Random::new(1);
 //! assert!((-1.0..1.0).contains(&random.number()) && random.below(3) < 3);
 //! ```
+
+#[cfg(feature = "images")]
+pub mod image_files;
+#[cfg(feature = "organs")]
+pub mod mesh_checks;
+#[cfg(feature = "organs")]
+pub mod organs;
 
 use std::fs;
 

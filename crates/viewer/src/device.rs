@@ -4,8 +4,8 @@
 use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
-use pliant_gpu::PointValue;
 use pliant_mechanics::Energies;
+use pliant_sim::gpu::PointValue;
 
 /// Wall time between two looks at a state that lies on a device.
 pub const LOOK: Duration = Duration::from_millis(250);

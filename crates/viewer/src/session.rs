@@ -7,12 +7,12 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
-use pliant_gpu::{DevicePoints, PointValue};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values, visible};
 use pliant_scene::format::ViewTable;
 use pliant_scene::{Column, Live, World};
+use pliant_sim::gpu::{DevicePoints, PointValue};
 use pliant_sim::{Failure, State};
 
 use crate::device::{Seen, point_value};
@@ -615,11 +615,12 @@ impl<'s> Player<'s> {
             return;
         }
         let left = (course.pace.goal() - self.live.simulation.time()) / self.world.step();
-        let advanced = match self.on_device && course.is_going() {
-            true => self.live.simulation.advance_without_read_back(left.ceil().max(1.0) as u64, FRAME / 2),
-            false => None,
+        let simulation = &mut self.live.simulation;
+        let advanced = match simulation.on_device().filter(|_| course.is_going()) {
+            Some(mut device) => device.advance_without_read_back(left.ceil().max(1.0) as u64, FRAME / 2),
+            None => simulation.step(1),
         };
-        match advanced.unwrap_or_else(|| self.live.simulation.step(1)) {
+        match advanced {
             Ok(steps) => {
                 course.steps += steps;
                 course.batch = (course.batch.0 + steps, course.batch.1 + started.elapsed());

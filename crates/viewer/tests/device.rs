@@ -6,11 +6,11 @@ mod support;
 use std::time::Duration;
 
 use pliant_geometry::Vector3;
-use pliant_gpu::{Device, DevicePoints, PointValue};
 use pliant_picture::{Camera, Drawn, Plane, Renderer, Section, Style, Subject, Target};
 use pliant_scene::Live;
 use pliant_scene::World;
 use pliant_scene::format::{ColourBy, FieldName, ViewTable};
+use pliant_sim::gpu::{Device, DevicePoints, PointValue};
 use pliant_viewer::{Frame, Hand, Order, Point, Session};
 use support::{BALL, subject, wait, world};
 
@@ -163,7 +163,12 @@ fn thirty_frames_played_and_drawn_read_nothing_back_and_show_the_state() {
     let mut steps = 0;
     // A quarter of a second, as between two looks.
     for _ in 0..30 {
-        steps += live.simulation.advance_without_read_back(8, Duration::from_secs(1)).unwrap().unwrap();
+        steps += live
+            .simulation
+            .on_device()
+            .unwrap()
+            .advance_without_read_back(8, Duration::from_secs(1))
+            .unwrap();
         let points = live.place(PointValue::Size, None).unwrap().unwrap();
         if !std::mem::replace(&mut bound, true) {
             screen.bind(&points);
@@ -193,7 +198,7 @@ fn pictures_from_the_device_are_those_from_memory_with_and_without_a_section() {
     let subject = Subject::new(live.mesh().unwrap());
     let (mut one, mut other) = (Screen::new(&device, &subject), Screen::new(&device, &subject));
     while live.simulation.time() < 0.05 {
-        live.simulation.advance_without_read_back(100, Duration::from_secs(1)).unwrap().unwrap();
+        live.simulation.on_device().unwrap().advance_without_read_back(100, Duration::from_secs(1)).unwrap();
     }
     let points = live.place(PointValue::Size, None).unwrap().unwrap();
     let (places, sizes) = in_memory(&mut live);

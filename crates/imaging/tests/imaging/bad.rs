@@ -4,7 +4,7 @@ use std::fs;
 
 use pliant_imaging::{ImageError, ImageFormat, ImageProblem, ReadOptions, read, read_bytes};
 
-use crate::write::*;
+use pliant_testing::image_files::*;
 
 fn error(bytes: &[u8], format: ImageFormat) -> String {
     read_bytes(bytes, format, &ReadOptions::default()).expect_err("the image is bad").to_string()

@@ -5,7 +5,7 @@ use std::fs;
 use nalgebra::{Matrix3, Vector3};
 use pliant_imaging::{Image, ImageFormat, ReadOptions, Scalar, read, read_bytes};
 
-use crate::write::*;
+use pliant_testing::image_files::*;
 
 /// The voxels of `image` equal those of `volume`, each at its position to `tolerance` [m]. Axes may be reversed
 /// (slices are sorted), so voxels are found by position.

@@ -8,7 +8,7 @@ use pliant_imaging::{
     Choice, Image, ImageError, ImageFormat, LabelChoice, LabelError, ReadOptions, read, read_bytes,
 };
 
-use crate::write::*;
+use pliant_testing::image_files::*;
 
 /// Labels 1 to 3 in slices 1, 2 and 4 of six, so frames are missing at both ends and in between.
 fn labelled() -> Volume {

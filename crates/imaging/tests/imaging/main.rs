@@ -7,4 +7,3 @@ mod formats;
 mod labels;
 mod mutation;
 mod real;
-mod write;

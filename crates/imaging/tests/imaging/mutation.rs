@@ -7,7 +7,7 @@ use std::path::Path;
 use pliant_imaging::{ImageFormat, ReadOptions, read_bytes};
 use pliant_testing::{PeakMemory, Random};
 
-use crate::write::*;
+use pliant_testing::image_files::*;
 
 /// One file of each format and variant.
 fn seeds() -> Vec<(ImageFormat, Vec<u8>)> {

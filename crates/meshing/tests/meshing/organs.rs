@@ -7,8 +7,8 @@ use pliant_imaging::{Cleaning, Grid, LabelError, LabelImage, Smoothing};
 use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets};
 use pliant_testing::Random;
 
-use crate::checks::*;
-use crate::images;
+use pliant_testing::mesh_checks::*;
+use pliant_testing::organs;
 
 pub fn anatomy(image: &LabelImage, labels: &[i32]) -> Anatomy<'static> {
     let cleaning = Cleaning { keep_largest: true, ..Cleaning::default() };
@@ -55,7 +55,7 @@ fn a_sphere_of_voxels_wherever_the_lattice_lies() {
 }
 
 fn sphere_at(lattices: usize) {
-    let ball = anatomy(&images::ball(0.05), &[1]);
+    let ball = anatomy(&organs::ball(0.05), &[1]);
     let exact = 4.0 / 3.0 * PI * 0.05_f64.powi(3);
     let mut random = Random::new(1);
     for edge in [0.008, 0.012, 0.016, 0.020] {
@@ -77,7 +77,7 @@ fn sphere_at(lattices: usize) {
 /// Where labels meet in lines and corners, no flat tets are left between them.
 #[test]
 fn many_labels_keep_three_quarters_of_the_ideal_step() {
-    let ball = anatomy(&images::parted_ball(0.05), &[1, 2, 3, 4, 5]);
+    let ball = anatomy(&organs::parted_ball(0.05), &[1, 2, 3, 4, 5]);
     let made = meshed(&ball, 0.008, Vector3::zeros());
     check_sound(&made);
     assert!(made.report.acoustic_part >= 0.75, "{}", made.report);
@@ -97,12 +97,12 @@ fn the_liver_wherever_the_lattice_lies() {
 }
 
 fn liver_at(edge: f64, lattices: usize) {
-    let liver = anatomy(&images::liver(), &[1]);
-    let truth = images::truth("liver");
+    let liver = anatomy(&organs::liver(), &[1]);
+    let truth = organs::truth("liver");
     let mut random = Random::new(5);
     for _ in 0..lattices {
         let made = meshed(&liver, edge, offset(&mut random, edge));
-        let [forth, back, rms] = images::distances(&made.mesh, &truth);
+        let [forth, back, rms] = organs::distances(&made.mesh, &truth);
         println!("{}\nH {:.3} / {:.3} a, RMS {:.3} a", made.report, forth / edge, back / edge, rms / edge);
         check_sound(&made);
         assert!(made.report.acoustic_part >= 0.75);
@@ -127,13 +127,13 @@ fn the_brain_wherever_the_lattice_lies() {
 
 fn brain_at(lattices: usize) {
     let edge = 0.010;
-    let image = images::brain();
+    let image = organs::brain();
     let brain = anatomy(&image, &[1, 2, 3]);
-    let truth = images::truth("brain");
+    let truth = organs::truth("brain");
     let mut random = Random::new(5);
     for _ in 0..lattices {
         let made = meshed(&brain, edge, offset(&mut random, edge));
-        let [_, _, rms] = images::distances(&made.mesh, &truth);
+        let [_, _, rms] = organs::distances(&made.mesh, &truth);
         println!("{}\nRMS {:.3} a", made.report, rms / edge);
         check_sound(&made);
         assert!(made.report.acoustic_part >= 0.75);
@@ -143,7 +143,7 @@ fn brain_at(lattices: usize) {
             assert!((material.volume / voxels - 1.0).abs() < 0.05, "{material:?}");
         }
         for (label, organ) in [(2, pliant_meshing::Organ::Ventricles), (3, pliant_meshing::Organ::Tumour)] {
-            let interface = images::interface_rms(&made.mesh, label, organ);
+            let interface = organs::interface_rms(&made.mesh, label, organ);
             println!("interface of label {label}: RMS {:.3} a", interface / edge);
             // The prototype of the specification had 0.15; its goal of 0.1 is missed by the ventricles, 12 mm thick, at 10 mm.
             assert!(interface <= 0.15 * edge);
@@ -154,7 +154,7 @@ fn brain_at(lattices: usize) {
 /// T4: the whole mesher gives the same bytes for any number of threads: field, lattice, materials, gaps, optimiser.
 #[test]
 fn the_thread_count_never_changes_a_bit() {
-    let image = images::brain();
+    let image = organs::brain();
     let with = |count| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("a pool");
         pool.install(|| meshed(&anatomy(&image, &[1, 2, 3]), 0.012, Vector3::new(1e-3, 2e-3, 3e-3)))
@@ -172,7 +172,7 @@ fn the_thread_count_never_changes_a_bit() {
 /// The same body in an image stored mirrored and turned gives the same mesh.
 #[test]
 fn storage_order_and_handedness_do_not_matter() {
-    let image = images::ball(0.03);
+    let image = organs::ball(0.03);
     let [nx, ny, nz] = image.grid.dims;
     // i and k change places, j runs backwards: left-handed to right-handed and back.
     let axes = image.grid.axes;
@@ -237,7 +237,7 @@ fn functions_mesh_like_images() {
 
 #[test]
 fn impossible_requests_are_refused() {
-    let ball = anatomy(&images::ball(0.02), &[1]);
+    let ball = anatomy(&organs::ball(0.02), &[1]);
     let with = |change: &dyn Fn(&mut OrganTets)| {
         let mut request = OrganTets::new(0.01);
         change(&mut request);
@@ -250,7 +250,7 @@ fn impossible_requests_are_refused() {
     assert!(matches!(with(&|r| r.edge = 5.0), MeshingError::NoCells { .. }));
     let many: Vec<i32> = (1..=64).collect();
     let error =
-        Anatomy::from_image(&images::ball(0.02), &many, &Cleaning::default(), &Smoothing::default(), &|_| {});
+        Anatomy::from_image(&organs::ball(0.02), &many, &Cleaning::default(), &Smoothing::default(), &|_| {});
     assert!(matches!(error, Err(LabelError::TooManyLabels { labels: 64, limit: 63 })));
 }
 

@@ -4,7 +4,7 @@ use pliant_geometry::Vector3;
 use pliant_meshing::{ImplicitField, Organ, Phantom, Stuffing, Voxels, brain_label};
 use pliant_testing::Random;
 
-use crate::checks::*;
+use pliant_testing::mesh_checks::*;
 
 /// The volume that the definition gives for the liver [m³].
 const LIVER: f64 = 774e-6;

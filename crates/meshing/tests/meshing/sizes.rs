@@ -7,8 +7,8 @@ use pliant_meshing::{
     MeshingError, Missed, OrganMesh, OrganTets, TriangleMesh, sphere,
 };
 
-use crate::checks::{conforming_boundary, tet_volume};
 use crate::organs::{anatomy, check_sound, check_sound_within};
+use pliant_testing::mesh_checks::{conforming_boundary, tet_volume};
 
 /// A ball of 30 mm with a spike that ends 55 mm from its centre; its base is a cap of this many
 /// degrees.

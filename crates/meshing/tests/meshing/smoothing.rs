@@ -4,7 +4,7 @@ use pliant_geometry::CellKind;
 use pliant_imaging::{Cleaning, LabelImage, Smoothing};
 use pliant_meshing::{Anatomy, Hausdorff, Organ, Phantom, SURFACE_PAIRS, SURFACE_SMOOTHING, TriangleMesh};
 
-use crate::images;
+use pliant_testing::organs;
 
 /// Voxels of the images [m].
 const VOXEL: f64 = 0.205 / 128.0;
@@ -40,7 +40,7 @@ fn truth(organ: Organ) -> TriangleMesh {
 /// has 0.74 and 0.70 mm, 0.158 mm, +0.02 %.
 #[test]
 fn the_surface_of_the_livers_labels_is_close_to_the_liver() {
-    let made = surface(&images::liver(), &SURFACE_SMOOTHING, SURFACE_PAIRS);
+    let made = surface(&organs::liver(), &SURFACE_SMOOTHING, SURFACE_PAIRS);
     let (own, part) = measure(&made, &truth(Organ::Liver));
     assert!(own.largest() < VOXEL / 2.0 && own.rms_forward < VOXEL / 10.0, "{own}");
     assert!(part.abs() < 1e-3, "{part}");
@@ -51,7 +51,7 @@ fn the_surface_of_the_livers_labels_is_close_to_the_liver() {
 #[test]
 #[ignore = "takes minutes; prints a table"]
 fn what_was_tried() {
-    for (organ, labels) in [(Organ::Liver, images::liver()), (Organ::Brain, images::whole_brain())] {
+    for (organ, labels) in [(Organ::Liver, organs::liver()), (Organ::Brain, organs::whole_brain())] {
         let truth = truth(organ);
         for sigma in [0.0, 0.4, 0.55, 0.7, 1.0] {
             for pairs in [0, 25, 50] {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, Tube, VolumeCell};
 
-use crate::checks::*;
+use pliant_testing::mesh_checks::*;
 
 const SIZE: [f64; 3] = [0.1, 0.05, 0.03];
 const TUBE: Tube = Tube { inner_radius: 0.01, outer_radius: 0.015, length: 0.04 };

@@ -6,7 +6,7 @@ use pliant_geometry::Vector3;
 use pliant_meshing::{Ellipsoid, FieldMesh, ImplicitField, Organ, Phantom, Stuffing};
 use pliant_testing::Random;
 
-use crate::checks::*;
+use pliant_testing::mesh_checks::*;
 
 const RADIUS: f64 = 0.05;
 

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use pliant_geometry::{Mesh, Vector3};
 use pliant_meshing::{Ellipsoid, ImplicitField, Organ, Phantom, Voxels};
 
-use crate::checks::*;
+use pliant_testing::mesh_checks::*;
 
 #[test]
 fn cubes_fill_a_sphere() {

@@ -31,9 +31,10 @@ pub use view::{
 };
 
 use pliant_explicit::stability::OnUnstable;
-use pliant_gpu::Design;
 use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
 use pliant_sim::Precision;
+#[cfg(feature = "gpu")]
+use pliant_sim::gpu::Design;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -63,6 +64,7 @@ pub struct RunTable {
     #[serde(default)]
     pub adapter: Option<String>,
     /// How the kernels of a GPU bring forces from cells to nodes; if not given, the way that measured best.
+    #[cfg(feature = "gpu")]
     #[serde(default)]
     pub design: Option<Design>,
     /// Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has

@@ -1,7 +1,8 @@
 //! Participants: bodies that one stepper advances together, apart from the others of the scene.
 
 use pliant_explicit::stability::OnUnstable;
-use pliant_gpu::Design;
+#[cfg(feature = "gpu")]
+use pliant_sim::gpu::Design;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -61,6 +62,7 @@ pub struct ParticipantTable {
     #[serde(default)]
     pub adapter: Option<String>,
     /// As in `[run]`.
+    #[cfg(feature = "gpu")]
     #[serde(default)]
     pub design: Option<Design>,
 }
@@ -83,6 +85,7 @@ impl ParticipantTable {
             precision: self.precision.or(run.precision),
             device: self.device.unwrap_or(run.device),
             adapter: self.adapter.clone().or(run.adapter),
+            #[cfg(feature = "gpu")]
             design: self.design.or(run.design),
             threads: run.threads,
             checkpoint: run.checkpoint,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
 use pliant_geometry::Vector3;
-use pliant_gpu::{Device, DevicePoints, PointValue};
+use pliant_sim::gpu::{Device, DevicePoints, PointValue};
 
 use super::App;
 use crate::device::{LOOK, point_value};

@@ -17,9 +17,9 @@ use std::time::{Duration, Instant, SystemTime};
 use eframe::egui::{self, Key, Rect};
 use eframe::wgpu;
 use pliant_geometry::{Labels, Vector3};
-use pliant_gpu::Device;
 use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
 use pliant_scene::format::{FieldName, ViewTable};
+use pliant_sim::gpu::Device;
 
 use self::paint::{SAMPLES, place};
 use self::parameters::Numbers;

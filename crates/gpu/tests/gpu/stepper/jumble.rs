@@ -7,8 +7,8 @@ use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::model::Surface;
 
-use crate::against::{PLAIN, compare_from, designs, load, step_of};
-use crate::cube::{CELLS, Jumble, elastic, every_law, jumbled_cube, layer, neo_hookean, top_quads};
+use super::against::{PLAIN, compare_from, designs, load, step_of};
+use super::cube::{CELLS, Jumble, elastic, every_law, jumbled_cube, layer, neo_hookean, top_quads};
 use crate::support;
 
 /// What differs most from design to design.

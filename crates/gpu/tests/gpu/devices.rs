@@ -1,7 +1,6 @@
 //! Finding and opening adapters.
 
-mod support;
-
+use crate::support;
 use pliant_gpu::{Device, GpuError, adapters};
 
 #[test]

@@ -11,9 +11,13 @@ use nalgebra::{Matrix3, Vector3};
 /// A volume of 16-bit numbers in RAS [mm].
 #[derive(Clone)]
 pub struct Volume {
+    /// Voxels along each axis.
     pub dims: [usize; 3],
+    /// Centre of the first voxel [mm].
     pub origin: Vector3<f64>,
+    /// Steps from voxel to voxel along each axis, as columns [mm].
     pub axes: Matrix3<f64>,
+    /// Value of each voxel, the first axis fastest.
     pub values: Vec<i16>,
 }
 
@@ -70,11 +74,15 @@ impl Bytes {
 /// Which of the orientations a NIfTI header gets.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Form {
+    /// In the affine matrix.
     Sform,
+    /// In the quaternion.
     Qform,
+    /// Nowhere.
     Neither,
 }
 
+/// A NIfTI-1 file.
 pub fn nifti1(volume: &Volume, form: Form, big: bool) -> Vec<u8> {
     let mut header = Bytes { bytes: vec![0; 352], big };
     header.put(0, 348_i32.to_le_bytes());
@@ -111,6 +119,7 @@ pub fn nifti1(volume: &Volume, form: Form, big: bool) -> Vec<u8> {
     header.bytes
 }
 
+/// A NIfTI-2 file.
 pub fn nifti2(volume: &Volume, big: bool) -> Vec<u8> {
     let mut header = Bytes { bytes: vec![0; 544], big };
     header.put(0, 540_i32.to_le_bytes());
@@ -147,6 +156,7 @@ fn quaternion(volume: &Volume) -> ([f64; 3], f64) {
     ([sign * q.i, sign * q.j, sign * q.k], qfac)
 }
 
+/// An NRRD file with its data.
 pub fn nrrd(volume: &Volume, encoding: &str, big: bool) -> Vec<u8> {
     let mut file = nrrd_header(volume, encoding, big).into_bytes();
     file.push(b'\n');
@@ -158,6 +168,7 @@ pub fn nrrd(volume: &Volume, encoding: &str, big: bool) -> Vec<u8> {
     file
 }
 
+/// The header of an NRRD file.
 pub fn nrrd_header(volume: &Volume, encoding: &str, big: bool) -> String {
     let [nx, ny, nz] = volume.dims;
     let vector = |[x, y, z]: [f64; 3]| format!("({x:.17},{y:.17},{z:.17})");
@@ -175,6 +186,7 @@ pub fn nrrd_header(volume: &Volume, encoding: &str, big: bool) -> String {
     )
 }
 
+/// A MetaImage file; its data are in `data_file`, or `LOCAL`.
 pub fn metaimage(volume: &Volume, compressed: bool, big: bool, data_file: &str) -> Vec<u8> {
     let [nx, ny, nz] = volume.dims;
     let numbers = |values: &[f64]| values.iter().map(|x| format!("{x:.17}")).collect::<Vec<_>>().join(" ");
@@ -195,6 +207,7 @@ pub fn metaimage(volume: &Volume, compressed: bool, big: bool, data_file: &str) 
     file
 }
 
+/// The data of a MetaImage file.
 pub fn metaimage_data(volume: &Volume, compressed: bool, big: bool) -> Vec<u8> {
     let bytes = volume.bytes(big);
     if compressed {
@@ -225,9 +238,13 @@ pub fn gipl(volume: &Volume) -> Vec<u8> {
 /// Encodings of DICOM.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Syntax {
+    /// Little-endian, value representations left out.
     Implicit,
+    /// Little-endian, with value representations.
     Explicit,
+    /// The same, compressed.
     Deflated,
+    /// Big-endian, with value representations.
     BigEndian,
 }
 
@@ -283,6 +300,7 @@ pub fn dicom(volume: &Volume, k: usize, syntax: Syntax, series: &str) -> Vec<u8>
 /// The encoding of the inside in a segmentation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segments {
+    /// A bit a voxel.
     Bits,
     /// A byte a pixel, 200 at most; half of it and more is inside.
     Fractions,
@@ -456,6 +474,7 @@ fn element(out: &mut Vec<u8>, number: u32, vr: &[u8; 2], value: &[u8], syntax: S
     out.extend(value);
 }
 
+/// Bytes as gzip compresses them.
 pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
     packed.write_all(bytes).unwrap();

@@ -1,8 +1,9 @@
 //! The stepper on a device against the one of the processor in double precision.
 
-use crate::cube::smooth;
+use super::cube::smooth;
+use pliant_explicit::Wanted;
 use pliant_explicit::{CentralDifference, Observable, State, critical_step};
-use pliant_gpu::{Design, Device, GpuStepper, Wanted};
+use pliant_gpu::{Design, Device, GpuStepper};
 use pliant_mechanics::Energies;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Model;

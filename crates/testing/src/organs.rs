@@ -13,19 +13,23 @@ fn labelled(label: impl Fn(&Vector3) -> i32 + Sync) -> LabelImage {
     LabelImage { labels: (0..grid.len()).into_par_iter().map(at).collect(), grid }
 }
 
+/// The liver, label 1.
 pub fn liver() -> LabelImage {
     let liver = Phantom::new(Organ::Liver, 1.0).expect("a positive scale");
     labelled(|point| i32::from(liver.value(point) > 0.0))
 }
 
+/// The brain with ventricles and tumour, labels 1 to 3.
 pub fn brain() -> LabelImage {
     labelled(|point| brain_label(point, 1.0) as i32)
 }
 
+/// The brain, label 1.
 pub fn whole_brain() -> LabelImage {
     labelled(|point| i32::from(brain_label(point, 1.0) > 0))
 }
 
+/// A ball of a radius [m], label 1.
 pub fn ball(radius: f64) -> LabelImage {
     labelled(|point| i32::from(point.norm() < radius))
 }
@@ -47,6 +51,7 @@ pub struct Truth {
 }
 
 impl Truth {
+    /// The surface of a field.
     pub fn new(field: &impl ImplicitField) -> Self {
         let fine = Stuffing::new(0.002).mesh(field).expect("the organ is meshed").mesh;
         let surface = boundary(&fine);
@@ -56,6 +61,7 @@ impl Truth {
     }
 }
 
+/// The surface of `liver` or `brain`.
 pub fn truth(organ: &str) -> Truth {
     let organ = if organ.starts_with("liver") { Organ::Liver } else { Organ::Brain };
     Truth::new(&Phantom::new(organ, 1.0).expect("a positive scale"))

@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
+use pliant_explicit::Wanted;
 use pliant_explicit::{CentralDifference, Observable, State};
-use pliant_gpu::{Design, PointValue, Wanted};
+use pliant_gpu::{Design, PointValue};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Model;
 
-use crate::against::{designs, distance, double, step_of, stepper};
-use crate::cube::{elastic, moved_cube, neo_hookean};
+use super::against::{designs, distance, double, step_of, stepper};
+use super::cube::{elastic, moved_cube, neo_hookean};
 use crate::support;
 
 const LONG: Duration = Duration::from_secs(100);

@@ -5,16 +5,16 @@ mod cube;
 mod failures;
 mod jumble;
 mod playing;
-#[path = "../support/mod.rs"]
-mod support;
 
+use crate::support;
 use against::{PLAIN, compare, designs, distance, double, load, numbers, step_of, stepper};
 use cube::{
     CELLS, EDGE, ELEMENTS, elastic, every_law, free_cube, held_cube, layer, moved_cube, neo_hookean, smooth,
 };
+use pliant_explicit::Wanted;
 use pliant_explicit::stability::{Monitor, OnUnstable};
 use pliant_explicit::{CentralDifference, Observable, State, StepError, critical_step};
-use pliant_gpu::{Design, StepFailure, Wanted};
+use pliant_gpu::{Design, StepFailure};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Model, Motion, Solid};

@@ -4,11 +4,8 @@
 //! M (longitudinal modulus without κ; κ): strains are sums of terms of the size of H, each rounded. So small strains
 //! without rotation count relative to their own stress, those under a large rotation to what the rotation leaves of their digits.
 
-#[path = "support/compute.rs"]
-mod compute;
-mod support;
-
-use compute::compute;
+use crate::compute::compute;
+use crate::support;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use pliant_gpu::Device;
 use pliant_mechanics::Number;

@@ -3,15 +3,16 @@
 use std::thread;
 use std::time::Duration;
 
+use pliant_explicit::Wanted;
 use pliant_explicit::{CentralDifference, State, StepError, critical_step};
-use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure, Wanted};
+use pliant_gpu::{Design, Device, GpuError, GpuStepper, StepFailure};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::samples::own;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Model, Motion};
 
-use crate::against::{PLAIN, compare, designs, load, step_of, stepper};
-use crate::cube::{CELLS, EDGE, elastic, every_law, held_cube, layer, moved_cube, neo_hookean, smooth};
+use super::against::{PLAIN, compare, designs, load, step_of, stepper};
+use super::cube::{CELLS, EDGE, elastic, every_law, held_cube, layer, moved_cube, neo_hookean, smooth};
 use crate::support;
 
 #[test]

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::Random;
 use pliant_geometry::{CellKind, Mesh, Vector3};
-use pliant_testing::Random;
 
 /// Six times the signed volume of a tetrahedron.
 fn determinant([a, b, c, d]: [Vector3; 4]) -> f64 {
