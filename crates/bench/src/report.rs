@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::case::Case;
 use crate::clock::Spread;
-use crate::suite::Settings;
+use crate::settings::Settings;
 use crate::{Count, Machine, Rates};
 
 /// The source of a critical step.

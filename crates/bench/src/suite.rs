@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use pliant_explicit::{Instructions, MissingInstructions, Scalar, State, StepError};
+use pliant_explicit::{MissingInstructions, Scalar, State, StepError};
 use pliant_gpu::{Device, DeviceRates, GpuError, StepFailure};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
@@ -16,6 +16,7 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use crate::case::{Case, EDGE, Element, LawKind, Place, Precision, Threads};
 use crate::clock::{Clocked, ClockedOnDevice, Spread, Timed};
 use crate::report::{Cube, Fit, Limit, Measured, OnDevice, Refused, Report, Row};
+use crate::settings::Settings;
 use crate::{Machine, Rates, Specimen};
 
 /// Displacement of `x-max` [m]; a node at x has x/[`EDGE`] of it.
@@ -28,23 +29,6 @@ const PART_OF_LIMIT: f64 = 0.9;
 /// Fraction of the limit for timed steps. The length of a step does not change its cost. The cubes vibrate for tens of
 /// thousands of steps without damping and without step reduction.
 const PART_UNDER_THE_CLOCK: f64 = 0.5;
-
-/// How to measure.
-#[derive(Clone, Copy, Debug)]
-pub struct Settings {
-    /// Repeats that count, at least one.
-    pub repeats: usize,
-    /// Wall time of a repeat [s].
-    pub seconds: f64,
-    /// The instructions of the steps.
-    pub lanes: Instructions,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { repeats: 5, seconds: 0.2, lanes: Instructions::widest() }
-    }
-}
 
 /// The progress of a measurement.
 #[derive(Clone, Debug)]
@@ -279,6 +263,8 @@ fn repeats<T: Timed>(clocked: &mut T, settings: Settings) -> Result<Vec<f64>, T:
 
 #[cfg(test)]
 mod tests {
+    use pliant_explicit::Instructions;
+
     use super::*;
     use crate::find;
 

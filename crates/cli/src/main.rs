@@ -10,14 +10,16 @@ mod arguments;
 mod bench;
 mod commands;
 mod info;
+#[cfg(feature = "viewer")]
+mod look;
 mod mesh;
 mod page;
 #[cfg_attr(not(feature = "viewer"), path = "no_pictures.rs")]
 mod pictures;
+mod prepare;
 mod report;
 mod reproduce;
 mod signals;
-mod skin;
 #[cfg(feature = "viewer")]
 mod view;
 

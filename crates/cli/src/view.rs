@@ -8,8 +8,8 @@ use pliant_scene::World;
 use pliant_viewer::{Lags, Opening, Recording, SelfTest, WindowError, open, replay, replay_in_real_time};
 
 use crate::arguments::View;
-use crate::commands::prepare;
-use crate::pictures::look_of;
+use crate::look::look_of;
+use crate::prepare::prepare;
 use crate::report::{Failure, say};
 
 impl From<WindowError> for Failure {

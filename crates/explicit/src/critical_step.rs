@@ -10,7 +10,7 @@ use pliant_mechanics::tensor::Vector;
 use rayon::prelude::*;
 
 use crate::forces::InternalForces;
-use crate::state::History;
+use crate::history::History;
 
 /// The smallest element bound of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -30,8 +30,9 @@ use serde::{Deserialize, Serialize};
 use crate::Scalar;
 use crate::applied::AppliedForces;
 use crate::forces::InternalForces;
+use crate::history::History;
 use crate::recover::Recovery;
-use crate::state::{History, State};
+use crate::state::State;
 use crate::step_error::at_corner;
 use crate::stepper::{Observable, owned_only, sum_owned};
 

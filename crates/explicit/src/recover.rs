@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use crate::Scalar;
 use crate::forces::pressure;
-use crate::state::{History, State};
+use crate::history::History;
+use crate::state::State;
 
 /// The state of one cell.
 #[derive(Clone, Copy, Debug)]

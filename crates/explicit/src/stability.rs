@@ -36,7 +36,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::critical_step::{limit_alone, scaled_bound};
-use crate::forces::Deformed;
+pub use crate::stability_record::{Look, MOST_SUBSTEPS, Stability};
 use crate::state::State;
 use crate::tangent::{Stiffness, gradient_square, stiffness};
 
@@ -50,8 +50,6 @@ pub const RESERVE: f64 = 0.95;
 pub const KEEP: f64 = 0.97;
 /// Steps between two critical time steps, except where a run would stop.
 pub const REFERENCE_EVERY: u64 = 1000;
-/// The most substeps a step is cut into.
-pub const MOST_SUBSTEPS: u32 = 100;
 /// One in this many cells is looked at closely, for each of the two orders …
 const SHARE: usize = 256;
 /// … and at least this many.
@@ -70,104 +68,6 @@ pub enum OnUnstable {
     Report,
 }
 
-/// How the steps of a run are cut, and what was seen of the limit. Part of the state, so that a copy of it goes on alike.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Stability {
-    /// Parts of the step under way, or of the last one.
-    pub substeps: u32,
-    /// Parts of the step under way already done; 0 between steps.
-    pub done: u32,
-    /// Looks taken at the limit.
-    pub checks: u64,
-    /// True limits found since the beginning.
-    pub critical_steps: u32,
-    /// The last look.
-    pub last: Option<Look>,
-    /// The look with the smallest limit.
-    pub smallest: Option<Look>,
-    /// Steps at the start of which the limit was known to be below the whole step.
-    pub steps_below: u64,
-    /// How often whole steps were given up for substeps.
-    pub cuts: u32,
-    /// Time [s] of the first cut.
-    pub first_cut: Option<f64>,
-    /// Time [s] at which the last step that was cut began.
-    pub last_cut: Option<f64>,
-    /// The most parts of a step.
-    pub most_substeps: u32,
-    /// Substeps beyond one a step, in all.
-    pub extra_steps: u64,
-    /// The last critical time step and the steps done then; its state is [`State::reference`](crate::State::reference).
-    pub(crate) reference: Option<(f64, u64)>,
-    /// Deformation at the last look.
-    pub(crate) deformed: Deformed,
-    /// Steps done at the last look.
-    pub(crate) looked_at: u64,
-}
-
-impl Default for Stability {
-    fn default() -> Self {
-        Self {
-            substeps: 1,
-            done: 0,
-            checks: 0,
-            critical_steps: 0,
-            reference: None,
-            last: None,
-            smallest: None,
-            steps_below: 0,
-            cuts: 0,
-            first_cut: None,
-            last_cut: None,
-            most_substeps: 1,
-            extra_steps: 0,
-            deformed: Deformed::default(),
-            looked_at: 0,
-        }
-    }
-}
-
-impl Stability {
-    /// Whether it can be of a state between two steps of a model.
-    pub fn fits(&self, model: &Model) -> bool {
-        let known = |look: &Look| {
-            model.solids.get(look.solid).is_some_and(|solid| look.cell < solid.cells.len())
-                && look.limit > 0.0
-        };
-        self.done == 0
-            && (1..=MOST_SUBSTEPS).contains(&self.substeps)
-            && self.last.iter().chain(&self.smallest).all(known)
-    }
-
-    /// Forgets what was seen of the limit of another model; how steps are cut stays until the first look.
-    pub(crate) fn forget(&mut self) {
-        let unseen = Self::default();
-        (self.checks, self.last, self.smallest) = (unseen.checks, unseen.last, unseen.smallest);
-        (self.reference, self.deformed, self.looked_at) =
-            (unseen.reference, unseen.deformed, unseen.looked_at);
-    }
-
-    /// Records a look and the deformation it was taken at.
-    pub(crate) fn note(&mut self, look: Look, deformed: Deformed, steps: u64) {
-        self.checks += 1;
-        (self.last, self.deformed, self.looked_at) = (Some(look), deformed, steps);
-        if self.smallest.is_none_or(|smallest| look.limit < smallest.limit) {
-            self.smallest = Some(look);
-        }
-    }
-
-    /// Records into how many parts the step that begins now is cut.
-    pub(crate) fn note_substeps(&mut self, substeps: u32, time: f64) {
-        if substeps > 1 {
-            self.cuts += u32::from(self.substeps == 1);
-            self.first_cut.get_or_insert(time);
-            self.last_cut = Some(time);
-            self.most_substeps = self.most_substeps.max(substeps);
-            self.extra_steps += u64::from(substeps) - 1;
-        }
-    }
-}
-
 /// The parts into which a step is cut, from how many there are now and the limit; `None` if more than
 /// [`MOST_SUBSTEPS`] are needed. Fewer than now only where they keep the reserve, so that a limit that hovers at a
 /// number of parts does not make it change all the time.
@@ -179,19 +79,6 @@ pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     let enough = (enough as u32).max(1);
     let stable = step / f64::from(now) <= KEEP * limit;
     Some(if stable { now.min(enough) } else { enough })
-}
-
-/// The limit at an instant.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Look {
-    /// Time [s].
-    pub time: f64,
-    /// The largest stable step [s], estimated or true.
-    pub limit: f64,
-    /// The solid of the cell that sets it.
-    pub solid: usize,
-    /// The cell in that solid.
-    pub cell: usize,
 }
 
 /// Watches the largest stable step of a model. Holds constants and scratch, and what follows from the reference.

@@ -1,12 +1,12 @@
 //! The state: everything that changes in a run. `Clone` is a snapshot.
 
-use pliant_mechanics::model::{self, FREE, Model, Solid, placed};
-use pliant_mechanics::tensor::{Symmetric, Vector};
+use pliant_mechanics::model::{self, FREE, Model, placed};
+use pliant_mechanics::tensor::Vector;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
-use crate::lanes::{PACK, Pack};
-use crate::stability::Stability;
+use crate::history::History;
+use crate::stability_record::Stability;
 
 /// What a stepper advances.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,47 +27,6 @@ pub struct State<R> {
     pub stability: Stability,
     /// Displacements [m] of the state whose critical time step is known, at first rest; see [`Monitor`](crate::stability::Monitor).
     pub reference: Vec<Vector<R>>,
-}
-
-/// What a relaxing law remembers of a solid.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct History<R> {
-    /// For each pack of cells [`History::slots`] tensors of six packs.
-    pub cells: Vec<Pack<R>>,
-    /// Where pressures are averaged, for each pack of them: Φⁿ⁻¹ and one h per volumetric term.
-    pub pressures: Vec<Pack<R>>,
-}
-
-impl<R: Scalar> History<R> {
-    /// At rest.
-    fn at_rest(solid: &Solid) -> Self {
-        let packs = |count: usize, slots: usize| vec![Pack::ZERO; count.div_ceil(PACK) * slots];
-        Self {
-            cells: packs(solid.cells.len(), 6 * Self::slots(solid)),
-            pressures: packs(solid.cells.averaged_pressures(), solid.material.prony.volumetric_slots()),
-        }
-    }
-
-    /// The tensors of a cell.
-    pub(crate) fn of_cell(&self, solid: &Solid, cell: usize) -> Vec<Symmetric<f64>> {
-        let slots = Self::slots(solid);
-        let number =
-            |slot: usize, k: usize| self.cells[(cell / PACK * slots + slot) * 6 + k].0[cell % PACK].to_f64();
-        (0..slots).map(|slot| Symmetric([0, 1, 2, 3, 4, 5].map(|k| number(slot, k)))).collect()
-    }
-
-    /// What an averaged pressure remembers [Pa].
-    pub(crate) fn of_pressure(&self, solid: &Solid, index: usize) -> Vec<f64> {
-        let slots = solid.material.prony.volumetric_slots();
-        (0..slots).map(|slot| self.pressures[index / PACK * slots + slot].0[index % PACK].to_f64()).collect()
-    }
-
-    /// Tensors of history per cell.
-    pub fn slots(solid: &Solid) -> usize {
-        let prony = &solid.material.prony;
-        let point = if solid.cells.averages_pressure() { prony.isochoric_slots() } else { prony.slots() };
-        solid.cells.points() * point
-    }
 }
 
 /// Work accumulated over the steps [J].

@@ -5,7 +5,7 @@ use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::{add, scale, sub};
 
 use crate::kernel::{Binding, Bound, GROUP, Kernel, Sides};
-use crate::solids::Four;
+use crate::transfer::Four;
 use crate::{Device, GpuError};
 
 /// What finds the forces of grips, and which nodes they pull at.

@@ -5,7 +5,7 @@ use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::{Vector, scale, sub};
 
 use crate::kernel::{Binding, Bound, Kernel, Memory, Sides};
-use crate::solids::Four;
+use crate::transfer::Four;
 use crate::{Device, GpuError};
 
 /// Marks an entry as a corner of a face.

@@ -3,7 +3,7 @@
 use pliant_mechanics::tensor::Vector;
 
 use crate::kernel::{Binding, Bound, Kernel, Memory, Sides};
-use crate::solids::Four;
+use crate::transfer::Four;
 use crate::transfer::Transfer;
 use crate::{Device, GpuError};
 

@@ -6,7 +6,7 @@ use pliant_mechanics::tensor::Vector;
 
 use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory, Sides, groups};
 use crate::loads::DeviceLoads;
-use crate::solids::Four;
+use crate::transfer::Four;
 use crate::{Device, GpuError};
 
 /// A node that is held.

@@ -19,7 +19,7 @@ use crate::kernel::{Binding, Bound, Memory};
 use crate::loads::DeviceLoads;
 use crate::nodes::{DeviceNodes, MOTION, MOVE, external_forces};
 use crate::run::table_constants;
-use crate::solids::Four;
+use crate::transfer::Four;
 use crate::{Design, Device, GpuError};
 
 /// Takes displacements from where they lie.

@@ -6,7 +6,7 @@ use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::Model;
 
 use crate::kernel::{Binding, Bound, Memory};
-use crate::solids::Four;
+use crate::transfer::Four;
 use crate::{Device, GpuError};
 
 /// Most instants in a submission.

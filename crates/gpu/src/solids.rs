@@ -7,7 +7,7 @@ use pliant_mechanics::tensor::Vector;
 
 use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory};
 use crate::paths::{CORNERS, EACH_CELL, Paths};
-use crate::transfer::Transfer;
+use crate::transfer::{Four, Transfer};
 use crate::{Device, GpuError};
 
 const INSTANT: &str = include_str!("shaders/instant.wgsl");
@@ -18,9 +18,6 @@ const SHAPE: &str = include_str!("shaders/stored_shape.wgsl");
 const HEX_CORNERS: &str = include_str!("shaders/hex_corners.wgsl");
 const TET: &str = include_str!("shaders/tet.wgsl");
 const AVERAGES: &str = include_str!("shaders/averages.wgsl");
-
-/// Four numbers that are read at once.
-pub(crate) type Four = [f32; 4];
 
 fn four([x, y, z]: Vector<f64>, w: f64) -> Four {
     [x as f32, y as f32, z as f32, w as f32]

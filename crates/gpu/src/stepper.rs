@@ -21,7 +21,8 @@ use crate::mapping::{DeviceMapping, PointValue};
 use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
 use crate::paths::Paths;
 use crate::run::{Instant, Instants, MOST, StepFailure, flags, table_constants};
-use crate::solids::{DeviceSolid, Four};
+use crate::solids::DeviceSolid;
+use crate::transfer::Four;
 use crate::transfer::Transfer;
 use crate::{Design, Device, GpuError};
 

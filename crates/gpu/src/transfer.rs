@@ -67,3 +67,6 @@ impl Transfer {
         Ok(())
     }
 }
+
+/// Four numbers that are read at once.
+pub(crate) type Four = [f32; 4];

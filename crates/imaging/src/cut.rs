@@ -1,14 +1,11 @@
 //! Crops an image to the box of a body, and resamples it by majority if the box has too many voxels. Voxels at the border of the image are
 //! reported, because the body may be cut off there.
 
-use std::fmt;
-
 use pliant_geometry::Vector3;
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
 
+use crate::border::Border;
 use crate::error::LabelError;
-use crate::grid::Grid;
 use crate::image::{Image, LabelImage};
 use crate::names::LabelChoice;
 
@@ -42,58 +39,6 @@ impl Cut {
         (self.factors != [1; 3]).then(|| {
             format!("resampled to voxels of {x:.3} × {y:.3} × {z:.3} mm: the box of the body is limited to 322³ voxels")
         })
-    }
-}
-
-/// Voxels of a region at the six sides of its image.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Border {
-    /// Where i, j and k are least and largest: the side of the patient that lies there, and voxels.
-    sides: [[(&'static str, u64); 2]; 3],
-}
-
-impl Border {
-    /// No voxel at the sides of a grid.
-    pub(crate) fn new(grid: &Grid) -> Self {
-        const WORDS: [[&str; 2]; 3] = [["left", "right"], ["back", "front"], ["foot", "head"]];
-        let along = |world: usize, axis: usize| grid.axes[(world, axis)] / grid.axes.column(axis).norm();
-        let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-        // The world axes nearest to the axes of the image, each once.
-        let fit = |order: &[usize; 3]| (0..3).map(|axis| along(order[axis], axis).abs()).sum::<f64>();
-        let order = orders.into_iter().max_by(|a, b| fit(a).total_cmp(&fit(b))).unwrap_or([0, 1, 2]);
-        let sides = [0, 1, 2].map(|axis| {
-            let [low, high] = WORDS[order[axis]];
-            let words = if along(order[axis], axis) < 0.0 { [high, low] } else { [low, high] };
-            words.map(|word| (word, 0))
-        });
-        Self { sides }
-    }
-
-    pub(crate) fn add(&mut self, voxels: [[u64; 2]; 3]) {
-        let sides = self.sides.as_flattened_mut().iter_mut();
-        sides.zip(voxels.as_flattened()).for_each(|((_, sum), voxels)| *sum += voxels);
-    }
-
-    /// Whether any voxel lies at the border.
-    pub fn is_touched(&self) -> bool {
-        self.sides.as_flattened().iter().any(|(_, voxels)| *voxels > 0)
-    }
-}
-
-impl Serialize for Border {
-    /// Voxels by side, as far as there are any.
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let touched = self.sides.as_flattened().iter().filter(|(_, voxels)| *voxels > 0);
-        serializer.collect_map(touched.map(|(side, voxels)| (side, voxels)))
-    }
-}
-
-impl fmt::Display for Border {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let touched = self.sides.as_flattened().iter().filter(|(_, voxels)| *voxels > 0);
-        let words: Vec<String> =
-            touched.map(|(side, voxels)| format!("{voxels} voxels on the {side} side")).collect();
-        f.write_str(&words.join(", "))
     }
 }
 
@@ -258,6 +203,7 @@ mod tests {
     use nalgebra::Matrix3;
 
     use super::*;
+    use crate::grid::Grid;
     use crate::image::{Numbers, Order, Scalar};
     use crate::names::LabelNames;
 

@@ -7,9 +7,9 @@
 use pliant_geometry::Vector3;
 use rayon::prelude::*;
 
-use crate::clean::Region;
 use crate::error::LabelError;
 use crate::grid::Grid;
+use crate::region::Region;
 
 /// No voxel.
 const NONE: u32 = u32::MAX;

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use crate::error::LabelError;
 use crate::grid::Grid;
-use crate::labels::RegionReport;
 use crate::names::LabelNames;
 
 /// Type of the numbers of an image.
@@ -192,18 +191,6 @@ impl Image {
         self.survey()?;
         let labels = (0..self.grid.len()).into_par_iter().map(|at| self.label(at)).collect();
         Ok(LabelImage { grid: self.grid, labels })
-    }
-
-    /// Every label but 0, increasing, with its size, place and pieces. `progress` hears fractions from 0 to 1.
-    pub fn regions(&self, progress: &dyn Fn(f64)) -> Result<Vec<RegionReport>, LabelError> {
-        self.survey()?;
-        progress(0.3);
-        let mut regions = RegionReport::all(&self.grid, |at| self.label(at));
-        for region in &mut regions {
-            region.name = self.names.get(region.label).map(str::to_owned);
-        }
-        progress(1.0);
-        Ok(regions)
     }
 
     /// The label of a voxel of a label image, as confirmed by a survey.

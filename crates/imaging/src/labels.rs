@@ -7,9 +7,10 @@ use std::fmt;
 use pliant_geometry::Vector3;
 use serde::Serialize;
 
-use crate::cut::Border;
+use crate::border::Border;
+use crate::error::LabelError;
 use crate::grid::Grid;
-use crate::image::LabelImage;
+use crate::image::{Image, LabelImage};
 
 /// The voxels of one label.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -216,6 +217,20 @@ impl Components {
             let start = run.row as usize * nx;
             (start + run.from as usize..start + run.to as usize, root)
         })
+    }
+}
+
+impl Image {
+    /// Every label but 0, increasing, with its size, place and pieces. `progress` hears fractions from 0 to 1.
+    pub fn regions(&self, progress: &dyn Fn(f64)) -> Result<Vec<RegionReport>, LabelError> {
+        self.survey()?;
+        progress(0.3);
+        let mut regions = RegionReport::all(&self.grid, |at| self.label(at));
+        for region in &mut regions {
+            region.name = self.names.get(region.label).map(str::to_owned);
+        }
+        progress(1.0);
+        Ok(regions)
     }
 }
 

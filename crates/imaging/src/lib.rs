@@ -15,6 +15,7 @@
 
 // Units stand in brackets; rustdoc takes [m] for a link.
 
+mod border;
 mod clean;
 mod cut;
 mod distance;
@@ -24,9 +25,11 @@ mod grid;
 mod image;
 mod labels;
 mod names;
+mod region;
 
-pub use clean::{Cleaned, Cleaning, Region};
-pub use cut::{Border, Choice, Cut};
+pub use border::Border;
+pub use clean::{Cleaned, Cleaning};
+pub use cut::{Choice, Cut};
 pub use distance::{DistanceField, Smoothing};
 pub use error::{ImageError, ImageProblem, LabelError};
 pub use file::{ImageFormat, ReadOptions, read, read_bytes, read_with};
@@ -34,3 +37,4 @@ pub use grid::Grid;
 pub use image::{Image, LabelImage, Scalar};
 pub use labels::RegionReport;
 pub use names::{LabelChoice, LabelNames};
+pub use region::Region;

@@ -8,10 +8,11 @@ use pliant_geometry::barycentric_of_closest;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
-use crate::facet::Vector18;
 use crate::model::Model;
+use crate::patch::Vector18;
+use crate::patch::{Carried, Place};
 use crate::state::State;
-use crate::surface::{Carried, CurvedSurface, Place};
+use crate::surface::CurvedSurface;
 
 /// A search tree over the curved surface where it was when the tree was made.
 struct Nearest<'s> {
@@ -128,7 +129,7 @@ impl CurvedSurface {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::EdgeRule;
+    use crate::patch::EdgeRule;
     use crate::tests::{ball, cube, model, strip};
     use pliant_testing::Random;
 

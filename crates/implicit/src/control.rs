@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use pliant_geometry::{ControlWeights, CurvedTriangle, EDGES};
 
 use crate::element::Matrix3x18;
+use crate::patch::Patch;
 use crate::rotation::skew;
-use crate::surface::Patch;
 
 /// A point to integrate at.
 pub(crate) struct Point {

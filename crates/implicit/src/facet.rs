@@ -9,16 +9,12 @@ use nalgebra::{
 };
 
 use crate::element::{
-    Corners, CurvedMembrane, Formulation, Layer, Matrix3x18, Matrix9, Membrane, PlaneStress, Section,
-    andes_higher, area, density, gradients, mean, mean_curvature, thickness,
+    Corners, CurvedMembrane, Formulation, Layer, Material, Matrix3x18, Matrix9, Membrane, PlaneStress,
+    Section, andes_higher, area, density, gradients, mean, mean_curvature, thickness,
 };
-use crate::model::Material;
+use crate::patch::{EdgeRule, Patch, Vector18};
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
 use crate::strain::ShellStrain;
-use crate::surface::{EdgeRule, Patch};
-
-/// Numbers of (u, v, w, θx, θy, θz) of three nodes, node by node.
-pub type Vector18 = SVector<f64, 18>;
 
 /// Stiffness over them.
 pub type Matrix18 = SMatrix<f64, 18, 18>;

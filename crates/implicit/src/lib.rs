@@ -35,15 +35,16 @@
 
 mod carry;
 mod control;
+mod creases;
 mod dynamics;
 pub mod element;
 mod error;
 mod facet;
 mod forces;
-mod gradients;
 mod initial;
 mod linear;
 mod model;
+mod patch;
 mod picture;
 mod pressure;
 mod recover;
@@ -61,17 +62,20 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
+pub use creases::Normal;
 pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
+pub use element::Material;
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
 pub use forces::Forces;
 pub use linear::{LinearReport, LinearSolver, Preconditioner};
-pub use model::{Constraint, Load, LoadKind, Material, Model, Motion, Normal, Notes, Shell, Spread, Spring};
+pub use model::{Constraint, Load, LoadKind, Model, Motion, Notes, Shell, Spread, Spring};
+pub use patch::{Carried, EdgeRule, Patch, Place};
 pub use picture::{Picture, PictureFields};
 pub use recover::{ShellFields, von_mises};
 pub use resolution::Resolution;
 pub use state::State;
 pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
 pub use strain::ShellStrain;
-pub use surface::{Carried, CurvedSurface, EdgeRule, Patch, Place};
+pub use surface::CurvedSurface;
 pub use system::Phases;

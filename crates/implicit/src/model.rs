@@ -7,11 +7,12 @@ use pliant_mechanics::curve::Curve;
 use pliant_mechanics::load::Face;
 use pliant_mechanics::model::{self, Solid};
 
-use crate::element::{Elasticity, Formulation, Layer};
+use crate::creases::{Normal, straight_edges};
+use crate::element::{Formulation, Layer, Material};
 use crate::error::ModelError;
 use crate::facet::Facet;
+use crate::patch::Carried;
 use crate::solid::refusal;
-use crate::surface::{Carried, straight_edges};
 
 /// The least part of a direction that lies in a triangle.
 const ALONG: f64 = 1e-3;
@@ -43,26 +44,6 @@ pub struct Model {
     pub loads: Vec<Load>,
     /// Constraints.
     pub constraints: Vec<Constraint>,
-}
-
-/// A normal that a node carries.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Normal {
-    /// The node.
-    pub node: u32,
-    /// Unit vector at rest.
-    pub direction: Vector3<f64>,
-    /// Whether it is the mean of its triangles, not given.
-    pub estimated: bool,
-}
-
-/// Elasticity and density.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Material {
-    /// Isotropic elasticity.
-    pub elastic: Elasticity,
-    /// Density [kg/m³].
-    pub density: f64,
 }
 
 /// Triangles that become a shell.
@@ -313,7 +294,7 @@ impl Model {
 
     /// Gives the facets the normals of their corners. A shell that shares edges with others makes creases of them.
     fn curve_facets(&mut self) {
-        let straight = straight_edges(self);
+        let straight = straight_edges(&self.facets, &self.corner_normals, &self.normals, &self.rest);
         for ((facet, corners), straight) in self.facets.iter_mut().zip(&self.corner_normals).zip(straight) {
             facet.curve(corners.map(|normal| self.normals[normal as usize].direction), straight);
         }

@@ -7,9 +7,10 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use crate::model::Model;
+use crate::patch::{Patch, Place};
 use crate::rotation::logarithm;
 use crate::state::State;
-use crate::surface::{CurvedSurface, Patch, Place};
+use crate::surface::CurvedSurface;
 
 /// Points and triangles that show the surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -181,7 +182,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::surface::EdgeRule;
+    use crate::patch::EdgeRule;
     use crate::tests::{ball, cube, model};
     use pliant_testing::Random;
 

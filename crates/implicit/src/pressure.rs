@@ -11,9 +11,10 @@ use pliant_geometry::EDGES;
 
 use crate::control::points;
 use crate::element::Matrix3x18;
-use crate::facet::{Matrix18, Vector18};
+use crate::facet::Matrix18;
+use crate::patch::Patch;
+use crate::patch::Vector18;
 use crate::rotation::skew;
-use crate::surface::Patch;
 
 /// ∫ F_a (F_b,u F_c,v − F_c,u F_b,v) over the triangle of area ½: constants of the cubic patch.
 static WEIGHTS: LazyLock<[[[f64; 9]; 9]; 9]> = LazyLock::new(|| {
@@ -136,8 +137,8 @@ fn back(forces: &[Vector3<f64>; 9], maps: &[Matrix3x18; 9]) -> Vector18 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::patch::EdgeRule;
     use crate::rotation::exponential;
-    use crate::surface::EdgeRule;
     use crate::testing::{Pose, moved};
     use crate::tests::{ball, model};
     use crate::{CurvedSurface, State};

@@ -1,10 +1,12 @@
 //! Everything that changes, as arrays over the nodes. A clone is a snapshot.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use rayon::prelude::*;
 
-use crate::facet::{Broken, Resultants, ShellEnergy};
+use crate::facet::{Broken, Facet, Resultants, ShellEnergy};
 use crate::model::Model;
 use crate::rotation::exponential;
+use crate::strain::ShellStrain;
 
 /// Where a model is.
 #[derive(Debug, Default, PartialEq)]
@@ -112,5 +114,14 @@ impl State {
         let facet = &model.facets[facet];
         let (x, rotation) = self.corners(facet.nodes);
         Ok(facet.resultants(&facet.place(&x, &rotation)?))
+    }
+
+    /// The strains of all facets, side by side; none of one that is collapsed or folded over.
+    pub fn shell_strains(&self, model: &Model) -> Vec<ShellStrain> {
+        let strain = |facet: &Facet| {
+            let (x, rotation) = self.corners(facet.nodes);
+            facet.place(&x, &rotation).map(|placed| facet.strain(&placed)).unwrap_or_default()
+        };
+        model.facets.par_iter().with_min_len(64).map(strain).collect()
     }
 }

@@ -5,10 +5,6 @@
 //! Leaves out: variation within a facet, shear across the thickness.
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
-
-use crate::model::Model;
-use crate::state::State;
 
 /// The strain of a facet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,21 +28,11 @@ fn largest(strain: &Vector3<f64>) -> f64 {
     (0.5 * (strain.x + strain.y)).abs() + (0.5 * (strain.x - strain.y)).hypot(0.5 * strain.z)
 }
 
-impl State {
-    /// The strains of all facets, side by side; none of one that is collapsed or folded over.
-    pub fn shell_strains(&self, model: &Model) -> Vec<ShellStrain> {
-        let strain = |facet: &crate::Facet| {
-            let (x, rotation) = self.corners(facet.nodes);
-            facet.place(&x, &rotation).map(|placed| facet.strain(&placed)).unwrap_or_default()
-        };
-        model.facets.par_iter().with_min_len(64).map(strain).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::rotation::exponential;
+    use crate::state::State;
     use crate::tests::{model, strip};
 
     /// A plate stretched by 20 % and thinned to match, bent to a radius of 1 m at a thickness of 0.1 m, and turned by a radian: 20 % in the

@@ -10,14 +10,16 @@ use pliant_mechanics::model::Solid;
 use rayon::prelude::*;
 
 use crate::error::SolveError;
-use crate::facet::{Broken, Facet, Matrix18, Tangent, Vector18, symmetrise};
+use crate::facet::{Broken, Facet, Matrix18, Tangent, symmetrise};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::model::{Load, LoadKind, Model, Motion, Spread, Spring};
+use crate::patch::Vector18;
+use crate::patch::{EdgeRule, Patch};
 use crate::rotation::skew;
 use crate::solid::{Response, Stars};
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
-use crate::surface::{CurvedSurface, EdgeRule, Patch};
+use crate::surface::CurvedSurface;
 
 /// Cells computed side by side before they are added up.
 const CHUNK: usize = 256;

@@ -11,10 +11,9 @@ use crate::anatomy::Anatomy;
 use crate::error::MeshingError;
 use crate::extent::checked_box;
 use crate::field::ImplicitField;
-use crate::given::{MeasuredTo, Patches};
+use crate::given::{MeasuredTo, Patches, is_outer};
 use crate::hausdorff::{Sample, distance};
 use crate::percentiles::Percentiles;
-use crate::regions::is_outer;
 use crate::topology::faces_between_labels;
 
 /// Samples of the field along the longest side of its box at most.

@@ -13,10 +13,12 @@ use serde::Serialize;
 
 use crate::anatomy::Anatomy;
 use crate::crossings::crossings;
+use crate::edges::key;
+use crate::error::counted;
 use crate::error::{MeshingError, require_positive};
 use crate::hausdorff::{distance, locator};
 use crate::nesting::{box_of, containers, corners_of, shells, signed_volume};
-use crate::triangles::{SurfaceRepairs, TriangleMesh, counted, key};
+use crate::triangles::{SurfaceRepairs, TriangleMesh};
 use crate::winding::Winding;
 
 /// Steps of the grid along an edge of the cells: the most for which it fits into memory.

@@ -2,8 +2,6 @@
 
 use pliant_geometry::Vector3;
 
-use crate::triangles::counted;
-
 /// The error of a mesh request. Lengths in metres.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshingError {
@@ -187,4 +185,9 @@ pub(crate) fn require_at_most(estimate: f64, limit: usize) -> Result<(), Meshing
         return Err(MeshingError::TooManyCells { estimate: estimate as u64, limit });
     }
     Ok(())
+}
+
+/// A number of things in words: `1 edge`, `2 edges`.
+pub(crate) fn counted(number: usize, one: &str, more: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { more })
 }

@@ -4,7 +4,9 @@ use pliant_geometry::{CellKind, Vector3};
 
 use crate::error::{MeshingError, require_at_most, require_positive};
 use crate::field::ImplicitField;
-use crate::stuffing::TETS_PER_CUBE;
+
+/// Tetrahedra in a cube of the lattice.
+pub(crate) const TETS_PER_CUBE: f64 = 12.0;
 
 /// Largest possible number of cells, for 32-bit indices of lattice points.
 const MOST_CELLS: usize = 1 << 25;

@@ -195,6 +195,11 @@ fn faces_of_voxels(grid: &Grid, materials: &[u8], label: &dyn Fn(u8) -> i32) -> 
     }
 }
 
+/// Whether a pair of sides is on the boundary of the whole.
+pub(crate) fn is_outer(sides: [i32; 2]) -> bool {
+    sides.contains(&OUTSIDE_LABEL)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

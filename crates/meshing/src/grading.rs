@@ -13,8 +13,8 @@ use crate::cut::cut_outside;
 use crate::error::{MeshingError, require_at_most, require_finite, require_positive};
 use crate::extent::{allowed, checked_box};
 use crate::octree::{Cube, Lattice, Octree};
+use crate::request::{OrganTets, SMALLEST_PART};
 use crate::surfaces::Surfaces;
-use crate::tets::{OrganTets, SMALLEST_PART};
 use crate::topology::in_large_components;
 
 /// Cubes outside the body may be this many doublings larger than the edge.

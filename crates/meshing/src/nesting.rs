@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use pliant_geometry::Vector3;
 
-use crate::triangles::key;
+use crate::edges::key;
 use crate::winding::Winding;
 
 /// A piece of a surface, held together by edges.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::anatomy::Anatomy;
 use crate::deviation::{Deviation, SAMPLES_PER_EDGE};
-use crate::given::{OUTSIDE_LABEL, Patches};
+use crate::given::Patches;
 use crate::missed::Missed;
 use crate::topology::faces_between_labels;
 use crate::voxels::Voxels;
@@ -131,9 +131,4 @@ fn volumes(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<LabelReport> {
         LabelReport { label, cells, volume, input_volume, distances: None }
     };
     anatomy.labels().into_iter().zip(anatomy.volumes()).map(of_label).collect()
-}
-
-/// Whether a pair of sides is on the boundary of the whole.
-pub(crate) fn is_outer(sides: [i32; 2]) -> bool {
-    sides.contains(&OUTSIDE_LABEL)
 }

@@ -10,7 +10,7 @@ use pliant_geometry::{CellKind, Vector3};
 use rayon::prelude::*;
 
 use crate::error::{MeshingError, require_at_most, require_finite, require_positive};
-use crate::extent::{allowed, checked_box, require_room};
+use crate::extent::{TETS_PER_CUBE, allowed, checked_box, require_room};
 use crate::field::ImplicitField;
 use crate::lattice::{DIRECTIONS, Lattice, Triple, is_long, tets_from};
 use crate::stencil::{Corner, stencil};
@@ -25,9 +25,6 @@ const ALPHA_SHORT: f64 = 0.41189;
 
 /// Bisections of an edge to find its cut: to 6e-8 of its length.
 const BISECTIONS: u32 = 24;
-
-/// Tetrahedra in a cube of the lattice.
-pub(crate) const TETS_PER_CUBE: f64 = 12.0;
 
 /// Marks a lattice point that was not warped.
 const UNMOVED: u32 = u32::MAX;

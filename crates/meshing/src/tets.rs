@@ -7,6 +7,7 @@ use std::fmt;
 use pliant_geometry::{CellKind, DataArray, Mesh, QualityReport, Spread, Vector3, volume};
 use serde::Serialize;
 
+use crate::Stuffing;
 use crate::anatomy::Anatomy;
 use crate::complex::{Complex, LONGEST};
 use crate::cut::{cut_gaps, cut_materials};
@@ -17,11 +18,8 @@ use crate::grading::{Filled, Levels, Wanted, fill, tree};
 use crate::manifold::{crowded_edges, mend, pinched_points};
 use crate::octree::{Octree, around};
 use crate::optimise::Optimiser;
+use crate::request::{OrganTets, SMALLEST_PART};
 use crate::surfaces::Surfaces;
-use crate::{DEFAULT_CELL_LIMIT, Stuffing};
-
-/// The smallest edge anywhere, as a fraction of the requested edge.
-pub(crate) const SMALLEST_PART: f64 = 1.0 / 64.0;
 
 /// Meshes made at most until a distance is held.
 const MOST_PASSES: usize = 8;
@@ -32,64 +30,7 @@ const BEYOND: f64 = 0.85;
 /// An unoptimised mesh is refined where its distance exceeds the requested one by this factor.
 const RAW_BEYOND: f64 = 1.2;
 
-/// A request for tetrahedra of an anatomy.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OrganTets {
-    /// Lattice constant [m]: the long edges of the inner tetrahedra; the short ones are √3/2 of it.
-    pub edge: f64,
-    /// Lattice constant inside, away from the surface [m], if larger: the largest `edge` × 2ⁿ up to this value.
-    pub inner_edge: Option<f64>,
-    /// Labels with smaller cells, and their lattice constant [m]: the largest `edge` / 2ⁿ that is not above it.
-    pub protect: Vec<(i32, f64)>,
-    /// Largest distance between mesh boundary and body surface [m] in both directions: cells are halved where it is exceeded. The
-    /// reference is the smooth surface of an image, or the triangles of a file.
-    pub distance: Option<f64>,
-    /// A lattice point [m]; the centre of the box of the body if `None`.
-    pub origin: Option<Vector3>,
-    /// Target for the smallest acoustic length, as a fraction of the ideal tet: 0.75 is usual, 0.9 the best, 0 skips
-    /// optimisation.
-    pub target: f64,
-    /// Most rounds of the optimiser.
-    pub rounds: usize,
-    /// Pieces of the mesh with fewer cells than this part of the largest one are left out.
-    pub smallest_piece: f64,
-    /// Most cells allowed.
-    pub cell_limit: usize,
-}
-
 impl OrganTets {
-    /// Lattice constant `edge` [m] everywhere, target 0.75 in at most 10 rounds, pieces of a twentieth of the largest one and more.
-    pub fn new(edge: f64) -> Self {
-        Self {
-            edge,
-            inner_edge: None,
-            protect: Vec::new(),
-            distance: None,
-            origin: None,
-            target: 0.75,
-            rounds: 10,
-            smallest_piece: 0.05,
-            cell_limit: DEFAULT_CELL_LIMIT,
-        }
-    }
-
-    /// The initial edge [m] if only a distance [m] is given, from the box of the body [m].
-    pub fn edge_for(distance: f64, [low, high]: [Vector3; 2]) -> f64 {
-        (12.0 * distance).min((high - low).norm() / 15.0)
-    }
-
-    /// The same with labels that have smaller cells: of the edge given [m], or else of half the edge of the others.
-    pub fn protecting(self, labels: &[(i32, Option<f64>)]) -> Self {
-        let own = |&(label, edge): &(i32, Option<f64>)| (label, edge.unwrap_or(self.edge / 2.0));
-        Self { protect: labels.iter().map(own).collect(), ..self }
-    }
-
-    /// The edge [m] that the field of a body must resolve: the shortest edge, or the requested distance.
-    pub fn finest(&self) -> f64 {
-        let protected = self.protect.iter().map(|(_, edge)| *edge).fold(self.edge, f64::min);
-        self.distance.map_or(protected, |distance| protected.min(distance.max(SMALLEST_PART * self.edge)))
-    }
-
     /// Fills an anatomy with tetrahedra; the label of each is its cell data `label`. `progress` hears fractions from 0 to
     /// 1. The result does not depend on the number of threads.
     pub fn mesh(&self, anatomy: &Anatomy<'_>, progress: &dyn Fn(f64)) -> Result<OrganMesh, MeshingError> {

@@ -9,7 +9,8 @@ use std::fmt;
 use pliant_geometry::{CellKind, Mesh, Surface, Vector3, boundary};
 use serde::Serialize;
 
-use crate::error::MeshingError;
+use crate::edges::key;
+use crate::error::{MeshingError, counted};
 use crate::nesting::{Shell, containers, signed_volume};
 
 /// Triangles of a worse shape have a normal by round-off only.
@@ -62,15 +63,6 @@ impl fmt::Display for SurfaceRepairs {
             .collect();
         f.write_str(&if told.is_empty() { "nothing".into() } else { told.join(", ") })
     }
-}
-
-/// A number of things in words: `1 edge`, `2 edges`.
-pub(crate) fn counted(number: usize, one: &str, more: &str) -> String {
-    format!("{number} {}", if number == 1 { one } else { more })
-}
-
-pub(crate) fn key(a: u32, b: u32) -> [u32; 2] {
-    [a.min(b), a.max(b)]
 }
 
 /// Twice the area times the normal [m²].

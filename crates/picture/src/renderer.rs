@@ -10,6 +10,7 @@ use crate::lines::{Line, MOST_EDGES};
 use crate::section::{Corner, Section};
 use crate::style::{PLAIN, Style, Texture};
 use crate::subject::Subject;
+use crate::vertex::staged;
 
 /// The render target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -482,20 +483,6 @@ impl Drawn {
             pass.draw(0..6 * self.mark_lines, 1..2);
         }
     }
-}
-
-/// Marks a missing value, so that neither it nor an interpolation with it takes a colour of the map: shaders may replace NaN by
-/// any number.
-const NO_VALUE: f32 = 1e38;
-
-/// A value for the shader; for a non-finite one the colour is that of tissue.
-pub fn drawn_value(value: f64) -> f32 {
-    if value.is_finite() { value.clamp(-1e29, 1e29) as f32 } else { NO_VALUE }
-}
-
-/// A position and a value as the shader takes them.
-pub(crate) fn staged(point: &Vector3, value: f64) -> [f32; 4] {
-    [point.x as f32, point.y as f32, point.z as f32, drawn_value(value)]
 }
 
 fn four(v: &Vector3, w: f64) -> [f32; 4] {

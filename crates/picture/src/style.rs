@@ -1,7 +1,7 @@
 //! How a body is shown.
 
 use crate::colour::ColourMap;
-use crate::section::Plane;
+use crate::plane::Plane;
 
 /// The background of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

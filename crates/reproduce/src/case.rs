@@ -8,8 +8,6 @@ use pliant_meshing::MeshingError;
 use pliant_scene::diagnostic::SceneErrors;
 use serde::Serialize;
 
-use crate::cases::CASES;
-
 /// A result of the literature.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
@@ -204,18 +202,6 @@ impl Case {
     }
 }
 
-/// The case of an id.
-///
-/// # Errors
-/// If it does not exist: the most similar id.
-pub fn find(id: &str) -> Result<&'static Case, &'static str> {
-    CASES.iter().find(|case| case.id.eq_ignore_ascii_case(id)).ok_or_else(|| {
-        let likeness = |case: &&Case| strsim::jaro_winkler(case.id, &id.to_lowercase());
-        let nearest = CASES.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-        nearest.map_or("", |case| case.id)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -234,16 +220,5 @@ mod tests {
         let findings = case.run();
         assert_eq!((findings.rows.len(), findings.rows[0].pass), (1, Some(false)));
         assert!(findings.rows[0].quantity.contains("no ink"));
-    }
-
-    #[test]
-    fn ids_are_found_and_slips_are_answered_with_the_nearest() {
-        assert_eq!(find("FIG-6.3").unwrap().id, "fig-6.3");
-        assert_eq!(find("fig6.10").unwrap_err(), "fig-6.10");
-        assert_eq!(find("brain").unwrap_err(), "brain-shift");
-        let mut ids: Vec<&str> = CASES.iter().map(|case| case.id).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        assert_eq!(ids.len(), CASES.len());
     }
 }

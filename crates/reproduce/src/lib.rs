@@ -6,6 +6,7 @@
 
 mod case;
 pub mod cases;
+mod digits;
 mod page;
 mod picture;
 mod plot;
@@ -14,12 +15,13 @@ mod report;
 mod run;
 pub mod shells;
 
-pub use case::{Case, CaseError, Correction, Figure, Findings, Row, find};
-pub use cases::CASES;
+pub use case::{Case, CaseError, Correction, Figure, Findings, Row};
+pub use cases::{CASES, find};
+pub use page::is_own_file;
 pub use pliant_bench::{
     HOURGLASS, Hexes, Specimen, Tets, deformation, elastic, law, liver, liver_matrix, liver_relaxation,
     soft_tissue,
 };
 pub use reference::{largest, mesh, numbers, reference};
-pub use report::{Report, is_own_file};
+pub use report::Report;
 pub use run::{Equilibrium, relax, run, run_on, settle, smooth_step};

@@ -1,13 +1,30 @@
 //! The page of a reproduction: one self-contained HTML file.
 
 use crate::case::{Case, Correction, Figure, Findings, Row};
+use crate::digits::{reference, tolerance};
 use crate::picture::NO_PICTURE;
-use crate::report::{Report, commit, reference, tolerance};
+use crate::report::{Report, commit};
+
+/// The files of a report.
+const FILES: [&str; 2] = ["index.html", "results.json"];
 
 const STYLE: &str = include_str!("page.css");
 
+impl Report {
+    /// The files, each with its name.
+    pub fn files(&self) -> [(&'static str, String); 2] {
+        let [index, results] = FILES;
+        [(index, page(self)), (results, format!("{:#}\n", self.results()))]
+    }
+}
+
+/// Whether a report writes a file of this name.
+pub fn is_own_file(name: &str) -> bool {
+    FILES.contains(&name)
+}
+
 /// The whole page.
-pub(crate) fn page(report: &Report) -> String {
+fn page(report: &Report) -> String {
     let [passed, failed] = report.counts();
     let judged = passed + failed;
     let shown_only = report.rows().count() - judged;

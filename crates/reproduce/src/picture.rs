@@ -89,7 +89,7 @@ mod drawn {
     };
 
     use super::{Body, CaseError, View};
-    use crate::report::significant;
+    use crate::digits::significant;
 
     /// Width of a picture in the SVG, and height of the text below it.
     const WIDTH: f64 = 340.0;

@@ -6,10 +6,7 @@ use pliant_bench::Machine;
 use serde_json::json;
 
 use crate::case::{Case, Findings, Row};
-use crate::page;
-
-/// The files of a report.
-const FILES: [&str; 2] = ["index.html", "results.json"];
+use crate::digits::{reference, significant, tolerance};
 
 /// Cases and their results.
 #[derive(Clone, Debug)]
@@ -46,13 +43,8 @@ impl Report {
         self.cases.iter().map(|case| case.2).sum()
     }
 
-    /// The files, each with its name.
-    pub fn files(&self) -> [(&'static str, String); 2] {
-        let [page, results] = FILES;
-        [(page, page::page(self)), (results, format!("{:#}\n", self.results()))]
-    }
-
-    fn results(&self) -> serde_json::Value {
+    /// `results.json`.
+    pub(crate) fn results(&self) -> serde_json::Value {
         let [passed, failed] = self.counts();
         json!({
             "version": env!("CARGO_PKG_VERSION"),
@@ -108,30 +100,6 @@ impl Row {
     }
 }
 
-/// The commit that was built, if git knew it.
-pub(crate) fn commit() -> Option<&'static str> {
-    option_env!("PLIANT_COMMIT")
-}
-
-/// A reference as it was given.
-pub(crate) fn reference(row: &Row) -> String {
-    shown(row.reference, 7)
-}
-
-/// A tolerance, to three digits.
-pub(crate) fn tolerance(row: &Row) -> String {
-    shown(row.tolerance, 3)
-}
-
-fn shown(value: Option<f64>, digits: usize) -> String {
-    let Some(value) = value else { return "–".to_owned() };
-    let text = significant(value, digits);
-    if text.contains('.') && !text.contains('e') {
-        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
-    }
-    text
-}
-
 /// Yes, no, or nothing to judge by.
 pub(crate) fn verdict(pass: Option<bool>) -> &'static str {
     match pass {
@@ -141,38 +109,14 @@ pub(crate) fn verdict(pass: Option<bool>) -> &'static str {
     }
 }
 
-/// A number with a count of significant digits, but whole up to a million; beyond, and below a thousandth, with an
-/// exponent.
-pub(crate) fn significant(value: f64, digits: usize) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return value.to_string();
-    }
-    let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
-    if (1e-3..1e6).contains(&rounded.abs()) {
-        let decimals = digits as i32 - 1 - rounded.abs().log10().floor() as i32;
-        format!("{value:.*}", decimals.max(0) as usize)
-    } else {
-        format!("{rounded:e}")
-    }
-}
-
-/// Whether a report writes a file of this name.
-pub fn is_own_file(name: &str) -> bool {
-    FILES.contains(&name)
+/// The commit that was built, if git knew it.
+pub(crate) fn commit() -> Option<&'static str> {
+    option_env!("PLIANT_COMMIT")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_have_the_digits_they_deserve() {
-        let four = [8.8109, 0.0234, 123456.7, 2.4276e-5, -34.85, 9.99996].map(|x| significant(x, 4));
-        assert_eq!(four, ["8.811", "0.02340", "123457", "2.428e-5", "-34.85", "10.00"]);
-        let given = [8.75, 0.1, 1e-9, 30.0, 2.12].map(|x| shown(Some(x), 7));
-        assert_eq!(given, ["8.75", "0.1", "1e-9", "30", "2.12"]);
-        assert_eq!(shown(Some(5.272704), 3), "5.27");
-    }
 
     #[test]
     fn a_computed_number_has_the_digits_by_which_it_is_judged() {

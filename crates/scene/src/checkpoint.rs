@@ -14,8 +14,7 @@ use pliant_sim::{Precision, Schedule, State, counted, number};
 use serde::{Deserialize, Serialize};
 
 use crate::format::{LoadSteps, SolverName};
-use crate::output::{OutputError, OutputFolder, Written, replace};
-use crate::run::{History, Watched};
+use crate::output::{History, OutputError, OutputFolder, Watched, Written, replace};
 use crate::world::{Part, World};
 
 /// The first bytes of every checkpoint.

@@ -5,22 +5,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use pliant_explicit::Wanted;
-use pliant_explicit::stability::Stability;
-use pliant_mechanics::Energies;
-use pliant_sim::{
-    Effort, Equilibria, Failure, Instant as Now, LoadStepProgress, Observer, Schedule, Simulation,
-};
-use serde::{Deserialize, Serialize};
+use pliant_sim::{Failure, LoadStepProgress, Observer, Schedule, Simulation};
 
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
-use crate::format::SolverName;
 use crate::output::{
-    CONVERGENCE, FieldMesh, Frame, OutputError, OutputFolder, PICTURE, PLOT, SUMMARY, Scheduled,
-    ShellStrains, Summary, interrupted, markdown, output_failure, outputs, plot, summarise, time_of,
+    CONVERGENCE, FieldMesh, History, Outcome, OutputError, OutputFolder, PICTURE, PLOT, PartOutcome, SUMMARY,
+    Scheduled, Summary, Watched, interrupted, markdown, output_failure, outputs, plot, summarise,
 };
 use crate::view::Draw;
-use crate::world::{Part, World};
+use crate::world::World;
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -45,121 +39,6 @@ pub struct Options<'a> {
     pub stop: Option<&'a AtomicBool>,
     /// Draws the last instant, as the scene's `[view]` shows it, into `picture.png`.
     pub picture: Option<&'a dyn Draw>,
-}
-
-/// Samples of a run for plot and summary.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct History {
-    pub times: Vec<f64>,
-    pub energies: Vec<Energies>,
-    /// Size of each constraint's reaction [N].
-    pub reactions: Vec<Vec<f64>>,
-}
-
-/// The worst that was seen of a participant so far.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Watched {
-    pub worst_balance: f64,
-    /// The largest hourglass energy over the internal one, and its time [s].
-    pub worst_hourglass: (f64, f64),
-    /// How far shells were strained.
-    pub strains: ShellStrains,
-}
-
-impl Watched {
-    fn see(&mut self, participant: &dyn Now) {
-        let (energies, floor) = (participant.energies(), participant.balance_floor());
-        if participant.largest_energy() > floor {
-            self.worst_balance = self.worst_balance.max(energies.balance);
-        }
-        let share = hourglass_share(&energies, floor);
-        if share > self.worst_hourglass.0 {
-            self.worst_hourglass = (share, participant.time());
-        }
-    }
-}
-
-/// The result of a run.
-#[derive(Clone, Debug)]
-pub(crate) struct Outcome {
-    pub failure: Option<Failure>,
-    /// Common instants after the start.
-    pub steps: u64,
-    pub time: f64,
-    pub wall_seconds: f64,
-    /// Energies of all participants together.
-    pub energies: Energies,
-    /// Of each participant, in the order of the world.
-    pub parts: Vec<PartOutcome>,
-    /// Why it ended before the time of the scene was over, without a failure.
-    pub ended: Option<String>,
-    pub history: History,
-    pub files: Vec<PathBuf>,
-    /// The picture of the last instant.
-    pub picture: Option<PathBuf>,
-    pub threads: usize,
-    /// The checkpoint it went on from, and its time [s].
-    pub resumed: Option<(PathBuf, f64)>,
-}
-
-/// The result of a participant.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct PartOutcome {
-    pub steps: u64,
-    pub energies: Energies,
-    pub balance_floor: f64,
-    pub watched: Watched,
-    /// The critical time step as it was seen; `None` of a run without inertia.
-    pub stability: Option<Stability>,
-    /// How good its equilibria are, if it found some by dynamic relaxation.
-    pub equilibria: Option<Equilibria>,
-    /// Cost of its equations, if it solved some.
-    pub effort: Option<Effort>,
-    /// Residuals of its last iterations, as a table.
-    pub convergence: Option<String>,
-    pub reactions: Vec<[f64; 3]>,
-}
-
-impl PartOutcome {
-    fn new(part: &Part, participant: &dyn Now, watched: Watched) -> Self {
-        let watches = part.plan.limits.is_some() && part.scene.run.solver == SolverName::Explicit;
-        let frame = Frame { part, now: participant };
-        Self {
-            steps: participant.steps(),
-            energies: participant.energies(),
-            balance_floor: participant.balance_floor(),
-            watched,
-            stability: watches.then(|| participant.stability()),
-            equilibria: participant.equilibria(),
-            effort: participant.effort(),
-            convergence: participant.convergence(),
-            reactions: frame.reactions().collect(),
-        }
-    }
-}
-
-impl Outcome {
-    /// Of a run whose steppers could not be made.
-    fn not_begun(failure: Failure, world: &World) -> Self {
-        let part = |part: &Part| PartOutcome {
-            reactions: vec![[0.0; 3]; part.built.model.constraints.len()],
-            ..PartOutcome::default()
-        };
-        Self {
-            failure: Some(failure),
-            steps: 0,
-            time: 0.0,
-            wall_seconds: 0.0,
-            energies: Energies::default(),
-            parts: world.participants.iter().map(part).collect(),
-            ended: None,
-            history: History::default(),
-            files: Vec::new(),
-            picture: None,
-            threads: rayon::current_num_threads(),
-            resumed: None,
-        }
-    }
 }
 
 /// Samples in the history.
@@ -272,17 +151,6 @@ fn go(
         threads: rayon::current_num_threads(),
         resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
     })
-}
-
-/// Hourglass energy over internal energy; 0 while both together are below the floor [J] from which on energies mean
-/// something.
-fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
-    let Energies { internal, hourglass, .. } = *energies;
-    if hourglass > 0.0 && internal + hourglass > floor {
-        hourglass / internal.max(f64::MIN_POSITIVE)
-    } else {
-        0.0
-    }
 }
 
 /// What is seen, written and kept of a run.
@@ -493,14 +361,5 @@ impl Observer for Run<'_> {
         let [from, to] = progress.iteration.span;
         let time = from + progress.iteration.fraction * (to - from);
         self.tell(time, Some(progress), false);
-    }
-}
-
-impl History {
-    fn sample(&mut self, frames: &[Frame<'_>]) {
-        self.times.push(time_of(frames));
-        self.energies.push(Energies::total(frames.iter().map(|frame| frame.now.energies())));
-        let size = |force: [f64; 3]| force.iter().map(|f| f * f).sum::<f64>().sqrt();
-        self.reactions.push(frames.iter().flat_map(Frame::reactions).map(size).collect());
     }
 }

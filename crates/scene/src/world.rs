@@ -11,7 +11,6 @@ use crate::assemble::{Built, Meshing, build_watched};
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{FieldName, ViewTable};
-use crate::output::Frame;
 use crate::plan::{Plan, plan, steps};
 use crate::scene::Scene;
 
@@ -160,11 +159,6 @@ impl World {
     /// Its participants without their tables.
     pub(crate) fn simulated(&self) -> pliant_sim::World {
         pliant_sim::World { parts: self.participants.iter().map(Part::simulated).collect() }
-    }
-
-    /// All participants of a simulation of it as outputs read them.
-    pub(crate) fn frames<'a>(&'a self, simulation: &'a Simulation) -> Vec<Frame<'a>> {
-        self.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame { part, now }).collect()
     }
 
     /// Adds a doubt to those that did not keep the models from being built.

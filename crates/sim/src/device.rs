@@ -9,7 +9,6 @@ use pliant_mechanics::grip::Grip;
 
 use crate::failure::Failure;
 use crate::part::{Method, Part};
-use crate::simulation::Simulation;
 use crate::solver::{LoadStepProgress, Solver};
 
 /// The place of a point at rest [m], and its nodes with their weights.
@@ -17,10 +16,10 @@ pub type MappedPoint = ([f64; 3], Vec<(u32, f64)>);
 
 /// A simulation whose bodies all go together on one GPU.
 pub struct OnDevice<'a> {
-    stepper: &'a mut GpuStepper,
-    state: &'a mut State<f32>,
+    pub(crate) stepper: &'a mut GpuStepper,
+    pub(crate) state: &'a mut State<f32>,
     /// Whether forces belong to the simulation's instant.
-    evaluated: &'a mut bool,
+    pub(crate) evaluated: &'a mut bool,
 }
 
 impl OnDevice<'_> {
@@ -45,15 +44,6 @@ impl OnDevice<'_> {
     /// Brings points on the device to the instant.
     pub fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
         self.stepper.apply(mapping, value);
-    }
-}
-
-impl Simulation {
-    /// What a state on a GPU can do beside; `None` of a state in ordinary memory.
-    pub fn on_device(&mut self) -> Option<OnDevice<'_>> {
-        let [only] = &mut self.participants[..] else { return None };
-        let (stepper, state) = only.on_device()?;
-        Some(OnDevice { stepper, state, evaluated: &mut self.evaluated })
     }
 }
 

@@ -4,20 +4,20 @@ use std::collections::VecDeque;
 use std::fmt::Write;
 use std::sync::Arc;
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+use nalgebra::Vector3;
 use pliant_explicit::Wanted;
 use pliant_implicit::{
     BackwardEuler, DynamicSettings, Explicit, Forces, Model, Phases, SolveError, Spring, State, Statics,
 };
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::{Energies, fingerprint};
-use serde::{Deserialize, Serialize};
 
 use crate::bodies::{Control, ImplicitBodies, Stop};
 use crate::failure::Failure;
-use crate::instant::{CellsNow, Instant};
+use crate::instant::{CellsNow, Effort, Instant};
+use crate::kept::{ImplicitState, Iterated, Kept, PlainState};
 use crate::part::{self, Part};
-use crate::participant::{Kept, Participant};
+use crate::participant::Participant;
 use crate::solids::SolidCells;
 use crate::solver::LoadStepProgress;
 use crate::words::{counted, number};
@@ -27,31 +27,6 @@ const FIRM: f64 = 10.0;
 
 /// Iterations of Newton's method whose residuals are kept: the last ones.
 const ITERATIONS_KEPT: usize = 10_000;
-
-/// What the equations of an implicit or a static run took.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Effort {
-    /// Iterations of Newton's method in all.
-    pub newton_iterations: u64,
-    /// Linear equations solved.
-    pub solutions: u64,
-    /// Iterations of conjugate gradients in all; 0 with factors.
-    pub linear_iterations: u64,
-    /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
-    pub linear_residual: f64,
-    /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.
-    pub residual: Option<f64>,
-    /// Steps that were halved.
-    pub halved: u64,
-    /// Wall time of forces and stiffness of the cells [s].
-    pub seconds_cells: f64,
-    /// Wall time of factorising, or of making the preconditioner [s].
-    pub seconds_factors: f64,
-    /// Wall time of solving with them [s].
-    pub seconds_solution: f64,
-    /// Beginning of the first unstable equilibrium [s], seen from a negative pivot.
-    pub unstable_from: Option<f64>,
-}
 
 /// A run of shells, and of solids whose equations are solved.
 pub(crate) struct Implicit {
@@ -91,22 +66,6 @@ pub(crate) struct Implicit {
     solids: Option<pliant_explicit::State<f64>>,
 }
 
-/// An iteration of Newton's method.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Iterated {
-    /// Step, counted from 1, and the attempt at it.
-    step: u64,
-    attempt: usize,
-    /// The time that it was to reach [s].
-    time: f64,
-    iteration: usize,
-    /// Residual, and what was allowed at the end of the attempt: [N] of static steps, over the largest force of implicit ones.
-    residual: f64,
-    allowed: f64,
-    /// Whether the attempt found its equilibrium.
-    found: bool,
-}
-
 /// How far a run by arc length is.
 #[derive(Default)]
 struct Path {
@@ -117,72 +76,6 @@ struct Path {
     limit_points: u32,
     /// Why it ended before its last step.
     ended: Option<String>,
-}
-
-/// What a resumed run needs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct ImplicitState {
-    /// Whole steps done, and the time [s] they end at.
-    done: u64,
-    time: f64,
-    state: PlainState,
-    before: Option<(Vec<f64>, PlainState)>,
-    /// The state that an implicit step takes differences with.
-    previous: Option<PlainState>,
-    energies: Energies,
-    effort: Effort,
-    convergence: VecDeque<Iterated>,
-}
-
-impl ImplicitState {
-    /// Whether it is of a model with so many nodes.
-    pub(crate) fn fits(&self, nodes: usize) -> bool {
-        let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
-        before && self.previous.iter().all(|state| state.fits(nodes)) && self.state.fits(nodes)
-    }
-}
-
-/// A state in plain numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct PlainState {
-    time: f64,
-    load_factor: f64,
-    position: Vec<[f64; 3]>,
-    /// Quaternions (i, j, k, w).
-    rotation: Vec<[f64; 4]>,
-    velocity: Vec<[f64; 3]>,
-    spin: Vec<[f64; 3]>,
-}
-
-impl PlainState {
-    fn of(state: &State) -> Self {
-        let plain = |vectors: &[Vector3<f64>]| vectors.iter().map(|&v| v.into()).collect();
-        Self {
-            time: state.time,
-            load_factor: state.load_factor,
-            position: plain(&state.position),
-            rotation: state.rotation.iter().map(|q| q.coords.into()).collect(),
-            velocity: plain(&state.velocity),
-            spin: plain(&state.spin),
-        }
-    }
-
-    fn fits(&self, nodes: usize) -> bool {
-        [self.position.len(), self.rotation.len(), self.velocity.len(), self.spin.len()] == [nodes; 4]
-    }
-
-    fn state(&self) -> State {
-        let vectors = |plain: &[[f64; 3]]| plain.iter().map(|&v| v.into()).collect();
-        let rotation = |&q: &[f64; 4]| UnitQuaternion::new_unchecked(Quaternion::from(Vector4::from(q)));
-        State {
-            time: self.time,
-            load_factor: self.load_factor,
-            position: vectors(&self.position),
-            rotation: self.rotation.iter().map(rotation).collect(),
-            velocity: vectors(&self.velocity),
-            spin: vectors(&self.spin),
-        }
-    }
 }
 
 /// A solver, and the forces at an instant: an explicit one finds them anyway.

@@ -3,8 +3,8 @@
 use pliant_explicit::recover::CellFields;
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
+use serde::{Deserialize, Serialize};
 
-use crate::implicit::Effort;
 use crate::solver::Equilibria;
 
 /// A participant at the instant last evaluated. Nodes and constraints are numbered in its model.
@@ -83,6 +83,31 @@ pub trait Instant {
     fn ended(&self) -> Option<&str> {
         None
     }
+}
+
+/// What the equations of an implicit or a static run took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Effort {
+    /// Iterations of Newton's method in all.
+    pub newton_iterations: u64,
+    /// Linear equations solved.
+    pub solutions: u64,
+    /// Iterations of conjugate gradients in all; 0 with factors.
+    pub linear_iterations: u64,
+    /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
+    pub linear_residual: f64,
+    /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.
+    pub residual: Option<f64>,
+    /// Steps that were halved.
+    pub halved: u64,
+    /// Wall time of forces and stiffness of the cells [s].
+    pub seconds_cells: f64,
+    /// Wall time of factorising, or of making the preconditioner [s].
+    pub seconds_factors: f64,
+    /// Wall time of solving with them [s].
+    pub seconds_solution: f64,
+    /// Beginning of the first unstable equilibrium [s], seen from a negative pivot.
+    pub unstable_from: Option<f64>,
 }
 
 /// Finds fields of cells at an instant.

@@ -6,12 +6,16 @@ use pliant_explicit::{Clock, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::{Energies, Model, fingerprint};
 
+#[cfg(feature = "gpu")]
+use crate::device::OnDevice;
 use crate::failure::Failure;
 use crate::instant::Instant;
-use crate::observer::{Observer, steps_to};
+use crate::kept::Kept;
 use crate::part::Part;
-use crate::participant::{Before, Kept, Participant, begin, go_on};
+use crate::participant::Participant;
+use crate::schedule::steps_to;
 use crate::solver::LoadStepProgress;
+use crate::start::{Before, begin, go_on};
 
 /// The participants of a simulation: constant while it runs.
 #[derive(Clone, Debug)]
@@ -115,13 +119,13 @@ impl State {
 /// ```
 pub struct Simulation {
     world: Arc<World>,
-    pub(crate) participants: Vec<Box<dyn Participant>>,
+    participants: Vec<Box<dyn Participant>>,
     /// Steps of each participant between two common instants.
     ratios: Vec<u64>,
     /// First node of each participant, counted over all.
     first_nodes: Vec<u32>,
     /// Whether forces, energies and reactions belong to the instant.
-    pub(crate) evaluated: bool,
+    evaluated: bool,
 }
 
 impl Simulation {
@@ -460,6 +464,90 @@ impl Simulation {
             (own == part).then_some((node, weight))
         });
         Some((part, Grip { nodes: nodes.collect::<Option<_>>()?, ..grip.clone() }))
+    }
+}
+
+/// Looks at a run ([`Simulation::observe`]) and changes nothing.
+///
+/// An observer that samples the height of a body every tenth of a second:
+///
+/// ```
+/// use pliant_sim::{Failure, Observer, Schedule, Simulation};
+///
+/// struct Height {
+///     schedule: Schedule,
+///     samples: Vec<f64>,
+/// }
+///
+/// impl Observer for Height {
+///     fn stride(&self, simulation: &Simulation) -> u64 {
+///         self.schedule.stride(simulation.time(), simulation.step_length())
+///     }
+///
+///     fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure> {
+///         if self.schedule.is_due(simulation.time(), simulation.step_length(), last) {
+///             self.samples.extend(simulation.instants().map(|now| now.displacement(3)[2]));
+///         }
+///         Ok(())
+///     }
+/// }
+/// # use pliant_mechanics::Model;
+/// # use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+/// # use pliant_mechanics::load::Load;
+/// # use pliant_mechanics::model::{Cells, Material, Solid};
+/// # let mut model = Model::default();
+/// # let tet = model.add_body("tet", &[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
+/// # let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
+/// # let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
+/// # model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
+/// # model.fix("base", vec![0, 1, 2]);
+/// # model.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
+/// # let part = pliant_sim::Part::explicit("tet", model, 0.5)?;
+///
+/// let mut height = Height { schedule: Schedule::new(0.1), samples: Vec::new() };
+/// Simulation::new(part)?.observe(0.5, &mut height)?;
+/// assert_eq!(height.samples.len(), 6);
+/// # Ok::<(), Failure>(())
+/// ```
+pub trait Observer {
+    /// The most common steps from here that miss no instant it has to see; at least one.
+    fn stride(&self, _simulation: &Simulation) -> u64 {
+        1
+    }
+
+    /// What it reads at an instant, the last or not.
+    fn wanted(&self, _simulation: &Simulation, _last: bool) -> Wanted {
+        Wanted::Everything
+    }
+
+    /// Reads an instant whose forces are found.
+    ///
+    /// # Errors
+    /// Whatever shall end the run.
+    fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure>;
+
+    /// Follows a step. Forces are not found yet, so the state can be taken.
+    ///
+    /// # Errors
+    /// Whatever shall end the run.
+    fn stepped(&mut self, _simulation: &mut Simulation, _last: bool) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Follows a step that failed.
+    fn step_failed(&mut self, _simulation: &mut Simulation) {}
+
+    /// Hears how far a load step is.
+    fn watch(&mut self, _progress: LoadStepProgress) {}
+}
+
+#[cfg(feature = "gpu")]
+impl Simulation {
+    /// What a state on a GPU can do beside; `None` of a state in ordinary memory.
+    pub fn on_device(&mut self) -> Option<OnDevice<'_>> {
+        let [only] = &mut self.participants[..] else { return None };
+        let (stepper, state) = only.on_device()?;
+        Some(OnDevice { stepper, state, evaluated: &mut self.evaluated })
     }
 }
 

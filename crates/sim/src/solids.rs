@@ -12,8 +12,9 @@ use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::failure::Failure;
 use crate::instant::{CellsNow, Instant};
-use crate::part::{Method, Part};
-use crate::participant::{Kept, Participant};
+use crate::kept::Kept;
+use crate::part::Part;
+use crate::participant::Participant;
 use crate::solver::{Equilibria, LoadStepProgress, Memory, Solver, on_cpu};
 
 /// The number types that solids in large strain are computed in.
@@ -228,20 +229,4 @@ impl<R: Numeric> Participant for Solids<R> {
         };
         fingerprint(&(bits(&self.state.displacement), bits(&self.state.increment)))
     }
-}
-
-/// Whether a state and its memory have the sizes of a participant's, and are of its method.
-pub(crate) fn fits<R: Numeric>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
-    let model: &Model = &part.model;
-    let found = matches!(memory, Memory::Equilibrium(_));
-    if found != matches!(part.method, Method::QuasiStatic { .. }) {
-        return false;
-    }
-    let rest = State::<R>::at_rest(model);
-    let sizes = |state: &State<R>| {
-        let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
-        let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
-        (nodes, history.collect::<Vec<_>>())
-    };
-    sizes(state) == sizes(&rest) && state.stability.fits(model) && memory.fits(model.node_count())
 }

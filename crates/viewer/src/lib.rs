@@ -4,6 +4,7 @@
 mod device;
 mod hand;
 mod parameters;
+mod recording;
 mod replay;
 mod samples;
 mod session;
@@ -13,7 +14,8 @@ mod window;
 pub use device::LOOK;
 pub use hand::{Hand, Hold, Point, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
-pub use replay::{Done, Lags, Move, Recording, Replayed, Surface, replay, replay_in_real_time};
+pub use recording::{Done, Move, Recording, Surface};
+pub use replay::{Lags, Replayed, replay, replay_in_real_time};
 pub use samples::Samples;
 pub use session::{Frame, Order, Session};
 #[cfg(feature = "window")]

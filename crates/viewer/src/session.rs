@@ -18,7 +18,7 @@ use pliant_sim::{Failure, State};
 use crate::device::{Seen, point_value};
 use crate::hand::{Hand, Hold, Point, nodes_of};
 use crate::parameters::Number;
-use crate::replay::{Done, Move, Recording, Surface};
+use crate::recording::{Done, Move, Recording, Surface};
 
 /// Wall time between frames.
 pub(crate) const FRAME: Duration = Duration::from_micros(16_667);

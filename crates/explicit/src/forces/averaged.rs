@@ -15,15 +15,15 @@ use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector};
 use rayon::prelude::*;
 
-use super::batch::{Batch, PACKS, pressures};
+use super::batch::{Batch, PACKS, pressures, volume_change};
 use super::blocks::{Blocks, Moved, Quad, Shares, Task};
 use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
 use crate::Scalar;
+use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, entry, load_tensor};
 use crate::relaxation::Relaxation;
-use crate::state::History;
 
 pub(super) struct AveragedTets<R> {
     processor: Processor,
@@ -206,12 +206,6 @@ fn average<R: Scalar, L: Lanes<R>>(local: &Local<'_, R, 4>, pack: usize, at: usi
         sum += local.gather::<L>(pack, node, at)[3];
     }
     sum * L::of(0.25)
-}
-
-/// J − 1, without cancellation.
-#[inline(always)]
-pub(super) fn volume_change<L: pliant_mechanics::Number>(h: &Tensor<L>) -> L {
-    h.trace() + h.second_invariant() + h.determinant()
 }
 
 /// Up to [`PACKS`] packs of J − 1 at nodes become pressures [Pa].

@@ -7,7 +7,6 @@ use pliant_mechanics::law::{AnyLaw, Deformation, Law, MOST_FAMILIES, Split, with
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot};
 
 use super::Findings;
-use super::averaged::volume_change;
 use crate::Scalar;
 use crate::lanes::{
     Lanes, PACK, Pack, Processor, Work, load_symmetric, load_tensor, load_vector, store_vector,
@@ -193,4 +192,10 @@ pub(crate) fn pressure(law: &AnyLaw, volume_change: f64) -> f64 {
         }
     }
     Processor::detect().run(One(law, Pack([volume_change; PACK])))
+}
+
+/// J − 1, without cancellation.
+#[inline(always)]
+pub(super) fn volume_change<L: Number>(h: &Tensor<L>) -> L {
+    h.trace() + h.second_invariant() + h.determinant()
 }

@@ -7,15 +7,15 @@ use pliant_mechanics::model::{CellBlock, Solid};
 use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Vector, add, cast};
 
-use super::averaged::{relaxed_pressures, volume_change};
-use super::batch::{Batch, PACKS};
+use super::averaged::relaxed_pressures;
+use super::batch::{Batch, PACKS, volume_change};
 use super::blocks::{Blocks, Moved, Quad, Task};
 use super::corners::{Look, PackedCorners, is_flat};
 use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
 use crate::Scalar;
+use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector, store_vector};
 use crate::relaxation::Relaxation;
-use crate::state::History;
 
 pub(super) struct FullHexes<R> {
     processor: Processor,

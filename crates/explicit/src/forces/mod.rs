@@ -32,8 +32,8 @@ use pliant_mechanics::tensor::{Tensor, Vector, add, cast, sub};
 use pulp::Simd;
 use serde::{Deserialize, Serialize};
 
+use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, WideF32, WideF64, load_vector};
-use crate::state::History;
 use blocks::{Blocks, Quad, Shares};
 use full_hex::FullHexes;
 use plain::SolidForces;

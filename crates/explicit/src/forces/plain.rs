@@ -13,9 +13,9 @@ use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
 };
 use crate::Scalar;
+use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work};
 use crate::relaxation::Relaxation;
-use crate::state::History;
 
 /// Cells of `N` nodes with one evaluation point; `M` is one less.
 pub(super) struct SolidForces<R, const N: usize, const M: usize> {

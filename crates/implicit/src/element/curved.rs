@@ -10,7 +10,7 @@ use pliant_geometry::EDGES;
 
 use super::membrane::DRILLING_TO_EDGE;
 use crate::control::points;
-use crate::surface::Patch;
+use crate::patch::Patch;
 
 /// Something of three rows over (u, v, w, θx, θy, θz) of three nodes.
 pub(crate) type Matrix3x18 = SMatrix<f64, 3, 18>;

@@ -6,6 +6,16 @@ mod comas;
 mod curved;
 mod layers;
 mod membrane;
+
+/// Elasticity and density.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Isotropic elasticity.
+    pub elastic: Elasticity,
+    /// Density [kg/m³].
+    pub density: f64,
+}
+
 #[cfg(test)]
 mod tests;
 

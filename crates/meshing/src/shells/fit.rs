@@ -9,16 +9,13 @@ use rayon::prelude::*;
 use super::crossing::COARSE;
 use super::effort::{Effort, ROW};
 use super::measure::Landing;
-use super::solve::{Block, Row, UNKNOWNS, solve};
+use super::solve::{Block, POWER, Row, UNKNOWNS, solve};
 use super::target::Target;
 use super::{LEAST_SHAPE, Shells};
 use crate::hausdorff::lattice;
 
 /// Parts of an edge between the places of a shell at which it is fitted.
 const PARTS: usize = 5;
-
-/// The power of distances whose sum is made small.
-pub(super) const POWER: i32 = 6;
 
 /// Points of the target count from this part of the distance asked for.
 const CLOSE: f64 = 0.3;

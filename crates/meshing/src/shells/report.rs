@@ -5,8 +5,8 @@ use std::fmt;
 use pliant_geometry::Vector3;
 use serde::Serialize;
 
+use crate::error::counted;
 use crate::hausdorff::Hausdorff;
-use crate::triangles::counted;
 
 /// How close shells are to their target, and of what shape.
 #[derive(Clone, Debug, PartialEq, Serialize)]

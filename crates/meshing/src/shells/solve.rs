@@ -1,6 +1,7 @@
 //! The damped least-squares step of a fit: (Jᵀ W J + D) δ = −Jᵀ W r by conjugate gradients, Jᵀ W J as one block for each shell.
 
-use super::fit::POWER;
+/// The power of distances whose sum is made small.
+pub(super) const POWER: i32 = 6;
 
 /// Unknowns of a vertex: ways along two tangents and the normal, two turns of the normal; all in lengths.
 pub(super) const UNKNOWNS: usize = 5;

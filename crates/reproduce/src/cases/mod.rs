@@ -63,3 +63,31 @@ const RELAXATION_SIGN: Correction = Correction {
     correct: "e^(−(t−s)/τ).",
     why: "As printed, the memory of a stress grows with its age t − s; (5.58) to (5.61) are right.",
 };
+
+/// The case of an id.
+///
+/// # Errors
+/// If it does not exist: the most similar id.
+pub fn find(id: &str) -> Result<&'static Case, &'static str> {
+    CASES.iter().find(|case| case.id.eq_ignore_ascii_case(id)).ok_or_else(|| {
+        let likeness = |case: &&Case| strsim::jaro_winkler(case.id, &id.to_lowercase());
+        let nearest = CASES.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+        nearest.map_or("", |case| case.id)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_found_and_slips_are_answered_with_the_nearest() {
+        assert_eq!(find("FIG-6.3").unwrap().id, "fig-6.3");
+        assert_eq!(find("fig6.10").unwrap_err(), "fig-6.10");
+        assert_eq!(find("brain").unwrap_err(), "brain-shift");
+        let mut ids: Vec<&str> = CASES.iter().map(|case| case.id).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), CASES.len());
+    }
+}

@@ -15,7 +15,7 @@ use pliant_meshing::{
     TriangleMesh, Voxels, require_room_for,
 };
 
-use super::meshes::unscaled;
+use super::mesh_files::{unscaled, words};
 use super::{Builder, MeshOrigin, Meshing};
 use crate::cache::{Kept, Key};
 use crate::diagnostic::Diagnostic;
@@ -424,17 +424,6 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
             ),
             help: "for example `error = 0.005`, half a percent of the diagonal, or `shells = 800`".into(),
         }),
-    }
-}
-
-/// The word for cells in messages.
-pub(super) fn words(cells: Cells) -> &'static str {
-    match cells {
-        Cells::Tets => "tets",
-        Cells::Hexes => "hexes",
-        Cells::ImmersedHexes => "immersed hexes",
-        Cells::Surface => "a surface",
-        Cells::Shells => "shells",
     }
 }
 

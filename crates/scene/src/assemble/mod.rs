@@ -9,6 +9,7 @@ mod images;
 mod implicit;
 mod loads;
 mod mass;
+mod mesh_files;
 mod meshes;
 mod node_vectors;
 mod sheets;
@@ -28,8 +29,8 @@ use crate::nearest::nearest;
 use crate::scene::Scene;
 use crate::source::Source;
 
+pub use mesh_files::SizeDoubt;
 pub(crate) use meshes::MeshOrigin;
-pub use meshes::SizeDoubt;
 
 /// A model, and what the outputs need beside it.
 #[derive(Clone, Debug)]

@@ -7,6 +7,7 @@ mod fields;
 mod file;
 mod folder;
 mod merged;
+mod outcome;
 mod plot;
 mod stability;
 mod strains;
@@ -15,12 +16,13 @@ mod vtu;
 
 use std::path::{Path, PathBuf};
 
-use pliant_sim::{Instant, Schedule};
+use pliant_sim::{Instant, Schedule, Simulation};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use file::{check_own_folder, replace};
 pub use folder::OutputFolder;
 pub(crate) use folder::{CONVERGENCE, PICTURE, PLOT, SUMMARY};
+pub(crate) use outcome::{History, Outcome, PartOutcome, Watched};
 pub use stability::{AddedMass, StabilitySummary};
 pub(crate) use strains::ShellStrains;
 pub use strains::StrainSummary;
@@ -71,6 +73,13 @@ impl Frame<'_> {
     /// Force [N] that holds or moves the nodes of each constraint.
     pub(crate) fn reactions(&self) -> impl Iterator<Item = [f64; 3]> {
         (0..self.built().model.constraints.len()).map(|constraint| self.now.reaction(constraint))
+    }
+}
+
+impl World {
+    /// All participants of a simulation of it as outputs read them.
+    pub(crate) fn frames<'a>(&'a self, simulation: &'a Simulation) -> Vec<Frame<'a>> {
+        self.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame { part, now }).collect()
     }
 }
 

@@ -5,7 +5,7 @@ use plotters::prelude::*;
 
 use pliant_mechanics::model::Constraint;
 
-use crate::run::History;
+use super::History;
 use crate::world::World;
 
 const SIZE: (u32, u32) = (900, 760);

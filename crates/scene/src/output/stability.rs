@@ -8,8 +8,8 @@ use pliant_mechanics::Energies;
 use pliant_sim::{counted, number};
 use serde::Serialize;
 
+use super::PartOutcome;
 use crate::assemble::Built;
-use crate::run::PartOutcome;
 use crate::world::Part;
 
 /// Hourglass energy, as a fraction of the internal one, above which a run gives a warning.

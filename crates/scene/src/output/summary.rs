@@ -9,11 +9,11 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
+use super::{History, Outcome, PartOutcome};
 use super::{OutputError, StrainSummary, constraints};
 use crate::assemble::Built;
 use crate::plan::{LimitingElement, Limits};
 use crate::printable::printable;
-use crate::run::{History, Outcome, PartOutcome};
 use crate::world::{Part, World};
 
 /// The status of a stopped run.

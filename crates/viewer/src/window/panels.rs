@@ -7,7 +7,7 @@ use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, No
 
 use super::App;
 use crate::hand::Hand;
-use crate::replay::Surface;
+use crate::recording::Surface;
 use crate::session::Order;
 
 /// The colours of labels, and those of tissue.

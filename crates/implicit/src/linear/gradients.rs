@@ -6,7 +6,8 @@
 use nalgebra::{Cholesky, Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
 
-use crate::linear::{Factors, LinearError, LinearReport};
+use super::factors::Factors;
+use super::report::{LinearError, LinearReport};
 use crate::rotation::skew;
 use crate::sparse::{Equations, LowerMatrix, NONE};
 

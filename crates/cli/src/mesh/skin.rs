@@ -11,8 +11,8 @@ use pliant_meshing::{
 };
 use serde_json::{Value as Json, json};
 
+use super::input::{Segmented, anatomy, cell_limit, is_mesh_file, mesh_file, meshing_failure, regions};
 use crate::arguments::{MeshCells, MeshImage};
-use crate::mesh::{Segmented, anatomy, cell_limit, is_mesh_file, mesh_file, meshing_failure, regions};
 use crate::report::{Bar, Failure, failed_output, say};
 
 /// Faces at more than this angle form a crease, which remeshing preserves [rad].

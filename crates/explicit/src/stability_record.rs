@@ -1,0 +1,120 @@
+//! How the steps of a run are cut, and what was seen of the critical time step: part of the state.
+
+use pliant_mechanics::model::Model;
+use serde::{Deserialize, Serialize};
+
+use crate::forces::Deformed;
+
+/// The most substeps a step is cut into.
+pub const MOST_SUBSTEPS: u32 = 100;
+
+/// How the steps of a run are cut, and what was seen of the limit. Part of the state, so that a copy of it goes on alike.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stability {
+    /// Parts of the step under way, or of the last one.
+    pub substeps: u32,
+    /// Parts of the step under way already done; 0 between steps.
+    pub done: u32,
+    /// Looks taken at the limit.
+    pub checks: u64,
+    /// True limits found since the beginning.
+    pub critical_steps: u32,
+    /// The last look.
+    pub last: Option<Look>,
+    /// The look with the smallest limit.
+    pub smallest: Option<Look>,
+    /// Steps at the start of which the limit was known to be below the whole step.
+    pub steps_below: u64,
+    /// How often whole steps were given up for substeps.
+    pub cuts: u32,
+    /// Time [s] of the first cut.
+    pub first_cut: Option<f64>,
+    /// Time [s] at which the last step that was cut began.
+    pub last_cut: Option<f64>,
+    /// The most parts of a step.
+    pub most_substeps: u32,
+    /// Substeps beyond one a step, in all.
+    pub extra_steps: u64,
+    /// The last critical time step and the steps done then; its state is [`State::reference`](crate::State::reference).
+    pub(crate) reference: Option<(f64, u64)>,
+    /// Deformation at the last look.
+    pub(crate) deformed: Deformed,
+    /// Steps done at the last look.
+    pub(crate) looked_at: u64,
+}
+
+impl Default for Stability {
+    fn default() -> Self {
+        Self {
+            substeps: 1,
+            done: 0,
+            checks: 0,
+            critical_steps: 0,
+            reference: None,
+            last: None,
+            smallest: None,
+            steps_below: 0,
+            cuts: 0,
+            first_cut: None,
+            last_cut: None,
+            most_substeps: 1,
+            extra_steps: 0,
+            deformed: Deformed::default(),
+            looked_at: 0,
+        }
+    }
+}
+
+impl Stability {
+    /// Whether it can be of a state between two steps of a model.
+    pub fn fits(&self, model: &Model) -> bool {
+        let known = |look: &Look| {
+            model.solids.get(look.solid).is_some_and(|solid| look.cell < solid.cells.len())
+                && look.limit > 0.0
+        };
+        self.done == 0
+            && (1..=MOST_SUBSTEPS).contains(&self.substeps)
+            && self.last.iter().chain(&self.smallest).all(known)
+    }
+
+    /// Forgets what was seen of the limit of another model; how steps are cut stays until the first look.
+    pub(crate) fn forget(&mut self) {
+        let unseen = Self::default();
+        (self.checks, self.last, self.smallest) = (unseen.checks, unseen.last, unseen.smallest);
+        (self.reference, self.deformed, self.looked_at) =
+            (unseen.reference, unseen.deformed, unseen.looked_at);
+    }
+
+    /// Records a look and the deformation it was taken at.
+    pub(crate) fn note(&mut self, look: Look, deformed: Deformed, steps: u64) {
+        self.checks += 1;
+        (self.last, self.deformed, self.looked_at) = (Some(look), deformed, steps);
+        if self.smallest.is_none_or(|smallest| look.limit < smallest.limit) {
+            self.smallest = Some(look);
+        }
+    }
+
+    /// Records into how many parts the step that begins now is cut.
+    pub(crate) fn note_substeps(&mut self, substeps: u32, time: f64) {
+        if substeps > 1 {
+            self.cuts += u32::from(self.substeps == 1);
+            self.first_cut.get_or_insert(time);
+            self.last_cut = Some(time);
+            self.most_substeps = self.most_substeps.max(substeps);
+            self.extra_steps += u64::from(substeps) - 1;
+        }
+    }
+}
+
+/// The limit at an instant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Look {
+    /// Time [s].
+    pub time: f64,
+    /// The largest stable step [s], estimated or true.
+    pub limit: f64,
+    /// The solid of the cell that sets it.
+    pub solid: usize,
+    /// The cell in that solid.
+    pub cell: usize,
+}

@@ -1,0 +1,146 @@
+//! The states of participants as they are kept: snapshots, and bytes of checkpoints.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+use pliant_explicit::{Scalar, State};
+use pliant_mechanics::{Energies, Model};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::instant::Effort;
+use crate::part::{Method, Part, Precision};
+use crate::solver::Memory;
+
+/// The state of a participant with all that a restart needs beside it.
+#[derive(Clone, Debug)]
+pub(crate) enum Kept {
+    /// In single precision.
+    Single(State<f32>, Memory<f32>),
+    /// In double precision.
+    Double(State<f64>, Memory<f64>),
+    /// Of shells, and of solids whose equations are solved.
+    Implicit(Box<ImplicitState>),
+}
+
+impl Kept {
+    /// That of a participant from its bytes; `None` where these are none, or of another size.
+    pub fn decode(part: &Part, bytes: &[u8]) -> Option<Self> {
+        fn read<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
+            postcard::from_bytes(bytes).ok()
+        }
+        let kept = match (part.method.bodies(), part.method.precision()) {
+            (Some(_), _) => Self::Implicit(read(bytes)?),
+            (None, Precision::Single) => read(bytes).map(|(state, memory)| Self::Single(state, memory))?,
+            (None, Precision::Double) => read(bytes).map(|(state, memory)| Self::Double(state, memory))?,
+        };
+        kept.fits(part).then_some(kept)
+    }
+
+    /// Whether it has the sizes of a participant's model, and is of its method.
+    pub fn fits(&self, part: &Part) -> bool {
+        match self {
+            Self::Single(state, memory) => fits(state, memory, part),
+            Self::Double(state, memory) => fits(state, memory, part),
+            Self::Implicit(state) => state.fits(part.model.node_count()),
+        }
+    }
+}
+
+/// What a resumed run needs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct ImplicitState {
+    /// Whole steps done, and the time [s] they end at.
+    pub done: u64,
+    pub time: f64,
+    pub state: PlainState,
+    pub before: Option<(Vec<f64>, PlainState)>,
+    /// The state that an implicit step takes differences with.
+    pub previous: Option<PlainState>,
+    pub energies: Energies,
+    pub effort: Effort,
+    pub convergence: VecDeque<Iterated>,
+}
+
+impl ImplicitState {
+    /// Whether it is of a model with so many nodes.
+    pub(crate) fn fits(&self, nodes: usize) -> bool {
+        let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
+        before && self.previous.iter().all(|state| state.fits(nodes)) && self.state.fits(nodes)
+    }
+}
+
+/// A state in plain numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PlainState {
+    pub time: f64,
+    pub load_factor: f64,
+    pub position: Vec<[f64; 3]>,
+    /// Quaternions (i, j, k, w).
+    pub rotation: Vec<[f64; 4]>,
+    pub velocity: Vec<[f64; 3]>,
+    pub spin: Vec<[f64; 3]>,
+}
+
+impl PlainState {
+    pub fn of(state: &pliant_implicit::State) -> Self {
+        let plain = |vectors: &[Vector3<f64>]| vectors.iter().map(|&v| v.into()).collect();
+        Self {
+            time: state.time,
+            load_factor: state.load_factor,
+            position: plain(&state.position),
+            rotation: state.rotation.iter().map(|q| q.coords.into()).collect(),
+            velocity: plain(&state.velocity),
+            spin: plain(&state.spin),
+        }
+    }
+
+    pub fn fits(&self, nodes: usize) -> bool {
+        [self.position.len(), self.rotation.len(), self.velocity.len(), self.spin.len()] == [nodes; 4]
+    }
+
+    pub fn state(&self) -> pliant_implicit::State {
+        let vectors = |plain: &[[f64; 3]]| plain.iter().map(|&v| v.into()).collect();
+        let rotation = |&q: &[f64; 4]| UnitQuaternion::new_unchecked(Quaternion::from(Vector4::from(q)));
+        pliant_implicit::State {
+            time: self.time,
+            load_factor: self.load_factor,
+            position: vectors(&self.position),
+            rotation: self.rotation.iter().map(rotation).collect(),
+            velocity: vectors(&self.velocity),
+            spin: vectors(&self.spin),
+        }
+    }
+}
+
+/// An iteration of Newton's method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Iterated {
+    /// Step, counted from 1, and the attempt at it.
+    pub step: u64,
+    pub attempt: usize,
+    /// The time that it was to reach [s].
+    pub time: f64,
+    pub iteration: usize,
+    /// Residual, and what was allowed at the end of the attempt: [N] of static steps, over the largest force of implicit ones.
+    pub residual: f64,
+    pub allowed: f64,
+    /// Whether the attempt found its equilibrium.
+    pub found: bool,
+}
+
+/// Whether a state and its memory have the sizes of a participant's, and are of its method.
+fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
+    let model: &Model = &part.model;
+    let found = matches!(memory, Memory::Equilibrium(_));
+    if found != matches!(part.method, Method::QuasiStatic { .. }) {
+        return false;
+    }
+    let rest = State::<R>::at_rest(model);
+    let sizes = |state: &State<R>| {
+        let history = state.history.iter().map(|h| (h.cells.len(), h.pressures.len()));
+        let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
+        (nodes, history.collect::<Vec<_>>())
+    };
+    sizes(state) == sizes(&rest) && state.stability.fits(model) && memory.fits(model.node_count())
+}

@@ -1,0 +1,72 @@
+//! Participants at their start, or from a state on.
+
+use pliant_explicit::{Clock, State};
+use pliant_mechanics::Model;
+
+use crate::failure::Failure;
+use crate::implicit::Implicit;
+use crate::kept::Kept;
+use crate::part::{Part, Precision};
+use crate::participant::Participant;
+use crate::solids::{Numeric, Solids};
+use crate::solver::Memory;
+
+/// A participant at its start.
+///
+/// # Errors
+/// If its stepper can't be made.
+pub(crate) fn begin(part: &Part) -> Result<Box<dyn Participant>, Failure> {
+    Ok(match (part.method.bodies(), part.method.precision()) {
+        (Some(bodies), _) => Box::new(Implicit::new(part, bodies)?),
+        (None, Precision::Single) => Box::new(Solids::<f32>::new(part, State::at_rest(&part.model))?),
+        (None, Precision::Double) => Box::new(Solids::<f64>::new(part, State::at_rest(&part.model))?),
+    })
+}
+
+/// The steps of a run whose state goes on with other numbers: how they are counted, their length [s], and the model.
+pub(crate) struct Before<'a> {
+    pub clock: Clock,
+    pub step: f64,
+    pub model: &'a Model,
+}
+
+/// A participant that goes on from a state of a run of the same mesh, of explicit steps with what they were. `None` where this one has
+/// another solver, precision or size.
+///
+/// # Errors
+/// If its stepper can't be made.
+pub(crate) fn go_on(
+    part: &Part,
+    kept: Kept,
+    before: Option<Before<'_>>,
+) -> Result<Option<Box<dyn Participant>>, Failure> {
+    if !kept.fits(part) {
+        return Ok(None);
+    }
+    Ok(match (kept, part.method.bodies(), part.method.precision()) {
+        (Kept::Implicit(state), Some(bodies), _) => {
+            let mut participant = Implicit::new(part, bodies)?;
+            participant.resume(*state);
+            Some(Box::new(participant))
+        }
+        (Kept::Single(state, memory), None, Precision::Single) => Some(resumed(part, state, memory, before)?),
+        (Kept::Double(state, memory), None, Precision::Double) => Some(resumed(part, state, memory, before)?),
+        _ => None,
+    })
+}
+
+fn resumed<R: Numeric>(
+    part: &Part,
+    mut state: State<R>,
+    memory: Memory<R>,
+    before: Option<Before<'_>>,
+) -> Result<Box<dyn Participant>, Failure> {
+    if let Some(before) = &before
+        && before.model.fingerprints() != part.model.fingerprints()
+    {
+        state.change_model(before.model, &part.model, before.clock.before);
+    }
+    let mut solids = Solids::new(part, state)?;
+    solids.resume(memory, before.map(|before| (before.clock, before.step)));
+    Ok(Box::new(solids))
+}

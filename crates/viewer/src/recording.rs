@@ -1,0 +1,99 @@
+//! What was done to a run, so that it can be repeated before the same steps.
+
+use pliant_geometry::CellLabel;
+use pliant_scene::format::ViewTable;
+use serde::{Deserialize, Serialize};
+
+use crate::hand::Hand;
+use crate::parameters::Number;
+
+/// Something done to a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Done {
+    /// By hand.
+    Hand(Hand),
+    /// Numbers of the scene that are others from then on; all others are as in the file.
+    Numbers(Vec<Number>),
+    /// Another surface is shown, whose triangles are held from then on.
+    Surface(Surface),
+}
+
+/// What of a view decides which triangles are drawn.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Surface {
+    /// The body or the carried surface; `None` for all bodies.
+    pub on: Option<String>,
+    /// Parts of each edge of a shell.
+    pub curved: u32,
+    /// Whether fibres are drawn.
+    pub fibres: bool,
+    /// Whether the critical cell is marked; shells are then flat.
+    pub critical: bool,
+    /// Labels whose cells are left out, as they are typed.
+    pub hide: Vec<String>,
+}
+
+impl Surface {
+    /// That of a view.
+    pub fn of(view: &ViewTable) -> Self {
+        Self {
+            on: view.on.clone(),
+            curved: view.curved,
+            fibres: view.fibres,
+            critical: view.critical,
+            hide: view.hide.iter().map(CellLabel::to_string).collect(),
+        }
+    }
+
+    /// A view with this surface.
+    pub(crate) fn put_into(&self, view: &ViewTable) -> ViewTable {
+        let Self { on, curved, fibres, critical, hide } = self.clone();
+        let hide = hide.iter().map(|label| match label.parse() {
+            Ok(label) => label,
+            Err(never) => match never {},
+        });
+        ViewTable { on, curved, fibres, critical, hide: hide.collect(), ..view.clone() }
+    }
+}
+
+/// When something was done, and what.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Move {
+    /// Steps done before.
+    pub steps: u64,
+    /// Whether that instant was looked at before, so that the step to come knows nothing of it yet.
+    pub looked: bool,
+    /// Wall time since the first one [s].
+    pub seconds: f64,
+    /// Wall time from when it was asked for to the end of the first step in which it acted [s]; `None` while the run stood still.
+    pub lag: Option<f64>,
+    /// What.
+    pub done: Done,
+}
+
+/// What was done to a run, from its start on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Recording {
+    /// In the order of time.
+    pub moves: Vec<Move>,
+    /// Steps in all.
+    pub steps: u64,
+}
+
+impl Recording {
+    /// As bytes that keep every bit.
+    ///
+    /// # Errors
+    /// Never in practice: memory that ran out.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
+        postcard::to_stdvec(self).map_err(|error| error.to_string())
+    }
+
+    /// From these bytes.
+    ///
+    /// # Errors
+    /// If they are no recording.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
+        postcard::from_bytes(bytes).map_err(|error| error.to_string())
+    }
+}
