@@ -36,21 +36,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::critical_step::{limit_alone, scaled_bound};
-pub use crate::stability_record::{Look, MOST_SUBSTEPS, Stability};
+pub use crate::stability_record::{MOST_SUBSTEPS, Stability, StepLimit};
 use crate::state::State;
 use crate::tangent::{Stiffness, gradient_square, stiffness};
 
-/// Steps between two looks at the limit.
+/// Steps between two checks of the limit.
 pub const CHECK_EVERY: u64 = 50;
-/// A look is taken earlier where the least J or the largest stretch has changed by this factor.
+/// The limit is checked earlier where the least J or the largest stretch has changed by this factor.
 pub const CHANGE: f64 = 1.1;
 /// Substeps are chosen so that they reach this part of the limit at the most.
 pub const RESERVE: f64 = 0.95;
-/// They are kept up to this part: the limit may fall before the next look.
+/// They are kept up to this part: the limit may fall before the next check.
 pub const KEEP: f64 = 0.97;
 /// Steps between two critical time steps, except where a run would stop.
 pub const REFERENCE_EVERY: u64 = 1000;
-/// One in this many cells is looked at closely, for each of the two orders …
+/// One in this many cells is checked closely, for each of the two orders …
 const SHARE: usize = 256;
 /// … and at least this many.
 const LEAST: usize = 16;
@@ -102,7 +102,7 @@ struct Watch {
     /// What stands first in the two orders.
     rank: Vec<[f64; 2]>,
     order: [Vec<u32>; 2],
-    /// Limit [s] and reference of the cells looked at closely.
+    /// Limit [s] and reference of the cells checked closely.
     found: Vec<(f64, Stiffness)>,
 }
 
@@ -162,7 +162,7 @@ impl Monitor {
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// The same with every cell looked at closely, as a measure of what [`limit`](Self::limit) leaves out.
+    /// The same with every cell checked closely, as a measure of what [`limit`](Self::limit) leaves out.
     pub fn limit_of_all<R: Scalar>(
         &self,
         model: &Model,
@@ -172,7 +172,7 @@ impl Monitor {
         let solids = self.solids.iter().zip(&model.solids).enumerate();
         solids
             .filter_map(|(index, (watch, solid))| {
-                let limit = |cell: usize| (watch.look(model, solid, displacement, reference, cell).0, cell);
+                let limit = |cell: usize| (watch.check(model, solid, displacement, reference, cell).0, cell);
                 let all = (0..solid.cells.len()).into_par_iter().map(limit).map(finite);
                 all.reduce(|| None, smaller).map(|(limit, cell)| (limit, index, cell))
             })
@@ -248,7 +248,7 @@ impl Watch {
     ) -> Option<(f64, usize)> {
         let mut found = std::mem::take(&mut self.found);
         found.par_iter_mut().zip(&self.order[by]).with_min_len(8).for_each(|(found, &cell)| {
-            *found = self.look(model, solid, displacement, reference, cell as usize);
+            *found = self.check(model, solid, displacement, reference, cell as usize);
         });
         let mut least = None;
         for (&(limit, before), &cell) in found.iter().zip(&self.order[by]) {
@@ -260,7 +260,7 @@ impl Watch {
     }
 
     /// The limit [s] that a cell sets, and its stiffness in the reference state.
-    fn look<R: Scalar>(
+    fn check<R: Scalar>(
         &self,
         model: &Model,
         solid: &Solid,
@@ -292,7 +292,7 @@ pub fn cell_limit<R: Scalar>(model: &Model, solid: usize, cell: usize, displacem
     limit_alone(model, solid, cell, mode.max(hourglass_modulus(solid, cell)))
 }
 
-/// How many of some cells are looked at closely for each order.
+/// How many of some cells are checked closely for each order.
 fn picked(count: usize) -> usize {
     (count / SHARE).max(LEAST).min(count)
 }

@@ -15,14 +15,14 @@ pub struct Stability {
     pub substeps: u32,
     /// Parts of the step under way already done; 0 between steps.
     pub done: u32,
-    /// Looks taken at the limit.
+    /// Checks of the limit.
     pub checks: u64,
     /// True limits found since the beginning.
     pub critical_steps: u32,
-    /// The last look.
-    pub last: Option<Look>,
-    /// The look with the smallest limit.
-    pub smallest: Option<Look>,
+    /// The last check.
+    pub last: Option<StepLimit>,
+    /// The check with the smallest limit.
+    pub smallest: Option<StepLimit>,
     /// Steps at the start of which the limit was known to be below the whole step.
     pub steps_below: u64,
     /// How often whole steps were given up for substeps.
@@ -37,10 +37,10 @@ pub struct Stability {
     pub extra_steps: u64,
     /// The last critical time step and the steps done then; its state is [`State::reference`](crate::State::reference).
     pub(crate) reference: Option<(f64, u64)>,
-    /// Deformation at the last look.
+    /// Deformation at the last check.
     pub(crate) deformed: Deformed,
-    /// Steps done at the last look.
-    pub(crate) looked_at: u64,
+    /// Steps done at the last check.
+    pub(crate) checked_at: u64,
 }
 
 impl Default for Stability {
@@ -60,7 +60,7 @@ impl Default for Stability {
             most_substeps: 1,
             extra_steps: 0,
             deformed: Deformed::default(),
-            looked_at: 0,
+            checked_at: 0,
         }
     }
 }
@@ -68,29 +68,29 @@ impl Default for Stability {
 impl Stability {
     /// Whether it can be of a state between two steps of a model.
     pub fn fits(&self, model: &Model) -> bool {
-        let known = |look: &Look| {
-            model.solids.get(look.solid).is_some_and(|solid| look.cell < solid.cells.len())
-                && look.limit > 0.0
+        let known = |found: &StepLimit| {
+            model.solids.get(found.solid).is_some_and(|solid| found.cell < solid.cells.len())
+                && found.limit > 0.0
         };
         self.done == 0
             && (1..=MOST_SUBSTEPS).contains(&self.substeps)
             && self.last.iter().chain(&self.smallest).all(known)
     }
 
-    /// Forgets what was seen of the limit of another model; how steps are cut stays until the first look.
+    /// Forgets what was seen of the limit of another model; how steps are cut stays until the first check.
     pub(crate) fn forget(&mut self) {
         let unseen = Self::default();
         (self.checks, self.last, self.smallest) = (unseen.checks, unseen.last, unseen.smallest);
-        (self.reference, self.deformed, self.looked_at) =
-            (unseen.reference, unseen.deformed, unseen.looked_at);
+        (self.reference, self.deformed, self.checked_at) =
+            (unseen.reference, unseen.deformed, unseen.checked_at);
     }
 
-    /// Records a look and the deformation it was taken at.
-    pub(crate) fn note(&mut self, look: Look, deformed: Deformed, steps: u64) {
+    /// Records a check and the deformation it was made at.
+    pub(crate) fn note(&mut self, limit: StepLimit, deformed: Deformed, steps: u64) {
         self.checks += 1;
-        (self.last, self.deformed, self.looked_at) = (Some(look), deformed, steps);
-        if self.smallest.is_none_or(|smallest| look.limit < smallest.limit) {
-            self.smallest = Some(look);
+        (self.last, self.deformed, self.checked_at) = (Some(limit), deformed, steps);
+        if self.smallest.is_none_or(|smallest| limit.limit < smallest.limit) {
+            self.smallest = Some(limit);
         }
     }
 
@@ -108,7 +108,7 @@ impl Stability {
 
 /// The limit at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Look {
+pub struct StepLimit {
     /// Time [s].
     pub time: f64,
     /// The largest stable step [s], estimated or true.

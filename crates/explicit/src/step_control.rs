@@ -6,7 +6,7 @@ use pliant_mechanics::tensor::{Vector, cast};
 use crate::Scalar;
 use crate::critical_step::limit_about;
 use crate::forces::Deformed;
-use crate::stability::{CHANGE, Look, Monitor, OnUnstable, substeps};
+use crate::stability::{CHANGE, Monitor, OnUnstable, StepLimit, substeps};
 use crate::state::State;
 use crate::step_error::StepError;
 
@@ -104,12 +104,12 @@ impl StepControl {
         if state.is_at_start() { 0.0 } else { self.lengths(state).before }
     }
 
-    /// Whether a look at the limit is due: the first one, `every` steps after the last, or where the deformation differs.
+    /// Whether a check of the limit is due: the first one, `every` steps after the last, or where the deformation differs.
     pub fn is_due<R>(&self, state: &State<R>, deformed: &Deformed, every: u64) -> bool {
         let seen = &state.stability;
         self.monitor.is_some()
             && (seen.checks == 0
-                || state.steps >= seen.looked_at.saturating_add(every)
+                || state.steps >= seen.checked_at.saturating_add(every)
                 || deformed.differs(&seen.deformed, CHANGE))
     }
 
@@ -127,7 +127,7 @@ impl StepControl {
             if monitor.doubts(state, limit, self.step, self.substeps) {
                 limit = take_as_reference(model, owners, state);
             }
-            let look = Look { time: state.time, limit, solid, cell };
+            let look = StepLimit { time: state.time, limit, solid, cell };
             state.stability.note(look, *deformed, state.steps);
         }
     }

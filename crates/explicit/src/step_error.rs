@@ -4,7 +4,7 @@ use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::cast;
 
 use crate::Scalar;
-use crate::stability::Look;
+use crate::stability::StepLimit;
 use crate::state::State;
 
 /// The name of a node's body and the node's number in it.
@@ -114,7 +114,7 @@ impl StepError {
         }
     }
 
-    pub(crate) fn below_limit(model: &Model, look: &Look, step: f64, time: f64) -> Self {
+    pub(crate) fn below_limit(model: &Model, look: &StepLimit, step: f64, time: f64) -> Self {
         let solid = &model.solids[look.solid];
         let (body, node) = located(model, solid.cells.nodes(look.cell)[0]);
         Self::BelowLimit { body, element: solid.original[look.cell], node, limit: look.limit, step, time }

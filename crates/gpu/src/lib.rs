@@ -89,6 +89,7 @@ mod nodes;
 mod paths;
 mod rates;
 mod run;
+mod solid_kernels;
 mod solids;
 mod stepper;
 mod transfer;

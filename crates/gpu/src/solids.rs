@@ -2,25 +2,51 @@
 
 use pliant_explicit::Relaxation;
 use pliant_explicit::{History, PACK};
+use pliant_mechanics::law::Shader;
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, LocalNodes, Solid};
 use pliant_mechanics::tensor::Vector;
 
-use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory};
-use crate::paths::{CORNERS, EACH_CELL, Paths};
+use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::paths::Paths;
+use crate::solid_kernels::{SolidKernels, constants_of};
 use crate::transfer::{Four, Transfer};
 use crate::{Device, GpuError};
 
-const INSTANT: &str = include_str!("shaders/instant.wgsl");
-const CELLS: &str = include_str!("shaders/cells.wgsl");
-const PRONY: &str = include_str!("shaders/prony.wgsl");
-const PRESSURE_HISTORY: &str = include_str!("shaders/pressure_history.wgsl");
-const SHAPE: &str = include_str!("shaders/stored_shape.wgsl");
-const HEX_CORNERS: &str = include_str!("shaders/hex_corners.wgsl");
-const TET: &str = include_str!("shaders/tet.wgsl");
-const AVERAGES: &str = include_str!("shaders/averages.wgsl");
-
 fn four([x, y, z]: Vector<f64>, w: f64) -> Four {
     [x as f32, y as f32, z as f32, w as f32]
+}
+
+/// The law of a solid as a shader has it.
+///
+/// # Errors
+/// If the element averages pressures and the law has none, or only the program knows the law.
+fn shader_of(solid: &Solid) -> Result<Shader, GpuError> {
+    let (cells, law) = (&solid.cells, &solid.material.law);
+    if cells.averages_pressure() && !law.has_volumetric_energy() {
+        let what = format!("`{}` with `{}`, which has no volumetric energy,", cells.element(), law.name());
+        return Err(GpuError::Unsupported { what });
+    }
+    let own = || GpuError::Unsupported { what: format!("`{}`, a law that the program gives,", law.name()) };
+    law.shader().ok_or_else(own)
+}
+
+/// Numbers in rows of four, the last one filled up with zeros.
+fn fours_of(numbers: &[f32]) -> Vec<Four> {
+    let row = |chunk: &[f32]| {
+        let mut four = Four::default();
+        four[..chunk.len()].copy_from_slice(chunk);
+        four
+    };
+    numbers.chunks(4).map(row).collect()
+}
+
+/// The order of averaged pressures on the device, of cells in an order.
+fn pressure_order(cells: &Cells, order: &[u32]) -> Vec<u32> {
+    match cells {
+        Cells::AveragedTet4(block, Averaging::Nodal) => (0..LocalNodes::new(block).len() as u32).collect(),
+        _ if cells.averages_pressure() => order.to_vec(),
+        _ => vec![],
+    }
 }
 
 /// A solid on the device.
@@ -49,61 +75,40 @@ impl DeviceSolid {
         (index, solid): (usize, &Solid),
         paths: &Paths,
     ) -> Result<Self, GpuError> {
-        let (cells, law) = (&solid.cells, &solid.material.law);
-        if cells.averages_pressure() && !law.has_volumetric_energy() {
-            let what =
-                format!("`{}` with `{}`, which has no volumetric energy,", cells.element(), law.name());
-            return Err(GpuError::Unsupported { what });
-        }
-        let prony = &solid.material.prony;
-        let own =
-            || GpuError::Unsupported { what: format!("`{}`, a law that the program gives,", law.name()) };
-        let shader = law.shader().ok_or_else(own)?;
-        let parameters: Vec<Four> = shader
-            .parameters
-            .chunks(4)
-            .map(|chunk| {
-                let mut four = Four::default();
-                four[..chunk.len()].copy_from_slice(chunk);
-                four
-            })
-            .collect();
-        let series = 1 + prony.isochoric.len() + prony.volumetric.len();
-        let constants =
-            memory.uniform("constants of a solid", (parameters.len() + series) * size_of::<Four>());
-        device.queue.write_buffer(&constants, 0, bytemuck::cast_slice(&parameters));
-
+        let cells = &solid.cells;
+        let shader = shader_of(solid)?;
         let blocks = paths.blocks.get(index);
         let order = match blocks {
             Some(blocks) => blocks.order.clone(),
             None => (0..cells.len() as u32).collect(),
         };
-        let slots = History::<f32>::slots(solid);
-        let packs = [6 * slots, prony.volumetric_slots()];
-        let pressure_order: Vec<u32> = match cells {
-            Cells::AveragedTet4(block, Averaging::Nodal) => {
-                (0..LocalNodes::new(block).len() as u32).collect()
-            }
-            _ if cells.averages_pressure() => order.clone(),
-            _ => vec![],
-        };
+        let pressure_order = pressure_order(cells, &order);
+        let packs = [6 * History::<f32>::slots(solid), solid.material.prony.volumetric_slots()];
         let history = |order: &[u32], packs: usize| {
             memory.zeros("the histories", order.len().div_ceil(PACK) * packs * PACK * size_of::<f32>())
         };
         let histories = [history(&order, packs[0])?, history(&pressure_order, packs[1])?];
-        let found_again = paths.finds_shapes && matches!(cells, Cells::Tet4(_));
-        let shapes = if found_again { vec![] } else { rows_at_rest(cells, &order) };
-        let fibre_row = shapes.len() / order.len().max(1);
         let averages = match cells {
             Cells::AveragedTet4(block, _) => Some(Averages::new(memory, block, &order)?),
             _ => None,
         };
+
+        let parameters = fours_of(&shader.parameters);
+        let terms = 1 + solid.material.prony.isochoric.len() + solid.material.prony.volumetric.len();
+        let constants =
+            memory.uniform("constants of a solid", (parameters.len() + terms) * size_of::<Four>());
+        device.queue.write_buffer(&constants, 0, bytemuck::cast_slice(&parameters));
+
         // Forces that are found in blocks name nodes by their places there.
         let names_nodes = blocks.is_none() || averages.is_some();
         let nodes = if names_nodes { rows_of_nodes(cells, &order) } else { vec![] };
         let nodes = memory.filled("the cells", &nodes)?;
+        let finds_shapes = paths.finds_shapes && matches!(cells, Cells::Tet4(_));
+        let shapes = if finds_shapes { vec![] } else { rows_at_rest(cells, &order) };
+        let fibre_row = shapes.len() / order.len().max(1);
         let rest = memory
             .filled("the shapes of cells at rest", &[shapes, rows_of_fibres(solid, &order)].concat())?;
+
         let of_cells = |nodes| {
             [nodes, Binding::Read(&rest), Binding::Write(&histories[0]), Binding::Uniform(&constants)]
         };
@@ -120,94 +125,21 @@ impl DeviceSolid {
             Bound::new(device, &[&of_cells(Binding::Read(&nodes))[..], &bindings].concat())
         });
 
-        let mut numbers = vec![
-            ("CELLS", order.len()),
-            ("FAMILIES", law.families()),
-            ("PARAMETERS", parameters.len()),
-            ("SERIES", series),
-            ("ISOCHORIC_TERMS", prony.isochoric.len()),
-            ("VOLUMETRIC_TERMS", prony.volumetric.len()),
-            ("SLOTS", slots),
-            ("LOCAL_NODES", averages.as_ref().map_or(0, |averages| averages.count)),
-        ];
-        numbers.push(("FIBRES", fibre_row));
-        numbers.push(("FIRST_SLOT", paths.first_slot[index]));
-        numbers.extend(&paths.constants);
-        numbers.extend(blocks.iter().flat_map(|blocks| &blocks.constants));
-        let kernel = |name: &str, snippets: &[&str], bound: &[&Bound], count: usize| {
-            let snippets = [&[INSTANT, &shader.source, CELLS, PRONY], snippets].concat();
-            Kernel::new(device, name, &numbers, &snippets, bound, count)
+        let kernels = SolidKernels {
+            device,
+            paths,
+            blocks,
+            solid,
+            law: &shader.source,
+            count: order.len(),
+            local_nodes: averages.as_ref().map_or(0, |averages| averages.count),
+            finds_shapes,
+            constants: constants_of(solid, parameters.len(), fibre_row, paths.first_slot[index]),
+            instant,
+            bound: &bound,
+            averaging: averaging.as_ref().unwrap_or(&bound),
         };
-        let groups = [instant, &bound, &paths.cells];
-        let averaging_groups = [instant, averaging.as_ref().unwrap_or(&bound), &paths.cells];
-        let forces = |name: &str, snippets: &[&str]| {
-            let own = paths.cell_snippet.as_str();
-            match blocks {
-                None => kernel(name, &[snippets, &[own]].concat(), &groups, cells.len()),
-                Some(blocks) => {
-                    let groups = [&groups[..], &[&blocks.bound]].concat();
-                    let stored = if paths.finds_shapes && !found_again {
-                        include_str!("shaders/block_stored.wgsl")
-                    } else {
-                        ""
-                    };
-                    kernel(name, &[snippets, &[own, stored]].concat(), &groups, blocks.count * GROUP as usize)
-                }
-            }
-        };
-        let force_shape = if found_again { include_str!("shaders/block_shape.wgsl") } else { SHAPE };
-        let tets = |name: &str, snippets: &[&str]| {
-            forces(name, &[&[force_shape, TET, include_str!("shaders/tet_forces.wgsl")], snippets].concat())
-        };
-        let kernels = match cells {
-            Cells::Tet4(_) => vec![tets("tet4", &[include_str!("shaders/tet4.wgsl")])],
-            Cells::Hex8(_) => vec![forces("hex8", &[HEX_CORNERS, include_str!("shaders/hex8.wgsl")])],
-            Cells::FullHex8(..) => {
-                let own = include_str!("shaders/full_hex8.wgsl");
-                vec![forces("hex8-full", &[PRESSURE_HISTORY, HEX_CORNERS, own])]
-            }
-            Cells::AveragedTet4(_, averaging) => {
-                let of_cells = |name: &str, snippets: &[&str]| {
-                    kernel(
-                        name,
-                        &[&[CORNERS, SHAPE, TET, AVERAGES], snippets, &[EACH_CELL]].concat(),
-                        &averaging_groups,
-                        order.len(),
-                    )
-                };
-                let local = averages.as_ref().map_or(0, |averages| averages.count);
-                let of_nodes = |name: &str, snippets: &[&str]| {
-                    let own = include_str!("shaders/node_averages.wgsl");
-                    kernel(name, &[&[AVERAGES], snippets, &[own]].concat(), &averaging_groups, local)
-                };
-                let changes = of_cells("volume changes", &[include_str!("shaders/volume_changes.wgsl")]);
-                let means = || of_nodes("means at nodes", &[include_str!("shaders/node_means.wgsl")]);
-                let averaged = |snippet: &str| {
-                    tets(cells.element(), &[AVERAGES, snippet, include_str!("shaders/averaged_tet4.wgsl")])
-                };
-                let of_pressure = include_str!("shaders/averaged_pressure.wgsl");
-                match averaging {
-                    Averaging::Nodal => {
-                        let own = [PRESSURE_HISTORY, include_str!("shaders/node_pressures.wgsl")];
-                        vec![changes, of_nodes("pressures at nodes", &own), averaged(of_pressure)]
-                    }
-                    Averaging::Variational => {
-                        let own = [PRESSURE_HISTORY, include_str!("shaders/cell_pressures.wgsl")];
-                        vec![
-                            changes,
-                            means(),
-                            of_cells("pressures of cells", &own),
-                            means(),
-                            averaged(of_pressure),
-                        ]
-                    }
-                    Averaging::NiftySim => {
-                        vec![changes, means(), averaged(include_str!("shaders/averaged_deformation.wgsl"))]
-                    }
-                }
-            }
-        };
-        let kernels = kernels.into_iter().collect::<Result<_, _>>()?;
+        let kernels = kernels.all()?;
         let series = (parameters.len() * size_of::<Four>()) as u64;
         Ok(Self { kernels, histories, orders: [order, pressure_order], packs, constants, series })
     }

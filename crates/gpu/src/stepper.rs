@@ -27,7 +27,7 @@ use crate::transfer::Transfer;
 use crate::{Design, Device, GpuError};
 
 /// Most steps between two evaluated instants, with energies, deformation of the cells and checks.
-const LOOK_EVERY: u64 = 100;
+const EVALUATE_EVERY: u64 = 100;
 
 /// Evaluations are more frequent where the deformation changes by more than this factor from one to the next.
 const CALM: f64 = 1.02;
@@ -298,7 +298,7 @@ impl GpuStepper {
         self.enter_passed(state, &results, self.lengths.before);
         let below = if state.is_between_steps() { self.watch(state, &results.deformed)? } else { Ok(()) };
         let calm = !results.deformed.differs(&self.deformed, CALM);
-        self.stride = if calm { (2 * self.stride).min(LOOK_EVERY) } else { (self.stride / 2).max(1) };
+        self.stride = if calm { (2 * self.stride).min(EVALUATE_EVERY) } else { (self.stride / 2).max(1) };
         self.deformed = results.deformed;
         if self.lengths != self.control.lengths(state) {
             self.lengths = self.control.lengths(state);

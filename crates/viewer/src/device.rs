@@ -1,5 +1,5 @@
 //! Scenes whose state lies on a GPU: their points are found and drawn there. What needs ordinary memory (energies,
-//! forces, the range of colours, whether all is sound, fields other than displacements) is looked at now and then.
+//! forces, the range of colours, whether all is sound, fields other than displacements) is inspected now and then.
 
 use std::time::{Duration, Instant};
 
@@ -7,13 +7,13 @@ use pliant_geometry::Vector3;
 use pliant_mechanics::Energies;
 use pliant_sim::gpu::PointValue;
 
-/// Wall time between two looks at a state that lies on a device.
-pub const LOOK: Duration = Duration::from_millis(250);
+/// Wall time between two inspections of a state that lies on a device.
+pub const INSPECTION: Duration = Duration::from_millis(250);
 
-/// What was seen at the last look.
+/// What the last inspection found.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// How many looks there were.
+    /// How many inspections there were.
     pub number: u64,
     /// Positions [m].
     pub points: Vec<Vector3>,
@@ -32,9 +32,9 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    /// Whether a look is due while a run goes on.
+    /// Whether an inspection is due while a run goes on.
     pub fn is_old(&self) -> bool {
-        self.at.is_none_or(|at| at.elapsed() >= LOOK)
+        self.at.is_none_or(|at| at.elapsed() >= INSPECTION)
     }
 }
 

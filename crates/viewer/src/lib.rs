@@ -11,7 +11,7 @@ mod session;
 #[cfg(feature = "window")]
 mod window;
 
-pub use device::LOOK;
+pub use device::INSPECTION;
 pub use hand::{Hand, Hold, Point, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
 pub use recording::{Done, Move, Recording, Surface};

@@ -61,8 +61,8 @@ impl Surface {
 pub struct Move {
     /// Steps done before.
     pub steps: u64,
-    /// Whether that instant was looked at before, so that the step to come knows nothing of it yet.
-    pub looked: bool,
+    /// Whether the forces of that instant were found before, so that the step to come knows nothing of it yet.
+    pub evaluated: bool,
     /// Wall time since the first one [s].
     pub seconds: f64,
     /// Wall time from when it was asked for to the end of the first step in which it acted [s]; `None` while the run stood still.

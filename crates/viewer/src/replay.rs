@@ -155,7 +155,7 @@ impl<'r> Replay<'r> {
                 self.moves = rest;
                 match &then.done {
                     Done::Hand(hand) => {
-                        if then.looked {
+                        if then.evaluated {
                             live.mesh().map_err(|failure| failure.message)?;
                         }
                         self.hold.take(hand, subject, &mut live);

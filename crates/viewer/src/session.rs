@@ -69,9 +69,9 @@ pub struct Frame {
     pub playing: bool,
     /// Points on the device where the state lies, at this instant, to be drawn from there; `None` of a state in ordinary memory.
     pub on_device: Option<DevicePoints>,
-    /// How many looks there were. Points, values, energies, what is held and the sample are of the last one: of this instant unless
-    /// the state lies on a device, where looks are rare ([`LOOK`](crate::LOOK)).
-    pub looks: u64,
+    /// How many inspections there were. Points, values, energies, what is held and the sample are of the last one: of this instant unless
+    /// the state lies on a device, where inspections are rare ([`INSPECTION`](crate::INSPECTION)).
+    pub inspections: u64,
     /// What was read back from the device so far.
     pub read_backs: u64,
     /// Positions [m].
@@ -270,7 +270,7 @@ struct Player<'s> {
     live: Live,
     /// Whether the state lies on a device.
     on_device: bool,
-    course: Playback,
+    playback: Playback,
 }
 
 fn play(
@@ -279,13 +279,13 @@ fn play(
     mut frames: triple_buffer::Input<Frame>,
     wake: &(impl Fn() + Send),
 ) -> Recording {
-    let mut course = Playback::new(&world);
+    let mut playback = Playback::new(&world);
     let mut from = None;
     let mut subject = None;
     loop {
         let (left, snapshot);
-        (left, snapshot, subject, course) = {
-            let mut player = match Player::enter(&world, from, subject, course) {
+        (left, snapshot, subject, playback) = {
+            let mut player = match Player::enter(&world, from, subject, playback) {
                 Ok(player) => player,
                 Err(message) => {
                     frames.input_buffer_mut().failure = Some(message);
@@ -297,26 +297,26 @@ fn play(
             player.show(&mut frames);
             wake();
             let left = player.go(inbox, &mut frames, wake);
-            let goes_on = matches!(left, Left::Change) && player.course.steps > 0;
-            let snapshot = if goes_on && player.course.failure.is_none() {
+            let goes_on = matches!(left, Left::Change) && player.playback.steps > 0;
+            let snapshot = if goes_on && player.playback.failure.is_none() {
                 player.live.simulation.state().ok()
             } else {
                 None
             };
-            let (subject, course) = player.end();
-            (left, snapshot, subject, course)
+            let (subject, playback) = player.end();
+            (left, snapshot, subject, playback)
         };
         if matches!(left, Left::Quit) {
-            let recording = course.recording.unwrap_or_default();
-            return Recording { steps: course.steps, ..recording };
+            let recording = playback.recording.unwrap_or_default();
+            return Recording { steps: playback.steps, ..recording };
         }
-        if matches!(left, Left::Reset) || course.failure.is_some() {
-            course.start_anew();
+        if matches!(left, Left::Reset) || playback.failure.is_some() {
+            playback.start_anew();
         }
-        from = course.change.take().map(|(mut next, numbers)| {
+        from = playback.change.take().map(|(mut next, numbers)| {
             next.share(world.device());
-            course.record(false, Instant::now(), Done::Numbers(numbers.clone()));
-            course.numbers = numbers;
+            playback.record(false, Instant::now(), Done::Numbers(numbers.clone()));
+            playback.numbers = numbers;
             (std::mem::replace(&mut world, *next), snapshot)
         });
     }
@@ -385,12 +385,12 @@ impl Playback {
         self.playing && self.failure.is_none()
     }
 
-    /// Keeps what was done at an instant, which was looked at or not.
-    fn record(&mut self, looked: bool, sent: Instant, done: Done) {
+    /// Keeps what was done at an instant, whose forces were found or not.
+    fn record(&mut self, evaluated: bool, sent: Instant, done: Done) {
         let Some(recording) = &mut self.recording else { return };
         let started = *self.started.get_or_insert(sent);
         let seconds = sent.saturating_duration_since(started).as_secs_f64();
-        recording.moves.push(Move { steps: self.steps, looked, seconds, lag: None, done });
+        recording.moves.push(Move { steps: self.steps, evaluated, seconds, lag: None, done });
     }
 
     /// After a step: what was asked for before has been felt.
@@ -414,19 +414,19 @@ impl<'s> Player<'s> {
         world: &'s World,
         from: Option<(World, Option<State>)>,
         subject: Option<Arc<Subject>>,
-        mut course: Playback,
+        mut playback: Playback,
     ) -> Result<Self, String> {
         let (mut live, goes_on) = enter(world, from)?;
-        if !goes_on && course.steps > 0 {
-            course.start_anew();
-            course.note = Some("the mesh or the solver is another one: it starts anew".into());
+        if !goes_on && playback.steps > 0 {
+            playback.start_anew();
+            playback.note = Some("the mesh or the solver is another one: it starts anew".into());
         }
-        course.hold.hold_on(&mut live);
+        playback.hold.hold_on(&mut live);
         let on_device = world.device().is_some();
         let known = subject.filter(|_| goes_on);
         let is_known = known.is_some();
         let mut player =
-            Self { world, subject: known.unwrap_or_default(), hidden: Vec::new(), live, on_device, course };
+            Self { world, subject: known.unwrap_or_default(), hidden: Vec::new(), live, on_device, playback };
         player.show_as_viewed();
         if !is_known {
             player.renew_subject()?;
@@ -437,7 +437,7 @@ impl<'s> Player<'s> {
 
     /// What lasts.
     fn end(self) -> (Option<Arc<Subject>>, Playback) {
-        (Some(self.subject), self.course)
+        (Some(self.subject), self.playback)
     }
 
     /// Follows orders and goes on, until the world is left.
@@ -453,7 +453,7 @@ impl<'s> Player<'s> {
                 return Left::Change;
             }
             // Orders come first, before each step; while it stands still nothing but orders happens.
-            if self.course.owed == 0 {
+            if self.playback.owed == 0 {
                 let mut next = match self.patience(changed) {
                     Duration::ZERO => inbox.try_recv().ok(),
                     patience => match inbox.recv_timeout(patience) {
@@ -468,14 +468,14 @@ impl<'s> Player<'s> {
                         return left;
                     }
                     // Steps that were asked for come before later orders.
-                    next = if self.course.owed > 0 { None } else { inbox.try_recv().ok() };
+                    next = if self.playback.owed > 0 { None } else { inbox.try_recv().ok() };
                 }
             }
             if self.is_due_to_change() {
                 return Left::Change;
             }
-            if self.course.owed > 0
-                || (self.course.is_going() && self.live.simulation.time() < self.course.pace.goal())
+            if self.playback.owed > 0
+                || (self.playback.is_going() && self.live.simulation.time() < self.playback.pace.goal())
             {
                 self.step();
                 changed = true;
@@ -484,8 +484,8 @@ impl<'s> Player<'s> {
                     return Left::Change;
                 }
             }
-            let still = !self.course.is_going() && self.course.owed == 0;
-            if changed && (still || self.course.shown.elapsed() >= self.course.interval()) {
+            let still = !self.playback.is_going() && self.playback.owed == 0;
+            if changed && (still || self.playback.shown.elapsed() >= self.playback.interval()) {
                 self.show(frames);
                 wake();
                 changed = false;
@@ -495,46 +495,46 @@ impl<'s> Player<'s> {
 
     /// Whether another world waits, and the run stands between two steps.
     fn is_due_to_change(&self) -> bool {
-        let course = &self.course;
-        course.change.is_some()
-            && (course.steps == 0 || course.failure.is_some() || !self.live.simulation.is_evaluated())
+        let playback = &self.playback;
+        playback.change.is_some()
+            && (playback.steps == 0 || playback.failure.is_some() || !self.live.simulation.is_evaluated())
     }
 
     /// How long it may wait for orders: until the simulation is due to go on, or the frame of what has changed is.
     fn patience(&self, changed: bool) -> Duration {
-        let course = &self.course;
+        let playback = &self.playback;
         let long = Duration::from_millis(50);
-        if !course.is_going() {
+        if !playback.is_going() {
             return long;
         }
-        let due = if changed { course.interval().saturating_sub(course.shown.elapsed()) } else { long };
-        let ahead = (self.live.simulation.time() - course.pace.goal()) / course.pace.speed.max(1e-9);
+        let due = if changed { playback.interval().saturating_sub(playback.shown.elapsed()) } else { long };
+        let ahead = (self.live.simulation.time() - playback.pace.goal()) / playback.pace.speed.max(1e-9);
         Duration::try_from_secs_f64(ahead.max(0.0)).unwrap_or(due).min(due)
     }
 
     fn obey(&mut self, sent: Instant, order: Order) -> Option<Left> {
-        let course = &mut self.course;
+        let playback = &mut self.playback;
         match order {
             Order::Play(playing) => {
-                course.playing = playing;
-                course.pace.anchor(self.live.simulation.time());
+                playback.playing = playing;
+                playback.pace.anchor(self.live.simulation.time());
             }
-            Order::Step(steps) => (course.playing, course.owed) = (false, steps),
+            Order::Step(steps) => (playback.playing, playback.owed) = (false, steps),
             Order::Reset => return Some(Left::Reset),
             Order::Speed(speed) => {
-                course.pace.speed = speed.clamp(1e-6, 1e6);
-                course.pace.anchor(self.live.simulation.time());
+                playback.pace.speed = speed.clamp(1e-6, 1e6);
+                playback.pace.anchor(self.live.simulation.time());
             }
             Order::Hand(hand) => self.hold(sent, &hand),
-            Order::Change(world, numbers) => course.change = Some((world, numbers)),
+            Order::Change(world, numbers) => playback.change = Some((world, numbers)),
             Order::Probe(point) => self.follow(&point),
             Order::ForgetProbes => {
-                course.followed.clear();
+                playback.followed.clear();
                 self.name_columns();
             }
-            Order::Record => course.begin_recording(),
+            Order::Record => playback.begin_recording(),
             Order::Show(view) => self.show_another(*view, sent),
-            Order::Memory(every) => course.in_memory = every,
+            Order::Memory(every) => playback.in_memory = every,
             Order::Quit => return Some(Left::Quit),
         }
         None
@@ -543,19 +543,19 @@ impl<'s> Player<'s> {
     fn hold(&mut self, sent: Instant, hand: &Hand) {
         // Where it takes hold has to be known.
         if self.on_device && matches!(hand, Hand::Take(..) | Hand::Pin(_)) {
-            self.look();
+            self.inspect();
         }
         if !matches!(hand, Hand::Pull(_)) {
-            self.course.seen.at = None;
+            self.playback.seen.at = None;
         }
-        let looked = self.live.simulation.is_evaluated();
-        let held = self.course.hold.take(hand, &self.subject, &mut self.live);
-        let course = &mut self.course;
-        course.note = (!held).then(|| "this solver knows no hand: it does not pull".into());
-        let number = course.recording.as_ref().map_or(0, |recording| recording.moves.len());
-        course.record(looked, sent, Done::Hand(*hand));
-        if held && course.is_going() {
-            course.waiting.push((sent, course.steps + u64::from(looked), number));
+        let evaluated = self.live.simulation.is_evaluated();
+        let held = self.playback.hold.take(hand, &self.subject, &mut self.live);
+        let playback = &mut self.playback;
+        playback.note = (!held).then(|| "this solver knows no hand: it does not pull".into());
+        let number = playback.recording.as_ref().map_or(0, |recording| recording.moves.len());
+        playback.record(evaluated, sent, Done::Hand(*hand));
+        if held && playback.is_going() {
+            playback.waiting.push((sent, playback.steps + u64::from(evaluated), number));
         }
     }
 
@@ -564,7 +564,7 @@ impl<'s> Player<'s> {
         let point = Grip { nodes, ..Grip::default() };
         let rest = |&(node, weight): &(u32, f64)| Vector3::from(self.live.simulation.rest(node)) * weight;
         let rest = point.nodes.iter().map(rest).sum();
-        self.course.followed.push(Followed { point, rest });
+        self.playback.followed.push(Followed { point, rest });
         self.name_columns();
     }
 
@@ -573,32 +573,32 @@ impl<'s> Player<'s> {
             |name: String, unit| ["x", "y", "z"].map(|axis| Column { name: format!("{name}.{axis}"), unit });
         let mut columns = axes("hand".into(), "N").to_vec();
         columns.extend_from_slice(self.live.columns());
-        for number in 1..=self.course.followed.len() {
+        for number in 1..=self.playback.followed.len() {
             columns.extend(axes(format!("point.{number}.displacement"), "m"));
         }
-        self.course.columns = columns.into();
-        self.course.seen.at = None;
+        self.playback.columns = columns.into();
+        self.playback.seen.at = None;
     }
 
     fn show_another(&mut self, view: ViewTable, sent: Instant) {
-        let (before, now) = (Surface::of(&self.course.view), Surface::of(&view));
-        self.course.view = view;
+        let (before, now) = (Surface::of(&self.playback.view), Surface::of(&view));
+        self.playback.view = view;
         self.show_as_viewed();
         if before != now {
-            self.course.record(self.live.simulation.is_evaluated(), sent, Done::Surface(now));
+            self.playback.record(self.live.simulation.is_evaluated(), sent, Done::Surface(now));
             if let Err(message) = self.renew_subject() {
-                self.course.failure.get_or_insert(message);
+                self.playback.failure.get_or_insert(message);
             }
         }
     }
 
     fn show_as_viewed(&mut self) {
-        let (scene, course) = (&self.world.scene, &mut self.course);
-        self.hidden = self.world.hidden(&course.view);
-        self.live.show(&scene.shown_as(&course.view, 1.0));
-        let part = course.view.component.map(|part| format!(":{}", part.word())).unwrap_or_default();
-        course.field = scene.field_of(&course.view).map(|field| format!("{}{part}", field.name()));
-        course.seen.at = None;
+        let (scene, playback) = (&self.world.scene, &mut self.playback);
+        self.hidden = self.world.hidden(&playback.view);
+        self.live.show(&scene.shown_as(&playback.view, 1.0));
+        let part = playback.view.component.map(|part| format!(":{}", part.word())).unwrap_or_default();
+        playback.field = scene.field_of(&playback.view).map(|field| format!("{}{part}", field.name()));
+        playback.seen.at = None;
     }
 
     fn renew_subject(&mut self) -> Result<(), String> {
@@ -608,35 +608,35 @@ impl<'s> Player<'s> {
     }
 
     fn step(&mut self) {
-        let (started, course) = (Instant::now(), &mut self.course);
-        course.owed = course.owed.saturating_sub(1);
-        if course.failure.is_some() {
-            course.owed = 0;
+        let (started, playback) = (Instant::now(), &mut self.playback);
+        playback.owed = playback.owed.saturating_sub(1);
+        if playback.failure.is_some() {
+            playback.owed = 0;
             return;
         }
-        let left = (course.pace.goal() - self.live.simulation.time()) / self.world.step();
+        let left = (playback.pace.goal() - self.live.simulation.time()) / self.world.step();
         let simulation = &mut self.live.simulation;
-        let advanced = match simulation.on_device().filter(|_| course.is_going()) {
+        let advanced = match simulation.on_device().filter(|_| playback.is_going()) {
             Some(mut device) => device.advance_without_read_back(left.ceil().max(1.0) as u64, FRAME / 2),
             None => simulation.step(1),
         };
         match advanced {
             Ok(steps) => {
-                course.steps += steps;
-                course.batch = (course.batch.0 + steps, course.batch.1 + started.elapsed());
-                course.feel();
+                playback.steps += steps;
+                playback.batch = (playback.batch.0 + steps, playback.batch.1 + started.elapsed());
+                playback.feel();
             }
-            Err(failure) => course.failure = Some(failure.message),
+            Err(failure) => playback.failure = Some(failure.message),
         }
-        if course.pace.goal() - self.live.simulation.time() > BEHIND * course.pace.speed {
-            course.pace.anchor = (Instant::now(), self.live.simulation.time());
+        if playback.pace.goal() - self.live.simulation.time() > BEHIND * playback.pace.speed {
+            playback.pace.anchor = (Instant::now(), self.live.simulation.time());
         }
     }
 
     /// Looks at the instant in ordinary memory.
-    fn look(&mut self) {
-        let course = &mut self.course;
-        let seen = &mut course.seen;
+    fn inspect(&mut self) {
+        let playback = &mut self.playback;
+        let seen = &mut playback.seen;
         match self.live.mesh() {
             Ok(mesh) => {
                 seen.points.clone_from(&mesh.points);
@@ -645,24 +645,25 @@ impl<'s> Player<'s> {
                         *point += Vector3::new(by[0], by[1], by[2]);
                     }
                 }
-                seen.values = course.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
+                seen.values =
+                    playback.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
                 let critical = || critical_cell(&visible(mesh, &self.hidden));
-                seen.critical = course.view.critical.then(critical).flatten().map(|(cell, _)| cell);
+                seen.critical = playback.view.critical.then(critical).flatten().map(|(cell, _)| cell);
                 seen.energies = self.live.simulation.energies();
             }
             // The last good picture stays.
             Err(failure) => {
-                course.failure.get_or_insert(failure.message);
+                playback.failure.get_or_insert(failure.message);
             }
         }
         seen.held.clear();
-        seen.held.extend(course.hold.shown(&self.live));
+        seen.held.extend(playback.hold.shown(&self.live));
         let [x, y, z] =
-            seen.held.first().filter(|_| course.hold.by_hand()).map_or([0.0; 3], |[_, force]| *force);
+            seen.held.first().filter(|_| playback.hold.by_hand()).map_or([0.0; 3], |[_, force]| *force);
         seen.sample.clear();
         seen.sample.extend([x, y, z]);
         self.live.sample(&mut seen.sample);
-        for followed in &course.followed {
+        for followed in &playback.followed {
             let [place, _] = self.live.simulation.pulled(&followed.point);
             seen.sample.extend((Vector3::from(place) - followed.rest).iter());
         }
@@ -670,16 +671,16 @@ impl<'s> Player<'s> {
         seen.at = Some(Instant::now());
     }
 
-    /// Brings the points that are drawn from the device to the instant; `looked` where their values are new.
-    fn place(&mut self, looked: bool) -> Option<DevicePoints> {
-        let course = &mut self.course;
-        let value = point_value(course.field.as_deref());
-        let given = (looked && value == PointValue::Given)
-            .then(|| course.seen.values.iter().map(|&value| drawn_value(value)).collect::<Vec<_>>());
+    /// Brings the points that are drawn from the device to the instant; `inspected` where their values are new.
+    fn place(&mut self, inspected: bool) -> Option<DevicePoints> {
+        let playback = &mut self.playback;
+        let value = point_value(playback.field.as_deref());
+        let given = (inspected && value == PointValue::Given)
+            .then(|| playback.seen.values.iter().map(|&value| drawn_value(value)).collect::<Vec<_>>());
         match self.live.place(value, given.as_deref())? {
             Ok(points) => Some(points),
             Err(failure) => {
-                course.failure.get_or_insert(failure.message);
+                playback.failure.get_or_insert(failure.message);
                 None
             }
         }
@@ -688,48 +689,49 @@ impl<'s> Player<'s> {
     /// Hands the instant over.
     fn show(&mut self, frames: &mut triple_buffer::Input<Frame>) {
         let started = Instant::now();
-        self.course.shown = started;
-        let course = &self.course;
-        let looks = !self.on_device || course.in_memory || !course.is_going() || course.seen.is_old();
-        if looks {
-            self.look();
+        self.playback.shown = started;
+        let playback = &self.playback;
+        let inspects =
+            !self.on_device || playback.in_memory || !playback.is_going() || playback.seen.is_old();
+        if inspects {
+            self.inspect();
         }
-        let on_device = if self.on_device { self.place(looks) } else { None };
-        let course = &mut self.course;
+        let on_device = if self.on_device { self.place(inspects) } else { None };
+        let playback = &mut self.playback;
         let frame = frames.input_buffer_mut();
-        if frame.looks != course.seen.number {
-            frame.looks = course.seen.number;
-            frame.points.clone_from(&course.seen.points);
-            frame.values.clone_from(&course.seen.values);
-            frame.energies = course.seen.energies;
-            frame.held.clone_from(&course.seen.held);
-            frame.sample.clone_from(&course.seen.sample);
+        if frame.inspections != playback.seen.number {
+            frame.inspections = playback.seen.number;
+            frame.points.clone_from(&playback.seen.points);
+            frame.values.clone_from(&playback.seen.values);
+            frame.energies = playback.seen.energies;
+            frame.held.clone_from(&playback.seen.held);
+            frame.sample.clone_from(&playback.seen.sample);
         }
         let device = self.world.device();
         frame.read_backs = device.map_or(0, |device| device.read_backs());
         frame.on_device = on_device;
-        frame.columns.clone_from(&course.columns);
-        let (steps, wall) = std::mem::take(&mut course.batch);
+        frame.columns.clone_from(&playback.columns);
+        let (steps, wall) = std::mem::take(&mut playback.batch);
         if steps > 0 {
-            course.step_seconds = wall.as_secs_f64() / steps as f64;
+            playback.step_seconds = wall.as_secs_f64() / steps as f64;
         }
-        frame.number = course.frames;
+        frame.number = playback.frames;
         frame.subject = self.subject.clone();
-        frame.critical = course.seen.critical;
+        frame.critical = playback.seen.critical;
         frame.time = self.live.simulation.time();
-        frame.steps = course.steps;
-        frame.playing = course.is_going();
+        frame.steps = playback.steps;
+        frame.playing = playback.is_going();
         frame.steps_a_frame = steps;
-        frame.step_seconds = course.step_seconds;
-        frame.real_time_factor = if frame.playing { course.pace.factor(frame.time) } else { 0.0 };
-        let step = if course.steps > 0 { frame.time / course.steps as f64 } else { self.world.step() };
-        frame.possible_factor = if course.step_seconds > 0.0 { step / course.step_seconds } else { 0.0 };
-        frame.input_lag = course.input_lag;
-        frame.failure.clone_from(&course.failure);
-        frame.note.clone_from(&course.note);
-        course.prepared = started.elapsed();
-        frame.prepare_seconds = course.prepared.as_secs_f64();
-        course.frames += 1;
+        frame.step_seconds = playback.step_seconds;
+        frame.real_time_factor = if frame.playing { playback.pace.factor(frame.time) } else { 0.0 };
+        let step = if playback.steps > 0 { frame.time / playback.steps as f64 } else { self.world.step() };
+        frame.possible_factor = if playback.step_seconds > 0.0 { step / playback.step_seconds } else { 0.0 };
+        frame.input_lag = playback.input_lag;
+        frame.failure.clone_from(&playback.failure);
+        frame.note.clone_from(&playback.note);
+        playback.prepared = started.elapsed();
+        frame.prepare_seconds = playback.prepared.as_secs_f64();
+        playback.frames += 1;
         frames.publish();
     }
 }

@@ -226,16 +226,16 @@ fn pictures_from_the_device_are_those_from_memory_with_and_without_a_section() {
     }
 }
 
-/// Frames of a session until there were so many looks.
-fn frames(session: &mut Session, looks: u64) -> Vec<Frame> {
+/// Frames of a session until there were so many inspections.
+fn frames(session: &mut Session, inspections: u64) -> Vec<Frame> {
     let mut frames = Vec::new();
-    let first = wait(session, |frame| frame.playing).looks;
+    let first = wait(session, |frame| frame.playing).inspections;
     loop {
         let (new, frame) = session.look();
         if new {
             assert_eq!(frame.failure, None);
             frames.push(frame.clone());
-            if frame.looks >= first + looks {
+            if frame.inspections >= first + inspections {
                 return frames;
             }
         }
@@ -262,7 +262,7 @@ fn a_session_reads_back_at_its_looks_and_at_no_frame_between() {
         screen.bind(pair[1].on_device.as_ref().expect("points on the device"));
         screen.draw(&style);
         assert!(pair[1].time >= pair[0].time);
-        if pair[0].looks == pair[1].looks {
+        if pair[0].inspections == pair[1].inspections {
             assert_eq!(pair[0].read_backs, pair[1].read_backs, "frame {} read back", pair[1].number);
             between += 1;
         } else {
@@ -277,7 +277,11 @@ fn a_session_reads_back_at_its_looks_and_at_no_frame_between() {
     session.order(Order::Show(Box::new(ViewTable { colour, ..view })));
     let shown = wait(&mut session, |frame| frame.values.iter().any(|value| *value > 0.0));
     let next = wait(&mut session, |frame| frame.number > shown.number + 3);
-    assert!(next.looks >= shown.looks + 3, "{} looks in 4 frames", next.looks - shown.looks);
+    assert!(
+        next.inspections >= shown.inspections + 3,
+        "{} inspections in 4 frames",
+        next.inspections - shown.inspections
+    );
     session.order(Order::Play(false));
     let still = wait(&mut session, |frame| !frame.playing);
     let drawn = still.on_device.unwrap().read().unwrap();

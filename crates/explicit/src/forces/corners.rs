@@ -88,8 +88,8 @@ pub(super) fn may_fold<R: Scalar>(reach: &Pack<R>, ratio: &Pack<R>, strain: &Pac
     !sound
 }
 
-/// Looks at the corners of a pack of cells of a block.
-pub(super) struct Look<'a, 'l, R, const N: usize, const M: usize> {
+/// Checks the corners of a pack of cells of a block.
+pub(super) struct CornerCheck<'a, 'l, R, const N: usize, const M: usize> {
     pub corners: &'a PackedCorners<R>,
     pub local: &'a Local<'l, R, N>,
     /// How flat the cells are.
@@ -98,7 +98,7 @@ pub(super) struct Look<'a, 'l, R, const N: usize, const M: usize> {
     pub pack: usize,
 }
 
-impl<R: Scalar, const N: usize, const M: usize> Work<R> for Look<'_, '_, R, N, M> {
+impl<R: Scalar, const N: usize, const M: usize> Work<R> for CornerCheck<'_, '_, R, N, M> {
     /// The first lane with an inverted corner.
     type Output = Option<usize>;
 

@@ -10,7 +10,7 @@ use pliant_mechanics::tensor::{Vector, add, cast};
 use super::averaged::relaxed_pressures;
 use super::batch::{Batch, PACKS, volume_change};
 use super::blocks::{Blocks, Moved, Quad, Task};
-use super::corners::{Look, PackedCorners, is_flat};
+use super::corners::{CornerCheck, PackedCorners, is_flat};
 use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
 use crate::Scalar;
 use crate::history::History;
@@ -117,7 +117,7 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
             ratio.0.iter_mut().for_each(|change| *change += R::ONE);
             if findings.folded.is_none() && ratio.0.iter().any(|&ratio| is_flat(ratio)) {
                 let pack_of_block = pack - packs.start;
-                let look = Look::<R, 8, 7> {
+                let look = CornerCheck::<R, 8, 7> {
                     corners: &corners[pack],
                     local: &local,
                     flatness: &ratio,

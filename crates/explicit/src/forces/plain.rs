@@ -7,7 +7,7 @@ use pliant_mechanics::tensor::Vector;
 
 use super::batch::{Batch, PACKS};
 use super::blocks::{Blocks, Moved, Quad, Task};
-use super::corners::{Look, PackedCorners, flatness, may_fold};
+use super::corners::{CornerCheck, PackedCorners, flatness, may_fold};
 use super::hourglass::{PackedHourglass, Resistance};
 use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
@@ -108,7 +108,7 @@ impl<R: Scalar, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                 if hourglass.is_some() && may_fold(&reach[index], ratio, strain) && findings.folded.is_none()
                 {
                     let pack_of_block = pack - packs.start;
-                    let look = Look::<R, N, M> {
+                    let look = CornerCheck::<R, N, M> {
                         corners: &corners[pack],
                         local: &local,
                         flatness: &flatness(ratio, strain),

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use pliant_explicit::BALANCE_LIMIT;
-use pliant_explicit::stability::{Look, OnUnstable};
+use pliant_explicit::stability::{OnUnstable, StepLimit};
 use pliant_mechanics::Energies;
 use pliant_sim::{counted, number};
 use serde::Serialize;
@@ -49,7 +49,7 @@ impl StabilitySummary {
     pub(crate) fn new(part: &Part, outcome: &PartOutcome) -> Option<Self> {
         let Part { scene, plan, .. } = part;
         let seen = outcome.stability?;
-        let of = |value: fn(&Look) -> f64| seen.smallest.as_ref().map(value);
+        let of = |value: fn(&StepLimit) -> f64| seen.smallest.as_ref().map(value);
         Some(Self {
             on_unstable: scene.run.on_unstable.unwrap_or_default(),
             checks: seen.checks,

@@ -7,7 +7,7 @@ use pliant_geometry::Vector3;
 use pliant_sim::gpu::{Device, DevicePoints, PointValue};
 
 use super::App;
-use crate::device::{LOOK, point_value};
+use crate::device::{INSPECTION, point_value};
 use crate::session::Order;
 use pliant_scene::World;
 
@@ -64,7 +64,7 @@ impl App {
     pub(super) fn told_of_device(&self) -> Option<String> {
         let points = self.on_device()?;
         let name = &points.device().adapter().name;
-        let rate = (1.0 / LOOK.as_secs_f64()).round();
+        let rate = (1.0 / INSPECTION.as_secs_f64()).round();
         Some(match (self.in_memory, point_value(self.shown_name().as_deref())) {
             (true, _) => format!("on {name}; points come back for the section"),
             (false, PointValue::Given) => {

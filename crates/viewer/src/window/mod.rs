@@ -296,8 +296,8 @@ impl App {
             self.values = Arc::default();
         }
         // After a failure at the first instant there is nothing but the message.
-        let looked = renewed || frame.looks != self.frame.looks;
-        if looked && frame.points.len() == self.subject.points.len() {
+        let inspected = renewed || frame.inspections != self.frame.inspections;
+        if inspected && frame.points.len() == self.subject.points.len() {
             Arc::make_mut(&mut self.points).clone_from(&frame.points);
             Arc::make_mut(&mut self.values).clone_from(&frame.values);
             self.fresh = true;
@@ -310,7 +310,7 @@ impl App {
         }
         let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
         self.strongest = self.strongest.max(force);
-        if looked {
+        if inspected {
             self.samples.take(&self.frame);
         }
         if first {
@@ -382,7 +382,7 @@ impl App {
         if self.record.is_some() {
             self.session.order(Order::Record);
         }
-        self.frame.looks = 0;
+        self.frame.inspections = 0;
         self.session.order(Order::Memory(self.in_memory));
         self.session.order(Order::Show(Box::new(self.view.clone())));
         self.session.order(Order::Speed(self.speed));
