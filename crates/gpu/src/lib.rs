@@ -9,8 +9,8 @@
 //! [`GpuStepper`] advances a state of a model as `CentralDifference` does on the CPU, hundreds of steps at a time:
 //!
 //! ```
+//! use pliant_explicit::{Observable, State, Wanted};
 //! use pliant_gpu::{Device, GpuStepper, StepFailure};
-//! use pliant_explicit::{Observable, State};
 //! use pliant_mechanics::Model;
 //!
 //! fn fall(device: &Device, model: &Model, step: f64) -> Result<State<f32>, StepFailure> {
