@@ -70,12 +70,12 @@ pub fn texture_of(name: TextureName) -> Texture {
 }
 
 /// The up direction: from the scene, or against gravity.
-pub fn up(scene: &Scene) -> Vector3 {
+fn up(scene: &Scene) -> Vector3 {
     let gravity = || scene.scene.gravity.map(|gravity| -Vector3::from(gravity));
     scene.view.camera.up.map(UpName::direction).map(Vector3::from).or_else(gravity).unwrap_or_default()
 }
 
-pub fn colour_by(look: &mut Look, field: FieldName, component: Option<&str>) {
+fn colour_by(look: &mut Look, field: FieldName, component: Option<&str>) {
     let part = component.map(|part| format!(":{part}")).unwrap_or_default();
     look.field = Some(format!("{}{part}", field.name()));
     let part = component.map(|part| format!(" {part}")).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! How the steps of a run are cut, and what was seen of the critical time step: part of the state.
+//! The record of a run's critical time step, and of the steps that were cut: part of the state.
 
 use pliant_mechanics::model::Model;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,8 @@ use crate::forces::Deformed;
 /// The most substeps a step is cut into.
 pub const MOST_SUBSTEPS: u32 = 100;
 
-/// How the steps of a run are cut, and what was seen of the limit. Part of the state, so that a copy of it goes on alike.
+/// How a run cuts its steps, and the limits that its checks found. The state holds this record, so a copy of the state continues with the
+/// same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stability {
     /// Parts of the step under way, or of the last one.
@@ -17,7 +18,7 @@ pub struct Stability {
     pub done: u32,
     /// Checks of the limit.
     pub checks: u64,
-    /// True limits found since the beginning.
+    /// Critical time steps computed since the beginning.
     pub critical_steps: u32,
     /// The last check.
     pub last: Option<StepLimit>,
@@ -77,7 +78,7 @@ impl Stability {
             && self.last.iter().chain(&self.smallest).all(known)
     }
 
-    /// Forgets what was seen of the limit of another model; how steps are cut stays until the first check.
+    /// Forgets the limits of another model. Steps stay cut as they are until the first check.
     pub(crate) fn forget(&mut self) {
         let unseen = Self::default();
         (self.checks, self.last, self.smallest) = (unseen.checks, unseen.last, unseen.smallest);

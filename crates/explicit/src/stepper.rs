@@ -30,7 +30,7 @@ use crate::step_error::StepError;
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
 
-/// What is read of an evaluated instant, and read back where the state lies on a GPU.
+/// The results of an evaluated instant that a caller needs. A GPU reads back only these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
     /// Energies and reactions.

@@ -17,6 +17,11 @@ const HEX_CORNERS: &str = include_str!("shaders/hex_corners.wgsl");
 const TET: &str = include_str!("shaders/tet.wgsl");
 const AVERAGES: &str = include_str!("shaders/averages.wgsl");
 
+/// Rows of the coefficients of relaxation of a solid: one of what remains, then one a term.
+pub(crate) fn rows_of_series(solid: &Solid) -> usize {
+    1 + solid.material.prony.isochoric.len() + solid.material.prony.volumetric.len()
+}
+
 /// Constants of the kernels of a solid whose law has so many rows of parameters.
 pub(crate) fn constants_of(
     solid: &Solid,
@@ -28,7 +33,7 @@ pub(crate) fn constants_of(
     vec![
         ("FAMILIES", solid.material.law.families()),
         ("PARAMETERS", parameters),
-        ("SERIES", 1 + prony.isochoric.len() + prony.volumetric.len()),
+        ("SERIES", rows_of_series(solid)),
         ("ISOCHORIC_TERMS", prony.isochoric.len()),
         ("VOLUMETRIC_TERMS", prony.volumetric.len()),
         ("SLOTS", History::<f32>::slots(solid)),
@@ -46,7 +51,7 @@ pub(crate) struct SolidKernels<'a> {
     pub solid: &'a Solid,
     /// WGSL of the law.
     pub law: &'a str,
-    /// Cells on the device; some lie there several times.
+    /// Cells on the device. Those at borders of blocks count once for each block.
     pub count: usize,
     /// Nodes over which pressures are averaged.
     pub local_nodes: usize,

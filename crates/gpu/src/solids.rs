@@ -8,7 +8,7 @@ use pliant_mechanics::tensor::Vector;
 
 use crate::kernel::{Binding, Bound, Kernel, Memory};
 use crate::paths::Paths;
-use crate::solid_kernels::{SolidKernels, constants_of};
+use crate::solid_kernels::{SolidKernels, constants_of, rows_of_series};
 use crate::transfer::{Four, Transfer};
 use crate::{Device, GpuError};
 
@@ -94,9 +94,8 @@ impl DeviceSolid {
         };
 
         let parameters = fours_of(&shader.parameters);
-        let terms = 1 + solid.material.prony.isochoric.len() + solid.material.prony.volumetric.len();
-        let constants =
-            memory.uniform("constants of a solid", (parameters.len() + terms) * size_of::<Four>());
+        let rows = parameters.len() + rows_of_series(solid);
+        let constants = memory.uniform("constants of a solid", rows * size_of::<Four>());
         device.queue.write_buffer(&constants, 0, bytemuck::cast_slice(&parameters));
 
         // Forces that are found in blocks name nodes by their places there.

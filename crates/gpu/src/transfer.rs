@@ -5,6 +5,9 @@ use wgpu::{BufferAddress, BufferUsages};
 
 use crate::{Device, GpuError};
 
+/// Four numbers that kernels read together.
+pub(crate) type Four = [f32; 4];
+
 /// A place in ordinary memory that the device can copy to; grows as needed.
 #[derive(Default)]
 pub(crate) struct Transfer(Option<wgpu::Buffer>);
@@ -67,6 +70,3 @@ impl Transfer {
         Ok(())
     }
 }
-
-/// Four numbers that are read at once.
-pub(crate) type Four = [f32; 4];

@@ -9,7 +9,7 @@ use crate::grid::Grid;
 /// Voxels of a region at the six sides of its image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Border {
-    /// Where i, j and k are least and largest: the side of the patient that lies there, and voxels.
+    /// The side of the patient at the least and the largest i, j and k, and the number of voxels there.
     sides: [[(&'static str, u64); 2]; 3],
 }
 
@@ -35,7 +35,7 @@ impl Border {
         sides.zip(voxels.as_flattened()).for_each(|((_, sum), voxels)| *sum += voxels);
     }
 
-    /// Whether any voxel lies at the border.
+    /// Whether the region has voxels at the border of the image.
     pub fn is_touched(&self) -> bool {
         self.sides.as_flattened().iter().any(|(_, voxels)| *voxels > 0)
     }

@@ -55,7 +55,7 @@ impl Live {
     }
 
     /// The points shown at the instant, found on the GPU where the state lies, with a value each; `given` takes the
-    /// place of those given before. `None` of a solver whose state lies in ordinary memory.
+    /// place of those given before. `None` where the solver keeps its state in ordinary memory.
     #[cfg(feature = "gpu")]
     pub fn place(
         &mut self,

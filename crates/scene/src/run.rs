@@ -230,12 +230,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Whether an output reads an instant.
-    fn is_awaited(&self, simulation: &Simulation, last: bool) -> bool {
-        let (time, step) = (simulation.time(), simulation.step_length());
-        self.outputs.iter().any(|(schedule, _)| schedule.awaits(time, step, last))
-    }
-
     fn look_at_strains(&mut self, simulation: &Simulation) {
         let parts = self.world.participants.iter().zip(simulation.instants());
         for (own, (part, now)) in self.watched.iter_mut().zip(parts) {
@@ -281,8 +275,9 @@ impl Observer for Run<'_> {
     }
 
     fn wanted(&self, simulation: &Simulation, last: bool) -> Wanted {
-        let everything = self.is_awaited(simulation, last) || (last && self.pictured);
-        if everything { Wanted::Everything } else { Wanted::Energies }
+        let (time, step) = (simulation.time(), simulation.step_length());
+        let is_read = self.outputs.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
+        if is_read || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies }
     }
 
     /// Shows an instant to all outputs that await it.
@@ -294,13 +289,11 @@ impl Observer for Run<'_> {
             self.look_at_strains(simulation);
         }
         let failed = |error| output_failure(&error, Some(time));
-        // Of steps that no output looks at nothing is made.
-        if self.is_awaited(simulation, last) {
-            let frames = self.world.frames(simulation);
-            for (schedule, output) in &mut self.outputs {
-                if schedule.is_due(time, step, last) {
-                    output.see(&frames).map_err(failed)?;
-                }
+        // Frames are made where an output is due, once for all.
+        let (world, mut frames) = (self.world, None);
+        for (schedule, output) in &mut self.outputs {
+            if schedule.is_due(time, step, last) {
+                output.see(frames.get_or_insert_with(|| world.frames(simulation))).map_err(failed)?;
             }
         }
         self.tell(time, None, last);

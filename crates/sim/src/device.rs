@@ -1,4 +1,4 @@
-//! A state on a GPU: its solver, steps without read-backs, and points that are found where it lies.
+//! Solids on a GPU: their solver, steps without read-backs, and points that the device computes.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -76,7 +76,7 @@ pub(crate) fn on_device(part: &Part, state: &State<f32>) -> Option<Result<Box<dy
     }))
 }
 
-/// Most steps in one go on a GPU, so that a run can be stopped and shows how far it is.
+/// Most steps that a GPU takes before a run reports progress and can be stopped.
 const STRIDE: u64 = 1024;
 
 impl Solver<f32> for GpuStepper {

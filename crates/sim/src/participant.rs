@@ -31,7 +31,7 @@ pub(crate) trait Participant: Instant + Send {
         1
     }
 
-    /// The stepper of a state on a GPU, and the state; `None` of a state in ordinary memory.
+    /// The GPU's stepper with its state; `None` of a participant on the CPU.
     #[cfg(feature = "gpu")]
     fn on_device(&mut self) -> Option<(&mut GpuStepper, &mut State<f32>)> {
         None

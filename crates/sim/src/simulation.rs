@@ -543,7 +543,7 @@ pub trait Observer {
 
 #[cfg(feature = "gpu")]
 impl Simulation {
-    /// What a state on a GPU can do beside; `None` of a state in ordinary memory.
+    /// Steps without read-backs and points on the GPU, where all bodies go together on one; `None` on the CPU.
     pub fn on_device(&mut self) -> Option<OnDevice<'_>> {
         let [only] = &mut self.participants[..] else { return None };
         let (stepper, state) = only.on_device()?;

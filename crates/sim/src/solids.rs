@@ -28,7 +28,7 @@ pub(crate) trait Numeric: Scalar {
     /// If it can't be made.
     fn solver(part: &Part, state: &State<Self>) -> Result<Box<dyn Solver<Self>>, Failure>;
 
-    /// The stepper of a state on a GPU, and the state; `None` of a state in ordinary memory.
+    /// The GPU's stepper with its state; `None` of solids on the CPU.
     #[cfg(feature = "gpu")]
     fn on_device(_solids: &mut Solids<Self>) -> Option<(&mut GpuStepper, &mut State<f32>)> {
         None

@@ -81,7 +81,7 @@ pub(crate) trait Solver<R>: Send {
         1
     }
 
-    /// The stepper itself, where the state lies on a GPU.
+    /// The GPU's stepper; `None` of a solver on the CPU.
     #[cfg(feature = "gpu")]
     fn on_device(&mut self) -> Option<&mut GpuStepper> {
         None

@@ -186,7 +186,7 @@ pub fn protected(
     found.map_err(|error| Failure::plain(error, help))
 }
 
-pub fn image_failure(error: &ImageError) -> Failure {
+fn image_failure(error: &ImageError) -> Failure {
     let help = match error {
         ImageError::Content { problem, .. } => match **problem {
             ImageProblem::MixedSeries { .. } => "`--series UID` selects one",

@@ -1,4 +1,4 @@
-//! What a run came to: its samples, what was seen of it, and its end.
+//! The outcome of a run: its samples, the worst of its balances and strains, and its end.
 
 use std::path::PathBuf;
 
