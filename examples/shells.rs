@@ -4,31 +4,24 @@ use std::error::Error;
 
 use nalgebra::Vector3;
 use pliant_implicit::element::Elasticity;
-use pliant_implicit::{Constraint, Load, LoadKind, Material, Model, Motion, Shell};
+use pliant_implicit::{Assembly, Shell, Wall};
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::load::{Load, LoadKind};
 use pliant_sim::{Part, Simulation};
 
 fn main() -> Result<(), Box<dyn Error>> {
     // 1 m × 0.1 m × 10 mm in ten squares of two triangles.
-    let points = (0..22).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0)).collect();
+    let points = (0..22).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0));
     let cells =
         (0..10).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]).collect();
-    let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.0 }, density: 1000.0 };
-    let mut model = Model::new(points);
+    let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.0 }, density: 1000.0 };
+    let mut model = Assembly::new("strip", points);
     model.add_shell(&Shell::new("strip", cells, 0.01, material))?;
-    model.constraints.push(Constraint {
-        name: "clamp".into(),
-        nodes: vec![0, 1],
-        components: [true; 6],
-        motion: Motion::Fixed,
-    });
+    model.model_mut().fix("clamp", vec![0, 1]);
     let force = 1e-4;
-    model.loads.push(Load {
-        name: "lift".into(),
-        kind: LoadKind::Force { nodes: vec![20, 21], force: Vector3::new(0.0, 0.0, 0.5 * force) },
-        curve: Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 },
-        controlled: false,
-    });
+    let lift = LoadKind::force([20, 21], [0.0, 0.0, 0.5 * force]);
+    let ramp = Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 };
+    model.model_mut().loads.push(Load::new("lift", lift, ramp));
 
     let mut simulation = Simulation::new(Part::equilibria("strip", model, 1.0, 1))?;
     simulation.step(1)?;

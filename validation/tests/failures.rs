@@ -30,7 +30,7 @@ fn a_cube_squeezed_between_glued_plates_fails() {
         .damped(50.0);
     let motion = Motion::Displacement([0.0, 0.0, -0.095], smooth_step(1.0));
     let (name, nodes) = ("top".into(), cube.face("z-max"));
-    cube.model.constraints.push(Constraint { name, nodes, components: [true; 3], motion });
+    cube.model.constraints.push(Constraint { name, nodes, components: [true; 6], motion });
     let step = 0.3 * cube.element_bound();
     let mut stepper = CentralDifference::<f64>::new(cube.model.clone(), step).unwrap();
     let mut state = State::at_rest(&cube.model);

@@ -46,7 +46,7 @@ impl Hanging {
         let nodes: Vec<u32> =
             specimen.model.rest.iter().enumerate().filter(held).map(|(node, _)| node as u32).collect();
         let constraint =
-            Constraint { name: "held".into(), nodes, components: [true; 3], motion: Motion::Fixed };
+            Constraint { name: "held".into(), nodes, components: [true; 6], motion: Motion::Fixed };
         specimen.model.constraints.push(constraint);
         Self { specimen: specimen.falling([0.0, 0.0, -0.981]), locator }
     }

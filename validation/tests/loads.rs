@@ -109,8 +109,14 @@ fn moved_nodes_follow_their_curve_and_a_velocity_adds_up_to_its_integral() {
         let constraint =
             |components, motion| Constraint { name: "move".into(), nodes: nodes.clone(), components, motion };
         block.model.constraints = vec![
-            constraint([true, false, false], Motion::Displacement([0.01, 0.0, 0.0], curve.clone())),
-            constraint([false, true, false], Motion::Velocity([0.0, 0.2, 0.0], curve.clone())),
+            constraint(
+                [true, false, false, false, false, false],
+                Motion::Displacement([0.01, 0.0, 0.0], curve.clone()),
+            ),
+            constraint(
+                [false, true, false, false, false, false],
+                Motion::Velocity([0.0, 0.2, 0.0], curve.clone()),
+            ),
         ];
         let mut worst = 0.0;
         run::<f64>(&block.model, 0.5 * block.element_bound(), 0.1, |_, state| {
@@ -136,7 +142,7 @@ fn rotated_nodes_stay_on_their_circles_and_turn_a_body_without_stress() {
         let places = nodes.iter().map(|&node| rest[node as usize]);
         let motion = Motion::rotation(axis.into(), centre, angle, curve.clone(), places);
         let constraint =
-            Constraint { name: "turn".into(), nodes: nodes.clone(), components: [true; 3], motion };
+            Constraint { name: "turn".into(), nodes: nodes.clone(), components: [true; 6], motion };
         block.model.constraints = vec![constraint];
         let turned = |node: usize, part: f64| {
             let turn = nalgebra::Rotation3::new(axis.normalize() * (angle * part));

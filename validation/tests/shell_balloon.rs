@@ -7,7 +7,8 @@ use std::f64::consts::PI;
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_implicit::element::{Formulation, Membrane};
-use pliant_implicit::{Control, LoadKind, Spread, State, StaticSettings, Statics};
+use pliant_implicit::{Control, State, StaticSettings, Statics};
+use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_validation::claim;
 use pliant_validation::shells::{FLAT, Specimen};
 
@@ -54,13 +55,13 @@ fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
         .hold(vec![0], [true, true, true, false, false, false])
         .hold(vec![1], [false, true, true, false, false, false])
         .hold(vec![2], [false, false, true, false, false, false]);
-    balloon = balloon.load(LoadKind::Pressure { cells: cells.clone(), pressure: 1.0, spread });
-    balloon.model.loads[0].controlled = true;
+    balloon = balloon.load(LoadKind::ShellPressure { facets: cells.clone(), pressure: 1.0, spread });
+    balloon.model.model_mut().loads[0].controlled = true;
     let model = &balloon.model;
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(model);
     state.time = 1.0;
-    let rest = model.enclosed_volume(&cells, &model.rest);
+    let rest = model.rest_volume(&cells);
     for part in 1..=parts {
         let volume = rest * (1.0 + f64::from(part) / 20.0);
         if let Err(error) = solver.control(&mut state, Control::Volume { volume }) {

@@ -5,7 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pliant_geometry::Mesh;
 use pliant_implicit::element::{Formulation, Membrane};
-use pliant_implicit::{Control, LinearSolver, LoadKind, State, StaticSettings, Statics, Step};
+use pliant_implicit::{Control, LinearSolver, State, StaticSettings, Statics, Step};
+use pliant_mechanics::load::LoadKind;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 use pliant_reproduce::cases::plate::{LARGE, deflections};
 use pliant_validation::shells::{CLAMPED, FLAT, Specimen, symmetry};
@@ -81,8 +82,8 @@ fn cantilever_rolled_up() {
             .unwrap()
             .hold_edge("x-min", CLAMPED);
     let tip = beam.edge("x-max");
-    let moment = [0.0, -50.0 * PI / 3.0 / 2.0, 0.0].into();
-    let beam = beam.load(LoadKind::Moment { nodes: tip.clone(), moment });
+    let moment = [0.0, -50.0 * PI / 3.0 / 2.0, 0.0];
+    let beam = beam.load(LoadKind::moment(tip.clone(), moment));
     let (last, off) =
         follow("roll-up", &beam, &table("cantilever_end_moment"), LinearSolver::Unsymmetric, |state| {
             let mean =
@@ -194,7 +195,7 @@ fn hinged_roof(cells: usize) -> Vec<[f64; 3]> {
     .hold_edge("end", [true, true, true, false, false, false]);
     let centre = roof.node(2540.0, 0.0, 0.0);
     let mut roof = roof.pull(centre, [-3000.0 / 4.0, 0.0, 0.0]);
-    roof.model.loads[0].controlled = true;
+    roof.model.model_mut().loads[0].controlled = true;
     let mut solver = Statics::new(roof.model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&roof.model);
     state.time = 1.0;

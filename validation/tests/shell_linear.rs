@@ -4,7 +4,7 @@
 
 use pliant_geometry::Mesh;
 use pliant_implicit::element::{Bending, Formulation, Membrane};
-use pliant_implicit::{LoadKind, Spread};
+use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Pattern, Sheet};
 use pliant_reproduce::CaseError;
 use pliant_reproduce::cases::obstacle_course::{self as course, CantileverCells};
@@ -96,7 +96,7 @@ fn timoshenko_plates_under_pressure() {
             let mesh = plate_mesh(cells, Pattern::Diagonal, None);
             let plate = plate::held(mesh, Formulation::default(), held).unwrap();
             let facets = (0..plate.model.facets.len() as u32).collect();
-            let plate = plate.load(LoadKind::Pressure { cells: facets, pressure: 1.0, spread });
+            let plate = plate.load(LoadKind::ShellPressure { facets, pressure: 1.0, spread });
             let centre = plate.node(0.5 * SIDE, 0.5 * SIDE, 0.0);
             let ratio = plate.linear(centre).unwrap()[2] * RIGIDITY / (reference * SIDE.powi(4));
             expect(&format!("plate under pressure, {spread:?}, N = {cells}"), ratio, expected, 0.002);

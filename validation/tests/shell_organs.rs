@@ -8,10 +8,12 @@ use std::time::Instant;
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
 use pliant_implicit::element::{Elasticity, Formulation, Membrane};
 use pliant_implicit::{
-    BackwardEuler, Constraint, DynamicSettings, LinearSolver, Load, LoadKind, Material, Model, Motion,
-    Preconditioner, Shell, Spread, State, StaticSettings, Statics,
+    Assembly, BackwardEuler, DynamicSettings, LinearSolver, Preconditioner, Shell, State, StaticSettings,
+    Statics, Wall,
 };
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::load::{Load, LoadKind, Spread};
+use pliant_mechanics::model::{Constraint, Motion};
 use pliant_validation::claim;
 use pliant_validation::shells::{FLAT, ramp, renumbered, triangles};
 
@@ -103,9 +105,9 @@ struct Organ {
 
 impl Organ {
     /// The lowest 5 % of the nodes in z fixed; pressure from inside grows with time from 0 to 1.
-    fn model(&self, mesh: &Mesh) -> Model {
-        let mut model = Model::new(mesh.points.clone());
-        let material = Material { elastic: Elasticity { young: self.young, poisson: 0.45 }, density: 1000.0 };
+    fn model(&self, mesh: &Mesh) -> Assembly {
+        let mut model = Assembly::new("shell", mesh.points.clone());
+        let material = Wall { elastic: Elasticity { young: self.young, poisson: 0.45 }, density: 1000.0 };
         let formulation = Formulation { membrane: self.membrane, ..Formulation::default() };
         let shell = Shell::new("organ", triangles(mesh), self.thickness, material);
         let notes = model.add_shell(&Shell { formulation, ..shell }).unwrap();
@@ -114,27 +116,31 @@ impl Organ {
         heights.sort_unstable_by(f64::total_cmp);
         let level = heights[heights.len() / 20];
         let low = (0..mesh.points.len() as u32).filter(|&n| mesh.points[n as usize].z <= level);
-        model.constraints.push(Constraint {
+        model.model_mut().constraints.push(Constraint {
             name: "lowest".into(),
             nodes: low.collect(),
             components: [true; 6],
             motion: Motion::Fixed,
         });
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
-        let outwards = model.enclosed_volume(&cells, &model.rest).signum();
-        let kind = LoadKind::Pressure { cells, pressure: outwards * self.pressure, spread: Spread::Lumped };
-        model.loads.push(Load { name: "pressure".into(), kind, curve: ramp(), controlled: false });
+        let outwards = model.rest_volume(&cells).signum();
+        let kind = LoadKind::ShellPressure {
+            facets: cells,
+            pressure: outwards * self.pressure,
+            spread: Spread::Lumped,
+        };
+        model.model_mut().loads.push(Load::new("pressure", kind, ramp()));
         model
     }
 
     /// The equilibrium at full pressure, in five load steps.
-    fn equilibrium(&self, mesh: &Mesh) -> Result<(Model, State), String> {
+    fn equilibrium(&self, mesh: &Mesh) -> Result<(Assembly, State), String> {
         let model = self.model(mesh);
         let start = Instant::now();
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         let mut state = State::at_rest(&model);
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
-        let rest = model.enclosed_volume(&cells, &model.rest);
+        let rest = model.rest_volume(&cells);
         let (steps, mut parts, mut iterations) = (5, 0, 0);
         for part in 1..=steps {
             match solver.solve(&mut state, f64::from(part) / f64::from(steps)) {
@@ -168,9 +174,9 @@ impl Organ {
     }
 
     /// One second of motion in steps of 10 ms, the pressure full after 0.5 s, mass-damped.
-    fn motion(&self, mesh: &Mesh) -> (Model, State) {
+    fn motion(&self, mesh: &Mesh) -> (Assembly, State) {
         let mut model = self.model(mesh);
-        model.loads[0].curve = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.5 };
+        model.model_mut().loads[0].curve = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.5 };
         model.mass_damping = 20.0;
         let linear = LinearSolver::ConjugateGradients {
             tolerance: 1e-6,
@@ -200,12 +206,12 @@ impl Organ {
     }
 }
 
-fn largest(model: &Model, state: &State) -> f64 {
+fn largest(model: &Assembly, state: &State) -> f64 {
     (0..model.rest.len()).map(|n| state.displacement(model, n).norm()).fold(0.0, f64::max)
 }
 
 /// The largest difference of displacements over the largest displacement; `map` leads from a node of the first to that of the second.
-fn apart(one: &(Model, State), other: &(Model, State), map: impl Fn(usize) -> usize) -> f64 {
+fn apart(one: &(Assembly, State), other: &(Assembly, State), map: impl Fn(usize) -> usize) -> f64 {
     let differences = (0..one.0.rest.len())
         .map(|n| (one.1.displacement(&one.0, n) - other.1.displacement(&other.0, map(n))).norm());
     differences.fold(0.0, f64::max) / largest(&one.0, &one.1)
@@ -271,7 +277,7 @@ fn table(path: PathBuf) -> Vec<(f64, f64)> {
 const EDGE: f64 = 4e-3;
 
 /// The distance [m] of a node from the nearest facet of another leaflet, if that is below a limit.
-fn gap(model: &Model, state: &State, leaflet: &[usize], node: usize, limit: f64) -> f64 {
+fn gap(model: &Assembly, state: &State, leaflet: &[usize], node: usize, limit: f64) -> f64 {
     let mut least = limit;
     let q = state.position[node];
     for facet in model.facets.iter().filter(|facet| leaflet[facet.nodes[0] as usize] != leaflet[node]) {
@@ -322,29 +328,29 @@ fn valve_leaflets_close() {
             leaflet.extend(mesh.points.iter().map(|_| number));
             points.extend(mesh.points);
         }
-        let mut model = Model::new(points);
+        let mut model = Assembly::new("shell", points);
         let longest =
             cells.iter().flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).fold(0.0, |longest: f64, [a, b]| {
-                longest.max((model.rest[*a as usize] - model.rest[*b as usize]).norm())
+                longest.max((model.place(*a as usize) - model.place(*b as usize)).norm())
             });
         assert!(1.5 * longest < EDGE, "{longest}");
-        let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.45 }, density: 1000.0 };
+        let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.45 }, density: 1000.0 };
         let shell = Shell { formulation: FLAT, ..Shell::new("valve", cells, 0.4e-3, material) };
         let notes = model.add_shell(&shell).unwrap();
         let count = held.len();
-        model.constraints.push(Constraint {
+        model.model_mut().constraints.push(Constraint {
             name: "wall".into(),
             nodes: held,
             components: [true; 6],
             motion: Motion::Fixed,
         });
-        let kind = LoadKind::Pressure {
-            cells: (0..model.facets.len() as u32).collect(),
+        let kind = LoadKind::ShellPressure {
+            facets: (0..model.facets.len() as u32).collect(),
             pressure: 1.0,
             spread: Spread::Lumped,
         };
         let course = Curve { shape: Shape::Table(curve.clone()), from: 0.0, to: 1.0 };
-        model.loads.push(Load { name: "valve".into(), kind, curve: course, controlled: false });
+        model.model_mut().loads.push(Load::new("valve", kind, course));
         model.mass_damping = 2.0;
         let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(step)).unwrap();
         let mut state = State::at_rest(&model);

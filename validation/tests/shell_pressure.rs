@@ -6,7 +6,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use pliant_geometry::{Mesh, Vector3};
 use pliant_implicit::element::{Bending, Formulation, Membrane};
-use pliant_implicit::{Explicit, LoadKind, Spread, State, StaticSettings, Statics};
+use pliant_implicit::{Explicit, State, StaticSettings, Statics};
+use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 use pliant_validation::shells::{FLAT, Specimen, symmetry};
 use pliant_validation::{Random, claim};
@@ -70,15 +71,15 @@ fn pressed(mesh: Mesh, whole: bool, thickness: f64, formulation: Formulation, sp
         cylinder.hold_edge("z-min", symmetry(2)).hold_edge("start", symmetry(1)).hold_edge("end", symmetry(0))
     };
     let cells = (0..cylinder.model.facets.len() as u32).collect();
-    cylinder.load(LoadKind::Pressure { cells, pressure: 1e-6 * thickness, spread })
+    cylinder.load(LoadKind::ShellPressure { facets: cells, pressure: 1e-6 * thickness, spread })
 }
 
 /// Radial displacement of each node by linear theory over Lamé's.
 fn ratios(cylinder: &Specimen) -> Vec<f64> {
     let mut solver = Statics::new(cylinder.model.clone(), StaticSettings::default()).unwrap();
     let moved = solver.linear(&State::at_rest(&cylinder.model), 1.0).unwrap();
-    let radial = |(u, x): (&[f64; 6], &Vector3)| (u[0] * x.x + u[1] * x.y) / 1e-6;
-    moved.iter().zip(&cylinder.model.rest).map(radial).collect()
+    let radial = |(u, x): (&[f64; 6], Vector3)| (u[0] * x.x + u[1] * x.y) / 1e-6;
+    moved.iter().zip(cylinder.model.places()).map(radial).collect()
 }
 
 fn bounds(ratios: &[f64]) -> [f64; 2] {
@@ -158,13 +159,15 @@ fn an_irregular_cylinder_is_blown_up_in_one_step() {
     let (formulation, spread) = DEFAULT;
     let cylinder = pressed(cylinder(Cut::Irregular(1), true, [40, 13]), true, 0.01, formulation, spread);
     let mut model = cylinder.model;
-    let LoadKind::Pressure { pressure, .. } = &mut model.loads[0].kind else { panic!("no pressure") };
+    let LoadKind::ShellPressure { pressure, .. } = &mut model.model_mut().loads[0].kind else {
+        panic!("no pressure")
+    };
     *pressure *= 1e3;
     let mut state = State::at_rest(&model);
     let step =
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
-    let ratio = |(x, rest): (&Vector3, &Vector3)| (x - rest).xy().dot(&rest.xy()) / 1e-3;
-    let found: Vec<f64> = state.position.iter().zip(&model.rest).map(ratio).collect();
+    let ratio = |(x, rest): (&Vector3, Vector3)| (x - rest).xy().dot(&rest.xy()) / 1e-3;
+    let found: Vec<f64> = state.position.iter().zip(model.places()).map(ratio).collect();
     println!("{} iterations, {:?}", step.residuals.len() - 1, bounds(&found));
     assert!(step.parts == 1 && step.residuals.len() <= 14, "{:?}", step.residuals);
     claim("irregular cylinder, strain 1e-3", off(&found), 0.03);
@@ -177,12 +180,12 @@ fn pressure_that_varies_bends_a_cylinder() {
     let oval = |[round, along]: [usize; 2], (formulation, spread): (Formulation, Spread)| {
         let mut cylinder =
             pressed(cylinder(Cut::Diagonal, false, [round, along]), false, 0.01, formulation, spread);
-        cylinder.model.loads.clear();
+        cylinder.model.model_mut().loads.clear();
         for cell in 0..cylinder.model.facets.len() {
             let centre: Vector3 =
-                cylinder.model.facets[cell].nodes.iter().map(|&n| cylinder.model.rest[n as usize]).sum();
+                cylinder.model.facets[cell].nodes.iter().map(|&n| cylinder.model.place(n as usize)).sum();
             let pressure = 1e-12 * (2.0 * centre.y.atan2(centre.x)).cos();
-            cylinder = cylinder.load(LoadKind::Pressure { cells: vec![cell as u32], pressure, spread });
+            cylinder = cylinder.load(LoadKind::ShellPressure { facets: vec![cell as u32], pressure, spread });
         }
         let node = cylinder.node(1.0, 0.0, 0.5);
         cylinder.linear(node).unwrap()[0]
@@ -214,10 +217,15 @@ fn spheres_under_pressure() {
             );
             let cells: Vec<u32> = (0..20 * 4_u32.pow(levels)).collect();
             let ball = ball.unwrap().hold(vec![0], [true; 6]);
-            let ball = ball.load(LoadKind::Pressure { cells, pressure: 1e-6 * thickness, spread: DEFAULT.1 });
+            let ball = ball.load(LoadKind::ShellPressure {
+                facets: cells,
+                pressure: 1e-6 * thickness,
+                spread: DEFAULT.1,
+            });
             let mut solver = Statics::new(ball.model.clone(), StaticSettings::default()).unwrap();
             let moved = solver.linear(&State::at_rest(&ball.model), 1.0).unwrap();
-            let places = moved.iter().zip(&ball.model.rest).map(|(u, x)| x + Vector3::new(u[0], u[1], u[2]));
+            let places =
+                moved.iter().zip(ball.model.places()).map(|(u, x)| x + Vector3::new(u[0], u[1], u[2]));
             let places: Vec<Vector3> = places.collect();
             let centre = places.iter().sum::<Vector3>() / places.len() as f64;
             let exact = 0.5e-6 * (1.0 - POISSON);
@@ -241,7 +249,7 @@ fn an_explicit_cylinder_comes_to_rest_in_equilibrium() {
     let mut cylinder = pressed(cylinder(Cut::Diagonal, false, [5, 4]), false, 0.04, formulation, spread);
     let exact = ratios(&cylinder);
     let model = &mut cylinder.model;
-    model.loads[0].curve.shape = pliant_mechanics::curve::Shape::Hold;
+    model.model_mut().loads[0].curve.shape = pliant_mechanics::curve::Shape::Hold;
     // A quarter of the breathing frequency √(E/ρ)/R.
     model.mass_damping = 0.5 * (1.0_f64 / 1000.0).sqrt();
     let step = 0.9 * Explicit::stable_step(model);
@@ -251,8 +259,8 @@ fn an_explicit_cylinder_comes_to_rest_in_equilibrium() {
     for _ in 0..steps {
         solver.advance(&mut state).unwrap();
     }
-    let ratio = |(x, rest): (&Vector3, &Vector3)| (x - rest).xy().dot(&rest.xy()) / 1e-6;
-    let found: Vec<f64> = state.position.iter().zip(&model.rest).map(ratio).collect();
+    let ratio = |(x, rest): (&Vector3, Vector3)| (x - rest).xy().dot(&rest.xy()) / 1e-6;
+    let found: Vec<f64> = state.position.iter().zip(model.places()).map(ratio).collect();
     println!("{steps} explicit steps: {:?}, by linear theory {:?}", bounds(&found), bounds(&exact));
     let apart = found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     claim("explicit against static", apart, 1e-3);

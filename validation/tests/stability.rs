@@ -112,7 +112,7 @@ fn pressed(law: AnyLaw, element: (VolumeCell, Tets, Hexes)) -> Specimen {
     let mut cube = cube.on_rollers().damped(60.0);
     let motion = Motion::Displacement([-0.01, 0.0, 0.0], smooth_step(0.5));
     let nodes = cube.face("x-max");
-    cube.model.constraints.push(Constraint { name: "press".into(), nodes, components: [true; 3], motion });
+    cube.model.constraints.push(Constraint { name: "press".into(), nodes, components: [true; 6], motion });
     cube
 }
 

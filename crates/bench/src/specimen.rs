@@ -153,8 +153,9 @@ impl Specimen {
         self.constrain("move", face, [true; 3], Motion::Displacement(by, curve))
     }
 
-    fn constrain(mut self, verb: &str, face: &str, components: [bool; 3], motion: Motion) -> Self {
+    fn constrain(mut self, verb: &str, face: &str, [x, y, z]: [bool; 3], motion: Motion) -> Self {
         let (name, nodes) = (format!("{verb} {face}"), self.face(face));
+        let components = [x, y, z, false, false, false];
         self.model.constraints.push(Constraint { name, nodes, components, motion });
         self
     }
@@ -169,7 +170,7 @@ impl Specimen {
     /// Under a load.
     #[must_use]
     pub fn loaded(mut self, kind: LoadKind, curve: Curve) -> Self {
-        self.model.loads.push(Load { name: "load".into(), kind, curve, surface: None });
+        self.model.loads.push(Load::new("load", kind, curve));
         self
     }
 

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::load::LoadKind;
+use pliant_mechanics::mapping::Displaced;
 use pliant_mechanics::model::Model;
-use pliant_mechanics::tensor::{Vector, add, cast};
+use pliant_mechanics::tensor::{Vector, add};
 
 use crate::Scalar;
 
@@ -51,27 +52,17 @@ impl AppliedForces {
         self.nodal.fill([0.0; 3]);
         self.gravity.fill([0.0; 3]);
         let model = &self.model;
+        let state = Displaced { rest: &model.rest, displacement, velocity: &[] };
         for load in &model.loads {
             if let LoadKind::Gravity { body, acceleration } = load.kind {
                 let factor = load.curve.value(time);
                 self.gravity[body] = add(self.gravity[body], acceleration.map(|a| a * factor));
             }
-            match load.surface.map(|index| &model.surfaces[index]) {
-                Some(surface) => {
-                    let place = |point: u32| {
-                        let moved = surface.mapping.apply_row(point as usize, displacement);
-                        add(surface.rest[point as usize], moved)
-                    };
-                    load.add_forces(time, Some(&surface.mapping), place, &mut self.nodal);
-                }
-                None => {
-                    let place = |node: u32| add(model.rest[node as usize], cast(displacement[node as usize]));
-                    load.add_forces(time, None, place, &mut self.nodal);
-                }
-            }
+            let points = load.surface.map(|index| &model.surfaces[index].mapping);
+            load.add_forces(time, points, &state, &mut self.nodal);
         }
         for grip in &self.grips {
-            grip.add_forces(model, displacement, &mut self.nodal);
+            grip.add_forces(&state, &mut self.nodal);
         }
     }
 

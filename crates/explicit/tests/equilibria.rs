@@ -49,7 +49,7 @@ fn block(counts: [u32; 3], edge: f64, element: &str, poisson: f64, prony: Prony)
     model.constraints.push(Constraint {
         name: "root".into(),
         nodes: at(&model, 0.0),
-        components: [true; 3],
+        components: [true; 6],
         motion: Motion::Fixed,
     });
     model
@@ -68,7 +68,7 @@ fn squeezed(poisson: f64, prony: Prony, element: &str, curve: Curve) -> Model {
     cube.constraints.push(Constraint {
         name: "plate".into(),
         nodes: at(&cube, 0.1),
-        components: [true; 3],
+        components: [true; 6],
         motion: Motion::Displacement([-0.02, 0.0, 0.0], curve),
     });
     cube
@@ -219,7 +219,7 @@ fn single_precision_bends_a_slender_beam_as_far() {
     let end: Vec<(u32, [f64; 3])> =
         at(&beam, 0.5).into_iter().map(|node| (node, [0.0, 0.0, 4e-3 / 9.0])).collect();
     let kind = LoadKind::Forces(end);
-    beam.loads.push(Load { name: "end".into(), kind, curve: ramp(), surface: None });
+    beam.loads.push(Load::new("end", kind, ramp()));
     fn bent<R: Scalar>(beam: &Model) -> (f64, f64) {
         let mut solver = DynamicRelaxation::<R>::new(beam.clone(), RelaxationSettings::usual::<R>()).unwrap();
         let mut state = State::at_rest(beam);

@@ -23,10 +23,7 @@ pub(crate) struct DeviceLoads {
 fn weights(model: &Model, load: &Load, point: u32) -> Vec<(u32, f64)> {
     match load.surface {
         None => vec![(point, 1.0)],
-        Some(surface) => {
-            let row = model.surfaces[surface].mapping.row(point as usize);
-            row.map(|(node, weight)| (node as u32, weight)).collect()
-        }
+        Some(surface) => model.surfaces[surface].mapping.row(point as usize).collect(),
     }
 }
 
@@ -96,7 +93,7 @@ impl DeviceLoads {
                         corners.add(model, (index, load), face, *pressure, &mut entries);
                     }
                 }
-                LoadKind::Gravity { .. } => {}
+                LoadKind::Gravity { .. } | LoadKind::Moments(_) | LoadKind::ShellPressure { .. } => {}
             }
         }
         let mut offsets = vec![0];

@@ -8,8 +8,7 @@ use pliant_geometry::barycentric_of_closest;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
-use crate::model::Model;
-use crate::patch::Vector18;
+use crate::assembly::Assembly;
 use crate::patch::{Carried, Place};
 use crate::state::State;
 use crate::surface::CurvedSurface;
@@ -17,7 +16,7 @@ use crate::surface::CurvedSurface;
 /// A search tree over the curved surface where it was when the tree was made.
 struct Nearest<'s> {
     surface: &'s CurvedSurface,
-    model: &'s Model,
+    model: &'s Assembly,
     state: &'s State,
     tree: RTree<Flat>,
     /// No point of a patch is farther than this from its flat facet [m].
@@ -47,7 +46,7 @@ impl PointDistance for Flat {
 }
 
 impl<'s> Nearest<'s> {
-    fn new(surface: &'s CurvedSurface, model: &'s Model, state: &'s State, cells: &[u32]) -> Self {
+    fn new(surface: &'s CurvedSurface, model: &'s Assembly, state: &'s State, cells: &[u32]) -> Self {
         let flat = |&facet: &u32| {
             let nodes = model.facets[facet as usize].nodes;
             Flat { facet, corners: nodes.map(|node| state.position[node as usize]) }
@@ -82,7 +81,7 @@ impl CurvedSurface {
     /// Points of a visual mesh [m], each bound to the nearest place of the patches over some facets at a state. `None` without facets.
     pub fn carry_all(
         &self,
-        model: &Model,
+        model: &Assembly,
         state: &State,
         cells: &[u32],
         points: &[Vector3<f64>],
@@ -95,7 +94,7 @@ impl CurvedSurface {
     /// Where carried points are [m], written to a slice of the same length.
     pub fn carried_all(
         &self,
-        model: &Model,
+        model: &Assembly,
         state: &State,
         points: &[Carried],
         positions: &mut [Vector3<f64>],
@@ -103,34 +102,15 @@ impl CurvedSurface {
         let both = positions.par_iter_mut().zip(points).with_min_len(64);
         both.for_each(|(position, point)| *position = self.carried(model, state, point));
     }
-
-    /// Adds forces [N] on carried points to nodal forces and moments, six a node [N, N m], by Jᵀ of each point with its offset: their
-    /// work, their sum and their moment are the same.
-    pub fn add_nodal_forces(
-        &self,
-        model: &Model,
-        state: &State,
-        points: &[Carried],
-        forces: &[Vector3<f64>],
-        nodal: &mut [f64],
-    ) {
-        for (point, force) in points.iter().zip(forces) {
-            let facet = point.place.facet;
-            let back: Vector18 = self.patch(model, state, facet).carried_forces(point, force);
-            for (node, own) in model.facets[facet as usize].nodes.iter().zip(back.as_slice().chunks_exact(6))
-            {
-                let at = 6 * *node as usize;
-                nodal[at..at + 6].iter_mut().zip(own).for_each(|(sum, value)| *sum += value);
-            }
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mapping::CarriedPoints;
     use crate::patch::EdgeRule;
     use crate::tests::{ball, cube, model, strip};
+    use pliant_mechanics::mapping::Mapping;
     use pliant_testing::Random;
 
     fn vector(random: &mut Random) -> Vector3<f64> {
@@ -207,7 +187,13 @@ mod tests {
         state.advance(&shake, 1.0);
         let forces: Vec<_> = points.iter().map(|_| vector(&mut random)).collect();
         let mut nodal = vec![0.0; 6 * model.rest.len()];
-        surface.add_nodal_forces(&model, &state, &carried, &forces, &mut nodal);
+        let mapping = CarriedPoints::Shell(&model, &surface, &carried);
+        for (point, force) in forces.iter().enumerate() {
+            mapping.add_force(&state, point, (*force).into(), &mut |node, force, moment| {
+                let own = force.into_iter().chain(moment);
+                nodal[6 * node as usize..].iter_mut().zip(own).for_each(|(sum, value)| *sum += value);
+            });
+        }
         let part = |at: usize| Vector3::new(nodal[at], nodal[at + 1], nodal[at + 2]);
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         for (node, x) in state.position.iter().enumerate() {

@@ -39,7 +39,7 @@ pub(crate) fn straight_edges(
     facets: &[Facet],
     corner_normals: &[[u32; 3]],
     normals: &[Normal],
-    rest: &[Vector3<f64>],
+    rest: &[[f64; 3]],
 ) -> Vec<[bool; 6]> {
     let mut straight = vec![[false; 6]; facets.len()];
     for sides in sides(facets).values() {
@@ -48,7 +48,7 @@ pub(crate) fn straight_edges(
             corner.map(|corner| corner_normals[facet][corner])
         };
         let leans = |facet: usize, normal: Option<u32>| {
-            let [a, b, c] = facets[facet].nodes.map(|node| rest[node as usize]);
+            let [a, b, c] = facets[facet].nodes.map(|node| Vector3::from(rest[node as usize]));
             let across = (b - a).cross(&(c - a)).normalize();
             normal.is_some_and(|normal| normals[normal as usize].direction.dot(&across) < LEANING)
         };

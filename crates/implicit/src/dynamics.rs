@@ -13,11 +13,11 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use pliant_mechanics::model::Solid;
 
+use crate::assembly::{Assembly, Spring};
 use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::forces::Forces;
 use crate::linear::{LinearReport, LinearSolver};
-use crate::model::{Model, Spring};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::solid::highest_frequency_squared;
 use crate::state::State;
@@ -153,7 +153,7 @@ impl BackwardEuler {
     ///
     /// # Errors
     /// If the equations are too many for the solver chosen.
-    pub fn new(model: impl Into<Arc<Model>>, settings: DynamicSettings) -> Result<Self, SolveError> {
+    pub fn new(model: impl Into<Arc<Assembly>>, settings: DynamicSettings) -> Result<Self, SolveError> {
         let model = model.into();
         let system = System::new(Arc::clone(&model), settings.linear)?;
         let (all, free) = (6 * model.rest.len(), system.equations.len());
@@ -345,7 +345,7 @@ impl BackwardEuler {
                 let (mass, before) = if first == 0 {
                     (model.mass[node], self.start.velocity[node])
                 } else {
-                    (model.inertia[node], self.start.spin[node])
+                    (model.rotary_inertia[node], self.start.spin[node])
                 };
                 let before = before + Course::part(rate, at + first);
                 let mut momentum =
@@ -391,7 +391,7 @@ impl BackwardEuler {
         let rate = 1.0 / (h * h) + model.mass_damping / h;
         for (equation, &component) in self.system.equations.component.iter().enumerate() {
             let node = component as usize / 6;
-            let mass = if component % 6 < 3 { model.mass[node] } else { model.inertia[node] };
+            let mass = if component % 6 < 3 { model.mass[node] } else { model.rotary_inertia[node] };
             self.system.matrix.add_diagonal(equation, rate * mass);
         }
     }
@@ -413,7 +413,7 @@ pub struct Explicit {
 impl Explicit {
     /// The longest stable step [s] about rest: 2/√(ω² + max k/m) of the stiffest element and the stiffest springs on a node, a lower bound
     /// of the model's.
-    pub fn stable_step(model: &Model) -> f64 {
+    pub fn stable_step(model: &Assembly) -> f64 {
         let shells = model.facets.iter().map(|facet| facet.highest_frequency_squared());
         let of_solid = |solid: &Solid| {
             let cells = (0..solid.cells.len()).map(|cell| highest_frequency_squared(solid, cell));
@@ -433,7 +433,7 @@ impl Explicit {
     ///
     /// # Errors
     /// If the step is longer than is stable, or damping is proportional to stiffness.
-    pub fn new(model: impl Into<Arc<Model>>, step: f64) -> Result<Self, SolveError> {
+    pub fn new(model: impl Into<Arc<Assembly>>, step: f64) -> Result<Self, SolveError> {
         let model = model.into();
         if !(step > 0.0 && step <= Self::stable_step(&model)) {
             return Err(SolveError::Impossible(
@@ -501,7 +501,7 @@ impl Explicit {
             };
             let (v, w) = (
                 velocity(0, state.velocity[node], model.mass[node]),
-                velocity(3, state.spin[node], model.inertia[node]),
+                velocity(3, state.spin[node], model.rotary_inertia[node]),
             );
             (state.velocity[node], state.spin[node]) = (v, w);
             state.position[node] += h * v;
@@ -517,34 +517,33 @@ mod tests {
 
     use super::*;
     use crate::element::Elasticity;
-    use crate::{
-        Constraint, Load, LoadKind, Material, Motion, Preconditioner, Shell, StaticSettings, Statics,
-    };
+    use crate::{Preconditioner, Shell, StaticSettings, Statics, Wall};
     use pliant_mechanics::curve::{Curve, Shape};
+    use pliant_mechanics::load::{Load, LoadKind};
+    use pliant_mechanics::model::{Constraint, Motion};
 
     const LENGTH: f64 = 1.0;
     const THIN: f64 = 0.01;
 
     /// A strip of 16 × 2 cells, 1 × 0.1 m; E = 1 MPa, ν = 0.
-    fn strip(thickness: f64) -> Model {
+    fn strip(thickness: f64) -> Assembly {
         let points = (0..51_u32)
-            .map(|i| Vector3::new(f64::from(i % 17) / 16.0 * LENGTH, f64::from(i / 17) * 0.05, 0.0))
-            .collect();
+            .map(|i| Vector3::new(f64::from(i % 17) / 16.0 * LENGTH, f64::from(i / 17) * 0.05, 0.0));
         let cell = |i: u32| {
             let a = i % 16 + 17 * (i / 16);
             [[a, a + 1, a + 18], [a, a + 18, a + 17]]
         };
-        let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.0 }, density: 1000.0 };
-        let mut model = Model::new(points);
+        let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.0 }, density: 1000.0 };
+        let mut model = Assembly::new("shell", points);
         let cells = (0..32).flat_map(cell).collect();
         model.add_shell(&Shell::new("strip", cells, thickness, material)).unwrap();
         model
     }
 
-    fn clamped(thickness: f64) -> Model {
+    fn clamped(thickness: f64) -> Assembly {
         let mut model = strip(thickness);
         let nodes = vec![0, 17, 34];
-        model.constraints.push(Constraint {
+        model.model_mut().constraints.push(Constraint {
             name: "clamp".into(),
             nodes,
             components: [true; 6],
@@ -553,10 +552,10 @@ mod tests {
         model
     }
 
-    fn weigh(model: &mut Model, g: f64) {
-        let kind = LoadKind::Gravity { acceleration: Vector3::new(0.0, 0.0, -g) };
+    fn weigh(model: &mut Assembly, g: f64) {
+        let kind = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -g] };
         let curve = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
-        model.loads.push(Load { name: "weight".into(), kind, curve, controlled: false });
+        model.model_mut().loads.push(Load::new("weight", kind, curve));
     }
 
     /// First bending frequency of a cantilever, 1.8751² √(E I/(ρ A L⁴)) [rad/s].
@@ -565,9 +564,9 @@ mod tests {
     }
 
     /// Period of the tip after a small push, from its zero crossings.
-    fn period(mut advance: impl FnMut(&mut State), model: &Model, step: f64) -> f64 {
+    fn period(mut advance: impl FnMut(&mut State), model: &Assembly, step: f64) -> f64 {
         let mut state = State::at_rest(model);
-        for (v, x) in state.velocity.iter_mut().zip(&model.rest) {
+        for (v, x) in state.velocity.iter_mut().zip(model.places()) {
             v.z = 1e-3 * x.x * x.x;
         }
         let mut crossings = Vec::new();
@@ -605,7 +604,7 @@ mod tests {
         let mut model = strip(THIN);
         for node in 0..model.rest.len() {
             let stiffness = TAU * TAU * model.mass[node];
-            model.springs.push(crate::Spring { node: node as u32, anchor: model.rest[node], stiffness });
+            model.springs.push(crate::Spring { node: node as u32, anchor: model.place(node), stiffness });
         }
         let settings =
             DynamicSettings { integrator, tolerance: 1e-10, ..DynamicSettings::new(1.0 / f64::from(steps)) };
@@ -703,7 +702,7 @@ mod tests {
         let free = Explicit::stable_step(&model);
         let node = 16;
         let stiffness = 100.0 * 4.0 / (free * free) * model.mass[node];
-        model.springs.push(crate::Spring { node: node as u32, anchor: model.rest[node], stiffness });
+        model.springs.push(crate::Spring { node: node as u32, anchor: model.place(node), stiffness });
         let step = Explicit::stable_step(&model);
         assert!(step < 0.1 * free && step > 0.09 * free, "{step:e} {free:e}");
         let mut state = State::at_rest(&model);
@@ -713,7 +712,7 @@ mod tests {
             solver.advance(&mut state).unwrap();
         }
         // What it starts with, kept within the strip and the spring: 1e-3 m/s over the frequency of the spring, and some.
-        let off = (state.position[node] - model.rest[node]).norm();
+        let off = (state.position[node] - model.place(node)).norm();
         assert!(off < 1e-3 * free, "{off:e}");
     }
 
@@ -722,7 +721,7 @@ mod tests {
     fn explicit_motion_keeps_its_energy() {
         let model = clamped(THIN);
         let mut state = State::at_rest(&model);
-        for (v, x) in state.velocity.iter_mut().zip(&model.rest) {
+        for (v, x) in state.velocity.iter_mut().zip(model.places()) {
             v.z = 1.5 * x.x * x.x;
         }
         let kinetic = |state: &State| -> f64 {
@@ -730,7 +729,7 @@ mod tests {
             nodes
                 .map(|i| {
                     0.5 * model.mass[i] * state.velocity[i].norm_squared()
-                        + 0.5 * model.inertia[i] * state.spin[i].norm_squared()
+                        + 0.5 * model.rotary_inertia[i] * state.spin[i].norm_squared()
                 })
                 .sum()
         };
@@ -752,14 +751,14 @@ mod tests {
     fn a_free_body_keeps_its_momentum() {
         let model = strip(THIN);
         let mut state = State::at_rest(&model);
-        for (v, x) in state.velocity.iter_mut().zip(&model.rest) {
+        for (v, x) in state.velocity.iter_mut().zip(model.places()) {
             *v = Vector3::new(0.1, 0.2 * x.x, 0.5 * x.x * x.x);
         }
         let momentum = |state: &State| {
             let nodes = 0..model.rest.len();
             nodes.fold((Vector3::zeros(), Vector3::zeros()), |(p, l), i| {
                 let own = model.mass[i] * state.velocity[i];
-                (p + own, l + state.position[i].cross(&own) + model.inertia[i] * state.spin[i])
+                (p + own, l + state.position[i].cross(&own) + model.rotary_inertia[i] * state.spin[i])
             })
         };
         let settings = DynamicSettings { tolerance: 1e-10, ..DynamicSettings::new(2e-3) };

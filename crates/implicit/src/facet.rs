@@ -9,8 +9,8 @@ use nalgebra::{
 };
 
 use crate::element::{
-    Corners, CurvedMembrane, Formulation, Layer, Material, Matrix3x18, Matrix9, Membrane, PlaneStress,
-    Section, andes_higher, area, density, gradients, mean, mean_curvature, thickness,
+    Bending, Corners, CurvedMembrane, Formulation, Layer, Matrix3x18, Matrix9, Membrane, PlaneStress,
+    Section, Wall, andes_higher, area, density, gradients, mean, mean_curvature, thickness,
 };
 use crate::patch::{EdgeRule, Patch, Vector18};
 use crate::rotation::{logarithm, moment_correction, skew, spin_to_vector};
@@ -136,7 +136,7 @@ impl Facet {
         nodes: [u32; 3],
         rest: [Vector3<f64>; 3],
         thickness: f64,
-        material: Material,
+        material: Wall,
         formulation: Formulation,
     ) -> Option<Self> {
         Self::of_wall(nodes, rest, thickness, material, None, formulation)
@@ -151,7 +151,7 @@ impl Facet {
         direction: &Vector3<f64>,
         formulation: Formulation,
     ) -> Option<Self> {
-        let material = Material { elastic: mean(layers), density: density(layers) };
+        let material = Wall { elastic: mean(layers), density: density(layers) };
         Self::of_wall(nodes, rest, thickness(layers), material, Some((layers, direction)), formulation)
     }
 
@@ -159,7 +159,7 @@ impl Facet {
         nodes: [u32; 3],
         rest: [Vector3<f64>; 3],
         thickness: f64,
-        Material { elastic, density }: Material,
+        Wall { elastic, density }: Wall,
         layers: Option<(&[Layer], &Vector3<f64>)>,
         formulation: Formulation,
     ) -> Option<Self> {
@@ -558,6 +558,11 @@ impl Facet {
         self.bending != Matrix9::zeros()
     }
 
+    /// Whether its nodes turn: not those of a membrane alone.
+    pub(crate) fn turns(&self) -> bool {
+        self.formulation.bending != Bending::None || self.formulation.membrane == Membrane::None
+    }
+
     /// The smallest altitude at rest [m].
     pub fn altitude(&self) -> f64 {
         let longest =
@@ -696,7 +701,7 @@ mod tests {
     use crate::rotation::exponential;
     use pliant_testing::Random;
 
-    const MATERIAL: Material = Material { elastic: Elasticity { young: 1e3, poisson: 0.3 }, density: 1000.0 };
+    const MATERIAL: Wall = Wall { elastic: Elasticity { young: 1e3, poisson: 0.3 }, density: 1000.0 };
 
     type Pose = ([Vector3<f64>; 3], [UnitQuaternion<f64>; 3]);
 

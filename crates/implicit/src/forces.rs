@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::assembly::{Assembly, Spring};
 use crate::error::SolveError;
-use crate::model::{Model, Spring};
 use crate::state::State;
 use crate::system::System;
 
@@ -14,7 +14,7 @@ pub struct Forces {
 
 impl Forces {
     /// For a model; nothing is known before the first evaluation.
-    pub fn new(model: impl Into<Arc<Model>>) -> Self {
+    pub fn new(model: impl Into<Arc<Assembly>>) -> Self {
         Self { system: System::forces_only(model.into()) }
     }
 

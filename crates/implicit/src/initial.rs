@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use crate::model::Model;
+use crate::assembly::Assembly;
 use crate::state::State;
 
 impl State {
@@ -22,19 +22,20 @@ impl State {
 
     /// Puts the nodes to positions [m] and turns those of shells with the facets round them: by the rotation that best maps corners and
     /// normals of these from rest (Kabsch 1976; Procrustes), so that a rigid motion costs nothing.
-    pub fn set_positions(&mut self, model: &Model, positions: &[Vector3<f64>]) {
+    pub fn set_positions(&mut self, model: &Assembly, positions: &[Vector3<f64>]) {
         self.position.copy_from_slice(positions);
         let mut moments = vec![Matrix3::zeros(); model.rest.len()];
         for facet in &model.facets {
-            let arms = |x: &[Vector3<f64>]| {
-                let corners = facet.nodes.map(|node| x[node as usize]);
+            let arms = |x: &dyn Fn(usize) -> Vector3<f64>| {
+                let corners = facet.nodes.map(|node| x(node as usize));
                 let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
                 let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
                 // As long as the arms are.
                 let normal = normal.try_normalize(0.0).unwrap_or_default() * facet.area.sqrt();
                 (corners.map(|x| x - centre), normal)
             };
-            let ((now, normal), (rest, rest_normal)) = (arms(positions), arms(&model.rest));
+            let ((now, normal), (rest, rest_normal)) =
+                (arms(&|node| positions[node]), arms(&|node| model.place(node)));
             let corners = now.iter().zip(&rest).map(|(x, r)| x * r.transpose()).sum::<Matrix3<f64>>();
             let moment = corners + normal * rest_normal.transpose();
             facet.nodes.iter().for_each(|&node| moments[node as usize] += moment);
@@ -62,15 +63,18 @@ mod tests {
     use super::*;
     use crate::rotation::exponential;
     use crate::tests::{ball, cantilever, model, ramp};
-    use crate::{BackwardEuler, DynamicSettings, Load, LoadKind, Motion, StaticSettings, Statics};
+    use crate::{BackwardEuler, DynamicSettings, StaticSettings, Statics};
     use crate::{CurvedSurface, EdgeRule};
+    use pliant_mechanics::load::{Load, LoadKind};
+    use pliant_mechanics::mapping::Weights;
+    use pliant_mechanics::model::{Motion, Surface};
 
     /// A rigid motion given as positions turns every node by its rotation and costs nothing.
     #[test]
     fn a_turned_start_is_not_strained() {
         let model = model(ball(2), 0.02);
         let turn = exponential(&Vector3::new(1.0, -2.0, 1.5));
-        let positions: Vec<_> = model.rest.iter().map(|x| turn * x + Vector3::x()).collect();
+        let positions: Vec<_> = model.places().map(|x| turn * x + Vector3::x()).collect();
         let mut state = State::at_rest(&model);
         state.set_positions(&model, &positions);
         let energy = state.shell_energy(&model).unwrap();
@@ -91,7 +95,7 @@ mod tests {
             solver.advance(&mut state).unwrap();
         }
         let turn = exponential(&(spin * 0.1));
-        for (x, rest) in state.position.iter().zip(&model.rest) {
+        for (x, rest) in state.position.iter().zip(model.places()) {
             // Backward Euler turns by arctan(ω h) a step and grows by (ω h)²/2: 1e-4 in all.
             assert!((x - (turn * rest + velocity * 0.1)).norm() < 1e-4, "{x} {rest}");
         }
@@ -106,8 +110,8 @@ mod tests {
         let mut end = model.constraints[0].clone();
         end.nodes = vec![8, 17, 26];
         end.components = [false, false, false, true, true, true];
-        end.motion = Motion::Moved { by: [0.0, 0.0, 0.0, vector.x, vector.y, vector.z], curve: ramp() };
-        model.constraints.push(end);
+        end.motion = Motion::turn([0.0; 3], vector.into(), 3, ramp());
+        model.model_mut().constraints.push(end);
         let mut state = State::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         for time in [0.3, 0.5, 1.0] {
@@ -131,14 +135,18 @@ mod tests {
     #[test]
     fn a_force_on_a_carried_point_has_its_moment() {
         let mut model = cantilever();
-        model.loads.clear();
+        model.model_mut().loads.clear();
         let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-        let above = model.rest[17] + Vector3::new(0.0, 0.0, 2.0);
+        let above = model.place(17) + Vector3::new(0.0, 0.0, 2.0);
         let cells: Vec<u32> = (0..32).collect();
         let points = surface.carry_all(&model, &State::at_rest(&model), &cells, &[above]).unwrap();
         let force = Vector3::new(3.0, 0.5, 0.2);
-        let kind = LoadKind::Carried { points: points.clone(), forces: vec![force] };
-        model.loads.push(Load { name: "pull".into(), kind, curve: ramp(), controlled: false });
+        let skin =
+            Surface { name: "skin".into(), body: 0, rest: vec![above.into()], mapping: Weights::default() };
+        model.model_mut().surfaces.push(skin);
+        model.carried.insert(0, points.clone());
+        let kind = LoadKind::force([0], force);
+        model.model_mut().loads.push(Load { surface: Some(0), ..Load::new("pull", kind, ramp()) });
         let mut state = State::at_rest(&model);
         let step =
             Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();

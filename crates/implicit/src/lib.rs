@@ -2,29 +2,27 @@
 //! rotation, and solids of any elastic law, which may share nodes with them. Knows nothing of files or windows. SI units throughout.
 //!
 //! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane (Felippa 2003), which takes the
-//! mean strain of the curved triangle, six degrees of freedom a node, in a frame that turns with the facet; its force is the gradient of its energy. [`Model`] is constant, [`State`]
-//! changes; [`Statics`] finds equilibria, [`BackwardEuler`] and [`Explicit`] move a state in time; [`CurvedSurface`] is the smooth
+//! mean strain of the curved triangle, six degrees of freedom a node, in a frame that turns
+//! with the facet; its force is the gradient of its energy. An [`Assembly`] is constant: a model with shells. A [`State`] changes; [`Statics`] finds equilibria, [`BackwardEuler`] and [`Explicit`] move a state in time; [`CurvedSurface`] is the smooth
 //! surface of the shells for pictures and for forces on any of its points.
 //!
 //! ```
 //! use nalgebra::Vector3;
 //! use pliant_implicit::element::Elasticity;
-//! use pliant_implicit::{
-//!     Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
-//! };
+//! use pliant_implicit::{Assembly, Shell, State, StaticSettings, Statics, Wall};
 //! use pliant_mechanics::curve::{Curve, Shape};
+//! use pliant_mechanics::load::{Load, LoadKind};
 //!
 //! // A strip of 1 m × 0.1 m × 10 mm in ten squares, clamped at x = 0, lifted at its other end.
-//! let points = (0..22).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0)).collect();
+//! let points = (0..22).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0));
 //! let cells = (0..10).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]).collect();
-//! let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
-//! let mut model = Model::new(points);
+//! let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+//! let mut model = Assembly::new("strip", points);
 //! model.add_shell(&Shell::new("strip", cells, 0.01, material))?;
-//! let clamp = Constraint { name: "clamp".into(), nodes: vec![0, 1], components: [true; 6], motion: Motion::Fixed };
-//! model.constraints.push(clamp);
-//! let kind = LoadKind::Force { nodes: vec![20, 21], force: Vector3::new(0.0, 0.0, 0.02) };
+//! model.model_mut().fix("clamp", vec![0, 1]);
+//! let kind = LoadKind::force([20, 21], [0.0, 0.0, 0.02]);
 //! let curve = Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 };
-//! model.loads.push(Load { name: "lift".into(), kind, curve, controlled: false });
+//! model.model_mut().loads.push(Load::new("lift", kind, curve));
 //!
 //! let mut state = State::at_rest(&model);
 //! let step = Statics::new(model.clone(), StaticSettings::default())?.solve(&mut state, 1.0)?;
@@ -33,6 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod assembly;
 mod carry;
 mod control;
 mod creases;
@@ -43,7 +42,7 @@ mod facet;
 mod forces;
 mod initial;
 mod linear;
-mod model;
+mod mapping;
 mod patch;
 mod picture;
 mod pressure;
@@ -62,14 +61,16 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
+pub use assembly::{Assembly, Notes, Shell, Spring};
 pub use creases::Normal;
 pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
-pub use element::Material;
+pub use element::Wall;
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
 pub use forces::Forces;
 pub use linear::{LinearReport, LinearSolver, Preconditioner};
-pub use model::{Constraint, Load, LoadKind, Model, Motion, Notes, Shell, Spread, Spring};
+
+pub use mapping::CarriedPoints;
 pub use patch::{Carried, EdgeRule, Patch, Place};
 pub use picture::{Picture, PictureFields};
 pub use recover::{ShellFields, von_mises};

@@ -6,7 +6,7 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::model::Model;
+use crate::assembly::Assembly;
 use crate::patch::{Patch, Place};
 use crate::rotation::logarithm;
 use crate::state::State;
@@ -40,7 +40,7 @@ pub struct PictureFields {
 
 impl CurvedSurface {
     /// Points and triangles with each edge cut into `parts` (at least 1).
-    pub fn picture(&self, model: &Model, parts: u32) -> Picture {
+    pub fn picture(&self, model: &Assembly, parts: u32) -> Picture {
         let parts = parts.max(1);
         let mut edges: Vec<[u32; 2]> = model
             .corner_normals
@@ -123,7 +123,7 @@ impl Picture {
 
 impl PictureFields {
     /// Fills the arrays for a state, points side by side.
-    pub fn fill(&mut self, picture: &Picture, surface: &CurvedSurface, model: &Model, state: &State) {
+    pub fn fill(&mut self, picture: &Picture, surface: &CurvedSurface, model: &Assembly, state: &State) {
         let count = picture.places.len();
         for vectors in [&mut self.position, &mut self.displacement, &mut self.rotation, &mut self.normal] {
             vectors.resize(count, Vector3::zeros());
@@ -186,7 +186,7 @@ mod tests {
     use crate::tests::{ball, cube, model};
     use pliant_testing::Random;
 
-    fn shaken(model: &Model, size: f64, seed: u64) -> State {
+    fn shaken(model: &Assembly, size: f64, seed: u64) -> State {
         let mut random = Random::new(seed);
         let mut state = State::at_rest(model);
         let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| size * random.number()).collect();
@@ -221,12 +221,12 @@ mod tests {
                 assert_eq!(picture.places.len(), v + 3 * f / 2 * (k - 1) + f * inside);
                 // Triangles lie above their facets.
                 for (number, triangle) in picture.triangles.iter().enumerate() {
-                    let mean = |points: [u32; 3], of: &[Vector3<f64>]| -> Vector3<f64> {
-                        points.iter().map(|&p| of[p as usize]).sum::<Vector3<f64>>() / 3.0
+                    let mean = |points: [u32; 3], of: &dyn Fn(usize) -> Vector3<f64>| -> Vector3<f64> {
+                        points.iter().map(|&p| of(p as usize)).sum::<Vector3<f64>>() / 3.0
                     };
                     let nodes = model.facets[picture.facet(number) as usize].nodes;
-                    let reach = (model.rest[nodes[0] as usize] - model.rest[nodes[1] as usize]).norm();
-                    let gap = mean(*triangle, &picture.rest) - mean(nodes, &model.rest);
+                    let reach = (model.place(nodes[0] as usize) - model.place(nodes[1] as usize)).norm();
+                    let gap = mean(*triangle, &|p| picture.rest[p]) - mean(nodes, &|n| model.place(n));
                     assert!(gap.norm() < reach, "{number}");
                 }
             }
@@ -308,7 +308,8 @@ mod tests {
     #[test]
     fn a_ball_is_shaded_as_a_sphere() {
         let mut model = model(ball(2), 0.01);
-        model.normals.iter_mut().for_each(|normal| normal.direction = model.rest[normal.node as usize]);
+        let places: Vec<_> = model.places().collect();
+        model.normals.iter_mut().for_each(|normal| normal.direction = places[normal.node as usize]);
         let surface = CurvedSurface::new(&model, EdgeRule::Arc);
         let picture = surface.picture(&model, 4);
         let mut fields = PictureFields::default();

@@ -9,9 +9,9 @@
 use nalgebra::{Matrix2, Matrix3, Vector3};
 use rayon::prelude::*;
 
+use crate::assembly::Assembly;
 use crate::error::SolveError;
 use crate::facet::{Resultants, ShellEnergy};
-use crate::model::Model;
 use crate::state::State;
 use crate::strain::ShellStrain;
 
@@ -41,7 +41,7 @@ impl ShellFields {
     ///
     /// # Errors
     /// If a facet is collapsed or folded over: the first one. The arrays then are partly of before.
-    pub fn fill(&mut self, model: &Model, state: &State) -> Result<(), SolveError> {
+    pub fn fill(&mut self, model: &Assembly, state: &State) -> Result<(), SolveError> {
         let count = model.facets.len();
         for tensors in [&mut self.membrane, &mut self.moment].into_iter().chain(&mut self.stress) {
             tensors.resize(count, Matrix3::zeros());
@@ -115,7 +115,9 @@ mod tests {
     use crate::element::Formulation;
     use crate::rotation::exponential;
     use crate::tests::{FLAT, MATERIAL, balloon, model, strip};
-    use crate::{Constraint, Load, LoadKind, Motion, Shell, Spread, StaticSettings, Statics};
+    use crate::{Shell, StaticSettings, Statics};
+    use pliant_mechanics::load::{Load, LoadKind, Spread};
+    use pliant_mechanics::model::{Constraint, Motion};
 
     const YOUNG: f64 = MATERIAL.elastic.young;
     const POISSON: f64 = MATERIAL.elastic.poisson;
@@ -136,7 +138,7 @@ mod tests {
         let model = model(strip(), 0.1);
         let k = 1e-7;
         let mut state = State::at_rest(&model);
-        for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(&model.rest) {
+        for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(model.places()) {
             x.z = 0.5 * k * rest.x * rest.x;
             *r = exponential(&Vector3::new(0.0, -k * rest.x, 0.0));
         }
@@ -192,7 +194,7 @@ mod tests {
         let pressure = 10.0;
         let scatter = [2, 3].map(|cuts| {
             let mut model = balloon(cuts, pressure);
-            model.loads[0].controlled = false;
+            model.model_mut().loads[0].controlled = false;
             let mut state = State::at_rest(&model);
             Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
             let mut fields = ShellFields::default();
@@ -231,24 +233,24 @@ mod tests {
                 [node(i, j), node(i + 1, j + 1), node(i, j + 1)],
             ]
         });
-        let mut model = Model::new(points.collect());
+        let mut model = Assembly::new("shell", points);
         let shell = Shell { formulation, ..Shell::new("cylinder", cells.collect(), 0.02, MATERIAL) };
         model.add_shell(&shell).unwrap();
         let mut hold = |nodes: Vec<u32>, components| {
             let motion = Motion::Fixed;
-            model.constraints.push(Constraint { name: "held".into(), nodes, components, motion });
+            model.model_mut().constraints.push(Constraint { name: "held".into(), nodes, components, motion });
         };
         hold((0..round).collect(), [false, false, true, false, false, false]);
         hold(vec![0, round / 2], [false, true, false, false, false, false]);
         hold(vec![round / 4], [true, false, false, false, false, false]);
         let curve = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
-        let edges = (0..round).map(|i| [node(i, long), node(i + 1, long)]).collect();
+        let edges: Vec<_> = (0..round).map(|i| [node(i, long), node(i + 1, long)]).collect();
         let cells = (0..model.facets.len() as u32).collect();
         for kind in [
-            LoadKind::Pressure { cells, pressure, spread },
-            LoadKind::Edge { edges, traction: Vector3::new(0.0, 0.0, 0.5 * pressure) },
+            LoadKind::ShellPressure { facets: cells, pressure, spread },
+            model.edge_load(&edges, Vector3::new(0.0, 0.0, 0.5 * pressure)),
         ] {
-            model.loads.push(Load { name: "load".into(), kind, curve: curve.clone(), controlled: false });
+            model.model_mut().loads.push(Load::new("load", kind, curve.clone()));
         }
         let mut state = State::at_rest(&model);
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
-use crate::model::Model;
+use crate::assembly::Assembly;
 
 /// How far a node may lie from the mean of its neighbours along the wall, as a part of its edges, in a regular mesh.
 const REGULAR: f64 = 0.05;
@@ -25,7 +25,7 @@ pub struct Resolution {
     pub estimated: usize,
 }
 
-impl Model {
+impl Assembly {
     /// Looks at facets under pressure.
     pub fn resolution(&self, cells: &[u32]) -> Resolution {
         let irregular = self.irregular_nodes(cells);
@@ -37,7 +37,7 @@ impl Model {
             let (mut coarse, mut curved) = (false, false);
             for i in 0..3 {
                 let j = (i + 1) % 3;
-                let [a, b] = [i, j].map(|corner| self.rest[facet.nodes[corner] as usize]);
+                let [a, b] = [i, j].map(|corner| self.place(facet.nodes[corner] as usize));
                 let edge = (b - a).norm();
                 let turn = (normals[j].direction - normals[i].direction).norm();
                 curved |= turn > 1e-3;
@@ -75,7 +75,7 @@ impl Model {
                 border.extend(ends);
             }
             for [a, b] in [ends, [ends[1], ends[0]]] {
-                let edge = self.rest[b as usize] - self.rest[a as usize];
+                let edge = self.place(b as usize) - self.place(a as usize);
                 let own = around.entry(a).or_insert((Vector3::zeros(), 0.0));
                 *own = (own.0 + edge, own.1 + edge.norm());
             }

@@ -3,8 +3,10 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
+use pliant_mechanics::Model;
+
+use crate::assembly::Assembly;
 use crate::facet::{Broken, Facet, Resultants, ShellEnergy};
-use crate::model::Model;
 use crate::rotation::exponential;
 use crate::strain::ShellStrain;
 
@@ -55,7 +57,7 @@ impl State {
         Self {
             time: 0.0,
             load_factor: 0.0,
-            position: model.rest.clone(),
+            position: model.rest.iter().map(|&place| Vector3::from(place)).collect(),
             rotation: vec![UnitQuaternion::identity(); nodes],
             velocity: vec![Vector3::zeros(); nodes],
             spin: vec![Vector3::zeros(); nodes],
@@ -63,8 +65,8 @@ impl State {
     }
 
     /// Displacement of a node [m].
-    pub fn displacement(&self, model: &Model, node: usize) -> Vector3<f64> {
-        self.position[node] - model.rest[node]
+    pub fn displacement(&self, model: &Assembly, node: usize) -> Vector3<f64> {
+        self.position[node] - model.place(node)
     }
 
     /// Moves and turns all nodes by a part of (translation, spin) increments, six a node.
@@ -85,7 +87,7 @@ impl State {
     }
 
     /// The current direction of a nodal normal.
-    pub fn normal(&self, model: &Model, number: usize) -> Vector3<f64> {
+    pub fn normal(&self, model: &Assembly, number: usize) -> Vector3<f64> {
         let normal = model.normals[number];
         self.rotation[normal.node as usize] * normal.direction
     }
@@ -94,7 +96,7 @@ impl State {
     ///
     /// # Errors
     /// If a facet is collapsed or folded over.
-    pub fn shell_energy(&self, model: &Model) -> Result<ShellEnergy, Broken> {
+    pub fn shell_energy(&self, model: &Assembly) -> Result<ShellEnergy, Broken> {
         let mut sum = ShellEnergy::default();
         for facet in &model.facets {
             let (x, rotation) = self.corners(facet.nodes);
@@ -110,14 +112,14 @@ impl State {
     ///
     /// # Errors
     /// If the facet is collapsed or folded over.
-    pub fn resultants(&self, model: &Model, facet: usize) -> Result<Resultants, Broken> {
+    pub fn resultants(&self, model: &Assembly, facet: usize) -> Result<Resultants, Broken> {
         let facet = &model.facets[facet];
         let (x, rotation) = self.corners(facet.nodes);
         Ok(facet.resultants(&facet.place(&x, &rotation)?))
     }
 
     /// The strains of all facets, side by side; none of one that is collapsed or folded over.
-    pub fn shell_strains(&self, model: &Model) -> Vec<ShellStrain> {
+    pub fn shell_strains(&self, model: &Assembly) -> Vec<ShellStrain> {
         let strain = |facet: &Facet| {
             let (x, rotation) = self.corners(facet.nodes);
             facet.place(&x, &rotation).map(|placed| facet.strain(&placed)).unwrap_or_default()

@@ -11,7 +11,9 @@ use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::linear::{LinearSolver, dot};
-use crate::model::{Load, LoadKind, Model, Spring};
+use pliant_mechanics::load::{Load, LoadKind};
+
+use crate::assembly::{Assembly, Spring};
 use crate::sparse::NONE;
 use crate::state::State;
 use crate::system::{Phases, System};
@@ -155,7 +157,7 @@ impl Statics {
     ///
     /// # Errors
     /// If a part of the model is free to move as a rigid body.
-    pub fn new(model: impl Into<Arc<Model>>, settings: StaticSettings) -> Result<Self, SolveError> {
+    pub fn new(model: impl Into<Arc<Assembly>>, settings: StaticSettings) -> Result<Self, SolveError> {
         let model = model.into();
         check_held(&model)?;
         let system = System::new(Arc::clone(&model), settings.linear)?;
@@ -265,7 +267,7 @@ impl Statics {
         }
         if matches!(control, Control::Volume { .. }) {
             for load in self.system.model.loads.iter().filter(|load| load.controlled) {
-                if let LoadKind::Pressure { cells, .. } = &load.kind {
+                if let LoadKind::ShellPressure { facets: cells, .. } = &load.kind {
                     self.system.model.check_closed(cells)?;
                 }
             }
@@ -484,7 +486,7 @@ impl Statics {
             Control::Volume { volume } => {
                 let model = Arc::clone(&self.system.model);
                 for load in model.loads.iter().filter(|load| load.controlled) {
-                    let LoadKind::Pressure { cells, .. } = &load.kind else { continue };
+                    let LoadKind::ShellPressure { facets: cells, .. } = &load.kind else { continue };
                     for &cell in cells {
                         let nodes = model.facets[cell as usize].nodes;
                         let x = nodes.map(|node| state.position[node as usize]);
@@ -546,7 +548,7 @@ impl Statics {
 }
 
 /// The equations of the translations of nodes that only membranes hold, and the extent of these nodes [m].
-fn slack(model: &Model, system: &System) -> (Vec<u32>, f64) {
+fn slack(model: &Assembly, system: &System) -> (Vec<u32>, f64) {
     let mut slack = vec![false; model.rest.len()];
     let mut mark = |nodes: &[u32], is: bool| nodes.iter().for_each(|&node| slack[node as usize] = is);
     model.facets.iter().for_each(|facet| mark(&facet.nodes, true));
@@ -555,16 +557,16 @@ fn slack(model: &Model, system: &System) -> (Vec<u32>, f64) {
     let nodes: Vec<usize> = (0..slack.len()).filter(|&node| slack[node]).collect();
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     for &node in &nodes {
-        (low, high) = (low.inf(&model.rest[node]), high.sup(&model.rest[node]));
+        (low, high) = (low.inf(&model.place(node)), high.sup(&model.place(node)));
     }
     let equations = nodes.iter().flat_map(|node| (0..3).map(move |c| system.equations.number[6 * node + c]));
     (equations.filter(|&equation| equation != NONE).collect(), (high - low).norm())
 }
 
 /// The volume [m³] that the facets of controlled pressures enclose.
-fn controlled_volume(model: &Model, state: &State) -> f64 {
+fn controlled_volume(model: &Assembly, state: &State) -> f64 {
     let volume = |load: &Load| match &load.kind {
-        LoadKind::Pressure { cells, .. } => model.enclosed_volume(cells, &state.position),
+        LoadKind::ShellPressure { facets: cells, .. } => model.enclosed_volume(cells, &state.position),
         _ => 0.0,
     };
     model.loads.iter().filter(|load| load.controlled).map(volume).sum()
@@ -574,7 +576,7 @@ fn controlled_volume(model: &Model, state: &State) -> f64 {
 ///
 /// # Errors
 /// If not: a node of a part, and how many motions it is free in.
-pub fn check_held(model: &Model) -> Result<(), SolveError> {
+pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
     let nodes = model.rest.len();
     let mut part: Vec<usize> = (0..nodes).collect();
     fn root(part: &mut [usize], mut node: usize) -> usize {
@@ -593,12 +595,13 @@ pub fn check_held(model: &Model) -> Result<(), SolveError> {
             part[x.max(y)] = x.min(y);
         }
     }
+    let turning = model.turning();
     // Per part: Σ of the squares of what its rigid motions (about the first node, in mean edges) do to what holds it.
     let length = model.mean_edge();
     let mut held = vec![Matrix6::zeros(); nodes];
     let mut hold = |node: usize, component: usize, held: &mut Vec<Matrix6<f64>>| {
         let first = root(&mut part, node);
-        let arm = (model.rest[node] - model.rest[first]) / length;
+        let arm = (model.place(node) - model.place(first)) / length;
         let row = if component < 3 {
             let along = Vector3::ith(component, 1.0);
             let turning = arm.cross(&along);
@@ -610,8 +613,14 @@ pub fn check_held(model: &Model) -> Result<(), SolveError> {
     };
     for constraint in &model.constraints {
         for &node in &constraint.nodes {
-            (0..6).filter(|&c| constraint.components[c]).for_each(|c| hold(node as usize, c, &mut held));
+            let components = if turning[node as usize] { 6 } else { 3 };
+            let own = (0..components).filter(|&c| constraint.components[c]);
+            own.for_each(|c| hold(node as usize, c, &mut held));
         }
+    }
+    // A membrane may hang from a line and be turned by its loads: its nodes count as if they could not turn.
+    for &node in model.facets.iter().filter(|facet| !facet.turns()).flat_map(|facet| &facet.nodes) {
+        (3..6).for_each(|c| hold(node as usize, c, &mut held));
     }
     for spring in &model.springs {
         (0..3).for_each(|c| hold(spring.node as usize, c, &mut held));

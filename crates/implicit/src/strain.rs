@@ -51,7 +51,7 @@ mod tests {
         }
         let curvature = 1e-4;
         let mut state = State::at_rest(&model);
-        for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(&model.rest) {
+        for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(model.places()) {
             x.z = 0.5 * curvature * rest.x * rest.x;
             *r = exponential(&Vector3::new(0.0, -curvature * rest.x, 0.0));
         }

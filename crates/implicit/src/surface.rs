@@ -4,8 +4,8 @@
 
 use nalgebra::Vector3;
 
+use crate::assembly::Assembly;
 use crate::creases::{sides, straight_edges};
-use crate::model::Model;
 use crate::patch::{Carried, EdgeRule, Patch, Place};
 use crate::state::State;
 
@@ -21,7 +21,7 @@ pub struct CurvedSurface {
 
 impl CurvedSurface {
     /// The surface of all facets.
-    pub fn new(model: &Model, rule: EdgeRule) -> Self {
+    pub fn new(model: &Assembly, rule: EdgeRule) -> Self {
         let mut neighbours = vec![[None; 3]; model.facets.len()];
         for sides in sides(&model.facets).values() {
             if let [(a, i), (b, j)] = sides[..] {
@@ -34,7 +34,7 @@ impl CurvedSurface {
     }
 
     /// The patch over a facet.
-    pub fn patch(&self, model: &Model, state: &State, facet: u32) -> Patch {
+    pub fn patch(&self, model: &Assembly, state: &State, facet: u32) -> Patch {
         let facet = facet as usize;
         let p = model.facets[facet].nodes.map(|node| state.position[node as usize]);
         let n = model.corner_normals[facet].map(|normal| state.normal(model, normal as usize));
@@ -43,7 +43,7 @@ impl CurvedSurface {
 
     /// The foot of a point on the surface at a state, found from a facet near it: the nearest place of its patch, then those of the
     /// neighbours across edges on which it lies, as long as they are nearer.
-    pub fn project(&self, model: &Model, state: &State, point: Vector3<f64>, facet: u32) -> Place {
+    pub fn project(&self, model: &Assembly, state: &State, point: Vector3<f64>, facet: u32) -> Place {
         let nearest = |facet: u32| {
             let (weights, distance) = self.patch(model, state, facet).closest(&point, [1.0 / 3.0; 3]);
             (Place { facet, weights }, distance)
@@ -71,11 +71,17 @@ impl CurvedSurface {
     }
 
     /// A point of a visual mesh, bound to the surface where it now is; `facet` is one near it.
-    pub fn carry(&self, model: &Model, state: &State, point: Vector3<f64>, facet: u32) -> Carried {
+    pub fn carry(&self, model: &Assembly, state: &State, point: Vector3<f64>, facet: u32) -> Carried {
         self.bind(model, state, &point, self.project(model, state, point, facet))
     }
 
-    pub(crate) fn bind(&self, model: &Model, state: &State, point: &Vector3<f64>, place: Place) -> Carried {
+    pub(crate) fn bind(
+        &self,
+        model: &Assembly,
+        state: &State,
+        point: &Vector3<f64>,
+        place: Place,
+    ) -> Carried {
         let patch = self.patch(model, state, place.facet);
         let offset = point - patch.point(place.weights);
         let [first, second, normal] = patch.frame(place.weights);
@@ -83,7 +89,7 @@ impl CurvedSurface {
     }
 
     /// Where a carried point is.
-    pub fn carried(&self, model: &Model, state: &State, point: &Carried) -> Vector3<f64> {
+    pub fn carried(&self, model: &Assembly, state: &State, point: &Carried) -> Vector3<f64> {
         self.patch(model, state, point.place.facet).carried(point)
     }
 }

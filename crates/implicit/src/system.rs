@@ -5,14 +5,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::{SMatrix, SVector, Vector3};
-use pliant_mechanics::load::{Face, NO_NODE, face_areas};
-use pliant_mechanics::model::Solid;
+use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, Spread, face_areas};
+use pliant_mechanics::mapping::Mapping;
+use pliant_mechanics::model::{Motion, Solid};
+use pliant_mechanics::tensor::scale;
 use rayon::prelude::*;
 
+use crate::assembly::{Assembly, Spring};
 use crate::error::SolveError;
 use crate::facet::{Broken, Facet, Matrix18, Tangent, symmetrise};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
-use crate::model::{Load, LoadKind, Model, Motion, Spread, Spring};
+use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
 use crate::patch::{EdgeRule, Patch};
 use crate::rotation::skew;
@@ -41,7 +44,7 @@ pub struct Phases {
 
 /// A model's equations with the forces and the stiffness last found.
 pub(crate) struct System {
-    pub(crate) model: Arc<Model>,
+    pub(crate) model: Arc<Assembly>,
     pub(crate) equations: Equations,
     pub(crate) matrix: LowerMatrix,
     places: Vec<Vec<u32>>,
@@ -98,7 +101,7 @@ struct FacetResult {
 }
 
 impl System {
-    pub(crate) fn new(model: Arc<Model>, solver: LinearSolver) -> Result<Self, SolveError> {
+    pub(crate) fn new(model: Arc<Assembly>, solver: LinearSolver) -> Result<Self, SolveError> {
         let mut system = Self::forces_only(Arc::clone(&model));
         let matrix = &mut system.matrix;
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
@@ -117,7 +120,7 @@ impl System {
             [cells.collect(), stars.collect()]
         };
         let of_load = |load: &Load| match &load.kind {
-            LoadKind::FacePressure { faces, .. } => {
+            LoadKind::Pressure { faces, .. } => {
                 Some(faces.iter().map(|face| places(corners(face))).collect())
             }
             _ => None,
@@ -135,13 +138,14 @@ impl System {
     }
 
     /// A system that has forces, but no stiffness.
-    pub(crate) fn forces_only(model: Arc<Model>) -> Self {
+    pub(crate) fn forces_only(model: Arc<Assembly>) -> Self {
         let nodes = model.rest.len();
         let mut free = vec![false; 6 * nodes];
-        for facet in &model.facets {
-            for node in facet.nodes {
-                free[6 * node as usize..6 * node as usize + 6].fill(true);
-            }
+        for &node in model.facets.iter().flat_map(|facet| &facet.nodes) {
+            free[6 * node as usize..6 * node as usize + 3].fill(true);
+        }
+        for (node, turns) in model.turning().into_iter().enumerate() {
+            free[6 * node + 3..6 * node + 6].fill(turns);
         }
         for &node in model.solid_cells().flatten() {
             free[6 * node as usize..6 * node as usize + 3].fill(true);
@@ -173,8 +177,8 @@ impl System {
                 .loads
                 .iter()
                 .any(|load| {
-                    use LoadKind::{Carried, Pressure};
-                    matches!(load.kind, Carried { .. } | Pressure { spread: Spread::Curved, .. })
+                    let curved = matches!(load.kind, LoadKind::ShellPressure { spread: Spread::Curved, .. });
+                    curved || load.surface.is_some_and(|surface| model.carried.contains_key(&surface))
                 })
                 .then(|| CurvedSurface::new(&model, EdgeRule::Arc)),
             energy: 0.0,
@@ -273,52 +277,43 @@ impl System {
         for load in &model.loads {
             let factor = load.curve.value(time);
             let target = if load.controlled { &mut self.controlled } else { &mut self.external };
-            let mut add = |node: u32, first: usize, force: Vector3<f64>| {
+            let mut add = |node: u32, first: usize, force: [f64; 3]| {
                 for c in 0..3 {
                     target[6 * node as usize + first + c] += factor * force[c];
                 }
             };
             match &load.kind {
-                LoadKind::Force { nodes, force } => nodes.iter().for_each(|&node| add(node, 0, *force)),
-                LoadKind::Moment { nodes, moment } => nodes.iter().for_each(|&node| add(node, 3, *moment)),
-                LoadKind::Gravity { acceleration } => {
-                    for (node, &mass) in model.mass.iter().enumerate() {
-                        add(node as u32, 0, acceleration * mass);
+                LoadKind::Forces(forces) => {
+                    for &(at, force) in forces {
+                        match load.surface {
+                            None => add(at, 0, force),
+                            Some(surface) => {
+                                let mapping = CarriedPoints::new(&model, self.surface.as_ref(), surface);
+                                mapping.add_force(state, at as usize, force, &mut |node, force, moment| {
+                                    add(node, 0, force);
+                                    add(node, 3, moment);
+                                });
+                            }
+                        }
                     }
                 }
-                LoadKind::Area { cells, traction } => {
-                    for facet in cells.iter().map(|&cell| &model.facets[cell as usize]) {
-                        facet.nodes.iter().for_each(|&node| add(node, 0, traction * (facet.area / 3.0)));
+                LoadKind::Moments(moments) => moments.iter().for_each(|&(node, moment)| add(node, 3, moment)),
+                LoadKind::Gravity { body, acceleration } => {
+                    for node in model.bodies[*body].nodes.clone() {
+                        add(node, 0, scale(*acceleration, model.mass[node as usize]));
                     }
                 }
-                LoadKind::FacePressure { faces, pressure } => {
+                LoadKind::Pressure { faces, pressure } => {
                     let place = |node: u32| -> [f64; 3] { state.position[node as usize].into() };
                     for face in faces {
                         for (node, area) in face_areas(face, place) {
-                            add(node, 0, -*pressure * Vector3::from(area));
+                            add(node, 0, scale(area, -*pressure));
                         }
                     }
                 }
-                LoadKind::Edge { edges, traction } => {
-                    for ends in edges {
-                        let [a, b] = ends.map(|node| model.rest[node as usize]);
-                        ends.iter().for_each(|&node| add(node, 0, traction * (0.5 * (b - a).norm())));
-                    }
-                }
-                LoadKind::Carried { points, forces } => {
-                    let Some(surface) = &self.surface else { continue };
-                    for (point, force) in points.iter().zip(forces) {
-                        let facet = point.place.facet;
-                        let back = surface.patch(&model, state, facet).carried_forces(point, force);
-                        for (i, &node) in model.facets[facet as usize].nodes.iter().enumerate() {
-                            add(node, 0, back.fixed_rows::<3>(6 * i).into());
-                            add(node, 3, back.fixed_rows::<3>(6 * i + 3).into());
-                        }
-                    }
-                }
-                LoadKind::Pressure { cells, pressure, spread } => {
-                    for &cell in cells {
-                        let own = &mut self.pressure[cell as usize];
+                LoadKind::ShellPressure { facets, pressure, spread } => {
+                    for &facet in facets {
+                        let own = &mut self.pressure[facet as usize];
                         let own = match spread {
                             Spread::Lumped => &mut own.lumped,
                             Spread::Curved => &mut own.curved,
@@ -448,7 +443,7 @@ impl System {
     fn press_faces(&mut self, state: &State, time: f64, moved: &[f64]) {
         let model = Arc::clone(&self.model);
         let pressing = model.loads.iter().filter_map(|load| match &load.kind {
-            LoadKind::FacePressure { faces, pressure } => Some((load, faces, pressure)),
+            LoadKind::Pressure { faces, pressure } => Some((load, faces, pressure)),
             _ => None,
         });
         for (number, (load, faces, pressure)) in pressing.enumerate() {
@@ -563,17 +558,11 @@ impl System {
     pub(crate) fn prescribed(&self, from: f64, to: f64, increments: &mut [f64]) {
         increments.fill(0.0);
         for constraint in &self.model.constraints {
-            let change = |index: usize, c: usize| match &constraint.motion {
-                Motion::Moved { by, curve } => by[c] * (curve.value(to) - curve.value(from)),
-                Motion::Displaced(motion) if c < 3 => {
-                    motion.displacement(index, to, 1.0)[c] - motion.displacement(index, from, 1.0)[c]
-                }
-                Motion::Fixed | Motion::Displaced(_) => 0.0,
-            };
             let moving = !matches!(constraint.motion, Motion::Fixed);
             for (index, &node) in constraint.nodes.iter().enumerate().filter(|_| moving) {
+                let by = constraint.motion.increment(index, from, to);
                 for c in (0..6).filter(|&c| constraint.components[c]) {
-                    increments[6 * node as usize + c] = change(index, c);
+                    increments[6 * node as usize + c] = by[c];
                 }
             }
         }

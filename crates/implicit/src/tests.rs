@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, Corotational};
-use pliant_mechanics::model::{Cells, Material as Elastic, Solid};
+use pliant_mechanics::load::{Load, LoadKind, Spread};
+use pliant_mechanics::model::{Cells, Constraint, Material, Motion, Solid};
 
 use crate::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
 use crate::facet::Tangent;
@@ -13,8 +14,7 @@ use crate::system::System;
 use crate::*;
 use pliant_testing::Random;
 
-pub(crate) const MATERIAL: Material =
-    Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+pub(crate) const MATERIAL: Wall = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
 
 /// Points and triangles of an octahedron of radius 1 facing outwards, each triangle cut in four some times.
 pub(crate) fn ball(cuts: usize) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
@@ -84,18 +84,18 @@ fn fix(nodes: Vec<u32>, components: [bool; 6]) -> Constraint {
     Constraint { name: "fixed".into(), nodes, components, motion: Motion::Fixed }
 }
 
-pub(crate) fn model((points, cells): (Vec<Vector3<f64>>, Vec<[u32; 3]>), thickness: f64) -> Model {
-    let mut model = Model::new(points);
+pub(crate) fn model((points, cells): (Vec<Vector3<f64>>, Vec<[u32; 3]>), thickness: f64) -> Assembly {
+    let mut model = Assembly::new("shell", points);
     model.add_shell(&Shell::new("shell", cells, thickness, MATERIAL)).unwrap();
     model
 }
 
 /// The strip clamped at one end with a force at the other.
-pub(crate) fn cantilever() -> Model {
+pub(crate) fn cantilever() -> Assembly {
     let mut model = model(strip(), 0.1);
-    model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
-    let kind = LoadKind::Force { nodes: vec![8, 17, 26], force: Vector3::new(0.0, 0.0, 0.5) };
-    model.loads.push(Load { name: "pull".into(), kind, curve: ramp(), controlled: false });
+    model.model_mut().constraints.push(fix(vec![0, 9, 18], [true; 6]));
+    let kind = LoadKind::force(vec![8, 17, 26], Vector3::new(0.0, 0.0, 0.5));
+    model.model_mut().loads.push(Load::new("pull", kind, ramp()));
     model
 }
 
@@ -104,16 +104,16 @@ pub(crate) const FLAT: Formulation =
     Formulation { membrane: Membrane::Opt { adaptation: 10.0 }, bending: Bending::Dkt };
 
 /// The ball with flat membranes and six components held, so that nothing resists its breathing.
-pub(crate) fn balloon(cuts: usize, pressure: f64) -> Model {
+pub(crate) fn balloon(cuts: usize, pressure: f64) -> Assembly {
     let (points, cells) = ball(cuts);
-    let mut model = Model::new(points);
+    let mut model = Assembly::new("shell", points);
     model.add_shell(&Shell { formulation: FLAT, ..Shell::new("shell", cells, 0.02, MATERIAL) }).unwrap();
-    model.constraints.push(fix(vec![0], [true, true, true, false, false, false]));
-    model.constraints.push(fix(vec![1], [false, true, true, false, false, false]));
-    model.constraints.push(fix(vec![2], [false, false, true, false, false, false]));
+    model.model_mut().constraints.push(fix(vec![0], [true, true, true, false, false, false]));
+    model.model_mut().constraints.push(fix(vec![1], [false, true, true, false, false, false]));
+    model.model_mut().constraints.push(fix(vec![2], [false, false, true, false, false, false]));
     let cells = (0..model.facets.len() as u32).collect();
-    let kind = LoadKind::Pressure { cells, pressure, spread: Spread::Lumped };
-    model.loads.push(Load { name: "pressure".into(), kind, curve: hold(), controlled: true });
+    let kind = LoadKind::ShellPressure { facets: cells, pressure, spread: Spread::Lumped };
+    model.model_mut().loads.push(Load { controlled: true, ..Load::new("pressure", kind, hold()) });
     model
 }
 
@@ -123,12 +123,12 @@ fn triangles_are_turned_to_one_side_and_counted() {
     for cell in [3, 17, 90] {
         cells[cell].swap(1, 2);
     }
-    let mut model = Model::new(points);
+    let mut model = Assembly::new("shell", points);
     let notes = model.add_shell(&Shell::new("ball", cells, 0.01, MATERIAL)).unwrap();
     assert_eq!(notes, Notes { turned: 3, ..Notes::default() });
     let all: Vec<u32> = (0..128).collect();
     // Of an inscribed polyhedron of 128 faces.
-    let volume = model.enclosed_volume(&all, &model.rest);
+    let volume = model.rest_volume(&all);
     assert!((3.7..4.19).contains(&volume), "{volume}");
     assert!(model.check_closed(&all).is_ok());
     let Err(ModelError::Open { loops }) = model.check_closed(&all[1..127]) else { panic!("closed") };
@@ -141,7 +141,7 @@ fn nodes_carry_one_normal_for_each_smooth_fan() {
     let ball = model(ball(2), 0.01);
     assert_eq!(ball.normals.len(), ball.rest.len());
     for normal in &ball.normals {
-        let angle = normal.direction.angle(&ball.rest[normal.node as usize]);
+        let angle = normal.direction.angle(&ball.place(normal.node as usize));
         assert!(angle < 0.052, "{angle}");
     }
     let points =
@@ -159,7 +159,8 @@ fn nodes_carry_one_normal_for_each_smooth_fan() {
 fn bad_shells_are_told_with_their_element() {
     let (points, cells) = strip();
     let good = Shell::new("skin", cells.clone(), 0.1, MATERIAL);
-    let refuse = |shell: &Shell| Model::new(points.clone()).add_shell(shell).unwrap_err().to_string();
+    let refuse =
+        |shell: &Shell| Assembly::new("shell", points.clone()).add_shell(shell).unwrap_err().to_string();
     let mut thin = good.clone();
     thin.thickness = vec![0.1; 32];
     thin.thickness[7] = -0.1;
@@ -171,7 +172,7 @@ fn bad_shells_are_told_with_their_element() {
     assert!(refuse(&soft).contains("Young's modulus"));
     soft.material[0].elastic = Elasticity { young: 1.0, poisson: 1.0 };
     assert!(refuse(&soft).contains("Poisson's ratio"));
-    soft.material[0] = Material { density: f64::NAN, ..MATERIAL };
+    soft.material[0] = Wall { density: f64::NAN, ..MATERIAL };
     assert!(refuse(&soft).contains("density"));
     let with = |cell: [u32; 3]| Shell { cells: [cells.clone(), vec![cell]].concat(), ..good.clone() };
     assert!(
@@ -180,12 +181,12 @@ fn bad_shells_are_told_with_their_element() {
     assert!(refuse(&with([3, 4, 99])).contains("node 99"));
     assert!(refuse(&with([1, 10, 26])).contains("3 triangles"), "{}", refuse(&with([1, 10, 26])));
     let branched = Shell { branches: true, ..with([1, 10, 26]) };
-    assert!(Model::new(points.clone()).add_shell(&branched).is_ok());
+    assert!(Assembly::new("shell", points.clone()).add_shell(&branched).is_ok());
     let with = |normal: [f64; 3]| Shell { normals: [(12, normal.into())].into(), ..good.clone() };
     for normal in [[1.0, 0.0, 0.0], [0.0; 3], [f64::NAN; 3]] {
         assert!(refuse(&with(normal)).contains("normal given at node 12"), "{normal:?}");
     }
-    let mut given = Model::new(points.clone());
+    let mut given = Assembly::new("shell", points.clone());
     given.add_shell(&with([0.6, 0.0, -0.8])).unwrap();
     let at = |node: u32| given.normals.iter().find(|n| n.node == node).unwrap().direction;
     assert_eq!(at(12) * at(11).z, Vector3::new(-0.6, 0.0, 0.8), "to the side of the triangles");
@@ -196,23 +197,23 @@ fn bad_shells_are_told_with_their_element() {
         Vector3::new(cosine, sine, 0.1 * f64::from(i * i))
     });
     let band = Shell::new("band", ring, 0.1, MATERIAL);
-    assert!(matches!(Model::new(around.collect()).add_shell(&band), Err(ModelError::OneSided { .. })));
+    assert!(matches!(Assembly::new("shell", around).add_shell(&band), Err(ModelError::OneSided { .. })));
     let thick = Shell::new("skin", cells, 0.8, MATERIAL);
-    assert_eq!(Model::new(points).add_shell(&thick).unwrap().thick, 32);
+    assert_eq!(Assembly::new("shell", points).add_shell(&thick).unwrap().thick, 32);
 }
 
 #[test]
 fn a_body_that_nothing_holds_is_named_with_its_free_modes() {
     let mut model = model(strip(), 0.1);
-    let free = |model: &Model| match Statics::new(model.clone(), StaticSettings::default()) {
+    let free = |model: &Assembly| match Statics::new(model.clone(), StaticSettings::default()) {
         Err(SolveError::FreeBody { free_modes, .. }) => free_modes,
         Err(error) => panic!("{error}"),
         Ok(_) => 0,
     };
     assert_eq!(free(&model), 6);
-    model.constraints.push(fix(vec![0], [true, true, true, false, false, false]));
+    model.model_mut().constraints.push(fix(vec![0], [true, true, true, false, false, false]));
     assert_eq!(free(&model), 3);
-    model.constraints.push(fix(vec![8], [false, true, true, false, false, false]));
+    model.model_mut().constraints.push(fix(vec![8], [false, true, true, false, false, false]));
     assert_eq!(free(&model), 1);
     model.springs.push(Spring { node: 22, anchor: Vector3::new(4.0, 2.0, 1.0), stiffness: 1.0 });
     assert_eq!(free(&model), 0);
@@ -222,10 +223,10 @@ fn a_body_that_nothing_holds_is_named_with_its_free_modes() {
 #[test]
 fn a_singular_stiffness_names_its_node() {
     let (points, cells) = strip();
-    let mut model = Model::new(points);
+    let mut model = Assembly::new("shell", points);
     let formulation = Formulation { membrane: Membrane::Cst { drilling: 0.0 }, ..Formulation::default() };
     model.add_shell(&Shell { formulation, ..Shell::new("skin", cells, 0.1, MATERIAL) }).unwrap();
-    model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
+    model.model_mut().constraints.push(fix(vec![0, 9, 18], [true; 6]));
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let error = solver.linear(&State::at_rest(&model), 1.0).unwrap_err();
     assert!(matches!(error, SolveError::Singular { component: "rotation about z", .. }), "{error}");
@@ -369,20 +370,19 @@ fn iterations_that_run_out_are_taken_if_told_so() {
     let step = BackwardEuler::new(model.clone(), settings).unwrap().advance(&mut state).unwrap();
     assert_eq!(step.linear.iterations, 4);
     assert!(step.linear.residual > 1e-9 && step.linear.residual < 1.0, "{:?}", step.linear);
-    assert_ne!(state.position, model.rest);
+    assert_ne!(state, State::at_rest(&model));
 }
 
 /// Moved supports: a rigid rotation of the clamped end carries the strip along without strain.
 #[test]
 fn a_turned_support_turns_the_whole_strip() {
     let mut model = model(strip(), 0.1);
-    let by = [0.0, 0.0, 0.0, 1.2, 0.0, 0.0];
     // Turned about the x axis through node 0.
-    model.constraints.push(Constraint {
+    model.model_mut().constraints.push(Constraint {
         name: "turned".into(),
         nodes: vec![0],
         components: [true; 6],
-        motion: Motion::Moved { by, curve: ramp() },
+        motion: Motion::turn([0.0; 3], [1.2, 0.0, 0.0], 1, ramp()),
     });
     let mut state = State::at_rest(&model);
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
@@ -390,7 +390,7 @@ fn a_turned_support_turns_the_whole_strip() {
         solver.solve(&mut state, f64::from(step) / 4.0).unwrap();
     }
     let turn = exponential(&Vector3::new(1.2, 0.0, 0.0));
-    for (x, rest) in state.position.iter().zip(&model.rest) {
+    for (x, rest) in state.position.iter().zip(model.places()) {
         assert!((x - turn * rest).norm() < 1e-6, "{x} {rest}");
     }
     assert!(state.shell_energy(&model).unwrap().bending < 1e-9);
@@ -414,7 +414,7 @@ fn a_balloon_takes_the_volume_it_is_told() {
     let missing = |cuts| {
         let model = balloon(cuts, 1.0);
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
-        let rest = model.enclosed_volume(&cells, &model.rest);
+        let rest = model.rest_volume(&cells);
         let mut state = State::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         solver.control(&mut state, Control::Volume { volume: rest * growth.powi(3) }).unwrap();
@@ -436,12 +436,12 @@ fn a_balloon_takes_the_volume_it_is_told() {
 fn a_balloon_doubles_its_volume() {
     let inflate = |membrane| {
         let mut model = balloon(3, 1.0);
-        let mut shell = Model::new(model.rest.clone());
+        let mut shell = Assembly::new("shell", model.places());
         let formulation = Formulation { membrane, ..Formulation::default() };
         shell.add_shell(&Shell { formulation, ..Shell::new("ball", ball(3).1, 0.02, MATERIAL) }).unwrap();
         model.facets = shell.facets;
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
-        let rest = model.enclosed_volume(&cells, &model.rest);
+        let rest = model.rest_volume(&cells);
         let mut state = State::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         for part in 1..=10 {
@@ -462,8 +462,8 @@ fn a_balloon_doubles_its_volume() {
 #[test]
 fn arc_length_and_displacement_control_agree() {
     let mut model = cantilever();
-    model.loads[0].controlled = true;
-    model.loads[0].curve = hold();
+    model.model_mut().loads[0].controlled = true;
+    model.model_mut().loads[0].curve = hold();
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&model);
     for _ in 0..4 {
@@ -488,8 +488,8 @@ fn arc_length_and_displacement_control_agree() {
 #[test]
 fn a_failed_load_step_keeps_what_was_found() {
     let mut model = cantilever();
-    let kind = LoadKind::Force { nodes: vec![26], force: Vector3::new(-3e6, 0.0, 1e3) };
-    model.loads.push(Load { name: "crush".into(), kind, curve: ramp(), controlled: false });
+    let kind = LoadKind::force(vec![26], Vector3::new(-3e6, 0.0, 1e3));
+    model.model_mut().loads.push(Load::new("crush", kind, ramp()));
     let settings = StaticSettings { halvings: 3, iterations: 8, ..StaticSettings::default() };
     let mut state = State::at_rest(&model);
     let mut solver = Statics::new(model.clone(), settings).unwrap();
@@ -543,7 +543,8 @@ fn the_curved_surface_is_watertight() {
 fn the_curved_surface_of_a_ball_is_round() {
     let model = {
         let mut model = model(ball(2), 0.01);
-        model.normals.iter_mut().for_each(|normal| normal.direction = model.rest[normal.node as usize]);
+        let places: Vec<_> = model.places().collect();
+        model.normals.iter_mut().for_each(|normal| normal.direction = places[normal.node as usize]);
         model
     };
     let surface = CurvedSurface::new(&model, EdgeRule::Arc);
@@ -556,7 +557,7 @@ fn the_curved_surface_of_a_ball_is_round() {
         |place: &Place| (surface.patch(&model, &state, place.facet).point(place.weights).norm() - 1.0).abs();
     let curved = picture.places.iter().map(off).fold(0.0, f64::max);
     let flat = model.facets.iter().map(|facet| {
-        let [a, b, c] = facet.nodes.map(|node| model.rest[node as usize]);
+        let [a, b, c] = facet.nodes.map(|node| model.place(node as usize));
         1.0 - ((a + b + c) / 3.0).norm()
     });
     let flat = flat.fold(0.0, f64::max);
@@ -573,7 +574,7 @@ fn a_visual_mesh_is_carried() {
     let points: Vec<Vector3<f64>> = ball(3).0.iter().map(|p| 1.02 * p).collect();
     let near = |point: &Vector3<f64>| {
         let distance = |facet: &u32| {
-            let nodes = model.facets[*facet as usize].nodes.map(|node| model.rest[node as usize]);
+            let nodes = model.facets[*facet as usize].nodes.map(|node| model.place(node as usize));
             ((nodes[0] + nodes[1] + nodes[2]) / 3.0 - point).norm()
         };
         (0..128_u32).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
@@ -628,12 +629,12 @@ pub(crate) fn bar(counts: [usize; 3], size: [f64; 3]) -> (Vec<Vector3<f64>>, Vec
 }
 
 /// Tets of the co-rotated linear law with the moduli of [`MATERIAL`].
-fn add_block(model: &mut Model, cells: &[[u32; 4]], density: f64) {
+fn add_block(model: &mut Assembly, cells: &[[u32; 4]], density: f64) {
     let Elasticity { young, poisson } = MATERIAL.elastic;
     let law = AnyLaw::Corotational(Corotational::from_young(young, poisson));
-    let rest: Vec<[f64; 3]> = model.rest.iter().map(|&x| x.into()).collect();
+    let rest: Vec<[f64; 3]> = model.places().map(Into::into).collect();
     let cells = Cells::tet4(cells.to_vec(), &rest);
-    model.add_solid("block", Solid::new(0, Elastic::elastic(law, density), cells)).unwrap();
+    model.add_solid("block", Solid::new(0, Material::elastic(law, density), cells)).unwrap();
 }
 
 /// A block pulled by a small stress lengthens by σ/E and thins by ν σ/E, exactly for linear tets; turned by a quarter with its supports it
@@ -641,29 +642,29 @@ fn add_block(model: &mut Model, cells: &[[u32; 4]], density: f64) {
 #[test]
 fn a_block_of_tets_is_stretched_as_by_hooke() {
     let (points, cells) = bar([3, 2, 2], [3.0, 2.0, 2.0]);
-    let mut model = Model::new(points);
+    let mut model = Assembly::new("shell", points);
     add_block(&mut model, &cells, MATERIAL.density);
     let on = |f: &dyn Fn(&Vector3<f64>) -> bool| {
-        (0..model.rest.len() as u32).filter(|&n| f(&model.rest[n as usize])).collect::<Vec<u32>>()
+        (0..model.rest.len() as u32).filter(|&n| f(&model.place(n as usize))).collect::<Vec<u32>>()
     };
     let (left, floor, back) = (on(&|x| x.x == 0.0), on(&|x| x.y == 0.0), on(&|x| x.z == 0.0));
     for (axis, nodes) in [left, floor, back].into_iter().enumerate() {
         let mut components = [false; 6];
         components[axis] = true;
-        model.constraints.push(fix(nodes, components));
+        model.model_mut().constraints.push(fix(nodes, components));
     }
     // Uniform traction on x = 3: a third of the area of each face triangle to its corners.
     let stress = 10.0;
     for tet in &cells {
-        let face: Vec<u32> = tet.iter().copied().filter(|&n| model.rest[n as usize].x == 3.0).collect();
+        let face: Vec<u32> = tet.iter().copied().filter(|&n| model.place(n as usize).x == 3.0).collect();
         if face.len() == 3 {
-            let kind = LoadKind::Force { nodes: face, force: Vector3::new(stress * 0.5 / 3.0, 0.0, 0.0) };
-            model.loads.push(Load { name: "traction".into(), kind, curve: hold(), controlled: false });
+            let kind = LoadKind::force(face, Vector3::new(stress * 0.5 / 3.0, 0.0, 0.0));
+            model.model_mut().loads.push(Load::new("traction", kind, hold()));
         }
     }
     let mut state = State::at_rest(&model);
     Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
-    for (x, rest) in state.position.iter().zip(&model.rest) {
+    for (x, rest) in state.position.iter().zip(model.places()) {
         let strain = stress / 1e6;
         let exact = Vector3::new(
             rest.x * (1.0 + strain),
@@ -685,18 +686,18 @@ fn shells_and_tets_move_together() {
         })
         .collect();
     let build = |skin: bool| {
-        let mut model = Model::new(points.clone());
+        let mut model = Assembly::new("shell", points.clone());
         add_block(&mut model, &cells, 10.0);
         if skin {
             model.add_shell(&Shell::new("skin", top.clone(), 0.2, MATERIAL)).unwrap();
         }
         let held = (0..points.len() as u32).filter(|&n| points[n as usize].x == 0.0).collect();
-        model.constraints.push(fix(held, [true; 6]));
-        let kind = LoadKind::Force { nodes: vec![8], force: Vector3::new(0.0, 0.0, -300.0) };
-        model.loads.push(Load { name: "pull".into(), kind, curve: hold(), controlled: false });
+        model.model_mut().constraints.push(fix(held, [true; 6]));
+        let kind = LoadKind::force(vec![8], Vector3::new(0.0, 0.0, -300.0));
+        model.model_mut().loads.push(Load::new("pull", kind, hold()));
         model
     };
-    let sag = |model: &Model| {
+    let sag = |model: &Assembly| {
         let mut state = State::at_rest(model);
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         state.position[8].z
@@ -718,14 +719,15 @@ fn shells_and_tets_move_together() {
 #[test]
 fn pressure_on_the_curved_surface_acts_on_its_area() {
     let mut model = balloon(2, 1.0);
-    model.normals.iter_mut().for_each(|normal| normal.direction = model.rest[normal.node as usize]);
-    let half = |model: &Model, spread| {
+    let places: Vec<_> = model.places().collect();
+    model.normals.iter_mut().for_each(|normal| normal.direction = places[normal.node as usize]);
+    let half = |model: &Assembly, spread| {
         let mut model = model.clone();
         let upper = (0..128).filter(|&cell: &u32| {
-            model.facets[cell as usize].nodes.iter().map(|&n| model.rest[n as usize].z).sum::<f64>() > 0.0
+            model.facets[cell as usize].nodes.iter().map(|&n| model.place(n as usize).z).sum::<f64>() > 0.0
         });
         let cells = upper.collect();
-        model.loads[0].kind = LoadKind::Pressure { cells, pressure: 1.0, spread };
+        model.model_mut().loads[0].kind = LoadKind::ShellPressure { facets: cells, pressure: 1.0, spread };
         let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
         system.evaluate(&State::at_rest(&model), 0.0, None).unwrap();
         (0..3).map(|c| system.controlled.iter().skip(c).step_by(6).sum()).collect::<Vec<f64>>()
@@ -764,17 +766,17 @@ fn icosphere() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
 }
 
 /// The balloon of 320 shells of the formulas' prototype, R/t = 50, which 500 Pa blow up by 10 %, with the sphere's own normals.
-fn sphere_of_320(formulation: Formulation, spread: Spread) -> Model {
+fn sphere_of_320(formulation: Formulation, spread: Spread) -> Assembly {
     let (points, cells) = icosphere();
     let normals = (0..).zip(points.iter().copied()).collect();
-    let mut model = Model::new(points);
-    let material = Material { elastic: Elasticity { young: 1e5, poisson: 0.3 }, density: 1000.0 };
+    let mut model = Assembly::new("shell", points);
+    let material = Wall { elastic: Elasticity { young: 1e5, poisson: 0.3 }, density: 1000.0 };
     model.add_shell(&Shell { formulation, normals, ..Shell::new("ball", cells, 0.02, material) }).unwrap();
     // Six components, without a force in equilibrium.
-    model.constraints.push(fix(vec![0], [true; 6]));
+    model.model_mut().constraints.push(fix(vec![0], [true; 6]));
     let cells = (0..model.facets.len() as u32).collect();
-    let kind = LoadKind::Pressure { cells, pressure: 500.0, spread };
-    model.loads.push(Load { name: "pressure".into(), kind, curve: ramp(), controlled: false });
+    let kind = LoadKind::ShellPressure { facets: cells, pressure: 500.0, spread };
+    model.model_mut().loads.push(Load::new("pressure", kind, ramp()));
     model
 }
 
@@ -849,7 +851,8 @@ fn conjugate_gradients_tell_why_they_stop() {
 fn a_balloon_must_be_closed() {
     let mut model = balloon(2, 1.0);
     let cells = (1..128).collect();
-    model.loads[0].kind = LoadKind::Pressure { cells, pressure: 1.0, spread: Spread::Lumped };
+    model.model_mut().loads[0].kind =
+        LoadKind::ShellPressure { facets: cells, pressure: 1.0, spread: Spread::Lumped };
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&model);
     let error = solver.control(&mut state, Control::Volume { volume: 5.0 }).unwrap_err();
@@ -892,7 +895,7 @@ fn hencky_slack_membrane_under_pressure() {
 }
 
 /// A disc of radius 1 m that resists in its plane only, under a pressure of 1e-3 E t/a; and its middle node.
-fn round_membrane(cells: u32) -> (Model, usize) {
+fn round_membrane(cells: u32) -> (Assembly, usize) {
     let row = cells + 1;
     let at = |i: u32| 2.0 * f64::from(i) / f64::from(cells) - 1.0;
     let points = (0..row * row).map(|n| {
@@ -905,21 +908,20 @@ fn round_membrane(cells: u32) -> (Model, usize) {
         // Diagonals towards the middle, so that no triangle has three corners on the rim.
         if (2 * i < cells) == (2 * j < cells) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
     });
-    let mut model = Model::new(points.collect());
+    let mut model = Assembly::new("shell", points);
     let mut shell = Shell::new("membrane", triangles.collect(), 0.01, MATERIAL);
     shell.formulation =
         Formulation { membrane: Membrane::Cst { drilling: 0.01 }, bending: crate::element::Bending::None };
     model.add_shell(&shell).unwrap();
     let rim = |n: &u32| [n % row, n / row].iter().any(|&i| i == 0 || i == cells);
-    model.constraints.push(fix((0..row * row).filter(rim).collect(), [true; 6]));
-    model.constraints.push(fix((0..row * row).collect(), [false, false, false, true, true, true]));
+    model.model_mut().constraints.push(fix((0..row * row).filter(rim).collect(), [true; 6]));
     let pressure = 1e-3 * MATERIAL.elastic.young * 0.01;
-    let kind = LoadKind::Pressure {
-        cells: (0..model.facets.len() as u32).collect(),
+    let kind = LoadKind::ShellPressure {
+        facets: (0..model.facets.len() as u32).collect(),
         pressure,
         spread: Spread::Lumped,
     };
-    model.loads.push(Load { name: "pressure".into(), kind, curve: ramp(), controlled: false });
+    model.model_mut().loads.push(Load::new("pressure", kind, ramp()));
     (model, (row * row / 2) as usize)
 }
 
@@ -938,17 +940,16 @@ fn a_taut_membrane_rises_as_by_poisson() {
     });
     let triangles: Vec<[u32; 3]> = triangles.collect();
     for membrane in [Membrane::Cst { drilling: 0.01 }, Membrane::default()] {
-        let mut model = Model::new(points.clone());
+        let mut model = Assembly::new("shell", points.clone());
         let mut shell = Shell::new("sheet", triangles.clone(), 1e-3, MATERIAL);
         shell.formulation = Formulation { membrane, bending: crate::element::Bending::None };
         shell.tension = tension;
         model.add_shell(&shell).unwrap();
         let rim = |n: &u32| [n % row, n / row].iter().any(|&i| i == 0 || i == cells);
-        model.constraints.push(fix((0..row * row).filter(rim).collect(), [true; 6]));
-        model.constraints.push(fix((0..row * row).collect(), [false, false, false, true, true, true]));
+        model.model_mut().constraints.push(fix((0..row * row).filter(rim).collect(), [true; 6]));
         let all = (0..model.facets.len() as u32).collect();
-        let kind = LoadKind::Pressure { cells: all, pressure, spread: Spread::Lumped };
-        model.loads.push(Load { name: "pressure".into(), kind, curve: ramp(), controlled: false });
+        let kind = LoadKind::ShellPressure { facets: all, pressure, spread: Spread::Lumped };
+        model.model_mut().loads.push(Load::new("pressure", kind, ramp()));
         let mut state = State::at_rest(&model);
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         let ratio = state.position[(row * row / 2) as usize].z / (0.073671 * pressure / tension);
@@ -966,14 +967,13 @@ fn a_twisted_strip_is_one_of_kirchhoff() {
     let width = 2.0;
     let ratios = [0.01, 0.2].map(|thickness| {
         let mut model = model(strip(), thickness);
-        model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
+        model.model_mut().constraints.push(fix(vec![0, 9, 18], [true; 6]));
         let angle = 1e-4;
         for node in [8_u32, 17, 26] {
-            let lift = angle * (model.rest[node as usize].y - 1.0);
-            let by = [0.0, 0.0, lift, angle, 0.0, 0.0];
-            let motion = Motion::Moved { by, curve: ramp() };
+            let lift = angle * (model.place(node as usize).y - 1.0);
+            let motion = Motion::turn([0.0, 0.0, lift], [angle, 0.0, 0.0], 1, ramp());
             let components = [false, false, true, true, false, false];
-            model.constraints.push(Constraint {
+            model.model_mut().constraints.push(Constraint {
                 name: "turned".into(),
                 nodes: vec![node],
                 components,
@@ -985,7 +985,7 @@ fn a_twisted_strip_is_one_of_kirchhoff() {
         solver.solve(&mut state, 1.0).unwrap();
         let reactions: Vec<[f64; 6]> = solver.reactions().collect();
         let torque: f64 =
-            [8, 17, 26].iter().map(|&n| reactions[n][3] + (model.rest[n].y - 1.0) * reactions[n][2]).sum();
+            [8, 17, 26].iter().map(|&n| reactions[n][3] + (model.place(n).y - 1.0) * reactions[n][2]).sum();
         let shear = MATERIAL.elastic.young / 2.6;
         let ratio = torque * 8.0 / angle / (shear * width * thickness.powi(3) / 3.0);
         println!("t/b = {}: torque over Kirchhoff's {ratio:.4}", thickness / width);
@@ -1010,8 +1010,8 @@ fn layered(
     (points, cells): (Vec<Vector3<f64>>, Vec<[u32; 3]>),
     layers: &[Layer],
     membrane: Membrane,
-) -> Model {
-    let mut model = Model::new(points);
+) -> Assembly {
+    let mut model = Assembly::new("shell", points);
     let mut shell = Shell::new("wall", cells, 1.0, MATERIAL);
     shell.layers = layers.to_vec();
     shell.direction = vec![Vector3::new(1.0, 0.0, 0.3)];
@@ -1026,11 +1026,11 @@ fn layered(
 fn timoshenko_two_layer_strip_stretches_as_it_bends() {
     let membrane = Membrane::Cst { drilling: 0.01 };
     let mut model = layered(strip(), &two_layers(), membrane);
-    model.constraints.push(fix(vec![0, 9, 18], [true; 6]));
+    model.model_mut().constraints.push(fix(vec![0, 9, 18], [true; 6]));
     let moment = 1e-4;
     for (nodes, part) in [(vec![8, 26], 0.25), (vec![17], 0.5)] {
-        let kind = LoadKind::Moment { nodes, moment: Vector3::new(0.0, -moment * part, 0.0) };
-        model.loads.push(Load { name: "moment".into(), kind, curve: ramp(), controlled: false });
+        let kind = LoadKind::moment(nodes, [0.0, -moment * part, 0.0]);
+        model.model_mut().loads.push(Load::new("moment", kind, ramp()));
     }
     // Heights of the layers' middles and of the neutral axis above the middle surface; width 2, length 8.
     let neutral: f64 = 0.025 * (4.0 - 1.0) / (4.0 + 1.0);
@@ -1092,7 +1092,7 @@ fn layers_pass_the_patch_test() {
     for membrane in [Membrane::default(), Membrane::Cst { drilling: 0.01 }] {
         let model = layered((points.clone(), cells.clone()), &layers, membrane);
         let mut state = State::at_rest(&model);
-        for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(&model.rest) {
+        for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(model.places()) {
             let (a, b) = (rest.x, rest.y);
             let [kx, ky, kxy] = curvature.into();
             x.x += strain.x * a + 0.5 * strain.z * b;
@@ -1141,6 +1141,7 @@ fn navier_orthotropic_plate() {
     let mut model = layered((points.collect(), triangles.collect()), &layers, Membrane::default());
     let rim = |n: &u32| [n % row, n / row].iter().any(|&i| i == 0 || i == cells);
     model
+        .model_mut()
         .constraints
         .push(fix((0..row * row).filter(rim).collect(), [true, true, true, false, false, false]));
     let pressure = 1e-3;
@@ -1148,8 +1149,8 @@ fn navier_orthotropic_plate() {
         let [x, y] =
             [node % row, node / row].map(|i| (std::f64::consts::PI * f64::from(i) / f64::from(cells)).sin());
         let force = Vector3::new(0.0, 0.0, pressure * x * y * a * b / f64::from(cells * cells));
-        let kind = LoadKind::Force { nodes: vec![node], force };
-        model.loads.push(Load { name: "pressure".into(), kind, curve: ramp(), controlled: false });
+        let kind = LoadKind::force([node], force);
+        model.model_mut().loads.push(Load::new("pressure", kind, ramp()));
     }
     let mut state = State::at_rest(&model);
     Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();

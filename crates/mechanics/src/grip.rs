@@ -3,9 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Real;
+use crate::mapping::{Configuration, Mapping, weighted};
 use crate::model::Model;
-use crate::tensor::{Vector, add, cast, scale, sub};
+use crate::tensor::{Vector, add, scale, sub};
 
 /// A spring between a point of a body and a place.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -22,31 +22,47 @@ pub struct Grip {
 pub const ROOM: f64 = 0.15;
 
 impl Grip {
-    /// Where the point is [m].
-    pub fn point<R: Real>(&self, model: &Model, displacement: &[Vector<R>]) -> Vector<f64> {
-        self.nodes.iter().fold([0.0; 3], |sum, &(node, weight)| {
-            let place = add(model.rest[node as usize], cast(displacement[node as usize]));
-            add(sum, scale(place, weight))
-        })
+    /// Nodes and weights of its point.
+    fn weights(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.nodes.iter().copied()
     }
 
     /// The force on the body [N].
-    pub fn force<R: Real>(&self, model: &Model, displacement: &[Vector<R>]) -> Vector<f64> {
-        scale(sub(self.place, self.point(model, displacement)), self.stiffness)
+    pub fn force(&self, state: &impl Configuration) -> Vector<f64> {
+        scale(sub(self.place, self.position(state, 0)), self.stiffness)
     }
 
     /// The stiffness [N/m] up to which such a spring leaves explicit steps [s] of 0.9 of the critical time step stable. It adds at most
     /// k Σ wᵢ²/mᵢ to the squares of the angular frequencies (Weyl), whose limit is 4/Δt² and of which 0.81 are taken.
     pub fn stiffest(&self, model: &Model, step: f64) -> f64 {
-        let mobility: f64 = self.nodes.iter().map(|&(node, w)| w * w / model.inertia(node as usize)).sum();
+        let mobility: f64 = self.weights().map(|(node, w)| w * w / model.inertia(node as usize)).sum();
         ROOM * 4.0 / (step * step * mobility)
     }
 
     /// Adds its forces on the nodes [N].
-    pub fn add_forces<R: Real>(&self, model: &Model, displacement: &[Vector<R>], to: &mut [Vector<f64>]) {
-        let force = self.force(model, displacement);
-        for &(node, weight) in &self.nodes {
-            to[node as usize] = add(to[node as usize], scale(force, weight));
-        }
+    pub fn add_forces(&self, state: &impl Configuration, to: &mut [Vector<f64>]) {
+        self.add_force(state, 0, self.force(state), &mut |node, force, _| {
+            to[node as usize] = add(to[node as usize], force);
+        });
+    }
+}
+
+impl<S: Configuration> Mapping<S> for Grip {
+    fn position(&self, state: &S, _: usize) -> Vector<f64> {
+        weighted(self.weights(), |node| state.position(node))
+    }
+
+    fn velocity(&self, state: &S, _: usize) -> Vector<f64> {
+        weighted(self.weights(), |node| state.velocity(node))
+    }
+
+    fn add_force(
+        &self,
+        _: &S,
+        _: usize,
+        force: Vector<f64>,
+        add: &mut dyn FnMut(u32, Vector<f64>, Vector<f64>),
+    ) {
+        self.weights().for_each(|(node, weight)| add(node, scale(force, weight), [0.0; 3]));
     }
 }

@@ -1,7 +1,7 @@
-//! Loads: nodal forces, tractions per reference area, pressure that follows the deformed surface, gravity.
+//! Loads: nodal forces and moments, tractions per reference area, pressure that follows the deformed surface, gravity.
 
 use crate::curve::{Curve, Shape};
-use crate::mapping::Mapping;
+use crate::mapping::{Configuration, Mapping, Weights};
 use crate::tensor::{Vector, add, cross, scale, sub};
 
 /// A face of three or four nodes, outward order.
@@ -21,6 +21,8 @@ pub struct Load {
     pub curve: Curve,
     /// The carried surface the node numbers refer to; `None`: the model's own nodes.
     pub surface: Option<usize>,
+    /// Whether a static solver finds its size, as a control asks.
+    pub controlled: bool,
 }
 
 /// What a load does.
@@ -28,6 +30,17 @@ pub struct Load {
 pub enum LoadKind {
     /// A dead force [N] on each of some nodes (nodal forces and tractions become this).
     Forces(Vec<(u32, Vector<f64>)>),
+    /// A moment [N m] on each of some nodes that have rotations, with axes that stay in space.
+    Moments(Vec<(u32, Vector<f64>)>),
+    /// Pressure [Pa] on shells, along the normal of each deformed facet.
+    ShellPressure {
+        /// Facets, numbered in the model.
+        facets: Vec<u32>,
+        /// Pressure [Pa], positive along the normal.
+        pressure: f64,
+        /// How it comes to the nodes.
+        spread: Spread,
+    },
     /// Pressure [Pa] on faces, pushing against the outward normal of the deformed face.
     Pressure {
         /// The faces.
@@ -44,30 +57,73 @@ pub enum LoadKind {
     },
 }
 
+/// How a pressure on a shell comes to its nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Spread {
+    /// A third of p A n of the flat facet to each corner: for flat membranes.
+    Lumped,
+    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments: for curved membranes.
+    #[default]
+    Curved,
+}
+
+impl LoadKind {
+    /// The same force [N] on each of some nodes.
+    pub fn force(nodes: impl IntoIterator<Item = u32>, force: impl Into<Vector<f64>>) -> Self {
+        let force = force.into();
+        Self::Forces(nodes.into_iter().map(|node| (node, force)).collect())
+    }
+
+    /// The same moment [N m] on each of some nodes.
+    pub fn moment(nodes: impl IntoIterator<Item = u32>, moment: impl Into<Vector<f64>>) -> Self {
+        let moment = moment.into();
+        Self::Moments(nodes.into_iter().map(|node| (node, moment)).collect())
+    }
+}
+
 impl Load {
+    /// A load on the model's own nodes or faces.
+    pub fn new(name: &str, kind: LoadKind, curve: Curve) -> Self {
+        Self { name: name.into(), kind, curve, surface: None, controlled: false }
+    }
+
+    /// Whether only shells take it.
+    pub fn is_for_shells(&self) -> bool {
+        matches!(self.kind, LoadKind::Moments(_) | LoadKind::ShellPressure { .. })
+    }
+
     /// The weight of a body under a constant acceleration [m/s²].
     pub fn gravity(body: usize, acceleration: Vector<f64>) -> Self {
         let kind = LoadKind::Gravity { body, acceleration };
         let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
-        Self { name: "gravity".into(), kind, curve, surface: None }
+        Self::new("gravity", kind, curve)
     }
 
-    /// Adds the nodal forces [N] at a time. `position` gives the current place of a (carried or own) node; gravity is
-    /// not added here: it acts through the masses.
-    pub fn add_forces(
+    /// Adds the nodal forces [N] at a time. `points` are those of the surface that it acts on. Gravity is not added here, since it acts
+    /// through the masses; nor are loads of shells, which `pliant-implicit` applies.
+    pub fn add_forces<S: Configuration>(
         &self,
         time: f64,
-        mapping: Option<&Mapping>,
-        position: impl Fn(u32) -> Vector<f64>,
+        points: Option<&Weights>,
+        state: &S,
         forces: &mut [Vector<f64>],
     ) {
         let factor = self.curve.value(time);
         if factor == 0.0 {
             return;
         }
-        let mut apply = |node: u32, force: Vector<f64>| match mapping {
-            Some(mapping) => mapping.apply_transpose_row(node as usize, force, forces),
-            None => forces[node as usize] = add(forces[node as usize], force),
+        let position = |node: u32| match points {
+            Some(points) => points.position(state, node as usize),
+            None => state.position(node),
+        };
+        let mut to_node = |node: u32, force: Vector<f64>| {
+            forces[node as usize] = add(forces[node as usize], force);
+        };
+        let mut apply = |node: u32, force: Vector<f64>| match points {
+            Some(points) => {
+                points.add_force(state, node as usize, force, &mut |node, force, _| to_node(node, force));
+            }
+            None => to_node(node, force),
         };
         match &self.kind {
             LoadKind::Forces(list) => {
@@ -77,12 +133,12 @@ impl Load {
             }
             LoadKind::Pressure { faces, pressure } => {
                 for face in faces {
-                    for (node, area) in face_areas(face, &position) {
+                    for (node, area) in face_areas(face, position) {
                         apply(node, scale(area, -factor * pressure));
                     }
                 }
             }
-            LoadKind::Gravity { .. } => {}
+            LoadKind::Gravity { .. } | LoadKind::Moments(_) | LoadKind::ShellPressure { .. } => {}
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::curve::Curve;
 use crate::element::{GaussPoints, HEX_EDGES, Hex8, Rest, gauss_points, hex8, tet4};
 use crate::law::AnyLaw;
 use crate::load::Load;
-use crate::mapping::Mapping;
+use crate::mapping::Weights;
 use crate::order::order;
 use crate::prony::Prony;
 use crate::tensor::{Vector, add, cross, dot, scale, sub};
@@ -460,8 +460,8 @@ pub struct Constraint {
     pub name: String,
     /// The nodes.
     pub nodes: Vec<u32>,
-    /// Which components (x, y, z) it prescribes.
-    pub components: [bool; 3],
+    /// Which of x, y and z it prescribes, and which of the rotations about them, where nodes have some.
+    pub components: [bool; 6],
     /// Where they go.
     pub motion: Motion,
 }
@@ -485,6 +485,17 @@ pub enum Motion {
     Displacement(Vector<f64>, Curve),
     /// Displacements [m], one per node of the constraint in their order, × curve.
     Displacements(Vec<Vector<f64>>, Curve),
+    /// Displacements [m], one per node, with a rotation vector [rad] that turns each node about its own place, × curve. With all three
+    /// rotations prescribed a node turns by exp(curve · vector) exactly, about any axis by any angle; with fewer, those components of
+    /// its spin are. Constraints with courses of their own on the same node about different axes do not commute.
+    Turn {
+        /// The displacements [m].
+        by: Vec<Vector<f64>>,
+        /// The rotation vector [rad].
+        turn: Vector<f64>,
+        /// Their course.
+        curve: Curve,
+    },
     /// Velocity [m/s] × curve; the displacement is its integral.
     Velocity(Vector<f64>, Curve),
     /// Rotation about an axis by an angle × curve, each node on its circle; see [`Motion::rotation`].
@@ -516,13 +527,18 @@ impl Motion {
         Self::Rotation { arms: rest.map(arm).collect(), angle, curve }
     }
 
+    /// A displacement [m] and a rotation vector [rad] of each of so many nodes, × curve.
+    pub fn turn(by: Vector<f64>, turn: Vector<f64>, nodes: usize, curve: Curve) -> Self {
+        Self::Turn { by: vec![by; nodes], turn, curve }
+    }
+
     /// What the factors multiply: the displacement [m], the velocity [m/s] or the arms [m] of the constraint's node at `index`.
     pub fn amplitudes(&self, index: usize) -> Amplitudes {
         let one = |amplitude| [amplitude, [0.0; 3]];
         match self {
             Self::Fixed => one([0.0; 3]),
             Self::Displacement(by, _) => one(*by),
-            Self::Displacements(by, _) => one(by[index]),
+            Self::Displacements(by, _) | Self::Turn { by, .. } => one(by[index]),
             Self::Velocity(velocity, _) => one(*velocity),
             Self::Rotation { arms, .. } => arms[index],
         }
@@ -537,7 +553,9 @@ impl Motion {
     fn factors_of_part(&self, time: f64, part: f64) -> [f64; 2] {
         match self {
             Self::Fixed => [0.0; 2],
-            Self::Displacement(_, curve) | Self::Displacements(_, curve) => [part * curve.value(time), 0.0],
+            Self::Displacement(_, curve) | Self::Displacements(_, curve) | Self::Turn { curve, .. } => {
+                [part * curve.value(time), 0.0]
+            }
             Self::Velocity(_, curve) => [part * curve.integral(time), 0.0],
             Self::Rotation { angle, curve, .. } => {
                 let angle = part * angle * curve.value(time);
@@ -553,13 +571,45 @@ impl Motion {
         [0, 1, 2].map(|c| placed(component(&amplitudes, c), factors))
     }
 
+    /// How far the constraint's node at `index` goes between two times [s]: its displacement [m] and its rotation vector [rad].
+    pub fn increment(&self, index: usize, from: f64, to: f64) -> [f64; 6] {
+        let shift = match self {
+            Self::Fixed => [0.0; 3],
+            // The difference of the factors first: it is exact to more digits than that of places.
+            Self::Displacement(_, curve) | Self::Displacements(_, curve) | Self::Turn { curve, .. } => {
+                scale(self.amplitudes(index)[0], curve.value(to) - curve.value(from))
+            }
+            Self::Velocity(..) | Self::Rotation { .. } => {
+                sub(self.displacement(index, to, 1.0), self.displacement(index, from, 1.0))
+            }
+        };
+        let spin = match self {
+            Self::Turn { turn, curve, .. } => scale(*turn, curve.value(to) - curve.value(from)),
+            _ => [0.0; 3],
+        };
+        [shift[0], shift[1], shift[2], spin[0], spin[1], spin[2]]
+    }
+
     /// Whether two motions of the same amplitudes are the same at all times.
     fn follows(&self, other: &Self) -> bool {
         let course = |motion: &Self| match motion {
             Self::Fixed => None,
-            Self::Displacement(_, curve) | Self::Displacements(_, curve) => Some((0, 0.0, curve.clone())),
+            Self::Displacement(_, curve) | Self::Displacements(_, curve) | Self::Turn { curve, .. } => {
+                Some((0, 0.0, curve.clone()))
+            }
             Self::Velocity(_, curve) => Some((1, 0.0, curve.clone())),
             Self::Rotation { angle, curve, .. } => Some((2, *angle, curve.clone())),
+        };
+        course(self) == course(other)
+    }
+}
+
+impl Motion {
+    /// Whether two motions turn nodes in the same way at all times.
+    fn turns_as(&self, other: &Self) -> bool {
+        let course = |motion: &Self| match motion {
+            Self::Turn { turn, curve, .. } if *turn != [0.0; 3] => Some((*turn, curve.clone())),
+            _ => None,
         };
         course(self) == course(other)
     }
@@ -587,12 +637,12 @@ pub struct Surface {
     /// Rest positions [m] of its points.
     pub rest: Vec<Vector<f64>>,
     /// How it follows the body's nodes (numbered in the model).
-    pub mapping: Mapping,
+    pub mapping: Weights,
 }
 
 /// Two constraints that ask for different things of one node.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("`{first}` and `{second}` both prescribe {} of node {node} of `{body}`, and differently", ["x", "y", "z"][*component])]
+#[error("`{first}` and `{second}` both prescribe {} of node {node} of `{body}`, and differently", COMPONENTS[*component])]
 pub struct Contradiction {
     /// The first constraint.
     pub first: String,
@@ -602,9 +652,13 @@ pub struct Contradiction {
     pub body: String,
     /// The node, numbered in its body.
     pub node: u32,
-    /// 0, 1 or 2 for x, y, z.
+    /// 0 to 5 for x, y, z and the rotations about them.
     pub component: usize,
 }
+
+/// Components of nodes in words.
+const COMPONENTS: [&str; 6] =
+    ["x", "y", "z", "the rotation about x", "the rotation about y", "the rotation about z"];
 
 /// No constraint on a component of a node.
 pub const FREE: u32 = u32::MAX;
@@ -642,7 +696,7 @@ impl Model {
 
     /// Prescribes the motion of nodes along all axes; the number of the constraint.
     pub fn constrain(&mut self, name: &str, nodes: Vec<u32>, motion: Motion) -> usize {
-        self.constraints.push(Constraint { name: name.into(), nodes, components: [true; 3], motion });
+        self.constraints.push(Constraint { name: name.into(), nodes, components: [true; 6], motion });
         self.constraints.len() - 1
     }
 
@@ -701,19 +755,41 @@ impl Model {
                     let first = &self.constraints[*owner as usize];
                     let still = *known == [0.0; 2];
                     if *known != own || !(still || first.motion.follows(&constraint.motion)) {
-                        let (body, local) = self.locate_node(node);
-                        return Err(Contradiction {
-                            first: first.name.clone(),
-                            second: constraint.name.clone(),
-                            body: self.bodies[body].name.clone(),
-                            node: local,
-                            component,
-                        });
+                        return Err(self.contradiction([*owner, index as u32], node, component));
                     }
                 }
             }
         }
+        self.check_rotations()?;
         Ok(owners)
+    }
+
+    /// Whether no two constraints turn a node differently.
+    fn check_rotations(&self) -> Result<(), Contradiction> {
+        let turned = |constraint: &Constraint| constraint.components[3..].contains(&true);
+        if !self.constraints.iter().any(|own| turned(own) && matches!(own.motion, Motion::Turn { .. })) {
+            return Ok(());
+        }
+        let mut owners = vec![[FREE; 3]; self.node_count()];
+        for (index, constraint) in self.constraints.iter().enumerate().filter(|(_, own)| turned(own)) {
+            for &node in &constraint.nodes {
+                for c in (0..3).filter(|&c| constraint.components[3 + c]) {
+                    let owner = &mut owners[node as usize][c];
+                    if *owner == FREE {
+                        *owner = index as u32;
+                    } else if !self.constraints[*owner as usize].motion.turns_as(&constraint.motion) {
+                        return Err(self.contradiction([*owner, index as u32], node, 3 + c));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn contradiction(&self, constraints: [u32; 2], node: u32, component: usize) -> Contradiction {
+        let [first, second] = constraints.map(|index| self.constraints[index as usize].name.clone());
+        let (body, node) = self.locate_node(node);
+        Contradiction { first, second, body: self.bodies[body].name.clone(), node, component }
     }
 
     /// The amplitudes of the motion of each component that has an owner (see [`Motion::amplitudes`]); 0 for the others.

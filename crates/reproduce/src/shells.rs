@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use pliant_geometry::{Mesh, Vector3};
 use pliant_implicit::element::{Bending, Elasticity, Formulation, Membrane};
-use pliant_implicit::{
-    Constraint, Load, LoadKind, Material, Model, Motion, Shell, State, StaticSettings, Statics,
-};
+use pliant_implicit::{Assembly, Shell, State, StaticSettings, Statics, Wall};
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::load::{Load, LoadKind};
+use pliant_mechanics::model::{Constraint, Motion};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 
 use crate::CaseError;
@@ -30,7 +30,7 @@ pub struct Specimen {
     /// Its mesh, for names and places of nodes.
     pub mesh: Mesh,
     /// Its model.
-    pub model: Model,
+    pub model: Assembly,
 }
 
 /// Held on a plane of symmetry with this normal (0, 1, 2): the displacement along it and the spins about the others.
@@ -77,8 +77,8 @@ impl Specimen {
         thickness: f64,
         formulation: Formulation,
     ) -> Result<Self, CaseError> {
-        let material = Material { elastic: Elasticity { young, poisson }, density: 1000.0 };
-        let mut model = Model::new(mesh.points.clone());
+        let material = Wall { elastic: Elasticity { young, poisson }, density: 1000.0 };
+        let mut model = Assembly::new("shell", mesh.points.clone());
         model.add_shell(&Shell {
             formulation,
             normals: normals(&mesh),
@@ -107,7 +107,12 @@ impl Specimen {
     #[must_use]
     pub fn hold(mut self, nodes: Vec<u32>, components: [bool; 6]) -> Self {
         let name = format!("constraint {}", self.model.constraints.len());
-        self.model.constraints.push(Constraint { name, nodes, components, motion: Motion::Fixed });
+        self.model.model_mut().constraints.push(Constraint {
+            name,
+            nodes,
+            components,
+            motion: Motion::Fixed,
+        });
         self
     }
 
@@ -122,14 +127,14 @@ impl Specimen {
     #[must_use]
     pub fn load(mut self, kind: LoadKind) -> Self {
         let name = format!("load {}", self.model.loads.len());
-        self.model.loads.push(Load { name, kind, curve: ramp(), controlled: false });
+        self.model.model_mut().loads.push(Load::new(&name, kind, ramp()));
         self
     }
 
     /// A force on one node.
     #[must_use]
     pub fn pull(self, node: u32, force: [f64; 3]) -> Self {
-        self.load(LoadKind::Force { nodes: vec![node], force: force.into() })
+        self.load(LoadKind::force(vec![node], force))
     }
 
     /// A force along an edge, evenly per length.
@@ -141,14 +146,16 @@ impl Specimen {
             .iter()
             .map(|[a, b]| (self.mesh.points[*a as usize] - self.mesh.points[*b as usize]).norm())
             .sum();
-        self.load(LoadKind::Edge { edges, traction: Vector3::from(total) / length })
+        let kind = self.model.edge_load(&edges, Vector3::from(total) / length);
+        self.load(kind)
     }
 
     /// A force per area everywhere.
     #[must_use]
     pub fn cover(self, traction: [f64; 3]) -> Self {
-        let cells = (0..self.model.facets.len() as u32).collect();
-        self.load(LoadKind::Area { cells, traction: traction.into() })
+        let facets: Vec<u32> = (0..self.model.facets.len() as u32).collect();
+        let kind = self.model.area_load(&facets, traction.into());
+        self.load(kind)
     }
 
     /// Displacement and rotation of a node by linear theory at full load.

@@ -111,11 +111,13 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
             "xyz".chars().zip(constraint.components).filter(|(_, on)| *on).map(|(c, _)| c).collect();
         let what = match constraint.motion {
             Motion::Fixed => "fixes",
-            Motion::Displacement(..) | Motion::Displacements(..) | Motion::Velocity(..) => "moves",
+            Motion::Displacement(..)
+            | Motion::Displacements(..)
+            | Motion::Turn { .. }
+            | Motion::Velocity(..) => "moves",
             Motion::Rotation { .. } => "rotates",
         };
-        let own = built.implicit.iter().flat_map(|part| &part.model.constraints);
-        let turns = own.filter(|own| own.name == constraint.name).flat_map(|own| &own.components[3..]);
+        let turns = &constraint.components[3..];
         let rotations: Vec<&str> =
             ["rx", "ry", "rz"].into_iter().zip(turns).filter(|(_, on)| **on).map(|(axis, _)| axis).collect();
         let axes = [axes, rotations.join(" ")].join(" ").trim().to_owned();
@@ -124,9 +126,6 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
     }
     for load in &built.model.loads {
         writeln!(page, "load `{}`: {}", load.name, describe_load(built, load))?;
-    }
-    for load in built.implicit.iter().flat_map(|part| &part.model.loads) {
-        writeln!(page, "load `{}`: {}", load.name, describe_implicit_load(&load.kind))?;
     }
     if let Some(springs) = built.implicit.as_ref().map(|part| part.model.springs.len()).filter(|&n| n > 0) {
         writeln!(page, "{} to points", counted(springs, "spring"))?;
@@ -157,7 +156,15 @@ fn describe_load(built: &Built, load: &Load) -> String {
             let mut nodes: Vec<u32> = forces.iter().map(|&(node, _)| node).collect();
             nodes.sort_unstable();
             nodes.dedup();
-            format!("{} N in all on {}", vector(sum), counted(nodes.len(), "node"))
+            let what = if load.surface.is_some() { "carried point" } else { "node" };
+            format!("{} N in all on {}", vector(sum), counted(nodes.len(), what))
+        }
+        LoadKind::Moments(moments) => {
+            let sum = moments.iter().fold([0.0; 3], |sum, (_, m)| [0, 1, 2].map(|c| sum[c] + m[c]));
+            format!("{} N m in all on {}", vector(sum), counted(moments.len(), "node"))
+        }
+        LoadKind::ShellPressure { facets, pressure, .. } => {
+            format!("{} Pa on {}", number(*pressure), counted(facets.len(), "triangle"))
         }
         LoadKind::Pressure { faces, pressure } => {
             format!("{} Pa on {}", number(*pressure), counted(faces.len(), "face"))
@@ -188,37 +195,6 @@ fn write_implicit(page: &mut String, part: &ImplicitBodies, name: &str, built: &
             writeln!(page, "  smallest altitude {} m", number(least(Facet::altitude)))
         }
         BodyCells::Solids => Ok(()),
-    }
-}
-
-/// What a load does at its full size.
-fn describe_implicit_load(kind: &pliant_implicit::LoadKind) -> String {
-    use pliant_implicit::LoadKind;
-    let vector = |v: &nalgebra::Vector3<f64>| format!("({})", [v.x, v.y, v.z].map(number).join(", "));
-    match kind {
-        LoadKind::Force { nodes, force } => {
-            format!("{} N on each of {}", vector(force), counted(nodes.len(), "node"))
-        }
-        LoadKind::Moment { nodes, moment } => {
-            format!("{} N m on each of {}", vector(moment), counted(nodes.len(), "node"))
-        }
-        LoadKind::Gravity { acceleration } => format!("{} m/s² on everything", vector(acceleration)),
-        LoadKind::Area { cells, traction } => {
-            format!("{} Pa on {}", vector(traction), counted(cells.len(), "triangle"))
-        }
-        LoadKind::Edge { edges, traction } => {
-            format!("{} N/m along {}", vector(traction), counted(edges.len(), "edge"))
-        }
-        LoadKind::Pressure { cells, pressure, .. } => {
-            format!("{} Pa on {}", number(*pressure), counted(cells.len(), "triangle"))
-        }
-        LoadKind::FacePressure { faces, pressure } => {
-            format!("{} Pa on {}", number(*pressure), counted(faces.len(), "face"))
-        }
-        LoadKind::Carried { forces, .. } => {
-            let sum = forces.iter().sum::<nalgebra::Vector3<f64>>();
-            format!("{} N in all on {}", vector(&sum), counted(forces.len(), "carried point"))
-        }
     }
 }
 

@@ -1,17 +1,16 @@
 //! Shells, and solids whose equations are solved, beside the model of all solvers.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use pliant_implicit::{Carried, CurvedSurface, Model, Motion, State};
-use pliant_mechanics::{fingerprint, model};
+use pliant_implicit::{Assembly, CurvedSurface, State};
+use pliant_mechanics::fingerprint;
 
-/// Bodies of the implicit solvers. They share the nodes of [`Part::model`](crate::Part::model), which keeps names, and fields of solids.
+/// Bodies of the implicit solvers, on the nodes of [`Part::model`](crate::Part::model).
 #[derive(Clone, Debug)]
 pub struct ImplicitBodies {
-    /// Their model.
-    pub model: Arc<Model>,
+    /// Their shells, with the model of their nodes.
+    pub model: Arc<Assembly>,
     /// The cells of each body, in the order of the bodies.
     pub cells: Vec<BodyCells>,
     /// What a static run prescribes instead of the size of a load.
@@ -20,8 +19,6 @@ pub struct ImplicitBodies {
     pub start: State,
     /// The curved surface of the shells, if something is carried by it.
     pub surface: Option<CurvedSurface>,
-    /// The points of each surface of the model that a shell carries.
-    pub carried: BTreeMap<usize, Vec<Carried>>,
 }
 
 /// The cells of a body, in the order of its mesh.
@@ -73,49 +70,14 @@ pub struct Stop {
 }
 
 impl ImplicitBodies {
-    /// No bodies on no nodes.
-    pub fn none() -> Self {
-        let model = Model::default();
-        Self {
-            start: State::at_rest(&model),
-            model: Arc::new(model),
-            cells: Vec::new(),
-            control: None,
-            surface: None,
-            carried: BTreeMap::new(),
-        }
-    }
-
-    /// Their model, to be added to before it is simulated.
-    pub fn model_mut(&mut self) -> &mut Model {
-        Arc::make_mut(&mut self.model)
-    }
-
-    /// One body of all that a model holds, starting at rest; and the model of its nodes, with the names of its constraints.
-    pub(crate) fn alone(name: &str, model: Arc<Model>) -> (model::Model, Self) {
-        let mut nodes = model::Model::default();
-        let rest: Vec<[f64; 3]> = model.rest.iter().map(|&place| place.into()).collect();
-        nodes.add_body(name, &rest);
-        nodes.mass.clone_from(&model.mass);
-        nodes.solids.clone_from(&model.solids);
-        nodes.constraints.extend(model.constraints.iter().map(|constraint| {
-            let [x, y, z, ..] = constraint.components;
-            let motion = match &constraint.motion {
-                Motion::Fixed => model::Motion::Fixed,
-                Motion::Moved { by: [x, y, z, ..], curve } => {
-                    model::Motion::Displacement([*x, *y, *z], curve.clone())
-                }
-                Motion::Displaced(motion) => motion.clone(),
-            };
-            let (name, nodes) = (constraint.name.clone(), constraint.nodes.clone());
-            model::Constraint { name, nodes, components: [x, y, z], motion }
-        }));
+    /// All that an assembly holds, starting at rest: its shells are of its first body.
+    pub(crate) fn alone(model: Arc<Assembly>) -> Self {
         let cells = match model.facets.len() as u32 {
             0 => BodyCells::Solids,
             facets => BodyCells::Facets(0..facets),
         };
         let start = State::at_rest(&model);
-        (nodes, Self { model, cells: vec![cells], start, ..Self::none() })
+        Self { model, cells: vec![cells], start, control: None, surface: None }
     }
 
     /// How many triangles a shell has, and their volume at rest [m³]; `None` of a solid.
@@ -130,8 +92,8 @@ impl ImplicitBodies {
         let model = &self.model;
         vec![
             ("the mesh, thickness or material of shells".into(), fingerprint(&model.facets)),
-            ("constraints".into(), fingerprint(&(&model.constraints, &model.springs))),
-            ("loads or their control".into(), fingerprint(&(&model.loads, &self.control))),
+            ("springs".into(), fingerprint(&model.springs)),
+            ("the control of a load".into(), fingerprint(&self.control)),
             ("creases".into(), fingerprint(&(&model.normals, &model.corner_normals))),
             ("damping".into(), fingerprint(&[model.mass_damping, model.stiffness_damping])),
         ]

@@ -7,9 +7,10 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use pliant_explicit::Wanted;
 use pliant_implicit::{
-    BackwardEuler, DynamicSettings, Explicit, Forces, Model, Phases, SolveError, Spring, State, Statics,
+    Assembly, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State, Statics,
 };
 use pliant_mechanics::grip::{Grip, ROOM};
+use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::{Energies, fingerprint};
 
 use crate::bodies::{Control, ImplicitBodies, Stop};
@@ -185,7 +186,7 @@ impl Implicit {
         let model = &self.bodies.model;
         let node = |node: usize| {
             model.mass[node] * self.state.velocity[node].norm_squared()
-                + model.inertia[node] * self.state.spin[node].norm_squared()
+                + model.rotary_inertia[node] * self.state.spin[node].norm_squared()
         };
         0.5 * (0..model.rest.len()).map(node).sum::<f64>()
     }
@@ -243,8 +244,7 @@ impl Implicit {
         self.springs.clear();
         for grip in &self.grips {
             let place = |node: u32| self.state.position[node as usize];
-            let middle: Vector3<f64> = grip.nodes.iter().map(|&(node, weight)| place(node) * weight).sum();
-            let pull = Vector3::from(grip.place) - middle;
+            let pull = Vector3::from(grip.place) - Vector3::from(grip.position(&self.state, 0));
             self.springs.extend(grip.nodes.iter().map(|&(node, weight)| Spring {
                 node,
                 anchor: place(node) + pull,
@@ -372,7 +372,7 @@ impl Path {
     }
 
     /// Why it ends here, if it does.
-    fn end(&self, stop: &Stop, state: &State, model: &Model) -> Option<String> {
+    fn end(&self, stop: &Stop, state: &State, model: &Assembly) -> Option<String> {
         let limit = number(stop.load_factor.unwrap_or(f64::INFINITY));
         if stop.load_factor.is_some_and(|limit| self.factor.abs() >= limit) {
             return Some(format!("the load factor is {}, at least {limit} in size", number(self.factor)));
@@ -452,7 +452,7 @@ impl Instant for Implicit {
     }
 
     fn displacement(&self, node: usize) -> [f64; 3] {
-        (self.state.position[node] - self.bodies.model.rest[node]).into()
+        (self.state.position[node] - self.bodies.model.place(node)).into()
     }
 
     fn velocity(&self, node: usize) -> [f64; 3] {
@@ -530,8 +530,9 @@ impl Participant for Implicit {
         self.find_energies();
         self.find_reactions();
         if let Some(solids) = &mut self.solids {
-            let rest = &self.bodies.model.rest;
-            for (own, (now, rest)) in solids.displacement.iter_mut().zip(self.state.position.iter().zip(rest))
+            let places = self.bodies.model.places();
+            for (own, (now, rest)) in
+                solids.displacement.iter_mut().zip(self.state.position.iter().zip(places))
             {
                 *own = (now - rest).into();
             }
@@ -568,9 +569,7 @@ impl Participant for Implicit {
     }
 
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
-        let weighted = |&(node, weight): &(u32, f64)| self.state.position[node as usize] * weight;
-        let point: Vector3<f64> = grip.nodes.iter().map(weighted).sum();
-        [point.into(), ((Vector3::from(grip.place) - point) * grip.stiffness).into()]
+        [grip.position(&self.state, 0), grip.force(&self.state)]
     }
 
     fn kept(&self) -> Kept {

@@ -5,13 +5,11 @@
 //! Two participants, each at its own step:
 //!
 //! ```
-//! use nalgebra::Vector3;
 //! use pliant_implicit::element::Elasticity;
-//! use pliant_implicit::{Load, LoadKind, Material, Shell};
-//! use pliant_mechanics::curve::{Curve, Shape};
+//! use pliant_implicit::{Assembly, Shell, Wall};
 //! use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
-//! use pliant_mechanics::load::Load as SolidLoad;
-//! use pliant_mechanics::model::{Cells, Material as SolidMaterial, Model, Solid};
+//! use pliant_mechanics::load::Load;
+//! use pliant_mechanics::model::{Cells, Material, Model, Solid};
 //! use pliant_sim::{Part, Simulation, World};
 //!
 //! let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
@@ -19,15 +17,13 @@
 //! let tet = tissue.add_body("tissue", &corners);
 //! let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
 //! let cells = Cells::tet4(vec![[0, 1, 2, 3]], &tissue.rest);
-//! tissue.add_solid(Solid::new(tet, SolidMaterial::elastic(law, 1000.0), cells));
-//! tissue.loads.push(SolidLoad::gravity(tet, [0.0, 0.0, -9.81]));
+//! tissue.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
+//! tissue.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
 //!
-//! let mut wall = pliant_implicit::Model::new(corners[..3].iter().map(|&corner| corner.into()).collect());
-//! let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+//! let mut wall = Assembly::new("wall", corners[..3].iter().map(|&corner| corner.into()));
+//! let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
 //! wall.add_shell(&Shell::new("wall", vec![[0, 1, 2]], 0.001, material))?;
-//! let kind = LoadKind::Gravity { acceleration: Vector3::new(0.0, 0.0, -9.81) };
-//! let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.1 };
-//! wall.loads.push(Load { name: "gravity".into(), kind, curve, controlled: false });
+//! wall.model_mut().loads.push(Load::gravity(0, [0.0, 0.0, -9.81]));
 //!
 //! let parts = vec![Part::explicit("tissue", tissue, 0.1)?, Part::implicit("wall", wall, 0.1, 0.01)];
 //! let mut simulation = Simulation::new(World::new(parts))?;

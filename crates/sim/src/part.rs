@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pliant_explicit::stability::{Monitor, OnUnstable};
 #[cfg(feature = "gpu")]
 use pliant_gpu::{Design, Device};
-use pliant_implicit::{DynamicSettings, StaticSettings};
+use pliant_implicit::{Assembly, DynamicSettings, StaticSettings};
 use pliant_mechanics::Model;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -142,28 +142,22 @@ impl Part {
     }
 
     /// Equilibria of shells and solids by Newton's method, at the ends of so many equal load steps within a duration [s].
-    pub fn equilibria(
-        name: &str,
-        model: impl Into<Arc<pliant_implicit::Model>>,
-        duration: f64,
-        load_steps: u64,
-    ) -> Self {
-        let (model, bodies) = ImplicitBodies::alone(name, model.into());
+    pub fn equilibria(name: &str, model: impl Into<Arc<Assembly>>, duration: f64, load_steps: u64) -> Self {
+        let assembly = model.into();
+        let model = Arc::clone(&assembly.model);
+        let bodies = ImplicitBodies::alone(assembly);
         let steps = Steps::within(duration, duration / load_steps.max(1) as f64);
         let method = Method::Static(Arc::new(bodies), StaticSettings::default());
-        Self { name: name.into(), model: Arc::new(model), method, steps }
+        Self { name: name.into(), model, method, steps }
     }
 
     /// Shells and solids with inertia by backward Euler, in steps of a length [s] within a duration [s].
-    pub fn implicit(
-        name: &str,
-        model: impl Into<Arc<pliant_implicit::Model>>,
-        duration: f64,
-        step: f64,
-    ) -> Self {
-        let (model, bodies) = ImplicitBodies::alone(name, model.into());
+    pub fn implicit(name: &str, model: impl Into<Arc<Assembly>>, duration: f64, step: f64) -> Self {
+        let assembly = model.into();
+        let model = Arc::clone(&assembly.model);
+        let bodies = ImplicitBodies::alone(assembly);
         let steps = Steps::within(duration, step);
         let method = Method::Implicit(Arc::new(bodies), DynamicSettings::new(steps.step));
-        Self { name: name.into(), model: Arc::new(model), method, steps }
+        Self { name: name.into(), model, method, steps }
     }
 }

@@ -8,6 +8,7 @@ use pliant_explicit::{Clock, Scalar, State, Wanted};
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuStepper;
 use pliant_mechanics::grip::Grip;
+use pliant_mechanics::mapping::{Displaced, Mapping};
 use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::failure::Failure;
@@ -83,6 +84,12 @@ impl<R: Numeric> Solids<R> {
     /// # Errors
     /// If the stepper can't be made.
     pub(crate) fn new(part: &Part, state: State<R>) -> Result<Self, Failure> {
+        if let Some(load) = part.model.loads.iter().find(|load| load.is_for_shells()) {
+            return Err(Failure::input(&format_args!(
+                "`{}` is a load of shells, and solids don't take it",
+                load.name
+            )));
+        }
         let solver = R::solver(part, &state)?;
         Ok(Self { model: Arc::clone(&part.model), step: part.steps.step, state, solver })
     }
@@ -204,7 +211,8 @@ impl<R: Numeric> Participant for Solids<R> {
 
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
         let displacement = &self.state.displacement;
-        [grip.point(&self.model, displacement), grip.force(&self.model, displacement)]
+        let nodes = Displaced { rest: &self.model.rest, displacement, velocity: &[] };
+        [grip.position(&nodes, 0), grip.force(&nodes)]
     }
 
     fn bring_back(&mut self) -> Result<(), Failure> {

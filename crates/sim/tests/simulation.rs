@@ -3,11 +3,12 @@
 use nalgebra::Vector3;
 use pliant_explicit::Wanted;
 use pliant_implicit::element::Elasticity;
-use pliant_implicit::{Constraint, Load, LoadKind, Material as Wall, Motion as WallMotion, Shell};
+use pliant_implicit::{Shell, Wall};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Cells, Material, Motion, Solid};
 use pliant_sim::{Method, Part, Precision, Simulation, State, World};
 
@@ -33,15 +34,14 @@ fn rising() -> Curve {
 }
 
 /// A square of two triangles, clamped at one edge, pressed at the other.
-fn strip() -> pliant_implicit::Model {
+fn strip() -> pliant_implicit::Assembly {
     let corner = |i: u32| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0);
-    let mut model = pliant_implicit::Model::new((0..4).map(corner).collect());
+    let mut model = pliant_implicit::Assembly::new("strip", (0..4).map(corner));
     let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
     model.add_shell(&Shell::new("strip", vec![[0, 2, 3], [0, 3, 1]], 0.002, material)).unwrap();
-    let (nodes, components) = (vec![0, 1], [true; 6]);
-    model.constraints.push(Constraint { name: "clamp".into(), nodes, components, motion: WallMotion::Fixed });
-    let kind = LoadKind::Force { nodes: vec![2, 3], force: Vector3::new(0.0, 0.0, 1e-3) };
-    model.loads.push(Load { name: "press".into(), kind, curve: rising(), controlled: false });
+    model.model_mut().fix("clamp", vec![0, 1]);
+    let kind = LoadKind::force([2, 3], [0.0, 0.0, 1e-3]);
+    model.model_mut().loads.push(Load::new("press", kind, rising()));
     model
 }
 

@@ -7,9 +7,9 @@ mod curved;
 mod layers;
 mod membrane;
 
-/// Elasticity and density.
+/// Elasticity and density of a homogeneous wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Material {
+pub struct Wall {
     /// Isotropic elasticity.
     pub elastic: Elasticity,
     /// Density [kg/m³].

@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, samples};
 use pliant_mechanics::load::NO_NODE;
-use pliant_mechanics::model::{Averaging, Cells, Material, Solid};
+use pliant_mechanics::load::{Load, LoadKind};
+use pliant_mechanics::model::{Averaging, Cells, Constraint, Material, Motion, Solid};
 use pliant_mechanics::prony::{Prony, PronyTerm, PronyUpdate};
 use pliant_testing::Random;
 use serde_json::json;
@@ -13,10 +14,7 @@ use crate::facet::Tangent;
 use crate::linear::LinearSolver;
 use crate::system::System;
 use crate::tests::bar;
-use crate::{
-    BackwardEuler, Constraint, DynamicSettings, Load, LoadKind, Model, ModelError, Motion, State,
-    StaticSettings, Statics,
-};
+use crate::{Assembly, BackwardEuler, DynamicSettings, ModelError, State, StaticSettings, Statics};
 
 const ELEMENTS: [&str; 4] = ["tet4", "tet4-anp", "hex8", "hex8-full"];
 
@@ -46,7 +44,7 @@ fn hexes([nx, ny, nz]: [usize; 3]) -> Vec<[u32; 8]> {
 }
 
 /// A block of counts of cells with sides [m], its inner geometry a little irregular.
-fn block(element: &str, law: AnyLaw, counts: [usize; 3], sides: [f64; 3]) -> Model {
+fn block(element: &str, law: AnyLaw, counts: [usize; 3], sides: [f64; 3]) -> Assembly {
     let (mut points, tets) = bar(counts, sides);
     let mut random = Random::new(7);
     for point in &mut points {
@@ -61,7 +59,7 @@ fn block(element: &str, law: AnyLaw, counts: [usize; 3], sides: [f64; 3]) -> Mod
     };
     let fibre = vec![[0.6, 0.0, 0.8]; law.families() * cells.len()];
     let solid = Solid { fibre, ..Solid::new(0, Material::elastic(law, 1000.0), cells) };
-    let mut model = Model::new(points);
+    let mut model = Assembly::new("shell", points);
     model.add_solid("block", solid).unwrap();
     model
 }
@@ -127,14 +125,14 @@ fn pressures_on_faces_have_their_stiffness() {
             "hex8" => block("hex8", law("neo-hookean"), [1, 1, 1], [0.1; 3]),
             _ => {
                 let rest = [[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
-                let mut model = Model::new(rest.map(Vector3::from).to_vec());
+                let mut model = Assembly::new("shell", rest.map(Vector3::from).to_vec());
                 let cells = Cells::tet4(vec![[0, 1, 2, 3]], &rest);
                 let solid = Solid::new(0, Material::elastic(law("neo-hookean"), 1000.0), cells);
                 model.add_solid("tet", solid).unwrap();
                 model
             }
         };
-        let stiffness = |model: &Model, state: &State| {
+        let stiffness = |model: &Assembly, state: &State| {
             let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
             let still = vec![0.0; 6 * model.rest.len()];
             system.evaluate(state, 1.0, Some((Tangent::Full, &still))).unwrap();
@@ -144,9 +142,9 @@ fn pressures_on_faces_have_their_stiffness() {
         let mut state = State::at_rest(&model);
         state.position.iter_mut().for_each(|x| *x += 0.01 * Vector3::from(random.vector()));
         let bare = stiffness(&model, &state);
-        let kind = LoadKind::FacePressure { faces, pressure: 1e5 };
+        let kind = LoadKind::Pressure { faces, pressure: 1e5 };
         let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
-        model.loads.push(Load { name: "press".into(), kind, curve, controlled: false });
+        model.model_mut().loads.push(Load::new("press", kind, curve));
         let mut pressed = stiffness(&model, &state);
         let size = pressed.equations.len();
         let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
@@ -181,22 +179,22 @@ fn pressures_on_faces_have_their_stiffness() {
     }
 }
 
-fn nodes_at(model: &Model, x: f64) -> Vec<u32> {
-    (0..model.rest.len() as u32).filter(|&n| (model.rest[n as usize].x - x).abs() < 0.02).collect()
+fn nodes_at(model: &Assembly, x: f64) -> Vec<u32> {
+    (0..model.rest.len() as u32).filter(|&n| (model.place(n as usize).x - x).abs() < 0.02).collect()
 }
 
 /// Clamped at x = 0, pushed to the side at its other end.
-fn cantilever(element: &str, law: AnyLaw, force: f64, to: f64) -> Model {
+fn cantilever(element: &str, law: AnyLaw, force: f64, to: f64) -> Assembly {
     let mut model = block(element, law, [6, 2, 2], [0.3, 0.1, 0.1]);
     let held = nodes_at(&model, 0.0);
     let clamp =
         Constraint { name: "clamp".into(), nodes: held, components: [true; 6], motion: Motion::Fixed };
-    model.constraints.push(clamp);
+    model.model_mut().constraints.push(clamp);
     let pushed = nodes_at(&model, 0.3);
     let force = Vector3::new(0.0, 0.0, force) / pushed.len() as f64;
-    let kind = LoadKind::Force { nodes: pushed, force };
+    let kind = LoadKind::force(pushed, force);
     let curve = Curve { shape: Shape::Ramp, from: 0.0, to };
-    model.loads.push(Load { name: "push".into(), kind, curve, controlled: false });
+    model.model_mut().loads.push(Load::new("push", kind, curve));
     model
 }
 
@@ -251,7 +249,7 @@ fn solids_without_stiffness_and_broken_ones_are_refused() {
     let (points, tets) = bar([1, 1, 1], [0.1; 3]);
     let rest: Vec<[f64; 3]> = points.iter().map(|&x| x.into()).collect();
     let with = |cells: Cells, material: Material| {
-        Model::new(points.clone()).add_solid("block", Solid::new(0, material, cells))
+        Assembly::new("shell", points.clone()).add_solid("block", Solid::new(0, material, cells))
     };
     let wide = Cells::averaged_tet4(tets.clone(), &rest, Averaging::Variational);
     let refused = with(wide, Material::elastic(plain, 1000.0)).unwrap_err();

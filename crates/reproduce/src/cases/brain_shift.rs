@@ -143,7 +143,7 @@ pub fn brain(mesh: Mesh, tets: Tets) -> Specimen {
     let motion = Motion::Displacements(by, Course { shape: Shape::SmoothStep, from: 0.0, to: 1.0 });
     for (name, motion) in [("skull", Motion::Fixed), ("opening", motion)] {
         let nodes = brain.mesh.point_sets[name].clone();
-        brain.model.constraints.push(Constraint { name: name.into(), nodes, components: [true; 3], motion });
+        brain.model.constraints.push(Constraint { name: name.into(), nodes, components: [true; 6], motion });
     }
     brain
 }

@@ -5,7 +5,7 @@
 use nalgebra::{SMatrix, SVector, UnitQuaternion};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
 use pliant_implicit::element::Formulation;
-use pliant_implicit::{CurvedSurface, EdgeRule, Model, Patch, Picture, Place, State};
+use pliant_implicit::{Assembly, CurvedSurface, EdgeRule, Patch, Picture, Place, State};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};
@@ -76,7 +76,7 @@ fn triangle_mesh(points: Vec<Vector3>, triangles: impl IntoIterator<Item = [u32;
 }
 
 /// Points of a picture on flat facets.
-fn flat(model: &Model, state: &State, place: &Place) -> Vector3 {
+fn flat(model: &Assembly, state: &State, place: &Place) -> Vector3 {
     let nodes = model.facets[place.facet as usize].nodes;
     nodes.iter().zip(place.weights).map(|(&node, w)| state.position[node as usize] * w).sum()
 }
@@ -279,7 +279,7 @@ fn layers() -> Result<Findings, CaseError> {
     let fine = Mesh { points: relief.collect(), ..fine };
     let nearest = |point: &Vector3| {
         let centre = |facet: usize| -> Vector3 {
-            model.facets[facet].nodes.iter().map(|&n| model.rest[n as usize]).sum::<Vector3>() / 3.0
+            model.facets[facet].nodes.iter().map(|&n| model.place(n as usize)).sum::<Vector3>() / 3.0
         };
         let facets = 0..model.facets.len();
         let closest =
@@ -331,7 +331,7 @@ fn layers() -> Result<Findings, CaseError> {
 
 /// A sphere of shells under an affine motion of its nodes; the normals rotate with those of the ellipsoid.
 struct Ellipsoid {
-    model: Model,
+    model: Assembly,
     state: State,
     axes: Vector3,
 }
@@ -343,10 +343,10 @@ impl Ellipsoid {
         let model = Specimen::new(mesh, [1e6, 0.3], 0.01, Formulation::default())?.model;
         let axes = Vector3::from(axes);
         let mut state = State::at_rest(&model);
-        for ((x, rotation), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(&model.rest) {
+        for ((x, rotation), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(model.places()) {
             *x = rest.component_mul(&axes);
             let normal = rest.component_div(&axes);
-            *rotation = UnitQuaternion::rotation_between(rest, &normal).unwrap_or_default();
+            *rotation = UnitQuaternion::rotation_between(&rest, &normal).unwrap_or_default();
         }
         Ok(Self { model, state, axes })
     }
@@ -456,7 +456,7 @@ fn rendering() -> Result<Findings, CaseError> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.5, -0.2));
     irregular.points.iter_mut().for_each(|p| *p = turn * *p);
     let centre = |facet: usize| -> Vector3 {
-        rest.model.facets[facet].nodes.iter().map(|&n| rest.model.rest[n as usize]).sum::<Vector3>()
+        rest.model.facets[facet].nodes.iter().map(|&n| rest.model.place(n as usize)).sum::<Vector3>()
     };
     for point in &mut irregular.points {
         let facets = 0..rest.model.facets.len();
@@ -484,7 +484,7 @@ fn rendering() -> Result<Findings, CaseError> {
 }
 
 /// The area coordinates of a place in a facet that it belongs to; places on edges belong to both.
-fn weights_in(model: &Model, place: &Place, facet: usize) -> Option<[f64; 3]> {
+fn weights_in(model: &Assembly, place: &Place, facet: usize) -> Option<[f64; 3]> {
     let (own, nodes) = (model.facets[place.facet as usize].nodes, model.facets[facet].nodes);
     let weighed = own.iter().zip(place.weights).filter(|(_, w)| *w > 0.0);
     let mut weights = [0.0; 3];

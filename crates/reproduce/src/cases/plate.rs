@@ -3,7 +3,8 @@
 
 use pliant_geometry::Mesh;
 use pliant_implicit::element::{Bending, Formulation, Membrane};
-use pliant_implicit::{LoadKind, State, StaticSettings, Statics};
+use pliant_implicit::{State, StaticSettings, Statics};
+use pliant_mechanics::load::LoadKind;
 use pliant_meshing::{Pattern, Sheet};
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};
@@ -119,7 +120,7 @@ fn as_in_the_thesis() -> Result<f64, CaseError> {
     let share = SIDE * SIDE / nodes.len() as f64;
     let plate = held(mesh, bending, CLAMPED)?
         .hold(nodes.clone(), [true, true, false, false, false, true])
-        .load(LoadKind::Force { nodes, force: [0.0, 0.0, share].into() });
+        .load(LoadKind::force(nodes, [0.0, 0.0, share]));
     let centre = plate.node(0.5 * SIDE, 0.5 * SIDE, 0.0);
     Ok(plate.linear(centre)?[2])
 }

@@ -8,10 +8,12 @@ use std::time::{Duration, Instant};
 use pliant_geometry::Vector3;
 use pliant_implicit::element::Elasticity;
 use pliant_implicit::{
-    BackwardEuler, Constraint, DynamicSettings, LinearSolver, Load, LoadKind, Material, Model, Motion,
-    Preconditioner, Shell, Spread, State, StaticSettings, Statics,
+    Assembly, BackwardEuler, DynamicSettings, LinearSolver, Preconditioner, Shell, State, StaticSettings,
+    Statics, Wall,
 };
 use pliant_mechanics::curve::{Curve as Course, Shape};
+use pliant_mechanics::load::{Load, LoadKind, Spread};
+use pliant_mechanics::model::{Constraint, Motion};
 
 use crate::case::{Case, CaseError, Findings, Row};
 use crate::plot::{Curve, Key, Pen, Plot};
@@ -41,7 +43,7 @@ pub const CASE: Case = Case {
 };
 
 /// The tube, with about this number of shells.
-fn tube(shells: usize) -> Result<Model, CaseError> {
+fn tube(shells: usize) -> Result<Assembly, CaseError> {
     // Cells about as long as wide: 2 a n = shells with n/a = 200/(40 π).
     let around = ((shells as f64 / 2.0) * (0.02 * TAU) / 0.2).sqrt().round().max(3.0) as usize;
     let along = (shells / 2 / around).max(1);
@@ -55,25 +57,25 @@ fn tube(shells: usize) -> Result<Model, CaseError> {
         let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
         [[a, b, c], [a, c, d]]
     };
-    let mut model = Model::new((0..around * (along + 1)).map(point).collect());
-    let material = Material { elastic: Elasticity { young: 1e5, poisson: 0.45 }, density: 1000.0 };
+    let mut model = Assembly::new("shell", (0..around * (along + 1)).map(point));
+    let material = Wall { elastic: Elasticity { young: 1e5, poisson: 0.45 }, density: 1000.0 };
     let cells = (0..around * along).flat_map(cell).collect();
     model.add_shell(&Shell { formulation: FLAT, ..Shell::new("tube", cells, 0.002, material) })?;
     let last = (around * (along + 1)) as u32;
-    model.constraints.push(Constraint {
+    model.model_mut().constraints.push(Constraint {
         name: "ends".into(),
         nodes: (0..around as u32).chain(last - around as u32..last).collect(),
         components: [true; 6],
         motion: Motion::Fixed,
     });
-    let kind = LoadKind::Pressure {
-        cells: (0..model.facets.len() as u32).collect(),
+    let kind = LoadKind::ShellPressure {
+        facets: (0..model.facets.len() as u32).collect(),
         pressure: 1000.0,
         spread: Spread::Lumped,
     };
     let pulse = (0..40).map(|i| (0.25 * f64::from(i), f64::from(i % 2))).collect();
     let curve = Course { shape: Shape::Table(pulse), from: 0.0, to: 1.0 };
-    model.loads.push(Load { name: "pressure".into(), kind, curve, controlled: false });
+    model.model_mut().loads.push(Load::new("pressure", kind, curve));
     model.mass_damping = 1.0;
     Ok(model)
 }
@@ -164,15 +166,20 @@ fn hexagon() -> Result<f64, CaseError> {
         let cell = |[a, b, c]: [Option<u32>; 3]| Some([a?, b?, c?]);
         [cell([corners[0], corners[1], corners[2]]), cell([corners[1], corners[3], corners[2]])]
     });
-    let mut model = Model::new(lattice.iter().map(place).collect());
-    let material = Material { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+    let mut model = Assembly::new("shell", lattice.iter().map(place));
+    let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
     model.add_shell(&Shell::new("hexagon", cells.flatten().collect(), 0.001, material))?;
     let held = [[true; 3], [false; 3]].concat();
     let nodes = (0..lattice.len()).filter(|&n| lattice[n].0.abs() == RINGS).map(|n| n as u32).collect();
     let components = std::array::from_fn(|c| held[c]);
-    model.constraints.push(Constraint { name: "sides".into(), nodes, components, motion: Motion::Fixed });
-    let kind = LoadKind::Gravity { acceleration: Vector3::new(0.0, 0.0, -9.81) };
-    model.loads.push(Load { name: "weight".into(), kind, curve: ramp(), controlled: false });
+    model.model_mut().constraints.push(Constraint {
+        name: "sides".into(),
+        nodes,
+        components,
+        motion: Motion::Fixed,
+    });
+    let kind = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -9.81] };
+    model.model_mut().loads.push(Load::new("weight", kind, ramp()));
     let mut times = Vec::new();
     let mut solver = Statics::new(model.clone(), StaticSettings::default())?;
     for _ in 0..50 {
@@ -238,7 +245,8 @@ fn compute() -> Result<Findings, CaseError> {
     let [loose, _] = printed();
     let [loose, exact] = [loose, real_time(LinearSolver::Direct)].map(|settings| measure(800, settings, 19));
     let (loose, exact) = (loose?.last, exact?.last);
-    let rest = tube(800)?.rest;
+    let tube = tube(800)?;
+    let rest = State::at_rest(&tube).position;
     let norm =
         |of: &dyn Fn(usize) -> Vector3| (0..rest.len()).map(|n| of(n).norm_squared()).sum::<f64>().sqrt();
     let off = norm(&|n| loose.position[n] - exact.position[n]) / norm(&|n| exact.position[n] - rest[n]);

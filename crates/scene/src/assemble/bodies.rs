@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use pliant_geometry::{
     CellBlock, CellKind, CellLabel, Labels, Mesh, Surface, UnknownLabel, body_blocks, boundary,
 };
-use pliant_mechanics::model::{Averaging, Body, Cells, Material, Solid};
+use pliant_mechanics::model::{Averaging, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
 use pliant_sim::counted;
 
@@ -72,13 +72,10 @@ impl Builder<'_> {
 
     fn add_body(&mut self, draft: &Draft<'_>) {
         let &Draft { name, table, mesh, .. } = draft;
-        let first = self.model.rest.len() as u32;
-        let body = self.model.bodies.len();
-        self.model.rest.extend(mesh.points.iter().map(|&p| <[f64; 3]>::from(p)));
-        self.model.mass.resize(self.model.rest.len(), 0.0);
+        let first = self.assembly.rest.len() as u32;
+        let body = self.assembly.add_body(name, mesh.points.iter().copied());
+        self.assembly.model_mut().bodies[body].damping = table.damping;
         self.set_velocity(name, table, first as usize);
-        let nodes = first..self.model.rest.len() as u32;
-        self.model.bodies.push(Body { name: name.into(), nodes, damping: table.damping });
         if table.layers.is_empty() {
             if table.law.values().is_empty() {
                 let message = format!("missing key `law` in `body.{name}`");
@@ -96,10 +93,14 @@ impl Builder<'_> {
                 let help = "leave it out, or set `model = \"solid\"`";
                 self.error(&["body", name, "fraction"], message, "has no effect", help);
             }
-            self.add_to_implicit(draft, |builder| builder.add_shell(draft, first));
+            (self.assembly.mass_damping, self.assembly.stiffness_damping) =
+                (table.damping, table.stiffness_damping);
+            if let Some(cells) = self.add_shell(draft, first) {
+                self.cells.push(cells);
+            }
             return;
         }
-        let before = self.model.solids.len();
+        let before = self.assembly.solids.len();
         for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
             if !self.check_element(name, table, block.kind) {
                 return;
@@ -109,7 +110,10 @@ impl Builder<'_> {
             }
         }
         if self.scene.is_implicit() {
-            self.add_to_implicit(draft, |builder| builder.add_solids(name, before));
+            (self.assembly.mass_damping, self.assembly.stiffness_damping) =
+                (table.damping, table.stiffness_damping);
+            self.check_solids(name, before);
+            self.cells.push(pliant_sim::BodyCells::Solids);
         }
     }
 
@@ -122,8 +126,9 @@ impl Builder<'_> {
             let help = "leave it out, or run the scene with `solver = \"explicit\"`";
             self.error(&["body", name, "velocity"], message, "has no effect", help);
         }
-        self.model.initial_velocity.resize(first, [0.0; 3]);
-        self.model.initial_velocity.resize(self.model.rest.len(), velocity);
+        self.assembly.model_mut().initial_velocity.resize(first, [0.0; 3]);
+        let nodes = self.assembly.rest.len();
+        self.assembly.model_mut().initial_velocity.resize(nodes, velocity);
     }
 
     fn check_element(&mut self, name: &str, table: &BodyTable, kind: CellKind) -> bool {
@@ -253,8 +258,8 @@ impl Builder<'_> {
         let Some(fibre) = self.fibres(draft, &law_name, law, block, &cells) else { return };
         let Some(fractions) = self.fractions(draft, block, &cells) else { return };
         let material = Material { law: law.law, prony, density: density.0 };
-        let first = self.model.bodies[body].nodes.start;
-        let rest = &self.model.rest;
+        let first = self.assembly.bodies[body].nodes.start;
+        let rest = &self.assembly.rest;
         let shear = law.law.small_strain().shear;
         let tets = || cells.iter().map(|&c| nodes(block, c, first)).collect();
         let hexes = || cells.iter().map(|&c| nodes(block, c, first)).collect();
@@ -271,7 +276,13 @@ impl Builder<'_> {
             _ => Cells::hex8(hexes(), rest, hourglass.0, shear),
         };
         let cells_of = cells_of.filled(&fractions);
-        self.model.add_solid(Solid { body, material, cells: cells_of, fibre, original: cells });
+        self.assembly.model_mut().add_solid(Solid {
+            body,
+            material,
+            cells: cells_of,
+            fibre,
+            original: cells,
+        });
     }
 
     fn prony(&mut self, law_name: &str, law: &LawTable) -> Option<Prony> {

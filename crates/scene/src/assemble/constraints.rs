@@ -36,13 +36,15 @@ impl Builder<'_> {
                 _ => Some(Motion::Fixed),
             };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
-                self.constrain_implicit(name, table, &motion, &nodes, components);
-                let [x, y, z, ..] = components;
-                let components = [x, y, z];
-                self.model.constraints.push(Constraint { name: name.clone(), nodes, components, motion });
+                self.assembly.model_mut().constraints.push(Constraint {
+                    name: name.clone(),
+                    nodes,
+                    components,
+                    motion,
+                });
             }
         }
-        if let Err(contradiction) = self.model.constrained_components() {
+        if let Err(contradiction) = self.assembly.constrained_components() {
             let first = self.source().key_span(&["constraint", &contradiction.first]);
             let second = self.source().key_span(&["constraint", &contradiction.second]);
             let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
@@ -114,7 +116,7 @@ impl Builder<'_> {
             self.error(&at, "the axis of the rotation is zero", "no direction", "such as `[0, 0, 1]`");
             return None;
         }
-        let rest = nodes.iter().map(|&node| self.model.rest[node as usize]);
+        let rest = nodes.iter().map(|&node| self.assembly.rest[node as usize]);
         Some(Motion::rotation(rotate.axis, rotate.centre, rotate.angle, curve, rest))
     }
 
@@ -126,7 +128,7 @@ impl Builder<'_> {
         path: &[&str],
     ) -> Option<Vec<u32>> {
         let built = &self.bodies[body];
-        let first = self.model.bodies[body].nodes.start;
+        let first = self.assembly.bodies[body].nodes.start;
         match selection.nodes(&built.mesh, &built.boundary) {
             Ok(nodes) => {
                 let (mesh, name) = (&built.mesh, &built.name);
@@ -158,16 +160,19 @@ impl Builder<'_> {
         let scene = self.scene;
         let flies =
             |name: &str| scene.bodies.iter().any(|(own, body)| own == name && body.velocity.is_some());
-        for (index, body) in self.model.bodies.iter().enumerate() {
-            let springs = self.implicit.as_ref().map_or(&[][..], |part| &part.model.springs);
-            let held =
-                self.model.constraints.iter().any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)))
-                    || springs.iter().any(|spring| body.nodes.contains(&spring.node));
+        for (index, body) in self.assembly.bodies.iter().enumerate() {
+            let springs = &self.assembly.springs;
+            let held = self
+                .assembly
+                .constraints
+                .iter()
+                .any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)))
+                || springs.iter().any(|spring| body.nodes.contains(&spring.node));
             if held || scene.run.solver == SolverName::Static {
                 continue;
             }
             let name = &body.name;
-            let surfaces = self.model.surfaces.iter().filter(|s| s.body == index).map(|s| s.name.as_str());
+            let surfaces = self.assembly.surfaces.iter().filter(|s| s.body == index).map(|s| s.name.as_str());
             let own: Vec<&str> = surfaces.chain([name.as_str()]).collect();
             let loaded = scene.loads.iter().any(|(_, load)| match load {
                 LoadTable::Gravity(_) => false,
@@ -219,9 +224,9 @@ mod tests {
     fn components_and_motions_are_as_written() {
         let model = built(&top("type = 'move'\nvelocity = [1, 2, 3]\ncomponents = ['z', 'x']")).model;
         let top = &model.constraints[1];
-        assert_eq!((top.nodes.len(), top.components), (9, [true, false, true]));
+        assert_eq!((top.nodes.len(), top.components), (9, [true, false, true, false, false, false]));
         assert!(matches!(top.motion, Motion::Velocity([1.0, 2.0, 3.0], _)));
-        assert_eq!(model.constraints[0].components, [true; 3]);
+        assert_eq!(model.constraints[0].components, [true, true, true, false, false, false]);
     }
 
     #[test]

@@ -14,22 +14,22 @@ use crate::registry::{LoadTable, OutputTable};
 impl Builder<'_> {
     pub(super) fn add_loads(&mut self) {
         let scene = self.scene;
-        if self.implicit.is_some() {
+        if scene.is_implicit() {
             self.add_implicit_loads();
             return;
         }
         if let Some(acceleration) = scene.scene.gravity {
-            for body in 0..self.model.bodies.len() {
+            for body in 0..self.assembly.bodies.len() {
                 let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
                 let kind = LoadKind::Gravity { body, acceleration };
-                self.model.loads.push(Load { name: "gravity".into(), kind, curve, surface: None });
+                self.assembly.model_mut().loads.push(Load::new("gravity", kind, curve));
             }
         }
         for (name, table) in &scene.loads {
             let path = ["load", name.as_str()];
             if let Some(loads) = self.loads(table, &path) {
-                let named = |(kind, curve, surface)| Load { name: name.clone(), kind, curve, surface };
-                self.model.loads.extend(loads.into_iter().map(named));
+                let named = |(kind, curve, surface)| Load { surface, ..Load::new(name, kind, curve) };
+                self.assembly.model_mut().loads.extend(loads.into_iter().map(named));
             }
         }
     }
@@ -50,7 +50,7 @@ impl Builder<'_> {
         if let LoadTable::Gravity(gravity) = table {
             let bodies = match &gravity.on {
                 Some(name) => vec![self.find_body(name, &at("on"))?],
-                None => (0..self.model.bodies.len()).collect(),
+                None => (0..self.assembly.bodies.len()).collect(),
             };
             let curve = curve?;
             let acceleration = gravity.acceleration;
@@ -61,7 +61,7 @@ impl Builder<'_> {
                     return None;
                 };
                 let nodes = self.body_nodes(body, selection, &at("nodes"))?;
-                let weight = |node: u32| (node, acceleration.map(|a| a * self.model.mass[node as usize]));
+                let weight = |node: u32| (node, acceleration.map(|a| a * self.assembly.mass[node as usize]));
                 return Some(vec![(LoadKind::Forces(nodes.into_iter().map(weight).collect()), curve, None)]);
             }
             let load = |body| LoadKind::Gravity { body, acceleration };
@@ -138,7 +138,7 @@ impl Builder<'_> {
     ) -> Option<Vec<Face>> {
         let result = match target {
             Target::Body(body) => {
-                let (built, first) = (&self.bodies[body], self.model.bodies[body].nodes.start);
+                let (built, first) = (&self.bodies[body], self.assembly.bodies[body].nodes.start);
                 select_faces(selection, &built.mesh, &built.boundary, first)
             }
             Target::Surface(index) => {
@@ -162,8 +162,8 @@ impl Builder<'_> {
         traction: [f64; 3],
     ) -> Vec<(u32, [f64; 3])> {
         let rest = match target {
-            Target::Body(_) => &self.model.rest,
-            Target::Surface(index) => &self.model.surfaces[index].rest,
+            Target::Body(_) => &self.assembly.rest,
+            Target::Surface(index) => &self.assembly.surfaces[index].rest,
         };
         let share = |(node, area): (u32, [f64; 3])| {
             let size = Vector3::from(area).norm();
@@ -209,7 +209,7 @@ impl Builder<'_> {
         match target {
             Some(None) => return,
             Some(Some(Target::Surface(surface))) => {
-                let body = self.model.surfaces[surface].body;
+                let body = self.assembly.surfaces[surface].body;
                 let model = self.scene.bodies[body].1.model;
                 if model != BodyModel::Solid && field != FieldName::Displacement {
                     let message = format!(
@@ -249,7 +249,7 @@ impl Builder<'_> {
     /// Refuses labels that nothing shown has, and a view that leaves nothing.
     fn check_labels_of_view(&mut self) {
         let view = &self.scene.view;
-        let mut left = labels_of(&self.model, &self.bodies, &self.surfaces, view.on.as_deref());
+        let mut left = labels_of(&self.assembly, &self.bodies, &self.surfaces, view.on.as_deref());
         let key = if view.hide.is_empty() { "colour" } else { "hide" };
         if left.is_empty() {
             if view.shows_labels() || !view.hide.is_empty() {
@@ -382,7 +382,7 @@ impl Builder<'_> {
 
     /// Rejects fields that need cells: a carried surface has no cells with stresses.
     fn refuse_cell_fields(&mut self, fields: &[FieldName], surface: usize, path: &[&str], help: &str) {
-        let on_shell = self.implicit.as_ref().is_some_and(|part| part.carried.contains_key(&surface));
+        let on_shell = self.assembly.carried.contains_key(&surface);
         if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {
             let message = format!("surfaces on shells have a displacement and no `{}`", field.name());
             self.error(path, message, "not on a surface", "write it on the body");

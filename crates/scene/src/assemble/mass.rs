@@ -63,15 +63,15 @@ impl Builder<'_> {
 
     pub(super) fn scale_mass(&mut self) {
         let Some(table) = self.scene.run.mass_scaling else { return };
-        critical_step::scale_mass(&mut self.model, table.target_step);
-        let Some(scaling) = &self.model.mass_scaling else { return };
-        let (added, mass) = (scaling.total(), self.model.mass.iter().sum::<f64>());
+        critical_step::scale_mass(self.assembly.model_mut(), table.target_step);
+        let Some(scaling) = &self.assembly.mass_scaling else { return };
+        let (added, mass) = (scaling.total(), self.assembly.mass.iter().sum::<f64>());
         let share = added / mass;
         let told = format!(
             "mass scaling to {} s makes {} of {} heavier: {} kg or {:.2} % of the mass is added",
             number(table.target_step),
             scaling.cells,
-            counted(self.model.cell_count(), "element"),
+            counted(self.assembly.cell_count(), "element"),
             number(added),
             share * 100.0
         );

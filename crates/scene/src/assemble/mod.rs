@@ -18,9 +18,10 @@ mod surfaces;
 use std::sync::Arc;
 
 use pliant_geometry::{Labels, Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
+use pliant_implicit::{Assembly, CurvedSurface};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
-use pliant_sim::ImplicitBodies;
+use pliant_sim::{BodyCells, Control, ImplicitBodies};
 
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, SceneErrors};
@@ -37,7 +38,7 @@ pub(crate) use meshes::MeshOrigin;
 pub struct Built {
     /// The model.
     pub model: Arc<Model>,
-    /// The model of the implicit solvers: shells, and solids whose equations are solved. Loads are then there.
+    /// Shells, and solids whose equations are solved, on the nodes of the model.
     pub implicit: Option<Arc<ImplicitBodies>>,
     /// The bodies' meshes, in the order of the model's bodies.
     pub bodies: Vec<BuiltBody>,
@@ -119,8 +120,10 @@ pub fn build_watched(
         scene,
         cache,
         watch,
-        model: Model::default(),
-        implicit: None,
+        assembly: Assembly::default(),
+        cells: Vec::new(),
+        control: None,
+        curved: None,
         bodies: Vec::new(),
         surfaces: Vec::new(),
         out: scene.doubts.clone(),
@@ -140,14 +143,15 @@ pub fn build_watched(
     builder.check_view();
     builder.check_free_bodies();
     builder.check_held();
-    if !builder.failed() {
-        builder.start_implicit();
-    }
+    let start = if builder.failed() { None } else { builder.start() };
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }
-    let Builder { model, implicit, bodies, surfaces, out: warnings, notes, .. } = builder;
-    let (model, implicit) = (Arc::new(model), implicit.map(Arc::new));
+    let Builder { assembly, cells, control, curved, bodies, surfaces, out: warnings, notes, .. } = builder;
+    let model = Arc::clone(&assembly.model);
+    let implicit = start.map(|start| {
+        Arc::new(ImplicitBodies { model: Arc::new(assembly), cells, control, start, surface: curved })
+    });
     Ok(Built { model, implicit, bodies, surfaces, warnings, notes })
 }
 
@@ -168,8 +172,13 @@ struct Builder<'s> {
     scene: &'s Scene,
     cache: &'s MeshCache,
     watch: &'s dyn Fn(Meshing<'_>),
-    model: Model,
-    implicit: Option<ImplicitBodies>,
+    /// All bodies; shells in scenes with some.
+    assembly: Assembly,
+    /// Those of each body that an implicit solver advances.
+    cells: Vec<BodyCells>,
+    control: Option<Control>,
+    /// The curved surface of the shells, if something is carried by it.
+    curved: Option<CurvedSurface>,
     bodies: Vec<BuiltBody>,
     surfaces: Vec<Mesh>,
     out: Vec<Diagnostic>,
@@ -212,14 +221,14 @@ impl<'s> Builder<'s> {
 
     /// The body or surface of a name; a diagnostic at `path` if there is none.
     fn find_target(&mut self, name: &str, path: &[&str]) -> Option<Target> {
-        if let Some(index) = self.model.surfaces.iter().position(|surface| surface.name == name) {
+        if let Some(index) = self.assembly.surfaces.iter().position(|surface| surface.name == name) {
             return Some(Target::Surface(index));
         }
         if self.bodies.iter().any(|body| body.name == name) {
             return self.find_body(name, path).map(Target::Body);
         }
         let bodies = self.bodies.iter().map(|body| body.name.as_str());
-        let known: Vec<&str> = bodies.chain(self.model.surfaces.iter().map(|s| s.name.as_str())).collect();
+        let known: Vec<&str> = bodies.chain(self.assembly.surfaces.iter().map(|s| s.name.as_str())).collect();
         let help = suggestion(name, &known, SCENE, "bodies and surfaces");
         self.error(path, format!("there is no body or surface `{name}`"), "no such body or surface", help);
         None

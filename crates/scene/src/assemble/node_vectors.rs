@@ -33,7 +33,7 @@ impl Builder<'_> {
         path: &[&str],
     ) -> Option<Vec<[f64; 3]>> {
         let built = &self.bodies[body];
-        let first = self.model.bodies[body].nodes.start;
+        let first = self.assembly.bodies[body].nodes.start;
         let own: Vec<u32> = nodes.iter().map(|node| node - first).collect();
         let (key, found) = match &table.from {
             NodeVectorSource::PointData(name) => (

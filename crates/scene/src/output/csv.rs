@@ -216,9 +216,7 @@ fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
     let owners = model.constrained_components().unwrap_or_default();
     let of = |&index: &usize| {
         let constraint = &model.constraints[index];
-        let mut of_model = built.implicit.iter().flat_map(|part| &part.model.constraints);
-        let named = of_model.find(|own| own.name == constraint.name);
-        let [.., rx, ry, rz] = named.map_or([false; 6], |own| own.components);
+        let [.., rx, ry, rz] = constraint.components;
         let own = |node: u32| {
             let [x, y, z] = owners[node as usize].map(|owner| owner as usize == index);
             [x, y, z, rx, ry, rz]
@@ -380,17 +378,13 @@ impl Probe {
             let nearest = (0..mesh.points.len())
                 .min_by(|&a, &b| distance(&mesh.points[a]).total_cmp(&distance(&mesh.points[b])))
                 .unwrap_or(0);
-            let carried = built.implicit.as_ref().and_then(|part| part.carried.get(&surface));
+            let carried = built.implicit.as_ref().and_then(|part| part.model.carried.get(&surface));
             if let Some(points) = carried {
                 let cell = Some(Place::Carried(points[nearest], mesh.points[nearest]));
                 return Self { weights: Vec::new(), cell, fields };
             }
             let row = built.model.surfaces[surface].mapping.row(nearest);
-            return Self {
-                weights: row.map(|(node, weight)| (node as u32, weight)).collect(),
-                cell: None,
-                fields,
-            };
+            return Self { weights: row.collect(), cell: None, fields };
         }
         let body = built.bodies.iter().position(|body| body.name == table.on).unwrap_or(0);
         let mesh = &built.bodies[body].mesh;

@@ -135,10 +135,7 @@ impl Own {
     /// A point of the mesh as a combination of nodes of the model; of a curved surface, the combination under its bulge.
     fn nodes_of(&self, built: &Built, point: u32) -> Vec<(u32, f64)> {
         match &self.content {
-            Content::Surface(index) => {
-                let row = built.model.surfaces[*index].mapping.row(point as usize);
-                row.map(|(node, weight)| (node as u32, weight)).collect()
-            }
+            Content::Surface(index) => built.model.surfaces[*index].mapping.row(point as usize).collect(),
             Content::Bodies { nodes, .. } | Content::Shells { nodes, .. } => {
                 vec![(nodes[point as usize], 1.0)]
             }
@@ -210,8 +207,9 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
     for (field, means) in of_cells.iter().zip(averages.means(&of_cells)) {
         let components = field.components();
         let carried = |point: usize| {
-            let mean =
-                |c: usize| mapping.row(point).map(|(node, w)| w * means[node * components + c]).sum::<f64>();
+            let mean = |c: usize| {
+                mapping.row(point).map(|(node, w)| w * means[node as usize * components + c]).sum::<f64>()
+            };
             (0..components).map(mean).collect::<Vec<f64>>()
         };
         let values = (0..mapping.len()).flat_map(carried).collect();
@@ -292,7 +290,7 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
 /// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
 pub(super) fn carried_on_shell(frame: &Frame<'_>, surface: usize) -> Option<Vec<Vector3>> {
     let part = frame.built().implicit.as_ref()?;
-    let (points, curved) = (part.carried.get(&surface)?, part.surface.as_ref()?);
+    let (points, curved) = (part.model.carried.get(&surface)?, part.surface.as_ref()?);
     let mut positions = vec![Vector3::zeros(); points.len()];
     curved.carried_all(&part.model, frame.now.shells()?, points, &mut positions);
     for (position, rest) in positions.iter_mut().zip(&frame.built().surfaces[surface].points) {
@@ -331,7 +329,7 @@ fn merged_shells(built: &Built, part: &ImplicitBodies, on: Option<&str>) -> (Mes
 
 fn fill_shells(
     mesh: &mut Mesh,
-    model: &pliant_implicit::Model,
+    model: &pliant_implicit::Assembly,
     found: &fields::OfShells,
     wanted: &[FieldName],
     at: At,

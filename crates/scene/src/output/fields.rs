@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 use pliant_explicit::recover::CellFields;
-use pliant_implicit::{Model, ShellFields, State};
+use pliant_implicit::{Assembly, ShellFields, State};
 use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
 
@@ -64,7 +64,7 @@ pub(super) struct OfShells {
 
 impl OfShells {
     /// Finds them for the instant of a frame.
-    pub fn fill(&mut self, model: &Model, state: &State, wanted: &[FieldName]) {
+    pub fn fill(&mut self, model: &Assembly, state: &State, wanted: &[FieldName]) {
         if wanted.contains(&FieldName::ElementStep) && self.steps.is_empty() {
             self.steps = model.facets.par_iter().map(|facet| facet.stable_step()).collect();
         }
@@ -73,7 +73,7 @@ impl OfShells {
     }
 
     /// The value of a field in a triangle, numbered in the model; the first `components` numbers count.
-    pub fn of(&self, model: &Model, facet: u32, field: FieldName) -> Value {
+    pub fn of(&self, model: &Assembly, facet: u32, field: FieldName) -> Value {
         let matrix = |matrix: &Matrix3<f64>| {
             let mut value = [0.0; 9];
             value.copy_from_slice(matrix.as_slice());

@@ -122,5 +122,5 @@ pub fn designs(device: &Device) -> impl Iterator<Item = Design> {
 
 /// A load that grows smoothly.
 pub fn load(name: &str, kind: LoadKind, surface: Option<usize>) -> Load {
-    Load { name: name.into(), kind, curve: smooth(0.3), surface }
+    Load { surface, ..Load::new(name, kind, smooth(0.3)) }
 }

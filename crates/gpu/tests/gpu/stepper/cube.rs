@@ -160,7 +160,7 @@ pub fn jumbled_cube(element: &str, material: Material) -> Jumble {
     let start = deformation(&rest, &mut random);
     let mut model = body(element, material, rest, tets, hexes);
     let nodes = layer(0).iter().map(|&base| node[base as usize]).collect();
-    let (name, components) = ("base".into(), [true; 3]);
+    let (name, components) = ("base".into(), [true; 6]);
     model.constraints.push(Constraint { name, nodes, components, motion: Motion::Fixed });
     Jumble { model, start, node }
 }
@@ -197,7 +197,7 @@ fn deformation(places: &[Vector<f64>], random: &mut Random) -> Vec<Vector<f64>> 
 /// The cube with its base held.
 pub fn held_cube(element: &str, material: Material) -> Model {
     let mut model = free_cube(element, material);
-    let (name, components) = ("base".into(), [true; 3]);
+    let (name, components) = ("base".into(), [true; 6]);
     model.constraints.push(Constraint { name, nodes: layer(0), components, motion: Motion::Fixed });
     model
 }
@@ -209,7 +209,7 @@ pub fn moved_cube(element: &str, material: Material) -> Model {
     model.constraints.push(Constraint {
         name: "top".into(),
         nodes: layer(CELLS),
-        components: [true; 3],
+        components: [true; 6],
         motion,
     });
     model

@@ -60,7 +60,7 @@ fn an_inverted_cell_is_told_as_on_the_processor_though_it_lies_between_two_looks
             let mut model = held_cube(element, elastic(neo_hookean()));
             let motion = Motion::Displacement([0.0, 0.0, -1.2 * EDGE], curve.clone());
             let (name, nodes) = ("top".into(), layer(CELLS));
-            model.constraints.push(Constraint { name, nodes, components: [true; 3], motion });
+            model.constraints.push(Constraint { name, nodes, components: [true; 6], motion });
             let step = 0.5 * step_of(&model);
             let expected = failure_of(&model, step);
             let (error, state) = failure_on(&device, &model, step, design);

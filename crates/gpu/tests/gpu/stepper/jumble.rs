@@ -4,7 +4,7 @@
 use pliant_gpu::Design;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
-use pliant_mechanics::mapping::Mapping;
+use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Surface;
 
 use super::against::{PLAIN, compare_from, designs, load, step_of};
@@ -77,7 +77,7 @@ fn every_load() {
     }
     let rows: Vec<[(u32, f64); 2]> =
         (0..).zip(below).map(|(node, below)| [(node, 0.5), (below, 0.5)]).collect();
-    let mapping = Mapping::from_rows(rows.iter().map(<[_; 2]>::as_slice));
+    let mapping = Weights::from_rows(rows.iter().map(<[_; 2]>::as_slice));
     let rest = mapping.apply(&cube.model.rest);
     cube.model.surfaces.push(Surface { name: "skin".into(), body: 0, rest, mapping });
     let pulling = pull(&cube, 4e-2);

@@ -96,7 +96,8 @@ fn relaxation_of_each_part_and_both_by_both_updates() {
 fn every_motion_damping_mass_scaling_and_initial_velocities() {
     let Some(device) = support::device() else { return };
     let held = || held_cube("tet4", elastic(neo_hookean()));
-    let with = |components, motion| {
+    let with = |[x, y, z]: [bool; 3], motion| {
+        let components = [x, y, z, false, false, false];
         let mut model = held();
         model.constraints.push(Constraint { name: "top".into(), nodes: layer(CELLS), components, motion });
         model
@@ -213,7 +214,7 @@ fn steps_are_cut_where_the_limit_falls_and_end_a_run_where_they_must_not_be() {
     let hold = |name: &str, z, motion| Constraint {
         name: name.into(),
         nodes: layer(z),
-        components: [true; 3],
+        components: [true; 6],
         motion,
     };
     model.constraints.push(hold("base", 0, Motion::Fixed));

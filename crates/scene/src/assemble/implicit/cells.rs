@@ -1,11 +1,11 @@
-//! The cells of the implicit solvers' model: triangles, elements, materials, thickness of shells; solids.
+//! The cells of shells: triangles, elements, materials, thickness. And which solids the implicit solvers can have.
 
 use std::collections::BTreeMap;
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_implicit::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
-use pliant_implicit::{Material, ModelError, Motion, Shell};
-use pliant_sim::{BodyCells, ImplicitBodies, counted};
+use pliant_implicit::{ModelError, Shell, Wall};
+use pliant_sim::{BodyCells, counted};
 
 use crate::assemble::bodies::{Draft, nodes};
 use crate::assemble::meshes::surface_of;
@@ -70,36 +70,15 @@ impl Builder<'_> {
         Some(Mesh { blocks: vec![whole], ..surface })
     }
 
-    /// Gives a body whose nodes are the last of the model to the model of the implicit solvers; `add` adds its cells.
-    pub(in crate::assemble) fn add_to_implicit(
-        &mut self,
-        draft: &Draft<'_>,
-        add: impl FnOnce(&mut Self) -> Option<BodyCells>,
-    ) {
-        let rest = &self.model.rest;
-        let model = self.implicit.get_or_insert_with(ImplicitBodies::none).model_mut();
-        model.rest.extend(rest[model.rest.len()..].iter().map(|&p| Vector3::from(p)));
-        model.mass.resize(rest.len(), 0.0);
-        model.inertia.resize(rest.len(), 0.0);
-        (model.mass_damping, model.stiffness_damping) = (draft.table.damping, draft.table.stiffness_damping);
-        let (Some(cells), Some(part)) = (add(self), &mut self.implicit) else { return };
-        part.cells.push(cells);
-        // What the scene's own model says of masses.
-        self.model.mass.copy_from_slice(&part.model.mass);
-    }
-
-    /// Adds the solids of the scene's model from a number on.
-    pub(in crate::assemble) fn add_solids(&mut self, name: &str, first: usize) -> Option<BodyCells> {
-        for index in first..self.model.solids.len() {
-            let solid = self.model.solids[index].clone();
-            if let Err(error) = self.implicit.as_mut()?.model_mut().add_solid(name, solid) {
-                self.refuse_part(name, &error);
-                return None;
-            }
+    /// Reports solids of the model, from a number on, that the implicit solvers can't have.
+    pub(in crate::assemble) fn check_solids(&mut self, name: &str, first: usize) {
+        let solids = &self.assembly.solids[first..];
+        if let Err(error) = solids.iter().try_for_each(|solid| self.assembly.check_solid(name, solid)) {
+            self.refuse_part(name, &error);
         }
-        Some(BodyCells::Solids)
     }
 
+    /// Adds the shell of a body whose nodes are the last of the model.
     pub(in crate::assemble) fn add_shell(&mut self, draft: &Draft<'_>, first: u32) -> Option<BodyCells> {
         let &Draft { name, table, mesh, .. } = draft;
         let block = mesh.block(CellKind::Triangle)?;
@@ -125,21 +104,11 @@ impl Builder<'_> {
             normals,
             branches: table.branches,
         };
-        let part = self.implicit.as_mut()?;
-        let start = part.model.facets.len() as u32;
-        match part.model_mut().add_shell(&shell) {
+        let start = self.assembly.facets.len() as u32;
+        match self.assembly.add_shell(&shell) {
             Ok(notes) => {
                 self.tell_notes(name, notes, count);
                 self.tell_slack(name, table, formulation, start as usize);
-                if formulation.bending == Bending::None && formulation.membrane != Membrane::None {
-                    let held = pliant_implicit::Constraint {
-                        name: format!("membrane {name}"),
-                        nodes: (first..self.model.rest.len() as u32).collect(),
-                        components: [false, false, false, true, true, true],
-                        motion: Motion::Fixed,
-                    };
-                    self.implicit.as_mut()?.model_mut().constraints.push(held);
-                }
                 Some(BodyCells::Facets(start..start + count as u32))
             }
             Err(error) => {
@@ -169,10 +138,10 @@ impl Builder<'_> {
     }
 
     /// The material of each cell of a block, or one for all.
-    fn materials(&mut self, draft: &Draft<'_>, block: &CellBlock) -> Option<Vec<Material>> {
+    fn materials(&mut self, draft: &Draft<'_>, block: &CellBlock) -> Option<Vec<Wall>> {
         let &Draft { name, table, given, .. } = draft;
         let labels = block.data.get("label");
-        let mut known: BTreeMap<Option<String>, Material> = BTreeMap::new();
+        let mut known: BTreeMap<Option<String>, Wall> = BTreeMap::new();
         let mut all = Vec::with_capacity(block.len());
         for cell in 0..block.len() {
             let label = labels.map(|labels| labels.item(cell)[0].to_string());
@@ -183,7 +152,7 @@ impl Builder<'_> {
                     let law = table.law.of(label.as_deref())?;
                     let density = table.density.of(label.as_deref())?.0;
                     let path = bodies::law_path(name, &given.law, law);
-                    let material = Material { elastic: self.elasticity(name, table, law, &path)?, density };
+                    let material = Wall { elastic: self.elasticity(name, table, law, &path)?, density };
                     *known.entry(label).or_insert(material)
                 }
             };
@@ -409,16 +378,13 @@ impl Builder<'_> {
     /// Reports nodes of a membrane without transverse stiffness at the start of a static run.
     fn tell_slack(&mut self, name: &str, table: &BodyTable, formulation: Formulation, first: usize) {
         let slack = formulation.bending == Bending::None && formulation.membrane != Membrane::None;
-        let Some(part) = self.implicit.as_ref().filter(|_| slack && table.pre_tension == 0.0) else {
-            return;
-        };
-        if self.scene.run.solver != SolverName::Static {
+        if !slack || table.pre_tension != 0.0 || self.scene.run.solver != SolverName::Static {
             return;
         }
         // Of each node the normal of a triangle, and whether all are parallel to it.
         let mut flat: BTreeMap<u32, (Vector3, bool)> = BTreeMap::new();
-        for facet in &part.model.facets[first..] {
-            let [a, b, c] = facet.nodes.map(|node| part.model.rest[node as usize]);
+        for facet in &self.assembly.facets[first..] {
+            let [a, b, c] = facet.nodes.map(|node| self.assembly.place(node as usize));
             let normal = (b - a).cross(&(c - a)).normalize();
             for node in facet.nodes {
                 let known = flat.entry(node).or_insert((normal, true));

@@ -1,14 +1,11 @@
 //! Constraints and springs of the implicit solvers.
 
 use pliant_geometry::Vector3;
-use pliant_implicit::{Motion, Spring};
-use pliant_mechanics::curve::Curve;
-use pliant_mechanics::model;
+use pliant_implicit::Spring;
+use pliant_mechanics::model::Motion;
 
 use crate::assemble::Builder;
-use crate::diagnostic::Diagnostic;
 use crate::format::{Axis, MoveTable, SpringTable, Vectors};
-use crate::registry::ConstraintTable;
 
 impl Builder<'_> {
     /// Whether the nodes of a body turn.
@@ -46,65 +43,13 @@ impl Builder<'_> {
         Some(chosen)
     }
 
-    /// Adds a constraint to the model of the implicit solvers, as the scene's own model has it in displacements.
-    pub(in crate::assemble) fn constrain_implicit(
-        &mut self,
-        name: &str,
-        table: &ConstraintTable,
-        motion: &model::Motion,
-        nodes: &[u32],
-        components: [bool; 6],
-    ) {
-        let Some(part) = &mut self.implicit else { return };
-        let turn = match table {
-            ConstraintTable::Move(moved) => moved.turn.unwrap_or_default(),
-            _ => [0.0; 3],
-        };
-        let moved = |[x, y, z]: [f64; 3], curve: &Curve| Motion::Moved {
-            by: [x, y, z, turn[0], turn[1], turn[2]],
-            curve: curve.clone(),
-        };
-        let all: Vec<(Vec<u32>, Motion)> = match motion {
-            model::Motion::Displacement(by, curve) => vec![(nodes.to_vec(), moved(*by, curve))],
-            model::Motion::Displacements(by, curve) => {
-                nodes.iter().zip(by).map(|(&node, &by)| (vec![node], moved(by, curve))).collect()
-            }
-            model::Motion::Fixed => vec![(nodes.to_vec(), Motion::Fixed)],
-            model::Motion::Velocity(..) | model::Motion::Rotation { .. } => {
-                vec![(nodes.to_vec(), Motion::Displaced(motion.clone()))]
-            }
-        };
-        let constraint = |(nodes, motion)| pliant_implicit::Constraint {
-            name: name.to_owned(),
-            nodes,
-            components,
-            motion,
-        };
-        let all: Vec<_> = all.into_iter().map(constraint).collect();
-        let clash = part
-            .model
-            .constraints
-            .iter()
-            .find(|known| all.iter().any(|own| clash(known, own)))
-            .map(|known| known.name.clone());
-        part.model_mut().constraints.extend(all);
-        if let Some(other) = clash {
-            let first = self.source().key_span(&["constraint", &other]);
-            let second = self.source().key_span(&["constraint", name]);
-            let message = format!("`{other}` and `{name}` both prescribe rotations of the same nodes");
-            let help = "take the shared nodes out of one of them, or limit `components`";
-            let diagnostic = Diagnostic::error(message).at(second, "contradicts the other");
-            self.out.push(diagnostic.also(first, "contradicts the other").help(help));
-        }
-    }
-
-    /// How nodes of shells are moved, without their rotation.
+    /// How nodes of shells are moved and turned.
     pub(in crate::assemble) fn motion_of_shell(
         &mut self,
         name: &str,
         table: &MoveTable,
         nodes: Option<(usize, &[u32])>,
-    ) -> Option<model::Motion> {
+    ) -> Option<Motion> {
         let path = ["constraint", name];
         if table.rotate.is_some() {
             let message = "a rotation about an axis is for nodes of solids";
@@ -122,7 +67,11 @@ impl Builder<'_> {
             (Some(Vectors::PerNode(by)), _) => {
                 let (body, nodes) = nodes?;
                 let by = self.node_vectors(by, body, nodes, &[path[0], path[1], "by"])?;
-                return Some(model::Motion::Displacements(by, self.curve(&table.timing, &path)?));
+                let curve = self.curve(&table.timing, &path)?;
+                return Some(match table.turn {
+                    Some(turn) => Motion::Turn { by, turn, curve },
+                    None => Motion::Displacements(by, curve),
+                });
             }
             (None, None) if table.turn.is_none() => {
                 let message = "a motion has `by`, `turn` or both, found neither";
@@ -134,7 +83,11 @@ impl Builder<'_> {
                 _ => [0.0; 3],
             },
         };
-        Some(model::Motion::Displacement(shift, self.curve(&table.timing, &path)?))
+        let curve = self.curve(&table.timing, &path)?;
+        Some(match table.turn {
+            Some(turn) => Motion::turn(shift, turn, nodes?.1.len(), curve),
+            None => Motion::Displacement(shift, curve),
+        })
     }
 
     /// Adds springs.
@@ -142,21 +95,14 @@ impl Builder<'_> {
         let path = ["constraint", name];
         let Some(body) = self.find_body(&table.body, &[path[0], path[1], "body"]) else { return };
         let Some(nodes) = self.body_nodes(body, &table.nodes, &[path[0], path[1], "nodes"]) else { return };
-        let Some(part) = &mut self.implicit else {
+        if !self.scene.is_implicit() {
             let message = "springs are for shells and for the solvers `static` and `implicit`";
             self.error(&path, message, "not with this solver", "take `fix`, or change the solver");
             return;
-        };
+        }
         for node in nodes {
-            let anchor = table.to.map_or(part.model.rest[node as usize], Vector3::from);
-            part.model_mut().springs.push(Spring { node, anchor, stiffness: table.stiffness });
+            let anchor = table.to.map_or(self.assembly.place(node as usize), Vector3::from);
+            self.assembly.springs.push(Spring { node, anchor, stiffness: table.stiffness });
         }
     }
-}
-
-/// Whether two constraints prescribe the same rotation of a node, and not both that it stays.
-fn clash(a: &pliant_implicit::Constraint, b: &pliant_implicit::Constraint) -> bool {
-    let shared = (3..6).any(|c| a.components[c] && b.components[c]);
-    let still = matches!((&a.motion, &b.motion), (Motion::Fixed, Motion::Fixed));
-    shared && !still && a.nodes.iter().any(|node| b.nodes.contains(node))
 }

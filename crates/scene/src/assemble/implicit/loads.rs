@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::Vector3;
+use pliant_implicit::Resolution;
 use pliant_implicit::element::Membrane;
-use pliant_implicit::{Resolution, Spread};
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_sim::{BodyCells, Control, Stop, counted, number};
 
 use crate::assemble::{Builder, SCENE, Target, suggestion};
@@ -16,12 +17,15 @@ use crate::format::{
 };
 use crate::registry::LoadTable;
 
+/// What acts, and the carried surface whose points it numbers.
+type Acting = (LoadKind, Option<usize>);
+
 impl Builder<'_> {
     pub(in crate::assemble) fn add_implicit_loads(&mut self) {
         let scene = self.scene;
         if let Some(acceleration) = scene.scene.gravity {
-            let kind = pliant_implicit::LoadKind::Gravity { acceleration: Vector3::from(acceleration) };
-            self.push_loads("gravity", vec![kind], constant(), false);
+            let kinds = self.weight_of_all(acceleration);
+            self.push_loads("gravity", kinds, constant(), false);
         }
         for (name, table) in &scene.loads {
             let path = ["load", name.as_str()];
@@ -41,13 +45,7 @@ impl Builder<'_> {
     }
 
     /// Adds loads. What acts in full from the start grows within the first step of a static run, so that it can be halved.
-    fn push_loads(
-        &mut self,
-        name: &str,
-        kinds: Vec<pliant_implicit::LoadKind>,
-        curve: Curve,
-        controlled: bool,
-    ) {
+    fn push_loads(&mut self, name: &str, kinds: Vec<Acting>, curve: Curve, controlled: bool) {
         let run = &self.scene.run;
         let at_once = curve.shape == Shape::Hold && curve.from <= 0.0 && !controlled;
         let curve = match run.solver {
@@ -61,10 +59,8 @@ impl Builder<'_> {
             }
             _ => curve,
         };
-        let Some(part) = &mut self.implicit else { return };
-        let load =
-            |kind| pliant_implicit::Load { name: name.to_owned(), kind, curve: curve.clone(), controlled };
-        part.model_mut().loads.extend(kinds.into_iter().map(load));
+        let load = |(kind, surface)| Load { surface, controlled, ..Load::new(name, kind, curve.clone()) };
+        self.assembly.model_mut().loads.extend(kinds.into_iter().map(load));
     }
 
     /// A controlled load has no course of its own.
@@ -78,7 +74,7 @@ impl Builder<'_> {
         Some(constant())
     }
 
-    fn implicit_load(&mut self, table: &LoadTable, path: &[&str]) -> Option<Vec<pliant_implicit::LoadKind>> {
+    fn implicit_load(&mut self, table: &LoadTable, path: &[&str]) -> Option<Vec<Acting>> {
         let at = |key| [path, &[key]].concat();
         if let LoadTable::Gravity(gravity) = table {
             return self.implicit_gravity(gravity, path);
@@ -88,70 +84,52 @@ impl Builder<'_> {
             Target::Surface(surface) => return self.load_on_surface(table, surface, path),
         };
         let shell = self.has_rotations(body);
-        Some(match table {
-            LoadTable::Force(force) => match self.nodal_forces(force, Target::Body(body), path)? {
-                pliant_mechanics::load::LoadKind::Forces(forces) => single_forces(&forces),
-                _ => return None,
-            },
-            LoadTable::Moment(moment) => vec![self.moment(moment, body, shell, path)?],
+        let kind = match table {
+            LoadTable::Force(force) => self.nodal_forces(force, Target::Body(body), path)?,
+            LoadTable::Moment(moment) => self.moment(moment, body, shell, path)?,
             LoadTable::Traction(traction) if shell => {
-                let cells = self.facets(body, &traction.faces, &at("faces"))?;
-                vec![pliant_implicit::LoadKind::Area { cells, traction: Vector3::from(traction.traction) }]
+                let facets = self.facets(body, &traction.faces, &at("faces"))?;
+                self.assembly.area_load(&facets, Vector3::from(traction.traction))
             }
             LoadTable::Traction(traction) => {
                 let faces = self.faces(Target::Body(body), &traction.faces, &at("faces"))?;
-                single_forces(&self.traction_forces(Target::Body(body), &faces, traction.traction))
+                LoadKind::Forces(self.traction_forces(Target::Body(body), &faces, traction.traction))
             }
-            LoadTable::Pressure(pressure) if shell => vec![self.shell_pressure(pressure, body, path)?],
+            LoadTable::Pressure(pressure) if shell => self.shell_pressure(pressure, body, path)?,
             LoadTable::Pressure(pressure) => {
                 let faces = self.faces(Target::Body(body), &pressure.faces, &at("faces"))?;
-                vec![pliant_implicit::LoadKind::FacePressure { faces, pressure: pressure.pressure }]
+                LoadKind::Pressure { faces, pressure: pressure.pressure }
             }
             LoadTable::Edge(edge) => {
                 if !shell {
-                    self.error(
-                        &at("on"),
-                        "a load on edges is for shells",
-                        "not a shell",
-                        "take a `traction`",
-                    );
+                    let message = "a load on edges is for shells";
+                    self.error(&at("on"), message, "not a shell", "take a `traction`");
                     return None;
                 }
                 let nodes = self.body_nodes(body, &edge.nodes, &at("nodes"))?;
                 let edges = self.border_edges(body, &nodes);
                 if edges.is_empty() {
                     let message = "no edge of the border has both its ends selected";
-                    self.error(
-                        &at("nodes"),
-                        message,
-                        "this selection",
-                        "select all nodes along a border of the shell",
-                    );
+                    let help = "select all nodes along a border of the shell";
+                    self.error(&at("nodes"), message, "this selection", help);
                     return None;
                 }
-                vec![pliant_implicit::LoadKind::Edge { edges, traction: Vector3::from(edge.traction) }]
+                self.assembly.edge_load(&edges, Vector3::from(edge.traction))
             }
             LoadTable::Gravity(_) => return None,
-        })
+        };
+        Some(vec![(kind, None)])
     }
 
     /// A load on a surface that a body carries.
-    fn load_on_surface(
-        &mut self,
-        table: &LoadTable,
-        surface: usize,
-        path: &[&str],
-    ) -> Option<Vec<pliant_implicit::LoadKind>> {
+    fn load_on_surface(&mut self, table: &LoadTable, surface: usize, path: &[&str]) -> Option<Vec<Acting>> {
         let at = |key| [path, &[key]].concat();
         let target = Target::Surface(surface);
-        let forces = match table {
-            LoadTable::Force(force) => match self.nodal_forces(force, target, path)? {
-                pliant_mechanics::load::LoadKind::Forces(forces) => forces,
-                _ => return None,
-            },
+        let kind = match table {
+            LoadTable::Force(force) => self.nodal_forces(force, target, path)?,
             LoadTable::Traction(traction) => {
                 let faces = self.faces(target, &traction.faces, &at("faces"))?;
-                self.traction_forces(target, &faces, traction.traction)
+                LoadKind::Forces(self.traction_forces(target, &faces, traction.traction))
             }
             _ => {
                 let message = "a carried surface takes forces and tractions";
@@ -159,50 +137,36 @@ impl Builder<'_> {
                 return None;
             }
         };
-        let part = self.implicit.as_ref()?;
-        if let Some(points) = part.carried.get(&surface) {
-            let (points, forces) =
-                forces.iter().map(|&(node, force)| (points[node as usize], Vector3::from(force))).unzip();
-            return Some(vec![pliant_implicit::LoadKind::Carried { points, forces }]);
-        }
-        let mapping = &self.model.surfaces[surface].mapping;
-        let nodal = forces.iter().flat_map(|&(point, force)| {
-            mapping.row(point as usize).map(move |(node, weight)| (node as u32, force.map(|f| f * weight)))
-        });
-        Some(single_forces(&nodal.collect::<Vec<_>>()))
+        Some(vec![(kind, Some(surface))])
     }
 
-    fn implicit_gravity(
-        &mut self,
-        table: &GravityTable,
-        path: &[&str],
-    ) -> Option<Vec<pliant_implicit::LoadKind>> {
+    /// The weight of all bodies.
+    fn weight_of_all(&self, acceleration: [f64; 3]) -> Vec<Acting> {
+        let of_body = |body| (LoadKind::Gravity { body, acceleration }, None);
+        (0..self.assembly.bodies.len()).map(of_body).collect()
+    }
+
+    fn implicit_gravity(&mut self, table: &GravityTable, path: &[&str]) -> Option<Vec<Acting>> {
         let at = |key| [path, &[key]].concat();
-        let acceleration = Vector3::from(table.acceleration);
+        let acceleration = table.acceleration;
         let body = match (&table.on, &table.nodes) {
             (Some(name), _) => self.find_body(name, &at("on"))?,
-            (None, None) => return Some(vec![pliant_implicit::LoadKind::Gravity { acceleration }]),
+            (None, None) => return Some(self.weight_of_all(acceleration)),
             (None, Some(_)) => {
                 let message = "`nodes` are nodes of one body, which `on` must name";
                 self.error(&at("nodes"), message, "of which body?", "add `on = \"BODY\"`");
                 return None;
             }
         };
-        let nodes = match &table.nodes {
-            Some(selection) => self.body_nodes(body, selection, &at("nodes"))?,
-            None => self.model.bodies[body].nodes.clone().collect(),
+        let Some(selection) = &table.nodes else {
+            return Some(vec![(LoadKind::Gravity { body, acceleration }, None)]);
         };
-        let weight = |node: u32| (node, <[f64; 3]>::from(acceleration * self.model.mass[node as usize]));
-        Some(single_forces(&nodes.into_iter().map(weight).collect::<Vec<_>>()))
+        let nodes = self.body_nodes(body, selection, &at("nodes"))?;
+        let weight = |node: u32| (node, acceleration.map(|a| a * self.assembly.mass[node as usize]));
+        Some(vec![(LoadKind::Forces(nodes.into_iter().map(weight).collect()), None)])
     }
 
-    fn moment(
-        &mut self,
-        table: &MomentTable,
-        body: usize,
-        shell: bool,
-        path: &[&str],
-    ) -> Option<pliant_implicit::LoadKind> {
+    fn moment(&mut self, table: &MomentTable, body: usize, shell: bool, path: &[&str]) -> Option<LoadKind> {
         let at = |key| [path, &[key]].concat();
         if !shell {
             let message = "only the nodes of shells take moments";
@@ -221,17 +185,12 @@ impl Builder<'_> {
                 return None;
             }
         };
-        Some(pliant_implicit::LoadKind::Moment { nodes, moment })
+        Some(LoadKind::moment(nodes, moment))
     }
 
-    fn shell_pressure(
-        &mut self,
-        table: &PressureTable,
-        body: usize,
-        path: &[&str],
-    ) -> Option<pliant_implicit::LoadKind> {
+    fn shell_pressure(&mut self, table: &PressureTable, body: usize, path: &[&str]) -> Option<LoadKind> {
         let cells = self.facets(body, &table.faces, &[path, &["faces"]].concat())?;
-        let model = &self.implicit.as_ref()?.model;
+        let model = &self.assembly;
         let membrane = cells.first().map(|&cell| model.facets[cell as usize].membrane());
         let curved = matches!(membrane, Some(Membrane::Curved { .. }));
         let spread = match table.spread {
@@ -251,7 +210,7 @@ impl Builder<'_> {
         if curved {
             self.tell_resolution(resolution, cells.len(), body, path);
         }
-        Some(pliant_implicit::LoadKind::Pressure { cells, pressure: table.pressure, spread })
+        Some(LoadKind::ShellPressure { facets: cells, pressure: table.pressure, spread })
     }
 
     /// Warns of a pressure and a membrane, curved or not, that are not of the same surface.
@@ -306,7 +265,7 @@ impl Builder<'_> {
 
     /// The facets of a shell, numbered in the model; `None` for another body.
     pub(in crate::assemble) fn shell_cells(&self, body: usize) -> Option<Vec<u32>> {
-        match self.implicit.as_ref()?.cells.get(body)? {
+        match self.cells.get(body)? {
             BodyCells::Facets(range) => Some(range.clone().collect()),
             BodyCells::Solids => None,
         }
@@ -335,11 +294,9 @@ impl Builder<'_> {
 
     /// The edges of one triangle only both of whose ends are among some nodes of the model (increasing).
     fn border_edges(&self, body: usize, nodes: &[u32]) -> Vec<[u32; 2]> {
-        let (Some(part), Some(cells)) = (&self.implicit, self.shell_cells(body)) else {
-            return Vec::new();
-        };
+        let Some(cells) = self.shell_cells(body) else { return Vec::new() };
         let mut count: BTreeMap<[u32; 2], u32> = BTreeMap::new();
-        for facet in cells.iter().map(|&cell| &part.model.facets[cell as usize]) {
+        for facet in cells.iter().map(|&cell| &self.assembly.facets[cell as usize]) {
             for corner in 0..3 {
                 let [a, b] = [facet.nodes[corner], facet.nodes[(corner + 1) % 3]];
                 *count.entry([a.min(b), a.max(b)]).or_default() += 1;
@@ -379,9 +336,7 @@ impl Builder<'_> {
             let message = "`stop` is for `arc-length`: other controls end where they are set to end";
             self.error(&[&path[..], &["stop"]].concat(), message, "has no effect here", "remove it");
         }
-        if let Some(part) = &mut self.implicit {
-            part.control = control;
-        }
+        self.control = control;
     }
 
     /// Where a path by arc length ends: at the load as written, unless `stop` says otherwise.
@@ -406,9 +361,9 @@ impl Builder<'_> {
     fn controlled_node(&mut self, wanted: &ControlledNode, path: &[&str]) -> Option<(u32, usize, f64)> {
         let at = |key| [path, &[key]].concat();
         let body = self.find_body(&wanted.body, &at("body"))?;
-        let nodes = self.model.bodies[body].nodes.clone();
+        let nodes = self.assembly.bodies[body].nodes.clone();
         let place = Vector3::from(wanted.at);
-        let away = |node: &u32| (Vector3::from(self.model.rest[*node as usize]) - place).norm_squared();
+        let away = |node: &u32| (Vector3::from(self.assembly.rest[*node as usize]) - place).norm_squared();
         let node = nodes.min_by(|a, b| away(a).total_cmp(&away(b)))?;
         let component = match wanted.component {
             Axis::X => 0,
@@ -424,10 +379,9 @@ impl Builder<'_> {
     }
 
     fn controlled_volume(&mut self, load: &str, to: f64) -> Option<Control> {
-        let part = self.implicit.as_ref()?;
         let pressed =
-            part.model.loads.iter().filter(|known| known.name == load).find_map(|load| match &load.kind {
-                pliant_implicit::LoadKind::Pressure { cells, .. } => Some(cells),
+            self.assembly.loads.iter().filter(|known| known.name == load).find_map(|load| match &load.kind {
+                LoadKind::ShellPressure { facets, .. } => Some(facets),
                 _ => None,
             });
         let scene = self.scene;
@@ -437,9 +391,9 @@ impl Builder<'_> {
             self.error(&path, message, "of what?", "let `load` name a pressure on a closed shell");
             return None;
         };
-        match part.model.check_closed(cells) {
+        match self.assembly.check_closed(cells) {
             Ok(()) => {
-                let from = part.model.enclosed_volume(cells, &part.model.rest);
+                let from = self.assembly.rest_volume(cells);
                 Some(Control::Volume { from, to })
             }
             Err(error) => {
@@ -453,19 +407,4 @@ impl Builder<'_> {
 
 fn constant() -> Curve {
     Curve { shape: Shape::Hold, from: 0.0, to: 0.0 }
-}
-
-/// Forces node by node; those of the same size together.
-fn single_forces(forces: &[(u32, [f64; 3])]) -> Vec<pliant_implicit::LoadKind> {
-    let mut all: Vec<(Vec<u32>, [f64; 3])> = Vec::new();
-    let mut known: BTreeMap<[u64; 3], usize> = BTreeMap::new();
-    for &(node, force) in forces {
-        let at = *known.entry(force.map(f64::to_bits)).or_insert_with(|| {
-            all.push((Vec::new(), force));
-            all.len() - 1
-        });
-        all[at].0.push(node);
-    }
-    let kind = |(nodes, force)| pliant_implicit::LoadKind::Force { nodes, force: Vector3::from(force) };
-    all.into_iter().map(kind).collect()
 }

@@ -1,5 +1,4 @@
-//! Shells, and solids whose equations are solved: their cells, constraints and loads, in the model of the implicit solvers, which shares
-//! the nodes. Bodies, names of constraints and carried surfaces stay in the scene's `Model`.
+//! Shells, and solids whose equations are solved: their cells, constraints, loads and start.
 
 mod cells;
 mod constraints;
@@ -164,11 +163,10 @@ impl Builder<'_> {
         if self.scene.run.solver != SolverName::Static {
             return;
         }
-        let Some(part) = &self.implicit else { return };
         if let Err(pliant_implicit::SolveError::FreeBody { node, free_modes }) =
-            pliant_implicit::check_held(&part.model)
+            pliant_implicit::check_held(&self.assembly)
         {
-            let owner = self.model.bodies.iter().find(|body| body.nodes.contains(&node));
+            let owner = self.assembly.bodies.iter().find(|body| body.nodes.contains(&node));
             let Some((name, first)) = owner.map(|body| (body.name.clone(), body.nodes.start)) else { return };
             let message = format!(
                 "`{name}` is free in {} of 6, and a static run needs every part constrained (this one has node {})",
@@ -186,10 +184,10 @@ impl Builder<'_> {
         let mut all = None;
         for (body, (name, table)) in scene.bodies.iter().enumerate() {
             let Some(wanted) = &table.initial_displacement else { continue };
-            let nodes: Vec<u32> = self.model.bodies[body].nodes.clone().collect();
+            let nodes: Vec<u32> = self.assembly.bodies[body].nodes.clone().collect();
             let path = ["body", name.as_str(), "initial-displacement"];
             let given = self.node_vectors(wanted, body, &nodes, &path)?;
-            let all = all.get_or_insert_with(|| vec![Vector3::zeros(); self.model.rest.len()]);
+            let all = all.get_or_insert_with(|| vec![Vector3::zeros(); self.assembly.rest.len()]);
             for (&node, vector) in nodes.iter().zip(given) {
                 all[node as usize] = Vector3::from(vector);
             }
@@ -197,23 +195,19 @@ impl Builder<'_> {
         all
     }
 
-    /// Sets the state that a run starts from.
-    pub(in crate::assemble) fn start_implicit(&mut self) {
+    /// The state that a run of an implicit solver starts from.
+    pub(in crate::assemble) fn start(&mut self) -> Option<State> {
         let displacement = self.initial_displacement();
-        let velocity = std::mem::take(&mut self.model.initial_velocity);
-        let Some(part) = &mut self.implicit else {
-            self.model.initial_velocity = velocity;
-            return;
-        };
-        part.start = State::at_rest(&part.model);
+        let assembly = &self.assembly;
+        let mut start = self.scene.is_implicit().then(|| State::at_rest(assembly))?;
         if let Some(displacement) = displacement {
-            let all = part.model.rest.iter().zip(displacement);
-            let positions: Vec<Vector3> = all.map(|(rest, u)| rest + u).collect();
-            part.start.set_positions(&part.model, &positions);
+            let positions: Vec<Vector3> = assembly.places().zip(displacement).map(|(x, u)| x + u).collect();
+            start.set_positions(assembly, &positions);
         }
-        for (own, given) in part.start.velocity.iter_mut().zip(velocity) {
-            *own = Vector3::from(given);
+        for (own, given) in start.velocity.iter_mut().zip(&assembly.initial_velocity) {
+            *own = Vector3::from(*given);
         }
+        Some(start)
     }
 }
 
@@ -250,7 +244,7 @@ mod tests {
             let part = built(file, more).unwrap().implicit.unwrap();
             let model = &part.model;
             assert_eq!(model.normals.len(), 12);
-            let wanted = model.rest.iter().map(|p| Vector3::new(p.x, p.y, 2.0 * p.z).normalize());
+            let wanted = model.places().map(|p| Vector3::new(p.x, p.y, 2.0 * p.z).normalize());
             let off = model.normals.iter().zip(wanted).map(|(n, wanted)| (n.direction - wanted).norm());
             off.fold(0.0, f64::max)
         };
@@ -291,7 +285,7 @@ mod tests {
         let part = build(&scene).unwrap().implicit.unwrap();
         let mut forces = Forces::new(part.model.clone());
         forces.evaluate(&part.start).unwrap();
-        let moved = (part.start.position[8] - part.model.rest[8]).norm();
+        let moved = (part.start.position[8] - part.model.place(8)).norm();
         assert!((moved - 2.0).abs() < 1e-12 && forces.strain_energy() < 1e-20, "{}", forces.strain_energy());
         assert!(part.start.velocity.iter().all(|v| <[f64; 3]>::from(*v) == [1.0, 2.0, 3.0]));
     }

@@ -1,14 +1,16 @@
-//! Everything constant: rest positions, facets, masses, normals, loads, constraints.
+//! A model with shells on its nodes: facets, normals, masses. Everything constant.
 
 use std::collections::BTreeMap;
+use std::ops::Deref;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
-use pliant_mechanics::curve::Curve;
-use pliant_mechanics::load::Face;
-use pliant_mechanics::model::{self, Solid};
+use pliant_mechanics::Model;
+use pliant_mechanics::load::LoadKind;
+use pliant_mechanics::model::Solid;
 
 use crate::creases::{Normal, straight_edges};
-use crate::element::{Formulation, Layer, Material};
+use crate::element::{Formulation, Layer, Wall};
 use crate::error::ModelError;
 use crate::facet::Facet;
 use crate::patch::Carried;
@@ -17,33 +19,28 @@ use crate::solid::refusal;
 /// The least part of a direction that lies in a triangle.
 const ALONG: f64 = 1e-3;
 
-/// A model of shells and solids. Nodes have three translations, and three rotations if a shell uses them.
+/// A model with shells: what the solvers of this crate work on. It reads as its [`Model`], which holds nodes, masses, solids, loads and
+/// constraints. Nodes have three translations, and three rotations if a facet that bends uses them.
 #[derive(Clone, Debug, Default)]
-pub struct Model {
-    /// Rest positions [m].
-    pub rest: Vec<Vector3<f64>>,
+pub struct Assembly {
+    /// Nodes, solids, loads, constraints.
+    pub model: Arc<Model>,
     /// Shell elements of all shells.
     pub facets: Vec<Facet>,
-    /// Solids of any elastic law, their nodes numbered in this model.
-    pub solids: Vec<Solid>,
     /// Nodal normals at rest, which turn with their nodes; several a node at creases.
     pub normals: Vec<Normal>,
     /// The normals at the corners of each facet.
     pub corner_normals: Vec<[u32; 3]>,
-    /// Mass [kg], one per node.
-    pub mass: Vec<f64>,
     /// Rotary inertia [kg m²], the same about every axis, one per node.
-    pub inertia: Vec<f64>,
+    pub rotary_inertia: Vec<f64>,
     /// Mass-proportional damping [1/s].
     pub mass_damping: f64,
     /// Stiffness-proportional damping [s].
     pub stiffness_damping: f64,
     /// Springs from nodes to points.
     pub springs: Vec<Spring>,
-    /// Loads, which add up.
-    pub loads: Vec<Load>,
-    /// Constraints.
-    pub constraints: Vec<Constraint>,
+    /// The points of each surface of the model that shells carry.
+    pub carried: BTreeMap<usize, Vec<Carried>>,
 }
 
 /// Triangles that become a shell.
@@ -56,7 +53,7 @@ pub struct Shell {
     /// Thickness [m]: one, or one a triangle.
     pub thickness: Vec<f64>,
     /// What it is made of: one, or one a triangle.
-    pub material: Vec<Material>,
+    pub material: Vec<Wall>,
     /// Its elements.
     pub formulation: Formulation,
     /// Layers from the bottom (against the normals) to the top; with some, `thickness` and `material` say nothing.
@@ -76,7 +73,7 @@ pub struct Shell {
 
 impl Shell {
     /// A shell of one thickness with the default elements, creases above 45° and no branches.
-    pub fn new(name: &str, cells: Vec<[u32; 3]>, thickness: f64, material: Material) -> Self {
+    pub fn new(name: &str, cells: Vec<[u32; 3]>, thickness: f64, material: Wall) -> Self {
         Self {
             name: name.into(),
             cells,
@@ -120,128 +117,42 @@ pub struct Spring {
     pub stiffness: f64,
 }
 
-/// A load with its course over time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Load {
-    /// Its name in messages.
-    pub name: String,
-    /// What acts.
-    pub kind: LoadKind,
-    /// Factor over time.
-    pub curve: Curve,
-    /// Whether it is multiplied by [`State::load_factor`](crate::State::load_factor), which a control finds.
-    pub controlled: bool,
+impl Deref for Assembly {
+    type Target = Model;
+
+    fn deref(&self) -> &Model {
+        &self.model
+    }
 }
 
-/// What a load acts on and how.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LoadKind {
-    /// A force [N] on each of some nodes.
-    Force {
-        /// The nodes.
-        nodes: Vec<u32>,
-        /// Force on each [N].
-        force: Vector3<f64>,
-    },
-    /// A moment [N m] on each of some nodes, with axes that stay in space.
-    Moment {
-        /// The nodes.
-        nodes: Vec<u32>,
-        /// Moment on each [N m].
-        moment: Vector3<f64>,
-    },
-    /// Weight of everything.
-    Gravity {
-        /// Acceleration [m/s²].
-        acceleration: Vector3<f64>,
-    },
-    /// A force per rest area that keeps its direction, a third to each corner.
-    Area {
-        /// Facets.
-        cells: Vec<u32>,
-        /// Force per area [Pa].
-        traction: Vector3<f64>,
-    },
-    /// A force per rest length along edges that keeps its direction, half to each end. Left out are the drilling moments in the plane that
-    /// the ANDES membrane would take of it at the ends of an edge; they cancel between edges but at the ends of the loaded line.
-    Edge {
-        /// Ends of the edges.
-        edges: Vec<[u32; 2]>,
-        /// Force per length [N/m].
-        traction: Vector3<f64>,
-    },
-    /// Pressure along the current normal.
-    Pressure {
-        /// Facets.
-        cells: Vec<u32>,
-        /// Pressure [Pa], positive along the normal.
-        pressure: f64,
-        /// How it comes to the nodes.
-        spread: Spread,
-    },
-    /// Pressure against the outward normals of deformed faces of solids.
-    FacePressure {
-        /// Faces, outward order.
-        faces: Vec<Face>,
-        /// Pressure [Pa].
-        pressure: f64,
-    },
-    /// Forces with fixed directions on points that the curved surface carries, by Jᵀ of the current state to forces and moments. How
-    /// these change with the state is left out of the stiffness.
-    Carried {
-        /// The points.
-        points: Vec<Carried>,
-        /// Force on each [N]; points beyond the last have none.
-        forces: Vec<Vector3<f64>>,
-    },
-}
+impl Assembly {
+    /// One body of nodes at rest [m] and nothing else.
+    pub fn new(name: &str, rest: impl IntoIterator<Item = Vector3<f64>>) -> Self {
+        let mut assembly = Self::default();
+        assembly.add_body(name, rest);
+        assembly
+    }
 
-/// How a pressure on a shell comes to its nodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Spread {
-    /// A third of p A n of the flat facet to each corner: for flat membranes.
-    Lumped,
-    /// ∫ p Jᵀ n dA over the curved surface, to forces and moments: for curved membranes.
-    #[default]
-    Curved,
-}
+    /// Adds a body of nodes at rest [m]; its number.
+    pub fn add_body(&mut self, name: &str, rest: impl IntoIterator<Item = Vector3<f64>>) -> usize {
+        let rest: Vec<[f64; 3]> = rest.into_iter().map(Into::into).collect();
+        self.rotary_inertia.resize(self.rest.len() + rest.len(), 0.0);
+        self.model_mut().add_body(name, &rest)
+    }
 
-/// Components of nodes that are held or moved.
-#[derive(Clone, Debug)]
-pub struct Constraint {
-    /// Its name in messages.
-    pub name: String,
-    /// The nodes.
-    pub nodes: Vec<u32>,
-    /// Which of (x, y, z) and of the spins about x, y and z.
-    pub components: [bool; 6],
-    /// Held, or moved from where they start.
-    pub motion: Motion,
-}
+    /// The model, to add loads and constraints to.
+    pub fn model_mut(&mut self) -> &mut Model {
+        Arc::make_mut(&mut self.model)
+    }
 
-/// What constrained components do.
-#[derive(Clone, Debug)]
-pub enum Motion {
-    /// They stay where they start.
-    Fixed,
-    /// They move.
-    Moved {
-        /// Displacement [m] and rotation vector [rad] at a factor of 1. With all three spins constrained a node turns by
-        /// exp(factor · vector) exactly, about any axis by any angle; with fewer, those components of its spin are prescribed. Constraints
-        /// with courses of their own on the same node about different axes do not commute.
-        by: [f64; 6],
-        /// Factor over time.
-        curve: Curve,
-    },
-    /// Displacements of the nodes from rest as of solids, in the order of the constraint; its rotations, if some are constrained, stay.
-    Displaced(model::Motion),
-}
+    /// Where a node is at rest [m].
+    pub fn place(&self, node: usize) -> Vector3<f64> {
+        Vector3::from(self.rest[node])
+    }
 
-impl Model {
-    /// A model of nodes at rest [m] and nothing else.
-    pub fn new(rest: Vec<Vector3<f64>>) -> Self {
-        let nodes = rest.len();
-        Self { rest, mass: vec![0.0; nodes], inertia: vec![0.0; nodes], ..Self::default() }
+    /// Where all nodes are at rest [m].
+    pub fn places(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        self.rest.iter().map(|&place| Vector3::from(place))
     }
 
     /// Adds a shell: its triangles are made to face one side (each connected part keeps the side of most of its triangles),
@@ -256,7 +167,7 @@ impl Model {
         let mut notes = Notes { turned, ..Notes::default() };
         let mut facets = Vec::with_capacity(cells.len());
         for (number, &nodes) in cells.iter().enumerate() {
-            let corners = nodes.map(|node| self.rest[node as usize]);
+            let corners = nodes.map(|node| self.place(node as usize));
             let facet = if shell.layers.is_empty() {
                 let thickness = shell.thickness[if shell.thickness.len() == 1 { 0 } else { number }];
                 let material = shell.material[if shell.material.len() == 1 { 0 } else { number }];
@@ -283,13 +194,41 @@ impl Model {
         self.corner_normals.extend(corner_normals);
         for facet in &facets {
             for node in facet.nodes {
-                self.mass[node as usize] += facet.mass;
-                self.inertia[node as usize] += facet.inertia;
+                Arc::make_mut(&mut self.model).mass[node as usize] += facet.mass;
+                self.rotary_inertia[node as usize] += facet.inertia;
             }
         }
         self.facets.extend(facets);
         self.curve_facets();
         Ok(notes)
+    }
+
+    /// A force per rest area [Pa] on facets that keeps its direction, a third to each corner.
+    pub fn area_load(&self, facets: &[u32], traction: Vector3<f64>) -> LoadKind {
+        let of_facet = |&facet: &u32| {
+            let facet = &self.facets[facet as usize];
+            facet.nodes.map(|node| (node, (traction * (facet.area / 3.0)).into()))
+        };
+        LoadKind::Forces(facets.iter().flat_map(of_facet).collect())
+    }
+
+    /// A force per rest length [N/m] along edges that keeps its direction, half to each end. Left out are the drilling moments in the
+    /// plane that the ANDES membrane would take of it at the ends of an edge; they cancel between edges but at the ends of the line.
+    pub fn edge_load(&self, edges: &[[u32; 2]], traction: Vector3<f64>) -> LoadKind {
+        let of_edge = |&ends: &[u32; 2]| {
+            let [a, b] = ends.map(|node| self.place(node as usize));
+            ends.map(|node| (node, (traction * (0.5 * (b - a).norm())).into()))
+        };
+        LoadKind::Forces(edges.iter().flat_map(of_edge).collect())
+    }
+
+    /// Which nodes have rotations: those of a facet that bends. Without bending rotations would have next to no stiffness.
+    pub fn turning(&self) -> Vec<bool> {
+        let mut turning = vec![false; self.rest.len()];
+        for facet in self.facets.iter().filter(|facet| facet.turns()) {
+            facet.nodes.iter().for_each(|&node| turning[node as usize] = true);
+        }
+        turning
     }
 
     /// Gives the facets the normals of their corners. A shell that shares edges with others makes creases of them.
@@ -304,7 +243,7 @@ impl Model {
     fn stoutness(&self, facets: &[Facet]) -> Option<f64> {
         let cells: Vec<[u32; 3]> = facets.iter().map(|facet| facet.nodes).collect();
         let border = edges(&cells).into_iter().filter(|(_, sides)| sides.len() == 1);
-        let length = |([a, b], _): ([u32; 2], _)| (self.rest[a as usize] - self.rest[b as usize]).norm();
+        let length = |([a, b], _): ([u32; 2], _)| (self.place(a as usize) - self.place(b as usize)).norm();
         let border: f64 = border.map(length).sum();
         let area: f64 = facets.iter().map(|facet| facet.area).sum();
         let volume: f64 = facets.iter().map(|facet| facet.area * facet.thickness).sum();
@@ -315,7 +254,7 @@ impl Model {
     fn inverted(&self, cells: &[[u32; 3]]) -> Option<(usize, usize)> {
         const TURNED: f64 = -0.866;
         let normal = |cell: usize| {
-            let [a, b, c] = cells[cell].map(|node| self.rest[node as usize]);
+            let [a, b, c] = cells[cell].map(|node| self.place(node as usize));
             (b - a).cross(&(c - a)).normalize()
         };
         let mut neighbours = vec![(0_usize, true); cells.len()];
@@ -334,10 +273,20 @@ impl Model {
     /// Adds a solid, which gives mass to its nodes. It may share nodes with shells and other solids.
     ///
     /// # Errors
-    /// If the density is out of range, a cell is degenerate or inverted, or the element or the law has no stiffness here: averages over
-    /// two rings of neighbours, laws that relax. The model then is as it was.
+    /// As [`Assembly::check_solid`]; the model then is as it was.
     pub fn add_solid(&mut self, name: &str, solid: Solid) -> Result<(), ModelError> {
-        if let Some(why) = refusal(&solid) {
+        self.check_solid(name, &solid)?;
+        self.model_mut().add_solid(solid);
+        Ok(())
+    }
+
+    /// Whether the solvers of this crate can have a solid on nodes of the model.
+    ///
+    /// # Errors
+    /// If the density is out of range, a cell is degenerate or inverted, or the element or the law has no stiffness here: averages over
+    /// two rings of neighbours, laws that relax.
+    pub fn check_solid(&self, name: &str, solid: &Solid) -> Result<(), ModelError> {
+        if let Some(why) = refusal(solid) {
             return Err(ModelError::NoStiffness { solid: name.into(), why });
         }
         let density = solid.material.density;
@@ -357,8 +306,6 @@ impl Model {
                 return Err(ModelError::Degenerate { shell: name.into(), cell, what: "volume", value });
             }
         }
-        solid.add_mass(&mut self.mass);
-        self.solids.push(solid);
         Ok(())
     }
 
@@ -369,7 +316,7 @@ impl Model {
 
     /// Displacement [m] of a node at a position.
     pub(crate) fn displacement(&self, position: &[Vector3<f64>], node: u32) -> [f64; 3] {
-        (position[node as usize] - self.rest[node as usize]).into()
+        (position[node as usize] - self.place(node as usize)).into()
     }
 
     fn check_quantities(&self, shell: &Shell) -> Result<(), ModelError> {
@@ -411,7 +358,7 @@ impl Model {
         facets: &[Facet],
     ) -> Result<(Vec<Normal>, Vec<[u32; 3]>), ModelError> {
         let normal_of = |facet: &Facet| {
-            let [a, b, c] = facet.nodes.map(|node| self.rest[node as usize]);
+            let [a, b, c] = facet.nodes.map(|node| self.place(node as usize));
             (b - a).cross(&(c - a)).normalize()
         };
         let face_normals: Vec<Vector3<f64>> = facets.iter().map(normal_of).collect();
@@ -433,7 +380,7 @@ impl Model {
                 let mut sum = Vector3::zeros();
                 for &(facet, corner) in &fan {
                     let [at, next, last] =
-                        [0, 1, 2].map(|i| self.rest[facets[facet].nodes[(corner + i) % 3] as usize]);
+                        [0, 1, 2].map(|i| self.place(facets[facet].nodes[(corner + i) % 3] as usize));
                     sum += face_normals[facet] * (next - at).angle(&(last - at));
                     corner_normals[facet][corner] = (self.normals.len() + normals.len()) as u32;
                 }
@@ -452,12 +399,21 @@ impl Model {
     }
 
     /// The volume [m³] that closed facets enclose at some positions, positive with normals outwards.
-    pub fn enclosed_volume(&self, cells: &[u32], position: &[Vector3<f64>]) -> f64 {
-        let tet = |&cell: &u32| {
-            let [a, b, c] = self.facets[cell as usize].nodes.map(|node| position[node as usize]);
+    pub fn enclosed_volume(&self, facets: &[u32], position: &[Vector3<f64>]) -> f64 {
+        self.volume_within(facets, |node| position[node])
+    }
+
+    /// The volume [m³] that closed facets enclose at rest.
+    pub fn rest_volume(&self, facets: &[u32]) -> f64 {
+        self.volume_within(facets, |node| self.place(node))
+    }
+
+    fn volume_within(&self, facets: &[u32], position: impl Fn(usize) -> Vector3<f64>) -> f64 {
+        let tet = |&facet: &u32| {
+            let [a, b, c] = self.facets[facet as usize].nodes.map(|node| position(node as usize));
             a.dot(&b.cross(&c)) / 6.0
         };
-        cells.iter().map(tet).sum()
+        facets.iter().map(tet).sum()
     }
 
     /// Whether facets close.
@@ -493,7 +449,7 @@ impl Model {
     /// What round-off leaves of the norm of a residual [N], 8 ε |x| √Σk²: displacements are differences of positions, known to ε |x|,
     /// and a cell makes forces of them with its largest stiffness k.
     pub(crate) fn round_off(&self) -> f64 {
-        let extent = self.rest.iter().map(|x| x.amax()).fold(0.0, f64::max);
+        let extent = self.places().map(|x| x.amax()).fold(0.0, f64::max);
         let stiffness = self.stiffnesses().map(|k| k * k).sum::<f64>().sqrt();
         8.0 * f64::EPSILON * stiffness * extent
     }
@@ -519,7 +475,7 @@ impl Model {
     pub(crate) fn mean_edge(&self) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         let mut add = |a: u32, b: u32| {
-            sum += (self.rest[a as usize] - self.rest[b as usize]).norm();
+            sum += (self.place(a as usize) - self.place(b as usize)).norm();
             count += 1;
         };
         for facet in &self.facets {
@@ -567,7 +523,7 @@ fn direction_of(shell: &Shell, cell: usize, corners: &[Vector3<f64>; 3]) -> Resu
     Err(ModelError::Direction { shell: shell.name.clone(), cell })
 }
 
-fn check_material(name: &str, Material { elastic, density }: Material) -> Result<(), ModelError> {
+fn check_material(name: &str, Wall { elastic, density }: Wall) -> Result<(), ModelError> {
     let out_of_range = |what: &str, value, range| {
         Err(ModelError::OutOfRange { shell: name.into(), what: what.into(), value, range })
     };

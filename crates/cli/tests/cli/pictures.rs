@@ -1,10 +1,8 @@
 //! Pictures and films through the real binary: pictures of scenes and of finished runs, rejections, and the message of a build
 //! without pictures. Without an adapter, tests that need one are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
-mod support;
-
 #[cfg(not(feature = "viewer"))]
-use support::{BLOCK, Workshop};
+use crate::support::{BLOCK, Workshop};
 
 #[cfg(not(feature = "viewer"))]
 #[test]
@@ -25,7 +23,7 @@ mod with_pictures {
 
     use pliant_picture::Picture;
 
-    use super::support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
+    use crate::support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
 
     /// The sizes of a PNG file, and the number of its frames if it is animated.
     fn png(workshop: &Workshop, name: &str) -> ([u32; 2], Option<u32>) {

@@ -1,8 +1,5 @@
 //! The environment of a run, through the real binary: signals, locked folders, links in them, standard streams that
 //! can't be written, stale files, paths that are not files.
-#![cfg(unix)]
-
-mod support;
 
 use std::fs::{self, File};
 use std::os::unix::fs::symlink;
@@ -10,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use support::{BLOCK, Told, Workshop, changed};
+use crate::support::{BLOCK, Told, Workshop, changed};
 
 /// A run of many seconds that writes often.
 fn long() -> Workshop {
@@ -253,9 +250,10 @@ fn within_seconds(workshop: &Workshop, arguments: &[&str]) -> Told {
 
 #[test]
 fn pipes_and_devices_are_no_files() {
-    let moved = support::FROM_FILE.replace("type = \"fix\"", "type = \"move\"\nby = { csv = \"pipe.csv\" }");
+    let moved =
+        crate::support::FROM_FILE.replace("type = \"fix\"", "type = \"move\"\nby = { csv = \"pipe.csv\" }");
     let workshop = Workshop::new(&moved);
-    workshop.write("case/organ.vtk", support::vtk(&support::CUBE, &support::TETS, ""));
+    workshop.write("case/organ.vtk", crate::support::vtk(&crate::support::CUBE, &crate::support::TETS, ""));
     for pipe in ["pipe.toml", "model.xml", "case/pipe.csv", "checkpoint-0000000001.pliant"] {
         assert!(Command::new("mkfifo").arg(workshop.path(pipe)).status().unwrap().success());
     }
@@ -275,7 +273,7 @@ fn pipes_and_devices_are_no_files() {
 
 /// A scene whose mesh, and whose table of motions, may lie elsewhere.
 fn naming(mesh: &str, table: &str) -> String {
-    let scene = support::FROM_FILE.replace("organ.vtk", mesh);
+    let scene = crate::support::FROM_FILE.replace("organ.vtk", mesh);
     let move_by = format!("type = \"move\"\nby = {{ csv = \"{table}\" }}");
     scene.replace("type = \"fix\"", &move_by)
 }
@@ -283,7 +281,7 @@ fn naming(mesh: &str, table: &str) -> String {
 #[test]
 fn a_sandbox_keeps_a_scene_in_its_folder() {
     let workshop = Workshop::new("");
-    let mesh = support::vtk(&support::CUBE, &support::TETS, "");
+    let mesh = crate::support::vtk(&crate::support::CUBE, &crate::support::TETS, "");
     let table: String = (0..8).map(|node| format!("{node},0,0,0\n")).collect();
     for folder in ["case", "case/deep", "elsewhere"] {
         workshop.write(&format!("{folder}/organ.vtk"), &mesh);
@@ -321,7 +319,7 @@ fn a_sandbox_keeps_a_scene_in_its_folder() {
 #[test]
 fn a_sandbox_keeps_images_and_models_in_their_folder() {
     let scene = changed(
-        support::FROM_FILE,
+        crate::support::FROM_FILE,
         "mesh = { file = \"organ.vtk\" }",
         "mesh = { image = \"scan.nhdr\", label = 1, edge = 0.05 }",
     );
@@ -348,7 +346,8 @@ fn a_sandbox_keeps_images_and_models_in_their_folder() {
     let model = "<Model><SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>5</DampingCoeff>\
                  <Density>1000</Density></SystemParams><VTKMesh Type=\"T4\">../elsewhere/organ.vtk</VTKMesh></Model>";
     workshop.write("model/model.xml", model);
-    workshop.write("elsewhere/organ.vtk", support::vtk(&support::CUBE, &support::TETS, ""));
+    workshop
+        .write("elsewhere/organ.vtk", crate::support::vtk(&crate::support::CUBE, &crate::support::TETS, ""));
     let words = |more: &[&str]| workshop.pliant(&[&["check", "model/model.xml"], more].concat()).words();
     assert!(!words(&[]).contains("outside the scene's folder"), "{}", words(&[]));
     assert!(words(&["--sandbox"]).contains("outside the scene's folder"), "{}", words(&["--sandbox"]));

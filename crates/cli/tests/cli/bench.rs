@@ -1,9 +1,7 @@
 //! `pliant bench` through the real binary.
 
-mod support;
-
+use crate::support::{Workshop, has_graphics_processor};
 use serde_json::Value;
-use support::{Workshop, has_graphics_processor};
 
 const KEYS: [&str; 16] = [
     "mesh",
@@ -86,7 +84,8 @@ fn designs_without_a_device_are_answered_with_the_packages() {
     // None answers to Direct3D there.
     let workshop = Workshop::new("");
     let mut command = workshop.command(&["bench", "--designs", "--repeats", "1"]);
-    let told: support::Told = command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into();
+    let told: crate::support::Told =
+        command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into();
     assert_eq!(told.code, 1, "{}", told.out);
     assert!(told.words().contains("mesa-vulkan-drivers"), "{}", told.err);
 }

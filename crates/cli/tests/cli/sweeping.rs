@@ -1,12 +1,10 @@
 //! Sweeps, through the real binary: the product of the values, one table, the same on any number of threads.
 
-mod support;
-
 use std::fs;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use support::{BLOCK, Told, Workshop};
+use crate::support::{BLOCK, Told, Workshop};
 
 fn sweep(workshop: &Workshop, arguments: &[&str]) -> Told {
     workshop.pliant(&[&["sweep", "case"], arguments].concat())

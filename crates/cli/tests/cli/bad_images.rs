@@ -1,13 +1,11 @@
 //! Images that cannot be meshed, through the real binary: malformed files of every format, series with slices missing or mixed.
 
-mod support;
-
 #[allow(dead_code)]
 use std::fs;
 use std::path::Path;
 
+use crate::support::{BLOCK, Told, Workshop};
 use pliant_testing::image_files::{Form, Syntax, Volume, dicom, nifti1, nifti2};
-use support::{BLOCK, Told, Workshop};
 
 fn assert_refused(workshop: &Workshop, image: &str, says: &[&str]) {
     let mesh = ["mesh", image, "--label", "1", "--edge", "5mm", "-o", "out.vtu", "--json"];

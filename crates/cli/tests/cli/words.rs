@@ -1,14 +1,12 @@
 //! Names, ranges, masks and units in `pliant labels`, `pliant mesh` and scenes of scans, and the replies.
 
-mod support;
-
+use crate::support::{BLOCK, Told, Workshop};
 #[allow(dead_code)]
 use pliant_geometry::io;
 use pliant_meshing::sphere;
 use pliant_testing::image_files::{
     Form, Segments, Syntax, Volume, metaimage, nifti1, segmentation, structure_set,
 };
-use support::{BLOCK, Told, Workshop};
 
 /// Voxels of 2 mm along each side.
 const SIDE: usize = 20;

@@ -1,9 +1,7 @@
 //! `pliant reproduce` through the real binary.
 
-mod support;
-
+use crate::support::Workshop;
 use serde_json::Value;
-use support::Workshop;
 
 #[test]
 fn the_list_names_every_case_in_a_line() {

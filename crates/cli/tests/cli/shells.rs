@@ -1,13 +1,11 @@
 //! Shells through the real binary: what is refused and in which words, what a failed run keeps, and what
 //! a run that went well leaves.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 
+use crate::support::{Told, Workshop, changed};
 use pliant_geometry::Mesh;
-use support::{Told, Workshop, changed};
 
 /// A cantilever of 16 triangles.
 const WALL: &str = r#"[scene]

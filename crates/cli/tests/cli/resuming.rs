@@ -1,14 +1,12 @@
 //! Interrupted and resumed runs, through the real binary: the same bits and files as an uninterrupted run, and clear
 //! messages for checkpoints that do not fit.
 
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use support::{BLOCK, Told, Workshop, changed};
+use crate::support::{BLOCK, Told, Workshop, changed};
 
 /// A bent block with an output of every kind and a checkpoint every 0.02 s, of an element, with or without history.
 fn bent(element: &str, run: &str, relaxing: bool) -> String {

@@ -1,14 +1,12 @@
 //! Labels and meshes of segmented images, from the command line and from scenes, through the real binary. The images are
 //! small and written here; one of a patient is used where `PLIANT_DATA` names a folder that has it.
 
-mod support;
-
 use std::io::Write;
 use std::path::Path;
 
+use crate::support::{Told, Workshop};
 use pliant_geometry::io;
 use serde_json::Value;
-use support::{Told, Workshop};
 
 /// Voxels along each side, of 1 mm.
 const SIDE: usize = 40;

@@ -1,10 +1,8 @@
 //! Labels by name, and pictures of labels, through the real binary: a segmentation with names becomes a mesh that keeps them, values and
 //! selections of a scene go by name, and pictures show and hide labels.
 
-mod support;
-
+use crate::support::{Told, Workshop};
 use pliant_geometry::{Labels, io};
-use support::{Told, Workshop};
 
 /// A block of 24 × 12 × 12 voxels of 1 mm as 3D Slicer writes it: the left half is liver, the right one spleen, and a tumour lies in the
 /// middle on a separate layer.
@@ -142,8 +140,8 @@ mod with_pictures {
 
     use pliant_picture::{Picture, label_colour};
 
-    use super::support::has_graphics_processor;
     use super::*;
+    use crate::support::has_graphics_processor;
 
     /// Pixels with the exact colour of a label: those of its swatch.
     fn swatches(workshop: &Workshop, file: &str) -> [usize; 4] {

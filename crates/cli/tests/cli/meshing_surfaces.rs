@@ -1,12 +1,10 @@
 //! Tets and hexes of closed surfaces, and what `pliant info` measures on surfaces, through the real binary.
 
-mod support;
-
+use crate::support::{BLOCK, Told, Workshop};
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_meshing::{Pattern, Sheet, sphere};
 use serde_json::Value;
-use support::{BLOCK, Told, Workshop};
 
 /// Radius of the balls [mm].
 const RADIUS: f64 = 15.0;

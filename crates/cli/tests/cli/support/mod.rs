@@ -1,8 +1,5 @@
 //! A folder with a scene, the real binary run in it, and its output.
 
-// Each test binary uses its own part of this.
-#![allow(dead_code)]
-
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};

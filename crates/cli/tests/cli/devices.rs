@@ -1,9 +1,7 @@
 //! Scenes on a GPU, through the real binary: their device, rejections and messages. Without an adapter, the tests that
 //! need one are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
-mod support;
-
-use support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
+use crate::support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
 
 /// [`BLOCK`] on a device.
 fn on(device: &str) -> Workshop {

@@ -1,8 +1,6 @@
 //! Values set on the command line, through the real binary.
 
-mod support;
-
-use support::{BLOCK, Told, Workshop, changed};
+use crate::support::{BLOCK, Told, Workshop, changed};
 
 fn check(workshop: &Workshop, set: &[&str]) -> Told {
     let options: Vec<&str> = set.iter().flat_map(|set| ["--set", *set]).collect();

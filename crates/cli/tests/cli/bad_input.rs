@@ -1,12 +1,10 @@
 //! Every bad input that the project promises to reject, through the real binary: the exit code, the user's own line,
 //! the wrong number and a remedy, nothing written, and one JSON object.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
-use support::{BLOCK, CUBE, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
+use crate::support::{BLOCK, CUBE, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
 
 /// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the folder does
 /// not change.

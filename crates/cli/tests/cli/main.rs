@@ -1,0 +1,24 @@
+//! The real binary: words, exit codes, files. One program for all files here, so that they are linked once; run those of a file with
+//! `cargo test -p pliant --test cli running::`.
+
+mod bad_images;
+mod bad_input;
+mod bench;
+mod devices;
+mod label_names;
+mod meshing_images;
+mod meshing_surfaces;
+mod pictures;
+mod reproduce;
+mod resuming;
+mod running;
+mod setting;
+mod shells;
+mod shells_of_surfaces;
+mod support;
+#[cfg(unix)]
+mod surroundings;
+mod sweeping;
+#[cfg(all(feature = "viewer", target_os = "linux"))]
+mod window;
+mod words;

@@ -1,0 +1,7 @@
+//! Scenes without the binary. One program for all files here; run those of a file with `cargo test -p pliant-scene --test scene grips::`.
+
+mod corpus;
+mod grips;
+mod niftysim;
+mod participants;
+mod static_solids;
