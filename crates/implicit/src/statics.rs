@@ -7,13 +7,12 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
-
-use crate::error::SolveError;
-use crate::facet::Tangent;
-use crate::linear::{LinearSolver, dot};
 use pliant_mechanics::load::{Load, LoadKind};
 
 use crate::assembly::{Assembly, Spring};
+use crate::error::SolveError;
+use crate::facet::Tangent;
+use crate::linear::{LinearSolver, dot};
 use crate::sparse::NONE;
 use crate::state::State;
 use crate::system::{Phases, System};
@@ -267,8 +266,8 @@ impl Statics {
         }
         if matches!(control, Control::Volume { .. }) {
             for load in self.system.model.loads.iter().filter(|load| load.controlled) {
-                if let LoadKind::ShellPressure { facets: cells, .. } = &load.kind {
-                    self.system.model.check_closed(cells)?;
+                if let LoadKind::ShellPressure { facets, .. } = &load.kind {
+                    self.system.model.check_closed(facets)?;
                 }
             }
         }
@@ -486,9 +485,9 @@ impl Statics {
             Control::Volume { volume } => {
                 let model = Arc::clone(&self.system.model);
                 for load in model.loads.iter().filter(|load| load.controlled) {
-                    let LoadKind::ShellPressure { facets: cells, .. } = &load.kind else { continue };
-                    for &cell in cells {
-                        let nodes = model.facets[cell as usize].nodes;
+                    let LoadKind::ShellPressure { facets, .. } = &load.kind else { continue };
+                    for &facet in facets {
+                        let nodes = model.facets[facet as usize].nodes;
                         let x = nodes.map(|node| state.position[node as usize]);
                         for i in 0..3 {
                             let slope = x[(i + 1) % 3].cross(&x[(i + 2) % 3]) / 6.0;
@@ -566,7 +565,7 @@ fn slack(model: &Assembly, system: &System) -> (Vec<u32>, f64) {
 /// The volume [m³] that the facets of controlled pressures enclose.
 fn controlled_volume(model: &Assembly, state: &State) -> f64 {
     let volume = |load: &Load| match &load.kind {
-        LoadKind::ShellPressure { facets: cells, .. } => model.enclosed_volume(cells, &state.position),
+        LoadKind::ShellPressure { facets, .. } => model.enclosed_volume(facets, &state.position),
         _ => 0.0,
     };
     model.loads.iter().filter(|load| load.controlled).map(volume).sum()

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{SMatrix, SVector, Vector3};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, Spread, face_areas};
-use pliant_mechanics::mapping::Mapping;
+use pliant_mechanics::mapping::{Configuration, Mapping};
 use pliant_mechanics::model::{Motion, Solid};
 use pliant_mechanics::tensor::scale;
 use rayon::prelude::*;
@@ -119,13 +119,10 @@ impl System {
             let stars = stars.iter().flat_map(|stars| &stars.nodes).map(|nodes| places(nodes));
             [cells.collect(), stars.collect()]
         };
-        let of_load = |load: &Load| match &load.kind {
-            LoadKind::Pressure { faces, .. } => {
-                Some(faces.iter().map(|face| places(corners(face))).collect())
-            }
-            _ => None,
+        let of_load = |(_, faces, _): (&Load, &Vec<Face>, f64)| {
+            faces.iter().map(|face| places(corners(face))).collect()
         };
-        system.face_places = model.loads.iter().filter_map(of_load).collect();
+        system.face_places = pressing(&model).map(of_load).collect();
         system.solid_places = model.solids.iter().zip(&system.stars).map(of_solid).collect();
         system.coupling = vec![0.0; system.equations.len()];
         system.workspace = Workspace::new(solver, &system.equations, matrix);
@@ -282,18 +279,25 @@ impl System {
                     target[6 * node as usize + first + c] += factor * force[c];
                 }
             };
+            let points =
+                load.surface.map(|surface| CarriedPoints::new(&model, self.surface.as_ref(), surface));
+            let mut apply = |at: u32, force: [f64; 3]| match points {
+                None => add(at, 0, force),
+                Some(points) => points.add_force(state, at as usize, force, &mut |node, force, moment| {
+                    add(node, 0, force);
+                    add(node, 3, moment);
+                }),
+            };
             match &load.kind {
-                LoadKind::Forces(forces) => {
-                    for &(at, force) in forces {
-                        match load.surface {
-                            None => add(at, 0, force),
-                            Some(surface) => {
-                                let mapping = CarriedPoints::new(&model, self.surface.as_ref(), surface);
-                                mapping.add_force(state, at as usize, force, &mut |node, force, moment| {
-                                    add(node, 0, force);
-                                    add(node, 3, moment);
-                                });
-                            }
+                LoadKind::Forces(forces) => forces.iter().for_each(|&(at, force)| apply(at, force)),
+                LoadKind::Pressure { faces, pressure } => {
+                    let position = |at: u32| match points {
+                        None => Configuration::position(state, at),
+                        Some(points) => points.position(state, at as usize),
+                    };
+                    for face in faces {
+                        for (at, area) in face_areas(face, position) {
+                            apply(at, scale(area, -*pressure));
                         }
                     }
                 }
@@ -301,14 +305,6 @@ impl System {
                 LoadKind::Gravity { body, acceleration } => {
                     for node in model.bodies[*body].nodes.clone() {
                         add(node, 0, scale(*acceleration, model.mass[node as usize]));
-                    }
-                }
-                LoadKind::Pressure { faces, pressure } => {
-                    let place = |node: u32| -> [f64; 3] { state.position[node as usize].into() };
-                    for face in faces {
-                        for (node, area) in face_areas(face, place) {
-                            add(node, 0, scale(area, -*pressure));
-                        }
                     }
                 }
                 LoadKind::ShellPressure { facets, pressure, spread } => {
@@ -442,11 +438,7 @@ impl System {
     /// the faces close or end at held nodes.
     fn press_faces(&mut self, state: &State, time: f64, moved: &[f64]) {
         let model = Arc::clone(&self.model);
-        let pressing = model.loads.iter().filter_map(|load| match &load.kind {
-            LoadKind::Pressure { faces, pressure } => Some((load, faces, pressure)),
-            _ => None,
-        });
-        for (number, (load, faces, pressure)) in pressing.enumerate() {
+        for (number, (load, faces, pressure)) in pressing(&model).enumerate() {
             let places = std::mem::take(&mut self.face_places[number]);
             let factor = if load.controlled { state.load_factor } else { 1.0 } * load.curve.value(time);
             for (face, places) in faces.iter().zip(&places) {
@@ -581,6 +573,14 @@ impl System {
             *value = components[component as usize];
         }
     }
+}
+
+/// The pressures on faces of solids. How those on carried surfaces change with the state is left out of the stiffness.
+fn pressing(model: &Assembly) -> impl Iterator<Item = (&Load, &Vec<Face>, f64)> {
+    model.loads.iter().filter_map(|load| match &load.kind {
+        LoadKind::Pressure { faces, pressure } if load.surface.is_none() => Some((load, faces, *pressure)),
+        _ => None,
+    })
 }
 
 /// The nodes of a face of a solid.

@@ -34,8 +34,9 @@ impl Grip {
 
     /// The stiffness [N/m] up to which such a spring leaves explicit steps [s] of 0.9 of the critical time step stable. It adds at most
     /// k Σ wᵢ²/mᵢ to the squares of the angular frequencies (Weyl), whose limit is 4/Δt² and of which 0.81 are taken.
-    pub fn stiffest(&self, model: &Model, step: f64) -> f64 {
-        let mobility: f64 = self.weights().map(|(node, w)| w * w / model.inertia(node as usize)).sum();
+    pub fn stiffest<S: Configuration>(&self, state: &S, model: &Model, step: f64) -> f64 {
+        let inertia = |node: u32| [model.inertia(node as usize), 0.0];
+        let mobility = self.mobility(state, 0, [1.0, 0.0, 0.0], &inertia);
         ROOM * 4.0 / (step * step * mobility)
     }
 

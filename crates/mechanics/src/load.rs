@@ -19,7 +19,7 @@ pub struct Load {
     pub kind: LoadKind,
     /// Factor over time.
     pub curve: Curve,
-    /// The carried surface the node numbers refer to; `None`: the model's own nodes.
+    /// The carried surface that forces and pressures number their points in; `None`: the model's own nodes.
     pub surface: Option<usize>,
     /// Whether a static solver finds its size, as a control asks.
     pub controlled: bool,

@@ -14,7 +14,7 @@ pub struct ImplicitBodies {
     /// The cells of each body, in the order of the bodies.
     pub cells: Vec<BodyCells>,
     /// What a static run prescribes instead of the size of a load.
-    pub control: Option<Control>,
+    pub control: Option<RunControl>,
     /// The state that a run starts from.
     pub start: State,
     /// The curved surface of the shells, if something is carried by it.
@@ -32,7 +32,7 @@ pub enum BodyCells {
 
 /// A control of a whole static run.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Control {
+pub enum RunControl {
     /// A component (0 to 2) of a node moves by a distance [m] in all.
     Displacement {
         /// The node.

@@ -13,7 +13,7 @@ use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::{Energies, fingerprint};
 
-use crate::bodies::{Control, ImplicitBodies, Stop};
+use crate::bodies::{ImplicitBodies, RunControl, Stop};
 use crate::failure::Failure;
 use crate::instant::{CellsNow, Effort, Instant};
 use crate::kept::{ImplicitState, Iterated, Kept, PlainState};
@@ -349,7 +349,7 @@ impl Implicit {
         if control.is_some() {
             self.state.time = until;
         }
-        if let Some(Control::ArcLength { stop, .. }) = self.bodies.control {
+        if let Some(RunControl::ArcLength { stop, .. }) = self.bodies.control {
             self.path.go_on(self.state.load_factor);
             self.path.ended = self.path.end(&stop, &self.state, &self.bodies.model);
         }
@@ -400,13 +400,13 @@ impl Effort {
 }
 
 /// What the load step of a number (counted from 1) prescribes.
-fn part_of(control: Control, number: u64, of: u64) -> pliant_implicit::Control {
+fn part_of(control: RunControl, number: u64, of: u64) -> pliant_implicit::Control {
     match control {
-        Control::Displacement { node, component, by } => {
+        RunControl::Displacement { node, component, by } => {
             pliant_implicit::Control::Displacement { node, component, by: by / of as f64 }
         }
-        Control::ArcLength { length, .. } => pliant_implicit::Control::ArcLength { length },
-        Control::Volume { from, to } => {
+        RunControl::ArcLength { length, .. } => pliant_implicit::Control::ArcLength { length },
+        RunControl::Volume { from, to } => {
             pliant_implicit::Control::Volume { volume: from + (to - from) * number as f64 / of as f64 }
         }
     }

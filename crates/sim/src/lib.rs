@@ -54,7 +54,7 @@ mod start;
 mod steps;
 mod words;
 
-pub use bodies::{BodyCells, Control, ImplicitBodies, Stop};
+pub use bodies::{BodyCells, ImplicitBodies, RunControl, Stop};
 #[cfg(feature = "gpu")]
 pub use device::{MappedPoint, OnDevice};
 pub use failure::{FailedLoadStep, Failure};

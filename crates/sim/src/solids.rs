@@ -94,6 +94,11 @@ impl<R: Numeric> Solids<R> {
         Ok(Self { model: Arc::clone(&part.model), step: part.steps.step, state, solver })
     }
 
+    /// Where the nodes are.
+    fn nodes(&self) -> Displaced<'_, R> {
+        Displaced { rest: &self.model.rest, displacement: &self.state.displacement, velocity: &[] }
+    }
+
     /// Takes up what a restart needs beside the state; of a run with other steps how these were counted, and their length [s].
     pub(crate) fn resume(&mut self, memory: Memory<R>, steps: Option<(Clock, f64)>) {
         if let Some((clock, step)) = steps {
@@ -206,12 +211,11 @@ impl<R: Numeric> Participant for Solids<R> {
     }
 
     fn stiffest(&self, grip: &Grip) -> f64 {
-        grip.stiffest(&self.model, self.step)
+        grip.stiffest(&self.nodes(), &self.model, self.step)
     }
 
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
-        let displacement = &self.state.displacement;
-        let nodes = Displaced { rest: &self.model.rest, displacement, velocity: &[] };
+        let nodes = self.nodes();
         [grip.position(&nodes, 0), grip.force(&nodes)]
     }
 

@@ -21,7 +21,7 @@ use pliant_geometry::{Labels, Mesh, Surface, SurfaceLocator, SurfacePoint, Vecto
 use pliant_implicit::{Assembly, CurvedSurface};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
-use pliant_sim::{BodyCells, Control, ImplicitBodies};
+use pliant_sim::{BodyCells, ImplicitBodies, RunControl};
 
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, SceneErrors};
@@ -176,7 +176,7 @@ struct Builder<'s> {
     assembly: Assembly,
     /// Those of each body that an implicit solver advances.
     cells: Vec<BodyCells>,
-    control: Option<Control>,
+    control: Option<RunControl>,
     /// The curved surface of the shells, if something is carried by it.
     curved: Option<CurvedSurface>,
     bodies: Vec<BuiltBody>,

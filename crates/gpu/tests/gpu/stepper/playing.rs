@@ -27,8 +27,10 @@ fn grips(model: &Model, step: f64) -> Vec<Grip> {
     (nodes.into_iter().zip([[1e-3, -2e-3, 3e-3], [0.0; 3]]))
         .map(|(nodes, by)| {
             let mut grip = Grip { nodes, ..Grip::default() };
-            grip.stiffness = 0.1 * grip.stiffest(model, step);
-            let point = grip.position(&displaced(model, &vec![[0.0; 3]; model.node_count()]), 0);
+            let rest = vec![[0.0; 3]; model.node_count()];
+            let nodes = displaced(model, &rest);
+            grip.stiffness = 0.1 * grip.stiffest(&nodes, model, step);
+            let point = grip.position(&nodes, 0);
             grip.place = [0, 1, 2].map(|c| point[c] + by[c]);
             grip
         })

@@ -7,7 +7,7 @@ use pliant_implicit::Resolution;
 use pliant_implicit::element::Membrane;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
-use pliant_sim::{BodyCells, Control, Stop, counted, number};
+use pliant_sim::{BodyCells, RunControl, Stop, counted, number};
 
 use crate::assemble::{Builder, SCENE, Target, suggestion};
 use crate::diagnostic::Diagnostic;
@@ -325,9 +325,9 @@ impl Builder<'_> {
         }
         let control = match (&table.displacement, table.arc_length, table.volume) {
             (Some(wanted), _, _) => (self.controlled_node(wanted, &[&path[..], &["displacement"]].concat()))
-                .map(|(node, component, by)| Control::Displacement { node, component, by }),
+                .map(|(node, component, by)| RunControl::Displacement { node, component, by }),
             (_, Some(length), _) => {
-                self.stop(table.stop.as_ref()).map(|stop| Control::ArcLength { length, stop })
+                self.stop(table.stop.as_ref()).map(|stop| RunControl::ArcLength { length, stop })
             }
             (_, _, Some(volume)) => self.controlled_volume(&table.load, volume),
             _ => None,
@@ -378,7 +378,7 @@ impl Builder<'_> {
         Some((node, component, wanted.by))
     }
 
-    fn controlled_volume(&mut self, load: &str, to: f64) -> Option<Control> {
+    fn controlled_volume(&mut self, load: &str, to: f64) -> Option<RunControl> {
         let pressed =
             self.assembly.loads.iter().filter(|known| known.name == load).find_map(|load| match &load.kind {
                 LoadKind::ShellPressure { facets, .. } => Some(facets),
@@ -394,7 +394,7 @@ impl Builder<'_> {
         match self.assembly.check_closed(cells) {
             Ok(()) => {
                 let from = self.assembly.rest_volume(cells);
-                Some(Control::Volume { from, to })
+                Some(RunControl::Volume { from, to })
             }
             Err(error) => {
                 let help = "close the surface, or press on all of it";
