@@ -177,7 +177,7 @@ impl Organ {
     fn motion(&self, mesh: &Mesh) -> (Assembly, State) {
         let mut model = self.model(mesh);
         model.model_mut().loads[0].curve = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.5 };
-        model.mass_damping = 20.0;
+        model.model_mut().bodies[0].damping = 20.0;
         let linear = LinearSolver::ConjugateGradients {
             tolerance: 1e-6,
             iterations: 5000,
@@ -351,7 +351,7 @@ fn valve_leaflets_close() {
         };
         let course = Curve { shape: Shape::Table(curve.clone()), from: 0.0, to: 1.0 };
         model.model_mut().loads.push(Load::new("valve", kind, course));
-        model.mass_damping = 2.0;
+        model.model_mut().bodies[0].damping = 2.0;
         let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(step)).unwrap();
         let mut state = State::at_rest(&model);
         let start = Instant::now();

@@ -251,11 +251,12 @@ fn an_explicit_cylinder_comes_to_rest_in_equilibrium() {
     let model = &mut cylinder.model;
     model.model_mut().loads[0].curve.shape = pliant_mechanics::curve::Shape::Hold;
     // A quarter of the breathing frequency √(E/ρ)/R.
-    model.mass_damping = 0.5 * (1.0_f64 / 1000.0).sqrt();
+    let damping = 0.5 * (1.0_f64 / 1000.0).sqrt();
+    model.model_mut().bodies[0].damping = damping;
     let step = 0.9 * Explicit::stable_step(model);
     let mut solver = Explicit::new(model.clone(), step).unwrap();
     let mut state = State::at_rest(model);
-    let steps = (40.0 / model.mass_damping / step) as usize;
+    let steps = (40.0 / damping / step) as usize;
     for _ in 0..steps {
         solver.advance(&mut state).unwrap();
     }

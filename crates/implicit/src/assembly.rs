@@ -33,8 +33,6 @@ pub struct Assembly {
     pub corner_normals: Vec<[u32; 3]>,
     /// Rotary inertia [kg m²], the same about every axis, one per node.
     pub rotary_inertia: Vec<f64>,
-    /// Mass-proportional damping [1/s].
-    pub mass_damping: f64,
     /// Stiffness-proportional damping [s].
     pub stiffness_damping: f64,
     /// Springs from nodes to points.
@@ -153,6 +151,15 @@ impl Assembly {
     /// Where all nodes are at rest [m].
     pub fn places(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         self.rest.iter().map(|&place| Vector3::from(place))
+    }
+
+    /// The mass-proportional damping [1/s] of each node: that of its body.
+    pub fn damping(&self) -> Vec<f64> {
+        let mut damping = vec![0.0; self.rest.len()];
+        for body in &self.bodies {
+            damping[body.nodes.start as usize..body.nodes.end as usize].fill(body.damping);
+        }
+        damping
     }
 
     /// Adds a shell: its triangles are made to face one side (each connected part keeps the side of most of its triangles),

@@ -94,6 +94,8 @@ pub struct BackwardEuler {
     system: System,
     settings: DynamicSettings,
     length: f64,
+    /// Mass-proportional damping [1/s] of each node.
+    damping: Vec<f64>,
     round_off: f64,
     pending: Vec<f64>,
     /// Translations and rotation vectors since the start of the step, six a node.
@@ -161,6 +163,7 @@ impl BackwardEuler {
         Ok(Self {
             settings,
             length: model.mean_edge(),
+            damping: model.damping(),
             round_off: model.round_off(),
             pending: vec![0.0; all],
             moved: vec![0.0; all],
@@ -349,7 +352,7 @@ impl BackwardEuler {
                 };
                 let before = before + Course::part(rate, at + first);
                 let mut momentum =
-                    (mass / (h * h)) * (moved - h * before) + (model.mass_damping * mass / h) * moved;
+                    (mass / (h * h)) * (moved - h * before) + (self.damping[node] * mass / h) * moved;
                 if first == 3 {
                     momentum = spin_to_vector(&part(&self.moved, first)).tr_mul(&momentum);
                 }
@@ -388,9 +391,9 @@ impl BackwardEuler {
         let (model, h) = (Arc::clone(&self.system.model), self.course.step);
         let factor = model.stiffness_damping / h;
         self.system.matrix.value.iter_mut().zip(&self.damper).for_each(|(k, d)| *k += factor * d);
-        let rate = 1.0 / (h * h) + model.mass_damping / h;
         for (equation, &component) in self.system.equations.component.iter().enumerate() {
             let node = component as usize / 6;
+            let rate = 1.0 / (h * h) + self.damping[node] / h;
             let mass = if component % 6 < 3 { model.mass[node] } else { model.rotary_inertia[node] };
             self.system.matrix.add_diagonal(equation, rate * mass);
         }
@@ -407,6 +410,8 @@ impl BackwardEuler {
 pub struct Explicit {
     forces: Forces,
     step: f64,
+    /// Mass-proportional damping [1/s] of each node.
+    damping: Vec<f64>,
     pending: Vec<f64>,
 }
 
@@ -445,7 +450,12 @@ impl Explicit {
                 "damping by stiffness needs the implicit solver; damp by mass instead",
             ));
         }
-        Ok(Self { pending: vec![0.0; 6 * model.rest.len()], forces: Forces::new(model.clone()), step })
+        Ok(Self {
+            pending: vec![0.0; 6 * model.rest.len()],
+            damping: model.damping(),
+            forces: Forces::new(model),
+            step,
+        })
     }
 
     /// Makes one step: [`evaluate`](Self::evaluate), then [`go`](Self::go).
@@ -481,15 +491,13 @@ impl Explicit {
         let (h, model) = (self.step, Arc::clone(&self.forces.system.model));
         let system = &self.forces.system;
         system.prescribed(state.time, state.time + h, &mut self.pending);
-        // (1 + αh/2) v⁺ = (1 − αh/2) v + h f/m.
-        let (kept, gained) = {
-            let half = 0.5 * model.mass_damping * h;
-            ((1.0 - half) / (1.0 + half), h / (1.0 + half))
-        };
-        for node in 0..model.rest.len() {
+        for (node, damping) in self.damping.iter().enumerate() {
             if model.mass[node] == 0.0 {
                 continue;
             }
+            // (1 + αh/2) v⁺ = (1 − αh/2) v + h f/m.
+            let half = 0.5 * damping * h;
+            let (kept, gained) = ((1.0 - half) / (1.0 + half), h / (1.0 + half));
             let velocity = |first: usize, now: Vector3<f64>, mass: f64| {
                 Vector3::from_fn(|c, _| {
                     let at = 6 * node + first + c;
@@ -782,7 +790,7 @@ mod tests {
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut rest, 1.0).unwrap();
         assert!(rest.position[16].z < -0.2, "{}", rest.position[16]);
         // About critical.
-        model.mass_damping = 2.0 * first_frequency(THIN);
+        model.model_mut().bodies[0].damping = 2.0 * first_frequency(THIN);
         model.stiffness_damping = 0.01;
         let iterative = |preconditioner| LinearSolver::ConjugateGradients {
             tolerance: 1e-8,
@@ -810,7 +818,7 @@ mod tests {
     fn real_time_steps_follow_the_converged_motion() {
         let mut model = clamped(THIN);
         weigh(&mut model, 0.5);
-        model.mass_damping = 1.0;
+        model.model_mut().bodies[0].damping = 1.0;
         let run = |settings: DynamicSettings| {
             let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
             let mut state = State::at_rest(&model);
@@ -822,5 +830,38 @@ mod tests {
         let settings = DynamicSettings::new(0.01);
         let (converged, quick) = (run(settings), run(settings.real_time(LinearSolver::Direct)));
         assert!((converged - quick).norm() < 0.02 * converged.z.abs(), "{converged} {quick}");
+    }
+
+    /// Two triangles that fly apart, each damped as its body says: backward Euler slows the one down by 1/(1 + α h) a step, central
+    /// differences by (1 − α h/2)/(1 + α h/2), and leave the other alone.
+    #[test]
+    fn bodies_are_damped_each_by_itself() {
+        let triangle =
+            |x: f64| [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[a, b]| Vector3::new(x + a, b, 0.0));
+        let mut model = Assembly::new("free", triangle(0.0));
+        model.add_body("slow", triangle(5.0));
+        for (name, first) in [("free", 0), ("slow", 3)] {
+            let material = Wall { elastic: Elasticity { young: 1e3, poisson: 0.3 }, density: 1000.0 };
+            model.add_shell(&Shell::new(name, vec![[first, first + 1, first + 2]], 0.1, material)).unwrap();
+        }
+        let alpha = 2.0;
+        model.model_mut().bodies[1].damping = alpha;
+        let flying = || {
+            let mut state = State::at_rest(&model);
+            state.velocity.fill(Vector3::new(0.0, 0.0, 0.5));
+            state
+        };
+        let slowed = |state: &State, ratio: f64| {
+            assert!((state.velocity[0].z - 0.5).abs() < 1e-9, "{}", state.velocity[0]);
+            assert!((state.velocity[4].z / 0.5 - ratio.powi(10)).abs() < 1e-9, "{}", state.velocity[4]);
+        };
+        let (mut state, h) = (flying(), 0.05);
+        let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(h)).unwrap();
+        (0..10).for_each(|_| drop(solver.advance(&mut state).unwrap()));
+        slowed(&state, 1.0 / (1.0 + alpha * h));
+        let (mut state, h) = (flying(), 0.5 * Explicit::stable_step(&model));
+        let mut solver = Explicit::new(model.clone(), h).unwrap();
+        (0..10).for_each(|_| solver.advance(&mut state).unwrap());
+        slowed(&state, (1.0 - 0.5 * alpha * h) / (1.0 + 0.5 * alpha * h));
     }
 }

@@ -706,7 +706,7 @@ fn shells_and_tets_move_together() {
     let (bare, skinned) = (sag(&build(false)), sag(&both));
     println!("sag {bare:.3}, with skin {skinned:.3}");
     assert!(skinned < 0.0 && bare < 1.05 * skinned, "{bare} {skinned}");
-    both.mass_damping = 2.0;
+    both.model_mut().bodies[0].damping = 2.0;
     let mut state = State::at_rest(&both);
     let mut solver = BackwardEuler::new(both.clone(), DynamicSettings::new(0.5)).unwrap();
     for _ in 0..100 {

@@ -807,3 +807,39 @@ impl Model {
         amplitudes
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Shape;
+
+    /// Two constraints of one node: what holds it does not turn it, and turning it twice in the same way is no contradiction.
+    #[test]
+    fn nodes_are_turned_in_one_way_only() {
+        let ramp = |to| Curve { shape: Shape::Ramp, from: 0.0, to };
+        let turn = |angle: f64, to: f64| Motion::turn([0.0; 3], [0.0, angle, 0.0], 1, ramp(to));
+        let with = |first: Motion, second: Motion| {
+            let mut model = Model::default();
+            model.add_body("wall", &[[0.0; 3], [1.0, 0.0, 0.0]]);
+            for (name, motion) in [("clamp", first), ("hand", second)] {
+                let components = [false, false, false, true, true, true];
+                model.constraints.push(Constraint { name: name.into(), nodes: vec![1], components, motion });
+            }
+            model.constrained_components().map(|_| ())
+        };
+        for same in [Motion::Fixed, turn(0.3, 1.0)] {
+            assert_eq!(with(same.clone(), same), Ok(()));
+        }
+        assert_eq!(with(Motion::Fixed, turn(0.0, 1.0)), Ok(()));
+        for (first, second) in [
+            (Motion::Fixed, turn(0.3, 1.0)),
+            (turn(0.3, 1.0), turn(0.2, 1.0)),
+            (turn(0.3, 1.0), turn(0.3, 2.0)),
+        ] {
+            let told = with(first, second).unwrap_err().to_string();
+            let wanted =
+                "`clamp` and `hand` both prescribe the rotation about x of node 1 of `wall`, and differently";
+            assert_eq!(told, wanted);
+        }
+    }
+}

@@ -8,7 +8,7 @@ use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
-use pliant_mechanics::load::{Load, LoadKind};
+use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Cells, Material, Motion, Solid};
 use pliant_sim::{Method, Part, Precision, Simulation, State, World};
 
@@ -192,5 +192,24 @@ fn a_load_step_tells_how_far_it_is() {
         let last = told.last().unwrap();
         assert!((last.iteration.span[1] - simulation.time()).abs() < 1e-15, "{last:?}");
         assert!(last.iteration.residual > last.tolerance);
+    }
+}
+
+/// Loads of shells on solids that an explicit or quasi-static solver steps are refused by name.
+#[test]
+fn solids_refuse_loads_of_shells() {
+    for kind in [
+        LoadKind::moment([4], [0.0, 0.0, 1.0]),
+        LoadKind::ShellPressure { facets: vec![0], pressure: 1.0, spread: Spread::Lumped },
+    ] {
+        let mut model = cube(1000.0);
+        model.loads.push(Load::new("twist", kind, rising()));
+        for part in [
+            Part::explicit("cube", model.clone(), DURATION).unwrap(),
+            Part::quasi_static("cube", model, DURATION, 1),
+        ] {
+            let told = Simulation::new(part).err().unwrap().to_string();
+            assert!(told.contains("`twist` is a load of shells"), "{told}");
+        }
     }
 }

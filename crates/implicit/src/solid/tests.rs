@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, samples};
-use pliant_mechanics::load::NO_NODE;
-use pliant_mechanics::load::{Load, LoadKind};
-use pliant_mechanics::model::{Averaging, Cells, Constraint, Material, Motion, Solid};
+use pliant_mechanics::load::{Load, LoadKind, NO_NODE};
+use pliant_mechanics::mapping::Weights;
+use pliant_mechanics::model::{Averaging, Cells, Constraint, Material, Motion, Solid, Surface};
 use pliant_mechanics::prony::{Prony, PronyTerm, PronyUpdate};
 use pliant_testing::Random;
 use serde_json::json;
@@ -176,6 +176,42 @@ fn pressures_on_faces_have_their_stiffness() {
             let found = -(a - b) / (2.0 * h);
             assert!((found - predicted).abs() < 1e-7 * largest, "{element}: {found} for {predicted}");
         }
+    }
+}
+
+/// Forces and pressures on a surface that the nodes of a side carry, numbered otherwise, act as those on the side itself; a point amid
+/// four nodes gives a quarter to each.
+#[test]
+fn loads_on_carried_surfaces_act_through_their_mapping() {
+    let loads = |load: Load| {
+        let mut model = block("hex8", law("neo-hookean"), [1, 1, 1], [0.1; 3]);
+        let one = [[(6, 1.0)], [(7, 1.0)], [(5, 1.0)], [(4, 1.0)]];
+        let middle = [4, 5, 6, 7].map(|node| (node, 0.25));
+        let rows = one.iter().map(|row| &row[..]).chain([&middle[..]]);
+        let mapping = Weights::from_rows(rows);
+        model.model_mut().surfaces.push(Surface { name: "top".into(), body: 0, rest: vec![], mapping });
+        model.model_mut().loads.push(load);
+        let mut state = State::at_rest(&model);
+        let mut random = Random::new(3);
+        state.position.iter_mut().for_each(|x| *x += 0.01 * Vector3::from(random.vector()));
+        let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
+        let still = vec![0.0; 6 * model.rest.len()];
+        system.evaluate(&state, 1.0, Some((Tangent::Full, &still))).unwrap();
+        system.external
+    };
+    let load = |kind| Load::new("load", kind, Curve { shape: Shape::Hold, from: 0.0, to: 0.0 });
+    let carried = |kind| Load { surface: Some(0), ..load(kind) };
+    let press = |face| LoadKind::Pressure { faces: vec![face], pressure: 1e5 };
+    let force = [0.1, -0.2, 0.3];
+    for (direct, through) in [
+        (load(press([4, 5, 7, 6])), carried(press([3, 2, 1, 0]))),
+        (load(LoadKind::force([5], force)), carried(LoadKind::force([2], force))),
+        (load(LoadKind::force(4..8, force.map(|f| 0.25 * f))), carried(LoadKind::force([4], force))),
+    ] {
+        let (direct, through) = (loads(direct), loads(through));
+        assert!(direct.iter().any(|f| f.abs() > 0.01));
+        let off = direct.iter().zip(&through).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-12, "{off}");
     }
 }
 

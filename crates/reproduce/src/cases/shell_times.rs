@@ -76,7 +76,7 @@ fn tube(shells: usize) -> Result<Assembly, CaseError> {
     let pulse = (0..40).map(|i| (0.25 * f64::from(i), f64::from(i % 2))).collect();
     let curve = Course { shape: Shape::Table(pulse), from: 0.0, to: 1.0 };
     model.model_mut().loads.push(Load::new("pressure", kind, curve));
-    model.mass_damping = 1.0;
+    model.model_mut().bodies[0].damping = 1.0;
     Ok(model)
 }
 

@@ -93,8 +93,7 @@ impl Builder<'_> {
                 let help = "leave it out, or set `model = \"solid\"`";
                 self.error(&["body", name, "fraction"], message, "has no effect", help);
             }
-            (self.assembly.mass_damping, self.assembly.stiffness_damping) =
-                (table.damping, table.stiffness_damping);
+            self.assembly.stiffness_damping = table.stiffness_damping;
             if let Some(cells) = self.add_shell(draft, first) {
                 self.cells.push(cells);
             }
@@ -110,8 +109,7 @@ impl Builder<'_> {
             }
         }
         if self.scene.is_implicit() {
-            (self.assembly.mass_damping, self.assembly.stiffness_damping) =
-                (table.damping, table.stiffness_damping);
+            self.assembly.stiffness_damping = table.stiffness_damping;
             self.check_solids(name, before);
             self.cells.push(pliant_sim::BodyCells::Solids);
         }

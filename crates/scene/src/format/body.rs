@@ -61,8 +61,7 @@ pub struct BodyTable {
     /// stiffness and mass are so much smaller, but never less than a tenth. If not given, `fraction` of `immersed-hexes`.
     #[serde(default)]
     pub fraction: Option<String>,
-    /// Mass-proportional damping [1/s]. All shells of a participant have the same, and all bodies with the solvers `implicit` and
-    /// `static`.
+    /// Mass-proportional damping [1/s].
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub damping: f64,

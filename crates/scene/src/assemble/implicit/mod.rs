@@ -62,14 +62,11 @@ impl Builder<'_> {
             let help = "leave it out; their step is compared with the critical one at rest before the run";
             self.error(&scene.run_at("on-unstable"), message, "not for these bodies", help);
         }
-        for key in ["damping", "stiffness-damping"] {
-            let value =
-                |body: &BodyTable| if key == "damping" { body.damping } else { body.stiffness_damping };
-            if let Some((name, _)) = scene.bodies.iter().find(|(_, body)| value(body) != value(table)) {
-                let message = format!("`{name}` and `{first}` have different `{key}`");
-                let help = "bodies of a participant share one value with this solver";
-                self.error(&["body", name, key], message, "another", help);
-            }
+        let other = |(_, body): &&(String, BodyTable)| body.stiffness_damping != table.stiffness_damping;
+        if let Some((name, _)) = scene.bodies.iter().find(other) {
+            let message = format!("`{name}` and `{first}` have different `stiffness-damping`");
+            let help = "bodies of a participant share one value with this solver";
+            self.error(&["body", name, "stiffness-damping"], message, "another", help);
         }
         if table.stiffness_damping > 0.0 && scene.run.solver != SolverName::Implicit {
             let message = format!(
