@@ -64,3 +64,35 @@ write("ellipsoid.json", {
     "T4": solutions["T4"].round(12).tolist(),
     "ANP": solutions["ANP_BonetBurton"].round(9).tolist(),
 })
+
+# From the reference set `coupling`, if its folder is given as second argument.
+if len(sys.argv) > 2:
+    source = Path(sys.argv[2])
+    here = here / "coupling"
+    here.mkdir(exist_ok=True)
+    blocks = numpy.load(source / "coated_block_t4.npz")
+    cases = {"none": "none_-0.05", "pressed": "A_-0.1", "pulled": "A_0.1"}
+    write("coated_block_t4.json", {
+        "points": blocks["X"].round(12).tolist(),
+        "tets": blocks["tets"].tolist(),
+        "top": blocks["top_triangles"].tolist(),
+        "fixed": blocks["fixed_dof"].tolist(),
+        **{
+            name: {"force": blocks["f_" + key.split("_")[1]].round(12).tolist(), "displacement": blocks["u_" + key].round(11).tolist()}
+            for name, key in cases.items()
+        },
+    })
+    block = read("coated_block_uniaxial.json")
+    laws = ("stvk", "corotational", "neo-hookean")
+    block["rows"] = [
+        {"coating": row["coating"], "eps": row["eps"], **{law: row["width_fixed_" + law]["F_total"] for law in laws}}
+        for row in block["rows"]
+    ]
+    write("coated_block_uniaxial.json", block)
+    block = read("coated_block_patch.json")
+    block["rows"] = {name: rows for name, rows in block["rows"].items() if name.endswith("n8")}
+    write("coated_block_patch.json", block)
+    organ = read("ellipsoid_capsule.json")
+    organ["rows"] = {name: rows["h0.0042"] for name, rows in organ["rows"].items() if "h0.0042" in rows}
+    write("ellipsoid_capsule.json", organ)
+    shutil.copyfile(source / "tubes.json", here / "tubes.json")

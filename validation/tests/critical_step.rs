@@ -82,7 +82,12 @@ fn element(data: &Value, case: &Value) -> Model {
         Cells::hex8(vec![[0, 1, 2, 3, 4, 5, 6, 7]], &rest, 0.05, shear)
     };
     let mut model = Model { mass: vec![0.0; rest.len()], ..Model::default() };
-    model.bodies.push(Body { name: "element".into(), nodes: 0..rest.len() as u32, damping: 0.0 });
+    model.bodies.push(Body {
+        name: "element".into(),
+        nodes: 0..rest.len() as u32,
+        shared: vec![],
+        damping: 0.0,
+    });
     model.rest = rest;
     model.add_solid(Solid { body: 0, material: elastic(tissue), cells, fibre: vec![], original: vec![0] });
     model

@@ -2,6 +2,7 @@
 //! beside those of others.
 
 mod brain_shift;
+mod coupling;
 mod critical_step;
 mod cube_compression;
 mod determinism;

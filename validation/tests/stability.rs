@@ -67,7 +67,7 @@ fn single(cells: VolumeCell, law: AnyLaw) -> Model {
     };
     let nodes = model.rest.len();
     model.mass = vec![0.0; nodes];
-    model.bodies.push(Body { name: "cell".into(), nodes: 0..nodes as u32, damping: 0.0 });
+    model.bodies.push(Body { name: "cell".into(), nodes: 0..nodes as u32, shared: vec![], damping: 0.0 });
     let fibre = vec![[0.6, 0.0, 0.8]; law.families()];
     model.add_solid(Solid { body: 0, material: elastic(law), cells, fibre, original: vec![0] });
     model

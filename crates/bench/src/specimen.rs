@@ -60,7 +60,12 @@ impl Specimen {
             mass: vec![0.0; nodes],
             ..Model::default()
         };
-        model.bodies.push(Body { name: "specimen".into(), nodes: 0..nodes as u32, damping: 0.0 });
+        model.bodies.push(Body {
+            name: "specimen".into(),
+            nodes: 0..nodes as u32,
+            shared: vec![],
+            damping: 0.0,
+        });
         for block in mesh.volume_blocks() {
             let cells = match block.kind {
                 CellKind::Tet => {

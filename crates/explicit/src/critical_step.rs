@@ -26,7 +26,7 @@ pub struct ElementBound {
 /// The bound [s] of one cell, of its material's mass.
 pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
     // Hourglass patterns are as fast as a wave of modulus c μ: slower than the law's own for any usual coefficient c.
-    let modulus = solid.material.law.longitudinal_modulus().max(solid.cells.hourglass_modulus(cell));
+    let modulus = solid.longitudinal_modulus().max(solid.cells.hourglass_modulus(cell));
     let wave = modulus / solid.material.density;
     let n = solid.cells.nodes_per_cell() as f64;
     2.0 / (n * wave * solid.cells.gradient_square_sum(cell)).sqrt()

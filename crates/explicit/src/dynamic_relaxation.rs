@@ -889,7 +889,7 @@ fn fictitious_masses(model: &Model) -> Vec<f64> {
         for cell in 0..solid.cells.len() {
             let nodes = solid.cells.nodes(cell);
             let stiffest = solid.cells.volume(cell)
-                * solid.material.law.longitudinal_modulus()
+                * solid.longitudinal_modulus()
                 * solid.cells.gradient_square_sum(cell);
             for &node in nodes {
                 mass[node as usize] += MASS_MARGIN / nodes.len() as f64 * stiffest;

@@ -60,7 +60,7 @@ pub fn model_balance_floor<R: Scalar>(model: &Model) -> f64 {
     let stiffness: f64 = (model.solids.iter())
         .map(|solid| {
             let volume: f64 = (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum();
-            volume * solid.material.law.longitudinal_modulus()
+            volume * solid.longitudinal_modulus()
         })
         .sum();
     balance_floor::<R>() * stiffness

@@ -1,8 +1,10 @@
 //! Fields recovered from a state: strains, stresses and energies of the cells, in double precision.
 
+use pliant_mechanics::element::Sheet;
+use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::{Deformation, Split};
 use pliant_mechanics::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
-use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale, sub};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, cross, dot, scale, sub};
 use rayon::prelude::*;
 
 use crate::Scalar;
@@ -32,6 +34,8 @@ pub struct CellFields {
     pub fibre: Option<Vector<f64>>,
     /// Length of the deformed unit fibre (of the first family); `None` if the law has none.
     pub fibre_stretch: Option<f64>,
+    /// Thickness [m] of a membrane, at rest and now; `None` of a solid.
+    pub thickness: Option<[f64; 2]>,
 }
 
 impl CellFields {
@@ -40,6 +44,11 @@ impl CellFields {
         let [xx, yy, zz, xy, yz, xz] = self.cauchy_stress.0;
         let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
         (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
+    }
+
+    /// Force per length [N/m] in the wall of a membrane, as a tensor in space; `None` of a solid.
+    pub fn membrane_force(&self) -> Option<Symmetric<f64>> {
+        self.thickness.map(|[_, now]| self.cauchy_stress * now)
     }
 
     /// Pressure [Pa]: minus a third of the trace of the Cauchy stress.
@@ -115,6 +124,10 @@ impl<'a, R: Scalar> Recovery<'a, R> {
                 };
                 mean((0..8).map(at), part.cells.volume(cell))
             }
+            Cells::Membrane(block, sheets) => {
+                let h = gradient(&u, &block.rest[cell].gradient);
+                membrane_fields(part, &h, cell, &sheets[cell], &history)
+            }
             cells => {
                 let h = with_cells!(cells, block => gradient(&u, &block.rest[cell].gradient));
                 point_fields(part, &h, fibres, averages, cell, &history)
@@ -174,6 +187,53 @@ fn point_fields(
         energy_density: isochoric + volumetric,
         fibre: fibres.first().copied(),
         fibre_stretch: fibres.first().copied().map(stretch),
+        thickness: None,
+    }
+}
+
+/// Fields of a triangle of a membrane, in space: across it F has the stretch that plane stress asks for.
+fn membrane_fields(
+    solid: &Solid,
+    h: &Tensor<f64>,
+    cell: usize,
+    sheet: &Sheet,
+    history: &[Symmetric<f64>],
+) -> CellFields {
+    let Material { law, prony, .. } = &solid.material;
+    let axes = &sheet.axes;
+    let changes = axes.map(|axis| h.apply(axis));
+    let plane = InPlane::from_changes(axes, &changes);
+    let found = law.plane_stress(plane.strain_twice, &solid.plane_fibres(cell, sheet));
+    let tangents = [add(axes[0], changes[0]), add(axes[1], changes[1])];
+    let across = cross(tangents[0], tangents[1]);
+    let stretch = 1.0 + found.thickness_change;
+    let now = scale(across, stretch / dot(across, across).sqrt());
+    let normal = cross(axes[0], axes[1]);
+    let mut gradient = Tensor::ZERO;
+    for (to, from) in [(tangents[0], axes[0]), (tangents[1], axes[1]), (now, normal)] {
+        gradient.add_outer(to, from);
+    }
+    // From the frame of the triangle to space.
+    let frame = Tensor([0, 1, 2].map(|k| [axes[0][k], axes[1][k], normal[k]]));
+    let [xx, yy, xy] = found.stress;
+    let elastic = Split { isochoric: Symmetric([xx, yy, 0.0, xy, 0.0, 0.0]), volumetric: Symmetric::ZERO };
+    let pk2_stress = prony.stress(elastic, history).push_forward(&frame);
+    let volume_ratio = (1.0 + plane.area_change()) * stretch;
+    let fibre = solid.fibres(cell).first().copied();
+    CellFields {
+        gradient,
+        volume_ratio,
+        cell_volume_ratio: volume_ratio,
+        green_strain: (found.deformation.strain_twice * 0.5).push_forward(&frame),
+        pk2_stress,
+        cauchy_stress: pk2_stress.push_forward(&gradient) * (1.0 / volume_ratio),
+        energy_density: found.energy,
+        fibre,
+        fibre_stretch: fibre.map(|a| {
+            let deformed = gradient.apply(a);
+            dot(deformed, deformed).sqrt()
+        }),
+        thickness: Some([sheet.thickness, sheet.thickness * stretch]),
     }
 }
 
@@ -203,6 +263,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
         energy_density: sum.energy_density + w * point.energy_density,
         fibre: point.fibre,
         fibre_stretch: point.fibre_stretch.map(|stretch| sum.fibre_stretch.unwrap_or(0.0) + w * stretch),
+        thickness: None,
     };
     let nothing = CellFields {
         gradient: Tensor::ZERO,
@@ -214,6 +275,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
         energy_density: 0.0,
         fibre: None,
         fibre_stretch: None,
+        thickness: None,
     };
     weighted.fold(nothing, add_up)
 }
@@ -239,7 +301,7 @@ fn averages<R: Scalar>(solid: &Solid, history: &History<R>, displacement: &[Vect
         changes.iter().enumerate().map(|(index, &change)| relaxed(index, change)).collect()
     };
     match &solid.cells {
-        Cells::Tet4(_) | Cells::Hex8(_) => Averages::None,
+        Cells::Tet4(_) | Cells::Hex8(_) | Cells::Membrane(..) => Averages::None,
         Cells::FullHex8(block, points) => {
             let mean_change = |cell: usize| {
                 let at =

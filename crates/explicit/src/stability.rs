@@ -28,7 +28,8 @@
 //! The state holds all that monitoring needs to resume ([`Stability`] and [`State::reference`]). Stiffnesses in the reference state are computed
 //! from it again, so a resumed run has the same bits. A new reference allocates memory; nothing else in a step does.
 
-use pliant_mechanics::model::{Model, Solid, with_cells};
+use pliant_mechanics::law::plane_stress::InPlane;
+use pliant_mechanics::model::{Cells, Model, Solid, with_cells};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, cast, dot, sub};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -183,7 +184,7 @@ impl Monitor {
 impl Watch {
     fn new(model: &Model, solid: &Solid, limit: f64) -> Self {
         let count = solid.cells.len();
-        let modulus = solid.material.law.longitudinal_modulus();
+        let modulus = solid.longitudinal_modulus();
         let weight = |cell: usize| {
             let square = gradient_square_of(solid, cell);
             let slowest = scaled_bound(model, solid, cell).max(limit);
@@ -202,8 +203,12 @@ impl Watch {
 
     /// Finds both ranks of every cell: the squared speed by an isotropic guess, and the squared stretch.
     fn rank<R: Scalar>(&mut self, solid: &Solid, displacement: &[Vector<R>]) {
-        let bulk = solid.material.law.small_strain().bulk;
-        let rest = solid.material.law.longitudinal_modulus();
+        let rest = solid.longitudinal_modulus();
+        let bulk = match &solid.cells {
+            // In plane stress the volume hardly counts.
+            Cells::Membrane(..) => 0.0,
+            _ => solid.material.law.small_strain().bulk,
+        };
         let weight = &self.weight;
         self.rank.par_iter_mut().enumerate().with_min_len(256).for_each(|(cell, rank)| {
             let (h, square) =
@@ -212,9 +217,13 @@ impl Watch {
             let c = strain + Symmetric::IDENTITY;
             let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
             let mean = c.trace() / 3.0;
-            let stretch = match solid.fibres(cell) {
-                [] => mean,
-                fibres => fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max),
+            let stretch = match (solid.fibres(cell), &solid.cells) {
+                ([], _) => mean,
+                (_, Cells::Membrane(_, sheets)) => {
+                    let fibres = solid.plane_fibres(cell, &sheets[cell]);
+                    fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max)
+                }
+                (fibres, _) => fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max),
             };
             // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
             let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * mean;
@@ -271,7 +280,7 @@ impl Watch {
         let in_state = |displacement: &[Vector<R>]| {
             let h = displacement_gradient(solid, cell, displacement);
             let square = gradient_square_of(solid, cell);
-            let Stiffness { mode, wave } = stiffness(&solid.material.law, solid.fibres(cell), &h, &square);
+            let Stiffness { mode, wave } = stiffness(solid, cell, &h, &square);
             Stiffness { mode: mode.max(self.hourglass[cell]), wave }
         };
         let now = in_state(displacement);
@@ -288,7 +297,7 @@ pub fn cell_limit<R: Scalar>(model: &Model, solid: usize, cell: usize, displacem
     let solid = &model.solids[solid];
     let h = displacement_gradient(solid, cell, displacement);
     let square = gradient_square_of(solid, cell);
-    let mode = stiffness(&solid.material.law, solid.fibres(cell), &h, &square).mode;
+    let mode = stiffness(solid, cell, &h, &square).mode;
     limit_alone(model, solid, cell, mode.max(hourglass_modulus(solid, cell)))
 }
 
@@ -315,12 +324,20 @@ fn hourglass_modulus(solid: &Solid, cell: usize) -> f64 {
     solid.cells.hourglass_modulus(cell) * solid.cells.gradient_square_sum(cell)
 }
 
-/// Σ B_a ⊗ B_a [1/m²].
+/// Σ B_a ⊗ B_a [1/m²]; of a membrane in the frame of the triangle.
 fn gradient_square_of(solid: &Solid, cell: usize) -> Symmetric<f64> {
-    with_cells!(&solid.cells, block => gradient_square(&block.rest[cell].gradient))
+    let square = with_cells!(&solid.cells, block => gradient_square(&block.rest[cell].gradient));
+    match &solid.cells {
+        Cells::Membrane(_, sheets) => {
+            let [t, s] = sheets[cell].axes;
+            let mixed = dot(t, square.apply(s));
+            Symmetric([square.quadratic(t), square.quadratic(s), 0.0, mixed, 0.0, 0.0])
+        }
+        _ => square,
+    }
 }
 
-/// ∂u/∂X, the mean over the cell.
+/// ∂u/∂X, the mean over the cell; of a membrane the gradient that its law sees, in the frame of the triangle.
 fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
     let mut h = Tensor::ZERO;
     with_cells!(&solid.cells, block => {
@@ -330,7 +347,12 @@ fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[
             h.add_outer(sub(cast(displacement[node as usize]), origin), b);
         }
     });
-    h
+    let Cells::Membrane(_, sheets) = &solid.cells else { return h };
+    let axes = sheets[cell].axes;
+    let plane = InPlane::from_changes(&axes, &axes.map(|axis| h.apply(axis)));
+    let fibres = solid.plane_fibres(cell, &sheets[cell]);
+    let across = solid.material.law.plane_stress(plane.strain_twice, &fibres).thickness_change;
+    plane.displacement_gradient(across)
 }
 
 /// tr (A B A B).

@@ -1,11 +1,14 @@
 //! The stiffest modes of a cell in a deformed state. With one evaluation point K_ab = V B_aᵀ A B_b, A = ∂P/∂F, and the
 //! eigenvalues of K other than zero are those of V Lᵀ A L, where L Lᵀ = G = Σ B_a⊗B_a: a 9×9 problem for any number
 //! of nodes. A comes from the law's stress by central differences, so that it is right for every law: nothing about
-//! stiffening is assumed. The instantaneous response bounds that of a relaxing law.
+//! stiffening is assumed. The instantaneous response bounds that of a relaxing law. A triangle of a membrane is taken in its own frame,
+//! where it has no gradient across: of the nine modes those have no stiffness.
 
 use nalgebra::{SMatrix, SVector};
 
-use pliant_mechanics::law::{AnyLaw, Deformation};
+use pliant_mechanics::law::Deformation;
+use pliant_mechanics::law::plane_stress::InPlane;
+use pliant_mechanics::model::{Cells, Solid};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, scale};
 
 /// Size of the differences of F: truncation and round-off both near 1e-10.
@@ -28,12 +31,7 @@ pub(crate) struct Stiffness {
 
 /// How stiff a cell with displacement gradient `h` and Σ B_a ⊗ B_a = `square` is. Not a number where the law is not
 /// defined.
-pub(crate) fn stiffness(
-    law: &AnyLaw,
-    fibres: &[Vector<f64>],
-    h: &Tensor<f64>,
-    square: &Symmetric<f64>,
-) -> Stiffness {
+pub(crate) fn stiffness(solid: &Solid, cell: usize, h: &Tensor<f64>, square: &Symmetric<f64>) -> Stiffness {
     let size = square.trace();
     let columns = cholesky_columns(&(*square * (1.0 / size)));
     let mut matrix = SMatrix::<f64, 9, 9>::zeros();
@@ -42,7 +40,7 @@ pub(crate) fn stiffness(
             let moved = |by: f64| {
                 let mut moved = *h;
                 moved.0[i] = add(moved.0[i], scale(column, by));
-                first_piola_kirchhoff(law, fibres, &moved)
+                first_piola_kirchhoff(solid, cell, &moved)
             };
             let (ahead, behind) = (moved(DIFFERENCE), moved(-DIFFERENCE));
             for k in 0..3 {
@@ -124,9 +122,19 @@ fn eigenvector(a: &SMatrix<f64, 3, 3>, eigenvalue: f64) -> SVector<f64, 3> {
     longest.and_then(|v| v.try_normalize(f64::MIN_POSITIVE)).unwrap_or_else(SVector::x)
 }
 
-fn first_piola_kirchhoff(law: &AnyLaw, fibres: &[Vector<f64>], h: &Tensor<f64>) -> Tensor<f64> {
+fn first_piola_kirchhoff(solid: &Solid, cell: usize, h: &Tensor<f64>) -> Tensor<f64> {
+    let law = &solid.material.law;
+    if let Cells::Membrane(_, sheets) = &solid.cells {
+        // Columns of H are the changes of the axes of the frame.
+        let changes = [0, 1].map(|i| [0, 1, 2].map(|k| h.0[k][i]));
+        let plane = InPlane::from_changes(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &changes);
+        let [xx, yy, xy] =
+            law.plane_stress(plane.strain_twice, &solid.plane_fibres(cell, &sheets[cell])).stress;
+        let stress = Symmetric([xx, yy, 0.0, xy, 0.0, 0.0]);
+        return Tensor::IDENTITY.plus_scaled(h, 1.0).times_symmetric(&stress);
+    }
     let deformation = Deformation::from_displacement_gradient(h);
-    let stress = law.stress(&deformation, fibres);
+    let stress = law.stress(&deformation, solid.fibres(cell));
     deformation.gradient.times_symmetric(&(stress.isochoric + stress.volumetric))
 }
 
@@ -137,5 +145,5 @@ fn cholesky_columns(s: &Symmetric<f64>) -> [Vector<f64>; 3] {
     let (b, c) = (xy / a, xz / a);
     let d = (yy - b * b).sqrt();
     let e = (yz - b * c) / d;
-    [[a, b, c], [0.0, d, e], [0.0, 0.0, (zz - c * c - e * e).sqrt()]]
+    [[a, b, c], [0.0, d, e], [0.0, 0.0, (zz - c * c - e * e).max(0.0).sqrt()]]
 }

@@ -42,7 +42,7 @@ fn block(counts: [u32; 3], edge: f64, element: &str, poisson: f64, prony: Prony)
     let law = json!({ "young-modulus": 10e3, "poisson-ratio": poisson });
     let law = AnyLaw::from_json("neo-hookean", law).unwrap();
     let mut model = Model { mass: vec![0.0; rest.len()], rest, ..Model::default() };
-    model.bodies.push(Body { name: "block".into(), nodes: 0..nx * ny * nz, damping: 0.0 });
+    model.bodies.push(Body { name: "block".into(), nodes: 0..nx * ny * nz, shared: vec![], damping: 0.0 });
     let original = (0..cells.len() as u32).collect();
     let material = Material { law, prony, density: 1000.0 };
     model.add_solid(Solid { body: 0, material, cells, fibre: vec![], original });

@@ -102,7 +102,7 @@ impl DeviceBlocks {
         Bisection { places: &centres, whole: GROUP as usize, fits: &fits }.cut(&mut order, 0, &mut ends);
         let mut blocks = Vec::new();
         let (mut nodes, mut rest, mut offsets, mut given) = (Vec::new(), Vec::new(), vec![0_u32], Vec::new());
-        let mut corners = vec![[0_u8; 4]; cells.len() * per_cell / 4];
+        let mut corners = vec![[0_u8; 4]; cells.len() * per_cell.div_ceil(4)];
         let mut first = 0;
         for end in ends {
             // In the order of the model, so that histories and shapes are read in long runs.
@@ -311,7 +311,7 @@ impl NodeBlocks {
     fn pack(&mut self, locals: &[usize], per_cell: usize) {
         self.corner_bits = if self.most_nodes <= 256 { 8 } else { 16 };
         let (count, per_word) = (self.cells.len(), 32 / self.corner_bits);
-        self.corners = vec![0; count * per_cell / per_word];
+        self.corners = vec![0; count * per_cell.div_ceil(per_word)];
         for (index, &local) in locals.iter().enumerate() {
             let (cell, a) = (index / per_cell, index % per_cell);
             self.corners[a / per_word * count + cell] |=

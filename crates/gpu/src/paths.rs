@@ -270,8 +270,9 @@ fn force_at_unit_strain(solid: &Solid, cell: usize) -> f64 {
     let area = match &solid.cells {
         Cells::Tet4(block) | Cells::AveragedTet4(block, _) => largest(block, cell),
         Cells::Hex8(block) | Cells::FullHex8(block, _) => largest(block, cell),
+        Cells::Membrane(block, _) => largest(block, cell),
     };
-    area * solid.material.law.longitudinal_modulus()
+    area * solid.longitudinal_modulus()
 }
 
 /// First entry of each node, and the slots there in their order, from slots with their nodes.

@@ -80,6 +80,7 @@ impl SolidKernels<'_> {
                 let own = include_str!("shaders/full_hex8.wgsl");
                 vec![self.forces(&[PRESSURE_HISTORY, HEX_CORNERS, own])?]
             }
+            Cells::Membrane(..) => vec![self.forces(&[include_str!("shaders/membrane.wgsl")])?],
             Cells::AveragedTet4(_, averaging) => self.averaged(*averaging)?,
         })
     }

@@ -4,7 +4,7 @@ use pliant_explicit::Relaxation;
 use pliant_explicit::{History, PACK};
 use pliant_mechanics::law::Shader;
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, LocalNodes, Solid};
-use pliant_mechanics::tensor::Vector;
+use pliant_mechanics::tensor::{Vector, dot};
 
 use crate::kernel::{Binding, Bound, Kernel, Memory};
 use crate::paths::Paths;
@@ -27,7 +27,12 @@ fn shader_of(solid: &Solid) -> Result<Shader, GpuError> {
         return Err(GpuError::Unsupported { what });
     }
     let own = || GpuError::Unsupported { what: format!("`{}`, a law that the program gives,", law.name()) };
-    law.shader().ok_or_else(own)
+    let mut shader = law.shader().ok_or_else(own)?;
+    if law.is_incompressible() {
+        // A membrane does not ask for the volumetric part: no infinity goes to the device.
+        shader.parameters.iter_mut().filter(|parameter| parameter.is_infinite()).for_each(|p| *p = 0.0);
+    }
+    Ok(shader)
 }
 
 /// Numbers in rows of four, the last one filled up with zeros.
@@ -103,7 +108,7 @@ impl DeviceSolid {
         let nodes = if names_nodes { rows_of_nodes(cells, &order) } else { vec![] };
         let nodes = memory.filled("the cells", &nodes)?;
         let finds_shapes = paths.finds_shapes && matches!(cells, Cells::Tet4(_));
-        let shapes = if finds_shapes { vec![] } else { rows_at_rest(cells, &order) };
+        let shapes = if finds_shapes { vec![] } else { rows_at_rest(solid, &order) };
         let fibre_row = shapes.len() / order.len().max(1);
         let rest = memory
             .filled("the shapes of cells at rest", &[shapes, rows_of_fibres(solid, &order)].concat())?;
@@ -204,12 +209,13 @@ impl DeviceSolid {
     }
 }
 
-/// Nodes, four to a row of all cells.
+/// Nodes, four to a row of all cells; that of a triangle is filled up.
 fn rows_of_nodes(cells: &Cells, order: &[u32]) -> Vec<[u32; 4]> {
+    let last = cells.nodes_per_cell() - 1;
     let row = |row: usize| {
-        order.iter().map(move |&cell| [0, 1, 2, 3].map(|a| cells.nodes(cell as usize)[4 * row + a]))
+        order.iter().map(move |&cell| [0, 1, 2, 3].map(|a| cells.nodes(cell as usize)[last.min(4 * row + a)]))
     };
-    (0..cells.nodes_per_cell() / 4).flat_map(row).collect()
+    (0..cells.nodes_per_cell().div_ceil(4)).flat_map(row).collect()
 }
 
 /// 3/2 κ² [1/m²], within what single precision holds.
@@ -218,7 +224,8 @@ fn reach(square: f64) -> f64 {
 }
 
 /// What the element needs of the shape at rest, row by row of all cells.
-fn rows_at_rest(cells: &Cells, order: &[u32]) -> Vec<Four> {
+fn rows_at_rest(solid: &Solid, order: &[u32]) -> Vec<Four> {
+    let (cells, law) = (&solid.cells, &solid.material.law);
     let rows = |count: usize, of_cell: &dyn Fn(usize, usize) -> Four| {
         (0..count).flat_map(|row| order.iter().map(move |&cell| of_cell(row, cell as usize))).collect()
     };
@@ -248,12 +255,32 @@ fn rows_at_rest(cells: &Cells, order: &[u32]) -> Vec<Four> {
             };
             four(points[cell].gradient[point][a], beside)
         }),
+        Cells::Membrane(block, sheets) => {
+            let across = law.across();
+            let modulus = if across.modulus.is_finite() { across.modulus } else { 0.0 };
+            rows(4, &|row, cell| {
+                let (rest, [t, s]) = (&block.rest[cell], sheets[cell].axes);
+                match row {
+                    0 => four(t, rest.volume),
+                    1 => four(s, modulus),
+                    2 => {
+                        let [b, c] = [rest.gradient[1], rest.gradient[2]];
+                        [dot(b, t), dot(b, s), dot(c, t), dot(c, s)].map(|x| x as f32)
+                    }
+                    _ => [across.coupling as f32, 0.0, 0.0, 0.0],
+                }
+            })
+        }
     }
 }
 
 /// The directions of the fibres, row by row of all cells.
 fn rows_of_fibres(solid: &Solid, order: &[u32]) -> Vec<Four> {
-    let row = |family: usize| order.iter().map(move |&cell| four(solid.fibres(cell as usize)[family], 0.0));
+    let direction = |cell: usize, family: usize| match &solid.cells {
+        Cells::Membrane(_, sheets) => solid.plane_fibres(cell, &sheets[cell])[family],
+        _ => solid.fibres(cell)[family],
+    };
+    let row = |family: usize| order.iter().map(move |&cell| four(direction(cell as usize, family), 0.0));
     (0..solid.material.law.families()).flat_map(row).collect()
 }
 

@@ -465,7 +465,7 @@ impl Assembly {
     fn stiffnesses(&self) -> impl Iterator<Item = f64> {
         let shells = self.facets.iter().map(|facet| facet.stiffest());
         let of_solid = |solid: &Solid| {
-            let modulus = solid.material.law.longitudinal_modulus();
+            let modulus = solid.longitudinal_modulus();
             let volumes = (0..solid.cells.len()).map(|cell| solid.cells.volume(cell));
             volumes.map(|volume| modulus * volume.cbrt()).collect::<Vec<_>>()
         };

@@ -3,7 +3,7 @@
 
 use std::fmt::{self, Debug, Write};
 
-use crate::model::{Model, Solid};
+use crate::model::{Cells, Model, Solid};
 
 /// A hash under way.
 struct Fnv(u64);
@@ -55,6 +55,7 @@ impl Model {
             let mut mesh = Fnv::new();
             mesh.numbers(self.rest[range.clone()].iter().flatten());
             solids().for_each(|solid| add_cells(&mut mesh, solid));
+            mesh.indices(&body.shared);
             let mut material = Fnv::new();
             material.numbers([&body.damping]);
             let velocity = self.initial_velocity.iter().skip(range.start).take(range.len());
@@ -65,6 +66,9 @@ impl Model {
                 material.numbers(solid.fibre.iter().flatten());
                 (0..solid.cells.len())
                     .for_each(|cell| material.numbers([&solid.cells.hourglass_modulus(cell)]));
+                if let Cells::Membrane(_, sheets) = &solid.cells {
+                    material.numbers(sheets.iter().map(|sheet| &sheet.thickness));
+                }
             }
             parts.push((format!("mesh of body `{}`", body.name), mesh.0));
             parts.push((format!("material of body `{}`", body.name), material.0));

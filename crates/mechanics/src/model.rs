@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::curve::Curve;
-use crate::element::{GaussPoints, HEX_EDGES, Hex8, Rest, gauss_points, hex8, tet4};
+use crate::element::{GaussPoints, HEX_EDGES, Hex8, Rest, Sheet, gauss_points, hex8, membrane, tet4};
 use crate::law::AnyLaw;
 use crate::load::Load;
 use crate::mapping::Weights;
@@ -59,10 +59,25 @@ impl MassScaling {
 pub struct Body {
     /// Its name.
     pub name: String,
-    /// Its nodes.
+    /// The nodes of its own.
     pub nodes: Range<u32>,
+    /// The nodes of other bodies that its cells use, numbered in the model: those of a wall on the boundary of a solid.
+    pub shared: Vec<u32>,
     /// Mass-proportional damping α [1/s].
     pub damping: f64,
+}
+
+impl Body {
+    /// The model's number of a node of its mesh: its own nodes first, then those that it shares.
+    pub fn node(&self, index: u32) -> u32 {
+        let own = self.nodes.len() as u32;
+        if index < own { self.nodes.start + index } else { self.shared[(index - own) as usize] }
+    }
+
+    /// The nodes of its mesh, numbered in the model.
+    pub fn all_nodes(&self) -> impl Iterator<Item = u32> + '_ {
+        self.nodes.clone().chain(self.shared.iter().copied())
+    }
 }
 
 /// A law with its history, and the density.
@@ -111,6 +126,24 @@ impl Solid {
         &self.fibre[cell * families..(cell + 1) * families]
     }
 
+    /// The directions of the families of fibres in a triangle of a membrane, in its own frame.
+    pub fn plane_fibres(&self, cell: usize, sheet: &Sheet) -> Vec<Vector<f64>> {
+        let in_plane = |&fibre: &Vector<f64>| {
+            let [along, across] = sheet.axes.map(|axis| dot(fibre, axis));
+            let length = along.hypot(across);
+            [along / length, across / length, 0.0]
+        };
+        self.fibres(cell).iter().map(in_plane).collect()
+    }
+
+    /// An upper bound of ρc² [Pa] at rest: of a membrane that of plane stress.
+    pub fn longitudinal_modulus(&self) -> f64 {
+        match &self.cells {
+            Cells::Membrane(..) => self.material.law.plane_modulus(),
+            _ => self.material.law.longitudinal_modulus(),
+        }
+    }
+
     /// Adds ρV/N [kg] of every cell to the masses of its nodes.
     pub fn add_mass(&self, mass: &mut [f64]) {
         for cell in 0..self.cells.len() {
@@ -156,6 +189,8 @@ pub enum Cells {
     Hex8(CellBlock<8>),
     /// Hexahedra with eight Gauss points and one mean dilatation.
     FullHex8(CellBlock<8>, Vec<GaussPoints>),
+    /// Triangles of a wall without bending, in plane stress, with the frame and the thickness of each.
+    Membrane(CellBlock<3>, Vec<Sheet>),
 }
 
 /// How tetrahedra average their pressure over nodes; see `forces/averaged.rs`.
@@ -177,6 +212,7 @@ macro_rules! with_cells {
         match $cells {
             $crate::model::Cells::Tet4($bound) | $crate::model::Cells::AveragedTet4($bound, _) => $body,
             $crate::model::Cells::Hex8($bound) | $crate::model::Cells::FullHex8($bound, _) => $body,
+            $crate::model::Cells::Membrane($bound, _) => $body,
         }
     };
 }
@@ -276,6 +312,17 @@ impl Cells {
         Self::FullHex8(CellBlock { nodes, rest: quantities, hourglass: None, offsets }, points)
     }
 
+    /// Triangles of a membrane from their nodes and the thickness of each [m].
+    ///
+    /// # Panics
+    /// If there are not as many thicknesses as triangles.
+    pub fn membrane(nodes: Vec<[u32; 3]>, rest: &[Vector<f64>], thickness: &[f64]) -> Self {
+        assert_eq!(thickness.len(), nodes.len(), "every triangle has a thickness");
+        let of_cell = |(cell, &t): (&[u32; 3], &f64)| membrane(&cell.map(|n| rest[n as usize]), t);
+        let (quantities, sheets) = nodes.iter().zip(thickness).map(of_cell).unzip();
+        Self::Membrane(CellBlock { nodes, rest: quantities, hourglass: None, offsets: vec![] }, sheets)
+    }
+
     /// The same cells, each filled only in part, as cubes at the border of a body are: its volume and with it its stiffness
     /// and mass are those of its fraction, one per cell, of [`LEAST_FRACTION`] at least. Gradients stay, and with them element
     /// bounds. One constant weight a cell is the simplest of the finite cells of Parvizian, Düster and Rank (2007).
@@ -300,6 +347,7 @@ impl Cells {
             Self::AveragedTet4(block, averaging) => Self::AveragedTet4(block.in_order(order), *averaging),
             Self::Hex8(block) => Self::Hex8(block.in_order(order)),
             Self::FullHex8(block, points) => Self::FullHex8(block.in_order(order), picked(points, order)),
+            Self::Membrane(block, sheets) => Self::Membrane(block.in_order(order), picked(sheets, order)),
         }
     }
 
@@ -337,6 +385,7 @@ impl Cells {
         match self {
             Self::Tet4(_) | Self::AveragedTet4(..) => 4,
             Self::Hex8(_) | Self::FullHex8(..) => 8,
+            Self::Membrane(..) => 3,
         }
     }
 
@@ -350,7 +399,7 @@ impl Cells {
         with_cells!(self, block => block.rest[cell].volume)
     }
 
-    /// The corner of a hexahedron at which det F is least, as its node and that determinant; `None` of tetrahedra.
+    /// The corner of a hexahedron at which det F is least, as its node and that determinant; `None` of others.
     pub fn worst_corner(&self, cell: usize, displacement: impl Fn(u32) -> Vector<f64>) -> Option<(u32, f64)> {
         let (Self::Hex8(block) | Self::FullHex8(block, _)) = self else { return None };
         let (nodes, rest) = (&block.nodes[cell], &block.offsets[cell]);
@@ -390,6 +439,7 @@ impl Cells {
             Self::AveragedTet4(_, Averaging::NiftySim) => "tet4-ianp-niftysim",
             Self::Hex8(_) => "hex8",
             Self::FullHex8(..) => "hex8-full",
+            Self::Membrane(..) => "membrane",
         }
     }
 }
@@ -685,8 +735,17 @@ impl Model {
         let first = self.rest.len() as u32;
         self.rest.extend_from_slice(rest);
         self.mass.resize(self.rest.len(), 0.0);
-        self.bodies.push(Body { name: name.into(), nodes: first..self.rest.len() as u32, damping: 0.0 });
+        let nodes = first..self.rest.len() as u32;
+        self.bodies.push(Body { name: name.into(), nodes, shared: Vec::new(), damping: 0.0 });
         self.bodies.len() - 1
+    }
+
+    /// Adds a body on nodes that other bodies have, such as a wall on the boundary of a solid; its number. The nodes stay those of their
+    /// bodies: damping, gravity and velocity at the start are theirs.
+    pub fn add_body_on(&mut self, name: &str, shared: Vec<u32>) -> usize {
+        let body = self.add_body(name, &[]);
+        self.bodies[body].shared = shared;
+        body
     }
 
     /// Fixes nodes where they are at rest; the number of the constraint.
@@ -728,7 +787,7 @@ impl Model {
         self.solids.iter().map(|solid| solid.cells.len()).sum()
     }
 
-    /// The body of a node and the node's number in it.
+    /// The body that a node is of and the node's number in it.
     pub fn locate_node(&self, node: u32) -> (usize, u32) {
         let body = self.bodies.partition_point(|body| body.nodes.end <= node);
         (body, node - self.bodies[body].nodes.start)

@@ -84,8 +84,11 @@ impl Scene {
         }
         // Equations are solved for solids and shells together.
         let kinds = match self.run.solver.solves_equations() {
-            true => vec![("bodies", vec![BodyModel::Solid, BodyModel::Shell])],
-            false => vec![("solids", vec![BodyModel::Solid]), ("shells", vec![BodyModel::Shell])],
+            true => vec![("bodies", vec![BodyModel::Solid, BodyModel::Membrane, BodyModel::Shell])],
+            false => vec![
+                ("solids", vec![BodyModel::Solid, BodyModel::Membrane]),
+                ("shells", vec![BodyModel::Shell]),
+            ],
         };
         for (word, kind) in kinds {
             let of_kind = self.bodies.iter().filter(|(_, body)| kind.contains(&body.model));
@@ -105,7 +108,42 @@ impl Scene {
             }
             groups.push((word.into(), bodies));
         }
+        self.check_walls(&groups, out);
         groups
+    }
+
+    /// Refuses walls on bodies of other participants: their common nodes have one solver.
+    fn check_walls(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) {
+        let group = |body: &String| groups.iter().find(|(_, bodies)| bodies.contains(body));
+        for (name, table) in &self.bodies {
+            let Some(host) = &table.on else { continue };
+            let (Some((own, _)), Some((other, _))) = (group(name), group(host)) else { continue };
+            if own == other {
+                continue;
+            }
+            let named = |group| self.participants.iter().any(|(known, _)| known == group);
+            let (message, label, help) = match table.model == BodyModel::Shell
+                && !(named(own) && named(other))
+            {
+                true => (
+                    format!(
+                        "`{name}` is a shell on `{host}`, and `{}` steps shells apart",
+                        self.run.solver.word()
+                    ),
+                    "bending needs another solver",
+                    "leave `model` out for a membrane, without bending, or take `solver = \"implicit\"` or `\"static\"`",
+                ),
+                false => (
+                    format!(
+                        "`{name}` goes with participant `{own}` and `{host}`, whose nodes it shares, with `{other}`"
+                    ),
+                    "not of one solver",
+                    "name both in one participant",
+                ),
+            };
+            let place = self.source.span(&["body", name, "on"]);
+            out.push(Diagnostic::error(message).at(place, label).help(help));
+        }
     }
 
     fn owners(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) -> Owners {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::checker::read_table;
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{BodyTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, ViewTable};
+use crate::format::{BodyModel, BodyTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, ViewTable};
 use crate::nearest::nearest;
 use crate::reads::{LONGEST_SCENE, Reads};
 use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
@@ -117,8 +117,15 @@ impl Scene {
             &mut out,
         );
         let laws = read_all(&source, "law", read_law, &mut out);
-        let bodies =
+        let mut bodies =
             read_all(&source, "body", |s, path, out| read_table::<BodyTable>(s, path, &[], out), &mut out);
+        for (name, table) in bodies.iter_mut().filter(|(_, table)| table.on.is_some()) {
+            if source.node(&["body", name, "model"]).is_none() {
+                table.model = BodyModel::Membrane;
+            }
+        }
+        // Walls after the bodies that they are on.
+        bodies.sort_by_key(|(_, table)| table.on.is_some());
         let surfaces = read_all(
             &source,
             "surface",

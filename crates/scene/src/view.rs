@@ -62,7 +62,7 @@ impl Scene {
     fn shows_surface_of_shell(&self, view: &ViewTable) -> bool {
         let shown = self.surfaces.iter().filter(|(name, _)| view.on.as_ref() == Some(name));
         let solid =
-            |on: &str| self.bodies.iter().any(|(name, body)| name == on && body.model == BodyModel::Solid);
+            |on: &str| self.bodies.iter().any(|(name, body)| name == on && body.model != BodyModel::Shell);
         shown.into_iter().any(|(_, surface)| !solid(&surface.on))
     }
 

@@ -87,6 +87,13 @@ impl ImplicitBodies {
         Some((range.len(), facets.iter().map(|facet| facet.area * facet.thickness).sum()))
     }
 
+    /// The mass of a shell [kg]; `None` of another body.
+    pub fn mass(&self, body: usize) -> Option<f64> {
+        let BodyCells::Facets(range) = self.cells.get(body)? else { return None };
+        let facets = &self.model.facets[range.start as usize..range.end as usize];
+        Some(3.0 * facets.iter().map(|facet| facet.mass).sum::<f64>())
+    }
+
     /// Each part of the model in words, with its [`fingerprint`].
     pub fn fingerprints(&self) -> Vec<(String, u64)> {
         let model = &self.model;

@@ -487,7 +487,7 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
     );
     refused(
         &[("model = \"shell\"\n", ""), (PLATE, "mesh = { block = { size = [0.1, 0.1, 0.1] }, edge = 0.05 }")],
-        &["`thickness` is for a shell, and `wall` is of model `solid`"],
+        &["`thickness` is for a shell or a membrane, and `wall` is of model `solid`"],
     );
     refused(
         &[explicit, (STEPS, "step = 1e-2")],

@@ -8,7 +8,7 @@
 //! A force field works through batches of four packs of points (`batch.rs`): displacement gradients, then stresses of the law, then nodal forces. So
 //! elements and laws are each compiled once per kind of lanes, never each law in each element, and the law is chosen once per batch.
 //! `plain.rs`: one point per cell, with hourglass control from `hourglass.rs`; `averaged.rs`: tets with averaged pressure; `full_hex.rs`:
-//! eight points. Every element whose force is the gradient of an energy runs through the battery in `tests.rs`.
+//! eight points; `membrane.rs`: triangles in plane stress. Every element whose force is the gradient of an energy runs through the battery in `tests.rs`.
 
 mod averaged;
 mod batch;
@@ -16,6 +16,7 @@ mod blocks;
 mod corners;
 mod full_hex;
 mod hourglass;
+mod membrane;
 mod plain;
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, WideF32, WideF64, load_vector};
 use blocks::{Blocks, Quad, Shares};
 use full_hex::FullHexes;
+use membrane::Membranes;
 use plain::SolidForces;
 
 /// What a pass over some packs of cells found, lane by lane.
@@ -305,6 +307,7 @@ fn force_field<R: Scalar>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
         Cells::AveragedTet4(cells, averaging) => Box::new(AveragedTets::new(solid, cells, *averaging, step)),
         Cells::Hex8(cells) => Box::new(SolidForces::<R, 8, 7>::new(solid, cells, step)),
         Cells::FullHex8(cells, points) => Box::new(FullHexes::new(solid, cells, points, step)),
+        Cells::Membrane(cells, sheets) => Box::new(Membranes::new(solid, cells, sheets, step)),
     }
 }
 

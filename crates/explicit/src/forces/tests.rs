@@ -1,10 +1,12 @@
 //! The battery every element runs through: patch test, rigid motion, f = dE/du, Σf = 0, Στ = 0. A new element is one
 //! line in [`ELEMENTS`] and its energy in [`energy`].
 
+use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::samples::every_law;
 use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
 use pliant_mechanics::model::{Averaging, Body, Cells, LocalNodes, Material};
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::tensor::scale as times;
 use pliant_mechanics::tensor::{cross, dot, scale};
 use pliant_testing::Random;
 
@@ -69,13 +71,22 @@ fn filled_cube(
         "tet4-anp" => Cells::averaged_tet4(tets(), &rest, Averaging::Nodal),
         "tet4-ianp" => Cells::averaged_tet4(tets(), &rest, Averaging::Variational),
         "hex8" => Cells::hex8(hex_nodes.clone(), &rest, 0.2, shear),
+        "membrane" => {
+            // Two sides of each hexahedron.
+            const SIDES: [[usize; 3]; 4] = [[0, 1, 2], [0, 2, 3], [0, 1, 5], [0, 5, 4]];
+            let triangles: Vec<[u32; 3]> =
+                hex_nodes.iter().flat_map(|hex| SIDES.map(|side| side.map(|corner| hex[corner]))).collect();
+            let thickness: Vec<f64> =
+                (0..triangles.len()).map(|cell| 0.01 + 0.001 * (cell % 7) as f64).collect();
+            Cells::membrane(triangles, &rest, &thickness)
+        }
         _ => Cells::full_hex8(hex_nodes.clone(), &rest),
     };
     assert_eq!(cells.element(), element);
     let fractions: Vec<f64> = (0..cells.len()).map(fraction).collect();
     let cells = cells.filled(&fractions);
     let mut model = Model { mass: vec![0.0; rest.len()], rest, ..Model::default() };
-    model.bodies.push(Body { name: "cube".into(), nodes: 0..n.pow(3), damping: 0.0 });
+    model.bodies.push(Body { name: "cube".into(), nodes: 0..n.pow(3), shared: vec![], damping: 0.0 });
     let material = Material { law, prony: Prony::default(), density };
     let count = cells.len();
     let fibre = vec![[0.6, 0.0, 0.8]; count * material.law.families()];
@@ -153,6 +164,16 @@ fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
                         .sum(),
                 }
         }
+        Cells::Membrane(block, sheets) => {
+            let stored = |cell: usize| {
+                let h = gradient(cell, &block.rest[cell].gradient);
+                let axes = sheets[cell].axes;
+                let plane = InPlane::from_changes(&axes, &axes.map(|axis| h.apply(axis)));
+                let fibres = solid.plane_fibres(cell, &sheets[cell]);
+                block.rest[cell].volume * law.plane_stress(plane.strain_twice, &fibres).energy
+            };
+            (0..block.nodes.len()).map(stored).sum()
+        }
         cells => {
             let stored = |cell: usize| {
                 let h = pliant_mechanics::model::with_cells!(cells, block => gradient(cell, &block.rest[cell].gradient));
@@ -172,7 +193,22 @@ fn every_element() -> impl Iterator<Item = Model> {
 fn every_element_full_or_not() -> impl Iterator<Item = Model> {
     let mut random = Random::new(19);
     let filled = laws().into_iter().flat_map(|law| ELEMENTS.map(|element| (element, law)));
-    every_element().chain(
+    let incompressible = [None, Some(f64::INFINITY)].map(|bulk| {
+        laws().map(|law| match (law, bulk) {
+            (AnyLaw::NeoHookean(law), Some(bulk)) => {
+                AnyLaw::NeoHookean(NeoHookean { volumetric: Volumetric::quadratic(bulk), ..law })
+            }
+            (AnyLaw::TransverselyIsotropic(law), Some(bulk)) => {
+                AnyLaw::TransverselyIsotropic(TransverselyIsotropic {
+                    volumetric: Volumetric::quadratic(bulk),
+                    ..law
+                })
+            }
+            (law, _) => law,
+        })
+    });
+    let membranes = incompressible.into_iter().flatten().map(|law| distorted_cube("membrane", law));
+    every_element().chain(membranes).chain(
         filled.map(move |(element, law)| {
             filled_cube(element, law, 700.0, 1000.0, |_| 0.55 + 0.9 * random.half())
         }),
@@ -195,6 +231,70 @@ fn patch_test_on_distorted_cells() {
         let residual = largest(forces.iter().zip(&model.rest).filter(|(_, x)| interior(x)).map(|(&f, _)| f));
         assert!(residual < 1e-12 * scale, "{}: {residual:e} of {scale:e}", model.solids[0].cells.element());
         assert!(hourglass < 1e-24);
+    }
+}
+
+/// A flat sheet of crooked triangles, turned in space: a homogeneous deformation leaves inner nodes in balance, and the force on an edge is
+/// that of the stress.
+#[test]
+fn a_membrane_passes_the_patch_test() {
+    let mut random = Random::new(47);
+    let (t, s) = ([0.6, 0.0, 0.8], [0.0, 1.0, 0.0]);
+    let place = |x: f64, y: f64| add(scale(t, x), scale(s, y));
+    let mut rest = Vec::new();
+    for (j, i) in (0..4).flat_map(|j| (0..4).map(move |i| (j, i))) {
+        let inside = (1..3).contains(&i) && (1..3).contains(&j);
+        let [a, b, _] = if inside { vector(&mut random, 0.02) } else { [0.0; 3] };
+        rest.push(place(0.1 * f64::from(i) + a, 0.1 * f64::from(j) + b));
+    }
+    let square = |j: u32, i: u32| {
+        let at = |i: u32, j: u32| 4 * j + i;
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        if (i + j).is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+    };
+    let triangles: Vec<[u32; 3]> =
+        (0..3).flat_map(|j| (0..3).map(move |i| (j, i))).flat_map(|(j, i)| square(j, i)).collect();
+    let h = Tensor([[0.12, 0.2, -0.05], [0.03, -0.1, 0.1], [-0.08, 0.07, 0.15]]);
+    for law in laws() {
+        let mut model = Model { mass: vec![0.0; 16], rest: rest.clone(), ..Model::default() };
+        model.bodies.push(Body { name: "sheet".into(), nodes: 0..16, shared: vec![], damping: 0.0 });
+        let cells = Cells::membrane(triangles.clone(), &rest, &[0.01; 18]);
+        let fibre = vec![t; 18 * law.families()];
+        model.add_solid(Solid { fibre, ..Solid::new(0, Material::elastic(law, 1000.0), cells) });
+        let displacement: Vec<_> = rest.iter().map(|&x| h.apply(x)).collect();
+        let (forces, _) = forces(&model, &displacement);
+        let scale = largest(forces.iter().copied());
+        let inner = [5, 6, 9, 10].map(|node| forces[node]);
+        assert!(largest(inner) < 1e-13 * scale, "{:e} of {scale:e}", largest(inner));
+        // The side x = 0.3 m with normal t: F S t per length times thickness and width.
+        let changes = [h.apply(t), h.apply(s)];
+        let plane = InPlane::from_changes(&[t, s], &changes);
+        let fibres = &[[1.0, 0.0, 0.0]][..law.families()];
+        let [xx, _, xy] = law.plane_stress(plane.strain_twice, fibres).stress;
+        let pull = add(times(add(t, changes[0]), xx), times(add(s, changes[1]), xy));
+        let side = [7, 11].into_iter().fold([0.0; 3], |sum, node| add(sum, forces[node]));
+        let apart = sub(side, times(pull, 0.01 * 0.2));
+        assert!(largest([apart]) < 1e-12 * scale, "{side:?} {pull:?}");
+    }
+}
+
+/// A triangle that is folded onto a line ends a run.
+#[test]
+fn a_flat_triangle_is_found() {
+    let model = distorted_cube("membrane", laws()[0]);
+    let cell = 17;
+    let [a, b, c] = [0, 1, 2].map(|k| model.solids[0].cells.nodes(cell)[k] as usize);
+    let mut displacement = vec![[0.0; 3]; model.node_count()];
+    let middle = scale(add(model.rest[a], model.rest[b]), 0.5);
+    displacement[c] = sub(middle, model.rest[c]);
+    for found in [
+        InternalForces::<f64>::new(&model, 1.0).evaluate(&displacement, &mut [History::default()]),
+        InternalForces::<f32>::new(&model, 1.0)
+            .evaluate(&displacement.iter().map(|&u| cast(u)).collect::<Vec<_>>(), &mut [History::default()]),
+    ] {
+        let (_, cell, ratio) = found.inverted.unwrap();
+        assert!(model.solids[0].cells.nodes(cell).contains(&(c as u32)));
+        assert!(ratio.is_nan() || ratio <= 0.0, "{ratio}");
     }
 }
 
@@ -383,9 +483,10 @@ fn apart(a: &[Vector<f64>], b: &[Vector<f64>]) -> f64 {
 
 /// Of every law and element, without and with history: 162 tets or 27 hexes, so that the last pack is not full.
 fn every_kernel() -> impl Iterator<Item = Model> {
-    let elements = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"];
+    let elements = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full", "membrane"];
     let models = every_law().into_iter().flat_map(move |law| elements.map(|e| (e, law)));
-    models.filter(|(e, law)| matches!(*e, "tet4" | "hex8") || law.has_volumetric_energy()).flat_map(
+    let any = ["tet4", "hex8", "membrane"];
+    models.filter(move |(e, law)| any.contains(e) || law.has_volumetric_energy()).flat_map(
         |(element, law)| {
             let terms =
                 [Part::Isochoric, Part::Volumetric].map(|part| PronyTerm { part, weight: 0.4, time: 0.3 });

@@ -4,9 +4,10 @@
 //!
 //! `hex8` adds its hourglass control, k γ_a·γ_b I. `hex8-full` takes one mean dilatation J̄ = v/V a cell, whose energy V U(J̄) adds
 //! p cof F B_a to the force, and U″(J̄)/V c_a ⊗ c_b with c_a = Σ w cof F B_a to the stiffness. `tet4-anp` does so for each node with
-//! the tets around it (`star.rs`).
+//! the tets around it (`star.rs`). Membranes are in plane stress (`membrane.rs`).
 
 mod closed;
+mod membrane;
 mod star;
 #[cfg(test)]
 mod tests;
@@ -86,6 +87,11 @@ impl Response {
                     add_dyad(&mut self.tangent, changes.as_flattened(), second / volume);
                 }
                 each
+            }
+            Cells::Membrane(block, sheets) => {
+                let u = moved(block, cell, displacement);
+                let own = Own { fibres: &solid.plane_fibres(cell, &sheets[cell]), ..own };
+                self.add_triangle(own, &u, &block.rest[cell], &sheets[cell].axes)
             }
         };
         self.broken = found.err();
@@ -223,7 +229,7 @@ fn inverted_corner(solid: &Solid, cell: usize, displacement: impl Fn(u32) -> Vec
             let volume = |(b, w): (&[Vector<f64>; 8], f64)| w * (1.0 + volume_change(&gradient(&u, b)));
             own.map(volume).sum::<f64>() / block.rest[cell].volume
         }
-        Cells::Tet4(_) | Cells::AveragedTet4(..) => return None,
+        Cells::Tet4(_) | Cells::AveragedTet4(..) | Cells::Membrane(..) => return None,
     };
     let (_, determinant) = solid.cells.worst_corner(cell, displacement).filter(|_| flatness < FLAT_HEX)?;
     is_inverted(determinant).then_some(determinant)
@@ -376,5 +382,5 @@ pub(crate) fn highest_frequency_squared(solid: &Solid, cell: usize) -> f64 {
         }
         _ => 0.0,
     };
-    (solid.material.law.longitudinal_modulus() * squares + control) / share
+    (solid.longitudinal_modulus() * squares + control) / share
 }

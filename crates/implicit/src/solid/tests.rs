@@ -55,6 +55,11 @@ fn block(element: &str, law: AnyLaw, counts: [usize; 3], sides: [f64; 3]) -> Ass
         "tet4" => Cells::tet4(tets, &rest),
         "tet4-anp" => Cells::averaged_tet4(tets, &rest, Averaging::Nodal),
         "hex8" => Cells::hex8(hexes(counts), &rest, 0.2, law.small_strain().shear),
+        "membrane" => {
+            let sides: Vec<[u32; 3]> = tets.iter().map(|&[a, b, c, _]| [a, b, c]).collect();
+            let thickness: Vec<f64> = (0..sides.len()).map(|cell| 0.01 + 0.001 * (cell % 7) as f64).collect();
+            Cells::membrane(sides, &rest, &thickness)
+        }
         _ => Cells::full_hex8(hexes(counts), &rest),
     };
     let fibre = vec![[0.6, 0.0, 0.8]; law.families() * cells.len()];
@@ -74,8 +79,24 @@ fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
 /// Central differences at a state of strains up to 20 %, turned far: force from energy and stiffness from force to 1e-7 of their largest.
 #[test]
 fn force_and_stiffness_are_derivatives() {
-    for (element, name) in all() {
-        let model = block(element, law(name), [2, 1, 2], [0.2, 0.1, 0.2]);
+    let half = ["neo-hookean", "transversely-isotropic"].map(|name| (name, Some(0.5)));
+    let laws = ["neo-hookean", "st-venant-kirchhoff", "ogden", "transversely-isotropic", "corotational"];
+    let of_membranes = laws.map(|name| (name, None)).into_iter().chain(half);
+    let membranes = of_membranes.map(|(name, poisson)| match poisson {
+        Some(nu) => {
+            let json = json!({ "young-modulus": 1e4, "poisson-ratio": nu, "fibre-modulus": 5e3 });
+            let json = if name == "neo-hookean" {
+                json!({ "young-modulus": 1e4, "poisson-ratio": nu })
+            } else {
+                json
+            };
+            ("membrane", name, samples::law(name, json))
+        }
+        None => ("membrane", name, law(name)),
+    });
+    let solids = all().map(|(element, name)| (element, name, law(name)));
+    for (element, name, law) in solids.chain(membranes) {
+        let model = block(element, law, [2, 1, 2], [0.2, 0.1, 0.2]);
         let mut random = Random::new(1);
         let mut state = State::at_rest(&model);
         let turn = crate::rotation::exponential(&Vector3::new(1.0, -2.0, 0.5));

@@ -49,7 +49,7 @@ impl NamedLaw for Corotational {
     type Parameters = CorotationalParameters;
 
     fn new(parameters: &CorotationalParameters) -> Result<Self, ParameterError> {
-        let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
+        let SmallStrainModuli { shear, bulk } = parameters.elastic.compressible_moduli()?;
         Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
     }
 }

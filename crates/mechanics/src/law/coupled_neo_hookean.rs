@@ -30,7 +30,7 @@ impl NamedLaw for CoupledNeoHookean {
     type Parameters = CoupledNeoHookeanParameters;
 
     fn new(parameters: &CoupledNeoHookeanParameters) -> Result<Self, ParameterError> {
-        let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
+        let SmallStrainModuli { shear, bulk } = parameters.elastic.compressible_moduli()?;
         Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
     }
 }

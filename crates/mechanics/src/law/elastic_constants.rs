@@ -19,8 +19,8 @@ pub struct ElasticConstants {
     /// Young's modulus E [Pa].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub young_modulus: Option<f64>,
-    /// Poisson's ratio ν; soft tissue lies near 0.45 to 0.49.
-    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5))]
+    /// Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells.
+    #[schemars(extend("exclusiveMinimum" = -1.0, "maximum" = 0.5))]
     pub poisson_ratio: Option<f64>,
 }
 
@@ -63,15 +63,27 @@ impl ElasticConstants {
                 young_modulus: Some(e),
                 poisson_ratio: Some(nu),
             } => {
-                if !(-1.0 < nu && nu < 0.5) {
-                    let message =
-                        format!("`poisson-ratio` must lie between −1 and 0.5, both excluded; found {nu}");
-                    return Err(error("poisson-ratio", message));
+                if !(-1.0 < nu && nu <= 0.5) {
+                    return Err(error("poisson-ratio", poisson_range(nu)));
                 }
                 Ok(SmallStrainModuli { shear: e / (2.0 * (1.0 + nu)), bulk: e / (3.0 * (1.0 - 2.0 * nu)) })
             }
             _ => Err(self.wrong_combination()),
         }
+    }
+
+    /// The same of a law that must be able to change its volume.
+    ///
+    /// # Errors
+    /// As [`moduli`](Self::moduli), and if ν = ½.
+    pub fn compressible_moduli(&self) -> Result<SmallStrainModuli, ParameterError> {
+        let moduli = self.moduli()?;
+        if moduli.bulk.is_infinite() {
+            let message = "this law has no version that keeps the volume (`poisson-ratio` 0.5)".into();
+            let help = "take a `poisson-ratio` below 0.5, or for a membrane a law such as `neo-hookean`";
+            return Err(ParameterError { key: "poisson-ratio", message, help: help.into() });
+        }
+        Ok(moduli)
     }
 
     fn wrong_combination(&self) -> ParameterError {
@@ -87,6 +99,11 @@ impl ElasticConstants {
             (false, false) => error("type", "the stiffness is missing".into()),
         }
     }
+}
+
+/// What is wrong with a Poisson's ratio out of range.
+pub(super) fn poisson_range(nu: f64) -> String {
+    format!("`poisson-ratio` must be above −1 and at most 0.5; found {nu}")
 }
 
 fn missing(first_given: bool, first: &'static str, second: &'static str) -> ParameterError {
@@ -109,6 +126,17 @@ mod tests {
         let moduli = given.moduli().unwrap();
         assert!((moduli.shear - 1034.4827586206898).abs() < 1e-9);
         assert!((moduli.bulk - 10000.0).abs() < 1e-9);
+        assert!((moduli.young() - 3000.0).abs() < 1e-9 && (moduli.poisson() - 0.45).abs() < 1e-12);
+    }
+
+    #[test]
+    fn half_a_poisson_ratio_keeps_the_volume() {
+        let given =
+            ElasticConstants { young_modulus: Some(3000.0), poisson_ratio: Some(0.5), ..Default::default() };
+        let moduli = given.moduli().unwrap();
+        assert_eq!((moduli.shear, moduli.bulk), (1000.0, f64::INFINITY));
+        assert_eq!((moduli.young(), moduli.poisson()), (3000.0, 0.5));
+        assert_eq!(given.compressible_moduli().unwrap_err().key, "poisson-ratio");
     }
 
     #[test]
@@ -124,7 +152,7 @@ mod tests {
             }),
             "young-modulus"
         );
-        for nu in [0.5, -1.0, 0.7] {
+        for nu in [0.51, -1.0, 0.7, f64::NAN] {
             let constants =
                 ElasticConstants { young_modulus: Some(1.0), poisson_ratio: Some(nu), ..Default::default() };
             assert_eq!(key(constants), "poisson-ratio");

@@ -30,7 +30,7 @@ impl NamedLaw for LogarithmicNeoHookean {
     type Parameters = LogarithmicNeoHookeanParameters;
 
     fn new(parameters: &LogarithmicNeoHookeanParameters) -> Result<Self, ParameterError> {
-        let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
+        let SmallStrainModuli { shear, bulk } = parameters.elastic.compressible_moduli()?;
         Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
     }
 }

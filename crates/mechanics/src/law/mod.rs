@@ -22,6 +22,7 @@ mod neo_hookean;
 mod ogden;
 mod orthotropic;
 mod own;
+pub mod plane_stress;
 mod polynomial;
 mod principal;
 mod shader;
@@ -85,8 +86,22 @@ pub struct Split<T> {
 pub struct SmallStrainModuli {
     /// Shear modulus of the matrix [Pa].
     pub shear: f64,
-    /// Bulk modulus [Pa].
+    /// Bulk modulus [Pa]; infinite of a law that keeps the volume, for walls in plane stress.
     pub bulk: f64,
+}
+
+impl SmallStrainModuli {
+    /// Young's modulus [Pa].
+    pub fn young(&self) -> f64 {
+        // 9κμ/(3κ + μ), which an infinite κ leaves at 3μ.
+        3.0 * self.shear / (1.0 + self.shear / (3.0 * self.bulk))
+    }
+
+    /// Poisson's ratio; ½ with an infinite bulk modulus.
+    pub fn poisson(&self) -> f64 {
+        let ratio = self.shear / (3.0 * self.bulk);
+        (0.5 - ratio) / (1.0 + ratio)
+    }
 }
 
 /// What is wrong with a parameter of a law.
@@ -146,7 +161,12 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// positive form is largest over that ball at some n⊗m.
     fn longitudinal_modulus(&self) -> f64 {
         let SmallStrainModuli { shear, bulk } = self.small_strain();
-        bulk + 4.0 / 3.0 * shear
+        bulk + 4.0 / 3.0 * shear + self.fibre_modulus()
+    }
+
+    /// An upper bound of what fibres add to ρc² at rest, over all directions [Pa].
+    fn fibre_modulus(&self) -> f64 {
+        0.0
     }
 }
 
@@ -295,6 +315,11 @@ impl AnyLaw {
     /// Upper bound of ρc² at rest [Pa]; see [`Law::longitudinal_modulus`].
     pub fn longitudinal_modulus(&self) -> f64 {
         with_law!(self, law => law.longitudinal_modulus())
+    }
+
+    /// What fibres add to ρc² at rest at most [Pa]; see [`Law::fibre_modulus`].
+    pub fn fibre_modulus(&self) -> f64 {
+        with_law!(self, law => law.fibre_modulus())
     }
 
     /// U(J) [J/m³] at a J − 1, of a law with an energy of the volume alone ([`has_volumetric_energy`](Self::has_volumetric_energy)).

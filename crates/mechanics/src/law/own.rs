@@ -176,4 +176,9 @@ impl Law for Own {
     fn longitudinal_modulus(&self) -> f64 {
         self.0.longitudinal_modulus()
     }
+
+    fn fibre_modulus(&self) -> f64 {
+        let SmallStrainModuli { shear, bulk } = self.0.small_strain();
+        (self.0.longitudinal_modulus() - bulk - 4.0 / 3.0 * shear).max(0.0)
+    }
 }

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use super::elastic_constants::poisson_range;
 use super::{
     Deformation, ElasticConstants, Law, NamedLaw, ParameterError, Shader, SmallStrainModuli, Split,
     Volumetric, VolumetricEnergy,
@@ -94,8 +95,8 @@ impl<L: SplitLaw> Law for L {
         SplitLaw::families(self)
     }
 
-    fn longitudinal_modulus(&self) -> f64 {
-        self.volumetric().bulk + 4.0 / 3.0 * self.shear() + self.fibre_stiffness()
+    fn fibre_modulus(&self) -> f64 {
+        self.fibre_stiffness()
     }
 }
 
@@ -130,8 +131,8 @@ pub struct Compressibility {
     /// Bulk modulus κ [Pa].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bulk_modulus: Option<f64>,
-    /// Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49.
-    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5))]
+    /// Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells.
+    #[schemars(extend("exclusiveMinimum" = -1.0, "maximum" = 0.5))]
     pub poisson_ratio: Option<f64>,
     /// How the energy grows with the change of volume.
     #[serde(default)]
@@ -156,11 +157,9 @@ impl Compressibility {
                     format!("`bulk-modulus` must be greater than 0 Pa, found {bulk}"),
                 );
             }
-            (None, Some(nu)) if -1.0 < nu && nu < 0.5 => 2.0 * shear * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu)),
+            (None, Some(nu)) if -1.0 < nu && nu <= 0.5 => 2.0 * shear * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu)),
             (None, Some(nu)) => {
-                let message =
-                    format!("`poisson-ratio` must lie between −1 and 0.5, both excluded; found {nu}");
-                return error("poisson-ratio", message);
+                return error("poisson-ratio", poisson_range(nu));
             }
             (Some(_), Some(_)) => {
                 return error("poisson-ratio", "the resistance to volume change is given in two ways".into());
@@ -191,7 +190,7 @@ mod tests {
         };
         assert_eq!(key(None, None), "type");
         assert_eq!(key(Some(1.0), Some(0.4)), "poisson-ratio");
-        assert_eq!(key(None, Some(0.5)), "poisson-ratio");
+        assert_eq!(key(None, Some(0.51)), "poisson-ratio");
         assert_eq!(key(Some(0.0), None), "bulk-modulus");
         assert_eq!(key(Some(f64::NAN), None), "bulk-modulus");
     }

@@ -31,7 +31,7 @@ impl NamedLaw for StVenantKirchhoff {
     type Parameters = StVenantKirchhoffParameters;
 
     fn new(parameters: &StVenantKirchhoffParameters) -> Result<Self, ParameterError> {
-        let SmallStrainModuli { shear, bulk } = parameters.elastic.moduli()?;
+        let SmallStrainModuli { shear, bulk } = parameters.elastic.compressible_moduli()?;
         Ok(Self { shear, lame: bulk - 2.0 / 3.0 * shear })
     }
 }

@@ -24,6 +24,16 @@ pub(super) struct Draft<'a> {
     pub boundary: &'a Surface,
 }
 
+/// The mesh of a body, and where it comes from.
+pub(super) struct Shape {
+    pub mesh: Mesh,
+    pub origin: String,
+    pub file_nodes: usize,
+    pub file_numbers: Vec<u32>,
+    /// The nodes of another body that it is on, numbered in the model.
+    pub shared: Option<Vec<u32>>,
+}
+
 /// Some cells of a block, of one material.
 struct Part {
     law: String,
@@ -36,46 +46,60 @@ impl Builder<'_> {
     pub(super) fn add_bodies(&mut self) {
         let scene = self.scene;
         for (name, table) in &scene.bodies {
-            let path = ["body", name.as_str()];
-            let mesh_path = [path[0], path[1], "mesh"];
-            let Some(mut made) = self.mesh(&table.mesh, &mesh_path) else { continue };
-            let file_nodes = made.mesh.points.len();
-            let file_numbers = self.repair(&mut made.mesh, &table.mesh, &mesh_path);
-            if table.model == BodyModel::Shell {
-                let label_names = std::mem::take(&mut made.mesh.label_names);
-                let Some(mesh) = self.triangles(made.mesh, &mesh_path) else { continue };
-                made.mesh = Mesh { label_names, ..mesh };
-            }
-            if !self.check_mesh(&made.mesh, table, &mesh_path) {
+            let Some(Shape { mesh, origin, file_nodes, file_numbers, shared }) = self.body_shape(name, table)
+            else {
                 continue;
-            }
-            let Some(numbered) = self.by_numbers(name, table, &made.mesh) else { continue };
-            let boundary = boundary(&made.mesh);
-            self.add_body(&Draft {
-                name,
-                table: &numbered,
-                given: table,
-                mesh: &made.mesh,
-                boundary: &boundary,
-            });
-            self.bodies.push(BuiltBody {
-                name: name.clone(),
-                mesh: made.mesh,
-                origin: made.origin,
-                boundary,
-                file_nodes,
-                file_numbers,
-            });
+            };
+            let Some(numbered) = self.by_numbers(name, table, &mesh) else { continue };
+            let boundary = boundary(&mesh);
+            let draft = Draft { name, table: &numbered, given: table, mesh: &mesh, boundary: &boundary };
+            self.add_body(&draft, shared);
+            let name = name.clone();
+            self.bodies.push(BuiltBody { name, mesh, origin, boundary, file_nodes, file_numbers });
         }
         self.check_unused_laws();
     }
 
-    fn add_body(&mut self, draft: &Draft<'_>) {
+    /// The mesh of a body, and where it comes from.
+    fn body_shape(&mut self, name: &str, table: &BodyTable) -> Option<Shape> {
+        if let Some(host) = &table.on {
+            return self.wall(name, table, host);
+        }
+        let path = ["body", name, "mesh"];
+        if self.source().node(&path).is_none() {
+            let message = format!("missing key `mesh` in `body.{name}`");
+            let help =
+                "`mesh`: a file, a shape or an image; or for a wall `on`, the body on whose boundary it is";
+            self.error(&path[..2], message, "`mesh` is missing here", help);
+            return None;
+        }
+        let mut made = self.mesh(&table.mesh, &path)?;
+        let file_nodes = made.mesh.points.len();
+        let file_numbers = self.repair(&mut made.mesh, &table.mesh, &path);
+        if table.model != BodyModel::Solid {
+            let label_names = std::mem::take(&mut made.mesh.label_names);
+            let mesh = self.triangles(made.mesh, &path)?;
+            made.mesh = Mesh { label_names, ..mesh };
+        }
+        if !self.check_mesh(&made.mesh, table, &path) {
+            return None;
+        }
+        Some(Shape { mesh: made.mesh, origin: made.origin, file_nodes, file_numbers, shared: None })
+    }
+
+    fn add_body(&mut self, draft: &Draft<'_>, shared: Option<Vec<u32>>) {
         let &Draft { name, table, mesh, .. } = draft;
-        let first = self.assembly.rest.len() as u32;
-        let body = self.assembly.add_body(name, mesh.points.iter().copied());
+        let first = self.assembly.rest.len();
+        let is_wall_on_solid = shared.is_some();
+        let body = match shared {
+            Some(nodes) => self.assembly.model_mut().add_body_on(name, nodes),
+            None => self.assembly.add_body(name, mesh.points.iter().copied()),
+        };
         self.assembly.model_mut().bodies[body].damping = table.damping;
-        self.set_velocity(name, table, first as usize);
+        self.set_velocity(name, table, first);
+        if self.scene.is_implicit() && !is_wall_on_solid {
+            self.assembly.stiffness_damping = table.stiffness_damping;
+        }
         if table.layers.is_empty() {
             if table.law.values().is_empty() {
                 let message = format!("missing key `law` in `body.{name}`");
@@ -93,14 +117,17 @@ impl Builder<'_> {
                 let help = "leave it out, or set `model = \"solid\"`";
                 self.error(&["body", name, "fraction"], message, "has no effect", help);
             }
-            self.assembly.stiffness_damping = table.stiffness_damping;
-            if let Some(cells) = self.add_shell(draft, first) {
+            if let Some(cells) = self.add_shell(draft, body) {
                 self.cells.push(cells);
             }
             return;
         }
         let before = self.assembly.solids.len();
-        for block in mesh.volume_blocks().filter(|block| !block.is_empty()) {
+        let is_own = |block: &&CellBlock| match table.model {
+            BodyModel::Membrane => block.kind == CellKind::Triangle,
+            _ => block.kind.dimension() == 3,
+        };
+        for block in mesh.blocks.iter().filter(|block| !block.is_empty()).filter(is_own) {
             if !self.check_element(name, table, block.kind) {
                 return;
             }
@@ -109,7 +136,6 @@ impl Builder<'_> {
             }
         }
         if self.scene.is_implicit() {
-            self.assembly.stiffness_damping = table.stiffness_damping;
             self.check_solids(name, before);
             self.cells.push(pliant_sim::BodyCells::Solids);
         }
@@ -130,6 +156,14 @@ impl Builder<'_> {
     }
 
     fn check_element(&mut self, name: &str, table: &BodyTable, kind: CellKind) -> bool {
+        if kind == CellKind::Triangle {
+            if table.element.is_some() {
+                let message = format!("`{name}` is a membrane, which has one element only");
+                let help = "leave `element` out, or set `model = \"shell\"`, whose elements differ";
+                self.error(&["body", name, "element"], message, "not for membranes", help);
+            }
+            return table.element.is_none();
+        }
         let fits = table
             .element
             .is_none_or(|element| !element.is_shell() && element.is_tet() == (kind == CellKind::Tet));
@@ -253,14 +287,27 @@ impl Builder<'_> {
             return;
         }
         let Some(prony) = self.prony(&law_name, law) else { return };
+        let at = law_path(name, &given.law, &law_name);
+        if !self.check_law_of_model(draft, &law_name, law, &prony, &at) {
+            return;
+        }
         let Some(fibre) = self.fibres(draft, &law_name, law, block, &cells) else { return };
         let Some(fractions) = self.fractions(draft, block, &cells) else { return };
         let material = Material { law: law.law, prony, density: density.0 };
-        let first = self.assembly.bodies[body].nodes.start;
+        if block.kind == CellKind::Triangle {
+            self.add_membrane(
+                draft,
+                body,
+                block,
+                Solid { body, material, cells: Cells::membrane(vec![], &[], &[]), fibre, original: cells },
+            );
+            return;
+        }
+        let own = &self.assembly.bodies[body];
         let rest = &self.assembly.rest;
         let shear = law.law.small_strain().shear;
-        let tets = || cells.iter().map(|&c| nodes(block, c, first)).collect();
-        let hexes = || cells.iter().map(|&c| nodes(block, c, first)).collect();
+        let tets = || cells.iter().map(|&c| nodes(block, c, |node| own.node(node))).collect();
+        let hexes = || cells.iter().map(|&c| nodes(block, c, |node| own.node(node))).collect();
         let cells_of = match (block.kind, table.element) {
             (CellKind::Tet, Some(Element::Tet4Anp)) => Cells::averaged_tet4(tets(), rest, Averaging::Nodal),
             (CellKind::Tet, Some(Element::Tet4Ianp)) => {
@@ -361,10 +408,11 @@ pub(super) fn law_path<'a>(body: &'a str, choice: &'a ByLabel<String>, law: &str
     ["body", body, "law"].into_iter().chain(label.map(String::as_str)).collect()
 }
 
-pub(super) fn nodes<const N: usize>(block: &CellBlock, cell: u32, first: u32) -> [u32; N] {
+/// The nodes of a cell, by the number of each in the model.
+pub(super) fn nodes<const N: usize>(block: &CellBlock, cell: u32, number: impl Fn(u32) -> u32) -> [u32; N] {
     let mut nodes = [0; N];
-    for (own, node) in nodes.iter_mut().zip(block.cell(cell as usize)) {
-        *own = first + node;
+    for (own, &node) in nodes.iter_mut().zip(block.cell(cell as usize)) {
+        *own = number(node);
     }
     nodes
 }

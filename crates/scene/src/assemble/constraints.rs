@@ -128,7 +128,7 @@ impl Builder<'_> {
         path: &[&str],
     ) -> Option<Vec<u32>> {
         let built = &self.bodies[body];
-        let first = self.assembly.bodies[body].nodes.start;
+        let own = &self.assembly.bodies[body];
         match selection.nodes(&built.mesh, &built.boundary) {
             Ok(nodes) => {
                 let (mesh, name) = (&built.mesh, &built.name);
@@ -146,7 +146,7 @@ impl Builder<'_> {
                         self.out.push(Diagnostic::warning(message).at(place, "far outside").help(help));
                     }
                 }
-                Some(nodes.into_iter().map(|node| first + node).collect())
+                Some(nodes.into_iter().map(|node| own.node(node)).collect())
             }
             Err(error) => {
                 self.error(path, error.to_string(), "this selection", "");
@@ -160,7 +160,9 @@ impl Builder<'_> {
         let scene = self.scene;
         let flies =
             |name: &str| scene.bodies.iter().any(|(own, body)| own == name && body.velocity.is_some());
-        for (index, body) in self.assembly.bodies.iter().enumerate() {
+        // A wall is held with the body that it is on.
+        let with_nodes = self.assembly.bodies.iter().enumerate().filter(|(_, body)| !body.nodes.is_empty());
+        for (index, body) in with_nodes {
             let springs = &self.assembly.springs;
             let held = self
                 .assembly

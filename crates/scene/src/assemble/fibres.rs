@@ -250,11 +250,11 @@ fn laplace(
     let tets = draft
         .mesh
         .block(CellKind::Tet)
-        .map_or(Vec::new(), |b| (0..b.len()).map(|c| nodes(b, c as u32, 0)).collect());
+        .map_or(Vec::new(), |b| (0..b.len()).map(|c| nodes(b, c as u32, |node| node)).collect());
     let hexes = draft
         .mesh
         .block(CellKind::Hex)
-        .map_or(Vec::new(), |b| (0..b.len()).map(|c| nodes(b, c as u32, 0)).collect());
+        .map_or(Vec::new(), |b| (0..b.len()).map(|c| nodes(b, c as u32, |node| node)).collect());
     let phi = Laplacian::new(&points, &tets, &hexes)
         .solve(&given)
         .map_err(|error| fault(&["laplace"], error.to_string(), "are there very flat cells in the mesh?"))?;

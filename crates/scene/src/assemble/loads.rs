@@ -1,6 +1,6 @@
 //! Loads: forces on nodes, tractions and pressures on faces, gravity. And the references of outputs.
 
-use pliant_geometry::{Locator, Mesh, Selection, Surface, Vector3, boundary};
+use pliant_geometry::{Mesh, Selection, Surface, Vector3, boundary};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
@@ -19,7 +19,7 @@ impl Builder<'_> {
             return;
         }
         if let Some(acceleration) = scene.scene.gravity {
-            for body in 0..self.assembly.bodies.len() {
+            for body in self.bodies_with_nodes() {
                 let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
                 let kind = LoadKind::Gravity { body, acceleration };
                 self.assembly.model_mut().loads.push(Load::new("gravity", kind, curve));
@@ -32,6 +32,22 @@ impl Builder<'_> {
                 self.assembly.model_mut().loads.extend(loads.into_iter().map(named));
             }
         }
+    }
+
+    /// The bodies that have nodes of their own, and with them mass: that of a wall on another body is the mass of its nodes.
+    pub(super) fn bodies_with_nodes(&self) -> Vec<usize> {
+        (0..self.assembly.bodies.len()).filter(|&body| !self.assembly.bodies[body].nodes.is_empty()).collect()
+    }
+
+    /// Refuses the weight of a wall apart from the body that it is on.
+    pub(super) fn check_weight(&mut self, bodies: &[usize], of_nodes: bool, path: &[&str]) -> bool {
+        let wall = bodies.iter().copied().find(|&body| self.assembly.bodies[body].nodes.is_empty());
+        let Some(wall) = wall.filter(|_| !of_nodes) else { return true };
+        let name = self.bodies[wall].name.clone();
+        let message =
+            format!("`{name}` has no nodes of its own: its weight is that of the body that it is on");
+        self.error(path, message, "a wall", "name that body, or leave `on` out");
+        false
     }
 
     fn loads(&mut self, table: &LoadTable, path: &[&str]) -> Option<Vec<(LoadKind, Curve, Option<usize>)>> {
@@ -50,8 +66,11 @@ impl Builder<'_> {
         if let LoadTable::Gravity(gravity) = table {
             let bodies = match &gravity.on {
                 Some(name) => vec![self.find_body(name, &at("on"))?],
-                None => (0..self.assembly.bodies.len()).collect(),
+                None => self.bodies_with_nodes(),
             };
+            if !self.check_weight(&bodies, gravity.nodes.is_some(), &at("on")) {
+                return None;
+            }
             let curve = curve?;
             let acceleration = gravity.acceleration;
             if let Some(selection) = &gravity.nodes {
@@ -138,12 +157,12 @@ impl Builder<'_> {
     ) -> Option<Vec<Face>> {
         let result = match target {
             Target::Body(body) => {
-                let (built, first) = (&self.bodies[body], self.assembly.bodies[body].nodes.start);
-                select_faces(selection, &built.mesh, &built.boundary, first)
+                let (built, own) = (&self.bodies[body], &self.assembly.bodies[body]);
+                select_faces(selection, &built.mesh, &built.boundary, |node| own.node(node))
             }
             Target::Surface(index) => {
                 let (mesh, boundary) = self.surface_mesh(index);
-                select_faces(selection, &mesh, &boundary, 0)
+                select_faces(selection, &mesh, &boundary, |node| node)
             }
         };
         result.map_err(|error| self.error(path, error, "this selection", "")).ok()
@@ -211,7 +230,7 @@ impl Builder<'_> {
             Some(Some(Target::Surface(surface))) => {
                 let body = self.assembly.surfaces[surface].body;
                 let model = self.scene.bodies[body].1.model;
-                if model != BodyModel::Solid && field != FieldName::Displacement {
+                if model == BodyModel::Shell && field != FieldName::Displacement {
                     let message = format!(
                         "surfaces that a body of model `{}` carries have a displacement and no `{}`",
                         model.word(),
@@ -332,7 +351,7 @@ impl Builder<'_> {
                      `stress-bottom`, `membrane-force`, `bending-moment`, `membrane-energy`, `bending-energy`, \
                      `drilling-energy`, `thickness`, `current-thickness`, `surface-strain`, `element-step`"
                 }
-                BodyModel::Solid => "leave it out: it is a field of shells",
+                _ => "leave it out: it is a field of other bodies",
             };
             let given = self.source().node(&[path, &[index_text.as_str()]].concat()).is_some();
             let at = if given { [path, &[index_text.as_str()]].concat() } else { path.to_vec() };
@@ -368,9 +387,7 @@ impl Builder<'_> {
                     BodyModel::Shell => {
                         self.bodies[body].closest(&place).map(|found| (found.position - place).norm())
                     }
-                    _ => {
-                        Locator::new(&self.bodies[body].mesh).locate(place).map(|location| location.distance)
-                    }
+                    _ => self.bodies[body].locator().locate(&place).map(|location| location.distance),
                 };
                 let distance = distance.unwrap_or(0.0);
                 let help = "give its place at rest in metres; the nearest cell carries it";
@@ -432,12 +449,12 @@ fn select_faces(
     selection: &Selection,
     mesh: &Mesh,
     boundary: &Surface,
-    first: u32,
+    number: impl Fn(u32) -> u32,
 ) -> Result<Vec<Face>, String> {
     let face = |index: u32| {
         let mut face = [NO_NODE; 4];
-        for (own, node) in face.iter_mut().zip(boundary.faces[index as usize].nodes()) {
-            *own = first + node;
+        for (own, &node) in face.iter_mut().zip(boundary.faces[index as usize].nodes()) {
+            *own = number(node);
         }
         face
     };

@@ -203,10 +203,10 @@ impl Builder<'_> {
         let table = &body.mesh;
         let fixes: &[Fix] = table.fix.as_ref().map_or(&[], |fixes| fixes.as_slice());
         let place = if table.file.is_some() { [path, &["file"]].concat() } else { path.to_vec() };
-        let dimension = if body.model == BodyModel::Shell { 2 } else { 3 };
+        let dimension = if body.model == BodyModel::Solid { 3 } else { 2 };
         if dimension == 3 && mesh.volume_blocks().all(|block| block.is_empty()) {
             let help = "a solid body needs tets or hexes; this mesh has only surface cells or none. For a thin wall set \
-                        `model = \"shell\"`";
+                        `model = \"shell\"` or `\"membrane\"`";
             self.error(&place, format!("`{}` has no volume elements", path[1]), "this mesh", help);
             return false;
         }

@@ -14,10 +14,11 @@ mod meshes;
 mod node_vectors;
 mod sheets;
 mod surfaces;
+mod walls;
 
 use std::sync::Arc;
 
-use pliant_geometry::{Labels, Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
+use pliant_geometry::{CellKind, Labels, Locator, Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
 use pliant_implicit::{Assembly, CurvedSurface};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
@@ -74,9 +75,66 @@ impl BuiltBody {
         SurfaceLocator::new(&self.boundary, &all, &self.mesh.points).closest(point)
     }
 
+    /// Finds points of its body.
+    pub(crate) fn locator(&self) -> BodyLocator<'_> {
+        if self.mesh.volume_blocks().any(|block| !block.is_empty()) {
+            return BodyLocator::Cells(&self.mesh, Locator::new(&self.mesh));
+        }
+        let all: Vec<u32> = (0..self.boundary.faces.len() as u32).collect();
+        BodyLocator::Wall(&self.boundary, SurfaceLocator::new(&self.boundary, &all, &self.mesh.points))
+    }
+
     /// The number that a node has in the mesh file.
     fn number_in_file(&self, node: u32) -> u32 {
         self.file_numbers.get(node as usize).copied().unwrap_or(node)
+    }
+}
+
+/// Finds where points lie in a body: in its cells, or on its triangles where it is a thin wall.
+pub(crate) enum BodyLocator<'b> {
+    /// In the cells of a solid.
+    Cells(&'b Mesh, Locator),
+    /// On triangles.
+    Wall(&'b Surface, SurfaceLocator),
+}
+
+/// Where a point lies in a body.
+pub(crate) struct Located {
+    /// The kind of the cell that is nearest.
+    pub kind: CellKind,
+    /// Its number in its block.
+    pub cell: u32,
+    /// Nodes of the mesh with their weights.
+    pub weights: Vec<(u32, f64)>,
+    /// How far outside the cell the point is [m].
+    pub distance: f64,
+}
+
+impl BodyLocator<'_> {
+    /// The place of a point at rest [m]; `None` without cells.
+    pub fn locate(&self, point: &Vector3) -> Option<Located> {
+        match self {
+            Self::Cells(mesh, cells) => {
+                let found = cells.locate(*point)?;
+                let nodes = mesh.block(found.kind)?.cell(found.cell as usize);
+                Some(Located {
+                    kind: found.kind,
+                    cell: found.cell,
+                    weights: nodes.iter().copied().zip(found.weights().iter().copied()).collect(),
+                    distance: found.distance,
+                })
+            }
+            Self::Wall(surface, triangles) => {
+                let found = triangles.closest(point)?;
+                let parent = surface.faces[found.face as usize].parent;
+                Some(Located {
+                    kind: parent.kind,
+                    cell: parent.index,
+                    weights: found.nodes.into_iter().zip(found.weights).collect(),
+                    distance: (found.position - point).norm(),
+                })
+            }
+        }
     }
 }
 

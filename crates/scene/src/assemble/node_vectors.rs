@@ -33,8 +33,8 @@ impl Builder<'_> {
         path: &[&str],
     ) -> Option<Vec<[f64; 3]>> {
         let built = &self.bodies[body];
-        let first = self.assembly.bodies[body].nodes.start;
-        let own: Vec<u32> = nodes.iter().map(|node| node - first).collect();
+        let numbers: BTreeMap<u32, u32> = self.assembly.bodies[body].all_nodes().zip(0..).collect();
+        let own: Vec<u32> = nodes.iter().filter_map(|node| numbers.get(node).copied()).collect();
         let (key, found) = match &table.from {
             NodeVectorSource::PointData(name) => (
                 "point-data",

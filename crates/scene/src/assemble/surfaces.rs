@@ -1,6 +1,6 @@
 //! Surfaces carried by bodies: each point tied to the cell it lies in, or the nearest one.
 
-use pliant_geometry::{Locator, Mesh};
+use pliant_geometry::Mesh;
 use pliant_implicit::{Carried, CurvedSurface, EdgeRule, State};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Surface;
@@ -63,22 +63,16 @@ impl Builder<'_> {
     }
 
     fn carry(&mut self, body: usize, name: &str, surface: &Mesh) -> Weights {
-        let mesh = &self.bodies[body].mesh;
-        let first = self.assembly.bodies[body].nodes.start;
-        let locator = Locator::new(mesh);
+        let own = &self.assembly.bodies[body];
+        let locator = self.bodies[body].locator();
         let mut farthest = 0.0_f64;
         let mut row = Vec::new();
         let mut rows = Vec::with_capacity(surface.points.len());
         for &point in &surface.points {
             row.clear();
-            if let Some(location) = locator.locate(point)
-                && let Some(block) = mesh.block(location.kind)
-            {
+            if let Some(location) = locator.locate(&point) {
                 farthest = farthest.max(location.distance);
-                let nodes = block.cell(location.cell as usize);
-                row.extend(
-                    nodes.iter().zip(location.weights()).map(|(&node, &weight)| (first + node, weight)),
-                );
+                row.extend(location.weights.iter().map(|&(node, weight)| (own.node(node), weight)));
             }
             rows.push(row.clone());
         }

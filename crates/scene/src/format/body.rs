@@ -14,15 +14,22 @@ use super::NodeVectors;
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyTable {
-    /// How it is modelled. With the solvers `explicit` and `quasi-static` solids and shells are different participants
-    /// (`[participant.NAME]`).
+    /// How it is modelled; if not given, `solid`, or `membrane` with `on`. With the solvers `explicit` and `quasi-static` shells are a
+    /// participant of their own (`[participant.NAME]`).
     #[serde(default)]
     pub model: BodyModel,
-    /// Its mesh, from a file, a built-in shape, or a segmented image. A shell's mesh is of triangles (quads are cut into
-    /// two); a volume mesh gives it its boundary.
+    /// Its mesh, from a file, a built-in shape, or a segmented image. The mesh of a shell or a membrane is of triangles (quads are cut
+    /// into two); a volume mesh gives it its boundary.
+    #[serde(default)]
     pub mesh: MeshTable,
-    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells. For soft tissue prefer
-    /// `tet4-anp` to `tet4`.
+    /// Instead of a mesh: the body on whose boundary this one is a wall, with the same nodes, as the capsule of an organ.
+    #[serde(default)]
+    pub on: Option<String>,
+    /// The faces of that boundary that are the wall; if not given, all of it.
+    #[serde(default)]
+    pub faces: Option<Selection>,
+    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells; `model = "membrane"` has one only. For
+    /// soft tissue prefer `tet4-anp` to `tet4`.
     #[serde(default)]
     pub element: Option<Element>,
     /// The name of its law, or a law for each cell label, by number or by the name of the label: `{ 1 = "soft", tumour = "stiff" }`. Shells
@@ -33,7 +40,7 @@ pub struct BodyTable {
     /// Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure average it apart on parts of
     /// different density.
     pub density: ByLabel<Density>,
-    /// Thickness of a shell [m]: one, or one for each triangle.
+    /// Thickness of a shell or a membrane [m]: one, or one for each triangle.
     #[serde(default)]
     pub thickness: Option<Thickness>,
     /// Layers of a shell from the side that its triangles face away from to the side that they face, instead of a `thickness`. Their
@@ -136,6 +143,8 @@ pub enum BodyModel {
     Solid,
     /// A thin wall of triangles with membrane, bending and twist in large rotation and small strain.
     Shell,
+    /// A thin wall of triangles without bending, in large strain, by any law, in plane stress: a capsule or a balloon.
+    Membrane,
 }
 
 impl BodyModel {
@@ -144,6 +153,7 @@ impl BodyModel {
         match self {
             Self::Solid => "solid",
             Self::Shell => "shell",
+            Self::Membrane => "membrane",
         }
     }
 }
@@ -298,7 +308,8 @@ pub enum Element {
     /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane, and calm under pressures
     /// that stretch thin curved walls much.
     DktCst,
-    /// Shell without bending: a constant-strain membrane whose nodes do not turn.
+    /// Shell without bending, in small strain: a constant-strain membrane whose nodes do not turn. In large strain take
+    /// `model = "membrane"`.
     Membrane,
     /// Shell without membrane: bending and twist of plates, for studies; something else must hold it in its plane.
     Plate,

@@ -21,7 +21,7 @@ pub enum FieldName {
     Reaction,
     /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero where it is free.
     ReactionMoment,
-    /// Deformation gradient F of a solid, the mean over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x
+    /// Deformation gradient F of a solid or a membrane, the mean over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x
     /// along y at rest.
     DeformationGradient,
     /// Cauchy stress [Pa].
@@ -51,7 +51,7 @@ pub enum FieldName {
     /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells that
     /// at rest, which turns with them. The smallest one bounds the step of the whole.
     ElementStep,
-    /// Force per length in the wall of a shell [N/m], as a tensor in space.
+    /// Force per length in the wall of a shell or a membrane [N/m], as a tensor in space.
     MembraneForce,
     /// Moment per length in the wall of a shell [N], as a tensor in space; positive where the top is in tension.
     BendingMoment,
@@ -68,9 +68,10 @@ pub enum FieldName {
     /// Energy of nodes of a shell that turn about the normal otherwise than their triangle, per area at rest [J/m²]: not of the
     /// wall; much of it means that the mesh is too coarse.
     DrillingEnergy,
-    /// Thickness of a shell at rest [m].
+    /// Thickness of a shell or a membrane at rest [m].
     Thickness,
-    /// Thickness [m] that a shell has with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1−ν)); forces do not feel it.
+    /// Thickness [m] with the strain across that plane stress asks for: of a membrane by its law, of a shell t (A/A₀)^(−ν/(1−ν)), which its
+    /// forces do not feel.
     CurrentThickness,
     /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity holds to about 0.1.
     SurfaceStrain,
@@ -267,7 +268,8 @@ impl FieldName {
             | Self::GreenStrain
             | Self::DeformationGradient
             | Self::Fibre
-            | Self::FibreStretch => model == BodyModel::Solid,
+            | Self::FibreStretch => model != BodyModel::Shell,
+            Self::MembraneForce | Self::Thickness | Self::CurrentThickness => model != BodyModel::Solid,
             _ => model == BodyModel::Shell,
         }
     }

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::{Locator, Vector3};
+use pliant_geometry::Vector3;
 use pliant_implicit::Carried;
 use pliant_mechanics::Energies;
 
@@ -387,24 +387,25 @@ impl Probe {
             return Self { weights: row.collect(), cell: None, fields };
         }
         let body = built.bodies.iter().position(|body| body.name == table.on).unwrap_or(0);
-        let mesh = &built.bodies[body].mesh;
-        let first = built.model.bodies[body].nodes.start;
+        let own = &built.model.bodies[body];
         let cells = built.implicit.as_ref().map(|part| &part.cells[body]);
         if let Some(BodyCells::Facets(range)) = cells {
             let Some(found) = built.bodies[body].closest(&point) else {
                 return Self { weights: Vec::new(), cell: None, fields };
             };
-            let weights =
-                found.nodes.iter().zip(found.weights).map(|(&node, weight)| (first + node, weight)).collect();
+            let weights = found
+                .nodes
+                .iter()
+                .zip(found.weights)
+                .map(|(&node, weight)| (own.node(node), weight))
+                .collect();
             let facet = range.start + built.bodies[body].boundary.faces[found.face as usize].parent.index;
             return Self { weights, cell: Some(Place::Facet(facet)), fields };
         }
-        let Some(location) = Locator::new(mesh).locate(point) else {
+        let Some(location) = built.bodies[body].locator().locate(&point) else {
             return Self { weights: Vec::new(), cell: None, fields };
         };
-        let nodes = mesh.block(location.kind).map_or(&[][..], |block| block.cell(location.cell as usize));
-        let weights =
-            nodes.iter().zip(location.weights()).map(|(&node, &weight)| (first + node, weight)).collect();
+        let weights = location.weights.iter().map(|&(node, weight)| (own.node(node), weight)).collect();
         let cell = built.model.solids.iter().enumerate().find_map(|(index, solid)| {
             let fits = solid.body == body && solid.cells.nodes_per_cell() == location.kind.node_count();
             let cell = solid.original.iter().position(|&original| fits && original == location.cell)?;

@@ -1,6 +1,7 @@
 //! A body, all bodies or a carried surface as a mesh with the fields of an instant. Points are at rest.
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use pliant_mechanics::model::{Cells, Solid};
 use pliant_sim::{BodyCells, ImplicitBodies};
 use rayon::prelude::*;
 
@@ -98,10 +99,16 @@ impl Own {
         if let Some(index) = surface {
             return vec![own((bare(&built.surfaces[index]), Content::Surface(index)), fields.to_vec())];
         }
-        let of = |model| fields.iter().copied().filter(|field| field.is_of(model)).collect();
+        let of =
+            |model| -> Vec<FieldName> { fields.iter().copied().filter(|field| field.is_of(model)).collect() };
         let mut all = Vec::new();
         if chosen(built, on, false).next().is_some() {
-            all.push(own(merged_bodies(built, on), of(BodyModel::Solid)));
+            let mut data = of(BodyModel::Solid);
+            data.extend(of(BodyModel::Membrane).into_iter().filter(|field| !field.is_of(BodyModel::Solid)));
+            if !has_membranes(built, on) {
+                data.retain(|field| field.is_of(BodyModel::Solid));
+            }
+            all.push(own(merged_bodies(built, on), data));
         }
         if let Some(part) = &built.implicit
             && chosen(built, on, true).next().is_some()
@@ -239,7 +246,16 @@ fn chosen<'b>(built: &'b Built, on: Option<&'b str>, shells: bool) -> impl Itera
         .filter(move |&body| is_shell(body) == shells && on.is_none_or(|on| built.bodies[body].name == on))
 }
 
-/// The volume cells of one body or of all, with `label` and, for several bodies, the number of the `body`.
+/// Whether some of the chosen bodies are membranes.
+fn has_membranes(built: &Built, on: Option<&str>) -> bool {
+    let is_membrane = |body: usize| {
+        let cells = built.model.solids.iter().filter(|solid| solid.body == body).map(|solid| &solid.cells);
+        cells.into_iter().any(|cells| matches!(cells, Cells::Membrane(..)))
+    };
+    chosen(built, on, false).any(is_membrane)
+}
+
+/// The cells of solids and membranes of one body or of all, with `label` and, for several bodies, the number of the `body`.
 fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
     let mut mesh = Mesh::default();
     let mut nodes = Vec::new();
@@ -247,16 +263,22 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
     for body in chosen(built, on, false) {
         offsets[body] = mesh.points.len() as u32;
         mesh.points.extend_from_slice(&built.bodies[body].mesh.points);
-        nodes.extend(built.model.bodies[body].nodes.clone());
+        nodes.extend(built.model.bodies[body].all_nodes());
     }
     let labelled = !built.labels(on).is_empty();
     let mut cells = Vec::new();
-    for kind in [CellKind::Tet, CellKind::Hex] {
+    for kind in [CellKind::Tet, CellKind::Hex, CellKind::Triangle] {
         let mut block = CellBlock::new(kind, Vec::new());
         let mut places = Vec::new();
         let (mut body_of, mut labels) = (Vec::new(), Vec::new());
         for body in chosen(built, on, false) {
+            // The mesh of a solid may list triangles, too.
+            let is_kind =
+                |solid: &Solid| solid.body == body && solid.cells.nodes_per_cell() == kind.node_count();
             let Some(own) = built.bodies[body].mesh.block(kind) else { continue };
+            if !built.model.solids.iter().any(is_kind) {
+                continue;
+            }
             block.nodes.extend(own.nodes.iter().map(|node| node + offsets[body]));
             body_of.resize(body_of.len() + own.len(), body as f64);
             match own.data.get("label") {
@@ -265,9 +287,8 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
             }
             let first = places.len();
             places.resize(first + own.len(), (0, 0));
-            for (index, solid) in built.model.solids.iter().enumerate() {
-                let fits = solid.body == body && solid.cells.nodes_per_cell() == kind.node_count();
-                for (cell, &original) in solid.original.iter().enumerate().filter(|_| fits) {
+            for (index, solid) in built.model.solids.iter().enumerate().filter(|(_, solid)| is_kind(solid)) {
+                for (cell, &original) in solid.original.iter().enumerate() {
                     places[first + original as usize] = (index as u32, cell as u32);
                 }
             }
@@ -309,7 +330,7 @@ fn merged_shells(built: &Built, part: &ImplicitBodies, on: Option<&str>) -> (Mes
         let body = &built.bodies[number];
         let offset = mesh.points.len() as u32;
         mesh.points.extend_from_slice(&body.mesh.points);
-        nodes.extend(built.model.bodies[number].nodes.clone());
+        nodes.extend(built.model.bodies[number].all_nodes());
         let own = body.mesh.block(CellKind::Triangle);
         block.nodes.extend(own.map_or(&[][..], |own| &own.nodes[..]).iter().map(|node| node + offset));
         facets.extend(range.clone());

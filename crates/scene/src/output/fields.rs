@@ -39,6 +39,9 @@ pub(super) fn of_cell((fields, step): &(CellFields, Option<f64>), field: FieldNa
         FieldName::VolumeRatio => padded(&[fields.volume_ratio]),
         FieldName::CellVolumeRatio => padded(&[fields.cell_volume_ratio]),
         FieldName::EnergyDensity => padded(&[fields.energy_density]),
+        FieldName::MembraneForce => fields.membrane_force().map_or([f64::NAN; 9], |force| tensor(&force)),
+        FieldName::Thickness => padded(&[fields.thickness.map_or(f64::NAN, |[rest, _]| rest)]),
+        FieldName::CurrentThickness => padded(&[fields.thickness.map_or(f64::NAN, |[_, now]| now)]),
         _ => [f64::NAN; 9],
     }
 }

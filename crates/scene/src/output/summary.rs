@@ -196,18 +196,14 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
         let volume = |solid: &pliant_mechanics::model::Solid| -> f64 {
             (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum()
         };
-        let range = body.nodes.start as usize..body.nodes.end as usize;
+        // Of its own cells: its nodes may have the mass of a wall, too.
+        let of_cells = || solids.clone().map(|solid| solid.material.density * volume(solid)).sum();
+        let mass = built.implicit.as_ref().and_then(|part| part.mass(index)).unwrap_or_else(of_cells);
         let (elements, volume) = match built.implicit.as_ref().and_then(|part| part.size(index)) {
             Some(size) => size,
-            None => (solids.clone().map(|solid| solid.cells.len()).sum(), solids.map(volume).sum()),
+            None => (solids.clone().map(|solid| solid.cells.len()).sum(), solids.clone().map(volume).sum()),
         };
-        BodySummary {
-            name: body.name.clone(),
-            nodes: range.len(),
-            elements,
-            volume,
-            mass: built.model.mass[range].iter().sum(),
-        }
+        BodySummary { name: body.name.clone(), nodes: body.all_nodes().count(), elements, volume, mass }
     };
     (0..built.model.bodies.len()).map(of).collect()
 }
@@ -231,7 +227,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
             Some(_) => "failed",
         },
         error: outcome.failure.clone(),
-        nodes: bodies.iter().map(|body| body.nodes).sum(),
+        nodes: parts().map(|(part, _)| part.built.model.node_count()).sum(),
         elements: bodies.iter().map(|body| body.elements).sum(),
         mass: parts().map(|(part, _)| part.built.model.mass.iter().sum::<f64>()).sum(),
         bodies,

@@ -5,3 +5,4 @@ mod grips;
 mod niftysim;
 mod participants;
 mod static_solids;
+mod walls;

@@ -19,6 +19,7 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Model, Motion, Solid};
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use serde_json::json;
 
 #[test]
 fn every_element_in_every_design() {
@@ -26,6 +27,26 @@ fn every_element_in_every_design() {
     let designs: Vec<_> = designs(&device).collect();
     for element in ELEMENTS {
         compare(&device, element, &moved_cube(element, elastic(neo_hookean())), &designs);
+    }
+}
+
+/// Every law in plane stress, and those that keep the volume; fibres in the plane.
+#[test]
+fn membranes_of_every_law() {
+    let Some(device) = support::device() else { return };
+    let half = |name: &str, mut parameters: serde_json::Value| {
+        parameters["poisson-ratio"] = 0.5.into();
+        cube::law(name, parameters)
+    };
+    let fibres = json!({ "young-modulus": 3000.0, "fibre-modulus": 1000.0 });
+    let incompressible = [
+        half("neo-hookean", json!({ "young-modulus": 3000.0 })),
+        half("mooney-rivlin", json!({ "c10": 400.0, "c01": 100.0 })),
+        half("transversely-isotropic", fibres),
+    ];
+    for law in every_law().into_iter().chain(incompressible) {
+        let what = format!("membrane of {}", law.name());
+        compare(&device, &what, &moved_cube("membrane", elastic(law)), &[Design::Gather, Design::Blocks]);
     }
 }
 
@@ -61,8 +82,8 @@ fn several_bodies_elements_and_laws_in_one_model() {
     }
     let last = model.bodies[0].nodes.end;
     model.bodies = vec![
-        Body { name: "low".into(), nodes: 0..60, damping: 2.0 },
-        Body { name: "high".into(), nodes: 60..last, damping: 0.0 },
+        Body { name: "low".into(), nodes: 0..60, shared: vec![], damping: 2.0 },
+        Body { name: "high".into(), nodes: 60..last, shared: vec![], damping: 0.0 },
     ];
     let kind = LoadKind::Gravity { body: 1, acceleration: [0.0, 9.81, 0.0] };
     model.loads.push(load("gravity", kind, None));
@@ -170,7 +191,7 @@ fn relaxing_cube(element: &str) -> Model {
 #[test]
 fn a_state_goes_from_the_processor_to_the_device_and_back() {
     let Some(device) = support::device() else { return };
-    for element in ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"] {
+    for element in ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full", "membrane"] {
         let model = relaxing_cube(element);
         let step = step_of(&model);
         let on_processor = |state: &mut State<f32>| {

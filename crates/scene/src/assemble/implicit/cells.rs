@@ -30,7 +30,7 @@ impl Builder<'_> {
     pub(in crate::assemble) fn triangles(&mut self, mesh: Mesh, path: &[&str]) -> Option<Mesh> {
         let surface = surface_of(mesh);
         if surface.blocks.is_empty() {
-            let help = "a shell needs triangles or quads";
+            let help = "a thin wall needs triangles or quads";
             self.error(path, format!("`{}` has no triangles", path[1]), "this mesh", help);
             return None;
         }
@@ -78,8 +78,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Adds the shell of a body whose nodes are the last of the model.
-    pub(in crate::assemble) fn add_shell(&mut self, draft: &Draft<'_>, first: u32) -> Option<BodyCells> {
+    /// Adds the shell of a body.
+    pub(in crate::assemble) fn add_shell(&mut self, draft: &Draft<'_>, body: usize) -> Option<BodyCells> {
         let &Draft { name, table, mesh, .. } = draft;
         let block = mesh.block(CellKind::Triangle)?;
         let formulation = self.formulation(name, table)?;
@@ -88,8 +88,10 @@ impl Builder<'_> {
             [] => (self.materials(draft, block)?, self.thickness(name, table, block)?),
             _ => (Vec::new(), Vec::new()),
         };
-        let normals = self.normals(draft, first)?;
-        let cells: Vec<[u32; 3]> = (0..block.len() as u32).map(|cell| nodes(block, cell, first)).collect();
+        let normals = self.normals(draft, body)?;
+        let own = &self.assembly.bodies[body];
+        let cells: Vec<[u32; 3]> =
+            (0..block.len() as u32).map(|cell| nodes(block, cell, |node| own.node(node))).collect();
         let count = cells.len();
         let shell = Shell {
             name: name.into(),
@@ -184,7 +186,6 @@ impl Builder<'_> {
             (_, false) => "relaxes",
             _ => {
                 let moduli = law.law.small_strain();
-                let (k, g) = (moduli.bulk, moduli.shear);
                 if law.law.name() != "st-venant-kirchhoff" {
                     let note = format!(
                         "`{name}` takes Young's modulus and Poisson's ratio of law `{law_name}` at small strain"
@@ -193,8 +194,7 @@ impl Builder<'_> {
                         self.notes.push(note);
                     }
                 }
-                let poisson = (3.0 * k - 2.0 * g) / (2.0 * (3.0 * k + g));
-                return Some(Elasticity { young: 9.0 * k * g / (3.0 * k + g), poisson });
+                return Some(Elasticity { young: moduli.young(), poisson: moduli.poisson() });
             }
         };
         let message = format!("law `{law_name}` {what}, and `{name}` is of model `{}`", table.model.word());
@@ -281,12 +281,18 @@ impl Builder<'_> {
         Some(Layer { elastic, thickness: layer.thickness, angle: layer.angle.to_radians(), density })
     }
 
-    fn thickness(&mut self, name: &str, table: &BodyTable, block: &CellBlock) -> Option<Vec<f64>> {
+    /// The thickness [m] of each triangle of a wall, or one for all.
+    pub(in crate::assemble) fn thickness(
+        &mut self,
+        name: &str,
+        table: &BodyTable,
+        block: &CellBlock,
+    ) -> Option<Vec<f64>> {
         let path = ["body", name, "thickness"];
         match &table.thickness {
             None => {
                 let help = "add `thickness = 0.002` in metres";
-                let message = format!("`{name}` is a shell and needs a `thickness`");
+                let message = format!("`{name}` is a {} and needs a `thickness`", table.model.word());
                 self.error(&path[..2], message, "`thickness` is missing", help);
                 None
             }
@@ -333,7 +339,7 @@ impl Builder<'_> {
     }
 
     /// The normals that the mesh gives to the nodes of a shell, by their numbers in the model.
-    fn normals(&mut self, draft: &Draft<'_>, first: u32) -> Option<BTreeMap<u32, Vector3>> {
+    fn normals(&mut self, draft: &Draft<'_>, body: usize) -> Option<BTreeMap<u32, Vector3>> {
         let &Draft { name, table, mesh, .. } = draft;
         if table.normals == Some(Normals::Mesh) && table.crease.is_some() {
             let message = format!("`{name}` takes its normals from the mesh, so `crease` has no effect");
@@ -341,6 +347,7 @@ impl Builder<'_> {
             return None;
         }
         let found = mesh.point_data.get(NORMAL).filter(|data| data.components == 3);
+        let own = &self.assembly.bodies[body];
         match (table.normals, found) {
             (Some(Normals::Triangles), _) | (None, None) => Some(BTreeMap::new()),
             (None, Some(_)) if table.crease.is_some() => Some(BTreeMap::new()),
@@ -354,7 +361,7 @@ impl Builder<'_> {
             (_, Some(data)) => {
                 let of = |node: u32| {
                     let given = data.item(node as usize);
-                    (first + node, Vector3::new(given[0], given[1], given[2]))
+                    (own.node(node), Vector3::new(given[0], given[1], given[2]))
                 };
                 // Where a fit finds no normal that stands on all triangles it gives none: there they are estimated, with creases.
                 let given: BTreeMap<u32, Vector3> = (0..mesh.points.len() as u32)

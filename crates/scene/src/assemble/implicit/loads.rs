@@ -143,7 +143,7 @@ impl Builder<'_> {
     /// The weight of all bodies.
     fn weight_of_all(&self, acceleration: [f64; 3]) -> Vec<Acting> {
         let of_body = |body| (LoadKind::Gravity { body, acceleration }, None);
-        (0..self.assembly.bodies.len()).map(of_body).collect()
+        self.bodies_with_nodes().into_iter().map(of_body).collect()
     }
 
     fn implicit_gravity(&mut self, table: &GravityTable, path: &[&str]) -> Option<Vec<Acting>> {
@@ -361,7 +361,7 @@ impl Builder<'_> {
     fn controlled_node(&mut self, wanted: &ControlledNode, path: &[&str]) -> Option<(u32, usize, f64)> {
         let at = |key| [path, &[key]].concat();
         let body = self.find_body(&wanted.body, &at("body"))?;
-        let nodes = self.assembly.bodies[body].nodes.clone();
+        let nodes = self.assembly.bodies[body].all_nodes();
         let place = Vector3::from(wanted.at);
         let away = |node: &u32| (Vector3::from(self.assembly.rest[*node as usize]) - place).norm_squared();
         let node = nodes.min_by(|a, b| away(a).total_cmp(&away(b)))?;

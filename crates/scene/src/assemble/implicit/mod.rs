@@ -22,15 +22,23 @@ impl Builder<'_> {
         let Some((first, table)) = scene.bodies.first().filter(|_| is_implicit) else { return };
         let solver = scene.run.solver.word();
         let of_model = |model: BodyModel| scene.bodies.iter().find(|(_, body)| body.model == model);
-        if let (Some((solid, _)), Some((shell, _)), false) =
-            (of_model(BodyModel::Solid), of_model(BodyModel::Shell), scene.run.solver.solves_equations())
-        {
+        if let (Some((solid, _)), Some((shell, _)), false) = (
+            of_model(BodyModel::Solid).or(of_model(BodyModel::Membrane)),
+            of_model(BodyModel::Shell),
+            scene.run.solver.solves_equations(),
+        ) {
             let message = format!(
-                "`{solid}` is a solid and `{shell}` a shell: they do not go together with the solver `{solver}`"
+                "`{shell}` is a shell and `{solid}` is not: they do not go together with the solver `{solver}`"
             );
-            let help =
-                "take `solver = \"static\"` or `\"implicit\"`, or give the solids a participant of their own";
-            self.error(&["body", shell, "model"], message, "not beside a `solid`", help);
+            let help = match &of_model(BodyModel::Shell).and_then(|(_, shell)| shell.on.as_ref()) {
+                Some(_) => {
+                    "a wall on a solid takes `model = \"membrane\"` with this solver, without bending, or the solver \"implicit\" or \"static\""
+                }
+                None => {
+                    "take `solver = \"static\"` or `\"implicit\"`, or give the others a participant of their own"
+                }
+            };
+            self.error(&["body", shell, "model"], message, "not with this solver", help);
         }
         if scene.run.solver == SolverName::QuasiStatic {
             let message = "the solver `quasi-static` is not for bodies of model `shell`";
@@ -62,7 +70,9 @@ impl Builder<'_> {
             let help = "leave it out; their step is compared with the critical one at rest before the run";
             self.error(&scene.run_at("on-unstable"), message, "not for these bodies", help);
         }
-        let other = |(_, body): &&(String, BodyTable)| body.stiffness_damping != table.stiffness_damping;
+        let other = |(_, body): &&(String, BodyTable)| {
+            body.on.is_none() && body.stiffness_damping != table.stiffness_damping
+        };
         if let Some((name, _)) = scene.bodies.iter().find(other) {
             let message = format!("`{name}` and `{first}` have different `stiffness-damping`");
             let help = "bodies of a participant share one value with this solver";
@@ -122,8 +132,15 @@ impl Builder<'_> {
     fn check_keys_of_bodies(&mut self, is_implicit: bool) {
         for (name, body) in &self.scene.bodies {
             let shell = body.model == BodyModel::Shell;
+            let own = body.on.is_none();
             let others = [
-                ("thickness", shell, "a shell"),
+                ("faces", !own, "a wall with `on`"),
+                ("damping", own, "a body with nodes of its own"),
+                ("stiffness-damping", own, "a body with nodes of its own"),
+                ("velocity", own, "a body with nodes of its own"),
+                ("initial-displacement", own, "a body with nodes of its own"),
+                ("fraction", body.model != BodyModel::Membrane, "`model = \"solid\"`"),
+                ("thickness", body.model != BodyModel::Solid, "a shell or a membrane"),
                 (
                     "pre-tension",
                     shell && body.element != Some(Element::Plate),
@@ -137,12 +154,8 @@ impl Builder<'_> {
                 ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
                 ("layers", shell, "a shell"),
                 ("thickness", body.layers.is_empty(), "a shell without `layers`"),
-                (
-                    "fibre",
-                    body.model == BodyModel::Solid || (shell && !body.layers.is_empty()),
-                    "`model = \"solid\"` and shells with `layers`",
-                ),
-                ("second-fibre", body.model == BodyModel::Solid, "`model = \"solid\"`"),
+                ("fibre", !shell || !body.layers.is_empty(), "solids, membranes and shells with `layers`"),
+                ("second-fibre", !shell, "solids and membranes"),
             ];
             for (key, wanted, of) in others {
                 if !wanted && self.source().node(&["body", name, key]).is_some() {
@@ -181,7 +194,7 @@ impl Builder<'_> {
         let mut all = None;
         for (body, (name, table)) in scene.bodies.iter().enumerate() {
             let Some(wanted) = &table.initial_displacement else { continue };
-            let nodes: Vec<u32> = self.assembly.bodies[body].nodes.clone().collect();
+            let nodes: Vec<u32> = self.assembly.bodies[body].all_nodes().collect();
             let path = ["body", name.as_str(), "initial-displacement"];
             let given = self.node_vectors(wanted, body, &nodes, &path)?;
             let all = all.get_or_insert_with(|| vec![Vector3::zeros(); self.assembly.rest.len()]);

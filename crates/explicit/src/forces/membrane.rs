@@ -1,0 +1,312 @@
+//! Membranes: triangles of constant strain in their own plane, in plane stress (`pliant_mechanics::law::plane_stress`). With the tangents
+//! f_i = t_i + Σ u_a (B_a·t_i) and S in the frame of the triangle, f_a = V (f_i S_ij (B_a·t_j)), V = A₀ t₀.
+//!
+//! A law works on batches as for solids, in the gradient that Cholesky's factor of C makes. The stretch across is found by a search over
+//! the whole batch, three or four stresses a cell; an incompressible law takes one.
+
+use pliant_mechanics::element::Sheet;
+use pliant_mechanics::law::AnyLaw;
+use pliant_mechanics::law::Split;
+use pliant_mechanics::law::plane_stress::{
+    Across, InPlane, MOST_SEARCHES, ThicknessSearch, kirchhoff_across,
+};
+use pliant_mechanics::model::{CellBlock, Solid};
+use pliant_mechanics::prony::Prony;
+use pliant_mechanics::tensor::{Symmetric, Vector, add, cast, dot, scale};
+
+use super::batch::{Batch, PACKS};
+use super::blocks::{Blocks, Moved, Quad, Task};
+use super::{Findings, ForceField, PackedCells, by_cell, relative};
+use crate::Scalar;
+use crate::history::History;
+use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector};
+use crate::relaxation::Relaxation;
+
+/// A triangle whose area falls below this part of that at rest counts as folded flat.
+const FLAT: f64 = 1e-3;
+/// Where a search ends: a step of so many units in the last place of λ₃ − 1.
+const SEARCHED: f64 = 64.0;
+
+/// The triangles of a membrane.
+pub(super) struct Membranes<R> {
+    processor: Processor,
+    moved: Moved<R>,
+    constants: Constants<R>,
+}
+
+/// What does not change from step to step.
+struct Constants<R> {
+    law: AnyLaw,
+    across: Across,
+    cells: PackedCells<R, 3>,
+    rest: Vec<PackedTriangle<R>>,
+    relaxation: Relaxation<R>,
+    /// Packs of history for a pack of cells.
+    history: usize,
+}
+
+/// Triangles at rest.
+struct PackedTriangle<R> {
+    axes: [Vector<Pack<R>>; 2],
+    /// B_a·t_1 and B_a·t_2 [1/m] of all nodes but the first.
+    gradient: [[Pack<R>; 2]; 2],
+    /// V [m³], zero where a pack is filled up.
+    volume: Pack<R>,
+}
+
+impl<R: Scalar> Membranes<R> {
+    pub(super) fn new(solid: &Solid, cells: &CellBlock<3>, sheets: &[Sheet], step: f64) -> Self {
+        let (mut packed, blocks) = PackedCells::new(solid, cells);
+        let own = |cell: usize, family: usize| cast(solid.plane_fibres(cell, &sheets[cell])[family]);
+        let families = packed.families;
+        let fibre = packed.packs().flat_map(|pack| (0..families).map(move |family| (pack, family)));
+        packed.fibre = fibre.map(|(pack, family)| packed.vector(pack, |cell| own(cell, family))).collect();
+        let rest = |pack: usize| PackedTriangle {
+            axes: [0, 1].map(|i| packed.vector(pack, |cell| cast(sheets[cell].axes[i]))),
+            gradient: [1, 2].map(|a| {
+                [0, 1].map(|i| {
+                    packed.pack(pack, |cell| R::of(dot(cells.rest[cell].gradient[a], sheets[cell].axes[i])))
+                })
+            }),
+            volume: packed.pack(pack, |cell| R::of(cells.rest[cell].volume)),
+        };
+        Self {
+            processor: Processor::detect(),
+            moved: Moved::new(blocks),
+            constants: Constants {
+                law: solid.material.law,
+                across: solid.material.law.across(),
+                rest: packed.packs().map(rest).collect(),
+                cells: packed,
+                relaxation: Relaxation::new(&solid.material.prony, step),
+                history: 6 * solid.material.prony.slots(),
+            },
+        }
+    }
+}
+
+impl<R: Scalar> PackedTriangle<R> {
+    /// The changes of the tangents ∂u/∂X_i.
+    #[inline(always)]
+    fn changes<L: Lanes<R>>(&self, u: &[Vector<L>; 2], at: usize) -> [Vector<L>; 2] {
+        let of_axis = |i: usize| {
+            let along = |a: usize| scale(u[a], L::load(&self.gradient[a][i], at));
+            add(along(0), along(1))
+        };
+        [of_axis(0), of_axis(1)]
+    }
+
+    #[inline(always)]
+    fn axes<L: Lanes<R>>(&self, at: usize) -> [Vector<L>; 2] {
+        [load_vector(&self.axes[0], at), load_vector(&self.axes[1], at)]
+    }
+}
+
+/// The strains of the packs of a batch, and the stretches across.
+struct Walls<R> {
+    /// Of [`InPlane::parts`].
+    plane: [[Pack<R>; 6]; PACKS],
+    /// Of [`ThicknessSearch::parts`].
+    search: [[Pack<R>; 4]; PACKS],
+    /// λ₃ − 1 of the stresses in the batch.
+    change: [Pack<R>; PACKS],
+}
+
+impl<R: Scalar> Walls<R> {
+    fn new() -> Self {
+        Self {
+            plane: [[Pack::ZERO; 6]; PACKS],
+            search: [[Pack::ZERO; 4]; PACKS],
+            change: [Pack::ZERO; PACKS],
+        }
+    }
+
+    #[inline(always)]
+    fn plane<L: Lanes<R>>(&self, pack: usize, at: usize) -> InPlane<L> {
+        let part = |k: usize| L::load(&self.plane[pack][k], at);
+        InPlane::from_parts([part(0), part(1), part(2), part(3), part(4), part(5)])
+    }
+
+    /// Sets the gradients that the law sees, with λ₃ − 1 across.
+    #[inline(always)]
+    fn set<L: Lanes<R>>(&mut self, batch: &mut Batch<R>, pack: usize, at: usize, change: L) {
+        change.store(&mut self.change[pack], at);
+        batch.set(pack, at, &self.plane::<L>(pack, at).displacement_gradient(change));
+    }
+
+    /// Finds the stresses of the first packs.
+    #[inline(always)]
+    fn evaluate<L: Lanes<R>>(
+        &mut self,
+        constants: &Constants<R>,
+        batch: &mut Batch<R>,
+        packs: usize,
+        fibres: &[Vector<Pack<R>>],
+    ) {
+        if constants.across.modulus.is_infinite() {
+            for pack in 0..packs {
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let change = self.plane::<L>(pack, at).incompressible();
+                    self.set(batch, pack, at, change);
+                }
+            }
+            batch.evaluate::<L>(&constants.law, packs, 1, fibres);
+            return;
+        }
+        for pack in 0..packs {
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let search = ThicknessSearch::new(&self.plane::<L>(pack, at), constants.across);
+                for (part, to) in search.parts().into_iter().zip(&mut self.search[pack]) {
+                    part.store(to, at);
+                }
+            }
+        }
+        for _ in 0..MOST_SEARCHES {
+            for pack in 0..packs {
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let change = L::load(&self.search[pack][0], at);
+                    self.set(batch, pack, at, change);
+                }
+            }
+            batch.evaluate::<L>(&constants.law, packs, 1, fibres);
+            let mut found = true;
+            for pack in 0..packs {
+                let mut steps = Pack::ZERO;
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let part = |k: usize| L::load(&self.search[pack][k], at);
+                    let mut search = ThicknessSearch::from_parts([part(0), part(1), part(2), part(3)]);
+                    let Split { isochoric, volumetric } = batch.elastic::<L>(pack, at);
+                    let stress = isochoric + volumetric;
+                    search.improve(kirchhoff_across(&stress, search.change)).store(&mut steps, at);
+                    for (part, to) in search.parts().into_iter().zip(&mut self.search[pack]) {
+                        part.store(to, at);
+                    }
+                }
+                for (step, change) in steps.0.iter().zip(&self.change[pack].0) {
+                    let (step, change) = (step.to_f64().abs(), change.to_f64().abs());
+                    // Not a number: a folded triangle, which ends the run.
+                    found &= step.is_nan() || step <= SEARCHED * R::EPSILON * change.max(R::EPSILON);
+                }
+            }
+            if found {
+                break;
+            }
+        }
+    }
+
+    /// S₁₁, S₂₂ and S₁₂.
+    #[inline(always)]
+    fn stress<L: Lanes<R>>(
+        &self,
+        constants: &Constants<R>,
+        batch: &Batch<R>,
+        pack: usize,
+        at: usize,
+    ) -> [L; 3] {
+        let Split { isochoric, volumetric } = batch.elastic::<L>(pack, at);
+        let whole = if constants.across.modulus.is_infinite() { isochoric } else { isochoric + volumetric };
+        let change = L::load(&self.change[pack], at);
+        self.plane::<L>(pack, at).without_stress_across(&whole, change, L::of(constants.across.coupling))
+    }
+}
+
+/// A pass over the triangles of a block.
+struct Pass<'a, R> {
+    constants: &'a Constants<R>,
+    displacement: &'a [Vector<R>],
+    task: Task<'a, R>,
+}
+
+impl<R: Scalar> Work<R> for Pass<'_, R> {
+    type Output = Findings<R>;
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) -> Findings<R> {
+        let Self { constants, displacement, mut task } = self;
+        let Constants { cells, rest, relaxation, history: per_pack, .. } = constants;
+        task.copy_in(displacement);
+        let Task { block, moved, forces: sums, history, .. } = task;
+        sums.fill([R::ZERO; 4]);
+        let mut findings = Findings::default();
+        let mut batch = Batch::new();
+        let mut walls = Walls::new();
+        let mut forces = [Pack([[R::ZERO; 4]; PACK]); 3];
+        let packs = cells.packs_of(block);
+        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
+        for first in packs.clone().step_by(PACKS) {
+            let count = PACKS.min(packs.end - first);
+            for index in 0..count {
+                let pack = first + index;
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let (u, _) = relative::<R, L, 3, 2>(&local, pack - packs.start, at);
+                    let plane = InPlane::from_changes(&rest[pack].axes(at), &rest[pack].changes(&u, at));
+                    for (part, to) in plane.parts().into_iter().zip(&mut walls.plane[index]) {
+                        part.store(to, at);
+                    }
+                }
+            }
+            walls.evaluate::<L>(constants, &mut batch, count, cells.fibres(first, count));
+            for index in 0..count {
+                let pack = first + index;
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let area = L::ONE + walls.plane::<L>(index, at).area_change();
+                    area.store(&mut batch.volume_ratio[index], at);
+                }
+                for ratio in &mut batch.volume_ratio[index].0 {
+                    *ratio = if *ratio < R::of(FLAT) { R::ZERO } else { *ratio };
+                }
+                batch.note(index, pack * PACK, &mut findings);
+                let own = (pack - packs.start) * per_pack;
+                let own = own.min(history.len())..(own + per_pack).min(history.len());
+                for at in (0..PACK).step_by(L::WIDTH) {
+                    let [xx, yy, xy] = walls.stress::<L>(constants, &batch, index, at);
+                    let o = L::ZERO;
+                    let elastic =
+                        Split { isochoric: Symmetric([xx, yy, o, xy, o, o]), volumetric: Symmetric([o; 6]) };
+                    let stress = relaxation.advance(elastic, &mut history[own.clone()], at);
+                    let [xx, yy, _, xy, ..] = stress.0;
+                    // Tangents now, from displacements that are still in the first cache.
+                    let (u, _) = relative::<R, L, 3, 2>(&local, pack - packs.start, at);
+                    let changes = rest[pack].changes(&u, at);
+                    let [t, s] = rest[pack].axes::<L>(at);
+                    let (t, s) = (add(t, changes[0]), add(s, changes[1]));
+                    let volume = L::load(&rest[pack].volume, at);
+                    let along = scale(add(scale(t, xx), scale(s, xy)), volume);
+                    let across = scale(add(scale(t, xy), scale(s, yy)), volume);
+                    let nodal = |a: usize| {
+                        let [g, h] = &rest[pack].gradient[a];
+                        add(scale(along, L::load(g, at)), scale(across, L::load(h, at)))
+                    };
+                    by_cell(&[nodal(0), nodal(1)], &mut forces, at);
+                }
+                local.add::<L>(pack - packs.start, &forces);
+            }
+        }
+        findings
+    }
+}
+
+impl<R: Scalar> ForceField<R> for Membranes<R> {
+    fn blocks(&self) -> &Blocks {
+        &self.moved.blocks
+    }
+    fn evaluate(
+        &mut self,
+        displacement: &[Vector<R>],
+        history: &mut History<R>,
+        forces: &mut [Quad<R>],
+        findings: &mut [Findings<R>],
+    ) {
+        let Self { processor, moved, constants } = self;
+        let history = (history.cells.as_mut_slice(), constants.history);
+        moved.for_each(forces, history, (&mut [], 0), findings, |_, task| {
+            processor.run(Pass { constants, displacement, task })
+        });
+    }
+    fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.constants.relaxation.set_step(prony, step);
+    }
+    fn set_processor(&mut self, processor: Processor) {
+        self.processor = processor;
+    }
+}
