@@ -172,9 +172,9 @@ fn patch(
     forces.into_iter().map(|(node, f)| (node, [0.0, 0.0, f * total / sum])).collect()
 }
 
-/// A quarter of the block of 40 × 40 × 20 mm in hexahedra, n over the 10 mm at the patch and half as many over the 10 mm beyond, with or
-/// without coat A, under a patch of traction of F on the whole block: displacement [m] of the middle of its top.
-fn block_patch(n: u32, coated: bool, force: f64) -> f64 {
+/// A quarter of the block of 40 × 40 × 20 mm with coat A, under a patch of traction of F on the whole block: displacement [m] of the
+/// middle of its top. Six tets a cube, n cubes over the 10 mm at the patch and half as many over the 10 mm beyond.
+fn block_patch(n: u32, force: f64) -> f64 {
     let count = 3 * n / 2 + 1;
     let fine = 0.01 / f64::from(n);
     // Away from the patch.
@@ -200,11 +200,13 @@ fn block_patch(n: u32, coated: bool, force: f64) -> f64 {
         .collect();
     let mut model = Model::default();
     model.add_body("block", &points);
-    let cells = Cells::hex8(hexes.collect(), &points, 0.1, soft_tissue().small_strain().shear);
+    // Kuhn's split around the diagonal 0–6.
+    const TETS: [[usize; 4]; 6] =
+        [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
+    let tets = hexes.flat_map(|hex: [u32; 8]| TETS.map(|tet| tet.map(|corner| hex[corner]))).collect();
+    let cells = Cells::averaged_tet4(tets, &points, Averaging::Nodal);
     model.add_solid(Solid::new(0, Material::elastic(soft_tissue(), 1000.0), cells));
-    if coated {
-        model.add_solid(wall(st_venant_kirchhoff([1e6, 0.3, 1e-4]), top.clone(), &points, 1e-4));
-    }
+    model.add_solid(wall(st_venant_kirchhoff([1e6, 0.3, 1e-4]), top.clone(), &points, 1e-4));
     let on = |component: usize| -> Vec<u32> {
         (0..points.len() as u32).filter(|&node| points[node as usize][component].abs() < 1e-12).collect()
     };
@@ -226,15 +228,15 @@ fn centre(data: &Value, row: &str) -> f64 {
 #[test]
 fn a_coated_block_converges_to_the_reference() {
     let data = reference("coupling/coated_block_patch.json");
-    for (row, coated, force) in [("A_F-0.1_n8", true, -0.1), ("A_F0.1_n8", true, 0.1)] {
+    for (row, force) in [("A_F-0.1_n8", -0.1), ("A_F0.1_n8", 0.1)] {
         let wanted = centre(&data, row);
-        let off = [8, 16].map(|n| block_patch(n, coated, force) / wanted - 1.0);
+        let off = [4, 8].map(|n| block_patch(n, force) / wanted - 1.0);
         println!(
-            "{row}: {wanted:.4e} m, off by {:.2} % with 8, {:.2} % with 16 cells",
+            "{row}: {wanted:.4e} m, off by {:.2} % with 4 and {:.2} % with 8 cells",
             100.0 * off[0],
             100.0 * off[1]
         );
-        claim(&format!("{row}: middle of the top, 16 cells"), off[1].abs(), 0.03);
+        claim(&format!("{row}: middle of the top, 8 cells"), off[1].abs(), 0.03);
         assert!(off[1].abs() < off[0].abs(), "{row}: no convergence, {off:?}");
     }
 }
