@@ -64,6 +64,7 @@ impl AppliedForces {
         for grip in &self.grips {
             grip.add_forces(&state, &mut self.nodal);
         }
+        model.give_back(&mut self.nodal);
     }
 
     /// The force [N] on a node.

@@ -58,6 +58,7 @@ pub fn scale_mass(model: &mut Model, target_step: f64) {
             }
         }
     }
+    model.give_down(&mut added);
     model.mass_scaling = Some(MassScaling { target_step, added, cells });
 }
 
@@ -129,6 +130,7 @@ pub(crate) fn limit_about(model: &Model, owners: &[[u32; 3]], displacement: &[Ve
 
 /// The symmetric operator M^(−1/2) K M^(−1/2) on the free components.
 struct Operator<'a> {
+    model: &'a Model,
     /// The state about which the model vibrates.
     about: &'a [Vector<f64>],
     forces: InternalForces<f64>,
@@ -141,7 +143,7 @@ struct Operator<'a> {
 }
 
 impl<'a> Operator<'a> {
-    fn new(model: &Model, owners: &[[u32; 3]], about: &'a [Vector<f64>]) -> Self {
+    fn new(model: &'a Model, owners: &[[u32; 3]], about: &'a [Vector<f64>]) -> Self {
         let inverse_root_mass = (owners.iter().enumerate())
             .map(|(node, owner)| (model.inertia(node), owner))
             .map(|(m, owner)| owner.map(|o| if o == FREE && m > 0.0 { 1.0 / m.sqrt() } else { 0.0 }))
@@ -153,6 +155,7 @@ impl<'a> Operator<'a> {
             })
             .fold(f64::INFINITY, f64::min);
         Self {
+            model,
             about,
             forces: InternalForces::new(model, 1.0),
             history: vec![History::default(); model.solids.len()],
@@ -174,6 +177,7 @@ impl<'a> Operator<'a> {
             for ((u, about), (v, w)) in self.displacement.iter_mut().zip(self.about).zip(moves) {
                 *u = [0, 1, 2].map(|c| about[c] + sign * h * v[c] * w[c]);
             }
+            self.model.follow(&mut self.displacement);
             self.forces.evaluate(&self.displacement, &mut self.history);
             self.calls += 1;
             let (forces, scale) = (&self.forces, sign / (2.0 * h));

@@ -620,6 +620,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
                 }
             }
         }
+        self.model.follow(&mut state.displacement);
     }
 
     /// Residual forces of a trial state; the history in the state stays.
@@ -710,6 +711,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
                     }
                 }
             });
+        self.model.follow(&mut state.displacement);
     }
 
     /// Takes a converged trial as the new state.
@@ -895,6 +897,11 @@ fn fictitious_masses(model: &Model) -> Vec<f64> {
                 mass[node as usize] += MASS_MARGIN / nodes.len() as f64 * stiffest;
             }
         }
+    }
+    model.give_down(&mut mass);
+    // Nodes that follow others feel no force.
+    for (mass, follows) in mass.iter_mut().zip(model.followers()) {
+        *mass = if follows { 1.0 } else { *mass };
     }
     mass
 }

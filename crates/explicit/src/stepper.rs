@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
+use pliant_mechanics::mapping::weighted;
 use pliant_mechanics::model::{Amplitudes, Contradiction, FREE, Model, component, placed};
 use pliant_mechanics::tensor::Vector;
 use rayon::prelude::*;
@@ -162,9 +163,15 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
 
     /// The mean of the increments before and after.
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
-        let (before, after) = (state.increment[node], self.next[node]);
         let Lengths { next, .. } = self.lengths;
-        [0, 1, 2].map(|c| (before[c].to_f64() * self.lengths.ratio() + after[c].to_f64()) / (2.0 * next))
+        let own = |node: u32| {
+            let (before, after) = (state.increment[node as usize], self.next[node as usize]);
+            [0, 1, 2].map(|c| (before[c].to_f64() * self.lengths.ratio() + after[c].to_f64()) / (2.0 * next))
+        };
+        match self.model.ties.is_empty() {
+            true => own(node as u32),
+            false => weighted(self.model.resolved(&[(node as u32, 1.0)]), own),
+        }
     }
 }
 
@@ -370,6 +377,7 @@ impl<R: Scalar> CentralDifference<R> {
             damping[body.nodes.start as usize..body.nodes.end as usize].fill([R::of(body.damping); 3]);
         }
         let owners = model.constrained_components()?;
+        let follows = model.followers();
         Ok(Self {
             control: StepControl::new(step),
             lengths: Lengths { before: step, next: step },
@@ -377,7 +385,10 @@ impl<R: Scalar> CentralDifference<R> {
             forces: InternalForces::new(&model, step),
             held: held(&owners, &model.amplitudes(&owners)),
             owners,
-            mass: (0..nodes).map(|node| [R::of(model.inertia(node)); 3]).collect(),
+            // Nodes that follow others have no mass, and no force.
+            mass: (0..nodes)
+                .map(|node| [R::of(if follows[node] { 1.0 } else { model.inertia(node) }); 3])
+                .collect(),
             damping,
             applied: AppliedForces::new(Arc::clone(&model)),
             loaded: !model.loads.is_empty(),
@@ -484,6 +495,7 @@ impl<R: Scalar> CentralDifference<R> {
                 }
             }
         });
+        self.model.follow(&mut state.displacement);
         state.work.advance();
         self.control.count(state);
     }

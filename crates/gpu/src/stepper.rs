@@ -145,6 +145,9 @@ impl GpuStepper {
     ) -> Result<Self, GpuError> {
         let model = model.into();
         let owners = model.constrained_components()?;
+        if let Some(tie) = model.ties.first() {
+            return Err(GpuError::Unsupported { what: format!("the tie `{}`", tie.name) });
+        }
         let memory = Memory::new(device);
         let design = design.unwrap_or(Design::usual(device.adapter().kind));
         device.fill(|| memory.bytes(), || Self::on_device(device, &memory, &model, step, design, owners))

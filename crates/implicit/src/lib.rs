@@ -39,6 +39,7 @@ mod dynamics;
 pub mod element;
 mod error;
 mod facet;
+mod followers;
 mod forces;
 mod initial;
 mod linear;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 use pliant_mechanics::load::{Load, LoadKind};
+use pliant_mechanics::tie::Tie;
 
 use crate::assembly::{Assembly, Spring};
 use crate::error::SolveError;
@@ -591,6 +592,12 @@ pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
         for &node in nodes {
             used[node as usize] = true;
             let (x, y) = (root(&mut part, nodes[0] as usize), root(&mut part, node as usize));
+            part[x.max(y)] = x.min(y);
+        }
+    }
+    for (node, row) in model.ties.iter().flat_map(Tie::rows) {
+        for (followed, _) in row {
+            let (x, y) = (root(&mut part, node as usize), root(&mut part, followed as usize));
             part[x.max(y)] = x.min(y);
         }
     }

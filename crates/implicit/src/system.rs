@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use crate::assembly::{Assembly, Spring};
 use crate::error::SolveError;
 use crate::facet::{Broken, Facet, Matrix18, Tangent, symmetrise};
+use crate::followers::Followers;
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
@@ -81,6 +82,7 @@ pub(crate) struct System {
     solid_results: Vec<Response>,
     pub(crate) phases: Phases,
     pub(crate) last_solution: LinearReport,
+    followers: Option<Followers>,
 }
 
 /// Pressures on a facet [Pa], each fixed and controlled.
@@ -106,14 +108,28 @@ impl System {
         let matrix = &mut system.matrix;
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
         let stars = system.stars.iter().flatten().flat_map(|stars| stars.nodes.iter().map(Vec::as_slice));
-        let cells = facets.chain(model.solid_cells()).chain(stars);
-        *matrix = LowerMatrix::new(&system.equations, cells);
+        let followers = system.followers.as_ref();
+        let expand = |nodes: &[u32], turns: bool| {
+            followers.and_then(|followers| followers.expanded(nodes, turns)).unwrap_or_else(|| nodes.to_vec())
+        };
+        let expanded: Vec<Vec<u32>> = match followers {
+            None => Vec::new(),
+            Some(_) => {
+                let solids = model.solid_cells().chain(stars.clone()).map(|nodes| expand(nodes, false));
+                facets.clone().map(|nodes| expand(nodes, true)).chain(solids).collect()
+            }
+        };
+        *matrix = match followers {
+            None => LowerMatrix::new(&system.equations, facets.chain(model.solid_cells()).chain(stars)),
+            Some(_) => LowerMatrix::new(&system.equations, expanded.iter().map(Vec::as_slice)),
+        };
         if solver == LinearSolver::Unsymmetric {
             matrix.keep_mirror();
         }
-        system.places = model.facets.iter().map(|f| matrix.places(&system.equations, &f.nodes, 6)).collect();
         let equations = &system.equations;
-        let places = |nodes: &[u32]| matrix.places(equations, nodes, 3);
+        system.places =
+            model.facets.iter().map(|f| matrix.places(equations, &expand(&f.nodes, true), 6)).collect();
+        let places = |nodes: &[u32]| matrix.places(equations, &expand(nodes, false), 3);
         let of_solid = |(solid, stars): (&Solid, &Option<Stars>)| {
             let cells = (0..solid.cells.len()).map(|cell| places(solid.cells.nodes(cell)));
             let stars = stars.iter().flat_map(|stars| &stars.nodes).map(|nodes| places(nodes));
@@ -154,7 +170,11 @@ impl System {
                 }
             }
         }
+        for &node in model.ties.iter().flat_map(|tie| &tie.nodes) {
+            free[6 * node as usize..6 * node as usize + 3].fill(false);
+        }
         Self {
+            followers: Followers::of(&model),
             equations: Equations::new(&free),
             matrix: LowerMatrix::default(),
             places: Vec::new(),
@@ -238,6 +258,11 @@ impl System {
                 if tangent.is_some() && self.equations.number[at + c] != NONE {
                     self.matrix.add_diagonal(self.equations.number[at + c] as usize, spring.stiffness);
                 }
+            }
+        }
+        if let Some(followers) = &self.followers {
+            for forces in [&mut self.internal, &mut self.external, &mut self.controlled] {
+                followers.give_back(forces);
             }
         }
         if tangent.is_some() && !self.matrix.mirror.is_empty() {
@@ -373,6 +398,14 @@ impl System {
             }
         }
         let Some(moved) = moved else { return };
+        let expanded = self.followers.as_ref().and_then(|followers| followers.expanded(&facet.nodes, true));
+        if let (Some(nodes), Some(followers)) = (expanded, &self.followers) {
+            let whole = followers.condensed(&facet.nodes, &nodes, 6, result.tangent.as_slice());
+            let places = std::mem::take(&mut self.places[number]);
+            self.add_block(&nodes, 6, &places, &whole, moved);
+            self.places[number] = places;
+            return;
+        }
         self.matrix.add(&self.equations, &facet.nodes, 6, &self.places[number], result.tangent.as_slice());
         let own = Vector18::from_fn(|i, _| moved[6 * facet.nodes[i / 6] as usize + i % 6]);
         if own != Vector18::zeros() {
@@ -481,9 +514,28 @@ impl System {
 
     /// Adds a stiffness of translations at its places.
     fn add_at(&mut self, nodes: &[u32], places: &[u32], tangent: &[f64], moved: &[f64]) {
-        self.matrix.add(&self.equations, nodes, 3, places, tangent);
-        let component = |i: usize| 6 * nodes[i / 3] as usize + i % 3;
-        let size = 3 * nodes.len();
+        let expanded = self.followers.as_ref().and_then(|followers| followers.expanded(nodes, false));
+        match (expanded, &self.followers) {
+            (Some(own), Some(followers)) => {
+                let whole = followers.condensed(nodes, &own, 3, tangent);
+                self.add_block(&own, 3, places, &whole, moved);
+            }
+            _ => self.add_block(nodes, 3, places, tangent, moved),
+        }
+    }
+
+    /// Adds a stiffness of the first components of nodes at its places, and what prescribed increments make of it.
+    fn add_block(
+        &mut self,
+        nodes: &[u32],
+        components: usize,
+        places: &[u32],
+        tangent: &[f64],
+        moved: &[f64],
+    ) {
+        self.matrix.add(&self.equations, nodes, components, places, tangent);
+        let component = |i: usize| 6 * nodes[i / components] as usize + i % components;
+        let size = components * nodes.len();
         for (column, entries) in tangent.chunks_exact(size).enumerate() {
             let by = moved[component(column)];
             if by == 0.0 {
@@ -558,12 +610,18 @@ impl System {
                 }
             }
         }
+        if let Some(followers) = &self.followers {
+            followers.follow(increments);
+        }
     }
 
     /// A vector of equations spread over all components; the others stay as they are.
     pub(crate) fn spread(&self, equations: &[f64], components: &mut [f64]) {
         for (&component, &value) in self.equations.component.iter().zip(equations) {
             components[component as usize] = value;
+        }
+        if let Some(followers) = &self.followers {
+            followers.follow(components);
         }
     }
 

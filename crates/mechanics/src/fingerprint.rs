@@ -75,6 +75,7 @@ impl Model {
         }
         let surfaces = self.surfaces.iter();
         parts.extend(surfaces.map(|s| (format!("surface `{}`", s.name), fingerprint(s))));
+        parts.extend(self.ties.iter().map(|tie| (format!("tie `{}`", tie.name), fingerprint(tie))));
         let constraints = self.constraints.iter();
         parts.extend(constraints.map(|c| (format!("constraint `{}`", c.name), fingerprint(c))));
         parts.extend(self.loads.iter().map(|load| (format!("load `{}`", load.name), fingerprint(load))));

@@ -29,6 +29,7 @@ pub mod order;
 pub mod prony;
 mod real;
 pub mod tensor;
+pub mod tie;
 
 pub use energies::Energies;
 pub use fingerprint::fingerprint;

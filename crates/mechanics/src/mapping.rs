@@ -162,7 +162,7 @@ impl Weights {
 }
 
 /// J v of one point from its nodes and weights.
-pub(crate) fn weighted(
+pub fn weighted(
     row: impl IntoIterator<Item = (u32, f64)>,
     field: impl Fn(u32) -> Vector<f64>,
 ) -> Vector<f64> {

@@ -11,6 +11,7 @@ use crate::mapping::Weights;
 use crate::order::order;
 use crate::prony::Prony;
 use crate::tensor::{Vector, add, cross, dot, scale, sub};
+use crate::tie::Tie;
 
 /// Bodies, what holds and loads them, and the surfaces they carry.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +30,8 @@ pub struct Model {
     pub loads: Vec<Load>,
     /// Surfaces carried by bodies.
     pub surfaces: Vec<Surface>,
+    /// Nodes that follow others.
+    pub ties: Vec<Tie>,
     /// Mass added for a larger stable step.
     pub mass_scaling: Option<MassScaling>,
     /// Velocities [m/s] of the nodes at time 0, for dynamics; nodes beyond its end are at rest.
@@ -690,7 +693,7 @@ pub struct Surface {
     pub mapping: Weights,
 }
 
-/// Two constraints that ask for different things of one node.
+/// Two constraints, or a constraint and a tie, that ask for different things of one node.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{first}` and `{second}` both prescribe {} of node {node} of `{body}`, and differently", COMPONENTS[*component])]
 pub struct Contradiction {
@@ -820,6 +823,16 @@ impl Model {
             }
         }
         self.check_rotations()?;
+        for tie in &self.ties {
+            for &node in &tie.nodes {
+                if let Some(component) = (0..3).find(|&c| owners[node as usize][c] != FREE) {
+                    let first = self.constraints[owners[node as usize][component] as usize].name.clone();
+                    let (body, node) = self.locate_node(node);
+                    let (second, body) = (tie.name.clone(), self.bodies[body].name.clone());
+                    return Err(Contradiction { first, second, body, node, component });
+                }
+            }
+        }
         Ok(owners)
     }
 

@@ -109,7 +109,27 @@ impl Scene {
             groups.push((word.into(), bodies));
         }
         self.check_walls(&groups, out);
+        self.check_ties(&groups, out);
         groups
+    }
+
+    /// Refuses ties between participants.
+    fn check_ties(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) {
+        let group = |body: &String| groups.iter().find(|(_, bodies)| bodies.contains(body));
+        for (name, table) in &self.ties {
+            let [first, second] = &table.between;
+            if let (Some((own, _)), Some((other, _))) = (group(first), group(second))
+                && own != other
+            {
+                let message = format!(
+                    "`{first}` goes with participant `{own}` and `{second}` with `{other}`, and a tie is of one solver"
+                );
+                let help = "name both in one participant; shells and solids go together with `solver = \"implicit\"` or `\"static\"`, \
+                            membranes and solids with each solver";
+                let place = self.source.span(&["tie", name, "between"]);
+                out.push(Diagnostic::error(message).at(place, "of two participants").help(help));
+            }
+        }
     }
 
     /// Refuses walls on bodies of other participants: their common nodes have one solver.
@@ -274,6 +294,7 @@ impl Scene {
             participants: Vec::new(),
             laws,
             bodies,
+            ties: self.ties.iter().filter(|(_, tie)| owns(&tie.between[0])).cloned().collect(),
             surfaces: self.surfaces.iter().filter(|(_, surface)| owns(&surface.on)).cloned().collect(),
             constraints: self.constraints.iter().filter(|(_, table)| owns(table.body())).cloned().collect(),
             loads: self.loads.iter().filter(|(_, load)| on_part(load.on())).cloned().collect(),

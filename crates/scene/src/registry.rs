@@ -12,7 +12,7 @@ use crate::checker::{check_skipping, read_table};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
     BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MomentTable,
-    MoveTable, ParticipantTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable,
+    MoveTable, ParticipantTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable, TieTable,
     TractionTable, ViewTable, VtuTable,
 };
 use crate::nearest::nearest;
@@ -211,7 +211,8 @@ pub fn sections() -> Vec<Section> {
         plain::<ParticipantTable>("[participant.NAME]"),
     ];
     all.extend(AnyLaw::NAMES.iter().filter_map(law));
-    all.extend([plain::<BodyTable>("[body.NAME]"), plain::<SurfaceTable>("[surface.NAME]")]);
+    all.push(plain::<BodyTable>("[body.NAME]"));
+    all.extend([plain::<TieTable>("[tie.NAME]"), plain::<SurfaceTable>("[surface.NAME]")]);
     all.extend(typed::<ConstraintTable>("[constraint.NAME]"));
     all.extend(typed::<LoadTable>("[load.NAME]"));
     all.extend(typed::<OutputTable>("[output.NAME]"));

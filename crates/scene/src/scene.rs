@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use crate::checker::read_table;
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{BodyModel, BodyTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, ViewTable};
+use crate::format::{
+    BodyModel, BodyTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, TieTable, ViewTable,
+};
 use crate::nearest::nearest;
 use crate::reads::{LONGEST_SCENE, Reads};
 use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
@@ -28,6 +30,8 @@ pub struct Scene {
     pub laws: Vec<(String, LawTable)>,
     /// `[body.NAME]`
     pub bodies: Vec<(String, BodyTable)>,
+    /// `[tie.NAME]`
+    pub ties: Vec<(String, TieTable)>,
     /// `[surface.NAME]`
     pub surfaces: Vec<(String, SurfaceTable)>,
     /// `[constraint.NAME]`
@@ -47,8 +51,8 @@ pub struct Scene {
 }
 
 /// The tables a scene file can have.
-const TABLES: [&str; 10] =
-    ["scene", "run", "participant", "law", "body", "surface", "constraint", "load", "output", "view"];
+const TABLES: [&str; 11] =
+    ["scene", "run", "participant", "law", "body", "tie", "surface", "constraint", "load", "output", "view"];
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -126,6 +130,8 @@ impl Scene {
         }
         // Walls after the bodies that they are on.
         bodies.sort_by_key(|(_, table)| table.on.is_some());
+        let ties =
+            read_all(&source, "tie", |s, path, out| read_table::<TieTable>(s, path, &[], out), &mut out);
         let surfaces = read_all(
             &source,
             "surface",
@@ -151,6 +157,7 @@ impl Scene {
                 participants,
                 laws,
                 bodies,
+                ties,
                 surfaces,
                 constraints,
                 loads,

@@ -32,7 +32,7 @@ pub struct Source {
 pub(crate) const SET: &str = "--set ";
 
 /// Kinds of tables that hold tables with names of the user's choice.
-const NAMED: [&str; 7] = ["participant", "law", "body", "surface", "constraint", "load", "output"];
+const NAMED: [&str; 8] = ["participant", "law", "body", "tie", "surface", "constraint", "load", "output"];
 
 /// A value and where it was given.
 #[derive(Clone, Debug)]

@@ -463,7 +463,8 @@ impl Simulation {
             let (own, node) = self.locate(node);
             (own == part).then_some((node, weight))
         });
-        Some((part, Grip { nodes: nodes.collect::<Option<_>>()?, ..grip.clone() }))
+        let nodes: Vec<_> = nodes.collect::<Option<_>>()?;
+        Some((part, Grip { nodes: self.world.parts[part].model.resolved(&nodes), ..grip.clone() }))
     }
 }
 

@@ -30,6 +30,7 @@ use pliant_mechanics::Real;
 use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
 use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Tensor, Vector, add, cast, sub};
+use pliant_mechanics::tie::Tie;
 use pulp::Simd;
 use serde::{Deserialize, Serialize};
 
@@ -322,6 +323,63 @@ pub(crate) struct InternalForces<R> {
     findings: Vec<Vec<Findings<R>>>,
     /// Where in `forces` the parts of each node are, in the order of fields and blocks.
     shares: Shares,
+    tied: Option<Tied<R>>,
+}
+
+/// Forces on nodes that follow others: found first, and given as parts to those that they follow.
+struct Tied<R> {
+    /// Where in `forces` the parts of each such node are, in the order of the ties.
+    shares: Shares,
+    /// First entry of `given` of each, one more than there are.
+    offsets: Vec<u32>,
+    /// How much of the force on it goes to each node that it follows.
+    given: Vec<R>,
+    /// The first of their places in `forces`.
+    first: usize,
+    forces: Vec<Vector<R>>,
+}
+
+impl<R: Scalar> Tied<R> {
+    /// Of a model whose cells leave their forces at some places before `first`; with the places that the followed nodes take over.
+    fn new(model: &Model, places: &[(u32, u32)], first: usize, none: u32) -> (Self, Vec<(u32, u32)>) {
+        let mut number = vec![u32::MAX; model.node_count()];
+        let (mut offsets, mut given, mut taken) = (vec![0], Vec::new(), Vec::new());
+        for (node, row) in model.ties.iter().flat_map(Tie::rows) {
+            number[node as usize] = offsets.len() as u32 - 1;
+            for (followed, weight) in row {
+                taken.push((followed, (first + given.len()) as u32));
+                given.push(R::of(weight));
+            }
+            offsets.push(given.len() as u32);
+        }
+        let count = offsets.len() - 1;
+        let own = places.iter().map(|&(node, place)| (number[node as usize], place));
+        let own = own.filter(|(number, _)| *number != u32::MAX);
+        let tied = Self {
+            shares: Shares::new(count, none, own),
+            forces: vec![[R::ZERO; 3]; count],
+            offsets,
+            given,
+            first,
+        };
+        (tied, taken)
+    }
+
+    /// Gives the forces on.
+    fn give(&mut self, forces: &mut [Quad<R>]) {
+        let part = |place: usize| {
+            let [x, y, z, _] = forces[place];
+            [x, y, z]
+        };
+        let count = self.forces.len();
+        self.shares.visit(0..count, &mut self.forces, part, |sum, place| *sum = add(*sum, part(place)));
+        for (rows, force) in self.offsets.windows(2).zip(&self.forces) {
+            let row = rows[0] as usize..rows[1] as usize;
+            for (to, &weight) in forces[self.first..][row.clone()].iter_mut().zip(&self.given[row]) {
+                *to = [weight * force[0], weight * force[1], weight * force[2], R::ZERO];
+            }
+        }
+    }
 }
 
 impl<R: Scalar> InternalForces<R> {
@@ -335,9 +393,21 @@ impl<R: Scalar> InternalForces<R> {
         let places = fields.iter().zip(&field_offsets).flat_map(|(field, &first)| {
             field.blocks().places().map(move |(node, place)| (node, first as u32 + place))
         });
+        let given: usize = model.ties.iter().map(|tie| tie.mapping.nodes.len()).sum();
+        let none = (count + given) as u32;
+        let (tied, shares) = if model.ties.is_empty() {
+            (None, Shares::new(model.node_count(), none, places))
+        } else {
+            let follows = model.followers();
+            let places: Vec<(u32, u32)> = places.collect();
+            let (tied, taken) = Tied::new(model, &places, count, none);
+            let own = places.into_iter().filter(|(node, _)| !follows[*node as usize]).chain(taken);
+            (Some(tied), Shares::new(model.node_count(), none, own))
+        };
         Self {
-            shares: Shares::new(model.node_count(), count as u32, places),
-            forces: vec![[R::ZERO; 4]; count + 1],
+            shares,
+            tied,
+            forces: vec![[R::ZERO; 4]; count + given + 1],
             findings: fields.iter().map(|field| vec![Findings::default(); field.blocks().len()]).collect(),
             field_offsets,
             fields,
@@ -361,6 +431,9 @@ impl<R: Scalar> InternalForces<R> {
                     });
                 }
             }
+        }
+        if let Some(tied) = &mut self.tied {
+            tied.give(&mut self.forces);
         }
         found
     }

@@ -14,6 +14,7 @@ mod meshes;
 mod node_vectors;
 mod sheets;
 mod surfaces;
+mod ties;
 mod walls;
 
 use std::sync::Arc;
@@ -189,6 +190,9 @@ pub fn build_watched(
     };
     builder.check_models();
     builder.add_bodies();
+    if !builder.failed() {
+        builder.add_ties();
+    }
     builder.check_explicit_only();
     if builder.failed() {
         return Err(scene.source.errors(builder.out));

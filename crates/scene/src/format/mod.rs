@@ -6,6 +6,7 @@ mod linear;
 mod load;
 mod output;
 mod participant;
+mod tie;
 mod view;
 
 pub use body::{
@@ -25,6 +26,7 @@ pub use load::{
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use participant::ParticipantTable;
+pub use tie::TieTable;
 pub use view::{
     BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, Labels, MapName, Nothing,
     TextureName, UpName, ViewTable,

@@ -5,4 +5,5 @@ mod grips;
 mod niftysim;
 mod participants;
 mod static_solids;
+mod ties;
 mod walls;

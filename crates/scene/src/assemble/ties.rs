@@ -1,0 +1,151 @@
+//! Ties: nodes of one body that follow the cells of another.
+
+use pliant_geometry::QualityReport;
+use pliant_mechanics::mapping::Weights;
+use pliant_mechanics::model::Cells;
+use pliant_sim::{counted, number};
+
+use super::Builder;
+use crate::diagnostic::Diagnostic;
+use crate::format::TieTable;
+
+/// Part of the median edge of the followed body that a gap may have.
+const GAP: f64 = 0.1;
+/// A body inside another that takes more of its volume is reported: both are stiff there.
+const CROWDED: f64 = 1e-3;
+
+impl Builder<'_> {
+    /// Adds all ties, once the bodies are there.
+    pub(super) fn add_ties(&mut self) {
+        let scene = self.scene;
+        for (name, table) in &scene.ties {
+            self.add_tie(name, table);
+        }
+    }
+
+    fn add_tie(&mut self, name: &str, table: &TieTable) -> Option<()> {
+        let path = ["tie", name, "between"];
+        let [guest, host] = [0, 1].map(|at: usize| {
+            let index = at.to_string();
+            self.find_body(&table.between[at], &[path[0], path[1], path[2], &index])
+        });
+        let (guest, host) = (guest?, host?);
+        let names = &table.between;
+        if guest == host {
+            let message = format!("`{}` would be tied to itself", names[0]);
+            self.error(&path, message, "one body", "name two bodies");
+            return None;
+        }
+        let shares = |a: usize, b: usize| {
+            let of = &self.assembly.bodies;
+            of[a].shared.iter().any(|node| of[b].nodes.contains(node))
+        };
+        if shares(guest, host) || shares(host, guest) {
+            let message = format!("`{}` and `{}` share their nodes already", names[0], names[1]);
+            self.error(&path, message, "one on the other", "leave the tie out: `on` joins them");
+            return None;
+        }
+        let nodes: Vec<u32> = match &table.nodes {
+            Some(selection) => self.body_nodes(guest, selection, &["tie", name, "nodes"])?,
+            None => self.assembly.bodies[guest].all_nodes().collect(),
+        };
+        let median =
+            QualityReport::new(&self.bodies[host].mesh).edge_length.map_or(0.0, |edges| edges.median);
+        let tolerance = table.tolerance.unwrap_or(GAP * median);
+        let locator = self.bodies[host].locator();
+        let own = &self.assembly.bodies[host];
+        let (mut tied, mut rows, mut left) = (Vec::new(), Vec::new(), 0);
+        let (mut widest, mut farthest, mut nearest) = (0.0_f64, (0.0_f64, [0.0; 3]), f64::INFINITY);
+        for &node in &nodes {
+            let place = self.assembly.rest[node as usize];
+            let Some(found) = locator.locate(&place.into()) else { continue };
+            nearest = nearest.min(found.distance);
+            if found.distance > tolerance {
+                left += 1;
+                if found.distance > farthest.0 {
+                    farthest = (found.distance, place);
+                }
+                continue;
+            }
+            widest = widest.max(found.distance);
+            tied.push(node);
+            rows.push(found.weights.iter().map(|&(node, w)| (own.node(node), w)).collect::<Vec<_>>());
+        }
+        let gap = format!("{} m", number(tolerance));
+        let help = "move one of them (`at`), or give a larger `tolerance` in metres";
+        if tied.is_empty() {
+            let message = format!(
+                "no node of `{}` lies within {gap} of `{}`: the nearest is {} m away",
+                names[0],
+                names[1],
+                number(nearest)
+            );
+            self.error(&path, message, "too far apart", help);
+            return None;
+        }
+        if left > 0 {
+            let [x, y, z] = farthest.1.map(number);
+            let message = format!(
+                "{} of {} of `{}` {} farther than {gap} from `{}`, up to {} m at ({x}, {y}, {z}) m",
+                left,
+                counted(nodes.len(), "node"),
+                names[0],
+                if left == 1 { "lies" } else { "lie" },
+                names[1],
+                number(farthest.0)
+            );
+            if table.nodes.is_some() {
+                self.error(&["tie", name, "nodes"], message, "beyond the tolerance", help);
+                return None;
+            }
+            let place = self.source().span(&path);
+            self.out.push(Diagnostic::warning(message).at(place, "not tied there").help(help));
+        }
+        self.notes.push(format!(
+            "`{name}`: {} of `{}` {} `{}`, with gaps of at most {} m",
+            counted(tied.len(), "node"),
+            names[0],
+            if tied.len() == 1 { "follows" } else { "follow" },
+            names[1],
+            number(widest)
+        ));
+        let mapping = Weights::from_rows(rows.iter().map(Vec::as_slice));
+        if let Err(error) = self.assembly.model_mut().tie(name, tied, mapping) {
+            self.error(
+                &path,
+                error.to_string(),
+                "this tie",
+                "leave those nodes out of one of the ties (`nodes`)",
+            );
+            return None;
+        }
+        self.tell_crowding([guest, host], names);
+        Some(())
+    }
+
+    /// Says how much of a solid a wall inside it takes: the solid is not removed there.
+    fn tell_crowding(&mut self, [guest, host]: [usize; 2], names: &[String; 2]) {
+        let volume = |body: usize, walls: bool| -> f64 {
+            let own = self.assembly.solids.iter().filter(|solid| solid.body == body);
+            let own = own.filter(|solid| matches!(solid.cells, Cells::Membrane(..)) == walls);
+            own.map(|solid| (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum::<f64>()).sum()
+        };
+        let shells: f64 = match self.shell_cells(guest) {
+            Some(cells) => cells
+                .iter()
+                .map(|&cell| &self.assembly.facets[cell as usize])
+                .map(|f| f.area * f.thickness)
+                .sum(),
+            None => 0.0,
+        };
+        let (wall, solid) = (volume(guest, true) + shells, volume(host, false));
+        if solid > 0.0 && wall > CROWDED * solid {
+            self.notes.push(format!(
+                "the wall of `{}` takes {} % of the volume of `{}`, which is stiff and heavy there, too",
+                names[0],
+                number(100.0 * wall / solid),
+                names[1]
+            ));
+        }
+    }
+}

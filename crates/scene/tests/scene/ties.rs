@@ -1,0 +1,188 @@
+//! Bodies tied to others whose meshes do not match, with every solver, and what is refused.
+
+use super::static_solids::{MATRIX, block, last_row, resumes, world};
+
+/// A block of 40 × 20 × 10 mm of tissue, its width held, stretched along x, and a coat on its top on another mesh.
+fn coated(solver: &str, coat: &str, more: &str) -> String {
+    format!(
+        "[scene]\nuntil = 1\n[run]\n{solver}\n\
+         [law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 3e3\npoisson-ratio = 0.45\n\
+         [law.coat]\ntype = 'st-venant-kirchhoff'\nyoung-modulus = 1e6\npoisson-ratio = 0.3\n\
+         [body.block]\nmesh = {{ block = {{ size = [0.04, 0.02, 0.01], cells = [8, 4, 2] }}, as = 'hexes' }}\n\
+         law = 'tissue'\ndensity = 1000\n\
+         [body.coat]\nmodel = 'membrane'\nmesh = {{ plate = {{ size = [0.04, 0.02], {coat} }}, at = [0, 0, 0.01] }}\n\
+         law = 'coat'\ndensity = 1000\nthickness = 1e-4\n\
+         [tie.glue]\nbetween = ['coat', 'block']\n\
+         [constraint.start]\ntype = 'fix'\nbody = 'block'\nnodes = {{ set = 'x-min' }}\ncomponents = ['x']\n\
+         [constraint.sides]\ntype = 'fix'\nbody = 'block'\nnodes = 'all'\ncomponents = ['y']\n\
+         [constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = {{ set = 'z-min' }}\ncomponents = ['z']\n\
+         [constraint.end]\ntype = 'move'\nbody = 'block'\nnodes = {{ set = 'x-max' }}\ncomponents = ['x']\nby = [0.004, 0, 0]\nto = 1\n\
+         [output.history]\ntype = 'csv'\nevery = 1\n\
+         probes.coat = {{ on = 'coat', at = [0.021, 0.011, 0.01], data = ['displacement', 'membrane-force'] }}\n{more}"
+    )
+}
+
+/// The closed form for a coat on the same nodes holds for any mesh of the coat: the deformation is homogeneous. Force of the reference set
+/// `coupling` for coat A at 10 %.
+#[test]
+fn a_coat_on_another_mesh_pulls_as_in_closed_form() {
+    for coat in ["cells = [8, 4]", "cells = [7, 5]", "cells = [13, 3], pattern = 'crossed', distortion = 0.2"]
+    {
+        for solver in [
+            "solver = 'static'\nload-steps = 4\ntolerance = 1e-10",
+            "solver = 'quasi-static'\ntolerance = 1e-9",
+        ] {
+            let row = last_row(&coated(solver, coat, ""));
+            let force = row["reaction.end.x"];
+            assert!((force / 0.319_980_499 - 1.0).abs() < 1e-6, "{coat}: {force}");
+            let stretched = row["probe.coat.displacement.x"];
+            assert!((stretched - 0.1 * 0.021).abs() < 1e-9, "{coat}: {stretched}");
+        }
+    }
+}
+
+/// A vessel through a block that is bent, turned and pressed: the same by Newton's method, dynamic relaxation, and at rest after a damped
+/// motion; as a shell in the systems of equations with its rotations free.
+fn vessel(solver: &str, more: &str, model: &str) -> String {
+    let law = format!("type = 'neo-hookean'\n{MATRIX}");
+    let text = block(solver, "tet4", &law, more);
+    format!(
+        "{text}[law.vessel]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.3\n\
+         [body.vessel]\n{model}\nmesh = {{ cylinder = {{ radius = 0.01, length = 0.05, cells = [12, 5] }}, at = [0.05, 0.025, 0] }}\n\
+         law = 'vessel'\ndensity = 1050\nthickness = 1e-3\n\
+         [tie.ingrown]\nbetween = ['vessel', 'block']\n"
+    )
+}
+
+#[test]
+fn a_vessel_in_a_solid_stands_where_every_solver_puts_it() {
+    let membrane = "model = 'membrane'";
+    let newton = last_row(&vessel("solver = 'static'\nload-steps = 4\ntolerance = 1e-10", "", membrane));
+    let compare = |other: &str, fields: &[(&str, f64)]| {
+        let other = last_row(other);
+        for (field, limit) in fields {
+            let of_field = || newton.iter().filter(|(name, _)| name.contains(field));
+            let largest = of_field().map(|(_, value)| value.abs()).fold(0.0, f64::max);
+            let off = of_field().map(|(name, value)| (value - other[name]).abs()).fold(0.0, f64::max);
+            println!("{field}: {:.1e}", off / largest);
+            assert!(largest > 0.0 && off < limit * largest, "{field}: {off:e} of {largest:e}");
+        }
+    };
+    let relaxed = vessel("solver = 'quasi-static'\nload-steps = 4\ntolerance = 1e-9", "", membrane);
+    compare(&relaxed, &[("displacement", 1e-5), ("reaction.", 1e-5)]);
+    for solver in ["solver = 'explicit'", "solver = 'implicit'\nstep = 0.05\ntolerance = 1e-10"] {
+        let moving = vessel(solver, "damping = 40", membrane)
+            .replace("thickness = 1e-3", "thickness = 1e-3\ndamping = 40")
+            .replace("until = 1", "until = 4")
+            .replace("every = 1", "every = 4");
+        compare(&moving, &[("displacement", 1e-5)]);
+    }
+    // A thin shell bends next to nothing, and a vessel in it makes a difference.
+    let shell = vessel(
+        "solver = 'static'\nload-steps = 4\ntolerance = 1e-10",
+        "",
+        "model = 'shell'\nelement = 'dkt-cst'",
+    );
+    compare(&shell, &[("displacement", 0.05)]);
+    let law = format!("type = 'neo-hookean'\n{MATRIX}");
+    let without = last_row(&block("solver = 'static'\nload-steps = 4", "tet4", &law, ""));
+    let off = newton
+        .iter()
+        .filter(|(name, _)| name.contains("displacement"))
+        .map(|(name, x)| (x - without[name]).abs());
+    assert!(off.fold(0.0, f64::max) > 1e-5);
+}
+
+#[test]
+fn energies_of_tied_bodies_balance_and_the_critical_step_is_that_of_the_whole() {
+    let out = tempfile::tempdir().unwrap();
+    let text = vessel("solver = 'explicit'", "", "model = 'membrane'").replace("until = 1", "until = 0.3");
+    let summary = super::static_solids::run(&text, out.path());
+    assert!(summary.energy_balance.unwrap().abs() < 0.01, "{:?}", summary.energy_balance);
+    let critical = summary.critical_step.unwrap();
+    assert!((summary.step / critical - 0.9).abs() < 0.01);
+    let broken = text.replace(
+        "solver = 'explicit'",
+        &format!("solver = 'explicit'\nstep = {}\non-unstable = 'report'", 1.05 * critical),
+    );
+    let world = world(&broken);
+    let failed = match world {
+        Err(told) => told.contains("stable"),
+        Ok(world) => {
+            let folder =
+                pliant_scene::OutputFolder::prepare(out.path().join("again"), &world.scene, false).unwrap();
+            pliant_scene::run(&world, &folder, &mut |_| ()).unwrap().status == "failed"
+        }
+    };
+    assert!(failed);
+}
+
+#[test]
+fn a_resumed_run_of_tied_bodies_ends_in_the_same_bits() {
+    for solver in [
+        "precision = 'single'\nstep = 1e-4",
+        "solver = 'static'\nstep = 0.1",
+        "solver = 'implicit'\nstep = 0.1",
+    ] {
+        resumes(&vessel(&format!("{solver}\ncheckpoint = {{ every = 0.4 }}"), "", "model = 'membrane'"));
+    }
+}
+
+#[test]
+fn ties_that_cannot_be_are_refused_by_name_and_gaps_are_told() {
+    let explicit = "solver = 'explicit'";
+    let plain = coated(explicit, "cells = [7, 5]", "");
+    let with = |from: &str, to: &str| plain.replace(from, to);
+    for (text, pieces) in [
+        (with("['coat', 'block']", "['coat', 'blok']"), ["there is no body `blok`", "did you mean `block`?"]),
+        (with("['coat', 'block']", "['block', 'block']"), ["would be tied to itself", "name two bodies"]),
+        (
+            with("at = [0, 0, 0.01]", "at = [0, 0, 0.02]"),
+            ["no node of `coat` lies within", "the nearest is 0.01"],
+        ),
+        (
+            with("['coat', 'block']\n", "['coat', 'block']\nnodes = 'all'\ntolerance = 1e-4\n")
+                .replace("at = [0, 0, 0.01]", "at = [0.001, 0, 0.01]"),
+            ["of `coat` lie farther than", "larger `tolerance`"],
+        ),
+        (
+            plain.clone() + "[tie.again]\nbetween = ['coat', 'block']\n",
+            ["is tied already, by `glue`", "leave those nodes out"],
+        ),
+        (plain.clone() + "[tie.back]\nbetween = ['block', 'coat']\n", ["no chains and no circles", ""]),
+        (
+            with(
+                "[constraint.start]\ntype = 'fix'\nbody = 'block'",
+                "[constraint.start]\ntype = 'fix'\nbody = 'coat'",
+            ),
+            ["`start` and `glue`", ""],
+        ),
+        (
+            with("model = 'membrane'", "model = 'shell'"),
+            ["`coat` goes with participant `shells`", "name both in one participant"],
+        ),
+        (
+            with(
+                "model = 'membrane'\nmesh = { plate = { size = [0.04, 0.02], cells = [7, 5] }, at = [0, 0, 0.01] }",
+                "on = 'block'\nfaces = { set = 'z-max' }",
+            ),
+            ["share their nodes already", "leave the tie out"],
+        ),
+        (with("between = ['coat', 'block']", "between = ['coat']"), ["between", ""]),
+    ] {
+        let told = world(&text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
+        assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+    }
+    // A coat that hangs over: what is not tied is told with its largest gap.
+    let over = world(&with("at = [0, 0, 0.01]", "at = [0.01, 0, 0.01]")).unwrap();
+    let told: Vec<String> = over.warnings().map(ToString::to_string).collect();
+    assert!(
+        told.iter().any(|told| told.contains("up to 0.01") && told.contains("of `coat` lie farther than")),
+        "{told:?}"
+    );
+    let notes = &over.participants[0].built.notes;
+    assert!(
+        notes.iter().any(|note| note.contains("`glue`: ") && note.contains("follow `block`")),
+        "{notes:?}"
+    );
+}
