@@ -169,7 +169,8 @@ impl Builder<'_> {
                 .constraints
                 .iter()
                 .any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)))
-                || springs.iter().any(|spring| body.nodes.contains(&spring.node));
+                || springs.iter().any(|spring| body.nodes.contains(&spring.node))
+                || self.assembly.ties.iter().flat_map(|tie| &tie.nodes).any(|node| body.nodes.contains(node));
             if held || scene.run.solver == SolverName::Static {
                 continue;
             }
