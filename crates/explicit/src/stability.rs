@@ -337,7 +337,7 @@ fn gradient_square_of(solid: &Solid, cell: usize) -> Symmetric<f64> {
     }
 }
 
-/// ∂u/∂X, the mean over the cell; of a membrane the gradient that its law sees, in the frame of the triangle.
+/// ∂u/∂X, the mean over the cell; of a membrane in the frame of the triangle, thinned as if it kept its volume.
 fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
     let mut h = Tensor::ZERO;
     with_cells!(&solid.cells, block => {
@@ -350,9 +350,7 @@ fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[
     let Cells::Membrane(_, sheets) = &solid.cells else { return h };
     let axes = sheets[cell].axes;
     let plane = InPlane::from_changes(&axes, &axes.map(|axis| h.apply(axis)));
-    let fibres = solid.plane_fibres(cell, &sheets[cell]);
-    let across = solid.material.law.plane_stress(plane.strain_twice, &fibres).thickness_change;
-    plane.displacement_gradient(across)
+    plane.displacement_gradient(plane.incompressible())
 }
 
 /// tr (A B A B).

@@ -36,7 +36,7 @@ pub(crate) fn stiffness(solid: &Solid, cell: usize, h: &Tensor<f64>, square: &Sy
     let columns = cholesky_columns(&(*square * (1.0 / size)));
     let mut matrix = SMatrix::<f64, 9, 9>::zeros();
     for i in 0..3 {
-        for (p, &column) in columns.iter().enumerate() {
+        for (p, &column) in columns.iter().enumerate().filter(|(_, column)| **column != [0.0; 3]) {
             let moved = |by: f64| {
                 let mut moved = *h;
                 moved.0[i] = add(moved.0[i], scale(column, by));
@@ -55,7 +55,15 @@ pub(crate) fn stiffness(solid: &Solid, cell: usize, h: &Tensor<f64>, square: &Sy
         return Stiffness { mode: f64::NAN, wave: f64::NAN };
     }
     let symmetric = (matrix + matrix.transpose()) * 0.5;
-    Stiffness { mode: size * symmetric.symmetric_eigenvalues().max(), wave: size * stiffest_wave(&symmetric) }
+    let mode = match solid.cells {
+        // Without the modes that have a gradient across.
+        Cells::Membrane(..) => {
+            let own = |k: usize| 3 * (k / 2) + k % 2;
+            SMatrix::<f64, 6, 6>::from_fn(|i, k| symmetric[(own(i), own(k))]).symmetric_eigenvalues().max()
+        }
+        _ => symmetric.symmetric_eigenvalues().max(),
+    };
+    Stiffness { mode: size * mode, wave: size * stiffest_wave(&symmetric) }
 }
 
 /// Directions in which the search for the stiffest wave begins: axes and diagonals of the square.

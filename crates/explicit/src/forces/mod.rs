@@ -312,6 +312,28 @@ fn force_field<R: Scalar>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
     }
 }
 
+/// Evaluates fields side by side: a small one, such as a vessel, has no work for several threads by itself. Forces begin at the first of
+/// the offsets.
+fn side_by_side<R: Scalar>(
+    fields: &mut [Box<dyn ForceField<R>>],
+    offsets: &[usize],
+    displacement: &[Vector<R>],
+    history: &mut [History<R>],
+    forces: &mut [Quad<R>],
+    findings: &mut [Vec<Findings<R>>],
+) {
+    let ([field, fields @ ..], [own, history @ ..], [found, findings @ ..]) = (fields, history, findings)
+    else {
+        return;
+    };
+    let (first, forces) = forces.split_at_mut(offsets[1] - offsets[0]);
+    let mut evaluate = || field.evaluate(displacement, own, first, found);
+    if fields.is_empty() {
+        return evaluate();
+    }
+    rayon::join(evaluate, || side_by_side(fields, &offsets[1..], displacement, history, forces, findings));
+}
+
 /// All force fields of a model, the sums of their blocks, and the order in which nodes gather these.
 pub(crate) struct InternalForces<R> {
     fields: Vec<Box<dyn ForceField<R>>>,
@@ -417,10 +439,10 @@ impl<R: Scalar> InternalForces<R> {
     /// Evaluates all cells. `history` has one entry per solid, each empty for the instantaneous elastic response.
     pub(crate) fn evaluate(&mut self, displacement: &[Vector<R>], history: &mut [History<R>]) -> Found {
         let mut found = Found::default();
-        for (index, field) in self.fields.iter_mut().enumerate() {
-            let forces = &mut self.forces[self.field_offsets[index]..self.field_offsets[index + 1]];
-            field.evaluate(displacement, &mut history[index], forces, &mut self.findings[index]);
-            for findings in &self.findings[index] {
+        let Self { fields, field_offsets, forces, findings, .. } = self;
+        side_by_side(fields, field_offsets, displacement, history, forces, findings);
+        for (index, findings) in self.findings.iter().enumerate() {
+            for findings in findings {
                 found.inverted = found.inverted.or(findings.inverted.map(|(cell, j)| (index, cell, j)));
                 found.folded = found.folded.or(findings.folded.map(|cell| (index, cell)));
                 for lane in 0..PACK {
