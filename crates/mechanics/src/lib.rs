@@ -19,6 +19,7 @@ pub mod curve;
 pub mod element;
 mod energies;
 mod fingerprint;
+mod followers;
 pub mod grip;
 pub mod harmonic;
 pub mod law;

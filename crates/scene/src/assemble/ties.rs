@@ -119,6 +119,12 @@ impl Builder<'_> {
             );
             return None;
         }
+        if self.shell_cells(guest).is_some() {
+            self.notes.push(format!(
+                "`{name}` holds places, not rotations: `{}` is hinged where it is tied",
+                names[0]
+            ));
+        }
         self.tell_crowding([guest, host], names);
         Some(())
     }

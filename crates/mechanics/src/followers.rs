@@ -1,0 +1,159 @@
+//! Nodes that follow others, in a model: J of displacements, Jᵀ of forces and masses, by the rows of its [`Tie`]s.
+
+use crate::Real;
+use crate::mapping::{Weights, weighted};
+use crate::model::Model;
+use crate::tensor::{Vector, add, cast, scale};
+use crate::tie::{Tie, TieError};
+
+impl Model {
+    /// Ties nodes to others, once all cells have given their masses; the number of the tie.
+    ///
+    /// # Errors
+    /// If a node is tied already, or follows one that is tied. The model then is as it was.
+    pub fn tie(&mut self, name: &str, nodes: Vec<u32>, mapping: Weights) -> Result<usize, TieError> {
+        let tie = Tie { name: name.into(), nodes, mapping };
+        let mut owner = vec![None; self.node_count()];
+        for known in &self.ties {
+            known.nodes.iter().for_each(|&node| owner[node as usize] = Some(known.name.as_str()));
+        }
+        let placed = |node: u32| {
+            let (body, node) = self.locate_node(node);
+            (self.bodies[body].name.clone(), node)
+        };
+        for &node in &tie.nodes {
+            if let Some(other) = owner[node as usize].replace(name) {
+                let (body, node) = placed(node);
+                return Err(TieError::Twice { node, body, other: other.into() });
+            }
+        }
+        let all = || self.ties.iter().chain([&tie]);
+        let chained = all().flat_map(Tie::rows).find_map(|(node, mut row)| {
+            row.any(|(followed, _)| owner[followed as usize].is_some()).then_some(node)
+        });
+        if let Some(node) = chained {
+            let (body, node) = placed(node);
+            return Err(TieError::Chain { node, body });
+        }
+        for (node, _) in tie.rows() {
+            if let Some(velocity) = self.initial_velocity.get_mut(node as usize) {
+                *velocity = [0.0; 3];
+            }
+        }
+        self.ties.push(tie);
+        let mut mass = std::mem::take(&mut self.mass);
+        self.give_down(&mut mass);
+        self.mass = mass;
+        Ok(self.ties.len() - 1)
+    }
+
+    /// Whether each node follows others.
+    pub fn followers(&self) -> Vec<bool> {
+        let mut follows = vec![false; self.node_count()];
+        self.ties.iter().flat_map(|tie| &tie.nodes).for_each(|&node| follows[node as usize] = true);
+        follows
+    }
+
+    /// Takes the nodes that follow others along: J of displacements or velocities.
+    pub fn follow<R: Real>(&self, field: &mut [Vector<R>]) {
+        for (node, row) in self.ties.iter().flat_map(Tie::rows) {
+            field[node as usize] =
+                weighted(row, |followed| cast::<R, f64>(field[followed as usize])).map(R::of);
+        }
+    }
+
+    /// Jᵀ of forces on all nodes: those on nodes that follow others go to these.
+    pub fn give_back(&self, forces: &mut [Vector<f64>]) {
+        for (node, row) in self.ties.iter().flat_map(Tie::rows) {
+            let force = std::mem::take(&mut forces[node as usize]);
+            for (followed, weight) in row {
+                forces[followed as usize] = add(forces[followed as usize], scale(force, weight));
+            }
+        }
+    }
+
+    /// Row sums of Jᵀ M J: the masses of nodes that follow others go to these.
+    pub fn give_down(&self, masses: &mut [f64]) {
+        for (node, row) in self.ties.iter().flat_map(Tie::rows) {
+            let mass = std::mem::take(&mut masses[node as usize]);
+            row.for_each(|(followed, weight)| masses[followed as usize] += weight * mass);
+        }
+    }
+
+    /// A point of nodes with weights as a combination of nodes that follow no others.
+    pub fn resolved(&self, point: &[(u32, f64)]) -> Vec<(u32, f64)> {
+        let mut all: Vec<(u32, f64)> = Vec::new();
+        for &(node, weight) in point {
+            let found = self.ties.iter().find_map(|tie| {
+                let at = tie.nodes.iter().position(|&own| own == node)?;
+                Some(tie.mapping.row(at).map(|(followed, w)| (followed, w * weight)).collect::<Vec<_>>())
+            });
+            for (node, weight) in found.unwrap_or_else(|| vec![(node, weight)]) {
+                match all.iter_mut().find(|(known, _)| *known == node) {
+                    Some((_, known)) => *known += weight,
+                    None => all.push((node, weight)),
+                }
+            }
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model() -> Model {
+        let mut model = Model::default();
+        model.add_body("host", &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        model.add_body("guest", &[[0.2, 0.3, 0.1], [0.1, 0.1, 0.1]]);
+        model.mass = vec![1.0, 1.0, 1.0, 1.0, 2.0, 3.0];
+        model
+    }
+
+    fn rows() -> Weights {
+        let rows: [&[(u32, f64)]; 2] =
+            [&[(0, 0.4), (1, 0.2), (2, 0.3), (3, 0.1)], &[(0, 0.7), (1, 0.1), (2, 0.1), (3, 0.1)]];
+        Weights::from_rows(rows)
+    }
+
+    /// ⟨J v, f⟩ = ⟨v, Jᵀ f⟩, masses keep their sum, rigid motions are followed.
+    #[test]
+    fn what_goes_down_comes_up_by_the_transpose() {
+        let mut model = model();
+        model.tie("glue", vec![4, 5], rows()).unwrap();
+        assert_eq!(model.mass[4..], [0.0, 0.0]);
+        assert!((model.mass.iter().sum::<f64>() - 9.0).abs() < 1e-14);
+        let mut velocity =
+            vec![[0.3, -0.1, 0.2], [0.5, 0.4, -0.7], [-0.2, 0.6, 0.1], [0.9, -0.8, 0.3], [0.0; 3], [0.0; 3]];
+        model.follow(&mut velocity);
+        let given: Vec<Vector<f64>> =
+            vec![[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [1.0, -2.0, 3.0], [0.5, 0.7, -0.1]];
+        let mut forces = given.clone();
+        model.give_back(&mut forces);
+        let power = |f: &[Vector<f64>]| -> f64 {
+            f.iter().zip(&velocity).map(|(f, v)| crate::tensor::dot(*f, *v)).sum()
+        };
+        assert!((power(&given) - power(&forces)).abs() < 1e-15 && forces[4..] == [[0.0; 3]; 2]);
+        let mut places = model.rest.clone();
+        model.follow(&mut places);
+        assert!(places.iter().zip(&model.rest).all(|(a, b)| (0..3).all(|c| (a[c] - b[c]).abs() < 1e-15)));
+        let point = model.resolved(&[(4, 0.5), (0, 0.5)]);
+        assert_eq!(point.iter().map(|(_, w)| w).sum::<f64>(), 1.0);
+        assert_eq!(point[0], (0, 0.7));
+    }
+
+    #[test]
+    fn chains_circles_and_second_ties_are_refused() {
+        let tied = |again: (Vec<u32>, Weights)| {
+            let mut model = model();
+            model.tie("glue", vec![4, 5], rows()).unwrap();
+            model.tie("thread", again.0, again.1).unwrap_err()
+        };
+        let to = |node: u32| Weights::from_rows([&[(node, 1.0)][..]]);
+        assert!(matches!(tied((vec![4], to(1))), TieError::Twice { node: 0, .. }));
+        assert!(matches!(tied((vec![3], to(4))), TieError::Chain { .. }));
+        assert!(matches!(tied((vec![0], to(1))), TieError::Chain { .. }));
+        assert!(matches!(model().tie("self", vec![4], to(4)), Err(TieError::Chain { node: 0, .. })));
+    }
+}
