@@ -89,11 +89,12 @@ impl<R: Scalar> PackedTriangle<R> {
     /// The changes of the tangents ∂u/∂X_i.
     #[inline(always)]
     fn changes<L: Lanes<R>>(&self, u: &[Vector<L>; 2], at: usize) -> [Vector<L>; 2] {
-        let of_axis = |i: usize| {
-            let along = |a: usize| scale(u[a], L::load(&self.gradient[a][i], at));
-            add(along(0), along(1))
-        };
-        [of_axis(0), of_axis(1)]
+        // Written out: closures are not compiled for the lanes.
+        let [[b1, b2], [c1, c2]] = &self.gradient;
+        [
+            add(scale(u[0], L::load(b1, at)), scale(u[1], L::load(c1, at))),
+            add(scale(u[0], L::load(b2, at)), scale(u[1], L::load(c2, at))),
+        ]
     }
 
     #[inline(always)]
@@ -123,8 +124,15 @@ impl<R: Scalar> Walls<R> {
 
     #[inline(always)]
     fn plane<L: Lanes<R>>(&self, pack: usize, at: usize) -> InPlane<L> {
-        let part = |k: usize| L::load(&self.plane[pack][k], at);
-        InPlane::from_parts([part(0), part(1), part(2), part(3), part(4), part(5)])
+        let [xx, yy, xy, a, b, c] = &self.plane[pack];
+        InPlane::from_parts([
+            L::load(xx, at),
+            L::load(yy, at),
+            L::load(xy, at),
+            L::load(a, at),
+            L::load(b, at),
+            L::load(c, at),
+        ])
     }
 
     /// Sets the gradients that the law sees, with λ₃ − 1 across.
@@ -173,8 +181,13 @@ impl<R: Scalar> Walls<R> {
             for pack in 0..packs {
                 let mut steps = Pack::ZERO;
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let part = |k: usize| L::load(&self.search[pack][k], at);
-                    let mut search = ThicknessSearch::from_parts([part(0), part(1), part(2), part(3)]);
+                    let [change, slope, last, moved] = &self.search[pack];
+                    let mut search = ThicknessSearch::from_parts([
+                        L::load(change, at),
+                        L::load(slope, at),
+                        L::load(last, at),
+                        L::load(moved, at),
+                    ]);
                     let Split { isochoric, volumetric } = batch.elastic::<L>(pack, at);
                     let stress = isochoric + volumetric;
                     search.improve(kirchhoff_across(&stress, search.change)).store(&mut steps, at);
@@ -273,11 +286,12 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
                     let volume = L::load(&rest[pack].volume, at);
                     let along = scale(add(scale(t, xx), scale(s, xy)), volume);
                     let across = scale(add(scale(t, xy), scale(s, yy)), volume);
-                    let nodal = |a: usize| {
-                        let [g, h] = &rest[pack].gradient[a];
-                        add(scale(along, L::load(g, at)), scale(across, L::load(h, at)))
-                    };
-                    by_cell(&[nodal(0), nodal(1)], &mut forces, at);
+                    let [[b1, b2], [c1, c2]] = &rest[pack].gradient;
+                    let nodal = [
+                        add(scale(along, L::load(b1, at)), scale(across, L::load(b2, at))),
+                        add(scale(along, L::load(c1, at)), scale(across, L::load(c2, at))),
+                    ];
+                    by_cell(&nodal, &mut forces, at);
                 }
                 local.add::<L>(pack - packs.start, &forces);
             }

@@ -27,12 +27,13 @@ impl<R: Number> InPlane<R> {
     /// From C₁₁ − 1, C₂₂ − 1 and C₁₂. Not a number where the wall is folded flat.
     #[inline(always)]
     pub fn from_strain_twice(strain_twice: [R; 3]) -> Self {
-        // √(1 + x) − 1 = x/(1 + √(1 + x)), without cancellation.
-        let root = |x: R| x / (R::ONE + (R::ONE + x).sqrt());
+        // √(1 + x) − 1 = x/(1 + √(1 + x)), without cancellation. Written out: closures are not compiled for lanes.
         let [xx, yy, xy] = strain_twice;
-        let first = root(xx);
+        let first = xx / (R::ONE + (R::ONE + xx).sqrt());
         let mixed = xy / (R::ONE + first);
-        Self { strain_twice, factor: [first, root(yy - mixed * mixed), mixed] }
+        let left = yy - mixed * mixed;
+        let second = left / (R::ONE + (R::ONE + left).sqrt());
+        Self { strain_twice, factor: [first, second, mixed] }
     }
 
     /// From the changes of the two tangents, ∂u/∂X₁ and ∂u/∂X₂, and the tangents t at rest: C_ij − δ_ij = t_i·u_j + t_j·u_i + u_i·u_j.
