@@ -345,10 +345,11 @@ fn tube(layers: &[(Layer, [usize; 2])]) -> Tube {
         let numbered = hexes.iter().map(|hex| hex.map(|node| first + node)).collect();
         let cells = Cells::full_hex8(numbered, &model.rest);
         model.add_solid(Solid::new(body, Material::elastic(law, 1000.0), cells));
-        let ring = |j: usize| {
-            (0..2).flat_map(|k| (0..=round).map(move |i| (i, k))).map(|(i, k)| first + at(i, j, k))
+        let ring = |j: usize| -> Vec<u32> {
+            let of_side = |k: usize| (0..=round).map(move |i| (i, k));
+            (0..2).flat_map(of_side).map(|(i, k)| first + at(i, j, k)).collect()
         };
-        rings.push([ring(0).collect(), ring(through).collect()]);
+        rings.push([ring(0), ring(through)]);
         let places = points.iter().map(|&x| Vector3::from(x)).collect();
         let block = CellBlock::new(CellKind::Hex, hexes.into_flattened());
         meshes.push((Mesh { points: places, blocks: vec![block], ..Mesh::default() }, first));
