@@ -518,7 +518,10 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
     for (line, pieces) in [
         ("element = \"tet4\"", ["`wall` is a shell, and this element is for solids", "`dkt-opt`"]),
         ("hourglass = 0.1", ["`hourglass` is for `model = \"solid\"`", "has no effect here"]),
-        ("fibre = [1, 0, 0]", ["`fibre` is for `model = \"solid\"`", "has no effect here"]),
+        (
+            "fibre = [1, 0, 0]",
+            ["`fibre` is for solids, membranes and shells with `layers`", "has no effect here"],
+        ),
         ("velocity = [1, 0, 0]", ["a static run has no inertia", "has no effect"]),
         (
             "stiffness-damping = 1e-3",

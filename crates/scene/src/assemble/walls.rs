@@ -121,6 +121,8 @@ impl Builder<'_> {
             ),
             _ => return true,
         };
+        let poisson = ["law", law_name, "poisson-ratio"];
+        let path = if draft.table.model == BodyModel::Solid { &poisson[..] } else { path };
         self.error(path, message, label, help);
         false
     }

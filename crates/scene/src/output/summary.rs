@@ -197,7 +197,11 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
             (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum()
         };
         // Of its own cells: its nodes may have the mass of a wall, too.
-        let of_cells = || solids.clone().map(|solid| solid.material.density * volume(solid)).sum();
+        let of_cells = || {
+            let mut mass = vec![0.0; built.model.node_count()];
+            solids.clone().for_each(|solid| solid.add_mass(&mut mass));
+            mass.iter().sum()
+        };
         let mass = built.implicit.as_ref().and_then(|part| part.mass(index)).unwrap_or_else(of_cells);
         let (elements, volume) = match built.implicit.as_ref().and_then(|part| part.size(index)) {
             Some(size) => size,
