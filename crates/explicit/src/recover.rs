@@ -203,7 +203,7 @@ fn membrane_fields(
     let axes = &sheet.axes;
     let changes = axes.map(|axis| h.apply(axis));
     let plane = InPlane::from_changes(axes, &changes);
-    let found = law.plane_stress(plane.strain_twice, &solid.plane_fibres(cell, sheet));
+    let found = law.plane_stress(plane.strain_twice, &solid.law_fibres(cell));
     let tangents = [add(axes[0], changes[0]), add(axes[1], changes[1])];
     let across = cross(tangents[0], tangents[1]);
     let stretch = 1.0 + found.thickness_change;

@@ -217,13 +217,9 @@ impl Watch {
             let c = strain + Symmetric::IDENTITY;
             let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
             let mean = c.trace() / 3.0;
-            let stretch = match (solid.fibres(cell), &solid.cells) {
-                ([], _) => mean,
-                (_, Cells::Membrane(_, sheets)) => {
-                    let fibres = solid.plane_fibres(cell, &sheets[cell]);
-                    fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max)
-                }
-                (fibres, _) => fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max),
+            let stretch = match &*solid.law_fibres(cell) {
+                [] => mean,
+                fibres => fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max),
             };
             // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
             let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * mean;

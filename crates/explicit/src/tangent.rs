@@ -132,12 +132,11 @@ fn eigenvector(a: &SMatrix<f64, 3, 3>, eigenvalue: f64) -> SVector<f64, 3> {
 
 fn first_piola_kirchhoff(solid: &Solid, cell: usize, h: &Tensor<f64>) -> Tensor<f64> {
     let law = &solid.material.law;
-    if let Cells::Membrane(_, sheets) = &solid.cells {
+    if let Cells::Membrane(..) = &solid.cells {
         // Columns of H are the changes of the axes of the frame.
         let changes = [0, 1].map(|i| [0, 1, 2].map(|k| h.0[k][i]));
         let plane = InPlane::from_changes(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &changes);
-        let [xx, yy, xy] =
-            law.plane_stress(plane.strain_twice, &solid.plane_fibres(cell, &sheets[cell])).stress;
+        let [xx, yy, xy] = law.plane_stress(plane.strain_twice, &solid.law_fibres(cell)).stress;
         let stress = Symmetric([xx, yy, 0.0, xy, 0.0, 0.0]);
         return Tensor::IDENTITY.plus_scaled(h, 1.0).times_symmetric(&stress);
     }

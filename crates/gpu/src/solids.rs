@@ -276,11 +276,8 @@ fn rows_at_rest(solid: &Solid, order: &[u32]) -> Vec<Four> {
 
 /// The directions of the fibres, row by row of all cells.
 fn rows_of_fibres(solid: &Solid, order: &[u32]) -> Vec<Four> {
-    let direction = |cell: usize, family: usize| match &solid.cells {
-        Cells::Membrane(_, sheets) => solid.plane_fibres(cell, &sheets[cell])[family],
-        _ => solid.fibres(cell)[family],
-    };
-    let row = |family: usize| order.iter().map(move |&cell| four(direction(cell as usize, family), 0.0));
+    let row =
+        |family: usize| order.iter().map(move |&cell| four(solid.law_fibres(cell as usize)[family], 0.0));
     (0..solid.material.law.families()).flat_map(row).collect()
 }
 

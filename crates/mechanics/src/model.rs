@@ -1,6 +1,7 @@
 //! The model: everything constant, built once and shared between threads. Arrays are in the order of the nodes, all
 //! bodies one after another.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::curve::Curve;
@@ -129,14 +130,16 @@ impl Solid {
         &self.fibre[cell * families..(cell + 1) * families]
     }
 
-    /// The directions of the families of fibres in a triangle of a membrane, in its own frame.
-    pub fn plane_fibres(&self, cell: usize, sheet: &Sheet) -> Vec<Vector<f64>> {
+    /// The directions of the families of fibres in a cell as its law sees them: those at rest, in a membrane within the frame of the triangle.
+    pub fn law_fibres(&self, cell: usize) -> Cow<'_, [Vector<f64>]> {
+        let Cells::Membrane(_, sheets) = &self.cells else { return Cow::Borrowed(self.fibres(cell)) };
+        let sheet = &sheets[cell];
         let in_plane = |&fibre: &Vector<f64>| {
             let [along, across] = sheet.axes.map(|axis| dot(fibre, axis));
             let length = along.hypot(across);
             [along / length, across / length, 0.0]
         };
-        self.fibres(cell).iter().map(in_plane).collect()
+        Cow::Owned(self.fibres(cell).iter().map(in_plane).collect())
     }
 
     /// An upper bound of ρc² [Pa] at rest: of a membrane that of plane stress.

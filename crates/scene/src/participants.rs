@@ -27,6 +27,11 @@ struct Owners {
     constraints: BTreeMap<String, usize>,
 }
 
+/// The group that a body goes with.
+fn group_of<'g>(groups: &'g [(String, Vec<String>)], body: &String) -> Option<&'g (String, Vec<String>)> {
+    groups.iter().find(|(_, bodies)| bodies.contains(body))
+}
+
 impl Scene {
     /// The participants with their names: the scene itself where all bodies go together.
     ///
@@ -74,7 +79,7 @@ impl Scene {
                     let message = format!("`{body}` is named twice");
                     let help = "leave one of them out";
                     out.push(Diagnostic::error(message).at(place, "again").help(help));
-                } else if let Some((other, _)) = groups.iter().find(|(_, bodies)| bodies.contains(body)) {
+                } else if let Some((other, _)) = group_of(&groups, body) {
                     let message = format!("`{body}` goes with participant `{other}` already");
                     let help = "a body has one participant: leave it out of the others";
                     out.push(Diagnostic::error(message).at(place, "named twice").help(help));
@@ -115,10 +120,9 @@ impl Scene {
 
     /// Refuses ties between participants.
     fn check_ties(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) {
-        let group = |body: &String| groups.iter().find(|(_, bodies)| bodies.contains(body));
         for (name, table) in &self.ties {
             let [first, second] = &table.between;
-            if let (Some((own, _)), Some((other, _))) = (group(first), group(second))
+            if let (Some((own, _)), Some((other, _))) = (group_of(groups, first), group_of(groups, second))
                 && own != other
             {
                 let message = format!(
@@ -134,10 +138,11 @@ impl Scene {
 
     /// Refuses walls on bodies of other participants: their common nodes have one solver.
     fn check_walls(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) {
-        let group = |body: &String| groups.iter().find(|(_, bodies)| bodies.contains(body));
         for (name, table) in &self.bodies {
             let Some(host) = &table.on else { continue };
-            let (Some((own, _)), Some((other, _))) = (group(name), group(host)) else { continue };
+            let (Some((own, _)), Some((other, _))) = (group_of(groups, name), group_of(groups, host)) else {
+                continue;
+            };
             if own == other {
                 continue;
             }

@@ -18,7 +18,8 @@ use rayon::prelude::*;
 use super::batch::{Batch, PACKS, pressures, volume_change};
 use super::blocks::{Blocks, Moved, Quad, Shares, Task};
 use super::{
-    Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
+    Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs,
+    relative,
 };
 use crate::Scalar;
 use crate::history::History;
@@ -297,8 +298,7 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
                 if !of_deformation {
                     batch.note(index, pack * PACK, &mut findings);
                 }
-                let own = (pack - packs.start) * per_pack;
-                let own = own.min(history.len())..(own + per_pack).min(history.len());
+                let own = own_packs(pack - packs.start, per_pack, history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let elastic = batch.elastic::<L>(index, at);
                     let f = batch.deformation_gradient::<L>(index, at);

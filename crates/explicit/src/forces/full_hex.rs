@@ -4,27 +4,22 @@
 use pliant_mechanics::element::GaussPoints;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{CellBlock, Solid};
-use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Vector, add, cast};
 
 use super::averaged::relaxed_pressures;
 use super::batch::{Batch, PACKS, volume_change};
-use super::blocks::{Blocks, Moved, Quad, Task};
+use super::blocks::Task;
 use super::corners::{CornerCheck, PackedCorners, is_flat};
-use super::{Findings, ForceField, PackedCells, by_cell, displacement_gradient, relative};
+use super::one_pass::{Element, OnePass};
+use super::{Findings, PackedCells, by_cell, displacement_gradient, own_packs, relative};
 use crate::Scalar;
-use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector, store_vector};
 use crate::relaxation::Relaxation;
 
-pub(super) struct FullHexes<R> {
-    processor: Processor,
-    moved: Moved<R>,
-    constants: Constants<R>,
-}
+pub(super) type FullHexes<R> = OnePass<R, Constants<R>>;
 
 /// What does not change from step to step.
-struct Constants<R> {
+pub(super) struct Constants<R> {
     law: AnyLaw,
     cells: PackedCells<R, 8>,
     points: Vec<[Point<R>; 8]>,
@@ -54,22 +49,19 @@ impl<R: Scalar> FullHexes<R> {
             }),
             weight: packed.pack(pack, |cell| R::of(points[cell].weight[g])),
         };
-        Self {
-            processor: Processor::detect(),
-            moved: Moved::new(blocks),
-            constants: Constants {
-                law: solid.material.law,
-                points: packed.packs().map(|pack| std::array::from_fn(|g| point(pack, g))).collect(),
-                inverse_volume: (packed.packs())
-                    .map(|pack| packed.pack(pack, |cell| R::of(1.0 / cells.rest[cell].volume)))
-                    .collect(),
-                corners: PackedCorners::of(&packed, &cells.offsets),
-                cells: packed,
-                relaxation: Relaxation::new(prony, step),
-                isochoric_slots: prony.isochoric_slots(),
-                volumetric_slots: prony.volumetric_slots(),
-            },
-        }
+        let constants = Constants {
+            law: solid.material.law,
+            points: packed.packs().map(|pack| std::array::from_fn(|g| point(pack, g))).collect(),
+            inverse_volume: (packed.packs())
+                .map(|pack| packed.pack(pack, |cell| R::of(1.0 / cells.rest[cell].volume)))
+                .collect(),
+            corners: PackedCorners::of(&packed, &cells.offsets),
+            cells: packed,
+            relaxation: Relaxation::new(prony, step),
+            isochoric_slots: prony.isochoric_slots(),
+            volumetric_slots: prony.volumetric_slots(),
+        };
+        Self::of(blocks, constants)
     }
 }
 
@@ -127,8 +119,7 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
             }
             // U'(v/V), relaxed where the law's volumetric part relaxes.
             let slots = constants.volumetric_slots;
-            let own = (pack - packs.start) * slots;
-            let own = own.min(pressures.len())..(own + slots).min(pressures.len());
+            let own = own_packs(pack - packs.start, slots, pressures.len());
             let values = std::slice::from_mut(&mut pressure);
             relaxed_pressures::<R, L>(law, relaxation, slots, values, &mut pressures[own], &mut batch);
             nodal.fill([Pack::ZERO; 3]);
@@ -145,8 +136,8 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
                 batch.evaluate::<L>(law, PACKS, PACKS, cells.fibres(pack, 1));
                 for (index, point) in points.iter().enumerate() {
                     batch.note(index, pack * PACK, &mut findings);
-                    let own = ((pack - packs.start) * 8 + part * PACKS + index) * per_point;
-                    let own = own.min(history.len())..(own + per_point).min(history.len());
+                    let number = (pack - packs.start) * 8 + part * PACKS + index;
+                    let own = own_packs(number, per_point, history.len());
                     for at in (0..PACK).step_by(L::WIDTH) {
                         let isochoric = batch.elastic::<L>(index, at).isochoric;
                         let stress = relaxation.advance_isochoric(isochoric, &mut history[own.clone()], at);
@@ -174,28 +165,14 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
     }
 }
 
-impl<R: Scalar> ForceField<R> for FullHexes<R> {
-    fn blocks(&self) -> &Blocks {
-        &self.moved.blocks
+impl<R: Scalar> Element<R> for Constants<R> {
+    fn slots(&self) -> [usize; 2] {
+        [8 * 6 * self.isochoric_slots, self.volumetric_slots]
     }
-    fn evaluate(
-        &mut self,
-        displacement: &[Vector<R>],
-        history: &mut History<R>,
-        forces: &mut [Quad<R>],
-        findings: &mut [Findings<R>],
-    ) {
-        let Self { processor, moved, constants } = self;
-        let pressures = (history.pressures.as_mut_slice(), constants.volumetric_slots);
-        let history = (history.cells.as_mut_slice(), 8 * 6 * constants.isochoric_slots);
-        moved.for_each(forces, history, pressures, findings, |_, task| {
-            processor.run(Pass { constants, displacement, task })
-        });
+    fn relaxation(&mut self) -> &mut Relaxation<R> {
+        &mut self.relaxation
     }
-    fn set_step(&mut self, prony: &Prony, step: f64) {
-        self.constants.relaxation.set_step(prony, step);
-    }
-    fn set_processor(&mut self, processor: Processor) {
-        self.processor = processor;
+    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R> {
+        processor.run(Pass { constants: self, displacement, task })
     }
 }

@@ -8,34 +8,27 @@ use pliant_mechanics::element::Sheet;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::law::Split;
 use pliant_mechanics::law::plane_stress::{
-    Across, InPlane, MOST_SEARCHES, ThicknessSearch, kirchhoff_across,
+    Across, FLAT_WALL, InPlane, MOST_SEARCHES, ThicknessSearch, kirchhoff_across,
 };
 use pliant_mechanics::model::{CellBlock, Solid};
-use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Symmetric, Vector, add, cast, dot, scale};
 
 use super::batch::{Batch, PACKS};
-use super::blocks::{Blocks, Moved, Quad, Task};
-use super::{Findings, ForceField, PackedCells, by_cell, relative};
+use super::blocks::Task;
+use super::one_pass::{Element, OnePass};
+use super::{Findings, PackedCells, by_cell, own_packs, relative};
 use crate::Scalar;
-use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector};
 use crate::relaxation::Relaxation;
 
-/// A triangle whose area falls below this part of that at rest counts as folded flat.
-const FLAT: f64 = 1e-3;
 /// Where a search ends: a step of so many units in the last place of λ₃ − 1.
 const SEARCHED: f64 = 64.0;
 
 /// The triangles of a membrane.
-pub(super) struct Membranes<R> {
-    processor: Processor,
-    moved: Moved<R>,
-    constants: Constants<R>,
-}
+pub(super) type Membranes<R> = OnePass<R, Constants<R>>;
 
 /// What does not change from step to step.
-struct Constants<R> {
+pub(super) struct Constants<R> {
     law: AnyLaw,
     across: Across,
     cells: PackedCells<R, 3>,
@@ -56,11 +49,7 @@ struct PackedTriangle<R> {
 
 impl<R: Scalar> Membranes<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<3>, sheets: &[Sheet], step: f64) -> Self {
-        let (mut packed, blocks) = PackedCells::new(solid, cells);
-        let own = |cell: usize, family: usize| cast(solid.plane_fibres(cell, &sheets[cell])[family]);
-        let families = packed.families;
-        let fibre = packed.packs().flat_map(|pack| (0..families).map(move |family| (pack, family)));
-        packed.fibre = fibre.map(|(pack, family)| packed.vector(pack, |cell| own(cell, family))).collect();
+        let (packed, blocks) = PackedCells::new(solid, cells);
         let rest = |pack: usize| PackedTriangle {
             axes: [0, 1].map(|i| packed.vector(pack, |cell| cast(sheets[cell].axes[i]))),
             gradient: [1, 2].map(|a| {
@@ -70,18 +59,15 @@ impl<R: Scalar> Membranes<R> {
             }),
             volume: packed.pack(pack, |cell| R::of(cells.rest[cell].volume)),
         };
-        Self {
-            processor: Processor::detect(),
-            moved: Moved::new(blocks),
-            constants: Constants {
-                law: solid.material.law,
-                across: solid.material.law.across(),
-                rest: packed.packs().map(rest).collect(),
-                cells: packed,
-                relaxation: Relaxation::new(&solid.material.prony, step),
-                history: 6 * solid.material.prony.slots(),
-            },
-        }
+        let constants = Constants {
+            law: solid.material.law,
+            across: solid.material.law.across(),
+            rest: packed.packs().map(rest).collect(),
+            cells: packed,
+            relaxation: Relaxation::new(&solid.material.prony, step),
+            history: 6 * solid.material.prony.slots(),
+        };
+        Self::of(blocks, constants)
     }
 }
 
@@ -266,11 +252,10 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
                     area.store(&mut batch.volume_ratio[index], at);
                 }
                 for ratio in &mut batch.volume_ratio[index].0 {
-                    *ratio = if *ratio < R::of(FLAT) { R::ZERO } else { *ratio };
+                    *ratio = if *ratio < R::of(FLAT_WALL) { R::ZERO } else { *ratio };
                 }
                 batch.note(index, pack * PACK, &mut findings);
-                let own = (pack - packs.start) * per_pack;
-                let own = own.min(history.len())..(own + per_pack).min(history.len());
+                let own = own_packs(pack - packs.start, *per_pack, history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let [xx, yy, xy] = walls.stress::<L>(constants, &batch, index, at);
                     let o = L::ZERO;
@@ -300,27 +285,14 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
     }
 }
 
-impl<R: Scalar> ForceField<R> for Membranes<R> {
-    fn blocks(&self) -> &Blocks {
-        &self.moved.blocks
+impl<R: Scalar> Element<R> for Constants<R> {
+    fn slots(&self) -> [usize; 2] {
+        [self.history, 0]
     }
-    fn evaluate(
-        &mut self,
-        displacement: &[Vector<R>],
-        history: &mut History<R>,
-        forces: &mut [Quad<R>],
-        findings: &mut [Findings<R>],
-    ) {
-        let Self { processor, moved, constants } = self;
-        let history = (history.cells.as_mut_slice(), constants.history);
-        moved.for_each(forces, history, (&mut [], 0), findings, |_, task| {
-            processor.run(Pass { constants, displacement, task })
-        });
+    fn relaxation(&mut self) -> &mut Relaxation<R> {
+        &mut self.relaxation
     }
-    fn set_step(&mut self, prony: &Prony, step: f64) {
-        self.constants.relaxation.set_step(prony, step);
-    }
-    fn set_processor(&mut self, processor: Processor) {
-        self.processor = processor;
+    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R> {
+        processor.run(Pass { constants: self, displacement, task })
     }
 }

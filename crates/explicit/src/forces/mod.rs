@@ -17,6 +17,7 @@ mod corners;
 mod full_hex;
 mod hourglass;
 mod membrane;
+mod one_pass;
 mod plain;
 #[cfg(test)]
 mod tests;
@@ -136,6 +137,12 @@ pub trait ForceField<R>: Send + Sync {
     fn set_processor(&mut self, processor: Processor);
 }
 
+/// Where the history of one of several points lies, `each` packs a point, in a history of `all` packs; nowhere in an empty one.
+#[inline(always)]
+fn own_packs(point: usize, each: usize, all: usize) -> Range<usize> {
+    (point * each).min(all)..((point + 1) * each).min(all)
+}
+
 /// What all elements need of their cells, in packs.
 struct PackedCells<R, const N: usize> {
     count: usize,
@@ -160,7 +167,7 @@ impl<R: Scalar, const N: usize> PackedCells<R, N> {
             let node = |a: usize| std::array::from_fn(|lane| local[last.min(pack * PACK + lane)][a]);
             packed.nodes.push(std::array::from_fn(node));
             for family in 0..packed.families {
-                packed.fibre.push(packed.vector(pack, |cell| cast(solid.fibres(cell)[family])));
+                packed.fibre.push(packed.vector(pack, |cell| cast(solid.law_fibres(cell)[family])));
             }
         }
         (packed, blocks)

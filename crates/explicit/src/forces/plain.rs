@@ -2,30 +2,25 @@
 
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{CellBlock, Solid};
-use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::Vector;
 
 use super::batch::{Batch, PACKS};
-use super::blocks::{Blocks, Moved, Quad, Task};
+use super::blocks::Task;
 use super::corners::{CornerCheck, PackedCorners, flatness, may_fold};
 use super::hourglass::{PackedHourglass, Resistance};
+use super::one_pass::{Element, OnePass};
 use super::{
-    Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, relative,
+    Findings, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
 };
 use crate::Scalar;
-use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work};
 use crate::relaxation::Relaxation;
 
 /// Cells of `N` nodes with one evaluation point; `M` is one less.
-pub(super) struct SolidForces<R, const N: usize, const M: usize> {
-    processor: Processor,
-    moved: Moved<R>,
-    constants: Constants<R, N, M>,
-}
+pub(super) type SolidForces<R, const N: usize, const M: usize> = OnePass<R, Constants<R, N, M>>;
 
 /// What does not change from step to step.
-struct Constants<R, const N: usize, const M: usize> {
+pub(super) struct Constants<R, const N: usize, const M: usize> {
     law: AnyLaw,
     cells: PackedCells<R, N>,
     rest: Vec<PackedRest<R, M>>,
@@ -45,19 +40,16 @@ impl<R: Scalar, const N: usize, const M: usize> SolidForces<R, N, M> {
             Some(_) => PackedCorners::of(&packed, &cells.offsets),
             None => Vec::new(),
         };
-        Self {
-            processor: Processor::detect(),
-            moved: Moved::new(blocks),
-            constants: Constants {
-                law: solid.material.law,
-                rest: PackedRest::of(&packed, cells),
-                cells: packed,
-                hourglass,
-                corners,
-                relaxation: Relaxation::new(&solid.material.prony, step),
-                history: 6 * solid.material.prony.slots(),
-            },
-        }
+        let constants = Constants {
+            law: solid.material.law,
+            rest: PackedRest::of(&packed, cells),
+            cells: packed,
+            hourglass,
+            corners,
+            relaxation: Relaxation::new(&solid.material.prony, step),
+            history: 6 * solid.material.prony.slots(),
+        };
+        Self::of(blocks, constants)
     }
 }
 
@@ -116,8 +108,7 @@ impl<R: Scalar, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
                     };
                     findings.folded = L::call(look).map(|lane| pack * PACK + lane);
                 }
-                let own = (pack - packs.start) * per_pack;
-                let own = own.min(history.len())..(own + per_pack).min(history.len());
+                let own = own_packs(pack - packs.start, *per_pack, history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let elastic = batch.elastic::<L>(index, at);
                     let stress = relaxation.advance(elastic, &mut history[own.clone()], at);
@@ -139,27 +130,14 @@ impl<R: Scalar, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
     }
 }
 
-impl<R: Scalar, const N: usize, const M: usize> ForceField<R> for SolidForces<R, N, M> {
-    fn blocks(&self) -> &Blocks {
-        &self.moved.blocks
+impl<R: Scalar, const N: usize, const M: usize> Element<R> for Constants<R, N, M> {
+    fn slots(&self) -> [usize; 2] {
+        [self.history, 0]
     }
-    fn evaluate(
-        &mut self,
-        displacement: &[Vector<R>],
-        history: &mut History<R>,
-        forces: &mut [Quad<R>],
-        findings: &mut [Findings<R>],
-    ) {
-        let Self { processor, moved, constants } = self;
-        let history = (history.cells.as_mut_slice(), constants.history);
-        moved.for_each(forces, history, (&mut [], 0), findings, |_, task| {
-            processor.run(Pass { constants, displacement, task })
-        });
+    fn relaxation(&mut self) -> &mut Relaxation<R> {
+        &mut self.relaxation
     }
-    fn set_step(&mut self, prony: &Prony, step: f64) {
-        self.constants.relaxation.set_step(prony, step);
-    }
-    fn set_processor(&mut self, processor: Processor) {
-        self.processor = processor;
+    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R> {
+        processor.run(Pass { constants: self, displacement, task })
     }
 }

@@ -169,7 +169,7 @@ fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
                 let h = gradient(cell, &block.rest[cell].gradient);
                 let axes = sheets[cell].axes;
                 let plane = InPlane::from_changes(&axes, &axes.map(|axis| h.apply(axis)));
-                let fibres = solid.plane_fibres(cell, &sheets[cell]);
+                let fibres = solid.law_fibres(cell);
                 block.rest[cell].volume * law.plane_stress(plane.strain_twice, &fibres).energy
             };
             (0..block.nodes.len()).map(stored).sum()

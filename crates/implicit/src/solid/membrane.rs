@@ -4,14 +4,11 @@
 //! eigenvalues deal with as for other walls.
 
 use pliant_mechanics::element::{Axes, Rest};
-use pliant_mechanics::law::plane_stress::InPlane;
+use pliant_mechanics::law::plane_stress::{FLAT_WALL, InPlane};
 use pliant_mechanics::tensor::{Vector, add, dot, scale};
 
 use super::{Own, Response, add_to};
 use crate::facet::Broken;
-
-/// A triangle whose area falls below this part of that at rest counts as folded flat.
-const FLAT: f64 = 1e-3;
 
 impl Response {
     /// Adds a triangle; the fibres of `own` are in its frame.
@@ -27,7 +24,7 @@ impl Response {
         let changes = [change(0), change(1)];
         let plane = InPlane::from_changes(axes, &changes);
         let area = 1.0 + plane.area_change();
-        if area.is_nan() || area < FLAT {
+        if area.is_nan() || area < FLAT_WALL {
             return Err(Broken::Inverted(0.0));
         }
         let found = own.law.plane_stress(plane.strain_twice, own.fibres);

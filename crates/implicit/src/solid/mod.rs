@@ -59,7 +59,8 @@ impl Response {
         if self.broken.is_some() {
             return;
         }
-        let own = Own { law: &solid.material.law, fibres: solid.fibres(cell), stiffness };
+        let fibres = solid.law_fibres(cell);
+        let own = Own { law: &solid.material.law, fibres: &fibres, stiffness };
         let found = match &solid.cells {
             Cells::Tet4(block) => self.fill_plain(own, block, cell, displacement),
             Cells::Hex8(block) => self.fill_plain(own, block, cell, displacement),
@@ -90,7 +91,6 @@ impl Response {
             }
             Cells::Membrane(block, sheets) => {
                 let u = moved(block, cell, displacement);
-                let own = Own { fibres: &solid.plane_fibres(cell, &sheets[cell]), ..own };
                 self.add_triangle(own, &u, &block.rest[cell], &sheets[cell].axes)
             }
         };

@@ -5,12 +5,13 @@
 //! with λ + 2μ as slope. An incompressible law has λ₃ = 1/√det C in the plane, and a pressure that takes S₃₃ away, without a search
 //! (Holzapfel, *Nonlinear Solid Mechanics*, 6.3). So every law of the registry has its plane-stress version.
 
+use super::tangent::{DIFFERENCE, by_differences};
 use super::{AnyLaw, Deformation, SmallStrainModuli, Split};
 use crate::Number;
-use crate::tensor::{Symmetric, Tensor, Vector};
+use crate::tensor::{Symmetric, Tensor, Vector, dot};
 
-/// Size of the differences of strain: truncation and round-off both near 1e-10.
-const DIFFERENCE: f64 = 1e-5;
+/// A wall whose area falls below this part of that at rest counts as folded flat.
+pub const FLAT_WALL: f64 = 1e-3;
 /// The most steps of a search; a few are enough unless a law is ill-posed.
 pub const MOST_SEARCHES: usize = 40;
 
@@ -39,7 +40,6 @@ impl<R: Number> InPlane<R> {
     /// From the changes of the two tangents, ∂u/∂X₁ and ∂u/∂X₂, and the tangents t at rest: C_ij − δ_ij = t_i·u_j + t_j·u_i + u_i·u_j.
     #[inline(always)]
     pub fn from_changes(tangents: &[Vector<R>; 2], changes: &[Vector<R>; 2]) -> Self {
-        use crate::tensor::dot;
         let ([t, s], [u, v]) = (*tangents, *changes);
         let twice = R::of(2.0);
         Self::from_strain_twice([
@@ -255,27 +255,13 @@ impl AnyLaw {
 
     /// D = ∂S/∂ε [Pa] of a wall, ε = (E₁₁, E₂₂, 2E₁₂), by central differences, symmetric.
     pub fn plane_tangent(&self, strain_twice: [f64; 3], fibres: &[Vector<f64>]) -> [[f64; 3]; 3] {
-        let mut columns = [[0.0; 3]; 3];
-        for (component, column) in columns.iter_mut().enumerate() {
+        by_differences(|component, sign| {
             // A change of E₁₁ by h changes C₁₁ by 2h, one of 2E₁₂ by h changes C₁₂ by h.
             let by = if component == 2 { DIFFERENCE } else { 2.0 * DIFFERENCE };
-            let stress = |sign: f64| {
-                let mut moved = strain_twice;
-                moved[component] += sign * by;
-                self.plane_stress(moved, fibres).stress
-            };
-            let (ahead, behind) = (stress(1.0), stress(-1.0));
-            for (entry, (a, b)) in column.iter_mut().zip(ahead.into_iter().zip(behind)) {
-                *entry = (a - b) / (2.0 * DIFFERENCE);
-            }
-        }
-        let mut symmetric = columns;
-        for (p, row) in symmetric.iter_mut().enumerate() {
-            for (q, entry) in row.iter_mut().enumerate() {
-                *entry = 0.5 * (columns[p][q] + columns[q][p]);
-            }
-        }
-        symmetric
+            let mut moved = strain_twice;
+            moved[component] += sign * by;
+            self.plane_stress(moved, fibres).stress
+        })
     }
 }
 

@@ -6,7 +6,7 @@ use super::{AnyLaw, Deformation, Split};
 use crate::tensor::{Symmetric, Tensor, Vector};
 
 /// Size of the differences of strain: truncation and round-off both near 1e-10.
-const DIFFERENCE: f64 = 1e-5;
+pub(super) const DIFFERENCE: f64 = 1e-5;
 
 /// Rows and columns of the components 11, 22, 33, 12, 23, 13.
 const COMPONENTS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [0, 2]];
@@ -22,9 +22,9 @@ impl AnyLaw {
     ) -> [[f64; 6]; 6] {
         let f = Deformation::from_displacement_gradient(h).gradient;
         let inverse_transposed = f.cofactor().scaled(1.0 / f.determinant());
-        let mut columns = [[0.0; 6]; 6];
-        for (column, [i, j]) in columns.iter_mut().zip(COMPONENTS) {
+        by_differences(|component, sign| {
             // δε = DIFFERENCE in one component, the shears half in each of two places.
+            let [i, j] = COMPONENTS[component];
             let mut strain = Tensor::ZERO;
             strain.0[i][j] = 0.5 * DIFFERENCE;
             strain.0[j][i] += 0.5 * DIFFERENCE;
@@ -33,21 +33,18 @@ impl AnyLaw {
                 // The rows of F⁻ᵀ δE; δE is symmetric.
                 *out = strain.apply(row);
             }
-            let stress = |by: f64| {
-                let moved = Deformation::from_displacement_gradient(&h.plus_scaled(&change, by));
-                part(self.stress(&moved, fibres))
-            };
-            let (ahead, behind) = (stress(1.0), stress(-1.0));
-            for (entry, (a, b)) in column.iter_mut().zip(ahead.0.into_iter().zip(behind.0)) {
-                *entry = (a - b) / (2.0 * DIFFERENCE);
-            }
-        }
-        let mut symmetric = columns;
-        for (p, row) in symmetric.iter_mut().enumerate() {
-            for (q, entry) in row.iter_mut().enumerate() {
-                *entry = 0.5 * (columns[p][q] + columns[q][p]);
-            }
-        }
-        symmetric
+            let moved = Deformation::from_displacement_gradient(&h.plus_scaled(&change, sign));
+            part(self.stress(&moved, fibres)).0
+        })
     }
+}
+
+/// The symmetric matrix of the central differences of stresses [Pa], from those at a component of strain moved by ± [`DIFFERENCE`].
+pub(super) fn by_differences<const N: usize>(stress: impl Fn(usize, f64) -> [f64; N]) -> [[f64; N]; N] {
+    let column = |component: usize| {
+        let (ahead, behind) = (stress(component, 1.0), stress(component, -1.0));
+        std::array::from_fn(|row| (ahead[row] - behind[row]) / (2.0 * DIFFERENCE))
+    };
+    let columns: [[f64; N]; N] = std::array::from_fn(column);
+    std::array::from_fn(|p| std::array::from_fn(|q| 0.5 * (columns[p][q] + columns[q][p])))
 }

@@ -294,21 +294,38 @@ impl Builder<'_> {
         let Some(fibre) = self.fibres(draft, &law_name, law, block, &cells) else { return };
         let Some(fractions) = self.fractions(draft, block, &cells) else { return };
         let material = Material { law: law.law, prony, density: density.0 };
-        if block.kind == CellKind::Triangle {
-            self.add_membrane(
-                draft,
-                body,
-                block,
-                Solid { body, material, cells: Cells::membrane(vec![], &[], &[]), fibre, original: cells },
-            );
-            return;
-        }
+        let cells_of = match block.kind {
+            CellKind::Triangle => self.membrane(draft, body, block, &cells, &fibre),
+            _ => {
+                let control = [hourglass.0, law.law.small_strain().shear];
+                Some(self.volume_cells(table.element, body, block, &cells, control))
+            }
+        };
+        let Some(cells_of) = cells_of else { return };
+        let cells_of = cells_of.filled(&fractions);
+        self.assembly.model_mut().add_solid(Solid {
+            body,
+            material,
+            cells: cells_of,
+            fibre,
+            original: cells,
+        });
+    }
+
+    /// Some cells of a block with their element; hourglass control has a coefficient and a shear modulus [Pa].
+    fn volume_cells(
+        &self,
+        element: Option<Element>,
+        body: usize,
+        block: &CellBlock,
+        cells: &[u32],
+        [hourglass, shear]: [f64; 2],
+    ) -> Cells {
         let own = &self.assembly.bodies[body];
         let rest = &self.assembly.rest;
-        let shear = law.law.small_strain().shear;
         let tets = || cells.iter().map(|&c| nodes(block, c, |node| own.node(node))).collect();
         let hexes = || cells.iter().map(|&c| nodes(block, c, |node| own.node(node))).collect();
-        let cells_of = match (block.kind, table.element) {
+        match (block.kind, element) {
             (CellKind::Tet, Some(Element::Tet4Anp)) => Cells::averaged_tet4(tets(), rest, Averaging::Nodal),
             (CellKind::Tet, Some(Element::Tet4Ianp)) => {
                 Cells::averaged_tet4(tets(), rest, Averaging::Variational)
@@ -318,16 +335,8 @@ impl Builder<'_> {
             }
             (CellKind::Tet, _) => Cells::tet4(tets(), rest),
             (_, Some(Element::Hex8Full)) => Cells::full_hex8(hexes(), rest),
-            _ => Cells::hex8(hexes(), rest, hourglass.0, shear),
-        };
-        let cells_of = cells_of.filled(&fractions);
-        self.assembly.model_mut().add_solid(Solid {
-            body,
-            material,
-            cells: cells_of,
-            fibre,
-            original: cells,
-        });
+            _ => Cells::hex8(hexes(), rest, hourglass, shear),
+        }
     }
 
     fn prony(&mut self, law_name: &str, law: &LawTable) -> Option<Prony> {

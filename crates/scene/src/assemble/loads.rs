@@ -383,12 +383,7 @@ impl Builder<'_> {
             Some(Target::Body(body)) => {
                 self.refuse_other_fields(&probe.data, Some(body), &at("data"));
                 let place = Vector3::from(probe.at);
-                let distance = match self.scene.bodies[body].1.model {
-                    BodyModel::Shell => {
-                        self.bodies[body].closest(&place).map(|found| (found.position - place).norm())
-                    }
-                    _ => self.bodies[body].locator().locate(&place).map(|location| location.distance),
-                };
+                let distance = self.bodies[body].locator().locate(&place).map(|found| found.distance);
                 let distance = distance.unwrap_or(0.0);
                 let help = "give its place at rest in metres; the nearest cell carries it";
                 self.doubt_place(&format!("probe `{name}`"), distance, body, &at("at"), help);

@@ -19,7 +19,7 @@ mod walls;
 
 use std::sync::Arc;
 
-use pliant_geometry::{CellKind, Labels, Locator, Mesh, Surface, SurfaceLocator, SurfacePoint, Vector3};
+use pliant_geometry::{CellKind, Labels, Locator, Mesh, Surface, SurfaceLocator, Vector3};
 use pliant_implicit::{Assembly, CurvedSurface};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
@@ -70,12 +70,6 @@ pub struct BuiltBody {
 }
 
 impl BuiltBody {
-    /// The point of its boundary that is closest to a point at rest [m].
-    pub(crate) fn closest(&self, point: &Vector3) -> Option<SurfacePoint> {
-        let all: Vec<u32> = (0..self.boundary.faces.len() as u32).collect();
-        SurfaceLocator::new(&self.boundary, &all, &self.mesh.points).closest(point)
-    }
-
     /// Finds points of its body.
     pub(crate) fn locator(&self) -> BodyLocator<'_> {
         if self.mesh.volume_blocks().any(|block| !block.is_empty()) {
@@ -91,7 +85,7 @@ impl BuiltBody {
     }
 }
 
-/// Finds where points lie in a body: in its cells, or on its triangles where it is a thin wall.
+/// Finds the cell of a solid, or the triangle of a thin wall, that is nearest to a point.
 pub(crate) enum BodyLocator<'b> {
     /// In the cells of a solid.
     Cells(&'b Mesh, Locator),
@@ -99,7 +93,7 @@ pub(crate) enum BodyLocator<'b> {
     Wall(&'b Surface, SurfaceLocator),
 }
 
-/// Where a point lies in a body.
+/// The place of a point in a body.
 pub(crate) struct Located {
     /// The kind of the cell that is nearest.
     pub kind: CellKind,

@@ -1,7 +1,7 @@
 //! Thin walls: membranes, and walls on the boundary of a solid, with its nodes.
 
 use pliant_geometry::{CellBlock, DataArray, Mesh, Surface, body_blocks};
-use pliant_mechanics::model::{Cells, Solid};
+use pliant_mechanics::model::Cells;
 use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{cross, dot, sub};
 
@@ -127,38 +127,44 @@ impl Builder<'_> {
         false
     }
 
-    /// Adds triangles of a membrane: the cells `original` of a block.
-    pub(super) fn add_membrane(&mut self, draft: &Draft<'_>, body: usize, block: &CellBlock, solid: Solid) {
+    /// Some triangles of a block as cells of a membrane, with the fibres of each.
+    pub(super) fn membrane(
+        &mut self,
+        draft: &Draft<'_>,
+        body: usize,
+        block: &CellBlock,
+        triangles: &[u32],
+        fibre: &[[f64; 3]],
+    ) -> Option<Cells> {
         let &Draft { name, table, .. } = draft;
-        let Some(thickness) = self.thickness(name, table, block) else { return };
+        let thickness = self.thickness(name, table, block)?;
         let of = |&cell: &u32| if thickness.len() == 1 { thickness[0] } else { thickness[cell as usize] };
-        let thickness: Vec<f64> = solid.original.iter().map(of).collect();
+        let thickness: Vec<f64> = triangles.iter().map(of).collect();
         if let Some(at) = thickness.iter().position(|t| !(*t > 0.0 && t.is_finite())) {
-            let (cell, value) = (solid.original[at], thickness[at]);
+            let (cell, value) = (triangles[at], thickness[at]);
             let message = format!("triangle {cell} of `{name}` has a thickness of {value} m");
             let help = "give every triangle a thickness above 0, in metres";
             self.error(&["body", name, "thickness"], message, "must be above 0", help);
-            return;
+            return None;
         }
         let own = &self.assembly.bodies[body];
         let cells: Vec<[u32; 3]> =
-            solid.original.iter().map(|&cell| nodes(block, cell, |node| own.node(node))).collect();
-        let families = solid.material.law.families();
-        let across = (0..cells.len() * families).find(|&at| {
+            triangles.iter().map(|&cell| nodes(block, cell, |node| own.node(node))).collect();
+        let families = fibre.len() / cells.len().max(1);
+        let across = fibre.iter().enumerate().position(|(at, &fibre)| {
             let [a, b, c] = cells[at / families].map(|node| self.assembly.rest[node as usize]);
             let normal = cross(sub(b, a), sub(c, a));
-            let along = dot(normal, solid.fibre[at]).powi(2) / dot(normal, normal);
+            let along = dot(normal, fibre).powi(2) / dot(normal, normal);
             1.0 - along < ACROSS * ACROSS
         });
         if let Some(at) = across {
-            let cell = solid.original[at / families];
+            let cell = triangles[at / families];
             let message = format!("the fibre of triangle {cell} of `{name}` stands across the wall");
-            let help = "fibres of a membrane lie in its plane: give another direction or rule there";
+            let help = "a membrane needs fibres in its plane: give another direction or rule there";
             self.error(&["body", name], message, "this body", help);
-            return;
+            return None;
         }
-        let cells = Cells::membrane(cells, &self.assembly.rest, &thickness);
-        self.assembly.model_mut().add_solid(Solid { cells, ..solid });
+        Some(Cells::membrane(cells, &self.assembly.rest, &thickness))
     }
 }
 

@@ -13,7 +13,7 @@ pub struct TieTable {
     /// The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. Take the finer or the softer one
     /// first.
     pub between: [String; 2],
-    /// The nodes of the first body that follow; if not given, all that lie in or on the second.
+    /// The nodes of the first body that follow; if not given, all inside or on the second.
     #[serde(default)]
     pub nodes: Option<Selection>,
     /// Largest distance of such a node from the second body [m]; if not given, a tenth of its median edge.

@@ -388,24 +388,13 @@ impl Probe {
         }
         let body = built.bodies.iter().position(|body| body.name == table.on).unwrap_or(0);
         let own = &built.model.bodies[body];
-        let cells = built.implicit.as_ref().map(|part| &part.cells[body]);
-        if let Some(BodyCells::Facets(range)) = cells {
-            let Some(found) = built.bodies[body].closest(&point) else {
-                return Self { weights: Vec::new(), cell: None, fields };
-            };
-            let weights = found
-                .nodes
-                .iter()
-                .zip(found.weights)
-                .map(|(&node, weight)| (own.node(node), weight))
-                .collect();
-            let facet = range.start + built.bodies[body].boundary.faces[found.face as usize].parent.index;
-            return Self { weights, cell: Some(Place::Facet(facet)), fields };
-        }
         let Some(location) = built.bodies[body].locator().locate(&point) else {
             return Self { weights: Vec::new(), cell: None, fields };
         };
         let weights = location.weights.iter().map(|&(node, weight)| (own.node(node), weight)).collect();
+        if let Some(BodyCells::Facets(range)) = built.implicit.as_ref().map(|part| &part.cells[body]) {
+            return Self { weights, cell: Some(Place::Facet(range.start + location.cell)), fields };
+        }
         let cell = built.model.solids.iter().enumerate().find_map(|(index, solid)| {
             let fits = solid.body == body && solid.cells.nodes_per_cell() == location.kind.node_count();
             let cell = solid.original.iter().position(|&original| fits && original == location.cell)?;

@@ -99,16 +99,12 @@ impl Own {
         if let Some(index) = surface {
             return vec![own((bare(&built.surfaces[index]), Content::Surface(index)), fields.to_vec())];
         }
-        let of =
-            |model| -> Vec<FieldName> { fields.iter().copied().filter(|field| field.is_of(model)).collect() };
+        let of = |model| fields.iter().copied().filter(|field| field.is_of(model)).collect();
         let mut all = Vec::new();
         if chosen(built, on, false).next().is_some() {
-            let mut data = of(BodyModel::Solid);
-            data.extend(of(BodyModel::Membrane).into_iter().filter(|field| !field.is_of(BodyModel::Solid)));
-            if !has_membranes(built, on) {
-                data.retain(|field| field.is_of(BodyModel::Solid));
-            }
-            all.push(own(merged_bodies(built, on), data));
+            // Membranes have all fields of solids.
+            let model = if has_membranes(built, on) { BodyModel::Membrane } else { BodyModel::Solid };
+            all.push(own(merged_bodies(built, on), of(model)));
         }
         if let Some(part) = &built.implicit
             && chosen(built, on, true).next().is_some()

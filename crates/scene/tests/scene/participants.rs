@@ -5,10 +5,11 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::static_solids::taken_up;
 use pliant_geometry::CellKind;
 use pliant_geometry::io;
 use pliant_scene::source::Source;
-use pliant_scene::{Checkpoint, Live, Options, OutputFolder, Scene, Summary, World};
+use pliant_scene::{Live, OutputFolder, Scene, Summary, World};
 
 const LAWS: &str = r#"
 [law.tissue]
@@ -145,17 +146,8 @@ fn outputs_show_all_bodies_together() {
 fn an_interrupted_run_of_two_goes_on_with_the_same_bits() {
     let place = tempfile::tempdir().unwrap();
     let whole = world(&both("[run]\ncheckpoint = { every = 0.1 }\n"));
-    run(&whole, &place.path().join("whole"));
     let half = world(&both("[run]\ncheckpoint = { every = 0.1 }\n").replace("until = 0.2", "until = 0.1"));
-    run(&half, &place.path().join("half"));
-    let checkpoint = Checkpoint::read(&place.path().join("half")).unwrap();
-    let onward = checkpoint.continues(&whole).unwrap();
-    let folder = OutputFolder::reopen(place.path().join("half"), &onward.scene, &checkpoint).unwrap();
-    let options = Options { resume: Some(&checkpoint), ..Options::default() };
-    let summary = pliant_scene::run_with(&onward, &folder, options, &mut |_| ()).unwrap();
-    assert_eq!(summary.status, "done", "{:?}", summary.error);
-    let [a, b] = ["whole", "half"]
-        .map(|name| fs::read_to_string(place.path().join(name).join("history.csv")).unwrap());
+    let (checkpoint, [a, b]) = taken_up(&whole, &half, place.path());
     assert_eq!(a, b);
     let other = world(&format!("{HEAD}{LAWS}{SOLID}{OUTPUTS}[run]\ncheckpoint = {{ every = 0.1 }}\n"));
     let refused = checkpoint.continues(&other).unwrap_err().to_string();

@@ -176,18 +176,28 @@ fn a_resumed_run_of_solids_ends_in_the_same_bits() {
 
 /// A run of 1 s that is cut off at 0.4 s and taken up again writes the same last row as one without a stop.
 pub(super) fn resumes(text: &str) {
+    let whole = world(text).unwrap();
+    let half = world(&text.replace("until = 1", "until = 0.4")).unwrap();
     let place = tempfile::tempdir().unwrap();
-    run(text, &place.path().join("whole"));
-    run(&text.replace("until = 1", "until = 0.4"), &place.path().join("half"));
-    let checkpoint = Checkpoint::read(&place.path().join("half")).unwrap();
-    let onward = checkpoint.continues(&world(text).unwrap()).unwrap();
-    let folder = OutputFolder::reopen(place.path().join("half"), &onward.scene, &checkpoint).unwrap();
+    let [a, b] = taken_up(&whole, &half, place.path()).1;
+    assert_eq!(a.lines().last(), b.lines().last(), "{text}");
+}
+
+/// Runs a world without a stop, and after a shorter one from its checkpoint on: that checkpoint, and the table of each.
+pub(super) fn taken_up(whole: &World, half: &World, place: &Path) -> (Checkpoint, [String; 2]) {
+    for (world, name) in [(whole, "whole"), (half, "half")] {
+        let folder = OutputFolder::prepare(place.join(name), &world.scene, false).unwrap();
+        let summary = pliant_scene::run(world, &folder, &mut |_| ()).unwrap();
+        assert_eq!(summary.status, "done", "{:?}", summary.error);
+    }
+    let checkpoint = Checkpoint::read(&place.join("half")).unwrap();
+    let onward = checkpoint.continues(whole).unwrap();
+    let folder = OutputFolder::reopen(place.join("half"), &onward.scene, &checkpoint).unwrap();
     let options = Options { resume: Some(&checkpoint), ..Options::default() };
     let summary = pliant_scene::run_with(&onward, &folder, options, &mut |_| ()).unwrap();
     assert_eq!(summary.status, "done", "{:?}", summary.error);
-    let [a, b] = ["whole", "half"]
-        .map(|name| fs::read_to_string(place.path().join(name).join("history.csv")).unwrap());
-    assert_eq!(a.lines().last(), b.lines().last(), "{text}");
+    let table = |name: &str| fs::read_to_string(place.join(name).join("history.csv")).unwrap();
+    (checkpoint, ["whole", "half"].map(table))
 }
 
 #[test]

@@ -1,0 +1,63 @@
+//! Elements whose forces are found in one pass over the blocks of cells.
+
+use pliant_mechanics::prony::Prony;
+use pliant_mechanics::tensor::Vector;
+
+use super::blocks::{Blocks, Moved, Quad, Task};
+use super::{Findings, ForceField};
+use crate::Scalar;
+use crate::history::History;
+use crate::lanes::Processor;
+use crate::relaxation::Relaxation;
+
+/// What an element knows of its cells that does not change from step to step.
+pub(super) trait Element<R>: Send + Sync {
+    /// Packs of history for a pack of cells, and of that of their pressures.
+    fn slots(&self) -> [usize; 2];
+
+    /// The coefficients of its relaxation.
+    fn relaxation(&mut self) -> &mut Relaxation<R>;
+
+    /// Does the pass over a block.
+    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R>;
+}
+
+/// The force field of such an element.
+pub(super) struct OnePass<R, E> {
+    processor: Processor,
+    moved: Moved<R>,
+    element: E,
+}
+
+impl<R: Scalar, E: Element<R>> OnePass<R, E> {
+    pub(super) fn of(blocks: Blocks, element: E) -> Self {
+        Self { processor: Processor::detect(), moved: Moved::new(blocks), element }
+    }
+}
+
+impl<R: Scalar, E: Element<R>> ForceField<R> for OnePass<R, E> {
+    fn blocks(&self) -> &Blocks {
+        &self.moved.blocks
+    }
+    fn evaluate(
+        &mut self,
+        displacement: &[Vector<R>],
+        history: &mut History<R>,
+        forces: &mut [Quad<R>],
+        findings: &mut [Findings<R>],
+    ) {
+        let Self { processor, moved, element } = self;
+        let [of_cells, of_pressures] = element.slots();
+        let pressures = (history.pressures.as_mut_slice(), of_pressures);
+        let history = (history.cells.as_mut_slice(), of_cells);
+        moved.for_each(forces, history, pressures, findings, |_, task| {
+            element.pass(*processor, displacement, task)
+        });
+    }
+    fn set_step(&mut self, prony: &Prony, step: f64) {
+        self.element.relaxation().set_step(prony, step);
+    }
+    fn set_processor(&mut self, processor: Processor) {
+        self.processor = processor;
+    }
+}
