@@ -446,3 +446,45 @@ fn thick_and_layered_tubes_are_inflated_as_in_closed_form() {
     claim("thick tubes: pressure and outer radius", worst[0], 0.01);
     claim("tubes of two tied layers: pressure and outer radius", worst[1], 0.01);
 }
+
+/// A liver and its portal vein from a scan (TotalSegmentator), as `pliant mesh` makes a scene of them: stiffer in its capsule, with the
+/// energy balanced.
+#[test]
+fn a_segmented_liver_is_pulled_with_and_without_its_capsule() {
+    let Some(data) = std::env::var_os("PLIANT_DATA").map(std::path::PathBuf::from) else {
+        println!("skipped: PLIANT_DATA is not set");
+        return;
+    };
+    let mask = |name: &str| {
+        format!("masks = [{:?}]", data.join("abdomen-totalseg").join(name).display().to_string())
+    };
+    let mut organ = pliant_scene::OrganScene {
+        title: "liver".into(),
+        source: format!("{}, clean = {{ keep-largest = true }}, labels = [1]", mask("fast_liver.nii.gz")),
+        edge: 0.014,
+        vessels: vec![(format!("{}, label = 1", mask("fast_portal_vein_and_splenic_vein.nii.gz")), 1e-3)],
+        capsule: Some(1e-4),
+        // Of the mask.
+        bounds: [Vector3::new(-0.0655, 0.0848, 0.0928), Vector3::new(0.1355, 0.2708, 0.1828)],
+    };
+    let pulled = |organ: &pliant_scene::OrganScene| {
+        let text = organ.text().replace("until = 3.0", "until = 0.4").replace("to = 2.0", "to = 0.4");
+        let source = pliant_scene::source::Source::parse("liver.toml", text).unwrap();
+        let mut scene = pliant_scene::Scene::from_source(source, ".".into()).unwrap();
+        scene.outputs.clear();
+        let world = pliant_scene::World::new(&scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
+        let out = tempfile::tempdir().unwrap();
+        let folder = pliant_scene::OutputFolder::prepare(out.path().to_owned(), &world.scene, false).unwrap();
+        let summary = pliant_scene::run(&world, &folder, &mut |_| ()).unwrap();
+        assert_eq!(summary.status, "done", "{:?}", summary.error);
+        let balance = summary.energy_balance.unwrap().abs();
+        let force = summary.reactions.iter().find(|(name, _)| name == "pull").unwrap().1;
+        println!("{} N, balance {balance:.1e}", dot(force, force).sqrt());
+        assert!(balance < 0.01, "{balance}");
+        dot(force, force).sqrt()
+    };
+    let coated = pulled(&organ);
+    organ.capsule = None;
+    let bare = pulled(&organ);
+    claim("a segmented liver: force without its capsule over that in it", bare / coated, 0.5);
+}

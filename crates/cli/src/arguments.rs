@@ -82,7 +82,7 @@ pub enum Command {
     Labels(Labels),
     /// Make a mesh from labels of a segmented image or from a closed surface: tets, hexes, a surface or curved shells.
     #[command(after_help = MESH_HELP)]
-    Mesh(MeshImage),
+    Mesh(Box<MeshImage>),
     /// Compute the results of the thesis and compare them with the published ones.
     #[command(
         after_help = "Examples:\n  pliant reproduce\n  pliant reproduce --list\n  pliant reproduce --only fig-6.3 --out shear\n\n\
@@ -492,9 +492,9 @@ Examples:
   pliant sweep scene.toml --set law.tissue.young-modulus=1e3..5e3/5 --set body.block.density=900,1100
   pliant sweep scene.toml --set run.load-steps=2,5,10 --dry-run
 
-Writes sweep.csv, a row for each run: its values, its status, final energies, reactions and probes. Each run writes its
-summary, plot and tables to a folder run-NNNN. All combinations are checked before the first run; a failed run does
-not stop the others.
+Writes sweep.csv, a row for each run: its values, its status, final energies, reactions and probes; and sweep.svg, the
+reactions of all runs over time. Each run writes its summary, plot and tables to a folder run-NNNN. All combinations are
+checked before the first run; a failed run does not stop the others.
 
 Exit codes: 0 done, 1 some runs failed, 2 invalid input, 130 interrupted (Ctrl-C; 128 + signal number for other signals).";
 
@@ -576,6 +576,8 @@ Examples:
   pliant mesh grey.nii --threshold 0.5 --edge 8mm -o grey.vtu
   pliant mesh grey.nii --add white.nii --threshold 0.5 --edge 8mm -o brain.vtu         # two maps of probabilities
 
+  pliant mesh seg.nii.gz --label 5 --vessels 6=1mm --capsule 0.1mm --edge 8mm -o liver/scene.toml  # to `pliant run liver`
+
   pliant mesh seg.nii.gz --label 5 --as surface --edge 5mm -o liver.ply              # even triangles
   pliant mesh liver.stl --as surface --cells 8000 -o coarse.stl                        # that many triangles
   pliant mesh liver.stl --as shells --error 0.5% -o liver.vtu --error-map off.vtu      # or --shells 800
@@ -609,7 +611,7 @@ pub struct Labels {
     pub json: bool,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct MeshImage {
     /// An image file, the folder of a DICOM series, or a mesh file (for tets and hexes a closed surface).
     #[arg(value_name = "INPUT")]
@@ -663,7 +665,13 @@ pub struct MeshImage {
     /// with the fraction that it fills (cell data `fraction`), a surface, or curved shells.
     #[arg(long = "as", value_name = "CELLS", default_value = "tets")]
     pub cells: MeshCells,
-    /// Name of the mesh: .vtu or .msh, for a surface also .ply, .obj or .stl.
+    /// In a scene: a label whose surface is a wall of that thickness, tied to the tissue, such as "portal vein=1mm"; may be repeated.
+    #[arg(long, value_name = "LABEL=LENGTH", value_parser = vessel)]
+    pub vessels: Vec<(LabelChoice, f64)>,
+    /// In a scene: a capsule of this thickness on the boundary of the tissue, such as 0.1mm.
+    #[arg(long, value_name = "LENGTH", value_parser = wall)]
+    pub capsule: Option<f64>,
+    /// Name of the mesh: .vtu or .msh, for a surface also .ply, .obj or .stl; or .toml for a scene of the image, with walls and ties.
     #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
     /// Close gaps and channels up to this width, or holes of a surface: 0.003 in metres, or 3mm. Holes of a surface narrower than the
@@ -739,6 +747,22 @@ fn protected(typed: &str) -> Result<(CellLabel, Option<f64>), String> {
         text => text.parse().unwrap_or_else(|never: std::convert::Infallible| match never {}),
     };
     Ok((label, edge.map(str::trim).map(length).transpose()?))
+}
+
+/// A label and the thickness of its wall.
+fn vessel(typed: &str) -> Result<(LabelChoice, f64), String> {
+    let help = "give a label with the thickness of its wall, such as 3=1mm or \"portal vein=1mm\"";
+    let (label, thickness) = typed.rsplit_once('=').ok_or(help)?;
+    let label = label.trim().parse().map_err(|_| help)?;
+    Ok((label, wall(thickness.trim())?))
+}
+
+/// The thickness of a wall [m].
+fn wall(typed: &str) -> Result<f64, String> {
+    match length(typed)? {
+        thickness if thickness > 0.0 => Ok(thickness),
+        _ => Err("the thickness of a wall must be above 0".into()),
+    }
 }
 
 fn positive(typed: &str) -> Result<f64, String> {

@@ -19,6 +19,8 @@ pub(crate) struct AppliedForces {
     gravity: Vec<Vector<f64>>,
     body_of: Vec<u16>,
     grips: Vec<Grip>,
+    /// Whether forces of collective constraints are added.
+    binds: bool,
 }
 
 impl AppliedForces {
@@ -30,6 +32,7 @@ impl AppliedForces {
         Self {
             nodal: vec![[0.0; 3]; model.node_count()],
             gravity: vec![[0.0; 3]; model.bodies.len()],
+            binds: model.collective().is_some(),
             model,
             body_of,
             grips: Vec::new(),
@@ -41,12 +44,22 @@ impl AppliedForces {
         self.grips.clear();
         self.grips.extend_from_slice(grips);
         self.nodal.fill([0.0; 3]);
-        !grips.is_empty() || !self.model.loads.is_empty()
+        self.acts()
+    }
+
+    /// Whether any force acts.
+    pub(crate) fn acts(&self) -> bool {
+        self.binds || !self.grips.is_empty() || !self.model.loads.is_empty()
+    }
+
+    /// Adds a force [N] on a node to those of the instant.
+    pub(crate) fn add(&mut self, node: u32, force: Vector<f64>) {
+        self.nodal[node as usize] = add(self.nodal[node as usize], force);
     }
 
     /// Finds the forces at a time [s] and in a deformed place.
     pub(crate) fn update<R: Scalar>(&mut self, time: f64, displacement: &[Vector<R>]) {
-        if self.model.loads.is_empty() && self.grips.is_empty() {
+        if !self.acts() {
             return;
         }
         self.nodal.fill([0.0; 3]);

@@ -157,7 +157,7 @@ impl<'a> Operator<'a> {
         Self {
             model,
             about,
-            forces: InternalForces::new(model, 1.0),
+            forces: InternalForces::new(&model.with_taut_threads(), 1.0),
             history: vec![History::default(); model.solids.len()],
             inverse_root_mass,
             displacement: vec![[0.0; 3]; model.node_count()],

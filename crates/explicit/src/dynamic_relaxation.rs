@@ -364,13 +364,27 @@ impl<R: Scalar> Observable<R> for DynamicRelaxation<R> {
     }
 }
 
+/// Why a model has no dynamic relaxation.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Unrelaxed {
+    /// Constraints contradict each other.
+    #[error(transparent)]
+    Contradiction(#[from] Contradiction),
+    /// A constraint binds nodes to each other.
+    #[error("the constraint `{0}` binds nodes to each other: take central differences")]
+    Collective(String),
+}
+
 impl<R: Scalar> DynamicRelaxation<R> {
     /// A solver for a model.
     ///
     /// # Errors
-    /// If constraints contradict each other.
-    pub fn new(model: impl Into<Arc<Model>>, settings: RelaxationSettings) -> Result<Self, Contradiction> {
+    /// If constraints contradict each other, or bind nodes to each other.
+    pub fn new(model: impl Into<Arc<Model>>, settings: RelaxationSettings) -> Result<Self, Unrelaxed> {
         let model = model.into();
+        if let Some(constraint) = model.collective() {
+            return Err(Unrelaxed::Collective(constraint.name.clone()));
+        }
         let nodes = model.node_count();
         Ok(Self {
             settings,

@@ -31,6 +31,7 @@
 //! ```
 
 mod applied;
+mod collective;
 pub mod critical_step;
 mod dynamic_relaxation;
 mod energies;
@@ -48,7 +49,8 @@ mod stepper;
 mod tangent;
 
 pub use dynamic_relaxation::{
-    Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Way,
+    Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Unrelaxed,
+    Way,
 };
 pub use energies::{BALANCE_LIMIT, BALANCE_STEPS, Sums, balance_floor, model_balance_floor};
 pub use forces::{Deformed, Scalar};

@@ -1,6 +1,6 @@
 //! Fields recovered from a state: strains, stresses and energies of the cells, in double precision.
 
-use pliant_mechanics::element::Sheet;
+use pliant_mechanics::element::{Cord, Rest, Sheet};
 use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::{Deformation, Split};
 use pliant_mechanics::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
@@ -34,8 +34,10 @@ pub struct CellFields {
     pub fibre: Option<Vector<f64>>,
     /// Length of the deformed unit fibre (of the first family); `None` if the law has none.
     pub fibre_stretch: Option<f64>,
-    /// Thickness [m] of a membrane, at rest and now; `None` of a solid.
+    /// Thickness [m] of a membrane, at rest and now; `None` of others.
     pub thickness: Option<[f64; 2]>,
+    /// Length of a bar over that without force, and its force [N]; `None` of others.
+    pub axial: Option<[f64; 2]>,
 }
 
 impl CellFields {
@@ -46,7 +48,7 @@ impl CellFields {
         (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
     }
 
-    /// Force per length [N/m] in the wall of a membrane, as a tensor in space; `None` of a solid.
+    /// Force per length [N/m] in the wall of a membrane, as a tensor in space; `None` of others.
     pub fn membrane_force(&self) -> Option<Symmetric<f64>> {
         self.thickness.map(|[_, now]| self.cauchy_stress * now)
     }
@@ -128,6 +130,7 @@ impl<'a, R: Scalar> Recovery<'a, R> {
                 let h = gradient(&u, &block.rest[cell].gradient);
                 membrane_fields(part, &h, cell, &sheets[cell], &history)
             }
+            Cells::Bar(block, cord) => bar_fields(part, &block.rest[cell], cord, u[1], &history),
             cells => {
                 let h = with_cells!(cells, block => gradient(&u, &block.rest[cell].gradient));
                 point_fields(part, &h, fibres, averages, cell, &history)
@@ -188,6 +191,7 @@ fn point_fields(
         fibre: fibres.first().copied(),
         fibre_stretch: fibres.first().copied().map(stretch),
         thickness: None,
+        axial: None,
     }
 }
 
@@ -234,6 +238,43 @@ fn membrane_fields(
             dot(deformed, deformed).sqrt()
         }),
         thickness: Some([sheet.thickness, sheet.thickness * stretch]),
+        axial: None,
+    }
+}
+
+/// Fields of a bar: its stress is force over the cross section at rest, in space, and its strains are along it. They know nothing of
+/// its thickness.
+fn bar_fields(
+    solid: &Solid,
+    rest: &Rest<2>,
+    cord: &Cord,
+    moved: Vector<f64>,
+    history: &[Symmetric<f64>],
+) -> CellFields {
+    let pull = cord.pull(rest, moved, solid.material.law.small_strain().young());
+    let elastic = Split {
+        isochoric: Symmetric([pull.stress[0], 0.0, 0.0, 0.0, 0.0, 0.0]),
+        volumetric: Symmetric::ZERO,
+    };
+    let relaxed = solid.material.prony.stress(elastic, history).0[0];
+    let stress = if cord.tension_only { relaxed.max(0.0) } else { relaxed };
+    let tangent = scale(rest.between(), 1.0 / rest.length());
+    // Length over that at rest, of which the mesh tells.
+    let grown = pull.length / rest.length();
+    let mut gradient = Tensor::IDENTITY;
+    gradient.add_outer(sub(scale(pull.along, grown), tangent), tangent);
+    CellFields {
+        gradient,
+        volume_ratio: f64::NAN,
+        cell_volume_ratio: f64::NAN,
+        green_strain: Symmetric::dyad(tangent) * (0.5 * (grown * grown - 1.0)),
+        pk2_stress: Symmetric::dyad(tangent) * (stress / grown),
+        cauchy_stress: Symmetric::dyad(pull.along) * stress,
+        energy_density: cord.energy(rest, &pull) / rest.volume,
+        fibre: None,
+        fibre_stretch: None,
+        thickness: None,
+        axial: Some([pull.stretch, stress * rest.area()]),
     }
 }
 
@@ -264,6 +305,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
         fibre: point.fibre,
         fibre_stretch: point.fibre_stretch.map(|stretch| sum.fibre_stretch.unwrap_or(0.0) + w * stretch),
         thickness: None,
+        axial: None,
     };
     let nothing = CellFields {
         gradient: Tensor::ZERO,
@@ -276,6 +318,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
         fibre: None,
         fibre_stretch: None,
         thickness: None,
+        axial: None,
     };
     weighted.fold(nothing, add_up)
 }
@@ -301,7 +344,7 @@ fn averages<R: Scalar>(solid: &Solid, history: &History<R>, displacement: &[Vect
         changes.iter().enumerate().map(|(index, &change)| relaxed(index, change)).collect()
     };
     match &solid.cells {
-        Cells::Tet4(_) | Cells::Hex8(_) | Cells::Membrane(..) => Averages::None,
+        Cells::Tet4(_) | Cells::Hex8(_) | Cells::Membrane(..) | Cells::Bar(..) => Averages::None,
         Cells::FullHex8(block, points) => {
             let mean_change = |cell: usize| {
                 let at =

@@ -205,8 +205,8 @@ impl Watch {
     fn rank<R: Scalar>(&mut self, solid: &Solid, displacement: &[Vector<R>]) {
         let rest = solid.longitudinal_modulus();
         let bulk = match &solid.cells {
-            // In plane stress the volume hardly counts.
-            Cells::Membrane(..) => 0.0,
+            // In plane stress the volume hardly counts, in a bar not at all.
+            Cells::Membrane(..) | Cells::Bar(..) => 0.0,
             _ => solid.material.law.small_strain().bulk,
         };
         let weight = &self.weight;

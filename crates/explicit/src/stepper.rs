@@ -20,6 +20,7 @@ use rayon::prelude::*;
 
 use crate::Scalar;
 use crate::applied::AppliedForces;
+use crate::collective::{Collective, Predicted};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
 use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
@@ -135,7 +136,9 @@ pub struct CentralDifference<R> {
     /// α of each component [1/s].
     damping: Vec<Vector<R>>,
     applied: AppliedForces,
-    /// True if there is any load or grip.
+    /// Nodes that are bound to each other.
+    collectives: Vec<Collective>,
+    /// True if there is any load, grip or collective constraint.
     loaded: bool,
     processor: Processor,
     /// Factors on the amplitudes of each constraint now and after the step.
@@ -154,7 +157,10 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
     }
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
-        sum_owned(&self.model, &self.owners, constraint, &self.reaction)
+        match self.collectives.iter().find(|own| own.constraint == constraint) {
+            Some(own) => own.force,
+            None => sum_owned(&self.model, &self.owners, constraint, &self.reaction),
+        }
     }
 
     fn nodal_reaction(&self, node: usize) -> Vector<f64> {
@@ -391,7 +397,8 @@ impl<R: Scalar> CentralDifference<R> {
                 .collect(),
             damping,
             applied: AppliedForces::new(Arc::clone(&model)),
-            loaded: !model.loads.is_empty(),
+            collectives: Collective::all(&model),
+            loaded: !model.loads.is_empty() || model.collective().is_some(),
             processor: Processor::detect(),
             factors: vec![[[0.0; 2]; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
@@ -464,6 +471,7 @@ impl<R: Scalar> CentralDifference<R> {
             self.start(state);
         }
         self.set_factors(state.time);
+        self.bind(state);
         self.pass_over_nodes(state);
         let sums = self.sums.iter().fold(Sums::default(), Sums::merge);
         self.check_state(state, &sums, &found)?;
@@ -542,6 +550,34 @@ impl<R: Scalar> CentralDifference<R> {
             }
         }
         state.work.begin(kinetic, shock);
+    }
+
+    /// Adds the forces of collective constraints, from where their nodes would go without them.
+    fn bind(&mut self, state: &State<R>) {
+        let mut collectives = std::mem::take(&mut self.collectives);
+        let [next, mean] = [self.lengths.next, self.lengths.mean()];
+        let step_squared = next * mean;
+        for own in &mut collectives {
+            let then = self.factors[own.constraint][1][0];
+            let predicted = |node: u32| {
+                let at = node as usize;
+                let (m, a) = (self.mass[at][0].to_f64(), 0.5 * mean * self.damping[at][0].to_f64());
+                let (external, internal): (Vector<f64>, _) = (self.applied.at(at), self.forces.at(at));
+                let inertia = m * (1.0 + a);
+                let place = [0, 1, 2].map(|c| {
+                    let before = state.increment[at][c].to_f64() * self.lengths.ratio();
+                    let force = external[c] - internal[c].to_f64();
+                    state.displacement[at][c].to_f64()
+                        + ((1.0 - a) * before * m + step_squared * force) / inertia
+                });
+                Predicted { displacement: place, mobility: step_squared / inertia }
+            };
+            own.find(&self.model, predicted, then);
+            for (node, force) in own.forces(&self.model) {
+                self.applied.add(node, force);
+            }
+        }
+        self.collectives = collectives;
     }
 
     fn pass_over_nodes(&mut self, state: &State<R>) {

@@ -6,6 +6,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use pliant_mechanics::element::{Cord, Pull, Rest};
 use pliant_mechanics::law::Deformation;
 use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::model::{Cells, Solid};
@@ -33,6 +34,9 @@ pub(crate) struct Stiffness {
 /// defined.
 pub(crate) fn stiffness(solid: &Solid, cell: usize, h: &Tensor<f64>, square: &Symmetric<f64>) -> Stiffness {
     let size = square.trace();
+    if let Cells::Bar(block, cord) = &solid.cells {
+        return of_bar(solid, &block.rest[cell], cord, h);
+    }
     let columns = cholesky_columns(&(*square * (1.0 / size)));
     let mut matrix = SMatrix::<f64, 9, 9>::zeros();
     for i in 0..3 {
@@ -64,6 +68,15 @@ pub(crate) fn stiffness(solid: &Solid, cell: usize, h: &Tensor<f64>, square: &Sy
         _ => symmetric.symmetric_eigenvalues().max(),
     };
     Stiffness { mode: size * mode, wave: size * stiffest_wave(&symmetric) }
+}
+
+/// Of a bar, as if it were taut: E/(λ₀ L²) along it, or P/(λ L²) across, twice for its two nodes, with λ₀ the slack.
+fn of_bar(solid: &Solid, rest: &Rest<2>, cord: &Cord, h: &Tensor<f64>) -> Stiffness {
+    let Pull { length, stress: [stress, _], .. } =
+        cord.pull(rest, h.apply(rest.between()), solid.material.law.small_strain().young());
+    let along = solid.longitudinal_modulus() / rest.length().powi(2);
+    let mode = 2.0 * along.max(stress / (rest.length() * length));
+    Stiffness { mode, wave: mode }
 }
 
 /// Directions in which the search for the stiffest wave begins: axes and diagonals of the square.

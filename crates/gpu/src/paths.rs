@@ -271,6 +271,7 @@ fn force_at_unit_strain(solid: &Solid, cell: usize) -> f64 {
         Cells::Tet4(block) | Cells::AveragedTet4(block, _) => largest(block, cell),
         Cells::Hex8(block) | Cells::FullHex8(block, _) => largest(block, cell),
         Cells::Membrane(block, _) => largest(block, cell),
+        Cells::Bar(block, _) => largest(block, cell),
     };
     area * solid.longitudinal_modulus()
 }

@@ -81,6 +81,7 @@ impl SolidKernels<'_> {
                 vec![self.forces(&[PRESSURE_HISTORY, HEX_CORNERS, own])?]
             }
             Cells::Membrane(..) => vec![self.forces(&[include_str!("shaders/membrane.wgsl")])?],
+            Cells::Bar(..) => vec![self.forces(&[include_str!("shaders/bar.wgsl")])?],
             Cells::AveragedTet4(_, averaging) => self.averaged(*averaging)?,
         })
     }

@@ -271,6 +271,21 @@ fn rows_at_rest(solid: &Solid, order: &[u32]) -> Vec<Four> {
                 }
             })
         }
+        Cells::Bar(block, cord) => {
+            let young = law.small_strain().young();
+            rows(2, &|row, cell| {
+                let rest = &block.rest[cell];
+                let length = rest.length();
+                match row {
+                    0 => four(rest.between(), length),
+                    _ => {
+                        let least = if cord.tension_only { 0.0 } else { f32::MIN };
+                        let modulus = young / (cord.slack * length);
+                        [((1.0 - cord.slack) * length) as f32, modulus as f32, rest.area() as f32, least]
+                    }
+                }
+            })
+        }
     }
 }
 

@@ -148,6 +148,10 @@ impl GpuStepper {
         if let Some(tie) = model.ties.first() {
             return Err(GpuError::Unsupported { what: format!("the tie `{}`", tie.name) });
         }
+        if let Some(constraint) = model.collective() {
+            let what = format!("the constraint `{}`, which binds nodes to each other", constraint.name);
+            return Err(GpuError::Unsupported { what });
+        }
         let memory = Memory::new(device);
         let design = design.unwrap_or(Design::usual(device.adapter().kind));
         device.fill(|| memory.bytes(), || Self::on_device(device, &memory, &model, step, design, owners))

@@ -631,8 +631,20 @@ pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
     for spring in &model.springs {
         (0..3).for_each(|c| hold(spring.node as usize, c, &mut held));
     }
+    // Of bars along a line the turn about it moves nothing: it needs no holding.
+    let mut moved = vec![Matrix6::zeros(); nodes];
+    for node in (0..nodes).filter(|&node| used[node]) {
+        (0..if turning[node] { 6 } else { 3 }).for_each(|c| hold(node, c, &mut moved));
+    }
     for node in 0..nodes {
         if used[node] && root(&mut part, node) == node {
+            let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(moved[node]);
+            let limit = 1e-10 * eigenvalues.max().max(1.0);
+            for (value, motion) in eigenvalues.iter().zip(eigenvectors.column_iter()) {
+                if *value < limit {
+                    held[node] += motion * motion.transpose();
+                }
+            }
             let values = SymmetricEigen::new(held[node]).eigenvalues;
             let limit = 1e-10 * values.max().max(1.0);
             let free_modes = values.iter().filter(|&&value| value < limit).count();

@@ -104,6 +104,11 @@ struct FacetResult {
 
 impl System {
     pub(crate) fn new(model: Arc<Assembly>, solver: LinearSolver) -> Result<Self, SolveError> {
+        if model.collective().is_some() {
+            return Err(SolveError::Impossible(
+                "a constraint binds nodes to each other (a mean, a rigid part): take central differences",
+            ));
+        }
         let mut system = Self::forces_only(Arc::clone(&model));
         let matrix = &mut system.matrix;
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);

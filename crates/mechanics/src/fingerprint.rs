@@ -66,8 +66,15 @@ impl Model {
                 material.numbers(solid.fibre.iter().flatten());
                 (0..solid.cells.len())
                     .for_each(|cell| material.numbers([&solid.cells.hourglass_modulus(cell)]));
-                if let Cells::Membrane(_, sheets) = &solid.cells {
-                    material.numbers(sheets.iter().map(|sheet| &sheet.thickness));
+                match &solid.cells {
+                    Cells::Membrane(_, sheets) => {
+                        material.numbers(sheets.iter().map(|sheet| &sheet.thickness));
+                    }
+                    Cells::Bar(block, cord) => {
+                        material.numbers(block.rest.iter().map(|rest| &rest.volume));
+                        let _ = write!(material, "{cord:?}");
+                    }
+                    _ => {}
                 }
             }
             parts.push((format!("mesh of body `{}`", body.name), mesh.0));

@@ -5,7 +5,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::curve::Curve;
-use crate::element::{GaussPoints, HEX_EDGES, Hex8, Rest, Sheet, gauss_points, hex8, membrane, tet4};
+use crate::element::{
+    Cord, GaussPoints, HEX_EDGES, Hex8, Rest, Sheet, bar, gauss_points, hex8, membrane, tet4,
+};
 use crate::law::AnyLaw;
 use crate::load::Load;
 use crate::mapping::Weights;
@@ -142,10 +144,11 @@ impl Solid {
         Cow::Owned(self.fibres(cell).iter().map(in_plane).collect())
     }
 
-    /// An upper bound of ρc² [Pa] at rest: of a membrane that of plane stress.
+    /// An upper bound of ρc² [Pa] at rest: of a membrane that of plane stress, of a bar that of uniaxial stress.
     pub fn longitudinal_modulus(&self) -> f64 {
         match &self.cells {
             Cells::Membrane(..) => self.material.law.plane_modulus(),
+            Cells::Bar(_, cord) => self.material.law.small_strain().young() / cord.slack,
             _ => self.material.law.longitudinal_modulus(),
         }
     }
@@ -197,6 +200,8 @@ pub enum Cells {
     FullHex8(CellBlock<8>, Vec<GaussPoints>),
     /// Triangles of a wall without bending, in plane stress, with the frame and the thickness of each.
     Membrane(CellBlock<3>, Vec<Sheet>),
+    /// Bars, all with the same slack, linear in their stretch by the law's Young's modulus at small strain.
+    Bar(CellBlock<2>, Cord),
 }
 
 /// How tetrahedra average their pressure over nodes; see `forces/averaged.rs`.
@@ -219,6 +224,7 @@ macro_rules! with_cells {
             $crate::model::Cells::Tet4($bound) | $crate::model::Cells::AveragedTet4($bound, _) => $body,
             $crate::model::Cells::Hex8($bound) | $crate::model::Cells::FullHex8($bound, _) => $body,
             $crate::model::Cells::Membrane($bound, _) => $body,
+            $crate::model::Cells::Bar($bound, _) => $body,
         }
     };
 }
@@ -329,6 +335,12 @@ impl Cells {
         Self::Membrane(CellBlock { nodes, rest: quantities, hourglass: None, offsets: vec![] }, sheets)
     }
 
+    /// Bars from their nodes and their cross section [m²].
+    pub fn bar(nodes: Vec<[u32; 2]>, rest: &[Vector<f64>], area: f64, cord: Cord) -> Self {
+        let quantities = nodes.iter().map(|cell| bar(&cell.map(|n| rest[n as usize]), area)).collect();
+        Self::Bar(CellBlock { nodes, rest: quantities, hourglass: None, offsets: vec![] }, cord)
+    }
+
     /// The same cells, each filled only in part, as cubes at the border of a body are: its volume and with it its stiffness
     /// and mass are those of its fraction, one per cell, of [`LEAST_FRACTION`] at least. Gradients stay, and with them element
     /// bounds. One constant weight a cell is the simplest of the finite cells of Parvizian, Düster and Rank (2007).
@@ -354,6 +366,7 @@ impl Cells {
             Self::Hex8(block) => Self::Hex8(block.in_order(order)),
             Self::FullHex8(block, points) => Self::FullHex8(block.in_order(order), picked(points, order)),
             Self::Membrane(block, sheets) => Self::Membrane(block.in_order(order), picked(sheets, order)),
+            Self::Bar(block, cord) => Self::Bar(block.in_order(order), *cord),
         }
     }
 
@@ -392,6 +405,7 @@ impl Cells {
             Self::Tet4(_) | Self::AveragedTet4(..) => 4,
             Self::Hex8(_) | Self::FullHex8(..) => 8,
             Self::Membrane(..) => 3,
+            Self::Bar(..) => 2,
         }
     }
 
@@ -446,6 +460,7 @@ impl Cells {
             Self::Hex8(_) => "hex8",
             Self::FullHex8(..) => "hex8-full",
             Self::Membrane(..) => "membrane",
+            Self::Bar(..) => "bar",
         }
     }
 }
@@ -563,9 +578,26 @@ pub enum Motion {
         /// Its course.
         curve: Curve,
     },
+    /// The mean of their displacements goes by so much [m] × curve, with weights that sum to 1; each by itself is free, as under a plate
+    /// that tilts.
+    Mean {
+        /// One for each node of the constraint.
+        weights: Vec<f64>,
+        /// Displacement [m].
+        by: Vector<f64>,
+        /// Its course.
+        curve: Curve,
+    },
+    /// Together they move as a rigid body, free in space.
+    Rigid,
 }
 
 impl Motion {
+    /// Whether it binds nodes to each other and prescribes none by itself.
+    pub fn is_collective(&self) -> bool {
+        matches!(self, Self::Mean { .. } | Self::Rigid)
+    }
+
     /// Rotation of nodes about an axis through a centre [m], by an angle [rad] × curve, by Rodrigues' formula
     /// u = sin θ k × r + (1 − cos θ) k × (k × r). The axis need not be of unit length, nor zero.
     pub fn rotation(
@@ -592,8 +624,8 @@ impl Motion {
     pub fn amplitudes(&self, index: usize) -> Amplitudes {
         let one = |amplitude| [amplitude, [0.0; 3]];
         match self {
-            Self::Fixed => one([0.0; 3]),
-            Self::Displacement(by, _) => one(*by),
+            Self::Fixed | Self::Rigid => one([0.0; 3]),
+            Self::Displacement(by, _) | Self::Mean { by, .. } => one(*by),
             Self::Displacements(by, _) | Self::Turn { by, .. } => one(by[index]),
             Self::Velocity(velocity, _) => one(*velocity),
             Self::Rotation { arms, .. } => arms[index],
@@ -608,10 +640,11 @@ impl Motion {
     /// Displacement over amplitudes where a part, from 0 to 1, of the way to where it is at a time [s] is gone.
     fn factors_of_part(&self, time: f64, part: f64) -> [f64; 2] {
         match self {
-            Self::Fixed => [0.0; 2],
-            Self::Displacement(_, curve) | Self::Displacements(_, curve) | Self::Turn { curve, .. } => {
-                [part * curve.value(time), 0.0]
-            }
+            Self::Fixed | Self::Rigid => [0.0; 2],
+            Self::Displacement(_, curve)
+            | Self::Displacements(_, curve)
+            | Self::Turn { curve, .. }
+            | Self::Mean { curve, .. } => [part * curve.value(time), 0.0],
             Self::Velocity(_, curve) => [part * curve.integral(time), 0.0],
             Self::Rotation { angle, curve, .. } => {
                 let angle = part * angle * curve.value(time);
@@ -630,9 +663,12 @@ impl Motion {
     /// How far the constraint's node at `index` goes between two times [s]: its displacement [m] and its rotation vector [rad].
     pub fn increment(&self, index: usize, from: f64, to: f64) -> [f64; 6] {
         let shift = match self {
-            Self::Fixed => [0.0; 3],
+            Self::Fixed | Self::Rigid => [0.0; 3],
             // The difference of the factors first: it is exact to more digits than that of places.
-            Self::Displacement(_, curve) | Self::Displacements(_, curve) | Self::Turn { curve, .. } => {
+            Self::Displacement(_, curve)
+            | Self::Displacements(_, curve)
+            | Self::Turn { curve, .. }
+            | Self::Mean { curve, .. } => {
                 scale(self.amplitudes(index)[0], curve.value(to) - curve.value(from))
             }
             Self::Velocity(..) | Self::Rotation { .. } => {
@@ -649,10 +685,11 @@ impl Motion {
     /// Whether two motions of the same amplitudes are the same at all times.
     fn follows(&self, other: &Self) -> bool {
         let course = |motion: &Self| match motion {
-            Self::Fixed => None,
-            Self::Displacement(_, curve) | Self::Displacements(_, curve) | Self::Turn { curve, .. } => {
-                Some((0, 0.0, curve.clone()))
-            }
+            Self::Fixed | Self::Rigid => None,
+            Self::Displacement(_, curve)
+            | Self::Displacements(_, curve)
+            | Self::Turn { curve, .. }
+            | Self::Mean { curve, .. } => Some((0, 0.0, curve.clone())),
             Self::Velocity(_, curve) => Some((1, 0.0, curve.clone())),
             Self::Rotation { angle, curve, .. } => Some((2, *angle, curve.clone())),
         };
@@ -783,6 +820,21 @@ impl Model {
         self.mass[node] + self.mass_scaling.as_ref().map_or(0.0, |scaling| scaling.added[node])
     }
 
+    /// The same model with threads that are taut: its vibrations are the fastest that they allow.
+    pub fn with_taut_threads(&self) -> Cow<'_, Self> {
+        let is_thread = |solid: &Solid| matches!(solid.cells, Cells::Bar(_, Cord { tension_only: true, .. }));
+        if !self.solids.iter().any(is_thread) {
+            return Cow::Borrowed(self);
+        }
+        let mut taut = self.clone();
+        for solid in &mut taut.solids {
+            if let Cells::Bar(_, cord) = &mut solid.cells {
+                cord.tension_only = false;
+            }
+        }
+        Cow::Owned(taut)
+    }
+
     /// Number of nodes.
     pub fn node_count(&self) -> usize {
         self.rest.len()
@@ -807,7 +859,8 @@ impl Model {
     pub fn constrained_components(&self) -> Result<Vec<[u32; 3]>, Contradiction> {
         let mut owners = vec![[FREE; 3]; self.node_count()];
         let mut amplitudes = vec![[[0.0; 2]; 3]; self.node_count()];
-        for (index, constraint) in self.constraints.iter().enumerate() {
+        let alone = |(_, constraint): &(usize, &Constraint)| !constraint.motion.is_collective();
+        for (index, constraint) in self.constraints.iter().enumerate().filter(alone) {
             for (&node, own) in constraint.nodes.iter().zip(constraint.amplitudes()) {
                 for component in (0..3).filter(|&c| constraint.components[c]) {
                     let own = self::component(&own, component);
@@ -826,6 +879,7 @@ impl Model {
             }
         }
         self.check_rotations()?;
+        self.check_collective(&owners)?;
         for tie in &self.ties {
             for &node in &tie.nodes {
                 if let Some(component) = (0..3).find(|&c| owners[node as usize][c] != FREE) {
@@ -837,6 +891,38 @@ impl Model {
             }
         }
         Ok(owners)
+    }
+
+    /// The first constraint that binds nodes to each other: central differences on the CPU alone hold them.
+    pub fn collective(&self) -> Option<&Constraint> {
+        self.constraints.iter().find(|constraint| constraint.motion.is_collective())
+    }
+
+    /// Whether nodes that are bound to each other are bound once, and held and tied by nothing else.
+    fn check_collective(&self, owners: &[[u32; 3]]) -> Result<(), Contradiction> {
+        let mut bound = vec![FREE; self.node_count()];
+        for (index, constraint) in self.constraints.iter().enumerate() {
+            for &node in constraint.nodes.iter().filter(|_| constraint.motion.is_collective()) {
+                let known = std::mem::replace(&mut bound[node as usize], index as u32);
+                let held = |c: usize| constraint.components[c] && owners[node as usize][c] != FREE;
+                if known != FREE {
+                    return Err(self.contradiction([known, index as u32], node, 0));
+                }
+                if let Some(component) = (0..3).find(|&c| held(c)) {
+                    let owner = owners[node as usize][component];
+                    return Err(self.contradiction([owner, index as u32], node, component));
+                }
+            }
+        }
+        for tie in &self.ties {
+            if let Some(&node) = tie.nodes.iter().find(|&&node| bound[node as usize] != FREE) {
+                let first = self.constraints[bound[node as usize] as usize].name.clone();
+                let (body, node) = self.locate_node(node);
+                let (second, body) = (tie.name.clone(), self.bodies[body].name.clone());
+                return Err(Contradiction { first, second, body, node, component: 0 });
+            }
+        }
+        Ok(())
     }
 
     /// Whether no two constraints turn a node differently.

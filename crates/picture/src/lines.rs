@@ -19,6 +19,13 @@ pub(crate) struct Line {
     half: [f32; 8],
 }
 
+impl Line {
+    /// The points that an edge connects.
+    pub fn ends(&self) -> [u32; 2] {
+        [self.nodes[0], self.nodes[1]]
+    }
+}
+
 /// The most edges of a cell.
 pub(crate) const MOST_EDGES: usize = 12;
 /// Cubes that fibres are chosen from, one of each, lie along a surface in about this number.
@@ -35,7 +42,8 @@ pub(crate) const fn edges(kind: CellKind) -> &'static [[usize; 2]] {
         }
         CellKind::Triangle => &[[0, 1], [1, 2], [2, 0]],
         CellKind::Quad => &[[0, 1], [1, 2], [2, 3], [3, 0]],
-        _ => &[],
+        CellKind::Line => &[[0, 1]],
+        CellKind::Vertex => &[],
     }
 }
 

@@ -222,12 +222,14 @@ pub struct Drawn {
     map: ColourMap,
     section: wgpu::Buffer,
     section_corners: u32,
-    /// Edges of the marked cell, fibres on the surface, fibres in the section.
+    /// Edges of the marked cell, bars, fibres on the surface, fibres in the section.
     lines: wgpu::Buffer,
     first: [Line; MOST_EDGES],
     marked: Option<u32>,
     mark_lines: u32,
-    surface_fibres: Vec<Line>,
+    /// Bars, then fibres on the surface.
+    strokes: Vec<Line>,
+    bars: u32,
     section_fibres: u32,
     corners: u32,
     vertex_count: u32,
@@ -277,9 +279,9 @@ impl Drawn {
         let around = storage(device, &subject.around);
         let rest_points: Vec<[f32; 4]> = subject.points.iter().map(|point| staged(point, f64::NAN)).collect();
         let section = storage::<Corner>(device, &[]);
-        let surface_fibres = subject.fibres.surface.clone();
+        let strokes = [&subject.bars[..], &subject.fibres.surface].concat();
         let first = [Line::default(); MOST_EDGES];
-        let lines = storage(device, &[&first[..], &surface_fibres].concat());
+        let lines = storage(device, &[&first[..], &strokes].concat());
         let rest = storage(device, &rest_points);
         let pose = |points: wgpu::Buffer| {
             let normals = storage(device, &vec![[0.0_f32; 4]; subject.vertices.len()]);
@@ -332,7 +334,8 @@ impl Drawn {
             first,
             marked: None,
             mark_lines: 0,
-            surface_fibres,
+            strokes,
+            bars: subject.bars.len() as u32,
             section_fibres: 0,
             corners: 3 * subject.triangles.len() as u32,
             vertex_count: subject.vertices.len() as u32,
@@ -406,7 +409,7 @@ impl Drawn {
         self.section_corners = section.corners.len() as u32;
         self.section_fibres = section.fibres.len() as u32;
         let fits = |buffer: &wgpu::Buffer, bytes: usize| buffer.size() >= bytes as u64;
-        let before = (MOST_EDGES + self.surface_fibres.len()) * size_of::<Line>();
+        let before = (MOST_EDGES + self.strokes.len()) * size_of::<Line>();
         let fibres: &[u8] = bytemuck::cast_slice(&section.fibres);
         let corners: &[u8] = bytemuck::cast_slice(&section.corners);
         if fits(&self.section, corners.len()) && fits(&self.lines, before + fibres.len()) {
@@ -415,7 +418,7 @@ impl Drawn {
             return;
         }
         self.section = storage(device, &section.corners);
-        self.lines = storage(device, &[&self.first[..], &self.surface_fibres, &section.fibres].concat());
+        self.lines = storage(device, &[&self.first[..], &self.strokes, &section.fibres].concat());
         self.bind_shape(device, renderer);
     }
 
@@ -465,12 +468,13 @@ impl Drawn {
             pass.set_pipeline(&renderer.opaque);
             pass.draw(0..self.corners, 0..1);
         }
+        let first = MOST_EDGES as u32;
+        pass.set_pipeline(&renderer.fibres);
+        pass.draw(6 * first..6 * (first + self.bars), 2..3);
         if style.fibres {
-            let first = MOST_EDGES as u32;
-            let surface = first + self.surface_fibres.len() as u32;
+            let surface = first + self.strokes.len() as u32;
             let last = surface + if style.clip.is_some() { self.section_fibres } else { 0 };
-            pass.set_pipeline(&renderer.fibres);
-            pass.draw(6 * first..6 * last, 0..1);
+            pass.draw(6 * (first + self.bars)..6 * last, 0..1);
         }
         if style.ghost {
             pass.set_bind_group(1, &self.poses[1].draw, &[]);

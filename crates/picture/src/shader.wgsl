@@ -359,14 +359,20 @@ fn line(@builtin(vertex_index) index: u32, @builtin(instance_index) mark: u32) -
 
 @fragment
 fn stroke(at: Stroke) -> @location(0) vec4<f32> {
-    let marked = at.mark != 0u;
+    let marked = at.mark == 1u;
     if dot(view.plane.xyz, at.position) > view.plane.w + view.line.w * 1.5 && !marked {
         discard;
     }
     // A core with a pale rim is seen on any colour.
-    let core = select(vec3(0.012, 0.014, 0.022), vec3(0.80, 0.0, 0.24), marked);
+    var core = select(vec3(0.012, 0.014, 0.022), vec3(0.80, 0.0, 0.24), marked);
+    var edge = vec3(0.92);
+    if at.mark == 2u {
+        // A bar: pale as a ligament, with a dark rim.
+        core = vec3(0.76, 0.60, 0.36);
+        edge = vec3(0.05, 0.04, 0.03);
+    }
     let rim = smoothstep(0.45, 0.75, abs(at.across));
-    return vec4(coded(mix(core, vec3(0.92), rim)), mix(0.95, 0.75, rim));
+    return vec4(coded(mix(core, edge, rim)), mix(0.95, 0.75, rim));
 }
 
 @fragment

@@ -31,6 +31,8 @@ pub struct Subject {
     /// Of each volume cell; empty without labels.
     paints: Vec<u32>,
     pub(crate) fibres: Fibres,
+    /// Cells that are lines, such as ligaments.
+    pub(crate) bars: Vec<Line>,
 }
 
 /// A face that is drawn: its three or four nodes, and the paint of its cell.
@@ -89,7 +91,20 @@ impl Subject {
         let painted = |block| (0..CellBlock::len(block) as u32).map(move |cell| paint(Some(block), cell));
         let paints = volumes.filter(|_| labelled).flat_map(painted).collect();
         let fibres = Fibres::new(mesh, &cells);
-        Self { points: mesh.points.clone(), triangles, vertices, offsets, around, cells, paints, fibres }
+        let lines = mesh.block(CellKind::Line).into_iter().flat_map(CellBlock::cells);
+        let known = |nodes: &&[u32]| nodes.iter().all(|&node| (node as usize) < mesh.points.len());
+        let bars = lines.filter(known).flat_map(|nodes| outline(CellKind::Line, nodes)).collect();
+        Self {
+            points: mesh.points.clone(),
+            triangles,
+            vertices,
+            offsets,
+            around,
+            cells,
+            paints,
+            fibres,
+            bars,
+        }
     }
 
     /// Whether its cells have fibres (the field `fibre` of its mesh).
@@ -116,9 +131,10 @@ impl Subject {
         self.triangles.iter().map(|&[a, b, c, _]| [a, b, c].map(|vertex| self.vertices[vertex as usize]))
     }
 
-    /// Points on the surface, increasing, each once.
+    /// Points on the surface and of lines, increasing, each once.
     pub fn surface_points(&self) -> Vec<u32> {
         let mut points = self.vertices.clone();
+        points.extend(self.bars.iter().flat_map(Line::ends));
         points.sort_unstable();
         points.dedup();
         points

@@ -150,6 +150,9 @@ pub enum CaseError {
     /// Constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
+    /// A model has no dynamic relaxation.
+    #[error(transparent)]
+    Unrelaxed(#[from] pliant_explicit::Unrelaxed),
     /// A body could not be meshed.
     #[error(transparent)]
     Mesh(#[from] MeshingError),

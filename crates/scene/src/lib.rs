@@ -45,6 +45,7 @@ mod method;
 mod nearest;
 pub mod niftysim;
 mod of_mesh;
+mod organ_scene;
 mod output;
 mod overview;
 mod participants;
@@ -71,6 +72,7 @@ pub use cache::MeshCache;
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use live::Live;
 pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
+pub use organ_scene::OrganScene;
 pub use output::{
     AddedMass, BodySummary, Column, OutputError, OutputFolder, ParticipantSummary, StabilitySummary, Summary,
     failed_input, failed_output,

@@ -116,6 +116,8 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
             | Motion::Turn { .. }
             | Motion::Velocity(..) => "moves",
             Motion::Rotation { .. } => "rotates",
+            Motion::Mean { .. } => "moves the mean",
+            Motion::Rigid => "keeps the shape,",
         };
         let turns = &constraint.components[3..];
         let rotations: Vec<&str> =

@@ -17,6 +17,8 @@ impl ConstraintTable {
             Self::Fix(table) => &table.body,
             Self::Move(table) => &table.body,
             Self::Spring(table) => &table.body,
+            Self::Mean(table) => &table.body,
+            Self::Rigid(table) => &table.body,
         }
     }
 }
@@ -89,9 +91,12 @@ impl Scene {
         }
         // Equations are solved for solids and shells together.
         let kinds = match self.run.solver.solves_equations() {
-            true => vec![("bodies", vec![BodyModel::Solid, BodyModel::Membrane, BodyModel::Shell])],
+            true => vec![(
+                "bodies",
+                vec![BodyModel::Solid, BodyModel::Membrane, BodyModel::Bar, BodyModel::Shell],
+            )],
             false => vec![
-                ("solids", vec![BodyModel::Solid, BodyModel::Membrane]),
+                ("solids", vec![BodyModel::Solid, BodyModel::Membrane, BodyModel::Bar]),
                 ("shells", vec![BodyModel::Shell]),
             ],
         };

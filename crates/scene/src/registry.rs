@@ -11,9 +11,9 @@ use serde_json::{Map, Value as Json, json};
 use crate::checker::{check_skipping, read_table};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
-    BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MomentTable,
-    MoveTable, ParticipantTable, PressureTable, RunTable, SceneTable, SpringTable, SurfaceTable, TieTable,
-    TractionTable, ViewTable, VtuTable,
+    BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MeanTable,
+    MomentTable, MoveTable, ParticipantTable, PressureTable, RigidTable, RunTable, SceneTable, SpringTable,
+    SurfaceTable, TieTable, TractionTable, ViewTable, VtuTable,
 };
 use crate::nearest::nearest;
 use crate::source::{Source, Value};
@@ -67,6 +67,8 @@ typed! {
     "fix" => Fix(FixTable),
     "move" => Move(MoveTable),
     "spring" => Spring(SpringTable),
+    "mean" => Mean(MeanTable),
+    "rigid" => Rigid(RigidTable),
 }
 
 typed! {

@@ -12,7 +12,9 @@ use pliant_sim::number;
 
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
-use crate::output::{AXES, ENERGIES, OutputError, OutputFolder, Summary, check_own_folder};
+use crate::output::{
+    AXES, ENERGIES, OutputError, OutputFolder, Reactions, Summary, check_own_folder, plot_of_sweep,
+};
 use crate::registry::OutputTable;
 use crate::run::{Options, run_with};
 use crate::scene::Scene;
@@ -21,6 +23,8 @@ use crate::world::World;
 
 /// The table of a sweep.
 pub const SWEEP: &str = "sweep.csv";
+/// Its plot: the reactions of all runs over time.
+pub const SWEEP_PLOT: &str = "sweep.svg";
 /// Combinations a sweep may have.
 const MOST: usize = 100_000;
 
@@ -68,6 +72,8 @@ pub struct SweepProgress {
 pub struct SweepSummary {
     /// The table.
     pub table: PathBuf,
+    /// The plot; `None` where no run has written reactions.
+    pub plot: Option<PathBuf>,
     /// For each run that failed its number and the reason.
     pub failures: Vec<(usize, String)>,
     /// Runs.
@@ -252,6 +258,7 @@ impl Sweep {
         };
         Ok(SweepSummary {
             table: folder.path().join(SWEEP),
+            plot: self.plot(folder, runs)?,
             failures: rows.iter().enumerate().filter_map(failed).collect(),
             runs,
             interrupted: rows.iter().any(|row| row.as_ref().is_none_or(|row| row.status == "interrupted")),
@@ -284,6 +291,18 @@ impl Sweep {
             Ok(summary) => Row::new(summary, final_probes(&world.scene, folder.path())),
             Err(error) => Row::failed(error),
         }
+    }
+
+    /// Draws the reactions that the runs have written.
+    fn plot(&self, folder: &OutputFolder, runs: usize) -> Result<Option<PathBuf>, OutputError> {
+        let of_run = |run: usize| {
+            let scene = self.scene(run).ok()?;
+            let path = folder.path().join(format!("run-{run:04}"));
+            Some((self.title(run), reactions(&scene, &path)))
+        };
+        let found: Vec<(String, Reactions)> = (0..runs).filter_map(of_run).collect();
+        let svg = plot_of_sweep(&found).map_err(|error| OutputError::new(folder.path(), error))?;
+        svg.map(|svg| folder.write(SWEEP_PLOT, svg)).transpose()
     }
 
     fn write(&self, folder: &OutputFolder, rows: &[Option<Row>]) -> Result<(), OutputError> {
@@ -360,6 +379,33 @@ impl Row {
             wall_seconds: 0.0,
         }
     }
+}
+
+/// The sizes of the reactions in the first table of a run that has some.
+fn reactions(scene: &Scene, folder: &Path) -> Reactions {
+    for (name, table) in &scene.outputs {
+        let OutputTable::Csv(_) = table else { continue };
+        let Ok(text) = fs::read_to_string(folder.join(format!("{name}.csv"))) else { continue };
+        let mut lines = text.lines();
+        let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+        let rows: Vec<Vec<f64>> = lines
+            .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
+            .collect();
+        let column = |name: &str| header.iter().position(|known| *known == name);
+        let own = header.iter().filter_map(|column| column.strip_prefix("reaction.")?.strip_suffix(".x"));
+        let sizes = own.filter_map(|constraint| {
+            let columns = AXES.map(|axis| column(&format!("reaction.{constraint}.{axis}")));
+            let [Some(x), Some(y), Some(z)] = columns else { return None };
+            let at = |row: &Vec<f64>, column: usize| row.get(column).copied().unwrap_or(f64::NAN);
+            let size = |row| [at(row, 0), at(row, x).hypot(at(row, y)).hypot(at(row, z))];
+            Some((constraint.to_owned(), rows.iter().map(size).collect()))
+        });
+        let sizes: Reactions = sizes.collect();
+        if !sizes.is_empty() {
+            return sizes;
+        }
+    }
+    Vec::new()
 }
 
 /// The last row of the probes in a run's tables; the columns begin with the name of the output.
@@ -519,7 +565,8 @@ fn range(text: &str) -> Option<Result<Vec<String>, String>> {
 impl SweepSummary {
     /// The result in a few lines.
     pub fn words(&self) -> String {
-        format!("{} runs, {} failed\nwrote {}", self.runs, self.failures.len(), self.table.display())
+        let plot = self.plot.as_ref().map_or(String::new(), |plot| format!("\nwrote {}", plot.display()));
+        format!("{} runs, {} failed\nwrote {}{plot}", self.runs, self.failures.len(), self.table.display())
     }
 }
 

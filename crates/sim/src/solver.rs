@@ -145,7 +145,8 @@ pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failu
             };
             let tolerance = settings.tolerance;
             Box::new(LoadSteps {
-                relaxation: DynamicRelaxation::new(model(), settings).map_err(contradicting)?,
+                relaxation: DynamicRelaxation::new(model(), settings)
+                    .map_err(|error| Failure::input(&error))?,
                 steps: part.steps.clone(),
                 tolerance,
             })

@@ -1,6 +1,7 @@
 //! `pliant labels` and `pliant mesh`: the labels of a segmented image, and volume meshes of an image or a closed surface. `skin.rs`
-//! makes surfaces and shells.
+//! makes surfaces and shells, `coupled.rs` scenes.
 
+mod coupled;
 mod input;
 mod skin;
 
@@ -62,6 +63,9 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
         let message = format!("`--scale` is {scale}; it must be positive and finite");
         return Err(Failure::plain(message, "for example `--scale 0.001` for a file in millimetres"));
     }
+    if coupled::is_scene(arguments) {
+        return coupled::scene(arguments);
+    }
     refuse_idle(arguments)?;
     if matches!(arguments.cells, MeshCells::Surface | MeshCells::Shells) {
         return skin::mesh(arguments);
@@ -108,6 +112,8 @@ fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
             "`--close-gaps`, `--fill-holes` and `--keep-largest` are for images, and for tets and hexes",
         ),
         (!file && arguments.scale.is_some(), "`--scale` is for mesh files: images store their lengths"),
+        (!arguments.vessels.is_empty(), "`--vessels` is for a scene, such as `-o scene.toml`"),
+        (arguments.capsule.is_some(), "`--capsule` is for a scene, such as `-o scene.toml`"),
         (!tets && arguments.distance.is_some(), "`--distance` is for tets"),
         (!tets && arguments.inner_edge.is_some(), "`--inner-edge` is for tets"),
         (!tets && !arguments.protect.is_empty(), "`--protect` is for tets"),

@@ -124,6 +124,73 @@ fn close(value: &Value, expected: f64, within: f64) -> bool {
     value.as_f64().is_some_and(|value| (value - expected).abs() <= within * expected.abs())
 }
 
+/// Tissue, a vessel and a capsule from an image: a scene that is checked and runs.
+#[test]
+fn an_image_becomes_a_scene_with_walls_and_ties() {
+    let workshop = with_image();
+    let more =
+        ["--label", "5", "--vessels", "8=0.5mm", "--capsule", "0.1mm", "--edge", "4mm", "--keep-largest"];
+    let told = mesh(&workshop, &[&more[..], &["-o", "organ/scene.toml"]].concat());
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.contains("wrote organ/scene.toml"), "{}", told.out);
+    let text = workshop.read("organ/scene.toml");
+    for piece in [
+        "labels = [5, 8]",
+        "label = 8, clean = { keep-largest = true }, as = \"surface\"",
+        "on = \"organ\"",
+        "[tie.vessel-1]",
+        "thickness = 0.0005",
+    ] {
+        assert!(text.contains(piece), "no `{piece}` in:\n{text}");
+    }
+    let told = workshop.pliant(&["run", "organ", "--until", "0.005"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let told = workshop.pliant(&["check", "organ"]);
+    assert!(told.out.contains("body `capsule`: the boundary of `organ`"), "{}", told.out);
+    assert!(told.out.contains("follow `organ`"), "{}", told.out);
+    // Masks stand for themselves, and are named after their files.
+    workshop.write("shell.nii", Picture::organ().nifti());
+    workshop.write("core.nii", Picture::new(|[x, y, z]| i16::from(x * x + y * y + z * z < 40.0)).nifti());
+    let masks =
+        ["mesh", "shell.nii", "core.nii", "--vessels", "core=1mm", "--edge", "4mm", "-o", "masks.toml"];
+    let told = workshop.pliant(&masks);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let text = workshop.read("masks.toml");
+    assert!(text.contains("masks = [\"shell.nii\"], labels = [1]"), "{text}");
+    assert!(text.contains("masks = [\"core.nii\"], label = 1") && !text.contains("capsule"), "{text}");
+    assert_eq!(workshop.pliant(&["check", "masks.toml"]).code, 0);
+    for (given, out, pieces) in [
+        (&["--vessels", "8"][..], "a.toml", ["8", "thickness"]),
+        (&["--vessels", "8=0"], "a.toml", ["above 0", ""]),
+        (&["--vessels", "77=1mm"], "a.toml", ["77", ""]),
+        (&["--capsule", "-1mm"], "a.toml", ["above 0", ""]),
+        (&["--capsule", "1mm"], "a.vtu", ["`--capsule` is for a scene", "leave it out"]),
+        (&["--vessels", "8=1mm"], "a.vtu", ["`--vessels` is for a scene", ""]),
+        (&["--as", "hexes"], "a.toml", ["of tets", "leave it out"]),
+        (&[], "masks.toml", ["exists already", "--force"]),
+    ] {
+        let told = mesh(&workshop, &[&["--label", "5", "--edge", "4mm", "-o", out], given].concat());
+        assert_eq!(told.code, 2, "{given:?}: {}", told.err);
+        assert!(pieces.iter().all(|piece| told.err.contains(piece)), "{given:?}: {}", told.err);
+    }
+    let none = workshop.pliant(&[
+        "mesh",
+        "shell.nii",
+        "core.nii",
+        "--vessels",
+        "vein=1mm",
+        "--edge",
+        "4mm",
+        "-o",
+        "b.toml",
+    ]);
+    assert!(
+        none.code == 2 && none.err.contains("none of the masks") && none.err.contains("shell, core"),
+        "{}",
+        none.err
+    );
+}
+
 #[test]
 fn labels_are_listed_with_volume_place_and_pieces() {
     let workshop = with_image();

@@ -41,6 +41,14 @@ fn a_sweep_runs_the_product_and_tells_what_each_run_came_to() {
     let told = sweep(&workshop, &set);
     assert_eq!(told.code, 0, "{}", told.err);
     assert!(told.out.contains("6 runs, 0 failed\nwrote out/case-sweep/sweep.csv"), "{}", told.out);
+    // A curve for each run, named by its values, in a panel for each constraint.
+    assert!(told.out.contains("wrote out/case-sweep/sweep.svg"), "{}", told.out);
+    let plot = workshop.read("out/case-sweep/sweep.svg");
+    assert!(plot.contains("<svg") && plot.contains("Reaction of"), "{plot}");
+    assert_eq!(
+        plot.matches("law.tissue.young-modulus=12500.0").count(),
+        2 * plot.matches("Reaction of").count()
+    );
     let rows = table(&workshop, "out/case-sweep/sweep.csv");
     let column = |name: &str| rows[0].iter().position(|other| other == name).expect(name);
     assert_eq!(rows.len(), 7);

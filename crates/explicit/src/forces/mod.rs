@@ -8,9 +8,10 @@
 //! A force field works through batches of four packs of points (`batch.rs`): displacement gradients, then stresses of the law, then nodal forces. So
 //! elements and laws are each compiled once per kind of lanes, never each law in each element, and the law is chosen once per batch.
 //! `plain.rs`: one point per cell, with hourglass control from `hourglass.rs`; `averaged.rs`: tets with averaged pressure; `full_hex.rs`:
-//! eight points; `membrane.rs`: triangles in plane stress. Every element whose force is the gradient of an energy runs through the battery in `tests.rs`.
+//! eight points; `membrane.rs`: triangles in plane stress; `bar.rs`: bars and threads. Every element whose force is the gradient of an energy runs through the battery in `tests.rs`.
 
 mod averaged;
+mod bar;
 mod batch;
 mod blocks;
 mod corners;
@@ -23,6 +24,7 @@ mod plain;
 mod tests;
 
 use averaged::AveragedTets;
+use bar::Bars;
 pub(crate) use batch::pressure;
 pub(crate) use blocks::BLOCK;
 use std::ops::Range;
@@ -316,6 +318,7 @@ fn force_field<R: Scalar>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
         Cells::Hex8(cells) => Box::new(SolidForces::<R, 8, 7>::new(solid, cells, step)),
         Cells::FullHex8(cells, points) => Box::new(FullHexes::new(solid, cells, points, step)),
         Cells::Membrane(cells, sheets) => Box::new(Membranes::new(solid, cells, sheets, step)),
+        Cells::Bar(cells, cord) => Box::new(Bars::new(solid, cells, cord, step)),
     }
 }
 

@@ -1,6 +1,7 @@
 //! The battery every element runs through: patch test, rigid motion, f = dE/du, Σf = 0, Στ = 0. A new element is one
 //! line in [`ELEMENTS`] and its energy in [`energy`].
 
+use pliant_mechanics::element::Cord;
 use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::samples::every_law;
 use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
@@ -80,9 +81,15 @@ fn filled_cube(
                 (0..triangles.len()).map(|cell| 0.01 + 0.001 * (cell % 7) as f64).collect();
             Cells::membrane(triangles, &rest, &thickness)
         }
+        "bar" | "thread" => {
+            const SIDES: [[usize; 2]; 4] = [[0, 1], [0, 3], [0, 4], [0, 6]];
+            let lines = hex_nodes.iter().flat_map(|hex| SIDES.map(|side| side.map(|corner| hex[corner])));
+            let cord = Cord { slack: 1.0, tension_only: element == "thread" };
+            Cells::bar(lines.collect(), &rest, 2e-4, cord)
+        }
         _ => Cells::full_hex8(hex_nodes.clone(), &rest),
     };
-    assert_eq!(cells.element(), element);
+    assert_eq!(cells.element(), if element == "thread" { "bar" } else { element });
     let fractions: Vec<f64> = (0..cells.len()).map(fraction).collect();
     let cells = cells.filled(&fractions);
     let mut model = Model { mass: vec![0.0; rest.len()], rest, ..Model::default() };
@@ -174,6 +181,14 @@ fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
             };
             (0..block.nodes.len()).map(stored).sum()
         }
+        Cells::Bar(block, cord) => {
+            let stored = |cell: usize| {
+                let [a, b] = block.nodes[cell].map(|node| displacement[node as usize]);
+                let rest = &block.rest[cell];
+                cord.energy(rest, &cord.pull(rest, sub(b, a), law.small_strain().young()))
+            };
+            (0..block.nodes.len()).map(stored).sum()
+        }
         cells => {
             let stored = |cell: usize| {
                 let h = pliant_mechanics::model::with_cells!(cells, block => gradient(cell, &block.rest[cell].gradient));
@@ -208,7 +223,8 @@ fn every_element_full_or_not() -> impl Iterator<Item = Model> {
         })
     });
     let membranes = incompressible.into_iter().flatten().map(|law| distorted_cube("membrane", law));
-    every_element().chain(membranes).chain(
+    let bars = ["bar", "thread"].map(|element| distorted_cube(element, laws()[0]));
+    every_element().chain(membranes).chain(bars).chain(
         filled.map(move |(element, law)| {
             filled_cube(element, law, 700.0, 1000.0, |_| 0.55 + 0.9 * random.half())
         }),
@@ -275,6 +291,34 @@ fn a_membrane_passes_the_patch_test() {
         let side = [7, 11].into_iter().fold([0.0; 3], |sum, node| add(sum, forces[node]));
         let apart = sub(side, times(pull, 0.01 * 0.2));
         assert!(largest([apart]) < 1e-12 * scale, "{side:?} {pull:?}");
+    }
+}
+
+/// A bar by itself: its natural frequency, that of two masses on a spring of E A/L₀, slack or not, and the length of the first step.
+#[test]
+fn a_bar_vibrates_as_two_masses_on_a_spring() {
+    for slack in [1.0, 0.8, 1.3] {
+        for tension_only in [false, true] {
+            let mut model = Model::default();
+            let rest = [[0.0; 3], [0.12, 0.0, 0.16]];
+            let body = model.add_body("ligament", &rest);
+            let cells = Cells::bar(vec![[0, 1]], &rest, 3e-6, Cord { slack, tension_only });
+            model.add_solid(Solid::new(body, Material::elastic(laws()[0], 1100.0), cells));
+            let [mass, stiffness] =
+                [1100.0 * 3e-6 * 0.1, laws()[0].small_strain().young() * 3e-6 / (0.2 * slack)];
+            let wanted = 2.0 / (2.0 * stiffness / mass).sqrt();
+            let found = critical_step::assembled(&model).unwrap().step;
+            assert!((found / wanted - 1.0).abs() < 1e-4, "{slack} {tension_only}: {found} for {wanted}");
+            let bound = critical_step::element_bound(&model).unwrap().step;
+            assert!((bound / wanted - 1.0).abs() < 1e-12, "{bound} for {wanted}");
+            let alone = crate::stability::cell_limit(&model, 0, 0, &[[0.0; 3], [0.3, 0.0, 0.4]]);
+            assert!(alone <= wanted * (1.0 + 1e-12) && (slack < 1.0 || alone > 0.99 * wanted), "{alone}");
+            // Pulled from the start by what it is too short.
+            let [force, _] = [0, 1].map(|node| forces(&model, &[[0.0; 3]; 2]).0[node]);
+            let strain = (1.0 - slack) / slack;
+            let pull = if tension_only && strain < 0.0 { 0.0 } else { stiffness * 0.2 * (1.0 - slack) };
+            assert!(largest([sub(force, scale([-0.6, 0.0, -0.8], pull))]) < 1e-12, "{force:?} for {pull}");
+        }
     }
 }
 
@@ -350,6 +394,9 @@ fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
         let solid = &model.solids[0];
         let name = format!("{} {}", solid.material.law.name(), solid.cells.element());
         assert!((summed / expected - 1.0).abs() < 1e-12, "{name}: {summed:e} for {expected:e}");
+        if matches!(solid.cells, Cells::Bar(..)) {
+            continue;
+        }
         let own: Vec<_> = (0..solid.cells.len()).map(|cell| recovery.cell(0, cell)).collect();
         // Averages and cells change the same volume in all, and pressure is that of J where it is averaged once.
         let volume = |of: fn(&CellFields) -> f64| -> f64 {

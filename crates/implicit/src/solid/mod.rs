@@ -4,8 +4,9 @@
 //!
 //! `hex8` adds its hourglass control, k γ_a·γ_b I. `hex8-full` takes one mean dilatation J̄ = v/V a cell, whose energy V U(J̄) adds
 //! p cof F B_a to the force, and U″(J̄)/V c_a ⊗ c_b with c_a = Σ w cof F B_a to the stiffness. `tet4-anp` does so for each node with
-//! the tets around it (`star.rs`). Membranes are in plane stress (`membrane.rs`).
+//! the tets around it (`star.rs`). Membranes are in plane stress (`membrane.rs`), bars in uniaxial stress (`bar.rs`).
 
+mod bar;
 mod closed;
 mod membrane;
 mod star;
@@ -92,6 +93,11 @@ impl Response {
             Cells::Membrane(block, sheets) => {
                 let u = moved(block, cell, displacement);
                 self.add_triangle(own, &u, &block.rest[cell], &sheets[cell].axes)
+            }
+            Cells::Bar(block, cord) => {
+                let u = moved(block, cell, displacement);
+                self.add_bar(own, &u, &block.rest[cell], cord);
+                Ok(())
             }
         };
         self.broken = found.err();
@@ -229,7 +235,7 @@ fn inverted_corner(solid: &Solid, cell: usize, displacement: impl Fn(u32) -> Vec
             let volume = |(b, w): (&[Vector<f64>; 8], f64)| w * (1.0 + volume_change(&gradient(&u, b)));
             own.map(volume).sum::<f64>() / block.rest[cell].volume
         }
-        Cells::Tet4(_) | Cells::AveragedTet4(..) | Cells::Membrane(..) => return None,
+        Cells::Tet4(_) | Cells::AveragedTet4(..) | Cells::Membrane(..) | Cells::Bar(..) => return None,
     };
     let (_, determinant) = solid.cells.worst_corner(cell, displacement).filter(|_| flatness < FLAT_HEX)?;
     is_inverted(determinant).then_some(determinant)

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::element::Cord;
 use pliant_mechanics::law::{AnyLaw, samples};
 use pliant_mechanics::load::{Load, LoadKind, NO_NODE};
 use pliant_mechanics::mapping::Weights;
@@ -60,6 +61,10 @@ fn block(element: &str, law: AnyLaw, counts: [usize; 3], sides: [f64; 3]) -> Ass
             let thickness: Vec<f64> = (0..sides.len()).map(|cell| 0.01 + 0.001 * (cell % 7) as f64).collect();
             Cells::membrane(sides, &rest, &thickness)
         }
+        "bar" | "thread" => {
+            let lines = tets.iter().flat_map(|&[a, b, c, d]| [[a, b], [c, d]]).collect();
+            Cells::bar(lines, &rest, 2e-4, Cord { slack: 0.95, tension_only: element == "thread" })
+        }
         _ => Cells::full_hex8(hexes(counts), &rest),
     };
     let fibre = vec![[0.6, 0.0, 0.8]; law.families() * cells.len()];
@@ -95,7 +100,8 @@ fn force_and_stiffness_are_derivatives() {
         None => ("membrane", name, law(name)),
     });
     let solids = all().map(|(element, name)| (element, name, law(name)));
-    for (element, name, law) in solids.chain(membranes) {
+    let bars = ["bar", "thread"].map(|element| (element, "neo-hookean", law("neo-hookean")));
+    for (element, name, law) in solids.chain(membranes).chain(bars) {
         let model = block(element, law, [2, 1, 2], [0.2, 0.1, 0.2]);
         let mut random = Random::new(1);
         let mut state = State::at_rest(&model);

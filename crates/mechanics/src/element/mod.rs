@@ -1,9 +1,11 @@
 //! Elements: the rest-shape quantities a kernel needs of a cell, computed once from its nodes.
 
+mod bar;
 mod hex8;
 mod membrane;
 mod tet4;
 
+pub use bar::{Cord, Pull, bar};
 pub use hex8::{FLAT_HEX, GaussPoints, HEX_CORNERS, HEX_EDGES, Hex8, gauss_points, hex8};
 pub use membrane::{Axes, Sheet, membrane};
 pub use tet4::tet4;

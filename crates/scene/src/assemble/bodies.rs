@@ -76,7 +76,10 @@ impl Builder<'_> {
         let mut made = self.mesh(&table.mesh, &path)?;
         let file_nodes = made.mesh.points.len();
         let file_numbers = self.repair(&mut made.mesh, &table.mesh, &path);
-        if table.model != BodyModel::Solid {
+        if table.model == BodyModel::Bar {
+            made.mesh.blocks.retain(|block| block.kind == CellKind::Line);
+            made.mesh.drop_unused_points();
+        } else if table.model != BodyModel::Solid {
             let label_names = std::mem::take(&mut made.mesh.label_names);
             let mesh = self.triangles(made.mesh, &path)?;
             made.mesh = Mesh { label_names, ..mesh };
@@ -125,6 +128,7 @@ impl Builder<'_> {
         let before = self.assembly.solids.len();
         let is_own = |block: &&CellBlock| match table.model {
             BodyModel::Membrane => block.kind == CellKind::Triangle,
+            BodyModel::Bar => block.kind == CellKind::Line,
             _ => block.kind.dimension() == 3,
         };
         for block in mesh.blocks.iter().filter(|block| !block.is_empty()).filter(is_own) {
@@ -156,11 +160,12 @@ impl Builder<'_> {
     }
 
     fn check_element(&mut self, name: &str, table: &BodyTable, kind: CellKind) -> bool {
-        if kind == CellKind::Triangle {
+        if kind.dimension() < 3 {
             if table.element.is_some() {
-                let message = format!("`{name}` is a membrane, which has one element only");
-                let help = "leave `element` out, or set `model = \"shell\"`, whose elements differ";
-                self.error(&["body", name, "element"], message, "not for membranes", help);
+                let message = format!("`{name}` is a {}, which has one element only", table.model.word());
+                let help =
+                    "leave `element` out, or set `model = \"shell\"` or `\"solid\"`, whose elements differ";
+                self.error(&["body", name, "element"], message, "has no effect", help);
             }
             return table.element.is_none();
         }
@@ -296,6 +301,7 @@ impl Builder<'_> {
         let material = Material { law: law.law, prony, density: density.0 };
         let cells_of = match block.kind {
             CellKind::Triangle => self.membrane(draft, body, block, &cells, &fibre),
+            CellKind::Line => self.bars(draft, body, block, &cells),
             _ => {
                 let control = [hourglass.0, law.law.small_strain().shear];
                 Some(self.volume_cells(table.element, body, block, &cells, control))

@@ -1,5 +1,7 @@
 //! Constraints: which nodes are held or moved, and that no two contradict each other.
 
+use std::collections::HashMap;
+
 use pliant_geometry::{Mesh, Selection, Vector3};
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::model::{Constraint, Motion};
@@ -24,6 +26,8 @@ impl Builder<'_> {
                     self.add_springs(name, spring);
                     continue;
                 }
+                ConstraintTable::Mean(mean) => (&mean.body, &mean.nodes, &mean.components, false),
+                ConstraintTable::Rigid(rigid) => (&rigid.body, &rigid.nodes, &None, false),
             };
             let body = self.find_body(body, &[path[0], path[1], "body"]);
             let components = self.components(axes.as_deref(), body, turns, &path);
@@ -33,6 +37,9 @@ impl Builder<'_> {
                     self.motion_of_shell(name, moved, body.zip(nodes.as_deref()))
                 }
                 ConstraintTable::Move(moved) => self.motion(moved, body.zip(nodes.as_deref()), &path),
+                ConstraintTable::Mean(_) | ConstraintTable::Rigid(_) => {
+                    self.collective(table, body.zip(nodes.as_deref()), &path)
+                }
                 _ => Some(Motion::Fixed),
             };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
@@ -45,8 +52,10 @@ impl Builder<'_> {
             }
         }
         if let Err(contradiction) = self.assembly.constrained_components() {
+            let tied = self.scene.ties.iter().any(|(name, _)| *name == contradiction.second);
             let first = self.source().key_span(&["constraint", &contradiction.first]);
-            let second = self.source().key_span(&["constraint", &contradiction.second]);
+            let second =
+                self.source().key_span(&[if tied { "tie" } else { "constraint" }, &contradiction.second]);
             let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
             let diagnostic = Diagnostic::error(contradiction.to_string())
                 .at(second, "contradicts the other")
@@ -54,6 +63,60 @@ impl Builder<'_> {
                 .help(help);
             self.out.push(diagnostic);
         }
+    }
+
+    /// How a constraint binds some nodes of a body to each other.
+    fn collective(
+        &mut self,
+        table: &ConstraintTable,
+        nodes: Option<(usize, &[u32])>,
+        path: &[&str; 2],
+    ) -> Option<Motion> {
+        let name = path[1];
+        let solver = self.scene.run.solver;
+        if solver != SolverName::Explicit {
+            let message = format!("`{name}` binds nodes to each other, which `{}` does not", solver.word());
+            let help = "take `solver = \"explicit\"`, or `fix` and `move`";
+            self.error(&[path[0], name, "type"], message, "for `explicit` only", help);
+            return None;
+        }
+        let (body, nodes) = nodes?;
+        if self.shell_cells(body).is_some() {
+            let message = format!("`{name}` binds nodes of a shell, which turn by themselves");
+            let help = "take a body of model `solid`, `membrane` or `bar`";
+            self.error(&[path[0], name, "body"], message, "a shell", help);
+            return None;
+        }
+        match table {
+            ConstraintTable::Mean(mean) => {
+                let curve = self.curve(&mean.timing, path)?;
+                Some(Motion::Mean { weights: self.shares(body, nodes), by: mean.by, curve })
+            }
+            _ if nodes.len() < 2 => {
+                let message = format!("`{name}` has one node, which is rigid by itself");
+                self.error(&[path[0], name, "nodes"], message, "one node", "choose the nodes of a part");
+                None
+            }
+            _ => Some(Motion::Rigid),
+        }
+    }
+
+    /// What of the area of a body's boundary each of some nodes has, of the faces all of whose nodes they are; equal parts without such
+    /// faces. Sums to 1.
+    fn shares(&self, body: usize, nodes: &[u32]) -> Vec<f64> {
+        let (built, own) = (&self.bodies[body], &self.assembly.bodies[body]);
+        let places: HashMap<u32, usize> = nodes.iter().copied().zip(0..).collect();
+        let place = |node: u32| places.get(&own.node(node)).copied();
+        let mut shares = vec![0.0; nodes.len()];
+        for face in &built.boundary.faces {
+            let corners: Option<Vec<usize>> = face.nodes().iter().map(|&node| place(node)).collect();
+            for corner in corners.iter().flatten() {
+                shares[*corner] += face.area(&built.mesh.points) / face.nodes().len() as f64;
+            }
+        }
+        let whole: f64 = shares.iter().sum();
+        let equal = 1.0 / nodes.len().max(1) as f64;
+        shares.into_iter().map(|share| if whole > 0.0 { share / whole } else { equal }).collect()
     }
 
     /// The motion of some nodes of a body (`None`: they are unknown, which is already reported).

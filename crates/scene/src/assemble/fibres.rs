@@ -10,7 +10,7 @@ use super::bodies::{Draft, nodes};
 use super::meshes::list_cells;
 use super::{Builder, suggestion};
 use crate::diagnostic::Diagnostic;
-use crate::format::{Fibre, FibreRule};
+use crate::format::{BodyModel, Fibre, FibreRule};
 use crate::registry::LawTable;
 
 /// Directions shorter than this are zero.
@@ -76,11 +76,6 @@ impl Builder<'_> {
         block: &CellBlock,
     ) -> Option<Vec<[f64; 3]>> {
         let path = ["body", draft.name, "fibre"];
-        if matches!(fibre, Fibre::PerCell(FibreRule::Laplace { .. })) {
-            let message = "a rule by Laplace's equation needs a solid";
-            self.error(&path, message, "not for shells", "take another rule, or cell data of the mesh");
-            return None;
-        }
         let cells: Vec<u32> = (0..block.len() as u32).collect();
         self.family("fibre", Some((fibre, path)), draft, block, &cells)
     }
@@ -107,6 +102,12 @@ impl Builder<'_> {
             self.error(&["body", name, "law"], message, "this law needs a fibre", help);
             return None;
         };
+        if draft.table.model != BodyModel::Solid && matches!(given, Fibre::PerCell(FibreRule::Laplace { .. }))
+        {
+            let message = "a rule by Laplace's equation needs a solid";
+            self.error(&path, message, "not for thin walls", "take another rule, or cell data of the mesh");
+            return None;
+        }
         let found = match given {
             Fibre::Uniform(direction) => along(direction, cells.len(), &[]),
             Fibre::PerCell(rule) => directions(rule, draft, block, cells),

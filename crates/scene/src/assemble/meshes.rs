@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use pliant_geometry::io::{self, MeshFileError};
-use pliant_geometry::{CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose, reorder};
+use pliant_geometry::{
+    CellBlock, CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose, reorder,
+};
 use pliant_meshing::{
     Block, DEFAULT_CELL_LIMIT, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Phantom, Resolution,
     Stuffing, Tube, VolumeCell, Voxels, brain_label,
@@ -44,12 +46,13 @@ impl Builder<'_> {
             ("hemisphere", table.hemisphere.is_some()),
             ("annulus", table.annulus.is_some()),
             ("twisted-strip", table.twisted_strip.is_some()),
+            ("lines", table.lines.is_some()),
         ];
         let sources: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
         let [source] = sources[..] else {
             let message = format!("a mesh comes from exactly one source, found {}", sources.len());
-            let help = "give one of `file`, `image`, `masks`, `block`, `ellipsoid`, `tube`, `organ`, or for shells `plate`, `cylinder`, \
-                        `sphere`, `hemisphere`, `annulus`, `twisted-strip`";
+            let help = "give one of `file`, `image`, `masks`, `block`, `ellipsoid`, `tube`, `organ`, for shells `plate`, `cylinder`, \
+                        `sphere`, `hemisphere`, `annulus`, `twisted-strip`, or for bars `lines`";
             self.error(path, message, "this mesh", help);
             return None;
         };
@@ -78,6 +81,7 @@ impl Builder<'_> {
         let mut made = match &table.file {
             Some(file) if !from_file => self.file(file.clone(), table, path)?,
             _ if matches!(source, "file" | "image" | "masks") => self.scanned(table, path)?,
+            _ if source == "lines" => self.lines(table, path)?,
             _ if SOLID_SHAPES.contains(&source) => self.shape(source, table, path)?,
             _ => self.sheet(source, table, path)?,
         };
@@ -203,7 +207,21 @@ impl Builder<'_> {
         let table = &body.mesh;
         let fixes: &[Fix] = table.fix.as_ref().map_or(&[], |fixes| fixes.as_slice());
         let place = if table.file.is_some() { [path, &["file"]].concat() } else { path.to_vec() };
-        let dimension = if body.model == BodyModel::Solid { 3 } else { 2 };
+        let dimension = match body.model {
+            BodyModel::Solid => 3,
+            BodyModel::Shell | BodyModel::Membrane => 2,
+            BodyModel::Bar => 1,
+        };
+        if dimension == 1 && mesh.block(CellKind::Line).is_none_or(CellBlock::is_empty) {
+            let help = "give `lines`, or a mesh file with line cells; for a thin wall set `model = \"shell\"` or `\"membrane\"`";
+            self.error(
+                &place,
+                format!("`{}` is a bar, and its mesh has no lines", path[1]),
+                "this mesh",
+                help,
+            );
+            return false;
+        }
         if dimension == 3 && mesh.volume_blocks().all(|block| block.is_empty()) {
             let help = "a solid body needs tets or hexes; this mesh has only surface cells or none. For a thin wall set \
                         `model = \"shell\"` or `\"membrane\"`";
@@ -211,7 +229,7 @@ impl Builder<'_> {
             return false;
         }
         let mut found = diagnose(mesh);
-        if dimension == 2 && table.file.is_none() {
+        if dimension != 3 && table.file.is_none() {
             // The slit of an annulus.
             found.duplicate_nodes.clear();
         }
@@ -256,7 +274,11 @@ fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, 
         ("elements that name nodes which do not exist", list_cells(&lost), "repair the mesh file"),
         ("inverted elements at rest", list_cells(&inverted), reorder),
         (
-            if dimension == 3 { "elements without volume at rest" } else { "triangles without area at rest" },
+            [
+                "bars of no length at rest",
+                "triangles without area at rest",
+                "elements without volume at rest",
+            ][dimension - 1],
             list_cells(&flat),
             "remesh there, or take them out of the mesh",
         ),

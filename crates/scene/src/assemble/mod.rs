@@ -1,6 +1,7 @@
 //! From a scene to a model: meshes read or made, laws assigned to cells, selections resolved, references checked.
 //! All mistakes are collected with the user's own lines.
 
+mod bars;
 mod bodies;
 mod constraints;
 mod fibres;
@@ -75,6 +76,9 @@ impl BuiltBody {
         if self.mesh.volume_blocks().any(|block| !block.is_empty()) {
             return BodyLocator::Cells(&self.mesh, Locator::new(&self.mesh));
         }
+        if self.boundary.faces.is_empty() {
+            return BodyLocator::Lines(&self.mesh);
+        }
         let all: Vec<u32> = (0..self.boundary.faces.len() as u32).collect();
         BodyLocator::Wall(&self.boundary, SurfaceLocator::new(&self.boundary, &all, &self.mesh.points))
     }
@@ -85,12 +89,14 @@ impl BuiltBody {
     }
 }
 
-/// Finds the cell of a solid, or the triangle of a thin wall, that is nearest to a point.
+/// Finds the cell of a solid, the triangle of a thin wall, or the bar that is nearest to a point.
 pub(crate) enum BodyLocator<'b> {
     /// In the cells of a solid.
     Cells(&'b Mesh, Locator),
     /// On triangles.
     Wall(&'b Surface, SurfaceLocator),
+    /// On bars, one after another: they are few.
+    Lines(&'b Mesh),
 }
 
 /// The place of a point in a body.
@@ -128,6 +134,20 @@ impl BodyLocator<'_> {
                     weights: found.nodes.into_iter().zip(found.weights).collect(),
                     distance: (found.position - point).norm(),
                 })
+            }
+            Self::Lines(mesh) => {
+                let nearest = |(cell, nodes): (u32, &[u32])| {
+                    let [a, b] = [0, 1].map(|k| mesh.points[nodes[k] as usize]);
+                    let part = ((point - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
+                    Located {
+                        kind: CellKind::Line,
+                        cell,
+                        weights: vec![(nodes[0], 1.0 - part), (nodes[1], part)],
+                        distance: (a + (b - a) * part - point).norm(),
+                    }
+                };
+                let lines = (0..).zip(mesh.block(CellKind::Line)?.cells());
+                lines.map(nearest).min_by(|a, b| a.distance.total_cmp(&b.distance))
             }
         }
     }

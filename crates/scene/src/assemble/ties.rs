@@ -1,6 +1,6 @@
 //! Ties: nodes of one body that follow the cells of another.
 
-use pliant_geometry::QualityReport;
+use pliant_geometry::{CellKind, QualityReport};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Cells;
 use pliant_sim::{counted, number};
@@ -34,6 +34,13 @@ impl Builder<'_> {
         if guest == host {
             let message = format!("`{}` would be tied to itself", names[0]);
             self.error(&path, message, "one body", "name two bodies");
+            return None;
+        }
+        if self.bodies[host].mesh.block(CellKind::Line).is_some()
+            && self.bodies[host].boundary.faces.is_empty()
+        {
+            let message = format!("`{}` is a bar, which holds no other body", names[1]);
+            self.error(&path, message, "a bar", "name it first: its nodes follow the other body");
             return None;
         }
         let shares = |a: usize, b: usize| {

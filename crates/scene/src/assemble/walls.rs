@@ -25,8 +25,9 @@ impl Builder<'_> {
             self.error(&["body", name, "mesh"], message, "not with `on`", help);
             return None;
         }
-        if table.model == BodyModel::Solid {
-            let message = format!("`{name}` is on the boundary of `{host}`, where a solid has no place");
+        if matches!(table.model, BodyModel::Solid | BodyModel::Bar) {
+            let word = table.model.word();
+            let message = format!("`{name}` is on the boundary of `{host}`, where a {word} has no place");
             let help = "leave `model` out, or set `model = \"membrane\"` or `\"shell\"`";
             self.error(&["body", name, "model"], message, "not with `on`", help);
             return None;
@@ -105,12 +106,18 @@ impl Builder<'_> {
                 "not for membranes",
                 "take an isotropic law, or one with fibres such as `holzapfel-gasser-ogden`",
             ),
-            BodyModel::Membrane if !prony.volumetric.is_empty() => (
+            BodyModel::Bar if law.law.families() > 0 || !law.law.is_isotropic() => (
+                format!("law `{law_name}` has directions of its own, and `{name}` is a bar"),
+                "not for bars",
+                "take an isotropic law: bars use its Young's modulus at small strain",
+            ),
+            model @ (BodyModel::Membrane | BodyModel::Bar) if !prony.volumetric.is_empty() => (
                 format!(
-                    "law `{law_name}` relaxes in volume, and `{name}` is a membrane, which relaxes as a whole"
+                    "law `{law_name}` relaxes in volume, and `{name}` is a {}, which relaxes as a whole",
+                    model.word()
                 ),
-                "not for membranes",
-                "give its terms `part = \"isochoric\"`: they act on the stress in the wall",
+                "not in volume",
+                "give its terms `part = \"isochoric\"`: they act on all of its stress",
             ),
             BodyModel::Solid if law.law.is_incompressible() => (
                 format!(

@@ -19,7 +19,7 @@ pub struct BodyTable {
     #[serde(default)]
     pub model: BodyModel,
     /// Its mesh, from a file, a built-in shape, or a segmented image. The mesh of a shell or a membrane is of triangles (quads are cut
-    /// into two); a volume mesh gives it its boundary.
+    /// into two); a volume mesh gives it its boundary. That of bars is of lines.
     #[serde(default)]
     pub mesh: MeshTable,
     /// Instead of a mesh: the body on whose boundary this one is a wall, with the same nodes, as the capsule of an organ.
@@ -33,7 +33,7 @@ pub struct BodyTable {
     #[serde(default)]
     pub element: Option<Element>,
     /// The name of its law, or a law for each cell label, by number or by the name of the label: `{ 1 = "soft", tumour = "stiff" }`. Shells
-    /// take Young's modulus and Poisson's ratio of an isotropic law at small strain; a shell whose `layers` all have their own elasticity
+    /// and bars take the moduli of an isotropic law at small strain; a shell whose `layers` all have their own elasticity
     /// needs none. With the solvers `implicit` and `static` a law of a solid must not relax.
     #[serde(default = "no_law")]
     pub law: ByLabel<String>,
@@ -68,6 +68,17 @@ pub struct BodyTable {
     /// stiffness and mass are so much smaller, but never less than a tenth. If not given, `fraction` of `immersed-hexes`.
     #[serde(default)]
     pub fraction: Option<String>,
+    /// Cross section of bars [m²].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub area: Option<f64>,
+    /// Length of bars without force over that in the mesh: above 1 they hang through at the start, below 1 they pull.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0.1, max = 10.0))]
+    pub slack: f64,
+    /// Whether bars take no compression, as threads.
+    #[serde(default)]
+    pub tension_only: bool,
     /// Mass-proportional damping [1/s].
     #[serde(default)]
     #[schemars(range(min = 0.0))]
@@ -93,6 +104,10 @@ pub struct BodyTable {
     /// Direction of the second family of fibres at rest; overrides that of the law.
     #[serde(default)]
     pub second_fibre: Option<Fibre>,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 fn no_law() -> ByLabel<String> {
@@ -145,6 +160,8 @@ pub enum BodyModel {
     Shell,
     /// A thin wall of triangles without bending, in large strain, by any law, in plane stress: a capsule or a balloon.
     Membrane,
+    /// Lines that carry force along their length only, linear in their stretch: ligaments, chords of a valve, sutures.
+    Bar,
 }
 
 impl BodyModel {
@@ -154,6 +171,7 @@ impl BodyModel {
             Self::Solid => "solid",
             Self::Shell => "shell",
             Self::Membrane => "membrane",
+            Self::Bar => "bar",
         }
     }
 }
@@ -339,8 +357,8 @@ impl Element {
     }
 }
 
-/// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, or for shells `plate`, `cylinder`, `sphere`,
-/// `hemisphere`, `annulus`, `twisted-strip`.
+/// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, for shells `plate`, `cylinder`, `sphere`,
+/// `hemisphere`, `annulus`, `twisted-strip`, or for bars `lines`.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
@@ -407,6 +425,10 @@ pub struct MeshTable {
     /// A strip of triangles along x that turns about the x axis. Point sets: `x-min`, `x-max`, `low`, `high`.
     #[serde(default)]
     pub twisted_strip: Option<TwistedStripShape>,
+    /// Paths of bars from point to point [m]: `lines = [[[0, 0, 0], [0, 0, 0.02]]]`. They meet where they have a point in common; with
+    /// `edge` each piece is cut into bars of about that length.
+    #[serde(default)]
+    pub lines: Option<Vec<Vec<[f64; 3]>>>,
     /// Target edge length of the cells of a built-in shape, an image or what the surface of a file encloses [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]

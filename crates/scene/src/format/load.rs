@@ -72,6 +72,37 @@ pub struct FixTable {
     pub components: Option<Vec<Axis>>,
 }
 
+/// Nodes whose mean displacement is prescribed, each of them free by itself: a face under a plate that tilts. Weighted by the area of the
+/// boundary at each node where the nodes have whole faces, else equally. Its reaction is the force of the plate. With the solver `explicit`
+/// on the CPU.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct MeanTable {
+    /// The body, a solid, a membrane or bars.
+    pub body: String,
+    /// Which nodes.
+    pub nodes: Selection,
+    /// Mean displacement [m], reached along the curve.
+    pub by: [f64; 3],
+    /// Components of it that are prescribed; if not given, all three.
+    #[serde(default)]
+    pub components: Option<Vec<Axis>>,
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
+/// A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn together, free in space. With the
+/// solver `explicit` on the CPU.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RigidTable {
+    /// The body, a solid, a membrane or bars.
+    pub body: String,
+    /// Which nodes.
+    pub nodes: Selection,
+}
+
 /// Springs without rest length that pull nodes to points: of shells, and of solids with the solvers `implicit` and `static`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]

@@ -20,8 +20,8 @@ pub use linear::{
     StopTable,
 };
 pub use load::{
-    Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MomentTable, MoveTable,
-    NodeVectorSource, NodeVectors, PressureTable, RotateTable, SpreadName, SpringTable, Timing,
+    Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MeanTable, MomentTable, MoveTable,
+    NodeVectorSource, NodeVectors, PressureTable, RigidTable, RotateTable, SpreadName, SpringTable, Timing,
     TractionTable, Vectors,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};

@@ -21,7 +21,7 @@ pub enum FieldName {
     Reaction,
     /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero where it is free.
     ReactionMoment,
-    /// Deformation gradient F of a solid or a membrane, the mean over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x
+    /// Deformation gradient F of a solid, a membrane or a bar (which keeps its thickness in it), the mean over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x
     /// along y at rest.
     DeformationGradient,
     /// Cauchy stress [Pa].
@@ -73,13 +73,17 @@ pub enum FieldName {
     /// Thickness [m] with the strain across that plane stress asks for: of a membrane by its law, of a shell t (A/A₀)^(−ν/(1−ν)), which its
     /// forces do not feel.
     CurrentThickness,
+    /// Length of a bar over its length without force.
+    AxialStretch,
+    /// Force along a bar [N], positive where it pulls.
+    AxialForce,
     /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity holds to about 0.1.
     SurfaceStrain,
 }
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 30] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
@@ -107,6 +111,8 @@ impl FieldName {
         Self::DrillingEnergy,
         Self::Thickness,
         Self::CurrentThickness,
+        Self::AxialStretch,
+        Self::AxialForce,
         Self::SurfaceStrain,
     ];
 
@@ -140,6 +146,8 @@ impl FieldName {
             Self::DrillingEnergy => "drilling-energy",
             Self::Thickness => "thickness",
             Self::CurrentThickness => "current-thickness",
+            Self::AxialStretch => "axial-stretch",
+            Self::AxialForce => "axial-force",
             Self::SurfaceStrain => "surface-strain",
         }
     }
@@ -155,7 +163,7 @@ impl FieldName {
             Self::Displacement | Self::Thickness | Self::CurrentThickness => "m",
             Self::Velocity => "m/s",
             Self::Rotation => "rad",
-            Self::Reaction => "N",
+            Self::Reaction | Self::AxialForce => "N",
             Self::ReactionMoment => "N m",
             Self::CauchyStress
             | Self::Pk2Stress
@@ -170,6 +178,7 @@ impl FieldName {
             | Self::FibreStretch
             | Self::VolumeRatio
             | Self::CellVolumeRatio
+            | Self::AxialStretch
             | Self::SurfaceStrain => "",
             Self::EnergyDensity => "J/m³",
             Self::ElementStep => "s",
@@ -209,6 +218,8 @@ impl FieldName {
             Self::DrillingEnergy => "drilling energy",
             Self::Thickness => "thickness",
             Self::CurrentThickness => "current thickness",
+            Self::AxialStretch => "axial stretch",
+            Self::AxialForce => "axial force",
             Self::SurfaceStrain => "strain at the surface",
         }
     }
@@ -243,6 +254,8 @@ impl FieldName {
             | Self::DrillingEnergy
             | Self::Thickness
             | Self::CurrentThickness
+            | Self::AxialStretch
+            | Self::AxialForce
             | Self::SurfaceStrain => 1,
         }
     }
@@ -260,16 +273,17 @@ impl FieldName {
         match self {
             Self::Displacement | Self::Velocity | Self::Reaction | Self::VonMises | Self::ElementStep => true,
             Self::CauchyStress
-            | Self::Pressure
-            | Self::VolumeRatio
-            | Self::CellVolumeRatio
-            | Self::EnergyDensity => model != BodyModel::Shell,
-            Self::Pk2Stress
+            | Self::EnergyDensity
+            | Self::Pk2Stress
             | Self::GreenStrain
-            | Self::DeformationGradient
-            | Self::Fibre
-            | Self::FibreStretch => model != BodyModel::Shell,
-            Self::MembraneForce | Self::Thickness | Self::CurrentThickness => model != BodyModel::Solid,
+            | Self::DeformationGradient => model != BodyModel::Shell,
+            Self::Pressure | Self::VolumeRatio | Self::CellVolumeRatio | Self::Fibre | Self::FibreStretch => {
+                matches!(model, BodyModel::Solid | BodyModel::Membrane)
+            }
+            Self::MembraneForce | Self::Thickness | Self::CurrentThickness => {
+                matches!(model, BodyModel::Shell | BodyModel::Membrane)
+            }
+            Self::AxialStretch | Self::AxialForce => model == BodyModel::Bar,
             _ => model == BodyModel::Shell,
         }
     }

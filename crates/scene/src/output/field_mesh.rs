@@ -99,12 +99,13 @@ impl Own {
         if let Some(index) = surface {
             return vec![own((bare(&built.surfaces[index]), Content::Surface(index)), fields.to_vec())];
         }
-        let of = |model| fields.iter().copied().filter(|field| field.is_of(model)).collect();
+        let of = |models: &[BodyModel]| -> Vec<FieldName> {
+            let is_of = |field: &FieldName| models.iter().any(|&model| field.is_of(model));
+            fields.iter().copied().filter(is_of).collect()
+        };
         let mut all = Vec::new();
         if chosen(built, on, false).next().is_some() {
-            // Membranes have all fields of solids.
-            let model = if has_membranes(built, on) { BodyModel::Membrane } else { BodyModel::Solid };
-            all.push(own(merged_bodies(built, on), of(model)));
+            all.push(own(merged_bodies(built, on), of(&models(built, on))));
         }
         if let Some(part) = &built.implicit
             && chosen(built, on, true).next().is_some()
@@ -116,7 +117,7 @@ impl Own {
                     (mesh, Content::Curved(Box::new(curved)))
                 }
             };
-            all.push(own(shells, of(BodyModel::Shell)));
+            all.push(own(shells, of(&[BodyModel::Shell])));
         }
         all
     }
@@ -242,16 +243,18 @@ fn chosen<'b>(built: &'b Built, on: Option<&'b str>, shells: bool) -> impl Itera
         .filter(move |&body| is_shell(body) == shells && on.is_none_or(|on| built.bodies[body].name == on))
 }
 
-/// Whether some of the chosen bodies are membranes.
-fn has_membranes(built: &Built, on: Option<&str>) -> bool {
-    let is_membrane = |body: usize| {
-        let cells = built.model.solids.iter().filter(|solid| solid.body == body).map(|solid| &solid.cells);
-        cells.into_iter().any(|cells| matches!(cells, Cells::Membrane(..)))
+/// The models of the chosen bodies that are no shells.
+fn models(built: &Built, on: Option<&str>) -> Vec<BodyModel> {
+    let of_body = |body: usize| built.model.solids.iter().filter(move |solid| solid.body == body);
+    let model = |solid: &Solid| match solid.cells {
+        Cells::Membrane(..) => BodyModel::Membrane,
+        Cells::Bar(..) => BodyModel::Bar,
+        _ => BodyModel::Solid,
     };
-    chosen(built, on, false).any(is_membrane)
+    chosen(built, on, false).flat_map(of_body).map(model).collect()
 }
 
-/// The cells of solids and membranes of one body or of all, with `label` and, for several bodies, the number of the `body`.
+/// The cells of solids, membranes and bars of one body or of all, with `label` and, for several bodies, the number of the `body`.
 fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
     let mut mesh = Mesh::default();
     let mut nodes = Vec::new();
@@ -263,7 +266,7 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
     }
     let labelled = !built.labels(on).is_empty();
     let mut cells = Vec::new();
-    for kind in [CellKind::Tet, CellKind::Hex, CellKind::Triangle] {
+    for kind in [CellKind::Tet, CellKind::Hex, CellKind::Triangle, CellKind::Line] {
         let mut block = CellBlock::new(kind, Vec::new());
         let mut places = Vec::new();
         let (mut body_of, mut labels) = (Vec::new(), Vec::new());

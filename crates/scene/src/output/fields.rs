@@ -42,6 +42,8 @@ pub(super) fn of_cell((fields, step): &(CellFields, Option<f64>), field: FieldNa
         FieldName::MembraneForce => fields.membrane_force().map_or([f64::NAN; 9], |force| tensor(&force)),
         FieldName::Thickness => padded(&[fields.thickness.map_or(f64::NAN, |[rest, _]| rest)]),
         FieldName::CurrentThickness => padded(&[fields.thickness.map_or(f64::NAN, |[_, now]| now)]),
+        FieldName::AxialStretch => padded(&[fields.axial.map_or(f64::NAN, |[stretch, _]| stretch)]),
+        FieldName::AxialForce => padded(&[fields.axial.map_or(f64::NAN, |[_, force]| force)]),
         _ => [f64::NAN; 9],
     }
 }

@@ -1,4 +1,4 @@
-//! The SVG plot of a run: the size of each reaction, and the energies, over time.
+//! SVG plots: of a run the size of each reaction, and the energies, over time; of a sweep each reaction in all runs.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -21,11 +21,25 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// A named curve.
+/// Panels in the plot of a sweep, and curves in each of them.
+const MOST: [usize; 2] = [6, 14];
+/// Height of such a panel.
+const HEIGHT: u32 = 380;
+
+/// A named curve of values over time [s].
 struct Curve<'a> {
     name: &'a str,
-    values: Vec<f64>,
+    points: Vec<[f64; 2]>,
 }
+
+impl<'a> Curve<'a> {
+    fn new(name: &'a str, times: &[f64], values: impl Iterator<Item = f64>) -> Self {
+        Self { name, points: times.iter().zip(values).map(|(&time, value)| [time, value]).collect() }
+    }
+}
+
+/// The sizes of the reactions of a run over time, by the names of their constraints.
+pub(crate) type Reactions = Vec<(String, Vec<[f64; 2]>)>;
 
 /// The constraints of all participants.
 pub(crate) fn constraints(world: &World) -> impl Iterator<Item = &Constraint> {
@@ -40,15 +54,13 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
         root.fill(&WHITE).map_err(|error| error.to_string())?;
         let (upper, lower) = root.split_vertically(SIZE.1 / 2);
         let reactions: Vec<Curve<'_>> = (constraints(world).enumerate())
-            .map(|(index, constraint)| Curve {
-                name: &constraint.name,
-                values: history.reactions.iter().map(|row| row[index]).collect(),
+            .map(|(index, constraint)| {
+                Curve::new(&constraint.name, &history.times, history.reactions.iter().map(|row| row[index]))
             })
             .collect();
-        panel(&upper, "Reaction", "N", &history.times, &reactions)?;
-        let energy = |name, of: fn(&pliant_mechanics::Energies) -> f64| Curve {
-            name,
-            values: history.energies.iter().map(of).collect(),
+        panel(&upper, "Reaction", "N", &reactions)?;
+        let energy = |name, of: fn(&pliant_mechanics::Energies) -> f64| {
+            Curve::new(name, &history.times, history.energies.iter().map(of))
         };
         let energies = [
             energy("external work", |e| e.external),
@@ -57,23 +69,56 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
             energy("damping", |e| e.damping),
             energy("hourglass", |e| e.hourglass),
         ];
-        panel(&lower, "Energy", "J", &history.times, &energies)?;
+        panel(&lower, "Energy", "J", &energies)?;
         root.present().map_err(|error| error.to_string())?;
     }
     Ok(svg)
+}
+
+/// The plot of a sweep: a panel for each reaction, a curve in it for each run by its title. At most the first six and fourteen. `None`
+/// without any reaction.
+pub(crate) fn plot_of_sweep(runs: &[(String, Reactions)]) -> Result<Option<String>, String> {
+    let mut names: Vec<&str> = Vec::new();
+    for (name, _) in runs.iter().flat_map(|(_, reactions)| reactions) {
+        if !names.contains(&name.as_str()) {
+            names.push(name);
+        }
+    }
+    names.truncate(MOST[0]);
+    if names.is_empty() {
+        return Ok(None);
+    }
+    let mut svg = String::new();
+    {
+        let size = (SIZE.0, HEIGHT * names.len() as u32);
+        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        root.fill(&WHITE).map_err(|error| error.to_string())?;
+        for (area, name) in root.split_evenly((names.len(), 1)).iter().zip(&names) {
+            let of_run = |(title, reactions): &'_ (String, Reactions)| {
+                let (_, points) = reactions.iter().find(|(known, _)| known == name)?;
+                Some((title.clone(), points.clone()))
+            };
+            let found: Vec<(String, Vec<[f64; 2]>)> = runs.iter().filter_map(of_run).take(MOST[1]).collect();
+            let curves: Vec<Curve<'_>> =
+                found.iter().map(|(title, points)| Curve { name: title, points: points.clone() }).collect();
+            panel(area, &format!("Reaction of {name}"), "N", &curves)?;
+        }
+        root.present().map_err(|error| error.to_string())?;
+    }
+    Ok(Some(svg))
 }
 
 fn panel(
     area: &DrawingArea<SVGBackend<'_>, Shift>,
     title: &str,
     unit: &str,
-    times: &[f64],
     curves: &[Curve<'_>],
 ) -> Result<(), String> {
-    let finite = curves.iter().flat_map(|curve| &curve.values).copied().filter(|value| value.is_finite());
+    let points = || curves.iter().flat_map(|curve| &curve.points);
+    let finite = points().map(|[_, value]| *value).filter(|value| value.is_finite());
     let (low, high) = finite.fold((0.0_f64, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
     let margin = 0.05 * (high - low).max(f64::MIN_POSITIVE);
-    let end = times.last().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
+    let end = points().map(|[time, _]| *time).reduce(f64::max).unwrap_or(1.0).max(f64::MIN_POSITIVE);
     let draw = || -> Result<(), Box<dyn std::error::Error + '_>> {
         let mut chart = ChartBuilder::on(area)
             .caption(format!("{title} [{unit}]"), ("sans-serif", 18))
@@ -89,7 +134,7 @@ fn panel(
             .draw()?;
         for (curve, &colour) in curves.iter().zip(COLOURS.iter().cycle()) {
             let points =
-                times.iter().copied().zip(curve.values.iter().copied()).filter(|(_, v)| v.is_finite());
+                curve.points.iter().map(|&[time, value]| (time, value)).filter(|(_, v)| v.is_finite());
             chart
                 .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
                 .label(curve.name)

@@ -1,5 +1,7 @@
 //! Scenes without the binary. One program for all files here; run those of a file with `cargo test -p pliant-scene --test scene grips::`.
 
+mod bars;
+mod collective;
 mod corpus;
 mod grips;
 mod niftysim;

@@ -186,3 +186,82 @@ fn ties_that_cannot_be_are_refused_by_name_and_gaps_are_told() {
         "{notes:?}"
     );
 }
+
+/// A block of crooked tets stretched freely, with a wall of no stiffness tied to its top, on its triangles and on others: the strain is
+/// uniform, and the wall takes it on.
+#[test]
+fn a_uniform_strain_passes_through_ties() {
+    let place = tempfile::tempdir().unwrap();
+    let block = pliant_meshing::Block::new([0.04, 0.02, 0.01]);
+    let counts = pliant_meshing::Resolution::Counts([8, 4, 2]);
+    let mut mesh = block.mesh(counts, pliant_meshing::VolumeCell::Tet, usize::MAX).unwrap();
+    let mut random = pliant_testing::Random::new(3);
+    for point in &mut mesh.points {
+        // Along the faces that it is on, by up to 0.8 of 5 mm.
+        for (c, size) in [0.04, 0.02, 0.01].into_iter().enumerate() {
+            let by = 8e-4 * random.number();
+            if point[c] > 1e-9 && point[c] < size - 1e-9 {
+                point[c] += by;
+            }
+        }
+    }
+    let file = place.path().join("block.vtu");
+    pliant_geometry::io::write(&file, &mesh).unwrap();
+    for (coat, solver) in [
+        ("cells = [8, 4]", "solver = 'static'\ntolerance = 1e-12"),
+        ("cells = [7, 5], distortion = 0.2", "solver = 'static'\ntolerance = 1e-12"),
+        ("cells = [7, 5], distortion = 0.2", "solver = 'quasi-static'\ntolerance = 1e-12"),
+    ] {
+        for model in ["membrane", "shell"] {
+            if model == "shell" && !solver.contains("'static'") {
+                continue;
+            }
+            let text =
+                coated(solver, coat, "[output.all]\ntype = 'vtu'\nevery = 1\ndata = ['displacement']\n")
+                    .replace(
+                        "block = { size = [0.04, 0.02, 0.01], cells = [8, 4, 2] }, as = 'hexes'",
+                        &format!("file = '{}'", file.display()),
+                    )
+                    .replace("young-modulus = 1e6", "young-modulus = 1e-9")
+                    .replace("model = 'membrane'", &format!("model = '{model}'"))
+                    .replace(
+                        "{ set = 'x-min' }",
+                        "{ half-space = { point = [1e-6, 0, 0], normal = [-1, 0, 0] } }",
+                    )
+                    .replace(
+                        "{ set = 'x-max' }",
+                        "{ half-space = { point = [0.039999, 0, 0], normal = [1, 0, 0] } }",
+                    )
+                    .replace(
+                        "{ set = 'z-min' }",
+                        "{ half-space = { point = [0, 0, 1e-6], normal = [0, 0, -1] } }",
+                    )
+                    .replace(
+                        "'block'\nnodes = 'all'",
+                        "'block'\nnodes = { half-space = { point = [0, 1e-6, 0], normal = [0, -1, 0] } }",
+                    );
+            let out = tempfile::tempdir().unwrap();
+            super::static_solids::run(&text, out.path());
+            let files = std::fs::read_dir(out.path().join("all")).unwrap().map(|entry| entry.unwrap().path());
+            let frame = pliant_geometry::io::read(&files.max().unwrap()).unwrap().mesh;
+            let moved = &frame.point_data["displacement"];
+            let far = frame
+                .points
+                .iter()
+                .position(|p| (p - nalgebra::Vector3::new(0.04, 0.02, 0.01)).norm() < 1e-9)
+                .unwrap();
+            let strain: Vec<f64> = (0..3).map(|c| moved.item(far)[c] / frame.points[far][c]).collect();
+            assert!(
+                (strain[0] - 0.1).abs() < 1e-12
+                    && strain[1] < -0.03
+                    && (strain[1] / strain[2] - 1.0).abs() < 1e-9
+            );
+            for (at, point) in frame.points.iter().enumerate() {
+                for c in 0..3 {
+                    let off = (moved.item(at)[c] - strain[c] * point[c]).abs();
+                    assert!(off < 1e-10 * 0.04, "{coat} {model} {solver}: {off:e} m at {point:?}");
+                }
+            }
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! A cube of distorted cells, held at its base and moved at its top; and one without any order, deformed at random.
 
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::element::Cord;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};
 use pliant_mechanics::prony::Prony;
@@ -9,8 +10,8 @@ use pliant_testing::Random;
 use serde_json::{Value, json};
 
 /// Every element.
-pub const ELEMENTS: [&str; 7] =
-    ["tet4", "tet4-anp", "tet4-ianp", "tet4-ianp-niftysim", "hex8", "hex8-full", "membrane"];
+pub const ELEMENTS: [&str; 9] =
+    ["tet4", "tet4-anp", "tet4-ianp", "tet4-ianp-niftysim", "hex8", "hex8-full", "membrane", "bar", "thread"];
 
 /// Edge of the cube [m].
 pub const EDGE: f64 = 0.1;
@@ -98,8 +99,8 @@ fn body(
     tets: Vec<[u32; 4]>,
     hexes: Vec<[u32; 8]>,
 ) -> Model {
-    // Walls alone are slack: they buckle, and round-off grows.
-    let inside = (element == "membrane").then(|| Cells::tet4(tets.clone(), &rest));
+    // Walls and bars alone are slack: they buckle, and round-off grows.
+    let inside = matches!(element, "membrane" | "bar" | "thread").then(|| Cells::tet4(tets.clone(), &rest));
     let cells = match element {
         "tet4" => Cells::tet4(tets, &rest),
         "tet4-anp" => Cells::averaged_tet4(tets, &rest, Averaging::Nodal),
@@ -114,6 +115,11 @@ fn body(
                 hexes.iter().flat_map(|hex| SIDES.map(|side| side.map(|corner| hex[corner]))).collect();
             let thickness: Vec<f64> = (0..sides.len()).map(|cell| 0.01 + 0.001 * (cell % 7) as f64).collect();
             Cells::membrane(sides, &rest, &thickness)
+        }
+        "bar" | "thread" => {
+            const SIDES: [[usize; 2]; 4] = [[0, 1], [0, 3], [0, 4], [0, 6]];
+            let lines = hexes.iter().flat_map(|hex| SIDES.map(|side| side.map(|corner| hex[corner])));
+            Cells::bar(lines.collect(), &rest, 2e-5, Cord { slack: 0.98, tension_only: element == "thread" })
         }
         other => panic!("no element `{other}`"),
     };

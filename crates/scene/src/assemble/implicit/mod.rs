@@ -23,7 +23,7 @@ impl Builder<'_> {
         let solver = scene.run.solver.word();
         let of_model = |model: BodyModel| scene.bodies.iter().find(|(_, body)| body.model == model);
         if let (Some((solid, _)), Some((shell, _)), false) = (
-            of_model(BodyModel::Solid).or(of_model(BodyModel::Membrane)),
+            of_model(BodyModel::Solid).or(of_model(BodyModel::Membrane)).or(of_model(BodyModel::Bar)),
             of_model(BodyModel::Shell),
             scene.run.solver.solves_equations(),
         ) {
@@ -133,14 +133,23 @@ impl Builder<'_> {
         for (name, body) in &self.scene.bodies {
             let shell = body.model == BodyModel::Shell;
             let own = body.on.is_none();
+            let bar = body.model == BodyModel::Bar;
+            let wall = matches!(body.model, BodyModel::Shell | BodyModel::Membrane);
             let others = [
+                ("area", bar, "`model = \"bar\"`"),
+                ("slack", bar, "`model = \"bar\"`"),
+                ("tension-only", bar, "`model = \"bar\"`"),
                 ("faces", !own, "a wall with `on`"),
                 ("damping", own, "a body with nodes of its own"),
                 ("stiffness-damping", own, "a body with nodes of its own"),
                 ("velocity", own, "a body with nodes of its own"),
                 ("initial-displacement", own, "a body with nodes of its own"),
-                ("fraction", body.model != BodyModel::Membrane, "`model = \"solid\"`"),
-                ("thickness", body.model != BodyModel::Solid, "a shell or a membrane"),
+                (
+                    "fraction",
+                    matches!(body.model, BodyModel::Solid | BodyModel::Shell),
+                    "`model = \"solid\"`",
+                ),
+                ("thickness", wall, "a shell or a membrane"),
                 (
                     "pre-tension",
                     shell && body.element != Some(Element::Plate),
@@ -154,8 +163,12 @@ impl Builder<'_> {
                 ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
                 ("layers", shell, "a shell"),
                 ("thickness", body.layers.is_empty(), "a shell without `layers`"),
-                ("fibre", !shell || !body.layers.is_empty(), "solids, membranes and shells with `layers`"),
-                ("second-fibre", !shell, "solids and membranes"),
+                (
+                    "fibre",
+                    !bar && (!shell || !body.layers.is_empty()),
+                    "solids, membranes and shells with `layers`",
+                ),
+                ("second-fibre", !bar && !shell, "solids and membranes"),
             ];
             for (key, wanted, of) in others {
                 if !wanted && self.source().node(&["body", name, key]).is_some() {

@@ -1,0 +1,209 @@
+//! `pliant mesh IMAGE -o scene.toml`: the scene of an organ with vessels and capsule.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use pliant_imaging::LabelChoice;
+use pliant_scene::OrganScene;
+
+use super::input::{is_mesh_file, regions};
+use crate::arguments::{MeshCells, MeshImage};
+use crate::report::{Bar, Failure, say};
+
+/// Whether the output is a scene.
+pub fn is_scene(arguments: &MeshImage) -> bool {
+    arguments.out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+/// Writes the scene; images are meshed when it runs.
+pub fn scene(arguments: &MeshImage) -> Result<ExitCode, Failure> {
+    let Some(edge) = arguments.edge else {
+        return Err(Failure::plain("the edge of the cells is missing", "for example `--edge 8mm`"));
+    };
+    let idle = [
+        (is_mesh_file(arguments), "a scene is made of images"),
+        (
+            !matches!(arguments.cells, MeshCells::Tets),
+            "the tissue of a scene is of tets: `--as` has no effect",
+        ),
+        (arguments.threshold.is_some(), "`--threshold` has no labels for a scene"),
+        (arguments.distance.is_some(), "`--distance` is for meshes"),
+        (arguments.inner_edge.is_some(), "`--inner-edge` is for meshes"),
+        (!arguments.protect.is_empty(), "`--protect` is for meshes"),
+        (arguments.series.is_some(), "`--series` is for meshes"),
+        (arguments.json, "`--json` is for meshes"),
+    ];
+    if let Some((_, message)) = idle.into_iter().find(|(idle, _)| *idle) {
+        return Err(Failure::plain(message, "leave it out, or name a mesh file as output"));
+    }
+    if arguments.out.exists() && !arguments.force {
+        let message = format!("`{}` exists already", arguments.out.display());
+        return Err(Failure::plain(message, "choose another name, or overwrite it with `--force`"));
+    }
+    let sources = Sources::of(arguments)?;
+    let bar = Bar::new();
+    // The organ gives the box; vessels are read once to see that they are there.
+    let mut vessels = arguments.clone();
+    vessels.label = arguments.vessels.iter().map(|(label, _)| label.clone()).collect();
+    let mut organ = arguments.clone();
+    organ.label = sources.organ;
+    let found = regions(&organ, &bar);
+    let there = if vessels.label.is_empty() { Ok(()) } else { regions(&vessels, &bar).map(|_| ()) };
+    bar.finish();
+    let found = found?;
+    there?;
+    for line in &found.lines {
+        say(line)?;
+    }
+    found.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    let grid = &found.labels.grid;
+    let inside = (found.labels.labels.iter().enumerate()).filter(|(_, label)| **label != 0);
+    let places = inside.map(|(at, _)| grid.position(&grid.triple(at).map(|x| x as f64).into()));
+    let Some(bounds) = places.fold(None, |bounds, place| {
+        let [low, high] = bounds.unwrap_or([place, place]);
+        Some([low.inf(&place), high.sup(&place)])
+    }) else {
+        return Err(Failure::plain("there is no voxel of these labels", "`pliant labels IMAGE` lists them"));
+    };
+    let folder = arguments.out.parent().unwrap_or(Path::new(""));
+    let source = |files: &[&PathBuf], labels: &str| source(arguments, folder, files, labels);
+    let with_thickness = |((files, label), (_, thickness)): (&(Vec<&PathBuf>, String), &(_, f64))| {
+        (source(files, &format!("label = {label}")), *thickness)
+    };
+    let organ = OrganScene {
+        title: folder_name(&arguments.out),
+        source: source(&sources.files, &format!("labels = [{}]", sources.labels.join(", "))),
+        edge,
+        vessels: sources.vessels.iter().zip(&arguments.vessels).map(with_thickness).collect(),
+        capsule: arguments.capsule,
+        bounds,
+    };
+    let written = fs::create_dir_all(folder).and_then(|()| fs::write(&arguments.out, organ.text()));
+    written.map_err(|error| {
+        let message = format!("`{}` cannot be written: {error}", arguments.out.display());
+        Failure::plain(
+            message,
+            "check the folder, its permissions and the free space, or choose another name",
+        )
+    })?;
+    let out = arguments.out.display();
+    say(format_args!("wrote {out}; try: pliant check {out} && pliant run {out}"))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Where organ and vessels come from.
+struct Sources<'a> {
+    /// What the organ is chosen by in the input.
+    organ: Vec<LabelChoice>,
+    /// Its files, and its labels as a scene has them.
+    files: Vec<&'a PathBuf>,
+    labels: Vec<String>,
+    /// The same of each vessel.
+    vessels: Vec<(Vec<&'a PathBuf>, String)>,
+}
+
+impl<'a> Sources<'a> {
+    /// Of one image the tissue fills the voxels of the vessels, too; masks overlap, and each stands for itself.
+    fn of(arguments: &'a MeshImage) -> Result<Self, Failure> {
+        let vessels = || arguments.vessels.iter().map(|(label, _)| label);
+        if arguments.masks.is_empty() {
+            let labels = arguments.label.iter().chain(vessels()).map(typed).collect();
+            let files = vec![&arguments.image];
+            let vessels = vessels().map(|label| (files.clone(), typed(label))).collect();
+            return Ok(Self { organ: arguments.label.clone(), files, labels, vessels });
+        }
+        let files: Vec<&PathBuf> = std::iter::once(&arguments.image).chain(&arguments.masks).collect();
+        let number = |label: &LabelChoice| {
+            let found = match label {
+                LabelChoice::One(number) => usize::try_from(*number).ok().and_then(|n| n.checked_sub(1)),
+                LabelChoice::Named(name) => {
+                    files.iter().position(|file| stem(file).eq_ignore_ascii_case(name))
+                }
+                LabelChoice::Range(..) => None,
+            };
+            found.filter(|&at| at < files.len()).ok_or_else(|| {
+                let names: Vec<String> = files.iter().map(|file| stem(file)).collect();
+                let message = format!("`{label}` is none of the masks");
+                Failure::plain(message, format!("by number from 1, or by name: {}", names.join(", ")))
+            })
+        };
+        let walls = vessels().map(number).collect::<Result<Vec<usize>, Failure>>()?;
+        let of_organ: Vec<usize> = match &arguments.label[..] {
+            [] => (0..files.len()).filter(|at| !walls.contains(at)).collect(),
+            labels => labels.iter().map(number).collect::<Result<_, _>>()?,
+        };
+        if of_organ.is_empty() {
+            return Err(Failure::plain("no mask is left for the tissue", "add the mask of the organ"));
+        }
+        Ok(Self {
+            organ: of_organ.iter().map(|&at| LabelChoice::One(at as i32 + 1)).collect(),
+            labels: (1..=of_organ.len()).map(|label| label.to_string()).collect(),
+            files: of_organ.iter().map(|&at| files[at]).collect(),
+            vessels: walls.iter().map(|&at| (vec![files[at]], "1".into())).collect(),
+        })
+    }
+}
+
+/// The name of a mask: that of its file, without endings.
+fn stem(file: &Path) -> String {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    name.split_once('.').map_or(&*name, |(stem, _)| stem).to_owned()
+}
+
+/// A label as a scene has it: a number, or a text in quotes.
+fn typed(label: &LabelChoice) -> String {
+    match label {
+        LabelChoice::One(number) => number.to_string(),
+        LabelChoice::Range(..) | LabelChoice::Named(_) => {
+            serde_json::Value::from(label.to_string()).to_string()
+        }
+    }
+}
+
+/// The source of a body in its `mesh`, with names and cleaning.
+fn source(arguments: &MeshImage, folder: &Path, files: &[&PathBuf], labels: &str) -> String {
+    let path = |path: &Path| serde_json::Value::from(from_folder(path, folder).to_string_lossy()).to_string();
+    let all: Vec<String> = files.iter().map(|file| path(file)).collect();
+    let all = all.join(", ");
+    let mut source =
+        if arguments.masks.is_empty() { format!("image = {all}") } else { format!("masks = [{all}]") };
+    source += &format!(", {labels}");
+    if let Some(names) = &arguments.names {
+        let known = names.as_os_str() == "totalsegmentator";
+        let names = if known { "\"totalsegmentator\"".into() } else { path(names) };
+        source += &format!(", names = {names}");
+    }
+    let mut clean = Vec::new();
+    if arguments.close_gaps > 0.0 {
+        clean.push(format!("close-gaps = {:?}", arguments.close_gaps));
+    }
+    if arguments.fill_holes {
+        clean.push("fill-holes = true".into());
+    }
+    if arguments.keep_largest {
+        clean.push("keep-largest = true".into());
+    }
+    if !clean.is_empty() {
+        source += &format!(", clean = {{ {} }}", clean.join(", "));
+    }
+    source
+}
+
+/// A path as a scene in a folder names it: below the folder without it, elsewhere in full.
+fn from_folder(path: &Path, folder: &Path) -> PathBuf {
+    if folder.as_os_str().is_empty() {
+        return path.to_owned();
+    }
+    match path.strip_prefix(folder) {
+        Ok(below) => below.to_owned(),
+        Err(_) => std::path::absolute(path).unwrap_or_else(|_| path.to_owned()),
+    }
+}
+
+/// What a scene is called: the name of its folder if it is a `scene.toml`, else its own.
+fn folder_name(out: &Path) -> String {
+    let stem = out.file_stem().unwrap_or_default();
+    let folder = out.parent().and_then(Path::file_name).filter(|_| stem == "scene");
+    folder.unwrap_or(stem).to_string_lossy().into_owned()
+}

@@ -1,0 +1,219 @@
+//! Constraints that bind nodes to each other: a mean displacement that is prescribed, and rigid parts of a body. A step predicts where the
+//! nodes go without them and corrects it by the least change in the metric of the masses, so that momentum and angular momentum are
+//! kept, and no wave becomes faster: the critical time step stays. The corrections enter the step as forces, hence the energies too.
+//!
+//! *Mean.* Σ wᵢ uᵢ = d with forces wᵢ λ: λ = (d − Σ wᵢ uᵢ*)/Σ wᵢ² yᵢ, uᵢ* the prediction and yᵢ = Δt²/m the mobility of a node.
+//!
+//! *Rigid.* The rigid motion x = c + R (X − X̄) that is nearest to the prediction: c and X̄ are centres of mass, R the rotation of the polar
+//! decomposition of Σ mᵢ (xᵢ* − c) ⊗ (Xᵢ − X̄) (Kabsch 1976; as shape matching, Müller et al. 2005). It is orthogonal to infinitesimal
+//! rotations about c, so that the forces have no moment.
+
+use nalgebra::{Matrix3, Vector3};
+use pliant_mechanics::model::{Model, Motion};
+use pliant_mechanics::tensor::{Vector, add, scale, sub};
+
+/// Where a node goes without a constraint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Predicted {
+    /// Its displacement [m] after the step.
+    pub displacement: Vector<f64>,
+    /// By how much a force moves it over the step [m/N].
+    pub mobility: f64,
+}
+
+/// The nodes of such a constraint.
+pub(crate) struct Collective {
+    /// The constraint of the model.
+    pub constraint: usize,
+    /// The force [N] of all of them together at the last evaluation.
+    pub force: Vector<f64>,
+    /// Of each node.
+    own: Vec<Vector<f64>>,
+    predicted: Vec<Predicted>,
+}
+
+impl Collective {
+    /// Those of a model.
+    pub fn all(model: &Model) -> Vec<Self> {
+        let collective = model.constraints.iter().enumerate().filter(|(_, own)| own.motion.is_collective());
+        let new = |(constraint, own): (usize, &pliant_mechanics::model::Constraint)| Self {
+            constraint,
+            force: [0.0; 3],
+            own: vec![[0.0; 3]; own.nodes.len()],
+            predicted: Vec::with_capacity(own.nodes.len()),
+        };
+        collective.map(new).collect()
+    }
+
+    /// Finds the forces; `factor` is that of a mean's displacement after the step.
+    pub fn find(&mut self, model: &Model, predicted: impl Fn(u32) -> Predicted, factor: f64) {
+        let constraint = &model.constraints[self.constraint];
+        self.predicted.clear();
+        self.predicted.extend(constraint.nodes.iter().map(|&node| predicted(node)));
+        match &constraint.motion {
+            Motion::Mean { weights, by, .. } => {
+                for c in 0..3 {
+                    let free = || self.predicted.iter().zip(weights);
+                    let apart = by[c] * factor - free().map(|(p, w)| w * p.displacement[c]).sum::<f64>();
+                    let mobility: f64 = free().map(|(p, w)| w * w * p.mobility).sum();
+                    let force = if constraint.components[c] { apart / mobility } else { 0.0 };
+                    self.own.iter_mut().zip(weights).for_each(|(own, w)| own[c] = w * force);
+                }
+            }
+            _ => self.find_rigid(model),
+        }
+        self.force = self.own.iter().fold([0.0; 3], |sum, &force| add(sum, force));
+    }
+
+    fn find_rigid(&mut self, model: &Model) {
+        let nodes = &model.constraints[self.constraint].nodes;
+        let rest = |index: usize| model.rest[nodes[index] as usize];
+        let place = |index: usize| add(rest(index), self.predicted[index].displacement);
+        let mass = |index: usize| 1.0 / self.predicted[index].mobility;
+        let count = nodes.len();
+        let whole: f64 = (0..count).map(mass).sum();
+        let centre = |of: &dyn Fn(usize) -> Vector<f64>| {
+            let sum = (0..count).fold([0.0; 3], |sum, index| add(sum, scale(of(index), mass(index))));
+            scale(sum, 1.0 / whole)
+        };
+        let (before, now) = (centre(&rest), centre(&place));
+        let arm = |of: Vector<f64>, centre: Vector<f64>| Vector3::from(sub(of, centre));
+        let sum = (0..count).fold(Matrix3::zeros(), |sum, index| {
+            sum + arm(place(index), now) * arm(rest(index), before).transpose() * mass(index)
+        });
+        let turn = rotation_of(&sum);
+        for index in 0..count {
+            let target = add(now, (turn * arm(rest(index), before)).into());
+            self.own[index] = scale(sub(target, place(index)), mass(index));
+        }
+    }
+
+    /// The force [N] on each node.
+    pub fn forces(&self, model: &Model) -> impl Iterator<Item = (u32, Vector<f64>)> {
+        model.constraints[self.constraint].nodes.iter().copied().zip(self.own.iter().copied())
+    }
+}
+
+/// The rotation nearest to a matrix.
+fn rotation_of(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    let svd = matrix.svd(true, true);
+    let (Some(u), Some(v)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
+    let mut signs = Vector3::repeat(1.0);
+    // nalgebra sorts singular values, the least last: there a reflection is turned back.
+    signs[2] = (u * v).determinant().signum();
+    u * Matrix3::from_diagonal(&signs) * v
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pliant_mechanics::curve::{Curve, Shape};
+    use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+    use pliant_mechanics::model::{Cells, Constraint, Material, Solid};
+    use pliant_mechanics::tensor::{cross, dot};
+    use pliant_testing::Random;
+
+    use crate::{CentralDifference, Observable, State, critical_step};
+
+    /// A bar of 4 × 1 × 1 cubes of 1 cm, free, in random motion, with a constraint on the nodes of an end.
+    fn moving(motion: impl FnOnce(&[u32]) -> Motion, chosen: impl Fn(&Vector<f64>) -> bool) -> Model {
+        let mut rest = Vec::new();
+        for x in 0..5 {
+            for (y, z) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                rest.push([x, y, z].map(|i| 0.01 * f64::from(i)));
+            }
+        }
+        let hexes = (0..4).map(|x| [0, 4, 5, 1, 2, 6, 7, 3].map(|node| 4 * x + node)).collect();
+        let mut model = Model::default();
+        let body = model.add_body("bar", &rest);
+        let law = AnyLaw::NeoHookean(NeoHookean { shear: 2e3, volumetric: Volumetric::quadratic(1e4) });
+        let cells = Cells::hex8(hexes, &rest, 0.2, 2e3);
+        model.add_solid(Solid::new(body, Material::elastic(law, 1000.0), cells));
+        let mut random = Random::new(5);
+        model.initial_velocity = rest
+            .iter()
+            .map(|x| add(random.vector().map(|v| 0.02 * v), cross([3.0, 5.0, -4.0], *x)))
+            .collect();
+        let nodes: Vec<u32> = (0..20).filter(|&node| chosen(&rest[node as usize])).collect();
+        let motion = motion(&nodes);
+        model.constraints.push(Constraint { name: "end".into(), nodes, components: [true; 6], motion });
+        model
+    }
+
+    /// Momentum and angular momentum of the middle of the last step.
+    fn momenta(model: &Model, state: &State<f64>, step: f64) -> [Vector<f64>; 2] {
+        let mut sums = [[0.0; 3]; 2];
+        for node in 0..model.node_count() {
+            let moment = scale(state.increment[node], model.mass[node] / step);
+            let back = sub(state.displacement[node], scale(state.increment[node], 0.5));
+            sums[0] = add(sums[0], moment);
+            sums[1] = add(sums[1], cross(add(model.rest[node], back), moment));
+        }
+        sums
+    }
+
+    /// An end keeps its shape to round-off while the bar tumbles; momentum is kept exactly, angular momentum and energy as without it.
+    #[test]
+    fn a_rigid_end_tumbles_without_loss() {
+        let model = moving(|_| Motion::Rigid, |x| x[0] > 0.025);
+        let step = 0.9 * critical_step::assembled(&model).unwrap().step;
+        let mut stepper = CentralDifference::<f64>::new(model.clone(), step).unwrap();
+        let mut state = State::at_rest(&model);
+        let mut first = None;
+        for _ in 0..2000 {
+            stepper.evaluate(&mut state).unwrap();
+            stepper.advance(&mut state);
+            let now = momenta(&model, &state, step);
+            let first = *first.get_or_insert(now);
+            for (kind, limit) in [(0, 1e-11), (1, 2e-3)] {
+                let change = sub(now[kind], first[kind]);
+                let size = dot(first[kind], first[kind]).sqrt();
+                assert!(dot(change, change).sqrt() < limit * size, "{kind}: {change:?} of {first:?}");
+            }
+        }
+        let place = |node: usize| add(model.rest[node], state.displacement[node]);
+        let length = |a: Vector<f64>, b: Vector<f64>| dot(sub(a, b), sub(a, b)).sqrt();
+        for a in 12..20 {
+            for b in 12..a {
+                let change = length(place(a), place(b)) - length(model.rest[a], model.rest[b]);
+                assert!(change.abs() < 1e-15, "{a} {b}: {change:e}");
+            }
+        }
+        let turned = length(place(19), model.rest[19]);
+        assert!(turned > 0.02, "{turned} m");
+        let free = length(place(0), place(4)) - 0.01;
+        assert!(free.abs() > 1e-6);
+        stepper.evaluate(&mut state).unwrap();
+        assert!(stepper.energies().balance.abs() < 1e-2, "{:?}", stepper.energies());
+    }
+
+    /// The mean goes where it is sent, single nodes do not; the work of its force is that of the balance.
+    #[test]
+    fn a_mean_goes_by_as_much_as_it_is_told() {
+        let curve = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.1 };
+        let weights = [0.1, 0.2, 0.3, 0.4];
+        let by = [0.002, 0.0, -0.001];
+        let mean = |_: &[u32]| Motion::Mean { weights: weights.to_vec(), by, curve: curve.clone() };
+        let mut model = moving(mean, |x| x[0] > 0.035);
+        model.initial_velocity.clear();
+        model.fix("base", vec![0, 1, 2, 3]);
+        model.bodies[0].damping = 30.0;
+        let step = 0.9 * critical_step::assembled(&model).unwrap().step;
+        let mut stepper = CentralDifference::<f64>::new(model.clone(), step).unwrap();
+        let mut state = State::at_rest(&model);
+        while state.time < 0.6 {
+            stepper.evaluate(&mut state).unwrap();
+            stepper.advance(&mut state);
+            let factor = curve.value(state.time);
+            for (c, by) in by.iter().enumerate() {
+                let found: f64 = (0..4).map(|k| weights[k] * state.displacement[16 + k][c]).sum();
+                assert!((found - factor * by).abs() < 1e-15, "{c}: {found} at {}", state.time);
+            }
+        }
+        stepper.evaluate(&mut state).unwrap();
+        let [force, base] = [stepper.reaction(0), stepper.reaction(1)];
+        assert!(force[0] > 0.01 && (force[0] + base[0]).abs() < 1e-3 * force[0], "{force:?} {base:?}");
+        assert!((state.displacement[16][0] - state.displacement[19][0]).abs() > 1e-6);
+        assert!(stepper.energies().balance.abs() < 1e-2);
+    }
+}
