@@ -570,7 +570,8 @@ impl<R: Scalar> CentralDifference<R> {
                     state.displacement[at][c].to_f64()
                         + ((1.0 - a) * before * m + step_squared * force) / inertia
                 });
-                Predicted { displacement: place, mobility: step_squared / inertia }
+                let now = state.displacement[at].map(|u| u.to_f64());
+                Predicted { now, displacement: place, mobility: step_squared / inertia }
             };
             own.find(&self.model, predicted, then);
             for (node, force) in own.forces(&self.model) {

@@ -22,7 +22,7 @@ pub struct OrganScene {
     pub vessels: Vec<(String, f64)>,
     /// Thickness of the capsule [m].
     pub capsule: Option<f64>,
-    /// Corners of the box round the tissue [m].
+    /// Corners of the box round the bulk of the tissue [m].
     pub bounds: [Vector3; 2],
 }
 

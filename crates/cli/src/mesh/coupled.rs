@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use pliant_geometry::Vector3;
 use pliant_imaging::LabelChoice;
 use pliant_scene::OrganScene;
 
@@ -60,10 +61,7 @@ pub fn scene(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     let grid = &found.labels.grid;
     let inside = (found.labels.labels.iter().enumerate()).filter(|(_, label)| **label != 0);
     let places = inside.map(|(at, _)| grid.position(&grid.triple(at).map(|x| x as f64).into()));
-    let Some(bounds) = places.fold(None, |bounds, place| {
-        let [low, high] = bounds.unwrap_or([place, place]);
-        Some([low.inf(&place), high.sup(&place)])
-    }) else {
+    let Some(bounds) = bulk(places.collect()) else {
         return Err(Failure::plain("there is no voxel of these labels", "`pliant labels IMAGE` lists them"));
     };
     let folder = arguments.out.parent().unwrap_or(Path::new(""));
@@ -90,6 +88,19 @@ pub fn scene(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     let out = arguments.out.display();
     say(format_args!("wrote {out}; try: pliant check {out} && pliant run {out}"))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Corners of the box that holds all but one in two hundred of the places at either end of each axis: loose voxels do not count.
+fn bulk(places: Vec<Vector3>) -> Option<[Vector3; 2]> {
+    let last = places.len().checked_sub(1)?;
+    let mut bounds = [Vector3::zeros(); 2];
+    for axis in 0..3 {
+        let mut along: Vec<f64> = places.iter().map(|place| place[axis]).collect();
+        along.sort_unstable_by(f64::total_cmp);
+        bounds[0][axis] = along[last / 200];
+        bounds[1][axis] = along[last - last / 200];
+    }
+    Some(bounds)
 }
 
 /// Where organ and vessels come from.
