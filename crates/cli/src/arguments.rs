@@ -666,10 +666,10 @@ pub struct MeshImage {
     #[arg(long = "as", value_name = "CELLS", default_value = "tets")]
     pub cells: MeshCells,
     /// In a scene: a label whose surface is a wall of that thickness, tied to the tissue, such as "portal vein=1mm"; may be repeated.
-    #[arg(long, value_name = "LABEL=LENGTH", value_parser = vessel)]
+    #[arg(long, value_name = "LABEL=LENGTH", value_parser = vessel, allow_hyphen_values = true)]
     pub vessels: Vec<(LabelChoice, f64)>,
     /// In a scene: a capsule of this thickness on the boundary of the tissue, such as 0.1mm.
-    #[arg(long, value_name = "LENGTH", value_parser = wall)]
+    #[arg(long, value_name = "LENGTH", value_parser = wall, allow_hyphen_values = true)]
     pub capsule: Option<f64>,
     /// Name of the mesh: .vtu or .msh, for a surface also .ply, .obj or .stl; or .toml for a scene of the image, with walls and ties.
     #[arg(short, long, value_name = "FILE")]

@@ -149,8 +149,10 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
     assert!(told.out.contains("body `capsule`: the boundary of `organ`"), "{}", told.out);
     assert!(told.out.contains("follow `organ`"), "{}", told.out);
     // Masks stand for themselves, and are named after their files.
-    workshop.write("shell.nii", Picture::organ().nifti());
-    workshop.write("core.nii", Picture::new(|[x, y, z]| i16::from(x * x + y * y + z * z < 40.0)).nifti());
+    let ball =
+        |radius: f64| Picture::new(move |[x, y, z]| i16::from(x * x + y * y + z * z < radius * radius));
+    workshop.write("shell.nii", ball(15.0).nifti());
+    workshop.write("core.nii", ball(7.0).nifti());
     let masks =
         ["mesh", "shell.nii", "core.nii", "--vessels", "core=1mm", "--edge", "4mm", "-o", "masks.toml"];
     let told = workshop.pliant(&masks);
