@@ -10,7 +10,8 @@
 //! on; nodes on a line keep that one.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use pliant_mechanics::model::{Model, Motion};
+use pliant_mechanics::model::{Constraint, Model, Motion};
+use pliant_mechanics::rotation::nearest_rotation;
 use pliant_mechanics::tensor::{Vector, add, scale, sub};
 
 /// Steps of Newton's method for a rotation; three are usual.
@@ -42,7 +43,7 @@ impl Collective {
     /// Those of a model.
     pub fn all(model: &Model) -> Vec<Self> {
         let collective = model.constraints.iter().enumerate().filter(|(_, own)| own.motion.is_collective());
-        let new = |(constraint, own): (usize, &pliant_mechanics::model::Constraint)| Self {
+        let new = |(constraint, own): (usize, &Constraint)| Self {
             constraint,
             force: [0.0; 3],
             own: vec![[0.0; 3]; own.nodes.len()],
@@ -88,7 +89,7 @@ impl Collective {
         let sum = (0..count).fold(Matrix3::zeros(), |sum, index| {
             sum + arm(place(index), then) * arm(rest(index), first).transpose() * mass(index)
         });
-        let mut turn = rotation_of(&sum);
+        let mut turn = nearest_rotation(&sum);
         for _ in 0..MOST_TURNS {
             let (mut moment, mut slope) = (Vector3::zeros(), Matrix3::zeros());
             for index in 0..count {
@@ -101,7 +102,7 @@ impl Collective {
             if !more.norm().is_finite() || more.norm() > 1.0 {
                 break;
             }
-            turn = Rotation3::new(-more).into_inner() * turn;
+            turn = Rotation3::new(-more) * turn;
             if more.norm() < 1e-15 {
                 break;
             }
@@ -118,22 +119,12 @@ impl Collective {
     }
 }
 
-/// The rotation nearest to a matrix.
-fn rotation_of(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    let svd = matrix.svd(true, true);
-    let (Some(u), Some(v)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
-    let mut signs = Vector3::repeat(1.0);
-    // nalgebra sorts singular values, the least last: there a reflection is turned back.
-    signs[2] = (u * v).determinant().signum();
-    u * Matrix3::from_diagonal(&signs) * v
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use pliant_mechanics::curve::{Curve, Shape};
     use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
-    use pliant_mechanics::model::{Cells, Constraint, Material, Solid};
+    use pliant_mechanics::model::{Cells, Material, Solid};
     use pliant_mechanics::tensor::{cross, dot};
     use pliant_testing::Random;
 

@@ -1,6 +1,7 @@
 //! States to start from other than rest.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use pliant_mechanics::rotation::nearest_rotation;
 
 use crate::assembly::Assembly;
 use crate::state::State;
@@ -41,21 +42,9 @@ impl State {
             facet.nodes.iter().for_each(|&node| moments[node as usize] += moment);
         }
         for (rotation, moment) in self.rotation.iter_mut().zip(&moments) {
-            *rotation = nearest_rotation(moment);
+            *rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(moment));
         }
     }
-}
-
-/// The rotation R with the largest tr(Rᵀ M); none for M = 0.
-fn nearest_rotation(moment: &Matrix3<f64>) -> UnitQuaternion<f64> {
-    if *moment == Matrix3::zeros() {
-        return UnitQuaternion::identity();
-    }
-    let svd = moment.svd(true, true);
-    let (Some(u), Some(vt)) = (svd.u, svd.v_t) else { return UnitQuaternion::identity() };
-    let sign = (u * vt).determinant().signum();
-    let r = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * vt;
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(r))
 }
 
 #[cfg(test)]

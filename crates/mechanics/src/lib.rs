@@ -29,6 +29,7 @@ pub mod model;
 pub mod order;
 pub mod prony;
 mod real;
+pub mod rotation;
 pub mod tensor;
 pub mod tie;
 

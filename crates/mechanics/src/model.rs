@@ -879,11 +879,12 @@ impl Model {
             }
         }
         self.check_rotations()?;
-        self.check_collective(&owners)?;
+        let bound = self.check_collective(&owners)?;
         for tie in &self.ties {
             for &node in &tie.nodes {
-                if let Some(component) = (0..3).find(|&c| owners[node as usize][c] != FREE) {
-                    let first = self.constraints[owners[node as usize][component] as usize].name.clone();
+                let own = owners[node as usize].into_iter().zip(0..).chain([(bound[node as usize], 0)]);
+                if let Some((first, component)) = own.into_iter().find(|&(first, _)| first != FREE) {
+                    let first = self.constraints[first as usize].name.clone();
                     let (body, node) = self.locate_node(node);
                     let (second, body) = (tie.name.clone(), self.bodies[body].name.clone());
                     return Err(Contradiction { first, second, body, node, component });
@@ -898,8 +899,8 @@ impl Model {
         self.constraints.iter().find(|constraint| constraint.motion.is_collective())
     }
 
-    /// Whether nodes that are bound to each other are bound once, and held and tied by nothing else.
-    fn check_collective(&self, owners: &[[u32; 3]]) -> Result<(), Contradiction> {
+    /// The constraint that binds each node to others, [`FREE`] where there is none: one at most, and no other holds the node.
+    fn check_collective(&self, owners: &[[u32; 3]]) -> Result<Vec<u32>, Contradiction> {
         let mut bound = vec![FREE; self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
             for &node in constraint.nodes.iter().filter(|_| constraint.motion.is_collective()) {
@@ -914,15 +915,7 @@ impl Model {
                 }
             }
         }
-        for tie in &self.ties {
-            if let Some(&node) = tie.nodes.iter().find(|&&node| bound[node as usize] != FREE) {
-                let first = self.constraints[bound[node as usize] as usize].name.clone();
-                let (body, node) = self.locate_node(node);
-                let (second, body) = (tie.name.clone(), self.bodies[body].name.clone());
-                return Err(Contradiction { first, second, body, node, component: 0 });
-            }
-        }
-        Ok(())
+        Ok(bound)
     }
 
     /// Whether no two constraints turn a node differently.

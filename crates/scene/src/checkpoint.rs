@@ -34,8 +34,8 @@ struct Origin {
     /// Duration [s] of the scene, from which the step comes.
     until: f64,
     participants: Vec<OwnOrigin>,
-    /// The outputs, with their fingerprints.
-    outputs: Vec<(String, u64)>,
+    /// The outputs and the ties between participants, with their fingerprints.
+    tables: Vec<(String, u64)>,
 }
 
 /// The same of a participant.
@@ -263,10 +263,12 @@ impl OwnOrigin {
 impl Origin {
     fn of(world: &World) -> Self {
         let outputs = world.scene.outputs.iter();
+        let outputs = outputs.map(|(name, table)| (format!("output `{name}`"), fingerprint(table)));
+        let ties = world.ties.iter().map(|tie| (format!("tie `{}`", tie.name), fingerprint(tie)));
         Self {
             until: world.scene.scene.until,
             participants: world.participants.iter().map(OwnOrigin::of).collect(),
-            outputs: outputs.map(|(name, table)| (format!("output `{name}`"), fingerprint(table))).collect(),
+            tables: outputs.chain(ties).collect(),
         }
     }
 
@@ -274,7 +276,7 @@ impl Origin {
     fn parts(&self) -> Vec<(String, u64)> {
         let own = self.participants.iter().flat_map(|own| &own.parts);
         let names: Vec<&String> = self.participants.iter().map(|own| &own.name).collect();
-        let mut parts: Vec<_> = own.chain(&self.outputs).cloned().collect();
+        let mut parts: Vec<_> = own.chain(&self.tables).cloned().collect();
         parts.push(("the list of participants".into(), fingerprint(&names)));
         parts
     }

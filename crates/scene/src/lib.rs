@@ -49,6 +49,7 @@ mod organ_scene;
 mod output;
 mod overview;
 mod participants;
+mod penalty;
 mod plan;
 mod plausible;
 mod printable;
@@ -75,7 +76,7 @@ pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
 pub use organ_scene::OrganScene;
 pub use output::{
     AddedMass, BodySummary, Column, OutputError, OutputFolder, ParticipantSummary, StabilitySummary, Summary,
-    failed_input, failed_output,
+    TieSummary, failed_input, failed_output,
 };
 pub use overview::overview;
 pub use plan::{LimitingElement, Limits, Plan, plan};

@@ -30,7 +30,7 @@ pub fn is_mesh(path: &Path) -> bool {
 }
 
 /// Makes a scene of a mesh file: soft tissue, held where its lowest tenth along its longest side is. What a surface encloses is filled with
-/// tets; the elements of a volume mesh with labels have their colours. Damping is half of the critical one of the slowest vibration along that side, α = 2 · ½ · (π/2) √(E/ρ)/L.
+/// tets; the elements of a volume mesh with labels have their colours. Damping is half of the critical one of the slowest vibration along that side.
 ///
 /// # Errors
 /// If the file can't be read.
@@ -51,7 +51,7 @@ pub fn scene_of_mesh(path: &Path) -> Result<SceneOfMesh, MeshFileError> {
         "fix = [\"reorder\", \"drop-unused\"]".into()
     };
     let [young, poisson, density] = TISSUE;
-    let damping = rounded(0.5 * std::f64::consts::PI * (young / density).sqrt() / length.max(1e-6));
+    let damping = rounded(calming(young, density, length));
     let labelled = !filled && !Labels::of(&mesh).is_empty();
     let view = if labelled { "\n[view]\ncolour = \"label\"\n" } else { "" };
     let mut point = scale * low;
@@ -92,6 +92,11 @@ nodes = {{ half-space = {{ point = {point:?}, normal = {normal:?} }} }}
     }
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     Ok(SceneOfMesh { text, folder, assumed })
+}
+
+/// Damping [1/s] of a body of a length [m]: half of the critical one of its slowest vibration along it, α = 2 · ½ · (π/2) √(E/ρ)/L.
+pub(crate) fn calming(young: f64, density: f64, length: f64) -> f64 {
+    0.5 * std::f64::consts::PI * (young / density).sqrt() / length.max(1e-6)
 }
 
 /// To two digits.

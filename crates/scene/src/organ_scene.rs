@@ -2,6 +2,8 @@
 
 use pliant_geometry::Vector3;
 
+use crate::of_mesh::calming;
+
 /// Young's modulus [Pa] and Poisson's ratio of tissue, capsule and vessels.
 const TISSUE: [f64; 2] = [5e3, 0.45];
 const CAPSULE: [f64; 2] = [5e6, 0.5];
@@ -46,8 +48,8 @@ impl OrganScene {
         let [low, high] = &self.bounds;
         let size = high - low;
         let axis = size.imax();
-        let length = size[axis].max(1e-6);
-        let damping = rounded(0.5 * std::f64::consts::PI * (TISSUE[0] / DENSITY).sqrt() / length);
+        let length = size[axis];
+        let damping = rounded(calming(TISSUE[0], DENSITY, length));
         let mut along = [0.0; 3];
         along[axis] = 1.0;
         let plane = |part: f64, sign: f64| {

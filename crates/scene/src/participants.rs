@@ -119,24 +119,20 @@ impl Scene {
             groups.push((word.into(), bodies));
         }
         self.check_walls(&groups, out);
-        self.check_ties(&groups, out);
+        self.check_ties(&known, out);
         groups
     }
 
-    /// Refuses ties between participants.
-    fn check_ties(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) {
+    /// Refuses ties of bodies that there are not.
+    fn check_ties(&self, known: &[&str], out: &mut Vec<Diagnostic>) {
         for (name, table) in &self.ties {
-            let [first, second] = &table.between;
-            if let (Some((own, _)), Some((other, _))) = (group_of(groups, first), group_of(groups, second))
-                && own != other
-            {
-                let message = format!(
-                    "`{first}` goes with participant `{own}` and `{second}` with `{other}`, and a tie is of one solver"
-                );
-                let help = "name both in one participant; shells and solids go together with `solver = \"implicit\"` or `\"static\"`, \
-                            membranes and solids with each solver";
-                let place = self.source.span(&["tie", name, "between"]);
-                out.push(Diagnostic::error(message).at(place, "of two participants").help(help));
+            for (index, body) in table.between.iter().enumerate() {
+                if !known.contains(&body.as_str()) {
+                    let place = self.source.span(&["tie", name, "between", &index.to_string()]);
+                    let help = suggestion(body, known, SCENE, "bodies");
+                    let message = format!("there is no body `{body}`");
+                    out.push(Diagnostic::error(message).at(place, "no such body").help(help));
+                }
             }
         }
     }
@@ -304,7 +300,18 @@ impl Scene {
             participants: Vec::new(),
             laws,
             bodies,
-            ties: self.ties.iter().filter(|(_, tie)| owns(&tie.between[0])).cloned().collect(),
+            ties: self
+                .ties
+                .iter()
+                .filter(|(_, tie)| tie.between.iter().all(|on| owns(on)))
+                .cloned()
+                .collect(),
+            tied_outside: self
+                .ties
+                .iter()
+                .filter(|(_, tie)| !tie.between.iter().all(|on| owns(on)))
+                .flat_map(|(_, tie)| tie.between.clone())
+                .collect(),
             surfaces: self.surfaces.iter().filter(|(_, surface)| owns(&surface.on)).cloned().collect(),
             constraints: self.constraints.iter().filter(|(_, table)| owns(table.body())).cloned().collect(),
             loads: self.loads.iter().filter(|(_, load)| on_part(load.on())).cloned().collect(),

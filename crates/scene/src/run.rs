@@ -11,7 +11,7 @@ use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::output::{
     CONVERGENCE, FieldMesh, History, Outcome, OutputError, OutputFolder, PICTURE, PLOT, PartOutcome, SUMMARY,
-    Scheduled, Summary, Watched, interrupted, markdown, output_failure, outputs, plot, summarise,
+    Scheduled, Summary, TieSummary, Watched, interrupted, markdown, output_failure, outputs, plot, summarise,
 };
 use crate::view::Draw;
 use crate::world::World;
@@ -144,6 +144,7 @@ fn go(
         wall_seconds,
         energies: simulation.energies(),
         parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own, watched)).collect(),
+        ties: simulation.ties().map(|tie| TieSummary::new(world, tie)).collect(),
         ended: simulation.ended().map(ToOwned::to_owned),
         history,
         files: files.into_iter().chain(kept).chain(drawn.clone()).collect(),

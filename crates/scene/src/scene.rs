@@ -32,6 +32,8 @@ pub struct Scene {
     pub bodies: Vec<(String, BodyTable)>,
     /// `[tie.NAME]`
     pub ties: Vec<(String, TieTable)>,
+    /// Bodies that ties to other participants hold.
+    pub(crate) tied_outside: Vec<String>,
     /// `[surface.NAME]`
     pub surfaces: Vec<(String, SurfaceTable)>,
     /// `[constraint.NAME]`
@@ -158,6 +160,7 @@ impl Scene {
                 laws,
                 bodies,
                 ties,
+                tied_outside: Vec::new(),
                 surfaces,
                 constraints,
                 loads,

@@ -13,7 +13,8 @@ use pliant_sim::number;
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
 use crate::output::{
-    AXES, ENERGIES, OutputError, OutputFolder, Reactions, Summary, check_own_folder, plot_of_sweep,
+    AXES, ENERGIES, MOST_CURVES, OutputError, OutputFolder, Reactions, Summary, check_own_folder,
+    plot_of_sweep,
 };
 use crate::registry::OutputTable;
 use crate::run::{Options, run_with};
@@ -298,9 +299,11 @@ impl Sweep {
         let of_run = |run: usize| {
             let scene = self.scene(run).ok()?;
             let path = folder.path().join(format!("run-{run:04}"));
-            Some((self.title(run), reactions(&scene, &path)))
+            let found = reactions(&scene, &path);
+            (!found.is_empty()).then(|| (self.title(run), found))
         };
-        let found: Vec<(String, Reactions)> = (0..runs).filter_map(of_run).collect();
+        // No more tables are read than are drawn.
+        let found: Vec<(String, Reactions)> = (0..runs).filter_map(of_run).take(MOST_CURVES).collect();
         let svg = plot_of_sweep(&found).map_err(|error| OutputError::new(folder.path(), error))?;
         svg.map(|svg| folder.write(SWEEP_PLOT, svg)).transpose()
     }
@@ -381,11 +384,18 @@ impl Row {
     }
 }
 
+/// The tables that a run has written, by the names of their outputs.
+fn tables<'s>(scene: &'s Scene, folder: &Path) -> impl Iterator<Item = (&'s String, String)> {
+    let of_output = |(name, table): &'s (String, OutputTable)| match table {
+        OutputTable::Csv(_) => Some((name, fs::read_to_string(folder.join(format!("{name}.csv"))).ok()?)),
+        OutputTable::Vtu(_) => None,
+    };
+    scene.outputs.iter().filter_map(of_output)
+}
+
 /// The sizes of the reactions in the first table of a run that has some.
 fn reactions(scene: &Scene, folder: &Path) -> Reactions {
-    for (name, table) in &scene.outputs {
-        let OutputTable::Csv(_) = table else { continue };
-        let Ok(text) = fs::read_to_string(folder.join(format!("{name}.csv"))) else { continue };
+    for (_, text) in tables(scene, folder) {
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
         let rows: Vec<Vec<f64>> = lines
@@ -411,9 +421,7 @@ fn reactions(scene: &Scene, folder: &Path) -> Reactions {
 /// The last row of the probes in a run's tables; the columns begin with the name of the output.
 fn final_probes(scene: &Scene, folder: &Path) -> Vec<(String, String)> {
     let mut all = Vec::new();
-    for (name, table) in &scene.outputs {
-        let OutputTable::Csv(_) = table else { continue };
-        let Ok(text) = fs::read_to_string(folder.join(format!("{name}.csv"))) else { continue };
+    for (name, text) in tables(scene, folder) {
         let (Some(header), Some(last)) = (text.lines().next(), text.lines().last()) else { continue };
         let columns = header.split(',').zip(last.split(','));
         let probes = columns.filter(|(column, _)| column.starts_with("probe."));

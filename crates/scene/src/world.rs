@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pliant_geometry::Labels;
 #[cfg(feature = "gpu")]
 use pliant_sim::gpu::Device;
-use pliant_sim::{Failure, Simulation};
+use pliant_sim::{Failure, PenaltyTie, Simulation};
 
 use crate::assemble::{Built, Meshing, build_watched};
 use crate::cache::MeshCache;
@@ -21,6 +21,10 @@ pub struct World {
     pub scene: Scene,
     /// Bodies that one stepper advances together. One of them where all bodies go together.
     pub participants: Vec<Part>,
+    /// Ties between them.
+    pub ties: Vec<PenaltyTie>,
+    /// Remarks on these.
+    pub(crate) tie_notes: Vec<String>,
 }
 
 /// A participant: some bodies of a scene, with their model and how it is stepped.
@@ -74,11 +78,19 @@ impl World {
             Ok(Part { name, plan: plan?, scene: part, built: Arc::new(built) })
         };
         let participants = built.into_iter().map(planned).collect::<Result<Vec<_>, SceneErrors>>()?;
-        let mut world = Self { scene: scene.clone(), participants };
+        let (ties, tie_notes) = (Vec::new(), Vec::new());
+        let mut world = Self { scene: scene.clone(), participants, ties, tie_notes };
         if world.only().is_none() {
             world.check_load_steps()?;
         }
+        let mut found = Vec::new();
+        world.find_ties(&mut found);
         world.meet();
+        world.check_ties(&mut found);
+        if found.iter().any(Diagnostic::is_error) {
+            return Err(scene.source.errors(found));
+        }
+        found.into_iter().for_each(|doubt| world.doubt(doubt));
         Ok(world)
     }
 
@@ -98,7 +110,7 @@ impl World {
     pub fn of(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Self {
         let part =
             Part { name: String::new(), scene: scene.clone(), built: Arc::clone(built), plan: plan.clone() };
-        Self { scene: scene.clone(), participants: vec![part] }
+        Self { scene: scene.clone(), participants: vec![part], ties: Vec::new(), tie_notes: Vec::new() }
     }
 
     /// The same of another duration [s].
@@ -114,6 +126,7 @@ impl World {
 
     /// Makes the steps of each participant a multiple of those of the participant with the fewest.
     fn meet(&mut self) {
+        self.shorten_tied();
         let (until, common) = (self.scene.scene.until, self.steps());
         self.participants.iter_mut().for_each(|part| part.plan.steps.meet(common, until));
     }
@@ -158,7 +171,8 @@ impl World {
 
     /// Its participants without their tables.
     pub(crate) fn simulated(&self) -> pliant_sim::World {
-        pliant_sim::World { parts: self.participants.iter().map(Part::simulated).collect() }
+        let parts = self.participants.iter().map(Part::simulated).collect();
+        pliant_sim::World { parts, ties: self.ties.clone() }
     }
 
     /// Adds a doubt to those that did not keep the models from being built.
@@ -172,7 +186,7 @@ impl World {
             let Part { built, plan, .. }: &Part = part;
             built.notes.iter().chain(&plan.note).chain(&plan.target.note)
         };
-        self.participants.iter().flat_map(of)
+        self.participants.iter().flat_map(of).chain(&self.tie_notes)
     }
 
     /// Doubts that did not keep the models from being built.

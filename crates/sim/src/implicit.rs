@@ -568,6 +568,10 @@ impl Participant for Implicit {
         ROOM * 4.0 * lightest / (self.step * self.step)
     }
 
+    fn last_velocity(&self, node: usize) -> [f64; 3] {
+        self.state.velocity[node].into()
+    }
+
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
         [grip.position(&self.state, 0), grip.force(&self.state)]
     }

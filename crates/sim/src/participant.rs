@@ -43,6 +43,9 @@ pub(crate) trait Participant: Instant + Send {
     /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where they are stable with any.
     fn stiffest(&self, grip: &Grip) -> f64;
 
+    /// Velocity [m/s] of a node over the step that has ended.
+    fn last_velocity(&self, node: usize) -> [f64; 3];
+
     /// The point of a grip now [m], and its force on the body [N].
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2];
 

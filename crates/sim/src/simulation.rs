@@ -13,6 +13,7 @@ use crate::instant::Instant;
 use crate::kept::Kept;
 use crate::part::Part;
 use crate::participant::Participant;
+use crate::penalty::{Memory, PenaltyTie, Springs, TieNow};
 use crate::schedule::steps_to;
 use crate::solver::LoadStepProgress;
 use crate::start::{Before, begin, go_on};
@@ -22,6 +23,8 @@ use crate::start::{Before, begin, go_on};
 pub struct World {
     /// Bodies that one stepper advances together: at least one participant.
     pub parts: Vec<Part>,
+    /// Ties between participants.
+    pub ties: Vec<PenaltyTie>,
 }
 
 impl World {
@@ -33,7 +36,7 @@ impl World {
             let duration = part.steps.step * part.steps.number as f64;
             part.steps.meet(common, duration);
         }
-        Self { parts }
+        Self { parts, ties: Vec::new() }
     }
 
     /// Steps of each participant between two common instants.
@@ -52,7 +55,7 @@ impl World {
 
 impl From<Part> for World {
     fn from(part: Part) -> Self {
-        Self { parts: vec![part] }
+        Self { parts: vec![part], ties: Vec::new() }
     }
 }
 
@@ -64,7 +67,7 @@ impl From<Part> for Arc<World> {
 
 /// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
 #[derive(Clone, Debug)]
-pub struct State(Vec<OwnState>);
+pub struct State(Vec<OwnState>, Memory);
 
 /// That of a participant.
 #[derive(Clone, Debug)]
@@ -77,15 +80,19 @@ struct OwnState {
 
 impl State {
     /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
-    pub fn decode<B: AsRef<[u8]>>(world: &World, participants: &[B]) -> Option<Self> {
-        if participants.len() != world.parts.len() {
-            return None;
-        }
+    pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
+        let (participants, ties) = bytes.split_at_checked(world.parts.len())?;
+        let ties: Memory = match ties {
+            [] => Memory::default(),
+            [ties] => postcard::from_bytes(ties.as_ref()).ok()?,
+            _ => return None,
+        };
         let of = |(part, bytes): (&Part, &B)| {
             let kept = Kept::decode(part, bytes.as_ref())?;
             Some(OwnState { kept, clock: None, step: part.steps.step })
         };
-        world.parts.iter().zip(participants).map(of).collect::<Option<_>>().map(Self)
+        let parts = world.parts.iter().zip(participants).map(of).collect::<Option<_>>()?;
+        ties.fits(&world.ties).then_some(Self(parts, ties))
     }
 }
 
@@ -124,6 +131,13 @@ pub struct Simulation {
     ratios: Vec<u64>,
     /// First node of each participant, counted over all.
     first_nodes: Vec<u32>,
+    /// The participants in the order in which they go on: those with fewer steps first.
+    order: Vec<usize>,
+    /// Steps of each since the last common instant.
+    done: Vec<u64>,
+    /// Hands on each participant.
+    hands: Vec<Vec<Grip>>,
+    springs: Springs,
     /// Whether forces, energies and reactions belong to the instant.
     evaluated: bool,
 }
@@ -139,23 +153,23 @@ impl Simulation {
         if participants.is_empty() {
             return Err(Failure::input(&"the world has no participants"));
         }
-        Ok(Self::of(world, participants))
+        Self::of(world, participants, Memory::default())
     }
 
     /// From a state of this world on.
     ///
     /// # Errors
     /// If a stepper can't be made, or the state is of another world.
-    pub fn resumed(world: impl Into<Arc<World>>, State(state): State) -> Result<Self, Failure> {
+    pub fn resumed(world: impl Into<Arc<World>>, State(state, ties): State) -> Result<Self, Failure> {
         let (world, other) = (world.into(), || Failure::input(&"the state is of another model"));
-        if state.is_empty() || state.len() != world.parts.len() {
+        if state.is_empty() || state.len() != world.parts.len() || !ties.fits(&world.ties) {
             return Err(other());
         }
         let mut participants = Vec::new();
         for (part, own) in world.parts.iter().zip(state) {
             participants.push(go_on(part, own.kept, None)?.ok_or_else(other)?);
         }
-        Ok(Self::of(world, participants))
+        Self::of(world, participants, ties)
     }
 
     /// From a state that another world was in, with displacements, velocities and the history of relaxing laws. `None` where this world
@@ -165,11 +179,12 @@ impl Simulation {
     /// If a stepper can't be made.
     pub fn continued(
         world: impl Into<Arc<World>>,
-        State(state): State,
+        State(state, ties): State,
         before: &World,
     ) -> Result<Option<Self>, Failure> {
         let world = world.into();
-        if state.is_empty() || [state.len(), before.parts.len()] != [world.parts.len(); 2] {
+        let fits = ties.fits(&world.ties);
+        if state.is_empty() || [state.len(), before.parts.len()] != [world.parts.len(); 2] || !fits {
             return Ok(None);
         }
         let mut participants = Vec::new();
@@ -184,14 +199,20 @@ impl Simulation {
                 None => return Ok(None),
             }
         }
-        Ok(Some(Self::of(world, participants)))
+        Self::of(world, participants, ties).map(Some)
     }
 
-    fn of(world: Arc<World>, participants: Vec<Box<dyn Participant>>) -> Self {
+    fn of(world: Arc<World>, participants: Vec<Box<dyn Participant>>, ties: Memory) -> Result<Self, Failure> {
         let ratios = world.ratios();
         let nodes = world.parts.iter().map(|part| part.model.node_count() as u32);
         let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes))).collect();
-        Self { world, participants, ratios, first_nodes, evaluated: false }
+        let hands = vec![Vec::new(); participants.len()];
+        let mut order: Vec<usize> = (0..participants.len()).collect();
+        // Of the same steps, one whose equations are solved goes last.
+        order.sort_by_key(|&part| (ratios[part], world.parts[part].method.solves_steps()));
+        let done = vec![0; participants.len()];
+        let springs = Springs::new(&world.ties, &world.parts, ties)?;
+        Ok(Self { world, participants, ratios, first_nodes, order, done, hands, springs, evaluated: false })
     }
 
     /// The world.
@@ -284,6 +305,13 @@ impl Simulation {
     /// If those of a participant can't be found.
     pub fn evaluate(&mut self, wanted: Wanted) -> Result<(), Failure> {
         if !self.evaluated {
+            if !self.springs.is_empty() {
+                self.springs.meet(&self.participants);
+                self.done.fill(0);
+                for part in 0..self.participants.len() {
+                    self.take_hold(part);
+                }
+            }
             self.participants.iter_mut().try_for_each(|participant| participant.evaluate(wanted))?;
             self.evaluated = true;
         }
@@ -300,20 +328,84 @@ impl Simulation {
     /// # Errors
     /// If a step of a participant can't be taken.
     pub fn advance(&mut self, steps: u64, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
-        for (participant, ratio) in self.participants.iter_mut().zip(&self.ratios) {
-            let mut left = steps * ratio;
-            loop {
-                let now = left.min(participant.stride());
-                participant.advance(now, watch)?;
-                left -= now;
-                if left == 0 {
-                    break;
+        match self.springs.is_empty() {
+            true => {
+                for part in 0..self.participants.len() {
+                    self.advance_apart(part, steps, watch)?;
                 }
-                participant.evaluate(Wanted::Energies)?;
             }
+            false => self.advance_tied(watch)?,
         }
         self.evaluated = false;
         Ok(())
+    }
+
+    fn advance_apart(
+        &mut self,
+        part: usize,
+        steps: u64,
+        watch: &mut dyn FnMut(LoadStepProgress),
+    ) -> Result<(), Failure> {
+        let participant = &mut self.participants[part];
+        let mut left = steps * self.ratios[part];
+        loop {
+            let now = left.min(participant.stride());
+            participant.advance(now, watch)?;
+            left -= now;
+            if left == 0 {
+                return Ok(());
+            }
+            participant.evaluate(Wanted::Energies)?;
+        }
+    }
+
+    /// One common step of participants that are tied: whoever is behind goes on, of several those with the longest steps.
+    fn advance_tied(&mut self, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
+        self.done.fill(0);
+        while let Some(part) = self.hindmost() {
+            // Forces of the first step are found where all meet; only equations are solved with ties as they are then.
+            let first = self.done[part] == 0;
+            if !first {
+                self.springs.settle(part, &self.world.parts);
+            }
+            if !first || self.world.parts[part].method.solves_steps() {
+                self.take_hold(part);
+            }
+            let participant = &mut self.participants[part];
+            if !first {
+                participant.evaluate(Wanted::Energies)?;
+            }
+            participant.advance(1, watch)?;
+            self.done[part] += 1;
+            let ahead = ahead(&self.world.parts, &self.done, part, 0);
+            self.springs.after(part, &self.world.parts, &self.participants, ahead);
+        }
+        (0..self.participants.len()).for_each(|part| self.springs.settle(part, &self.world.parts));
+        Ok(())
+    }
+
+    /// The participant that is farthest from the next common instant.
+    fn hindmost(&self) -> Option<usize> {
+        let left = self.order.iter().copied().filter(|&part| self.done[part] < self.ratios[part]);
+        left.min_by_key(|&part| {
+            // In parts of the common step; the first one of several.
+            let all: u64 = 1 << 40;
+            self.done[part] * all / self.ratios[part]
+        })
+    }
+
+    /// Lets hands and ties take hold of a participant for its next step; false if it knows no grips.
+    fn take_hold(&mut self, part: usize) -> bool {
+        let mut grips = self.hands[part].clone();
+        let ahead = ahead(&self.world.parts, &self.done, part, 1);
+        self.springs.before(part, &self.participants, ahead);
+        self.springs.add_to(part, &mut grips);
+        self.participants[part].hold(&grips)
+    }
+
+    /// The ties between participants at the instant last evaluated.
+    pub fn ties(&self) -> impl Iterator<Item = TieNow<'_>> {
+        self.springs.now()
     }
 
     /// The most common instants that it passes in one go: more than one where the state lies on a GPU.
@@ -336,7 +428,7 @@ impl Simulation {
         let parts = self.world.parts.iter().zip(&self.participants);
         let own =
             parts.map(|(part, now)| OwnState { clock: now.clock(), kept: now.kept(), step: part.steps.step });
-        Ok(State(own.collect()))
+        Ok(State(own.collect(), self.springs.memory().clone()))
     }
 
     /// Goes back, or on, to a state of this world.
@@ -364,15 +456,16 @@ impl Simulation {
         }
     }
 
-    /// The state of each participant as bytes of a checkpoint, after a step.
+    /// The state of each participant as bytes of a checkpoint, after a step; with ties between participants, theirs after them.
     ///
     /// # Errors
     /// If a device fails, or a state can't be encoded.
     pub fn encode(&mut self) -> Result<Vec<Vec<u8>>, Failure> {
         self.bring_back()?;
-        let bytes = self.participants.iter().map(|participant| participant.encode());
+        let own = self.participants.iter().map(|participant| participant.encode());
+        let ties = (!self.springs.is_empty()).then(|| postcard::to_stdvec(self.springs.memory()));
         let failed = |error: postcard::Error| Failure::new("output", error.to_string(), Some(self.time()));
-        bytes.collect::<postcard::Result<_>>().map_err(failed)
+        own.chain(ties).collect::<postcard::Result<_>>().map_err(failed)
     }
 
     fn bring_back(&mut self) -> Result<(), Failure> {
@@ -438,9 +531,10 @@ impl Simulation {
             let Some((part, own)) = self.own(grip) else { return false };
             of_parts[part].push(own);
         }
+        self.hands = of_parts;
         let mut all = true;
-        for (participant, own) in self.participants.iter_mut().zip(&of_parts) {
-            all &= participant.hold(own);
+        for part in 0..self.participants.len() {
+            all &= self.take_hold(part);
         }
         all
     }
@@ -550,6 +644,12 @@ impl Simulation {
         let (stepper, state) = only.on_device()?;
         Some(OnDevice { stepper, state, evaluated: &mut self.evaluated })
     }
+}
+
+/// How far [s] others are, each by its place, beyond where a participant is after so many more steps.
+fn ahead<'a>(parts: &'a [Part], done: &'a [u64], part: usize, more: u64) -> impl Fn(usize) -> f64 + 'a {
+    let at = move |part: usize, more: u64| (done[part] + more) as f64 * parts[part].steps.step;
+    move |other| at(other, 0) - at(part, more)
 }
 
 /// Whether a participant has the nodes and cells that another one has.

@@ -214,6 +214,11 @@ impl<R: Numeric> Participant for Solids<R> {
         grip.stiffest(&self.nodes(), &self.model, self.step)
     }
 
+    fn last_velocity(&self, node: usize) -> [f64; 3] {
+        let length = self.solver.clock(&self.state).map_or(self.step, |clock| clock.before);
+        self.state.increment[node].map(|moved| moved.to_f64() / length)
+    }
+
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
         let nodes = self.nodes();
         [grip.position(&nodes, 0), grip.force(&nodes)]

@@ -116,7 +116,7 @@ fn a_state_is_of_its_model_and_between_two_steps() {
     assert!(refused.message.contains("belong to the step to come"), "{refused}");
     simulation.step(1).unwrap();
     simulation.state().unwrap();
-    assert!(Simulation::new(World { parts: Vec::new() }).is_err());
+    assert!(Simulation::new(World::new(Vec::new())).is_err());
 }
 
 #[test]

@@ -8,7 +8,7 @@ use pliant_geometry::Vector3;
 use pliant_imaging::LabelChoice;
 use pliant_scene::OrganScene;
 
-use super::input::{is_mesh_file, regions};
+use super::input::{image, is_mesh_file, label_failure, regions_in};
 use crate::arguments::{MeshCells, MeshImage};
 use crate::report::{Bar, Failure, say};
 
@@ -44,16 +44,17 @@ pub fn scene(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     }
     let sources = Sources::of(arguments)?;
     let bar = Bar::new();
-    // The organ gives the box; vessels are read once to see that they are there.
-    let mut vessels = arguments.clone();
-    vessels.label = arguments.vessels.iter().map(|(label, _)| label.clone()).collect();
-    let mut organ = arguments.clone();
-    organ.label = sources.organ;
-    let found = regions(&organ, &bar);
-    let there = if vessels.label.is_empty() { Ok(()) } else { regions(&vessels, &bar).map(|_| ()) };
+    let vessels: Vec<LabelChoice> = arguments.vessels.iter().map(|(label, _)| label.clone()).collect();
+    let organ = MeshImage { label: sources.organ, ..arguments.clone() };
+    let found = image(arguments, &bar).and_then(|image| {
+        // The organ gives the box; of vessels it is enough that they are there.
+        if !vessels.is_empty() {
+            image.choose(&vessels).map_err(|error| label_failure(&error))?;
+        }
+        regions_in(image, &organ, &bar)
+    });
     bar.finish();
     let found = found?;
-    there?;
     for line in &found.lines {
         say(line)?;
     }

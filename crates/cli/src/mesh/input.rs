@@ -102,20 +102,32 @@ const READING: f64 = 0.1;
 
 /// The chosen labels of an image, or all voxels from a threshold. Very many voxels are resampled to suit the cells.
 pub fn regions(arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
-    let refused = |error: LabelError| label_failure(&error);
-    let masks = !arguments.masks.is_empty();
-    let source = Source {
+    regions_in(image(arguments, bar)?, arguments, bar)
+}
+
+fn source(arguments: &MeshImage) -> Source<'_> {
+    Source {
         files: std::iter::once(&arguments.image).chain(&arguments.masks).collect(),
         names: arguments.names.as_deref(),
         series: arguments.series.clone(),
         threshold: arguments.threshold,
         force: arguments.force,
-    };
-    let mut image = source.read(bar, READING)?;
+    }
+}
+
+/// The image of the arguments, before labels are chosen.
+pub fn image(arguments: &MeshImage, bar: &Bar) -> Result<Image, Failure> {
+    source(arguments).read(bar, READING)
+}
+
+/// [`regions`] of an image that is read.
+pub fn regions_in(mut image: Image, arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
+    let refused = |error: LabelError| label_failure(&error);
+    let masks = !arguments.masks.is_empty();
     let choice = match arguments.threshold {
         Some(least) if !masks => {
             if let Some(path) = &arguments.add {
-                let added = read_with(path, &source.options(), &|_| {});
+                let added = read_with(path, &source(arguments).options(), &|_| {});
                 image = image.plus(&added.map_err(|error| image_failure(&error))?).map_err(refused)?;
             }
             Choice::From(least)

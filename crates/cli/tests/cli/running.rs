@@ -26,7 +26,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 26] = [
+const KEYS: [&str; 27] = [
     "status",
     "error",
     "bodies",
@@ -38,6 +38,7 @@ const KEYS: [&str; 26] = [
     "critical_step",
     "limiting_element",
     "participants",
+    "ties",
     "solver",
     "equilibria",
     "ended",

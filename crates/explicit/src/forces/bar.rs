@@ -11,7 +11,7 @@ use super::blocks::Task;
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, own_packs, relative};
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector};
+use crate::lanes::{Lanes, Local, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;
 
 /// Bars of one solid.
@@ -67,20 +67,17 @@ impl<R: Scalar> Bars<R> {
     }
 }
 
-/// A pass over the bars of a block.
-struct Pass<'a, R> {
-    constants: &'a Constants<R>,
-    displacement: &'a [Vector<R>],
-    task: Task<'a, R>,
-}
-
-impl<R: Scalar> Work<R> for Pass<'_, R> {
-    type Output = Findings<R>;
+impl<R: Scalar> Element<R> for Constants<R> {
+    fn slots(&self) -> [usize; 2] {
+        [self.history, 0]
+    }
+    fn relaxation(&mut self) -> &mut Relaxation<R> {
+        &mut self.relaxation
+    }
 
     #[inline(always)]
-    fn run<L: Lanes<R>>(self) -> Findings<R> {
-        let Self { constants, displacement, mut task } = self;
-        let Constants { cells, rest, tension_only, relaxation, history: per_pack } = constants;
+    fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
+        let Constants { cells, rest, tension_only, relaxation, history: per_pack } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);
@@ -115,17 +112,5 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
             local.add::<L>(pack - packs.start, &forces);
         }
         Findings::default()
-    }
-}
-
-impl<R: Scalar> Element<R> for Constants<R> {
-    fn slots(&self) -> [usize; 2] {
-        [self.history, 0]
-    }
-    fn relaxation(&mut self) -> &mut Relaxation<R> {
-        &mut self.relaxation
-    }
-    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R> {
-        processor.run(Pass { constants: self, displacement, task })
     }
 }

@@ -13,7 +13,7 @@ use super::corners::{CornerCheck, PackedCorners, is_flat};
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, displacement_gradient, own_packs, relative};
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector, store_vector};
+use crate::lanes::{Lanes, Local, PACK, Pack, load_vector, store_vector};
 use crate::relaxation::Relaxation;
 
 pub(super) type FullHexes<R> = OnePass<R, Constants<R>>;
@@ -65,24 +65,21 @@ impl<R: Scalar> FullHexes<R> {
     }
 }
 
-/// A pass over the cells of a block.
-struct Pass<'a, R> {
-    constants: &'a Constants<R>,
-    displacement: &'a [Vector<R>],
-    task: Task<'a, R>,
-}
-
-impl<R: Scalar> Work<R> for Pass<'_, R> {
-    type Output = Findings<R>;
+impl<R: Scalar> Element<R> for Constants<R> {
+    fn slots(&self) -> [usize; 2] {
+        [8 * 6 * self.isochoric_slots, self.volumetric_slots]
+    }
+    fn relaxation(&mut self) -> &mut Relaxation<R> {
+        &mut self.relaxation
+    }
 
     #[inline(always)]
-    fn run<L: Lanes<R>>(self) -> Findings<R> {
-        let Self { constants, displacement, mut task } = self;
-        let Constants { law, cells, points, corners, inverse_volume, relaxation, .. } = constants;
+    fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
+        let Constants { law, cells, points, corners, inverse_volume, relaxation, .. } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, pressures, .. } = task;
         sums.fill([R::ZERO; 4]);
-        let per_point = 6 * constants.isochoric_slots;
+        let per_point = 6 * self.isochoric_slots;
         let mut findings = Findings::default();
         let mut batch = Batch::new();
         let mut u = [[Pack::ZERO; 3]; 7];
@@ -118,7 +115,7 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
                 findings.folded = L::call(look).map(|lane| pack * PACK + lane);
             }
             // U'(v/V), relaxed where the law's volumetric part relaxes.
-            let slots = constants.volumetric_slots;
+            let slots = self.volumetric_slots;
             let own = own_packs(pack - packs.start, slots, pressures.len());
             let values = std::slice::from_mut(&mut pressure);
             relaxed_pressures::<R, L>(law, relaxation, slots, values, &mut pressures[own], &mut batch);
@@ -162,17 +159,5 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
             local.add::<L>(pack - packs.start, &forces);
         }
         findings
-    }
-}
-
-impl<R: Scalar> Element<R> for Constants<R> {
-    fn slots(&self) -> [usize; 2] {
-        [8 * 6 * self.isochoric_slots, self.volumetric_slots]
-    }
-    fn relaxation(&mut self) -> &mut Relaxation<R> {
-        &mut self.relaxation
-    }
-    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R> {
-        processor.run(Pass { constants: self, displacement, task })
     }
 }

@@ -18,7 +18,7 @@ use super::blocks::Task;
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, own_packs, relative};
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, load_vector};
+use crate::lanes::{Lanes, Local, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;
 
 /// Where a search ends: a step of so many units in the last place of λ₃ − 1.
@@ -209,20 +209,17 @@ impl<R: Scalar> Walls<R> {
     }
 }
 
-/// A pass over the triangles of a block.
-struct Pass<'a, R> {
-    constants: &'a Constants<R>,
-    displacement: &'a [Vector<R>],
-    task: Task<'a, R>,
-}
-
-impl<R: Scalar> Work<R> for Pass<'_, R> {
-    type Output = Findings<R>;
+impl<R: Scalar> Element<R> for Constants<R> {
+    fn slots(&self) -> [usize; 2] {
+        [self.history, 0]
+    }
+    fn relaxation(&mut self) -> &mut Relaxation<R> {
+        &mut self.relaxation
+    }
 
     #[inline(always)]
-    fn run<L: Lanes<R>>(self) -> Findings<R> {
-        let Self { constants, displacement, mut task } = self;
-        let Constants { cells, rest, relaxation, history: per_pack, .. } = constants;
+    fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
+        let Constants { cells, rest, relaxation, history: per_pack, .. } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);
@@ -244,7 +241,7 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
                     }
                 }
             }
-            walls.evaluate::<L>(constants, &mut batch, count, cells.fibres(first, count));
+            walls.evaluate::<L>(self, &mut batch, count, cells.fibres(first, count));
             for index in 0..count {
                 let pack = first + index;
                 for at in (0..PACK).step_by(L::WIDTH) {
@@ -257,7 +254,7 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
                 batch.note(index, pack * PACK, &mut findings);
                 let own = own_packs(pack - packs.start, *per_pack, history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let [xx, yy, xy] = walls.stress::<L>(constants, &batch, index, at);
+                    let [xx, yy, xy] = walls.stress::<L>(self, &batch, index, at);
                     let o = L::ZERO;
                     let elastic =
                         Split { isochoric: Symmetric([xx, yy, o, xy, o, o]), volumetric: Symmetric([o; 6]) };
@@ -282,17 +279,5 @@ impl<R: Scalar> Work<R> for Pass<'_, R> {
             }
         }
         findings
-    }
-}
-
-impl<R: Scalar> Element<R> for Constants<R> {
-    fn slots(&self) -> [usize; 2] {
-        [self.history, 0]
-    }
-    fn relaxation(&mut self) -> &mut Relaxation<R> {
-        &mut self.relaxation
-    }
-    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R> {
-        processor.run(Pass { constants: self, displacement, task })
     }
 }

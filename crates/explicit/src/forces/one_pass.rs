@@ -7,19 +7,19 @@ use super::blocks::{Blocks, Moved, Quad, Task};
 use super::{Findings, ForceField};
 use crate::Scalar;
 use crate::history::History;
-use crate::lanes::Processor;
+use crate::lanes::{Lanes, Processor, Work};
 use crate::relaxation::Relaxation;
 
 /// What an element knows of its cells that does not change from step to step.
-pub(super) trait Element<R>: Send + Sync {
+pub(super) trait Element<R: Scalar>: Send + Sync {
     /// Packs of history for a pack of cells, and of that of their pressures.
     fn slots(&self) -> [usize; 2];
 
     /// The coefficients of its relaxation.
     fn relaxation(&mut self) -> &mut Relaxation<R>;
 
-    /// Does the pass over a block.
-    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R>;
+    /// The pass over a block, in lanes; inlined into each kind of lanes.
+    fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R>;
 }
 
 /// The force field of such an element.
@@ -32,6 +32,22 @@ pub(super) struct OnePass<R, E> {
 impl<R: Scalar, E: Element<R>> OnePass<R, E> {
     pub(super) fn of(blocks: Blocks, element: E) -> Self {
         Self { processor: Processor::detect(), moved: Moved::new(blocks), element }
+    }
+}
+
+/// A pass over the cells of a block.
+struct Pass<'a, R, E> {
+    element: &'a E,
+    displacement: &'a [Vector<R>],
+    task: Task<'a, R>,
+}
+
+impl<R: Scalar, E: Element<R>> Work<R> for Pass<'_, R, E> {
+    type Output = Findings<R>;
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) -> Findings<R> {
+        self.element.pass::<L>(self.displacement, self.task)
     }
 }
 
@@ -51,7 +67,7 @@ impl<R: Scalar, E: Element<R>> ForceField<R> for OnePass<R, E> {
         let pressures = (history.pressures.as_mut_slice(), of_pressures);
         let history = (history.cells.as_mut_slice(), of_cells);
         moved.for_each(forces, history, pressures, findings, |_, task| {
-            element.pass(*processor, displacement, task)
+            processor.run(Pass { element: &*element, displacement, task })
         });
     }
     fn set_step(&mut self, prony: &Prony, step: f64) {

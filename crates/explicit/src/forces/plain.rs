@@ -13,7 +13,7 @@ use super::{
     Findings, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
 };
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work};
+use crate::lanes::{Lanes, Local, PACK, Pack};
 use crate::relaxation::Relaxation;
 
 /// Cells of `N` nodes with one evaluation point; `M` is one less.
@@ -53,20 +53,17 @@ impl<R: Scalar, const N: usize, const M: usize> SolidForces<R, N, M> {
     }
 }
 
-/// A pass over the cells of a block.
-struct Pass<'a, R, const N: usize, const M: usize> {
-    constants: &'a Constants<R, N, M>,
-    displacement: &'a [Vector<R>],
-    task: Task<'a, R>,
-}
-
-impl<R: Scalar, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
-    type Output = Findings<R>;
+impl<R: Scalar, const N: usize, const M: usize> Element<R> for Constants<R, N, M> {
+    fn slots(&self) -> [usize; 2] {
+        [self.history, 0]
+    }
+    fn relaxation(&mut self) -> &mut Relaxation<R> {
+        &mut self.relaxation
+    }
 
     #[inline(always)]
-    fn run<L: Lanes<R>>(self) -> Findings<R> {
-        let Self { constants, displacement, mut task } = self;
-        let Constants { law, cells, rest, hourglass, corners, relaxation, history: per_pack } = constants;
+    fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
+        let Constants { law, cells, rest, hourglass, corners, relaxation, history: per_pack } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);
@@ -127,17 +124,5 @@ impl<R: Scalar, const N: usize, const M: usize> Work<R> for Pass<'_, R, N, M> {
             }
         }
         findings
-    }
-}
-
-impl<R: Scalar, const N: usize, const M: usize> Element<R> for Constants<R, N, M> {
-    fn slots(&self) -> [usize; 2] {
-        [self.history, 0]
-    }
-    fn relaxation(&mut self) -> &mut Relaxation<R> {
-        &mut self.relaxation
-    }
-    fn pass(&self, processor: Processor, displacement: &[Vector<R>], task: Task<'_, R>) -> Findings<R> {
-        processor.run(Pass { constants: self, displacement, task })
     }
 }

@@ -233,6 +233,7 @@ impl Builder<'_> {
                 .iter()
                 .any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)))
                 || springs.iter().any(|spring| body.nodes.contains(&spring.node))
+                || scene.tied_outside.contains(&body.name)
                 || self.assembly.ties.iter().flat_map(|tie| &tie.nodes).any(|node| body.nodes.contains(node));
             if held || scene.run.solver == SolverName::Static {
                 continue;

@@ -35,6 +35,7 @@ use crate::source::Source;
 
 pub use mesh_files::SizeDoubt;
 pub(crate) use meshes::MeshOrigin;
+pub(crate) use ties::{Placed, attach, holds_nothing};
 
 /// A model, and what the outputs need beside it.
 #[derive(Clone, Debug)]
@@ -71,12 +72,17 @@ pub struct BuiltBody {
 }
 
 impl BuiltBody {
+    /// Whether it is made of lines.
+    pub(crate) fn is_of_bars(&self) -> bool {
+        self.boundary.faces.is_empty()
+    }
+
     /// Finds points of its body.
     pub(crate) fn locator(&self) -> BodyLocator<'_> {
         if self.mesh.volume_blocks().any(|block| !block.is_empty()) {
             return BodyLocator::Cells(&self.mesh, Locator::new(&self.mesh));
         }
-        if self.boundary.faces.is_empty() {
+        if self.is_of_bars() {
             return BodyLocator::Lines(&self.mesh);
         }
         let all: Vec<u32> = (0..self.boundary.faces.len() as u32).collect();

@@ -1,18 +1,120 @@
 //! Ties: nodes of one body that follow the cells of another.
 
-use pliant_geometry::{CellKind, QualityReport};
+use pliant_geometry::QualityReport;
+use pliant_mechanics::Model;
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Cells;
 use pliant_sim::{counted, number};
 
-use super::Builder;
+use super::{Builder, BuiltBody};
 use crate::diagnostic::Diagnostic;
 use crate::format::TieTable;
+use crate::source::Source;
 
 /// Part of the median edge of the followed body that a gap may have.
 const GAP: f64 = 0.1;
 /// A body inside another that takes more of its volume is reported: both are stiff there.
 const CROWDED: f64 = 1e-3;
+
+/// Nodes of a body with the points of another one that they follow.
+pub(crate) struct Attached {
+    /// The nodes, numbered in the first model.
+    pub nodes: Vec<u32>,
+    /// Nodes of the second model with their weights, for each of them.
+    pub mapping: Weights,
+    /// A remark on how many there are, and the widest gap.
+    pub note: String,
+}
+
+/// A body with the model that it is in.
+#[derive(Clone, Copy)]
+pub(crate) struct Placed<'b> {
+    pub body: &'b BuiltBody,
+    pub model: &'b Model,
+    /// Its place among the bodies of the model.
+    pub index: usize,
+}
+
+/// Finds where nodes of one body lie in another one, and says which lie too far away.
+pub(crate) fn attach(
+    source: &Source,
+    (name, table): (&str, &TieTable),
+    (guest, nodes): (Placed<'_>, &[u32]),
+    host: Placed<'_>,
+    out: &mut Vec<Diagnostic>,
+) -> Option<Attached> {
+    let path = ["tie", name, "between"];
+    let names = &table.between;
+    let median = QualityReport::new(&host.body.mesh).edge_length.map_or(0.0, |edges| edges.median);
+    let tolerance = table.tolerance.unwrap_or(GAP * median);
+    let locator = host.body.locator();
+    let own = &host.model.bodies[host.index];
+    let (mut tied, mut rows, mut left) = (Vec::new(), Vec::new(), 0);
+    let (mut widest, mut farthest, mut nearest) = (0.0_f64, (0.0_f64, [0.0; 3]), f64::INFINITY);
+    for &node in nodes {
+        let place = guest.model.rest[node as usize];
+        let Some(found) = locator.locate(&place.into()) else { continue };
+        nearest = nearest.min(found.distance);
+        if found.distance > tolerance {
+            left += 1;
+            if found.distance > farthest.0 {
+                farthest = (found.distance, place);
+            }
+            continue;
+        }
+        widest = widest.max(found.distance);
+        tied.push(node);
+        rows.push(found.weights.iter().map(|&(node, w)| (own.node(node), w)).collect::<Vec<_>>());
+    }
+    let gap = format!("{} m", number(tolerance));
+    let help = "move one of them (`at`), or give a larger `tolerance` in metres";
+    let mut error = |path: &[&str], message: String, label: &str| {
+        out.push(Diagnostic::error(message).at(source.span(path), label).help(help));
+    };
+    if tied.is_empty() {
+        let message = format!(
+            "no node of `{}` lies within {gap} of `{}`: the nearest is {} m away",
+            names[0],
+            names[1],
+            number(nearest)
+        );
+        error(&path, message, "too far apart");
+        return None;
+    }
+    if left > 0 {
+        let [x, y, z] = farthest.1.map(number);
+        let message = format!(
+            "{} of {} of `{}` {} farther than {gap} from `{}`, up to {} m at ({x}, {y}, {z}) m",
+            left,
+            counted(nodes.len(), "node"),
+            names[0],
+            if left == 1 { "lies" } else { "lie" },
+            names[1],
+            number(farthest.0)
+        );
+        if table.nodes.is_some() {
+            error(&["tie", name, "nodes"], message, "beyond the tolerance");
+            return None;
+        }
+        out.push(Diagnostic::warning(message).at(source.span(&path), "not tied there").help(help));
+    }
+    let note = format!(
+        "`{name}`: {} of `{}` {} `{}`, with gaps of at most {} m",
+        counted(tied.len(), "node"),
+        names[0],
+        if tied.len() == 1 { "follows" } else { "follow" },
+        names[1],
+        number(widest)
+    );
+    Some(Attached { nodes: tied, mapping: Weights::from_rows(rows.iter().map(Vec::as_slice)), note })
+}
+
+/// The complaint about a bar that shall hold another body.
+pub(crate) fn holds_nothing(source: &Source, path: &[&str], host: &str) -> Diagnostic {
+    Diagnostic::error(format!("`{host}` is a bar, which holds no other body"))
+        .at(source.span(path), "a bar")
+        .help("name it first: its nodes follow the other body")
+}
 
 impl Builder<'_> {
     /// Adds all ties, once the bodies are there.
@@ -36,11 +138,9 @@ impl Builder<'_> {
             self.error(&path, message, "one body", "name two bodies");
             return None;
         }
-        if self.bodies[host].mesh.block(CellKind::Line).is_some()
-            && self.bodies[host].boundary.faces.is_empty()
-        {
-            let message = format!("`{}` is a bar, which holds no other body", names[1]);
-            self.error(&path, message, "a bar", "name it first: its nodes follow the other body");
+        if self.bodies[host].is_of_bars() {
+            let refused = holds_nothing(self.source(), &path, &names[1]);
+            self.out.push(refused);
             return None;
         }
         let shares = |a: usize, b: usize| {
@@ -56,68 +156,11 @@ impl Builder<'_> {
             Some(selection) => self.body_nodes(guest, selection, &["tie", name, "nodes"])?,
             None => self.assembly.bodies[guest].all_nodes().collect(),
         };
-        let median =
-            QualityReport::new(&self.bodies[host].mesh).edge_length.map_or(0.0, |edges| edges.median);
-        let tolerance = table.tolerance.unwrap_or(GAP * median);
-        let locator = self.bodies[host].locator();
-        let own = &self.assembly.bodies[host];
-        let (mut tied, mut rows, mut left) = (Vec::new(), Vec::new(), 0);
-        let (mut widest, mut farthest, mut nearest) = (0.0_f64, (0.0_f64, [0.0; 3]), f64::INFINITY);
-        for &node in &nodes {
-            let place = self.assembly.rest[node as usize];
-            let Some(found) = locator.locate(&place.into()) else { continue };
-            nearest = nearest.min(found.distance);
-            if found.distance > tolerance {
-                left += 1;
-                if found.distance > farthest.0 {
-                    farthest = (found.distance, place);
-                }
-                continue;
-            }
-            widest = widest.max(found.distance);
-            tied.push(node);
-            rows.push(found.weights.iter().map(|&(node, w)| (own.node(node), w)).collect::<Vec<_>>());
-        }
-        let gap = format!("{} m", number(tolerance));
-        let help = "move one of them (`at`), or give a larger `tolerance` in metres";
-        if tied.is_empty() {
-            let message = format!(
-                "no node of `{}` lies within {gap} of `{}`: the nearest is {} m away",
-                names[0],
-                names[1],
-                number(nearest)
-            );
-            self.error(&path, message, "too far apart", help);
-            return None;
-        }
-        if left > 0 {
-            let [x, y, z] = farthest.1.map(number);
-            let message = format!(
-                "{} of {} of `{}` {} farther than {gap} from `{}`, up to {} m at ({x}, {y}, {z}) m",
-                left,
-                counted(nodes.len(), "node"),
-                names[0],
-                if left == 1 { "lies" } else { "lie" },
-                names[1],
-                number(farthest.0)
-            );
-            if table.nodes.is_some() {
-                self.error(&["tie", name, "nodes"], message, "beyond the tolerance", help);
-                return None;
-            }
-            let place = self.source().span(&path);
-            self.out.push(Diagnostic::warning(message).at(place, "not tied there").help(help));
-        }
-        self.notes.push(format!(
-            "`{name}`: {} of `{}` {} `{}`, with gaps of at most {} m",
-            counted(tied.len(), "node"),
-            names[0],
-            if tied.len() == 1 { "follows" } else { "follow" },
-            names[1],
-            number(widest)
-        ));
-        let mapping = Weights::from_rows(rows.iter().map(Vec::as_slice));
-        if let Err(error) = self.assembly.model_mut().tie(name, tied, mapping) {
+        let placed = |index: usize| Placed { body: &self.bodies[index], model: &self.assembly.model, index };
+        let (source, out) = (&self.scene.source, &mut self.out);
+        let found = attach(source, (name, table), (placed(guest), &nodes), placed(host), out)?;
+        self.notes.push(found.note);
+        if let Err(error) = self.assembly.model_mut().tie(name, found.nodes, found.mapping) {
             self.error(
                 &path,
                 error.to_string(),

@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// Ties the nodes of one body to another body, whose mesh need not match: each follows the cell of the other in which it lies, or on
-/// whose surface, and its forces and its mass go there. For vessels inside an organ, walls on a surface, parts that are glued. Both bodies
-/// are of one participant, on the CPU.
+/// whose surface, and its forces and its mass go there. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of
+/// two participants are tied by springs, as stiff as their steps allow. On the CPU.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TieTable {

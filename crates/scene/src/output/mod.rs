@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use file::{check_own_folder, replace};
 pub use folder::OutputFolder;
 pub(crate) use folder::{CONVERGENCE, PICTURE, PLOT, SUMMARY};
+pub use outcome::TieSummary;
 pub(crate) use outcome::{History, Outcome, PartOutcome, Watched};
 pub use stability::{AddedMass, StabilitySummary};
 pub(crate) use strains::ShellStrains;
@@ -31,7 +32,7 @@ pub use summary::{BodySummary, ParticipantSummary, Summary, failed_input, failed
 pub use csv::Column;
 pub(crate) use csv::{AXES, ENERGIES, Samples};
 pub(crate) use field_mesh::FieldMesh;
-pub(crate) use plot::{Reactions, constraints, plot, plot_of_sweep};
+pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
 
 use crate::assemble::Built;

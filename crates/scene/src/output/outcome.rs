@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
-use pliant_sim::{Effort, Equilibria, Failure, Instant};
+use pliant_sim::{Effort, Equilibria, Failure, Instant, TieNow};
 use serde::{Deserialize, Serialize};
 
 use super::{Frame, ShellStrains, time_of};
@@ -23,6 +23,8 @@ pub(crate) struct Outcome {
     pub energies: Energies,
     /// Of each participant, in the order of the world.
     pub parts: Vec<PartOutcome>,
+    /// The ties between participants.
+    pub ties: Vec<TieSummary>,
     /// Why it ended before the time of the scene was over, without a failure.
     pub ended: Option<String>,
     pub history: History,
@@ -48,6 +50,7 @@ impl Outcome {
             wall_seconds: 0.0,
             energies: Energies::default(),
             parts: world.participants.iter().map(part).collect(),
+            ties: Vec::new(),
             ended: None,
             history: History::default(),
             files: Vec::new(),
@@ -91,6 +94,32 @@ impl PartOutcome {
             convergence: participant.convergence(),
             reactions: frame.reactions().collect(),
         }
+    }
+}
+
+/// A tie between two participants.
+#[derive(Clone, Debug, Serialize)]
+pub struct TieSummary {
+    /// Its name.
+    pub name: String,
+    /// The bodies that it ties.
+    pub bodies: [String; 2],
+    /// Its points.
+    pub points: usize,
+    /// Force [N] on the first body at the end.
+    pub force: [f64; 3],
+    /// The widest gap of a point at the end [m].
+    pub gap: f64,
+    /// The widest gap of a point during the run [m].
+    pub widest: f64,
+}
+
+impl TieSummary {
+    pub(crate) fn new(world: &World, tie: TieNow<'_>) -> Self {
+        let TieNow { name, points, forces: [force, _], gap, widest } = tie;
+        let table = world.scene.ties.iter().find(|(known, _)| known == name);
+        let bodies = table.map_or_else(Default::default, |(_, table)| table.between.clone());
+        Self { name: name.into(), bodies, points, force, gap, widest }
     }
 }
 

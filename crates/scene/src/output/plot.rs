@@ -21,8 +21,10 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Panels in the plot of a sweep, and curves in each of them.
-const MOST: [usize; 2] = [6, 14];
+/// Runs that the plot of a sweep shows.
+pub(crate) const MOST_CURVES: usize = 14;
+/// Panels in it.
+const MOST_PANELS: usize = 6;
 /// Height of such a panel.
 const HEIGHT: u32 = 380;
 
@@ -75,8 +77,8 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
     Ok(svg)
 }
 
-/// The plot of a sweep: a panel for each reaction, a curve in it for each run by its title. At most the first six and fourteen. `None`
-/// without any reaction.
+/// The plot of some runs of a sweep: a panel for each reaction, six at most, and a curve in it for each run by its title. `None` without
+/// any reaction.
 pub(crate) fn plot_of_sweep(runs: &[(String, Reactions)]) -> Result<Option<String>, String> {
     let mut names: Vec<&str> = Vec::new();
     for (name, _) in runs.iter().flat_map(|(_, reactions)| reactions) {
@@ -84,7 +86,7 @@ pub(crate) fn plot_of_sweep(runs: &[(String, Reactions)]) -> Result<Option<Strin
             names.push(name);
         }
     }
-    names.truncate(MOST[0]);
+    names.truncate(MOST_PANELS);
     if names.is_empty() {
         return Ok(None);
     }
@@ -94,13 +96,12 @@ pub(crate) fn plot_of_sweep(runs: &[(String, Reactions)]) -> Result<Option<Strin
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE).map_err(|error| error.to_string())?;
         for (area, name) in root.split_evenly((names.len(), 1)).iter().zip(&names) {
-            let of_run = |(title, reactions): &'_ (String, Reactions)| {
-                let (_, points) = reactions.iter().find(|(known, _)| known == name)?;
-                Some((title.clone(), points.clone()))
-            };
-            let found: Vec<(String, Vec<[f64; 2]>)> = runs.iter().filter_map(of_run).take(MOST[1]).collect();
-            let curves: Vec<Curve<'_>> =
-                found.iter().map(|(title, points)| Curve { name: title, points: points.clone() }).collect();
+            let mut curves = Vec::new();
+            for (title, reactions) in runs {
+                if let Some((_, points)) = reactions.iter().find(|(known, _)| known == name) {
+                    curves.push(Curve { name: title, points: points.clone() });
+                }
+            }
             panel(area, &format!("Reaction of {name}"), "N", &curves)?;
         }
         root.present().map_err(|error| error.to_string())?;

@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
-use super::{History, Outcome, PartOutcome};
+use super::{History, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, constraints};
 use crate::assemble::Built;
 use crate::plan::{LimitingElement, Limits};
@@ -44,6 +44,8 @@ pub struct Summary {
     pub limiting_element: Option<LimitingElement>,
     /// Each participant, of a scene with several; what follows is then of the first participant that has it.
     pub participants: Vec<ParticipantSummary>,
+    /// The ties between participants.
+    pub ties: Vec<TieSummary>,
     /// Cost of its equations; `null` where none were solved.
     pub solver: Option<Effort>,
     /// How good the equilibria of a quasi-static run are; `null` of others.
@@ -163,7 +165,7 @@ fn empty(status: &str, error: Failure) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "critical_step": null, "limiting_element": null, "participants": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "critical_step": null, "limiting_element": null, "participants": [], "ties": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
     })
 }
@@ -243,6 +245,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
             Some(_) => Vec::new(),
             None => parts().map(|(part, own)| ParticipantSummary::new(part, own)).collect(),
         },
+        ties: outcome.ties.clone(),
         solver: parts().find_map(|(_, own)| own.effort.clone()),
         equilibria: parts().find_map(|(_, own)| own.equilibria),
         ended: outcome.ended.clone(),
@@ -324,6 +327,7 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
         write_energy_rows(page, &outcome.energies)?;
     }
     write_reactions(page, world, outcome)?;
+    write_ties(page, &outcome.ties)?;
     writeln!(page, "\n## Cost\n\n| | |\n|---|---|")?;
     writeln!(page, "| wall time | {} s |", number(summary.wall_seconds))?;
     writeln!(page, "| real-time factor | {} |", number(summary.real_time_factor))?;
@@ -335,6 +339,7 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
     let doubts = summary.warnings.iter().map(|doubt| format!("**Warning:** {doubt}"));
     let remarks: Vec<String> = (doubts.chain(world.warnings().map(ToString::to_string)))
         .chain(world.participants.iter().flat_map(|part| &part.built.notes).cloned())
+        .chain(world.tie_notes.iter().cloned())
         .collect();
     if !remarks.is_empty() {
         writeln!(page, "\n## Remarks\n")?;
@@ -492,6 +497,21 @@ fn write_reactions(page: &mut String, world: &World, outcome: &Outcome) -> std::
         writeln!(page, "| {} | {nodes} | ({x}, {y}, {z}) | {largest} |", constraint.name)?;
     }
     Ok(())
+}
+
+fn write_ties(page: &mut String, ties: &[TieSummary]) -> std::fmt::Result {
+    if ties.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        page,
+        "\n## Ties between participants\n\n| tie | points | force on the first body [N] | gap [m] | widest gap [m] |\n|---|---|---|---|---|"
+    )?;
+    for TieSummary { name, points, force, gap, widest, .. } in ties {
+        let [x, y, z] = force.map(number);
+        writeln!(page, "| {name} | {points} | ({x}, {y}, {z}) | {} | {} |", number(*gap), number(*widest))?;
+    }
+    writeln!(page, "\nThese ties are springs: they open under load, less with shorter steps.")
 }
 
 fn short(file: &Path) -> String {

@@ -6,6 +6,7 @@ mod corpus;
 mod grips;
 mod niftysim;
 mod participants;
+mod penalty;
 mod static_solids;
 mod ties;
 mod walls;
