@@ -19,7 +19,7 @@ pub(crate) struct AppliedForces {
     gravity: Vec<Vector<f64>>,
     body_of: Vec<u16>,
     grips: Vec<Grip>,
-    /// Whether forces of collective constraints are added.
+    /// Whether forces of collective constraints or contacts are added.
     binds: bool,
 }
 
@@ -44,6 +44,12 @@ impl AppliedForces {
         self.grips.clear();
         self.grips.extend_from_slice(grips);
         self.nodal.fill([0.0; 3]);
+        self.acts()
+    }
+
+    /// Takes forces of contacts from now on; whether any force acts.
+    pub(crate) fn touch(&mut self) -> bool {
+        self.binds = true;
         self.acts()
     }
 

@@ -47,6 +47,7 @@ mod step_control;
 mod step_error;
 mod stepper;
 mod tangent;
+mod touching;
 
 pub use dynamic_relaxation::{
     Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Unrelaxed,

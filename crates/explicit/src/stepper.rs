@@ -11,11 +11,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use pliant_contact::touch::Contacts;
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::weighted;
 use pliant_mechanics::model::{Amplitudes, Contradiction, FREE, Model, component, placed};
-use pliant_mechanics::tensor::Vector;
+use pliant_mechanics::tensor::{Vector, add};
 use rayon::prelude::*;
 
 use crate::Scalar;
@@ -28,6 +29,7 @@ use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
+use crate::touching::{Free, Touching};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -59,6 +61,11 @@ pub trait Observable<R> {
 
     /// Velocity [m/s] of a node.
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64>;
+
+    /// Force [N] of each contact on the thing that its nodes touch.
+    fn contact_forces(&self) -> Vec<Vector<f64>> {
+        Vec::new()
+    }
 }
 
 /// A node of which a component moves as prescribed.
@@ -138,6 +145,8 @@ pub struct CentralDifference<R> {
     applied: AppliedForces,
     /// Nodes that are bound to each other.
     collectives: Vec<Collective>,
+    /// Contacts with rigid things.
+    touching: Option<Touching>,
     /// True if there is any load, grip or collective constraint.
     loaded: bool,
     processor: Processor,
@@ -165,6 +174,11 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
 
     fn nodal_reaction(&self, node: usize) -> Vector<f64> {
         owned_only(&self.owners[node], self.reaction[node])
+    }
+
+    fn contact_forces(&self) -> Vec<Vector<f64>> {
+        let on_nodes = self.touching.iter().flat_map(|touching| &touching.forces);
+        on_nodes.map(|force| force.map(|f| -f)).collect()
     }
 
     /// The mean of the increments before and after.
@@ -384,6 +398,7 @@ impl<R: Scalar> CentralDifference<R> {
         }
         let owners = model.constrained_components()?;
         let follows = model.followers();
+        let applied = AppliedForces::new(Arc::clone(&model));
         Ok(Self {
             control: StepControl::new(step),
             lengths: Lengths { before: step, next: step },
@@ -396,9 +411,10 @@ impl<R: Scalar> CentralDifference<R> {
                 .map(|node| [R::of(if follows[node] { 1.0 } else { model.inertia(node) }); 3])
                 .collect(),
             damping,
-            applied: AppliedForces::new(Arc::clone(&model)),
+            loaded: applied.acts(),
+            applied,
             collectives: Collective::all(&model),
-            loaded: !model.loads.is_empty() || model.collective().is_some(),
+            touching: None,
             processor: Processor::detect(),
             factors: vec![[[0.0; 2]; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
@@ -414,6 +430,14 @@ impl<R: Scalar> CentralDifference<R> {
     #[must_use]
     pub fn watched(mut self, monitor: Monitor) -> Self {
         self.control.watch(monitor);
+        self
+    }
+
+    /// Lets nodes touch rigid things.
+    #[must_use]
+    pub fn touching(mut self, contacts: Arc<Contacts>) -> Self {
+        self.touching = Some(Touching::new(contacts, &self.model.rest));
+        self.loaded = self.applied.touch();
         self
     }
 
@@ -467,10 +491,16 @@ impl<R: Scalar> CentralDifference<R> {
         };
         self.lengths = self.control.lengths(state);
         self.applied.update(state.time, &state.displacement);
+        self.set_factors(state.time);
         if state.is_at_start() {
             self.start(state);
+            // Half of a step's force moves a node in the first one: its other half is in the increment before.
+            if self.touch(state, 0.5) {
+                self.start(state);
+            }
+        } else {
+            self.touch(state, 1.0);
         }
-        self.set_factors(state.time);
         self.bind(state);
         self.pass_over_nodes(state);
         let sums = self.sums.iter().fold(Sums::default(), Sums::merge);
@@ -552,28 +582,56 @@ impl<R: Scalar> CentralDifference<R> {
         state.work.begin(kinetic, shock);
     }
 
+    /// Where a node goes with the forces that are found.
+    fn predicted(&self, state: &State<R>, node: u32) -> Predicted {
+        let at = node as usize;
+        let [next, mean] = [self.lengths.next, self.lengths.mean()];
+        let step_squared = next * mean;
+        let (m, a) = (self.mass[at][0].to_f64(), 0.5 * mean * self.damping[at][0].to_f64());
+        let (external, internal): (Vector<f64>, _) = (self.applied.at(at), self.forces.at(at));
+        let inertia = m * (1.0 + a);
+        let place = [0, 1, 2].map(|c| {
+            let before = state.increment[at][c].to_f64() * self.lengths.ratio();
+            let force = external[c] - internal[c].to_f64();
+            state.displacement[at][c].to_f64() + ((1.0 - a) * before * m + step_squared * force) / inertia
+        });
+        let now = state.displacement[at].map(|u| u.to_f64());
+        Predicted { now, displacement: place, mobility: step_squared / inertia }
+    }
+
+    /// Adds the forces of contacts, from where nodes would go without them; of their mobility this part counts. Whether there are contacts.
+    fn touch(&mut self, state: &State<R>, part: f64) -> bool {
+        let Some(mut touching) = self.touching.take() else { return false };
+        let mut found = Vec::new();
+        let rest = |node: u32| self.model.rest[node as usize];
+        let now = |node: u32| {
+            let (moved, way) = (state.displacement[node as usize], state.increment[node as usize]);
+            let way = way.iter().map(|x| x.to_f64() * x.to_f64()).sum::<f64>().sqrt();
+            (add(rest(node), moved.map(|x| x.to_f64())), way * self.lengths.ratio())
+        };
+        let free = |node: u32| {
+            let Predicted { mut displacement, mobility, .. } = self.predicted(state, node);
+            let mut moves = [part * mobility; 3];
+            for held in self.held_in(node as usize..node as usize + 1) {
+                for (c, constraint) in held.components() {
+                    (displacement[c], moves[c]) = (held.place(c, self.factors[constraint][1]), 0.0);
+                }
+            }
+            Free { then: add(rest(node), displacement), mobility: moves }
+        };
+        let times = [state.time, state.time + self.lengths.next];
+        touching.find(times, now, free, |node, force| found.push((node, force)));
+        found.into_iter().for_each(|(node, force)| self.applied.add(node, force));
+        self.touching = Some(touching);
+        true
+    }
+
     /// Adds the forces of collective constraints, from where their nodes would go without them.
     fn bind(&mut self, state: &State<R>) {
         let mut collectives = std::mem::take(&mut self.collectives);
-        let [next, mean] = [self.lengths.next, self.lengths.mean()];
-        let step_squared = next * mean;
         for own in &mut collectives {
             let then = self.factors[own.constraint][1][0];
-            let predicted = |node: u32| {
-                let at = node as usize;
-                let (m, a) = (self.mass[at][0].to_f64(), 0.5 * mean * self.damping[at][0].to_f64());
-                let (external, internal): (Vector<f64>, _) = (self.applied.at(at), self.forces.at(at));
-                let inertia = m * (1.0 + a);
-                let place = [0, 1, 2].map(|c| {
-                    let before = state.increment[at][c].to_f64() * self.lengths.ratio();
-                    let force = external[c] - internal[c].to_f64();
-                    state.displacement[at][c].to_f64()
-                        + ((1.0 - a) * before * m + step_squared * force) / inertia
-                });
-                let now = state.displacement[at].map(|u| u.to_f64());
-                Predicted { now, displacement: place, mobility: step_squared / inertia }
-            };
-            own.find(&self.model, predicted, then);
+            own.find(&self.model, |node| self.predicted(state, node), then);
             for (node, force) in own.forces(&self.model) {
                 self.applied.add(node, force);
             }

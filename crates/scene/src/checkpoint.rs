@@ -253,6 +253,9 @@ impl OwnOrigin {
         if let LoadSteps::Times(times) = &scene.run.load_steps {
             parts.push(("`run.load-steps`".into(), fingerprint(times)));
         }
+        if let Some(contacts) = &built.contacts {
+            parts.push(("contacts with obstacles and tools".into(), fingerprint(contacts)));
+        }
         parts.push(("`run.iterations`".into(), fingerprint(&scene.run.iterations)));
         parts.push(("`run.linear`".into(), fingerprint(&scene.run.linear)));
         let (precision, solver, step) = (plan.target.precision, scene.run.solver, plan.steps.step);

@@ -30,6 +30,7 @@ impl Part {
                     .limits
                     .as_ref()
                     .map_or(f64::INFINITY, |limits| limits.critical.assembled.step),
+                contacts: built.contacts.clone(),
                 #[cfg(feature = "gpu")]
                 device: plan.target.device.clone(),
                 #[cfg(feature = "gpu")]

@@ -126,6 +126,12 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
         let nodes = counted(constraint.nodes.len(), "node");
         writeln!(page, "constraint `{}`: {what} {axes} of {nodes}", constraint.name)?;
     }
+    for contact in built.contacts.iter().flat_map(|all| &all.contacts) {
+        let thing = built.contacts.as_ref().map_or("", |all| &all.rigids[contact.rigid].name);
+        let nodes = counted(contact.nodes.len(), "node");
+        let friction = number(contact.touch.friction);
+        writeln!(page, "contact `{}`: {nodes} with `{thing}`, friction {friction}", contact.name)?;
+    }
     for load in &built.model.loads {
         writeln!(page, "load `{}`: {}", load.name, describe_load(built, load))?;
     }

@@ -314,6 +314,16 @@ impl Scene {
                 .collect(),
             surfaces: self.surfaces.iter().filter(|(_, surface)| owns(&surface.on)).cloned().collect(),
             constraints: self.constraints.iter().filter(|(_, table)| owns(table.body())).cloned().collect(),
+            obstacles: self.obstacles.clone(),
+            tools: self.tools.clone(),
+            contacts: self
+                .contacts
+                .iter()
+                .filter(|(_, table)| {
+                    owns(&table.between[0]) || (index == 0 && !owners.of.contains_key(&table.between[0]))
+                })
+                .cloned()
+                .collect(),
             loads: self.loads.iter().filter(|(_, load)| on_part(load.on())).cloned().collect(),
             outputs,
             view,

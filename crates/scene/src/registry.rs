@@ -11,9 +11,9 @@ use serde_json::{Map, Value as Json, json};
 use crate::checker::{check_skipping, read_table};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
-    BodyTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras, MeanTable,
-    MomentTable, MoveTable, ParticipantTable, PressureTable, RigidTable, RunTable, SceneTable, SpringTable,
-    SurfaceTable, TieTable, TractionTable, ViewTable, VtuTable,
+    BodyTable, ContactTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras,
+    MeanTable, MomentTable, MoveTable, ParticipantTable, PressureTable, RigidTable, RunTable, SceneTable,
+    SpringTable, SurfaceTable, TieTable, ToolTable, TractionTable, ViewTable, VtuTable,
 };
 use crate::nearest::nearest;
 use crate::source::{Source, Value};
@@ -217,6 +217,8 @@ pub fn sections() -> Vec<Section> {
     all.extend([plain::<TieTable>("[tie.NAME]"), plain::<SurfaceTable>("[surface.NAME]")]);
     all.extend(typed::<ConstraintTable>("[constraint.NAME]"));
     all.extend(typed::<LoadTable>("[load.NAME]"));
+    all.extend([plain::<ToolTable>("[obstacle.NAME]"), plain::<ToolTable>("[tool.NAME]")]);
+    all.push(plain::<ContactTable>("[contact.NAME]"));
     all.extend(typed::<OutputTable>("[output.NAME]"));
     all.push(plain::<ViewTable>("[view]"));
     all
@@ -308,14 +310,17 @@ mod tests {
         let expected = [
             "body",
             "constraint",
+            "contact",
             "law",
             "load",
+            "obstacle",
             "output",
             "participant",
             "run",
             "scene",
             "surface",
             "tie",
+            "tool",
             "view",
         ];
         assert_eq!(tables, expected);

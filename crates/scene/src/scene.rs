@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use crate::checker::read_table;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{
-    BodyModel, BodyTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, TieTable, ViewTable,
+    BodyModel, BodyTable, ContactTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, TieTable,
+    ToolTable, ViewTable,
 };
 use crate::nearest::nearest;
 use crate::reads::{LONGEST_SCENE, Reads};
@@ -40,6 +41,12 @@ pub struct Scene {
     pub constraints: Vec<(String, ConstraintTable)>,
     /// `[load.NAME]`
     pub loads: Vec<(String, LoadTable)>,
+    /// `[obstacle.NAME]`
+    pub obstacles: Vec<(String, ToolTable)>,
+    /// `[tool.NAME]`
+    pub tools: Vec<(String, ToolTable)>,
+    /// `[contact.NAME]`
+    pub contacts: Vec<(String, ContactTable)>,
     /// `[output.NAME]`
     pub outputs: Vec<(String, OutputTable)>,
     /// `[view]`
@@ -53,8 +60,22 @@ pub struct Scene {
 }
 
 /// The tables a scene file can have.
-const TABLES: [&str; 11] =
-    ["scene", "run", "participant", "law", "body", "tie", "surface", "constraint", "load", "output", "view"];
+const TABLES: [&str; 14] = [
+    "scene",
+    "run",
+    "participant",
+    "law",
+    "body",
+    "tie",
+    "surface",
+    "constraint",
+    "load",
+    "obstacle",
+    "tool",
+    "contact",
+    "output",
+    "view",
+];
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -142,6 +163,16 @@ impl Scene {
         );
         let constraints = read_all(&source, "constraint", read_typed::<ConstraintTable>, &mut out);
         let loads = read_all(&source, "load", read_typed::<LoadTable>, &mut out);
+        let rigid =
+            |s: &Source, path: &[&str], out: &mut Vec<Diagnostic>| read_table::<ToolTable>(s, path, &[], out);
+        let obstacles = read_all(&source, "obstacle", rigid, &mut out);
+        let tools = read_all(&source, "tool", rigid, &mut out);
+        let contacts = read_all(
+            &source,
+            "contact",
+            |s, path, out| read_table::<ContactTable>(s, path, &[], out),
+            &mut out,
+        );
         let outputs = read_all(&source, "output", read_typed::<OutputTable>, &mut out);
         let view = read_table::<ViewTable>(&source, &["view"], &[], &mut out);
         check_probe_names(&source, &mut out);
@@ -164,6 +195,9 @@ impl Scene {
                 surfaces,
                 constraints,
                 loads,
+                obstacles,
+                tools,
+                contacts,
                 outputs,
                 view,
                 doubts: out,

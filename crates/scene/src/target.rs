@@ -28,7 +28,7 @@ impl Target {
     /// If a GPU is requested, and there is none or it can't run the scene.
     pub(crate) fn choose(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
         let run = &scene.run;
-        let implicit = built.implicit.is_some();
+        let (implicit, touches) = (built.implicit.is_some(), built.contacts.is_some());
         match run.device {
             DeviceName::Cpu => match key_of_gpu(run) {
                 None => Ok(Self::processor(run, None)),
@@ -39,7 +39,7 @@ impl Target {
                     Err(Box::new(Diagnostic::error(message).at(place, "not used").help(help)))
                 }
             },
-            DeviceName::Gpu => match processor_only(run, implicit) {
+            DeviceName::Gpu => match processor_only(run, implicit, touches) {
                 None => Self::gpu(scene),
                 Some((key, what, help)) => {
                     let error = Diagnostic::error(format!("{what} runs on the CPU only"))
@@ -48,7 +48,7 @@ impl Target {
                     Err(Box::new(error.help(help)))
                 }
             },
-            DeviceName::Auto => Ok(match processor_only(run, implicit) {
+            DeviceName::Auto => Ok(match processor_only(run, implicit, touches) {
                 Some((_, what, _)) => Self::processor(run, Some(format!("{what} runs on the CPU only"))),
                 None => Self::best(run),
             }),
@@ -150,10 +150,17 @@ fn key_of_gpu(run: &RunTable) -> Option<&'static str> {
 }
 
 /// The key that a GPU can't support, in words, and a remedy.
-fn processor_only(run: &RunTable, implicit: bool) -> Option<(&'static str, &'static str, &'static str)> {
+fn processor_only(
+    run: &RunTable,
+    implicit: bool,
+    touches: bool,
+) -> Option<(&'static str, &'static str, &'static str)> {
     if implicit {
         let help = "set `device = \"cpu\"`, or leave it out";
         return Some(("device", "the model of shells, `implicit` and `static`", help));
+    }
+    if touches {
+        return Some(("device", "contact", "set `device = \"cpu\"`, or leave it out"));
     }
     if run.solver == SolverName::QuasiStatic {
         let help = "set `device = \"cpu\"`, or `solver = \"explicit\"`";

@@ -35,6 +35,11 @@ pub trait Instant {
     /// Force [N] that holds or moves the nodes of a constraint, summed.
     fn reaction(&self, constraint: usize) -> [f64; 3];
 
+    /// Force [N] of each contact on the rigid thing that it is with, in the order of the contacts.
+    fn contact_forces(&self) -> Vec<[f64; 3]> {
+        Vec::new()
+    }
+
     /// Energies [J].
     fn energies(&self) -> Energies;
 

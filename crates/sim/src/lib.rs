@@ -68,6 +68,8 @@ pub use solver::{Equilibria, LoadStepProgress};
 pub use steps::{Critical, SAFETY, Steps};
 pub use words::{counted, number};
 
+/// Obstacles, tools, and bodies that touch them.
+pub use pliant_contact as contact;
 /// Devices, and points on them.
 #[cfg(feature = "gpu")]
 pub use pliant_gpu as gpu;

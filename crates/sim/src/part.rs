@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use pliant_contact::touch::Contacts;
 use pliant_explicit::stability::{Monitor, OnUnstable};
 #[cfg(feature = "gpu")]
 use pliant_gpu::{Design, Device};
@@ -76,6 +77,8 @@ pub struct Explicit {
     pub on_unstable: OnUnstable,
     /// The critical time step of the assembled model at rest [s]; where it is infinite it is not monitored.
     pub critical_step: f64,
+    /// Contacts with rigid things.
+    pub contacts: Option<Arc<Contacts>>,
     /// The GPU; `None`: the CPU.
     #[cfg(feature = "gpu")]
     pub device: Option<Device>,
@@ -102,6 +105,14 @@ impl Method {
         }
     }
 
+    /// The contacts with rigid things; `None` without any.
+    pub fn contacts(&self) -> Option<&Arc<Contacts>> {
+        match self {
+            Self::Explicit(settings) => settings.contacts.as_ref(),
+            _ => None,
+        }
+    }
+
     /// The number type.
     pub fn precision(&self) -> Precision {
         match self {
@@ -125,6 +136,7 @@ impl Part {
             precision: Precision::Double,
             on_unstable: OnUnstable::default(),
             critical_step: critical.assembled.step,
+            contacts: None,
             #[cfg(feature = "gpu")]
             device: None,
             #[cfg(feature = "gpu")]

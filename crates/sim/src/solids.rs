@@ -133,6 +133,10 @@ impl<R: Numeric> Instant for Solids<R> {
         self.solver.observable().reaction(constraint)
     }
 
+    fn contact_forces(&self) -> Vec<[f64; 3]> {
+        self.solver.observable().contact_forces()
+    }
+
     fn energies(&self) -> Energies {
         *self.solver.observable().energies()
     }

@@ -133,6 +133,10 @@ pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failu
     Ok(match &part.method {
         Method::Explicit(settings) => {
             let stepper = CentralDifference::new(model(), part.steps.step).map_err(contradicting)?;
+            let stepper = match &settings.contacts {
+                Some(contacts) => stepper.touching(Arc::clone(contacts)),
+                None => stepper,
+            };
             match settings.monitor(&part.model) {
                 Some(monitor) => Box::new(stepper.watched(monitor)),
                 None => Box::new(stepper),

@@ -4,6 +4,7 @@
 mod bars;
 mod bodies;
 mod constraints;
+mod contacts;
 mod fibres;
 mod fractions;
 mod images;
@@ -24,6 +25,7 @@ use pliant_geometry::{CellKind, Labels, Locator, Mesh, Surface, SurfaceLocator, 
 use pliant_implicit::{Assembly, CurvedSurface};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
+use pliant_sim::contact::touch::Contacts;
 use pliant_sim::{BodyCells, ImplicitBodies, RunControl};
 
 use crate::cache::MeshCache;
@@ -48,6 +50,8 @@ pub struct Built {
     pub bodies: Vec<BuiltBody>,
     /// The carried surfaces' meshes, in the order of the model's surfaces.
     pub surfaces: Vec<Mesh>,
+    /// Contacts with obstacles and tools.
+    pub contacts: Option<Arc<Contacts>>,
     /// Doubts that did not keep the model from being built.
     pub warnings: Vec<Diagnostic>,
     /// What a user may want to know, a sentence each.
@@ -221,6 +225,7 @@ pub fn build_watched(
     builder.add_surfaces();
     builder.add_constraints();
     builder.add_loads();
+    let contacts = builder.contacts();
     builder.check_outputs();
     builder.check_view();
     builder.check_free_bodies();
@@ -234,7 +239,7 @@ pub fn build_watched(
     let implicit = start.map(|start| {
         Arc::new(ImplicitBodies { model: Arc::new(assembly), cells, control, start, surface: curved })
     });
-    Ok(Built { model, implicit, bodies, surfaces, warnings, notes })
+    Ok(Built { model, implicit, bodies, surfaces, contacts, warnings, notes })
 }
 
 /// The labels of a body or a surface by name, or of all bodies.

@@ -2,6 +2,7 @@
 //! beside its formulas) with meaning, unit, range and default; schema, checks and reference page come from that.
 
 mod body;
+mod contact;
 mod linear;
 mod load;
 mod output;
@@ -15,6 +16,7 @@ pub use body::{
     MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape, SurfaceTable,
     Thickness, ThicknessRule, TubeShape, TwistedStripShape,
 };
+pub use contact::{BoxTool, CapsuleTool, ConeTool, ContactTable, ShapeName, SphereTool, ToolTable};
 pub use linear::{
     ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,
     StopTable,

@@ -92,6 +92,8 @@ impl Column {
 /// Those of one participant.
 struct Own {
     reactions: Vec<usize>,
+    /// Contacts whose forces are columns.
+    contacts: usize,
     /// The point [m] about which moments of reactions are taken, and what each of them prescribes.
     moments: Option<([f64; 3], Vec<Held>)>,
     energy: bool,
@@ -136,6 +138,11 @@ impl Own {
             let name = &built.model.constraints[constraint].name;
             AXES.iter().for_each(|axis| add(format!("reaction.{name}.{axis}"), "N"));
         }
+        let contacts = built.contacts.as_ref().map_or(&[][..], |all| &all.contacts);
+        for contact in contacts {
+            AXES.iter().for_each(|axis| add(format!("contact.{}.{axis}", contact.name), "N"));
+        }
+        let contacts = contacts.len();
         let moments = table.moments_about.map(|point| {
             for &constraint in &reactions {
                 let name = &built.model.constraints[constraint].name;
@@ -166,13 +173,18 @@ impl Own {
         }
         let probes = probes().map(|(_, probe)| Probe::new(built, probe)).collect();
         let shells = fields::OfShells::default();
-        Self { reactions, moments, energy: table.energy, probes, shells }
+        Self { reactions, contacts, moments, energy: table.energy, probes, shells }
     }
 
     /// Adds the sample of an instant to a row.
     fn read(&mut self, frame: &Frame<'_>, row: &mut Vec<f64>) {
         for &constraint in &self.reactions {
             row.extend(frame.now.reaction(constraint));
+        }
+        if self.contacts > 0 {
+            let forces = frame.now.contact_forces();
+            // Before the first evaluation there are none.
+            (0..self.contacts).for_each(|at| row.extend(forces.get(at).copied().unwrap_or_default()));
         }
         for (point, held) in
             self.moments.iter().flat_map(|(point, all)| all.iter().map(move |held| (point, held)))

@@ -2,6 +2,8 @@
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::model::{Cells, Solid};
+use pliant_sim::contact::pose::Pose;
+use pliant_sim::contact::touch::Rigid;
 use pliant_sim::{BodyCells, ImplicitBodies};
 use rayon::prelude::*;
 
@@ -30,6 +32,14 @@ impl FieldMesh {
             let all = Own::all(&part.built, on, &part.fields(&table.data), table.at, table.curved);
             parts.extend(all.into_iter().map(|own| (index, Own { first_body, ..own })));
             first_body += part.built.bodies.len();
+        }
+        if on.is_none() {
+            let things = world.participants.iter().enumerate();
+            parts.extend(things.filter_map(|(index, part)| {
+                let own = Own::of_things(&part.built, &table.data)?;
+                first_body += 1;
+                Some((index, Own { first_body: first_body - 1, ..own }))
+            }));
         }
         let mut mesh = Self { parts, merged: None };
         mesh.merge();
@@ -89,6 +99,8 @@ enum Content {
     Shells { nodes: Vec<u32>, facets: Vec<u32>, fields: Box<fields::OfShells> },
     /// The curved surface of shells.
     Curved(Box<super::curved::Curved>),
+    /// Obstacles and tools: the thing of each point.
+    Things(Vec<u32>),
 }
 
 impl Own {
@@ -122,6 +134,29 @@ impl Own {
         all
     }
 
+    /// Of the obstacles and tools that its bodies touch, where they are at the start; `None` without any.
+    fn of_things(built: &Built, fields: &[FieldName]) -> Option<Self> {
+        let contacts = built.contacts.as_ref()?;
+        let bounds = built.bodies.iter().filter_map(|body| body.mesh.bounds());
+        let (low, high) = bounds.reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)))?;
+        let mut mesh = Mesh::default();
+        let mut block = CellBlock::new(CellKind::Triangle, Vec::new());
+        let mut owners = Vec::new();
+        for (rigid, index) in contacts.rigids.iter().zip(0..) {
+            let (points, triangles) = rigid.shape.surface(1.3 * (high - low).norm());
+            let (first, pose) = (mesh.points.len() as u32, rigid.course.at(0.0));
+            mesh.points.extend(points.iter().map(|point| (pose * nalgebra::Point3::from(*point)).coords));
+            owners.resize(mesh.points.len(), index);
+            block.nodes.extend(triangles.iter().flatten().map(|node| first + node));
+        }
+        let cells = block.len();
+        block.data.insert("body".into(), DataArray::scalar(vec![0.0; cells]));
+        mesh.blocks.push(block);
+        let fields = fields.iter().copied().filter(|&field| field == FieldName::Displacement).collect();
+        let content = Content::Things(owners);
+        Some(Self { mesh, first_body: 0, fields, at: At::default(), content })
+    }
+
     fn new(
         built: &Built,
         on: Option<&str>,
@@ -146,6 +181,7 @@ impl Own {
             Content::Curved(curved) => {
                 built.implicit.as_ref().map_or_else(Vec::new, |part| curved.nodes_of(part, point))
             }
+            Content::Things(_) => Vec::new(),
         }
     }
 
@@ -173,8 +209,27 @@ impl Own {
                 }
             }
             Content::Curved(curved) => curved.fill(&mut self.mesh, frame, &self.fields),
+            Content::Things(owners) if !self.fields.is_empty() => {
+                let values = moved_things(frame, &self.mesh.points, owners);
+                let name = FieldName::Displacement.name();
+                self.mesh.point_data.insert(name.into(), DataArray { components: 3, values });
+            }
+            Content::Things(_) => {}
         }
     }
+}
+
+/// Displacements [m] of the points of obstacles and tools since the start.
+fn moved_things(frame: &Frame<'_>, points: &[Vector3], owners: &[u32]) -> Vec<f64> {
+    let Some(contacts) = &frame.built().contacts else { return Vec::new() };
+    let motion = |rigid: &Rigid| rigid.course.at(frame.now.time()) * rigid.course.at(0.0).inverse();
+    let motions: Vec<Pose> = contacts.rigids.iter().map(motion).collect();
+    let moved = |(point, &owner): (&Vector3, &u32)| {
+        let there = motions[owner as usize] * nalgebra::Point3::from(*point);
+        let shift = there.coords - point;
+        [shift.x, shift.y, shift.z]
+    };
+    points.iter().zip(owners).flat_map(moved).collect()
 }
 
 /// Fields on a carried surface; those of cells as means at the nodes.

@@ -2,6 +2,7 @@
 
 mod bars;
 mod collective;
+mod contact;
 mod corpus;
 mod grips;
 mod niftysim;

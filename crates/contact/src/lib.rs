@@ -1,0 +1,23 @@
+//! Contact of soft bodies with rigid surfaces: [shapes](shape) with their signed distance, [motions](pose) of obstacles and tools, and the
+//! [least correction](touch) of a node that would go into one, with friction. Knows no solver: how a correction acts is the stepper's.
+//! SI units throughout.
+//!
+//! A node falls onto a plane:
+//!
+//! ```
+//! use pliant_contact::pose::{Course, Pose};
+//! use pliant_contact::shape::Shape;
+//! use pliant_contact::touch::{Rigid, Touch};
+//!
+//! let floor = Rigid { name: "floor".into(), shape: Shape::HalfSpace, course: Course::fixed(Pose::identity()), inside: false };
+//! let touch = Touch { friction: 0.3, offset: 0.0 };
+//! let (now, predicted) = ([0.0, 0.0, 0.001], [0.002, 0.0, -0.001]);
+//! let place = touch.correct(&floor, [0.0, 0.001], now, predicted, [1.0; 3]).unwrap();
+//! // Lifted to the plane, and held back by 0.3 of that.
+//! assert!(place[2].abs() < 1e-15 && (place[0] - (0.002 - 0.3 * 0.001)).abs() < 1e-15);
+//! ```
+
+pub mod grid;
+pub mod pose;
+pub mod shape;
+pub mod touch;

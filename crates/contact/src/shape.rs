@@ -1,0 +1,278 @@
+//! Rigid shapes, each in a frame of its own, with their signed distance.
+
+use std::sync::Arc;
+
+use nalgebra::{Vector2, Vector3};
+
+use crate::grid::Grid;
+
+/// A rigid shape.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// A ball around the origin.
+    Sphere {
+        /// Its radius [m].
+        radius: f64,
+    },
+    /// All within a radius of a segment along z, centred at the origin.
+    Capsule {
+        /// Its radius [m].
+        radius: f64,
+        /// Length of the segment [m].
+        length: f64,
+    },
+    /// A box centred at the origin.
+    Cuboid {
+        /// Its edges [m].
+        size: [f64; 3],
+    },
+    /// A cone along z, its base in the plane z = 0 and its tip above.
+    Cone {
+        /// Radius of the base [m].
+        radius: f64,
+        /// Its height [m].
+        height: f64,
+    },
+    /// All below the plane z = 0.
+    HalfSpace,
+    /// Distances of a closed surface, sampled.
+    Grid(Arc<Grid>),
+}
+
+/// What a shape is at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Near {
+    /// Distance [m] to its surface, negative inside.
+    pub distance: f64,
+    /// The direction, of length 1, in which the distance grows.
+    pub normal: Vector3<f64>,
+}
+
+impl Shape {
+    /// The distance of a point [m] of its frame, and the direction away from it.
+    pub fn near(&self, point: &Vector3<f64>) -> Near {
+        match self {
+            Self::Sphere { radius } => around(*point, *radius),
+            Self::Capsule { radius, length } => {
+                let z = point.z.clamp(-0.5 * length, 0.5 * length);
+                around(point - Vector3::z() * z, *radius)
+            }
+            Self::Cuboid { size } => cuboid(point, &(0.5 * Vector3::from(*size))),
+            Self::Cone { radius, height } => cone(point, *radius, *height),
+            Self::HalfSpace => Near { distance: point.z, normal: Vector3::z() },
+            Self::Grid(grid) => grid.near(point),
+        }
+    }
+
+    /// The least distance [m] that a point can go through it; infinite of a half-space.
+    pub fn thinnest(&self) -> f64 {
+        match self {
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => *radius,
+            Self::Cuboid { size } => 0.5 * size.iter().copied().fold(f64::INFINITY, f64::min),
+            Self::Cone { radius, height } => 0.5 * radius.min(*height),
+            Self::HalfSpace => f64::INFINITY,
+            Self::Grid(grid) => grid.spacing(),
+        }
+    }
+
+    /// Radius [m] around the origin of all that moves fastest when it turns: of a half-space zero.
+    pub fn reach(&self) -> f64 {
+        match self {
+            Self::Sphere { radius } => *radius,
+            Self::Capsule { radius, length } => radius + 0.5 * length,
+            Self::Cuboid { size } => 0.5 * Vector3::from(*size).norm(),
+            Self::Cone { radius, height } => radius.max(*height),
+            Self::HalfSpace => 0.0,
+            Self::Grid(grid) => grid.reach(),
+        }
+    }
+}
+
+/// Points [m] and triangles of a surface, outward.
+pub type Triangles = (Vec<Vector3<f64>>, Vec<[u32; 3]>);
+
+/// Points around a circle of a surface that is drawn.
+const AROUND: u32 = 32;
+
+impl Shape {
+    /// Its surface in its own frame, to be drawn; of a half-space a square of this width [m], of a sampled surface nothing.
+    pub fn surface(&self, width: f64) -> Triangles {
+        let arc = |centre: f64, radius: f64, from: i32, to: i32| {
+            (from..=to).map(move |step| {
+                let angle = f64::from(step) * std::f64::consts::PI / 16.0;
+                [radius * angle.cos(), centre + radius * angle.sin()]
+            })
+        };
+        match *self {
+            Self::Sphere { radius } => revolved(&arc(0.0, radius, -8, 8).collect::<Vec<_>>()),
+            Self::Capsule { radius, length } => {
+                let [low, high] = [-0.5, 0.5].map(|part| part * length);
+                revolved(&arc(low, radius, -8, 0).chain(arc(high, radius, 0, 8)).collect::<Vec<_>>())
+            }
+            Self::Cone { radius, height } => revolved(&[[0.0, 0.0], [radius, 0.0], [0.0, height]]),
+            Self::Cuboid { size } => {
+                let corner =
+                    |k: usize| Vector3::from_fn(|c, _| (f64::from((k >> c & 1) as u8) - 0.5) * size[c]);
+                let faces =
+                    [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+                let halves = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+                ((0..8).map(corner).collect(), halves.collect())
+            }
+            Self::HalfSpace => {
+                let corner = |[x, y]: [f64; 2]| Vector3::new(0.5 * width * x, 0.5 * width * y, 0.0);
+                let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+                (corners.map(corner).to_vec(), vec![[0, 1, 2], [0, 2, 3]])
+            }
+            Self::Grid(_) => (Vec::new(), Vec::new()),
+        }
+    }
+}
+
+/// The surface of a profile of radii and heights, from the axis to the axis, around z.
+fn revolved(profile: &[[f64; 2]]) -> Triangles {
+    let mut points = Vec::new();
+    let mut triangles = Vec::new();
+    for &[radius, z] in profile {
+        points.extend((0..AROUND).map(|k| {
+            let angle = f64::from(k) * std::f64::consts::TAU / f64::from(AROUND);
+            Vector3::new(radius * angle.cos(), radius * angle.sin(), z)
+        }));
+    }
+    for ring in 1..profile.len() as u32 {
+        for k in 0..AROUND {
+            let [low, high] = [ring - 1, ring].map(|ring| [k, (k + 1) % AROUND].map(|k| ring * AROUND + k));
+            let flat = |ring: u32| profile[ring as usize][0] < 1e-12;
+            if !flat(ring - 1) {
+                triangles.push([low[0], low[1], high[1]]);
+            }
+            if !flat(ring) {
+                triangles.push([low[0], high[1], high[0]]);
+            }
+        }
+    }
+    (points, triangles)
+}
+
+/// A ball of a radius, from its centre.
+fn around(from: Vector3<f64>, radius: f64) -> Near {
+    let distance = from.norm();
+    let normal = if distance > 0.0 { from / distance } else { Vector3::x() };
+    Near { distance: distance - radius, normal }
+}
+
+fn cuboid(point: &Vector3<f64>, half: &Vector3<f64>) -> Near {
+    let beyond = point.abs() - half;
+    let outside = beyond.map(|x| x.max(0.0));
+    let distance = outside.norm();
+    let signs = point.map(|x| if x < 0.0 { -1.0 } else { 1.0 });
+    if distance > 0.0 {
+        return Near { distance, normal: outside.component_mul(&signs) / distance };
+    }
+    let axis = beyond.imax();
+    let mut normal = Vector3::zeros();
+    normal[axis] = signs[axis];
+    Near { distance: beyond[axis], normal }
+}
+
+/// In the half-plane of the distance from the axis and the height, the nearest point of the base or of the slope.
+fn cone(point: &Vector3<f64>, radius: f64, height: f64) -> Near {
+    let from_axis = Vector2::new(point.x, point.y);
+    let q = Vector2::new(from_axis.norm(), point.z);
+    let slope = Vector2::new(-radius, height);
+    let on_base = Vector2::new(q.x.min(radius), 0.0);
+    let along = ((q - Vector2::new(radius, 0.0)).dot(&slope) / slope.norm_squared()).clamp(0.0, 1.0);
+    let on_slope = Vector2::new(radius, 0.0) + slope * along;
+    let inside = q.y > 0.0 && q.x / radius + q.y / height < 1.0;
+    let nearest = if (q - on_base).norm() < (q - on_slope).norm() { on_base } else { on_slope };
+    let away = q - nearest;
+    let distance = away.norm();
+    let sign = if inside { -1.0 } else { 1.0 };
+    let flat = match distance > 0.0 {
+        true => away * (sign / distance),
+        // On the surface: across the slope or down.
+        false if nearest == on_base => Vector2::new(0.0, -1.0),
+        false => Vector2::new(height, radius).normalize(),
+    };
+    let radial = if q.x > 0.0 { from_axis / q.x } else { Vector2::x() };
+    Near { distance: sign * distance, normal: Vector3::new(radial.x * flat.x, radial.y * flat.x, flat.y) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pliant_testing::Random;
+
+    /// Normals are the gradients of the distance, by central differences, and the distance along them changes as fast as they say.
+    #[test]
+    fn normals_are_gradients_of_the_distance() {
+        let shapes = [
+            Shape::Sphere { radius: 0.3 },
+            Shape::Capsule { radius: 0.2, length: 0.7 },
+            Shape::Cuboid { size: [0.5, 0.9, 0.4] },
+            Shape::Cone { radius: 0.4, height: 0.6 },
+            Shape::HalfSpace,
+        ];
+        let mut random = Random::new(3);
+        for shape in &shapes {
+            let mut inside = 0;
+            let mut rough = 0;
+            for _ in 0..2000 {
+                let point = Vector3::from_fn(|_, _| 2.0 * random.part() - 1.0);
+                let near = shape.near(&point);
+                inside += u32::from(near.distance < 0.0);
+                let h = 1e-6;
+                let slope = Vector3::from_fn(|c, _| {
+                    let mut step = Vector3::zeros();
+                    step[c] = h;
+                    (shape.near(&(point + step)).distance - shape.near(&(point - step)).distance) / (2.0 * h)
+                });
+                assert!((near.normal.norm() - 1.0).abs() < 1e-12, "{shape:?} at {point}");
+                // At an edge of the inner skeleton the distance has no gradient.
+                rough += u32::from((slope - near.normal).norm() > 1e-4);
+                let onto = point - near.normal * near.distance;
+                assert!(
+                    shape.near(&onto).distance.abs() < 1e-9 || near.distance < 0.0,
+                    "{shape:?} at {point}"
+                );
+            }
+            assert!(inside > 20 && rough < 5, "{shape:?}: {inside} inside, {rough} rough");
+        }
+    }
+
+    /// Points lie on the surface, and triangles look outward.
+    #[test]
+    fn drawn_surfaces_are_those_of_the_shapes() {
+        for shape in [
+            Shape::Sphere { radius: 0.3 },
+            Shape::Capsule { radius: 0.2, length: 0.7 },
+            Shape::Cuboid { size: [0.5, 0.9, 0.4] },
+            Shape::Cone { radius: 0.4, height: 0.6 },
+            Shape::HalfSpace,
+        ] {
+            let (points, triangles) = shape.surface(1.0);
+            assert!(!triangles.is_empty() && points.iter().all(|x| shape.near(x).distance.abs() < 1e-12));
+            for corners in triangles {
+                let [a, b, c] = corners.map(|k| points[k as usize]);
+                let normal = (b - a).cross(&(c - a));
+                let outward = shape.near(&((a + b + c) / 3.0 + 1e-3 * normal.normalize())).distance;
+                let inward = shape.near(&((a + b + c) / 3.0 - 1e-3 * normal.normalize())).distance;
+                assert!(outward > inward, "{shape:?}: {corners:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn distances_are_those_of_geometry() {
+        let near = |shape: Shape, at: [f64; 3]| shape.near(&at.into());
+        assert_eq!(near(Shape::Sphere { radius: 1.0 }, [0.0, 3.0, 4.0]).distance, 4.0);
+        assert_eq!(near(Shape::Capsule { radius: 1.0, length: 4.0 }, [3.0, 0.0, 1.0]).distance, 2.0);
+        assert_eq!(near(Shape::Capsule { radius: 1.0, length: 4.0 }, [0.0, 0.0, 5.0]).distance, 2.0);
+        assert_eq!(near(Shape::Cuboid { size: [2.0, 2.0, 2.0] }, [4.0, 5.0, 0.0]).distance, 5.0);
+        assert_eq!(near(Shape::Cuboid { size: [2.0, 2.0, 2.0] }, [0.25, 0.0, 0.0]).distance, -0.75);
+        let cone = Shape::Cone { radius: 3.0, height: 4.0 };
+        assert_eq!(near(cone.clone(), [0.0, 0.0, -2.0]).distance, 2.0);
+        assert_eq!(near(cone.clone(), [0.0, 0.0, 6.0]).distance, 2.0);
+        let side = near(cone, [3.0, 0.0, 4.0]);
+        assert!((side.distance - 2.4).abs() < 1e-12 && (side.normal.x - 0.8).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,215 @@
+//! Soft bodies at rigid things: an incline, a wall, a sphere that is pressed in, held to closed forms.
+
+use std::sync::Arc;
+
+use pliant_contact::pose::{Course, Pose};
+use pliant_contact::shape::Shape;
+use pliant_contact::touch::{Contact, Contacts, Rigid, Touch};
+use pliant_explicit::critical_step::assembled;
+use pliant_explicit::{CentralDifference, Observable, State};
+use pliant_mechanics::curve::{Curve, Shape as CurveShape};
+use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+use pliant_mechanics::load::Load;
+use pliant_mechanics::model::{Cells, Material, Model, Solid};
+use pliant_mechanics::prony::Prony;
+
+/// A block of so many hexahedra along each axis, its lowest corner at the origin; without volumetric coupling.
+fn block(cells: [u32; 3], edge: f64, shear: f64, prony: Prony) -> Model {
+    let [nx, ny, nz] = cells;
+    let node = |i: u32, j: u32, k: u32| (k * (ny + 1) + j) * (nx + 1) + i;
+    let mut points = Vec::new();
+    for k in 0..=nz {
+        for j in 0..=ny {
+            points.extend((0..=nx).map(|i| [i, j, k].map(|x| edge * f64::from(x))));
+        }
+    }
+    let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+    let mut hexes = Vec::new();
+    for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
+        hexes.push(corners.map(|[a, b, c]| node(i + a, j + b, k + c)));
+    }
+    let mut model = Model::default();
+    let body = model.add_body("block", &points);
+    let law = AnyLaw::NeoHookean(NeoHookean { shear, volumetric: Volumetric::quadratic(2.0 * shear / 3.0) });
+    let cells = Cells::full_hex8(hexes, &points);
+    model.add_solid(Solid::new(body, Material { prony, ..Material::elastic(law, 1000.0) }, cells));
+    model
+}
+
+/// Triangles of the faces of hexahedra that no other one has.
+fn faces(model: &Model) -> Vec<[u32; 3]> {
+    const SIDES: [[usize; 4]; 6] =
+        [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+    let mut all = std::collections::BTreeMap::new();
+    for cell in 0..model.solids[0].cells.len() {
+        let nodes = model.solids[0].cells.nodes(cell);
+        for side in SIDES.map(|side| side.map(|k| nodes[k])) {
+            let mut key = side;
+            key.sort_unstable();
+            all.entry(key).or_insert_with(Vec::new).push(side);
+        }
+    }
+    let outer = all.into_values().filter(|sides| sides.len() == 1).flatten();
+    outer.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
+}
+
+/// Contact of all nodes and outer faces with a thing.
+fn at(rigid: Rigid, model: &Model, friction: f64) -> Arc<Contacts> {
+    let faces = faces(model);
+    let nodes = (0..model.node_count() as u32).collect();
+    let touch = Touch { friction, offset: 0.0 };
+    let contact = Contact { name: "touch".into(), nodes, faces, rigid: 0, touch };
+    Arc::new(Contacts { rigids: vec![rigid], contacts: vec![contact] })
+}
+
+fn floor() -> Rigid {
+    Rigid {
+        name: "floor".into(),
+        shape: Shape::HalfSpace,
+        course: Course::fixed(Pose::identity()),
+        inside: false,
+    }
+}
+
+fn stepper(model: &Arc<Model>, contacts: &Arc<Contacts>, part: f64) -> CentralDifference<f64> {
+    let step = part * assembled(model).unwrap().step;
+    CentralDifference::new(Arc::clone(model), step).unwrap().touching(Arc::clone(contacts))
+}
+
+/// Slope with a tangent of ½: sticks with μ = ½, and slides by ½ a t² with less (A4 of the acceptance tests of contact). The block is first
+/// pressed on, then tilted, so that it does not hop.
+#[test]
+fn a_block_on_an_incline_sticks_or_slides_by_coulombs_law() {
+    let (sine, cosine) = (0.2_f64.sqrt(), 0.8_f64.sqrt());
+    // Sliding with friction excites vibrations of an elastic block, which the tissue calms.
+    let relaxing = Prony { isochoric: vec![(0.3, 0.005)], ..Prony::default() };
+    let smooth = |from, to| Curve { shape: CurveShape::SmoothStep, from, to };
+    for (friction, slid, bound) in
+        [(0.51, 0.0, 1e-5), (0.49, 0.0439, 0.05), (0.3, 0.877, 0.02), (0.0, 2.194, 0.02)]
+    {
+        let mut model = block([2, 2, 1], 0.05, 3e5, relaxing.clone());
+        for (pull, curve) in
+            [([0.0, 0.0, -9.81 * cosine], smooth(0.0, 0.2)), ([9.81 * sine, 0.0, 0.0], smooth(0.2, 0.4))]
+        {
+            model.loads.push(Load { curve, ..Load::gravity(0, pull) });
+        }
+        let contacts = at(floor(), &model, friction);
+        let model = Arc::new(model);
+        let mut stepper = stepper(&model, &contacts, 0.9);
+        let mut state = State::at_rest(&model);
+        let mut lowest = 0.0_f64;
+        let mean = |field: &[[f64; 3]]| field.iter().map(|u| u[0]).sum::<f64>() / field.len() as f64;
+        let mut start = None;
+        while state.time < 1.4 {
+            stepper.evaluate(&mut state).unwrap();
+            if state.time >= 0.4 && start.is_none() {
+                start =
+                    Some((state.time, mean(&state.displacement), mean(&state.increment) / stepper.step()));
+            }
+            stepper.advance(&mut state);
+            lowest = height(&state, &model).min(lowest);
+        }
+        let (from, place, speed) = start.unwrap();
+        let time = state.time - from;
+        let moved = (mean(&state.displacement) - place - speed * time) / (time * time);
+        println!("friction {friction}: {moved} m of {slid} m, lowest {lowest:.1e} m");
+        assert!(lowest > -1e-12, "{lowest:.1e} m below the floor");
+        let off = if slid == 0.0 { mean(&state.displacement) - place } else { moved / slid - 1.0 };
+        assert!(off.abs() < bound, "friction {friction}: {moved} m of {slid} m");
+    }
+}
+
+/// Height [m] of the lowest node.
+fn height(state: &State<f64>, model: &Model) -> f64 {
+    state.displacement.iter().zip(&model.rest).map(|(u, x)| u[2] + x[2]).fold(f64::INFINITY, f64::min)
+}
+
+/// A bar flies against a wall: no node goes through it, the energy never grows beyond the start, the bar flies back, and the step stays
+/// that of the free bar up to 0.99 of the critical one (A7).
+#[test]
+fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
+    // At 0.99 the bar itself is not resolved: kinetic energy of mean velocities wavers.
+    for (part, limit) in [(0.5, 1e-6), (0.9, 1e-6), (0.99, 0.02)] {
+        let mut model = block([1, 1, 40], 0.01, 5e4, Prony::default());
+        model.initial_velocity = vec![[0.0, 0.0, -0.05]; model.node_count()];
+        model.rest.iter_mut().for_each(|x| x[2] += 1e-4);
+        let contacts = at(floor(), &model, 0.0);
+        let model = Arc::new(model);
+        let mut stepper = stepper(&model, &contacts, part);
+        let mut state = State::at_rest(&model);
+        let kinetic = 0.5 * model.mass.iter().sum::<f64>() * 0.0025;
+        let (mut lowest, mut most, mut impulse) = (f64::INFINITY, 0.0_f64, 0.0);
+        // Longer than a wave there and back.
+        while state.time < 0.12 {
+            stepper.evaluate(&mut state).unwrap();
+            let all = stepper.energies();
+            most = most.max((all.kinetic + all.internal) / kinetic);
+            impulse -= stepper.contact_forces()[0][2] * stepper.step();
+            stepper.advance(&mut state);
+            lowest = height(&state, &model).min(lowest);
+        }
+        stepper.evaluate(&mut state).unwrap();
+        let momentum: f64 =
+            (0..model.node_count()).map(|node| model.mass[node] * stepper.velocity(&state, node)[2]).sum();
+        let before = -0.05 * model.mass.iter().sum::<f64>();
+        println!("{part}: lowest {lowest:.1e} m, energy at most {most}, rebound {}", momentum / -before);
+        assert!(lowest > -1e-12 && most < 1.0 + limit, "{part}: {lowest:.1e} m, {most}");
+        assert!((0.9..=1.0).contains(&(momentum / -before)), "{part}: {momentum} of {before}");
+        assert!(
+            ((momentum - before) / impulse - 1.0).abs() < 1e-9,
+            "{part}: {momentum} - {before} and {impulse}"
+        );
+    }
+}
+
+/// A capsule that is driven into a block stays free of all nodes, and nearly of all points between; the work that drives it is the energy of
+/// the block.
+#[test]
+fn a_tool_presses_no_node_into_itself() {
+    for fast in [1.0, 20.0] {
+        let mut model = block([8, 8, 4], 0.01, 2e3, Prony::default());
+        model.bodies[0].damping = 20.0;
+        let low =
+            (0..model.node_count() as u32).filter(|&node| model.rest[node as usize][2] == 0.0).collect();
+        model.fix("base", low);
+        let radius = 0.006;
+        let depth = 0.008;
+        let over = |z: f64| Pose::translation(0.04, 0.04, z) * Pose::rotation([0.0, 1.6, 0.0].into());
+        let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.3 / fast };
+        let shape = Shape::Capsule { radius, length: 0.03 };
+        let course = Course::by(over(0.04 + radius + 0.001), [0.0, 0.0, -depth - 0.001], curve);
+        let tool = Rigid { name: "tool".into(), shape, course, inside: false };
+        let contacts = at(tool.clone(), &model, 0.2);
+        let model = Arc::new(model);
+        let mut stepper = stepper(&model, &contacts, 0.6);
+        let mut state = State::at_rest(&model);
+        let (mut deepest, mut between, mut force) = (0.0_f64, 0.0_f64, [0.0; 3]);
+        while state.time < 0.4 {
+            stepper.evaluate(&mut state).unwrap();
+            force = stepper.contact_forces()[0];
+            stepper.advance(&mut state);
+            let pose = tool.course.at(state.time);
+            let place = |node: u32| {
+                let (u, x) = (state.displacement[node as usize], model.rest[node as usize]);
+                nalgebra::Vector3::from([0, 1, 2].map(|c| x[c] + u[c]))
+            };
+            for node in 0..model.node_count() as u32 {
+                deepest = deepest.min(tool.near(&pose, &place(node)).distance);
+            }
+            for &[a, b, c] in &contacts.contacts[0].faces {
+                let middle = (place(a) + place(b) + place(c)) / 3.0;
+                between = between.min(tool.near(&pose, &middle).distance);
+            }
+        }
+        println!(
+            "{fast}: deepest {deepest:.1e} m, between nodes {between:.1e} m, force {force:?} N, {:?}",
+            stepper.energies()
+        );
+        assert!(deepest > -1e-12 && between > -0.05 * radius, "{deepest:.1e} m, {between:.1e} m");
+        assert!(
+            force[2] > 0.1 && stepper.energies().balance.abs() < 0.01,
+            "{force:?} {:?}",
+            stepper.energies()
+        );
+    }
+}

@@ -1,0 +1,123 @@
+//! Bodies that touch obstacles and tools, from the text of a scene to its outputs, and what is refused.
+
+use super::static_solids::{last_row, resumes, run, world};
+
+/// A block of 40 × 40 × 20 mm of tissue on a floor, a ball that is pressed into its top.
+fn pressed(run: &str, more: &str) -> String {
+    format!(
+        "[scene]\nuntil = 0.5\n[run]\n{run}\n\
+         [law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 5e3\npoisson-ratio = 0.4\n\
+         [body.block]\nmesh = {{ block = {{ size = [0.04, 0.04, 0.02], cells = [8, 8, 4] }}, as = 'hexes' }}\n\
+         law = 'tissue'\ndensity = 1000\ndamping = 40\n\
+         [obstacle.floor]\nshape = 'half-space'\n\
+         [tool.ball]\nshape = {{ sphere = {{ radius = 0.01 }} }}\nat = [0.02, 0.02, 0.0301]\nby = [0, 0, -0.005]\nto = 0.2\n\
+         [contact.below]\nbetween = ['block', 'floor']\nfriction = 0.5\n\
+         [contact.above]\nbetween = ['block', 'ball']\nfriction = 0.2\n\
+         [output.history]\ntype = 'csv'\nevery = 0.5\nprobes.top = {{ on = 'block', at = [0.02, 0.02, 0.02], data = ['displacement'] }}\n{more}"
+    )
+}
+
+/// The ball's force goes through the block to the floor; the node under it stands where the ball does; energies balance.
+#[test]
+fn a_tool_presses_a_body_onto_an_obstacle() {
+    for precision in ["", "precision = 'single'"] {
+        let text = pressed(precision, "");
+        let row = last_row(&text);
+        let (up, down) = (row["contact.above.z"], row["contact.below.z"]);
+        println!(
+            "{up} N on the ball, {down} N on the floor, top moved by {} m",
+            row["probe.top.displacement.z"]
+        );
+        assert!(up > 0.05 && (up / -down - 1.0).abs() < 1e-2, "{up} N and {down} N");
+        assert!(
+            (row["probe.top.displacement.z"] + 0.0049).abs() < 1e-6,
+            "{}",
+            row["probe.top.displacement.z"]
+        );
+        let out = tempfile::tempdir().unwrap();
+        let balance = run(&text, out.path()).energy_balance.unwrap();
+        assert!(balance < 0.01, "{balance}");
+    }
+}
+
+/// The same step with and without contact.
+#[test]
+fn contact_leaves_the_critical_step_as_it_is() {
+    let with = world(&pressed("", "")).unwrap();
+    let text = pressed("", "");
+    let (before, _) = text.split_once("[contact.below]").unwrap();
+    let (_, after) = text.split_once("[output.history]").unwrap();
+    let without = world(&format!("{before}[output.history]{after}")).unwrap();
+    assert_eq!(with.step(), without.step());
+}
+
+#[test]
+fn a_resumed_run_in_contact_ends_in_the_same_bits() {
+    let text = pressed("step = 2e-4\ncheckpoint = { every = 0.4 }", "");
+    resumes(&text.replace("until = 0.5", "until = 1").replace("every = 0.5", "every = 1"));
+}
+
+/// A table of poses moves a tool; a grid of tools and bodies comes out as one mesh.
+#[test]
+fn tools_follow_tables_of_poses_and_are_written_with_the_bodies() {
+    let place = tempfile::tempdir().unwrap();
+    let poses = place.path().join("poses.csv");
+    std::fs::write(&poses, "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n0.2,0,0,-0.005,1,0,0,0\n").unwrap();
+    let moved = pressed("", "[output.all]\ntype = 'vtu'\nevery = 0.25\ndata = ['displacement']\n")
+        .replace("by = [0, 0, -0.005]\nto = 0.2", &format!("poses = '{}'", poses.display()));
+    let out = tempfile::tempdir().unwrap();
+    run(&moved, out.path());
+    let bytes = std::fs::read(out.path().join("out/all/000002.vtu"))
+        .or_else(|_| std::fs::read(out.path().join("all/000002.vtu")));
+    assert!(bytes.unwrap().len() > 1000);
+}
+
+#[test]
+fn contact_that_cannot_be_is_refused_with_its_line() {
+    let plain = pressed("", "");
+    let with = |from: &str, to: &str| plain.replace(from, to);
+    let place = tempfile::tempdir().unwrap();
+    let table = |name: &str, text: &str| {
+        let path = place.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        with("by = [0, 0, -0.005]\nto = 0.2", &format!("poses = '{}'", path.display()))
+    };
+    for (text, pieces) in [
+        (
+            with("['block', 'ball']", "['block', 'bal']"),
+            ["there is no obstacle or tool `bal`", "did you mean `ball`?"],
+        ),
+        (with("['block', 'ball']", "['blok', 'ball']"), ["there is no body `blok`", "did you mean `block`?"]),
+        (
+            with("['block', 'ball']", "['block', 'block']"),
+            ["there is no obstacle or tool `block`", "not there yet"],
+        ),
+        (
+            with("0.0301]", "0.025]"),
+            ["of `block` lie in `ball` at the start, up to 0.005", "move one of them"],
+        ),
+        (with("radius = 0.01", "radius = 0"), ["radius", ""]),
+        (with("friction = 0.2", "friction = -1"), ["friction", ""]),
+        (
+            with("{ sphere = { radius = 0.01 } }", "{ box = { size = [0.01, 0, 0.01] } }"),
+            ["a box without a volume", ""],
+        ),
+        (
+            with("by = [0, 0, -0.005]", "by = [0, 0, -0.005]\nposes = 'none.csv'"),
+            ["`by`, `rotate` and `poses`", ""],
+        ),
+        (
+            table("nan.csv", "0,0,0,0,1,0,0,0\n1,0,0,nan,1,0,0,0\n"),
+            ["nan.csv:2: a row has 8 finite numbers", "unit quaternion"],
+        ),
+        (table("turn.csv", "0,0,0,0,1,1,0,0\n"), ["the quaternion has length 1.414", ""]),
+        (table("back.csv", "1,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n"), ["its times do not increase", ""]),
+        (pressed("solver = 'quasi-static'", ""), ["contact is for the solver `explicit`", "`quasi-static`"]),
+        (pressed("solver = 'implicit'", ""), ["contact is for the solver `explicit`", "`implicit`"]),
+        (pressed("device = 'gpu'", ""), ["contact runs on the CPU only", ""]),
+        (with("[tool.ball]", "[tool.floor]"), ["`floor` is an obstacle already", ""]),
+    ] {
+        let told = world(&text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
+        assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+    }
+}
