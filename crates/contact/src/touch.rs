@@ -68,16 +68,16 @@ impl Touch {
         predicted: Vector<f64>,
         mobility: Vector<f64>,
     ) -> Option<Vector<f64>> {
-        let poses = times.map(|time| rigid.course.at(time));
-        let passage = Passage { rigid, poses, parts: rigid.parts(poses), times };
-        let place = self.pass(&passage, &now.into(), &predicted.into(), &mobility.into())?;
+        let passage = Passage::new(rigid, times);
+        let place = self.pass(rigid, &passage, &now.into(), &predicted.into(), &mobility.into())?;
         Some(place.into())
     }
 
     /// [`correct`](Self::correct) of a step whose poses are known.
     pub fn pass(
         &self,
-        passage: &Passage<'_>,
+        rigid: &Rigid,
+        passage: &Passage,
         now: &Vector3<f64>,
         predicted: &Vector3<f64>,
         mobility: &Vector3<f64>,
@@ -85,9 +85,9 @@ impl Touch {
         let mut shift = Vector3::zeros();
         for part in 1..=passage.parts {
             let share = part as f64 / passage.parts as f64;
-            let pose = passage.at(part);
+            let pose = passage.at(rigid, part);
             let place = now.lerp(predicted, share) + shift;
-            let Near { distance, normal } = passage.rigid.near(&pose, &place);
+            let Near { distance, normal } = rigid.near(&pose, &place);
             let gap = distance - self.offset;
             let along = mobility.component_mul(&normal);
             let mobility_along = along.dot(&normal);
@@ -116,40 +116,49 @@ impl Touch {
     }
 }
 
-/// A rigid thing in a step.
+/// The way of a rigid thing in a step.
 #[derive(Clone, Debug)]
-pub struct Passage<'r> {
-    rigid: &'r Rigid,
+pub struct Passage {
     /// Its poses before and after.
     poses: [Pose; 2],
     parts: usize,
     times: [f64; 2],
 }
 
-impl<'r> Passage<'r> {
+impl Passage {
     /// In the step between two times [s].
-    pub fn new(rigid: &'r Rigid, times: [f64; 2]) -> Self {
+    pub fn new(rigid: &Rigid, times: [f64; 2]) -> Self {
         let poses = times.map(|time| rigid.course.at(time));
-        Self { rigid, poses, parts: rigid.parts(poses), times }
+        Self { poses, parts: rigid.parts(poses), times }
     }
 
-    /// How far a point [m] is from the thing at the end of the step.
-    pub fn distance(&self, point: &Vector3<f64>) -> f64 {
-        self.rigid.near(&self.poses[1], point).distance
+    /// Whether the thing moves so far that it could pass over a point.
+    pub fn is_fast(&self) -> bool {
+        self.parts > 1
+    }
+
+    /// How far a point [m] is from the thing at the end of the step, and the direction away from it.
+    pub fn near(&self, rigid: &Rigid, point: &Vector3<f64>) -> Near {
+        rigid.near(&self.poses[1], point)
+    }
+
+    /// Where a point [m] of the thing before the step is after it.
+    pub fn carry(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        (self.poses[1] * self.poses[0].inverse_transform_point(&(*point).into())).coords
     }
 
     /// The largest way [m] of a point of the thing.
-    pub fn travel(&self) -> f64 {
-        travel(self.rigid, &self.poses)
+    pub fn travel(&self, rigid: &Rigid) -> f64 {
+        travel(rigid, &self.poses)
     }
 
     /// The pose after a part of the step.
-    fn at(&self, part: usize) -> Pose {
+    fn at(&self, rigid: &Rigid, part: usize) -> Pose {
         if part == self.parts {
             return self.poses[1];
         }
         let [from, to] = self.times;
-        self.rigid.course.at(from + (to - from) * part as f64 / self.parts as f64)
+        rigid.course.at(from + (to - from) * part as f64 / self.parts as f64)
     }
 }
 

@@ -17,7 +17,7 @@ fn pressed(run: &str, more: &str) -> String {
     )
 }
 
-/// The ball's force goes through the block to the floor; the node under it stands where the ball does; energies balance.
+/// The ball's force goes through the block to the floor; the node under it is not in the ball; energies balance.
 #[test]
 fn a_tool_presses_a_body_onto_an_obstacle() {
     for precision in ["", "precision = 'single'"] {
@@ -29,11 +29,9 @@ fn a_tool_presses_a_body_onto_an_obstacle() {
             row["probe.top.displacement.z"]
         );
         assert!(up > 0.05 && (up / -down - 1.0).abs() < 1e-2, "{up} N and {down} N");
-        assert!(
-            (row["probe.top.displacement.z"] + 0.0049).abs() < 1e-6,
-            "{}",
-            row["probe.top.displacement.z"]
-        );
+        // Flat faces that touch the ball around the node let it hang by up to edge²/(4 R) below.
+        let hangs = -0.0049 - row["probe.top.displacement.z"];
+        assert!((-1e-6..6.3e-4).contains(&hangs), "{hangs} m below the ball");
         let out = tempfile::tempdir().unwrap();
         let balance = run(&text, out.path()).energy_balance.unwrap();
         assert!(balance < 0.01, "{balance}");
