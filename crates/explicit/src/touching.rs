@@ -12,7 +12,9 @@ use pliant_mechanics::tensor::{Vector, add};
 /// Passes over all rows at most.
 const PASSES: usize = 30;
 /// The change of a gap in a pass, over the deepest one, at which impulses are found.
-const FOUND: f64 = 1e-4;
+const FOUND: f64 = 1e-3;
+/// Gaps, over the depth of the deepest point, up to which points take part.
+const BAND: f64 = 8.0;
 /// Part of the longest edge of a surface within which its nodes are looked at, beside the way that they go.
 const MARGIN: f64 = 0.1;
 
@@ -231,6 +233,8 @@ impl Touching {
         if deepest <= 0.0 {
             return;
         }
+        // No impulse moves a point farther than a few times the deepest one.
+        rows.retain(|row| row.gap < BAND * deepest);
         for _ in 0..PASSES {
             let mut change = 0.0_f64;
             for row in rows.iter_mut() {
