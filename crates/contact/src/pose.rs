@@ -54,11 +54,6 @@ impl Course {
         (increase && !poses.is_empty()).then_some(Self { start, motion: Motion::Table(poses) })
     }
 
-    /// Whether it never moves.
-    pub fn is_fixed(&self) -> bool {
-        matches!(self.motion, Motion::Fixed)
-    }
-
     /// The pose at a time [s].
     pub fn at(&self, time: f64) -> Pose {
         match &self.motion {

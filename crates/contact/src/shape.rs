@@ -239,7 +239,7 @@ mod tests {
         }
     }
 
-    /// Points lie on the surface, and triangles look outward.
+    /// Points lie on the surface, and triangles face outward.
     #[test]
     fn drawn_surfaces_are_those_of_the_shapes() {
         for shape in [

@@ -1,7 +1,7 @@
 //! The least correction of a node that would go into a rigid surface: along the normal to the surface, then against sliding by the cone of
 //! friction. With the predicted place x*, the mobility w = ∂x/∂f of each component and the gap g = d(x*) − offset < 0,
 //! λ = −g / Σ w n², x* += w n λ; the slip d over the step, less that of the surface, is taken back by a force of at most μ λ. The force on the
-//! node is the correction over its mobility: a step that goes on with it is perfectly plastic along the normal, keeps momentum, and leaves the
+//! node is the correction over its mobility: a step with this force is perfectly plastic along the normal, keeps momentum, and leaves the
 //! critical time step as it is.
 
 use nalgebra::Vector3;

@@ -602,7 +602,6 @@ impl<R: Scalar> CentralDifference<R> {
     /// Adds the forces of contacts, from where nodes would go without them; of their mobility this part counts. Whether there are contacts.
     fn touch(&mut self, state: &State<R>, part: f64) -> bool {
         let Some(mut touching) = self.touching.take() else { return false };
-        let mut found = Vec::new();
         let rest = |node: u32| self.model.rest[node as usize];
         let now = |node: u32| {
             let (moved, way) = (state.displacement[node as usize], state.increment[node as usize]);
@@ -620,8 +619,8 @@ impl<R: Scalar> CentralDifference<R> {
             Free { then: add(rest(node), displacement), mobility: moves }
         };
         let times = [state.time, state.time + self.lengths.next];
-        touching.find(times, now, free, |node, force| found.push((node, force)));
-        found.into_iter().for_each(|(node, force)| self.applied.add(node, force));
+        touching.find(times, now, free);
+        touching.nodal_forces().for_each(|(node, force)| self.applied.add(node, force));
         self.touching = Some(touching);
         true
     }

@@ -15,7 +15,7 @@ const PASSES: usize = 30;
 const FOUND: f64 = 1e-3;
 /// Gaps, over the depth of the deepest point, up to which points take part.
 const BAND: f64 = 8.0;
-/// Part of the longest edge of a surface within which its nodes are looked at, beside the way that they go.
+/// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
 const MARGIN: f64 = 0.1;
 
 /// Where a node goes without contact.
@@ -52,7 +52,7 @@ struct Own {
     samples: Vec<[f64; 3]>,
     /// How far [m] a point of a face can be from its nearest corner.
     reach: f64,
-    /// How near [m] all are looked at.
+    /// Distance [m] at which a node at rest still counts as near.
     margin: f64,
     passage: Passage,
 }
@@ -128,7 +128,6 @@ impl Touching {
         times: [f64; 2],
         now: impl Fn(u32) -> (Vector<f64>, f64),
         free: impl Fn(u32) -> Free,
-        mut push: impl FnMut(u32, Vector<f64>),
     ) {
         self.forces.fill([0.0; 3]);
         let mut farthest = 0.0_f64;
@@ -144,12 +143,13 @@ impl Touching {
         self.sweep();
         self.solve();
         self.lift();
-        for (node, &number) in self.nodes.iter().zip(&self.numbers).filter(|(node, _)| node.near) {
-            let moved = node.then - node.free;
-            if moved != Vector3::zeros() {
-                push(number, over(&moved, &node.mobility).into());
-            }
-        }
+    }
+
+    /// The force [N] on each node that touches something.
+    pub fn nodal_forces(&self) -> impl Iterator<Item = (u32, Vector<f64>)> {
+        let touching = |(node, _): &(&Node, &u32)| node.near && node.then != node.free;
+        let nodes = self.nodes.iter().zip(&self.numbers).filter(touching);
+        nodes.map(|(node, &number)| (number, over(&(node.then - node.free), &node.mobility).into()))
     }
 
     /// Rows of all points that may touch in the step.
@@ -197,14 +197,17 @@ impl Touching {
 
     /// Takes nodes along that a fast thing would pass over.
     fn sweep(&mut self) {
-        for (contact, own) in self.contacts.contacts.iter().zip(&self.own) {
+        for ((contact, own), force) in self.contacts.contacts.iter().zip(&self.own).zip(&mut self.forces) {
             if own.passage.is_fast() {
                 let rigid = &self.contacts.rigids[contact.rigid];
                 for &node in &own.nodes {
                     let node = &mut self.nodes[node as usize];
                     let Node { now, then, mobility, near, .. } = *node;
                     let place = near.then(|| contact.touch.pass(rigid, &own.passage, &now, &then, &mobility));
-                    node.then = place.flatten().unwrap_or(then);
+                    if let Some(place) = place.flatten() {
+                        node.then = place;
+                        *force = add(*force, over(&(place - then), &mobility).into());
+                    }
                 }
             }
         }

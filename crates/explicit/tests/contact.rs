@@ -213,3 +213,28 @@ fn a_tool_presses_no_node_into_itself() {
         );
     }
 }
+
+/// The force that is reported of a thing so fast that its way is followed in parts is that which moves the body.
+#[test]
+fn the_force_of_a_fast_tool_is_the_change_of_momentum() {
+    let model = Arc::new(block([2, 2, 2], 0.01, 2e3, Prony::default()));
+    let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.00105 };
+    let course = Course::by(Pose::translation(0.01, 0.01, 0.03), [0.0, 0.0, -0.0105], curve);
+    let tool = Rigid { name: "tool".into(), shape: Shape::Sphere { radius: 0.002 }, course, inside: false };
+    let mut stepper = stepper(&model, &at(tool, &model, 0.0), 0.1);
+    let mut state = State::at_rest(&model);
+    let momentum = |state: &State<f64>| {
+        model.mass.iter().zip(&state.increment).map(|(mass, way)| mass * way[2]).sum::<f64>()
+    };
+    let mut touched = 0;
+    while state.time < 4e-3 {
+        let (before, time) = (momentum(&state), state.time);
+        stepper.evaluate(&mut state).unwrap();
+        let force = stepper.contact_forces()[0][2];
+        stepper.advance(&mut state);
+        let change = (momentum(&state) - before) / (state.time - time).powi(2);
+        touched += u32::from(force != 0.0);
+        assert!((change + force).abs() <= 1e-9 * (1.0 + force.abs()), "{}: {change} {force}", state.time);
+    }
+    assert!(touched > 0);
+}

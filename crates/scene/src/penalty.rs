@@ -12,8 +12,9 @@ use crate::world::{Part, World};
 const FINER: u64 = 2;
 
 impl World {
-    /// Ties between participants, with remarks on them; mistakes go to `out`.
+    /// Finds the ties between participants, and remarks on them; mistakes go to `out`.
     pub(crate) fn find_ties(&mut self, out: &mut Vec<Diagnostic>) {
+        let mut notes = Vec::new();
         for (name, table) in &self.scene.ties {
             let found = [0, 1].map(|side: usize| self.tied_body(&table.between[side]));
             let [Some((first, guest)), Some((second, host))] = found else { continue };
@@ -45,13 +46,14 @@ impl World {
             };
             let alone = found.nodes.iter().map(|&node| [(node, 1.0)]).collect::<Vec<_>>();
             let own = pliant_mechanics::mapping::Weights::from_rows(alone.iter().map(|row| &row[..]));
-            self.tie_notes.push(found.note);
+            notes.push(found.note);
             self.ties.push(PenaltyTie {
                 name: name.clone(),
                 parts: [first, second],
                 points: [own, found.mapping],
             });
         }
+        notes.into_iter().for_each(|note| self.note(note));
     }
 
     /// The participant of a body, and its place there.

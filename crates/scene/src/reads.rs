@@ -63,6 +63,18 @@ impl Reads {
     }
 }
 
+/// The text of a table beside a scene.
+pub(crate) fn table(path: &Path) -> io::Result<String> {
+    String::from_utf8(read_limited(path, LONGEST_TABLE)?).map_err(io::Error::other)
+}
+
+/// The rows of a table with the numbers of their lines. Empty lines and what follows a # are passed over.
+pub(crate) fn rows_of(text: &str) -> impl Iterator<Item = (&str, usize)> {
+    let lines = text.strip_prefix('\u{feff}').unwrap_or(text).lines().zip(1..);
+    let rows = lines.map(|(line, number)| (line.split('#').next().unwrap_or("").trim(), number));
+    rows.filter(|(row, _)| !row.is_empty())
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;

@@ -23,8 +23,6 @@ pub struct World {
     pub participants: Vec<Part>,
     /// Ties between them.
     pub ties: Vec<PenaltyTie>,
-    /// Remarks on these.
-    pub(crate) tie_notes: Vec<String>,
 }
 
 /// A participant: some bodies of a scene, with their model and how it is stepped.
@@ -78,8 +76,7 @@ impl World {
             Ok(Part { name, plan: plan?, scene: part, built: Arc::new(built) })
         };
         let participants = built.into_iter().map(planned).collect::<Result<Vec<_>, SceneErrors>>()?;
-        let (ties, tie_notes) = (Vec::new(), Vec::new());
-        let mut world = Self { scene: scene.clone(), participants, ties, tie_notes };
+        let mut world = Self { scene: scene.clone(), participants, ties: Vec::new() };
         if world.only().is_none() {
             world.check_load_steps()?;
         }
@@ -110,7 +107,7 @@ impl World {
     pub fn of(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Self {
         let part =
             Part { name: String::new(), scene: scene.clone(), built: Arc::clone(built), plan: plan.clone() };
-        Self { scene: scene.clone(), participants: vec![part], ties: Vec::new(), tie_notes: Vec::new() }
+        Self { scene: scene.clone(), participants: vec![part], ties: Vec::new() }
     }
 
     /// The same of another duration [s].
@@ -180,13 +177,18 @@ impl World {
         Arc::make_mut(&mut self.participants[0].built).warnings.push(warning);
     }
 
+    /// Adds a remark to those on how the models were built.
+    pub(crate) fn note(&mut self, note: String) {
+        Arc::make_mut(&mut self.participants[0].built).notes.push(note);
+    }
+
     /// Remarks on how the scene was built and is stepped.
     pub fn notes(&self) -> impl Iterator<Item = &String> {
         let of = |part| {
             let Part { built, plan, .. }: &Part = part;
             built.notes.iter().chain(&plan.note).chain(&plan.target.note)
         };
-        self.participants.iter().flat_map(of).chain(&self.tie_notes)
+        self.participants.iter().flat_map(of)
     }
 
     /// Doubts that did not keep the models from being built.

@@ -105,14 +105,6 @@ impl Method {
         }
     }
 
-    /// The contacts with rigid things; `None` without any.
-    pub fn contacts(&self) -> Option<&Arc<Contacts>> {
-        match self {
-            Self::Explicit(settings) => settings.contacts.as_ref(),
-            _ => None,
-        }
-    }
-
     /// The number type.
     pub fn precision(&self) -> Precision {
         match self {

@@ -131,7 +131,7 @@ pub struct Simulation {
     ratios: Vec<u64>,
     /// First node of each participant, counted over all.
     first_nodes: Vec<u32>,
-    /// The participants in the order in which they go on: those with fewer steps first.
+    /// Participants by their number of steps, fewest first.
     order: Vec<usize>,
     /// Steps of each since the last common instant.
     done: Vec<u64>,
@@ -359,7 +359,8 @@ impl Simulation {
         }
     }
 
-    /// One common step of participants that are tied: whoever is behind goes on, of several those with the longest steps.
+    /// One common step of tied participants. The participant at the earliest time takes the next step; at equal times, the one with the
+    /// longest step.
     fn advance_tied(&mut self, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
         self.done.fill(0);
         while let Some(part) = self.hindmost() {

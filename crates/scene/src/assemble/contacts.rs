@@ -4,7 +4,6 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use pliant_geometry::io::read_limited;
 use pliant_geometry::{Selection, Vector3};
 use pliant_mechanics::load::NO_NODE;
 use pliant_sim::contact::pose::{Course, Pose};
@@ -14,7 +13,7 @@ use pliant_sim::{counted, number};
 
 use super::{Builder, Target, suggestion};
 use crate::format::{ContactTable, ShapeName, SolverName, ToolTable};
-use crate::reads::LONGEST_TABLE;
+use crate::reads::{rows_of, table as table_file};
 
 /// What a row of a table of poses holds.
 const ROW: &str =
@@ -80,7 +79,7 @@ impl Builder<'_> {
             };
             Course::turn(start, axis.into(), rotate.centre, rotate.angle, self.curve(&table.timing, &path)?)
         } else if let Some(file) = &table.poses {
-            let text = self.scene.file(file).and_then(|found| read_limited(&found, LONGEST_TABLE));
+            let text = self.scene.file(file).and_then(|found| table_file(&found));
             match poses(file, text).map(|poses| Course::table(start, poses)) {
                 Ok(Some(course)) => course,
                 Ok(None) => {
@@ -184,14 +183,11 @@ impl Builder<'_> {
 }
 
 /// The poses of a table. Empty lines, a header and what follows a # are passed over.
-fn poses(file: &Path, text: io::Result<Vec<u8>>) -> Result<Vec<(f64, Pose)>, String> {
-    let text = text.and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other));
+fn poses(file: &Path, text: io::Result<String>) -> Result<Vec<(f64, Pose)>, String> {
     let text = text.map_err(|error| format!("`{}` cannot be read: {error}", file.display()))?;
     let shown = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
-    let lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines().zip(1..);
-    let rows = lines.map(|(line, number)| (line.split('#').next().unwrap_or("").trim(), number));
     let mut all = Vec::new();
-    for (row, line) in rows.filter(|(row, _)| !row.is_empty()) {
+    for (row, line) in rows_of(&text) {
         let columns: Vec<&str> = row.split(',').map(str::trim).collect();
         if all.is_empty() && columns[0].eq_ignore_ascii_case("t") {
             continue;

@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::read_limited;
 use pliant_geometry::{DataArray, Mesh};
 use pliant_sim::counted;
 
 use super::{Builder, suggestion};
 use crate::format::{NodeVectorSource, NodeVectors};
-use crate::reads::LONGEST_TABLE;
+use crate::reads::{rows_of, table};
 
 /// What is wrong with a table of vectors, and what to do about it.
 #[derive(Debug)]
@@ -90,18 +89,14 @@ fn read_rows(
 ) -> Result<BTreeMap<u32, [f64; 3]>, Fault> {
     const FORM: &str =
         "each row is `node,x,y,z`: a node counted from 0 and three numbers in metres (or newtons)";
-    let read = found.and_then(|found| read_limited(&found, LONGEST_TABLE));
-    let text = read.and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other));
-    let text = text.map_err(|error| {
+    let text = found.and_then(|found| table(&found)).map_err(|error| {
         let help = "it must be a text file; file names are relative to the scene file";
         fault(format!("`{}` cannot be read: {error}", path.display()), help)
     })?;
     let shown = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    let lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines();
-    let written = lines.zip(1..).map(|(line, number)| (line.split('#').next().unwrap_or("").trim(), number));
     let mut rows = BTreeMap::new();
     let mut header_allowed = true;
-    for (row, line) in written.filter(|(row, _)| !row.is_empty()) {
+    for (row, line) in rows_of(&text) {
         let columns: Vec<&str> = row.split(',').map(str::trim).collect();
         if std::mem::take(&mut header_allowed) && columns[0].eq_ignore_ascii_case("node") {
             continue;

@@ -35,7 +35,7 @@ pub(crate) struct Placed<'b> {
     pub index: usize,
 }
 
-/// Finds where nodes of one body lie in another one, and says which lie too far away.
+/// Finds where nodes of one body lie in another one, and reports the nodes that are too far away.
 pub(crate) fn attach(
     source: &Source,
     (name, table): (&str, &TieTable),

@@ -339,7 +339,6 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
     let doubts = summary.warnings.iter().map(|doubt| format!("**Warning:** {doubt}"));
     let remarks: Vec<String> = (doubts.chain(world.warnings().map(ToString::to_string)))
         .chain(world.participants.iter().flat_map(|part| &part.built.notes).cloned())
-        .chain(world.tie_notes.iter().cloned())
         .collect();
     if !remarks.is_empty() {
         writeln!(page, "\n## Remarks\n")?;
