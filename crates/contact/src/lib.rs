@@ -1,6 +1,6 @@
-//! Contact of soft bodies with rigid surfaces: [shapes](shape) with their signed distance, [motions](pose) of obstacles and tools, and the
-//! [least correction](touch) of a node that would go into one, with friction. Knows no solver: how a correction acts is the stepper's.
-//! SI units throughout.
+//! Contact of soft bodies. With rigid things: [shapes](shape) with their signed distance, [motions](pose) of obstacles and tools, and the
+//! [least correction](touch) of a node that would go into one, with friction. With each other and themselves: [pairs](pairs) of points of
+//! their surfaces, found by [trees](tree). Knows no solver: how a contact acts is the stepper's. SI units throughout.
 //!
 //! A node falls onto a plane:
 //!
@@ -18,6 +18,8 @@
 //! ```
 
 pub mod grid;
+pub mod pairs;
 pub mod pose;
 pub mod shape;
 pub mod touch;
+pub mod tree;

@@ -7,6 +7,7 @@
 use nalgebra::Vector3;
 use pliant_mechanics::tensor::Vector;
 
+use crate::pairs::Surface;
 use crate::pose::{Course, Pose};
 use crate::shape::{Near, Shape};
 
@@ -162,22 +163,32 @@ impl Passage {
     }
 }
 
-/// The surface of a body that touches a rigid thing.
+/// Who touches whom.
 #[derive(Clone, Debug)]
 pub struct Contact {
     /// Its name.
     pub name: String,
-    /// The nodes, numbered in the model.
-    pub nodes: Vec<u32>,
-    /// Triangles of these nodes. Points on them touch, too, close enough together for the thing.
-    pub faces: Vec<[u32; 3]>,
-    /// The thing, by its place in [`Contacts::rigids`].
-    pub rigid: usize,
-    /// How they touch it.
+    /// The surface of a body, nodes numbered in the model and increasing. Points on its triangles touch, too: close enough together for a rigid
+    /// thing.
+    pub surface: Surface,
+    /// What it touches.
+    pub with: With,
+    /// How.
     pub touch: Touch,
 }
 
-/// The contacts of a model with rigid things.
+/// What the surface of a body touches.
+#[derive(Clone, Debug)]
+pub enum With {
+    /// A rigid thing, by its place in [`Contacts::rigids`].
+    Rigid(usize),
+    /// Another body.
+    Body(Surface),
+    /// Other parts of the same surface.
+    Itself,
+}
+
+/// The contacts of a model.
 #[derive(Clone, Debug, Default)]
 pub struct Contacts {
     /// Obstacles and tools.

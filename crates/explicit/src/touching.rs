@@ -1,12 +1,14 @@
-//! Surfaces at rigid things in a step: nodes are predicted, and impulses found that keep them and points between them out of the things.
-//! A point x = Σ cᵢ xᵢ of a triangle with normal n and gap g is a row: impulses cᵢ λ on its corners with λ ≥ 0, g ≥ 0 and λ g = 0, and against
-//! its slip by at most μ λ. Projected Gauss–Seidel finds them; a last pass over nodes alone keeps these out of curved things, too.
+//! Contacts in a step: nodes are predicted, and impulses found that keep them and points between them apart from rigid things, other bodies and
+//! other parts of their own. A point pair x = Σ cᵢ xᵢ with normal n and gap g is a row: impulses cᵢ λ n on its nodes with λ ≥ 0, g ≥ 0 and
+//! λ g = 0, and against its slip by at most μ λ. Projected Gauss–Seidel finds them, in the order of the rows: momentum is kept to the last bit of
+//! each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_contact::pairs::{Pairs, Surface};
 use pliant_contact::shape::Near;
-use pliant_contact::touch::{Contacts, Passage, lattice, parts_of};
+use pliant_contact::touch::{Contact, Contacts, Passage, Rigid, With, lattice, parts_of};
 use pliant_mechanics::tensor::{Vector, add};
 
 /// Passes over all rows at most.
@@ -45,9 +47,17 @@ impl Node {
 }
 
 /// What a contact is about, in numbers of nodes of [`Touching`].
-struct Own {
-    nodes: Vec<u32>,
-    faces: Vec<[u32; 3]>,
+enum Own {
+    Rigid(AtRigid),
+    /// Bodies in the order of their nodes, with −1 where the contact names them in the other one: results don't depend on that.
+    Bodies(Pairs, f64),
+}
+
+/// A surface at a rigid thing.
+struct AtRigid {
+    /// The thing, by its place in [`Contacts::rigids`].
+    rigid: usize,
+    surface: Surface,
     /// Points of each face.
     samples: Vec<[f64; 3]>,
     /// How far [m] a point of a face can be from its nearest corner.
@@ -57,21 +67,68 @@ struct Own {
     passage: Passage,
 }
 
-/// A point that may touch a thing.
+/// A pair of points that may touch.
 struct Row {
     contact: usize,
-    corners: [u32; 3],
-    weights: [f64; 3],
+    nodes: [u32; 4],
+    weights: [f64; 4],
+    /// How many nodes take part.
+    count: usize,
     normal: Vector3<f64>,
-    /// The gap [m] as predicted, and the place [m] then.
+    /// The gap [m] as predicted, and Σ cᵢ xᵢ [m] then.
     gap: f64,
     place: Vector3<f64>,
-    /// Where the thing carries the point [m].
+    /// Σ cᵢ xᵢ [m] of no slip.
     carried: Vector3<f64>,
     mobility: Vector3<f64>,
     /// Impulse over the step along the normal [N], and across it.
     push: f64,
     drag: Vector3<f64>,
+    /// 1 if the impulse acts on the first surface of the contact, −1 if on the second.
+    sign: f64,
+}
+
+impl Row {
+    fn new<const N: usize>(contact: usize, nodes: [u32; N], weights: [f64; N]) -> Self {
+        let zero = Vector3::zeros();
+        let (normal, place, carried, mobility, drag) = (zero, zero, zero, zero, zero);
+        let at = |k: usize| k.min(N - 1);
+        let nodes = std::array::from_fn(|k| nodes[at(k)]);
+        let weights = std::array::from_fn(|k| weights[at(k)]);
+        Self {
+            contact,
+            nodes,
+            weights,
+            count: N,
+            normal,
+            gap: 0.0,
+            place,
+            carried,
+            mobility,
+            push: 0.0,
+            drag,
+            sign: 1.0,
+        }
+    }
+
+    /// The nodes that take part, with their weights.
+    fn parts(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.nodes.iter().zip(&self.weights).take(self.count).map(|(&node, &weight)| (node as usize, weight))
+    }
+
+    /// Takes places and mobilities; returns Σ cᵢ xᵢ [m] before the step.
+    fn place(&mut self, nodes: &[Node]) -> Vector3<f64> {
+        let mut now = Vector3::zeros();
+        let (mut place, mut mobility) = (Vector3::zeros(), Vector3::zeros());
+        for (node, weight) in self.parts() {
+            let node = &nodes[node];
+            place += node.then * weight;
+            now += node.now * weight;
+            mobility += node.mobility * (weight * weight);
+        }
+        (self.place, self.mobility) = (place, mobility);
+        now
+    }
 }
 
 /// The contacts of a model, with the nodes that they are about.
@@ -80,36 +137,46 @@ pub(crate) struct Touching {
     numbers: Vec<u32>,
     nodes: Vec<Node>,
     own: Vec<Own>,
-    /// Distances [m] of the nodes of a contact, by node.
+    /// Distances [m] of the nodes from a rigid thing, by node.
     distances: Vec<f64>,
     rows: Vec<Row>,
-    /// The force [N] of each contact on its body at the last evaluation.
+    /// The force [N] of each contact on its first surface at the last evaluation.
     pub forces: Vec<Vector<f64>>,
 }
 
 impl Touching {
     /// Those of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
-        let mut numbers: Vec<u32> = contacts.contacts.iter().flat_map(|own| &own.nodes).copied().collect();
+        let surfaces = contacts.contacts.iter().flat_map(|Contact { surface, with, .. }| {
+            let other = if let With::Body(other) = with { Some(other) } else { None };
+            std::iter::once(surface).chain(other)
+        });
+        let mut numbers: Vec<u32> = surfaces.flat_map(|surface| &surface.nodes).copied().collect();
         numbers.sort_unstable();
         numbers.dedup();
         // Faces are of nodes that touch.
         let number = |node: &u32| numbers.partition_point(|known| known < node) as u32;
-        let own = contacts.contacts.iter().map(|contact| {
-            let place = |node: u32| Vector3::from(rest[node as usize]);
-            let edges = contact.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-            let longest = edges.map(|[a, b]| (place(a) - place(b)).norm()).fold(0.0, f64::max);
-            let rigid = &contacts.rigids[contact.rigid];
-            Own {
-                nodes: contact.nodes.iter().map(number).collect(),
-                faces: contact.faces.iter().map(|face| face.map(|node| number(&node))).collect(),
-                samples: lattice(parts_of(longest, &rigid.shape)),
-                reach: longest,
-                margin: MARGIN * longest,
-                passage: Passage::new(rigid, [0.0; 2]),
+        let own = |Surface { nodes, faces }: &Surface| {
+            let faces = faces.iter().map(|face| face.map(|node| number(&node))).collect();
+            Surface { nodes: nodes.iter().map(number).collect(), faces }
+        };
+        let place = |node: u32| Vector3::from(rest[numbers[node as usize] as usize]);
+        let pairs = |contact: &Contact, second: Option<&Surface>| {
+            let first = own(&contact.surface);
+            let (first, second, sign) = match second {
+                Some(second) if second.nodes < first.nodes => (second, Some(&first), -1.0),
+                _ => (&first, second, 1.0),
+            };
+            Own::Bodies(Pairs::new(first, second, contact.touch.offset, place), sign)
+        };
+        let parts = contacts.contacts.iter().map(|contact| match &contact.with {
+            &With::Rigid(rigid) => {
+                Own::Rigid(AtRigid::new(&contacts.rigids[rigid], rigid, own(&contact.surface), place))
             }
+            With::Body(second) => pairs(contact, Some(&own(second))),
+            With::Itself => pairs(contact, None),
         });
-        let own = own.collect();
+        let own = parts.collect();
         Self {
             nodes: vec![Node::NONE; numbers.len()],
             distances: vec![0.0; numbers.len()],
@@ -136,13 +203,13 @@ impl Touching {
             (node.now, node.near) = (place.into(), false);
             farthest = farthest.max(way);
         }
-        self.find_rows(times, farthest, free);
-        if self.rows.is_empty() {
-            return;
+        self.look(times, farthest, free);
+        if self.nodes.iter().any(|node| node.near) {
+            self.sweep();
+            self.measure();
+            self.solve();
+            self.lift();
         }
-        self.sweep();
-        self.solve();
-        self.lift();
     }
 
     /// The force [N] on each node that touches something.
@@ -152,40 +219,29 @@ impl Touching {
         nodes.map(|(node, &number)| (number, over(&(node.then - node.free), &node.mobility).into()))
     }
 
-    /// Rows of all points that may touch in the step.
-    fn find_rows(&mut self, times: [f64; 2], farthest: f64, free: impl Fn(u32) -> Free) {
+    /// Finds the nodes that may touch in the step, and where they go; rows of the points near rigid things.
+    fn look(&mut self, times: [f64; 2], farthest: f64, free: impl Fn(u32) -> Free) {
         let Self { contacts, numbers, nodes, own, distances, rows, .. } = self;
         rows.clear();
-        let blank = |contact, corners, weights| {
-            let zero = Vector3::zeros();
-            let (normal, place, carried, mobility, drag) = (zero, zero, zero, zero, zero);
-            Row { contact, corners, weights, normal, gap: 0.0, place, carried, mobility, push: 0.0, drag }
-        };
-        for (index, (contact, own)) in contacts.contacts.iter().zip(own.iter_mut()).enumerate() {
-            let rigid = &contacts.rigids[contact.rigid];
-            own.passage = Passage::new(rigid, times);
-            // A way can double in a step.
-            let room = contact.touch.offset + own.margin + own.passage.travel(rigid) + 2.0 * farthest;
-            let mut nearest = f64::INFINITY;
-            for &node in &own.nodes {
-                let distance = own.passage.near(rigid, &nodes[node as usize].now).distance;
-                distances[node as usize] = distance;
-                nearest = nearest.min(distance);
-                if distance < room {
-                    nodes[node as usize].near = true;
-                    rows.push(blank(index, [node; 3], [1.0, 0.0, 0.0]));
+        for (index, own) in own.iter_mut().enumerate() {
+            match own {
+                Own::Rigid(own) => {
+                    let offset = contacts.contacts[index].touch.offset;
+                    own.look(
+                        &contacts.rigids[own.rigid],
+                        times,
+                        offset + 2.0 * farthest,
+                        nodes,
+                        distances,
+                        |row| {
+                            rows.push(Row { contact: index, ..row });
+                        },
+                    );
                 }
-            }
-            if own.samples.is_empty() || nearest > room + own.reach {
-                continue;
-            }
-            for &face in &own.faces {
-                let corners = face.map(|node| nodes[node as usize].now);
-                let around = (corners[0] - corners[1]).norm().max((corners[0] - corners[2]).norm());
-                let least = face.iter().map(|&node| distances[node as usize]).fold(f64::INFINITY, f64::min);
-                if least < room + around {
-                    face.iter().for_each(|&node| nodes[node as usize].near = true);
-                    rows.extend(own.samples.iter().map(|&weights| blank(index, face, weights)));
+                Own::Bodies(pairs, _) => {
+                    // A way can double in a step.
+                    pairs.update(|node| nodes[node as usize].now, 2.0 * farthest);
+                    pairs.near().iter().for_each(|&node| nodes[node as usize].near = true);
                 }
             }
         }
@@ -198,9 +254,11 @@ impl Touching {
     /// Takes nodes along that a fast thing would pass over.
     fn sweep(&mut self) {
         for ((contact, own), force) in self.contacts.contacts.iter().zip(&self.own).zip(&mut self.forces) {
-            if own.passage.is_fast() {
-                let rigid = &self.contacts.rigids[contact.rigid];
-                for &node in &own.nodes {
+            if let Own::Rigid(own) = own
+                && own.passage.is_fast()
+            {
+                let rigid = &self.contacts.rigids[own.rigid];
+                for &node in &own.surface.nodes {
                     let node = &mut self.nodes[node as usize];
                     let Node { now, then, mobility, near, .. } = *node;
                     let place = near.then(|| contact.touch.pass(rigid, &own.passage, &now, &then, &mobility));
@@ -213,37 +271,52 @@ impl Touching {
         }
     }
 
-    /// Impulses of all rows, by projected Gauss–Seidel.
-    fn solve(&mut self) {
-        let Self { contacts, nodes, own, rows, forces, .. } = self;
+    /// Finds the gaps of all rows; leaves out those that are too wide to close.
+    fn measure(&mut self) {
+        let Self { contacts, nodes, own, rows, .. } = self;
         let mut deepest = 0.0_f64;
         rows.retain_mut(|row| {
-            let contact = &contacts.contacts[row.contact];
-            let own = &own[row.contact];
-            let mut now = Vector3::zeros();
-            for (&corner, &weight) in row.corners.iter().zip(&row.weights) {
-                let node = &nodes[corner as usize];
-                row.place += node.then * weight;
-                now += node.now * weight;
-                row.mobility += node.mobility * (weight * weight);
-            }
-            let Near { distance, normal } = own.passage.near(&contacts.rigids[contact.rigid], &row.place);
-            (row.normal, row.gap) = (normal, distance - contact.touch.offset);
+            let Own::Rigid(own) = &own[row.contact] else { return false };
+            let now = row.place(nodes);
+            let Near { distance, normal } = own.passage.near(&contacts.rigids[own.rigid], &row.place);
+            (row.normal, row.gap) = (normal, distance - contacts.contacts[row.contact].touch.offset);
             row.carried = own.passage.carry(&now);
             deepest = deepest.max(-row.gap);
             row.gap < own.margin
         });
-        if deepest <= 0.0 {
-            return;
+        for (index, own) in own.iter().enumerate() {
+            let Own::Bodies(pairs, sign) = own else { continue };
+            let offset = contacts.contacts[index].touch.offset;
+            // Impulses along the way between two points before the step have no moment.
+            pairs.find(
+                |node| nodes[node as usize].now,
+                |pair| {
+                    let mut row = Row::new(index, pair.nodes, pair.weights);
+                    row.carried = row.place(nodes);
+                    (row.normal, row.sign) = (pair.normal, if pair.in_order { *sign } else { -sign });
+                    row.gap = row.normal.dot(&row.place) - offset;
+                    deepest = deepest.max(-row.gap);
+                    rows.push(row);
+                },
+            );
         }
         // No impulse moves a point farther than a few times the deepest one.
         rows.retain(|row| row.gap < BAND * deepest);
+    }
+
+    /// Impulses of all rows, by projected Gauss–Seidel.
+    fn solve(&mut self) {
+        let Self { contacts, nodes, rows, forces, .. } = self;
+        let deepest = rows.iter().map(|row| -row.gap).fold(0.0, f64::max);
+        if deepest <= 0.0 {
+            return;
+        }
         for _ in 0..PASSES {
             let mut change = 0.0_f64;
             for row in rows.iter_mut() {
                 let mut place = Vector3::zeros();
-                for (&corner, &weight) in row.corners.iter().zip(&row.weights) {
-                    place += nodes[corner as usize].then * weight;
+                for (node, weight) in row.parts() {
+                    place += nodes[node].then * weight;
                 }
                 let along = row.mobility.component_mul(&row.normal).dot(&row.normal);
                 if along <= 0.0 {
@@ -267,8 +340,8 @@ impl Touching {
                 }
                 if more != Vector3::zeros() {
                     change = change.max(row.mobility.component_mul(&more).norm());
-                    for (&corner, &weight) in row.corners.iter().zip(&row.weights) {
-                        let node = &mut nodes[corner as usize];
+                    for (node, weight) in row.parts() {
+                        let node = &mut nodes[node];
                         node.then += node.mobility.component_mul(&more) * weight;
                     }
                 }
@@ -278,15 +351,17 @@ impl Touching {
             }
         }
         for row in rows.iter() {
-            forces[row.contact] = add(forces[row.contact], (row.normal * row.push + row.drag).into());
+            let force = (row.normal * row.push + row.drag) * row.sign;
+            forces[row.contact] = add(forces[row.contact], force.into());
         }
     }
 
     /// Lifts nodes that are still in a thing.
     fn lift(&mut self) {
         for ((contact, own), force) in self.contacts.contacts.iter().zip(&self.own).zip(&mut self.forces) {
-            let rigid = &self.contacts.rigids[contact.rigid];
-            for &node in &own.nodes {
+            let Own::Rigid(own) = own else { continue };
+            let rigid = &self.contacts.rigids[own.rigid];
+            for &node in &own.surface.nodes {
                 let node = &mut self.nodes[node as usize];
                 if !node.near {
                     continue;
@@ -299,6 +374,57 @@ impl Touching {
                     node.then += along * push;
                     *force = add(*force, (normal * push).into());
                 }
+            }
+        }
+    }
+}
+
+impl AtRigid {
+    fn new(rigid: &Rigid, number: usize, surface: Surface, place: impl Fn(u32) -> Vector3<f64>) -> Self {
+        let edges = surface.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let longest = edges.map(|[a, b]| (place(a) - place(b)).norm()).fold(0.0, f64::max);
+        Self {
+            rigid: number,
+            samples: lattice(parts_of(longest, &rigid.shape)),
+            reach: longest,
+            margin: MARGIN * longest,
+            passage: Passage::new(rigid, [0.0; 2]),
+            surface,
+        }
+    }
+
+    /// Marks the nodes that may come nearer than a room [m] in the step between two times [s]; rows of these and of points between them.
+    fn look(
+        &mut self,
+        rigid: &Rigid,
+        times: [f64; 2],
+        room: f64,
+        nodes: &mut [Node],
+        distances: &mut [f64],
+        mut found: impl FnMut(Row),
+    ) {
+        self.passage = Passage::new(rigid, times);
+        let room = room + self.margin + self.passage.travel(rigid);
+        let mut nearest = f64::INFINITY;
+        for &node in &self.surface.nodes {
+            let distance = self.passage.near(rigid, &nodes[node as usize].now).distance;
+            distances[node as usize] = distance;
+            nearest = nearest.min(distance);
+            if distance < room {
+                nodes[node as usize].near = true;
+                found(Row::new(0, [node], [1.0]));
+            }
+        }
+        if self.samples.is_empty() || nearest > room + self.reach {
+            return;
+        }
+        for &face in &self.surface.faces {
+            let corners = face.map(|node| nodes[node as usize].now);
+            let around = (corners[0] - corners[1]).norm().max((corners[0] - corners[2]).norm());
+            let least = face.iter().map(|&node| distances[node as usize]).fold(f64::INFINITY, f64::min);
+            if least < room + around {
+                face.iter().for_each(|&node| nodes[node as usize].near = true);
+                self.samples.iter().for_each(|&weights| found(Row::new(0, face, weights)));
             }
         }
     }

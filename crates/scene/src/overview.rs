@@ -6,6 +6,7 @@ use pliant_geometry::QualityReport;
 use pliant_implicit::Facet;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
+use pliant_sim::contact::touch::With;
 use pliant_sim::{BodyCells, Critical, ImplicitBodies, counted, number};
 
 use crate::assemble::Built;
@@ -127,10 +128,14 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
         writeln!(page, "constraint `{}`: {what} {axes} of {nodes}", constraint.name)?;
     }
     for contact in built.contacts.iter().flat_map(|all| &all.contacts) {
-        let thing = built.contacts.as_ref().map_or("", |all| &all.rigids[contact.rigid].name);
-        let nodes = counted(contact.nodes.len(), "node");
+        let thing = match (&contact.with, &built.contacts) {
+            (With::Rigid(rigid), Some(all)) => format!("`{}`", all.rigids[*rigid].name),
+            (With::Body(other), _) => format!("{} of another body", counted(other.nodes.len(), "node")),
+            _ => "each other".into(),
+        };
+        let nodes = counted(contact.surface.nodes.len(), "node");
         let friction = number(contact.touch.friction);
-        writeln!(page, "contact `{}`: {nodes} with `{thing}`, friction {friction}", contact.name)?;
+        writeln!(page, "contact `{}`: {nodes} with {thing}, friction {friction}", contact.name)?;
     }
     for load in &built.model.loads {
         writeln!(page, "load `{}`: {}", load.name, describe_load(built, load))?;

@@ -320,7 +320,10 @@ impl Scene {
                 .contacts
                 .iter()
                 .filter(|(_, table)| {
-                    owns(&table.between[0]) || (index == 0 && !owners.of.contains_key(&table.between[0]))
+                    let body = table.between.iter().find(|name| owners.of.contains_key(*name));
+                    body.map_or(index == 0 || table.between.iter().any(|name| name == "all"), |name| {
+                        owns(name)
+                    })
                 })
                 .cloned()
                 .collect(),

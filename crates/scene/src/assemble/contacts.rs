@@ -1,14 +1,15 @@
-//! Obstacles and tools, and the nodes that touch them.
+//! Obstacles and tools, and who touches whom.
 
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use pliant_geometry::{Selection, Vector3};
+use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::load::NO_NODE;
+use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::pose::{Course, Pose};
 use pliant_sim::contact::shape::Shape;
-use pliant_sim::contact::touch::{Contact, Contacts, Rigid, Touch};
+use pliant_sim::contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_sim::{counted, number};
 
 use super::{Builder, Target, suggestion};
@@ -20,6 +21,18 @@ const ROW: &str =
     "each row is `t,x,y,z,qw,qx,qy,qz`: a time in seconds, a position in metres, a unit quaternion";
 /// How far the length of a quaternion may be off 1.
 const UNIT: f64 = 1e-3;
+
+/// What to do about contact with other solvers.
+const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars";
+
+/// Who touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Partner {
+    /// A body of the model.
+    Body(usize),
+    /// An obstacle or tool.
+    Rigid(usize),
+}
 
 impl Builder<'_> {
     /// The contacts of the scene; `None` without any.
@@ -37,8 +50,8 @@ impl Builder<'_> {
             }
         }
         for (name, table) in &scene.contacts {
-            let contact = self.contact(name, table, &all.rigids);
-            all.contacts.extend(contact);
+            let contacts = self.contact(name, table, &all.rigids);
+            all.contacts.extend(contacts.into_iter().flatten());
         }
         (!all.contacts.is_empty()).then(|| Arc::new(all))
     }
@@ -98,36 +111,124 @@ impl Builder<'_> {
         Some(Rigid { name: name.into(), shape, course, inside: table.inside })
     }
 
-    fn contact(&mut self, name: &str, table: &ContactTable, rigids: &[Rigid]) -> Option<Contact> {
-        let path = ["contact", name, "between"];
-        let body = self.find_body(&table.between[0], &["contact", name, "between", "0"])?;
-        let with = &table.between[1];
-        let Some(rigid) = rigids.iter().position(|rigid| rigid.name == *with) else {
-            let named = |(known, _): &(String, ToolTable)| known == with;
-            if self.scene.obstacles.iter().chain(&self.scene.tools).any(named) {
-                // Its own mistake is reported.
-                return None;
-            }
-            let known: Vec<&str> = rigids.iter().map(|rigid| rigid.name.as_str()).collect();
-            let help = match self.bodies.iter().any(|body| body.name == *with) {
-                true => "contact of two bodies is not there yet: name an obstacle or a tool".into(),
-                false => suggestion(with, &known, "the scene", "obstacles and tools"),
-            };
-            let message = format!("there is no obstacle or tool `{with}`");
-            self.error(&["contact", name, "between", "1"], message, "no such thing", help);
-            return None;
-        };
+    /// The contacts of a table: one, or with `"all"` one for each pair.
+    fn contact(&mut self, name: &str, table: &ContactTable, rigids: &[Rigid]) -> Option<Vec<Contact>> {
         let run = &self.scene.run;
-        let own = &table.between[0];
-        let help = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars";
-        if run.solver != SolverName::Explicit || self.shell_cells(body).is_some() {
-            let by = if run.solver == SolverName::Explicit { "steps of shells" } else { run.solver.word() };
-            let message = format!("contact is for the solver `explicit`, and `{own}` goes with `{by}`");
-            self.error(&path, message, "not for this solver", help);
+        if run.solver != SolverName::Explicit {
+            let message = format!(
+                "contact is for the solver `explicit`, and this scene goes with `{}`",
+                run.solver.word()
+            );
+            self.error(&["contact", name, "between"], message, "not for this solver", EXPLICIT);
             return None;
         }
-        let faces = match &table.faces {
-            Some(selection) => self.faces(Target::Body(body), selection, &["contact", name, "faces"])?,
+        let [first, second] = [0, 1].map(|side| self.partners(name, table, side, rigids));
+        let (first, second) = (first?, second?);
+        let mut pairs = Vec::new();
+        for &a in &first {
+            for &b in &second {
+                let pair = match (a, b) {
+                    (Partner::Rigid(_), Partner::Body(_)) => [b, a],
+                    (Partner::Body(one), Partner::Body(other)) if other < one && first.len() > 1 => [b, a],
+                    _ => [a, b],
+                };
+                if pair != [a, b] && pairs.contains(&pair) || matches!(pair, [Partner::Rigid(_), _]) {
+                    continue;
+                }
+                if !pairs.contains(&pair) {
+                    pairs.push(pair);
+                }
+            }
+        }
+        if pairs.is_empty() {
+            let help = "name a body first: `between = [\"liver\", \"probe\"]`";
+            self.error(&["contact", name, "between"], "no body touches anything here", "no body", help);
+            return None;
+        }
+        let several = pairs.len() > 1;
+        let mut all = Vec::new();
+        for [own, with] in pairs {
+            let Partner::Body(body) = own else { continue };
+            let other = match with {
+                Partner::Rigid(rigid) => rigids[rigid].name.clone(),
+                Partner::Body(other) => self.bodies[other].name.clone(),
+            };
+            let full =
+                if several { format!("{name}.{}-{other}", self.bodies[body].name) } else { name.into() };
+            let surface = self.surface_of(name, table, body, 0)?;
+            let touch = Touch { friction: table.friction, offset: table.thickness };
+            let with = match with {
+                Partner::Rigid(rigid) => {
+                    self.check_apart(name, table, body, &rigids[rigid], &surface.nodes);
+                    With::Rigid(rigid)
+                }
+                Partner::Body(other) if other == body => {
+                    self.note_apart(&full, &surface, table.thickness);
+                    With::Itself
+                }
+                Partner::Body(other) => {
+                    let second = self.surface_of(name, table, other, 1)?;
+                    self.check_bodies_apart(name, table, [body, other], [&surface, &second]);
+                    With::Body(second)
+                }
+            };
+            all.push(Contact { name: full, surface, with, touch });
+        }
+        Some(all)
+    }
+
+    /// The bodies and things of a side of a contact.
+    fn partners(
+        &mut self,
+        name: &str,
+        table: &ContactTable,
+        side: usize,
+        rigids: &[Rigid],
+    ) -> Option<Vec<Partner>> {
+        let wanted = &table.between[side];
+        let bodies = self.bodies.iter().zip(0..);
+        if wanted == "all" {
+            let solids = bodies.filter(|(body, _)| body.mesh.volume_blocks().any(|block| !block.is_empty()));
+            let solids = solids.map(|(_, index)| Partner::Body(index));
+            return Some(solids.chain((0..rigids.len()).map(Partner::Rigid)).collect());
+        }
+        if let Some(rigid) = rigids.iter().position(|rigid| rigid.name == *wanted) {
+            return Some(vec![Partner::Rigid(rigid)]);
+        }
+        let named = |(known, _): &(String, ToolTable)| known == wanted;
+        if self.scene.obstacles.iter().chain(&self.scene.tools).any(named) {
+            // Its own mistake is reported.
+            return None;
+        }
+        if let Some(body) = self.bodies.iter().position(|body| body.name == *wanted) {
+            return Some(vec![Partner::Body(body)]);
+        }
+        let known = self.bodies.iter().map(|body| body.name.as_str());
+        let known: Vec<&str> =
+            known.chain(rigids.iter().map(|rigid| rigid.name.as_str())).chain(["all"]).collect();
+        let help = suggestion(wanted, &known, "the scene", "bodies, obstacles and tools");
+        let help = format!("{help}; bodies that touch each other are of one participant");
+        let place = ["0", "1"][side];
+        let message = format!("there is no body, obstacle or tool `{wanted}`");
+        self.error(&["contact", name, "between", place], message, "no such thing", help);
+        None
+    }
+
+    /// The faces and nodes of a body that touch.
+    fn surface_of(&mut self, name: &str, table: &ContactTable, body: usize, side: usize) -> Option<Surface> {
+        let path = ["contact", name, "between"];
+        let own = self.bodies[body].name.clone();
+        if self.shell_cells(body).is_some() {
+            let message = format!("contact is for solids, membranes and bars, and `{own}` is a shell");
+            self.error(&path, message, "a shell", EXPLICIT);
+            return None;
+        }
+        let (selection, key) = match side {
+            0 => (&table.faces, "faces"),
+            _ => (&table.other_faces, "other-faces"),
+        };
+        let faces = match selection {
+            Some(selection) => self.faces(Target::Body(body), selection, &["contact", name, key])?,
             None => self.faces(Target::Body(body), &Selection::All, &path)?,
         };
         let halves = faces.iter().flat_map(|&[a, b, c, d]| {
@@ -151,17 +252,83 @@ impl Builder<'_> {
                 "node {} of `{own}` follows others by a tie, a rigid part or a mean",
                 self.assembly.locate_node(node).1
             );
-            let help = "choose `faces` without such nodes";
+            let help = format!("choose `{key}` without such nodes");
             self.error(&path, message, "bound to others", help);
             return None;
         }
-        self.check_apart(name, table, &rigids[rigid], &nodes);
-        let touch = Touch { friction: table.friction, offset: table.thickness };
-        Some(Contact { name: name.into(), nodes, faces: halves, rigid, touch })
+        Some(Surface { nodes, faces: halves })
+    }
+
+    /// Remarks on parts of a body that are too near each other at rest to touch.
+    fn note_apart(&mut self, name: &str, surface: &Surface, thickness: f64) {
+        let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
+        let count = Pairs::new(surface, None, thickness, place).set_apart_count();
+        if count > 0 {
+            self.notes.push(format!(
+                "contact `{name}`: {} of nodes with faces or of edges never touch, since they are too near at rest",
+                counted(count, "pair")
+            ));
+        }
+    }
+
+    /// Refuses bodies that overlap at the start, or have no inside.
+    fn check_bodies_apart(
+        &mut self,
+        name: &str,
+        table: &ContactTable,
+        bodies: [usize; 2],
+        surfaces: [&Surface; 2],
+    ) {
+        let path = ["contact", name, "between"];
+        let names = bodies.map(|body| self.bodies[body].name.clone());
+        for body in bodies {
+            if self.bodies[body].mesh.volume_blocks().all(|block| block.is_empty()) {
+                let message = format!(
+                    "bodies that touch each other are solids, and `{}` is none",
+                    self.bodies[body].name
+                );
+                let help = "name the solid under it, or let it touch obstacles and tools only";
+                self.error(&path, message, "no solid", help);
+                return;
+            }
+        }
+        let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
+        // How deep nodes lie in the other body: from cells for large overlaps, from faces for the distance to keep.
+        let mut inside: Vec<(f64, Vector3)> = Vec::new();
+        for (surface, other) in [(surfaces[0], bodies[1]), (surfaces[1], bodies[0])] {
+            let body = &self.bodies[other];
+            let (cells, all) =
+                (Locator::new(&body.mesh), (0..body.boundary.faces.len() as u32).collect::<Vec<_>>());
+            let faces = SurfaceLocator::new(&body.boundary, &all, &body.mesh.points);
+            for at in surface.nodes.iter().map(|&node| place(node)) {
+                if cells.locate(at).is_some_and(|found| found.distance == 0.0)
+                    && let Some(on) = faces.closest(&at)
+                {
+                    inside.push(((on.position - at).norm(), at));
+                }
+            }
+        }
+        let mut pairs = Pairs::new(surfaces[0], Some(surfaces[1]), table.thickness, place);
+        pairs.update(place, 0.0);
+        pairs.find(place, |pair| {
+            inside.push((table.thickness - pair.distance, place(pair.nodes[0])));
+        });
+        inside.retain(|(depth, _)| *depth > 1e-9 * size);
+        let Some((depth, at)) = inside.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        let [x, y, z] = [at.x, at.y, at.z].map(number);
+        let [first, second] = &names;
+        let message = format!(
+            "`{first}` and `{second}` overlap at the start in {}, up to {} m deep at ({x}, {y}, {z}) m",
+            counted(inside.len(), "place"),
+            number(*depth)
+        );
+        let help = "move one of them (`at` of its mesh), or make `thickness` smaller";
+        self.error(&path, message, "overlapping", help);
     }
 
     /// Refuses bodies that are in an obstacle or a tool at the start: a step would throw them out.
-    fn check_apart(&mut self, name: &str, table: &ContactTable, rigid: &Rigid, nodes: &[u32]) {
+    fn check_apart(&mut self, name: &str, table: &ContactTable, body: usize, rigid: &Rigid, nodes: &[u32]) {
         let pose = rigid.course.at(0.0);
         let places = nodes.iter().map(|&node| Vector3::from(self.assembly.rest[node as usize]));
         let gaps = places.map(|place| (rigid.near(&pose, &place).distance - table.thickness, place));
@@ -172,7 +339,7 @@ impl Builder<'_> {
         let message = format!(
             "{} of `{}` {} in `{}` at the start, up to {} m deep at ({x}, {y}, {z}) m",
             counted(inside.len(), "node"),
-            table.between[0],
+            self.bodies[body].name,
             if inside.len() == 1 { "lies" } else { "lie" },
             rigid.name,
             number(-gap)

@@ -96,21 +96,25 @@ pub struct ConeTool {
     pub height: f64,
 }
 
-/// A body that touches an obstacle or a tool: no node of its surface goes into it. With the solver `explicit` on the CPU, for bodies
-/// without bending. Its force on the obstacle or tool is in `csv` outputs as `contact.NAME`.
+/// Who touches whom: a body an obstacle or a tool, another body, or itself. No surface goes into the other. With the solver `explicit` on the
+/// CPU, for bodies without bending; bodies that touch each other are solids. The force on the second is in `csv` outputs as `contact.NAME`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactTable {
-    /// The body, and the obstacle or tool: `between = ["liver", "probe"]`.
+    /// The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`: all solids, obstacles and tools, each
+    /// pair with an entry of its own, `contact.NAME.liver-probe`.
     pub between: [String; 2],
-    /// The faces of the body that touch; if not given, all of its boundary.
+    /// The faces of the first that touch; if not given, all of its boundary.
     #[serde(default)]
     pub faces: Option<Selection>,
+    /// The faces of the second, if that is another body; if not given, all of its boundary.
+    #[serde(default)]
+    pub other_faces: Option<Selection>,
     /// Coulomb's coefficient of friction.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub friction: f64,
-    /// Distance [m] that nodes keep from the surface.
+    /// Distance [m] that the surfaces keep.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub thickness: f64,

@@ -9,6 +9,7 @@ use pliant_implicit::Carried;
 use pliant_mechanics::Energies;
 
 use crc32fast::Hasher;
+use pliant_sim::contact::touch::With;
 use pliant_sim::{BodyCells, CellsNow};
 
 use super::file::{create, reopen};
@@ -92,8 +93,8 @@ impl Column {
 /// Those of one participant.
 struct Own {
     reactions: Vec<usize>,
-    /// Contacts whose forces are columns.
-    contacts: usize,
+    /// Contacts whose forces are columns: all but those of a body with itself, whose forces have no sum.
+    contacts: Vec<usize>,
     /// The point [m] about which moments of reactions are taken, and what each of them prescribes.
     moments: Option<([f64; 3], Vec<Held>)>,
     energy: bool,
@@ -139,10 +140,11 @@ impl Own {
             AXES.iter().for_each(|axis| add(format!("reaction.{name}.{axis}"), "N"));
         }
         let contacts = built.contacts.as_ref().map_or(&[][..], |all| &all.contacts);
-        for contact in contacts {
+        let paired: Vec<usize> =
+            (0..contacts.len()).filter(|&at| !matches!(contacts[at].with, With::Itself)).collect();
+        for contact in paired.iter().map(|&at| &contacts[at]) {
             AXES.iter().for_each(|axis| add(format!("contact.{}.{axis}", contact.name), "N"));
         }
-        let contacts = contacts.len();
         let moments = table.moments_about.map(|point| {
             for &constraint in &reactions {
                 let name = &built.model.constraints[constraint].name;
@@ -173,7 +175,7 @@ impl Own {
         }
         let probes = probes().map(|(_, probe)| Probe::new(built, probe)).collect();
         let shells = fields::OfShells::default();
-        Self { reactions, contacts, moments, energy: table.energy, probes, shells }
+        Self { reactions, contacts: paired, moments, energy: table.energy, probes, shells }
     }
 
     /// Adds the sample of an instant to a row.
@@ -181,10 +183,10 @@ impl Own {
         for &constraint in &self.reactions {
             row.extend(frame.now.reaction(constraint));
         }
-        if self.contacts > 0 {
+        if !self.contacts.is_empty() {
             let forces = frame.now.contact_forces();
             // Before the first evaluation there are none.
-            (0..self.contacts).for_each(|at| row.extend(forces.get(at).copied().unwrap_or_default()));
+            self.contacts.iter().for_each(|&at| row.extend(forces.get(at).copied().unwrap_or_default()));
         }
         for (point, held) in
             self.moments.iter().flat_map(|(point, all)| all.iter().map(move |held| (point, held)))

@@ -38,6 +38,64 @@ fn a_tool_presses_a_body_onto_an_obstacle() {
     }
 }
 
+/// A block on a floor with a smaller lid of other cells that falls onto it and is pulled along by gravity.
+fn stacked(run: &str, more: &str) -> String {
+    format!(
+        "[scene]\nuntil = 1.0\ngravity = [1, 0, -9.81]\n[run]\n{run}\n\
+         [law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 2e4\npoisson-ratio = 0.4\n\
+         [body.block]\nmesh = {{ block = {{ size = [0.04, 0.04, 0.02], cells = [6, 6, 3] }}, as = 'hexes' }}\n\
+         law = 'tissue'\ndensity = 1000\ndamping = 60\n\
+         [body.lid]\nmesh = {{ block = {{ size = [0.03, 0.03, 0.02], cells = [4, 4, 3] }}, as = 'tets', at = [0.005, 0.005, 0.0205] }}\n\
+         law = 'tissue'\ndensity = 1000\ndamping = 60\n\
+         [obstacle.floor]\nshape = 'half-space'\n\
+         [contact.below]\nbetween = ['block', 'floor']\nfriction = 0.5\n\
+         [contact.above]\nbetween = ['lid', 'block']\nfriction = 0.3\nthickness = 0\n\
+         [output.history]\ntype = 'csv'\nevery = 1\nenergy = true\n\
+         probes.top = {{ on = 'lid', at = [0.02, 0.02, 0.0405], data = ['displacement'] }}\n{more}"
+    )
+}
+
+/// A lid of tets lies on a block of hexes: the forces between them and on the floor are the weights, single precision like double.
+#[test]
+fn a_body_lies_on_another_one() {
+    for precision in ["", "precision = 'single'"] {
+        let row = last_row(&stacked(precision, ""));
+        let weights =
+            [0.03 * 0.03 * 0.02, 0.03 * 0.03 * 0.02 + 0.04 * 0.04 * 0.02].map(|volume| volume * 1000.0);
+        let (between, floor) =
+            (["x", "z"].map(|c| row[&format!("contact.above.{c}")]), row["contact.below.z"]);
+        let moved = row["probe.top.displacement.z"];
+        println!(
+            "{between:?} N between the bodies, {floor} N on the floor, weights {weights:?} kg, lid at {moved} m"
+        );
+        assert!((between[1] / (-9.81 * weights[0]) - 1.0).abs() < 0.01, "{between:?}");
+        assert!((between[0] / weights[0] - 1.0).abs() < 0.05, "{between:?}");
+        assert!((floor / (-9.81 * weights[1]) - 1.0).abs() < 0.01, "{floor}");
+        assert!(moved < -5e-4 && moved > -1.2e-3 && row["energy.balance"] < 0.02, "{moved}");
+    }
+}
+
+/// `"all"` is all pairs, each with its force; the result does not depend on the order in which bodies are named.
+#[test]
+fn all_touch_all() {
+    let named = last_row(&stacked("", ""));
+    let table = "[contact.every]\nbetween = ['all', 'all']\nfriction = 0.3\n[output.history]";
+    let text = stacked("", "");
+    let (start, rest) = text.split_once("[contact.below]").unwrap();
+    let (_, end) = rest.split_once("[output.history]").unwrap();
+    let all = last_row(&format!("{start}{table}{end}"));
+    let columns: Vec<&String> =
+        all.keys().filter(|name| name.starts_with("contact.") && name.ends_with(".z")).collect();
+    println!("{columns:?}");
+    let (between, floor) = (all["contact.every.block-lid.z"], all["contact.every.block-floor.z"]);
+    assert!((between / named["contact.above.z"] + 1.0).abs() < 0.02, "{between}");
+    assert!((floor / named["contact.below.z"] - 1.0).abs() < 0.02, "{floor}");
+    let turned = text.replace("['lid', 'block']", "['block', 'lid']");
+    let other = last_row(&turned);
+    assert_eq!(other["contact.above.z"], -named["contact.above.z"]);
+    assert_eq!(other["probe.top.displacement.x"], named["probe.top.displacement.x"]);
+}
+
 /// The same step with and without contact.
 #[test]
 fn contact_leaves_the_critical_step_as_it_is() {
@@ -83,12 +141,32 @@ fn contact_that_cannot_be_is_refused_with_its_line() {
     for (text, pieces) in [
         (
             with("['block', 'ball']", "['block', 'bal']"),
-            ["there is no obstacle or tool `bal`", "did you mean `ball`?"],
+            ["there is no body, obstacle or tool `bal`", "did you mean `ball`?"],
         ),
-        (with("['block', 'ball']", "['blok', 'ball']"), ["there is no body `blok`", "did you mean `block`?"]),
         (
-            with("['block', 'ball']", "['block', 'block']"),
-            ["there is no obstacle or tool `block`", "not there yet"],
+            with("['block', 'ball']", "['blok', 'ball']"),
+            ["there is no body, obstacle or tool `blok`", "did you mean `block`?"],
+        ),
+        (
+            with("['block', 'ball']", "['floor', 'ball']"),
+            ["no body touches anything here", "name a body first"],
+        ),
+        (
+            stacked("", "").replace("at = [0.005, 0.005, 0.0205]", "at = [0.005, 0.005, 0.019]"),
+            ["`lid` and `block` overlap at the start in", "up to 0.001000 m deep"],
+        ),
+        (
+            stacked("", "").replace("thickness = 0", "thickness = 0.001"),
+            ["overlap at the start in", "up to 0.0005000 m deep"],
+        ),
+        (
+            stacked(
+                "",
+                "[law.skin]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.45\n\
+                     [body.capsule]\non = 'block'\nmodel = 'membrane'\nlaw = 'skin'\nthickness = 1e-4\ndensity = 1000\n\
+                     [contact.skin]\nbetween = ['capsule', 'lid']\n",
+            ),
+            ["bodies that touch each other are solids, and `capsule` is none", "name the solid under it"],
         ),
         (
             with("0.0301]", "0.025]"),

@@ -1,65 +1,29 @@
-//! Soft bodies at rigid things: an incline, a wall, a sphere that is pressed in, held to closed forms.
+//! An incline, a wall, a tool that is pressed in.
 
 use std::sync::Arc;
 
+use pliant_contact::pairs::Surface;
 use pliant_contact::pose::{Course, Pose};
 use pliant_contact::shape::Shape;
-use pliant_contact::touch::{Contact, Contacts, Rigid, Touch};
-use pliant_explicit::critical_step::assembled;
-use pliant_explicit::{CentralDifference, Observable, State};
+use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
+use pliant_explicit::{Observable, State};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
-use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::load::Load;
-use pliant_mechanics::model::{Cells, Material, Model, Solid};
+use pliant_mechanics::model::Model;
 use pliant_mechanics::prony::Prony;
 
-/// A block of so many hexahedra along each axis, its lowest corner at the origin; without volumetric coupling.
-fn block(cells: [u32; 3], edge: f64, shear: f64, prony: Prony) -> Model {
-    let [nx, ny, nz] = cells;
-    let node = |i: u32, j: u32, k: u32| (k * (ny + 1) + j) * (nx + 1) + i;
-    let mut points = Vec::new();
-    for k in 0..=nz {
-        for j in 0..=ny {
-            points.extend((0..=nx).map(|i| [i, j, k].map(|x| edge * f64::from(x))));
-        }
-    }
-    let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
-    let mut hexes = Vec::new();
-    for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
-        hexes.push(corners.map(|[a, b, c]| node(i + a, j + b, k + c)));
-    }
-    let mut model = Model::default();
-    let body = model.add_body("block", &points);
-    let law = AnyLaw::NeoHookean(NeoHookean { shear, volumetric: Volumetric::quadratic(2.0 * shear / 3.0) });
-    let cells = Cells::full_hex8(hexes, &points);
-    model.add_solid(Solid::new(body, Material { prony, ..Material::elastic(law, 1000.0) }, cells));
-    model
-}
-
-/// Triangles of the faces of hexahedra that no other one has.
-fn faces(model: &Model) -> Vec<[u32; 3]> {
-    const SIDES: [[usize; 4]; 6] =
-        [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
-    let mut all = std::collections::BTreeMap::new();
-    for cell in 0..model.solids[0].cells.len() {
-        let nodes = model.solids[0].cells.nodes(cell);
-        for side in SIDES.map(|side| side.map(|k| nodes[k])) {
-            let mut key = side;
-            key.sort_unstable();
-            all.entry(key).or_insert_with(Vec::new).push(side);
-        }
-    }
-    let outer = all.into_values().filter(|sides| sides.len() == 1).flatten();
-    outer.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
-}
+use super::{block, faces, stepper};
 
 /// Contact of all nodes and outer faces with a thing.
 fn at(rigid: Rigid, model: &Model, friction: f64) -> Arc<Contacts> {
-    let faces = faces(model);
+    let faces = faces(&model.solids[0]);
     let nodes = (0..model.node_count() as u32).collect();
     let touch = Touch { friction, offset: 0.0 };
-    let contact = Contact { name: "touch".into(), nodes, faces, rigid: 0, touch };
-    Arc::new(Contacts { rigids: vec![rigid], contacts: vec![contact] })
+    let (surface, with) = (Surface { nodes, faces }, With::Rigid(0));
+    Arc::new(Contacts {
+        rigids: vec![rigid],
+        contacts: vec![Contact { name: "touch".into(), surface, with, touch }],
+    })
 }
 
 fn floor() -> Rigid {
@@ -69,11 +33,6 @@ fn floor() -> Rigid {
         course: Course::fixed(Pose::identity()),
         inside: false,
     }
-}
-
-fn stepper(model: &Arc<Model>, contacts: &Arc<Contacts>, part: f64) -> CentralDifference<f64> {
-    let step = part * assembled(model).unwrap().step;
-    CentralDifference::new(Arc::clone(model), step).unwrap().touching(Arc::clone(contacts))
 }
 
 /// Slope with a tangent of ½: sticks with μ = ½, and slides by ½ a t² with less (A4 of the acceptance tests of contact). The block is first
@@ -196,7 +155,7 @@ fn a_tool_presses_no_node_into_itself() {
             for node in 0..model.node_count() as u32 {
                 deepest = deepest.min(tool.near(&pose, &place(node)).distance);
             }
-            for &[a, b, c] in &contacts.contacts[0].faces {
+            for &[a, b, c] in &contacts.contacts[0].surface.faces {
                 let middle = (place(a) + place(b) + place(c)) / 3.0;
                 between = between.min(tool.near(&pose, &middle).distance);
             }

@@ -1,0 +1,545 @@
+//! Where two deformable surfaces, or parts of a surface, come near each other: a node above a triangle, and two edges that cross. Distances are
+//! signed by the outward side of the surfaces, so that a small overlap is seen as such.
+//!
+//! Trees of triangles and edges give lists of candidates. These hold until a node has moved by half of a margin, the skin. A step looks at
+//! the candidates alone. Lists and results do not depend on the order in which bodies or threads come.
+//!
+//! A node is compared with each triangle that it lies above or beneath, and with the nearest edge or corner if that is nearer still. Two edges
+//! count where the normal between them is in the cones of normals of both (Gauss map). Surfaces that look the same way do not touch.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use pliant_geometry::barycentric_of_closest;
+
+use crate::tree::{Bounds, Tree};
+
+/// The skin of the lists, over the mean edge.
+const SKIN: f64 = 0.25;
+/// Overlap, over the mean edge, up to which a surface is seen from behind.
+const DEPTH: f64 = 0.25;
+/// The cosine of the angle between outward normals up to which surfaces face each other.
+const FACING: f64 = 0.3;
+/// How far beside a triangle, over its height, a point still counts as above it: bodies with common borders hold each other there.
+const BESIDE: f64 = 0.02;
+/// Overlap, over the deepest one, that is undone though a side that faces away is nearer.
+const SLIGHT: f64 = 0.1;
+/// Rest distances, over the distance to keep, up to which parts of a surface never touch each other.
+const AT_REST: f64 = 1.02;
+
+/// A surface that touches: triangles, outward, and their nodes.
+#[derive(Clone, Debug, Default)]
+pub struct Surface {
+    /// The nodes.
+    pub nodes: Vec<u32>,
+    /// Triangles of these nodes.
+    pub faces: Vec<[u32; 3]>,
+}
+
+/// A point of one surface beside a point of another.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair {
+    /// Nodes that take part: a node and the corners of a triangle, or the ends of two edges.
+    pub nodes: [u32; 4],
+    /// Σ wᵢ xᵢ is the way [m] from the point of the second to that of the first.
+    pub weights: [f64; 4],
+    /// Outward from the second.
+    pub normal: Vector3<f64>,
+    /// The distance [m] along it, negative of an overlap.
+    pub distance: f64,
+    /// Whether the first belongs to the first of two surfaces.
+    pub in_order: bool,
+}
+
+/// An edge with the nodes across it of the triangles that it is part of: of the one that has its ends in this order, and of the other one, or the
+/// same again at a border.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    ends: [u32; 2],
+    across: [u32; 2],
+}
+
+impl Edge {
+    /// The sum of the outward normals of its triangles.
+    fn outward(&self, place: &impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
+        let [a, b] = self.ends.map(place);
+        let [left, right] = self.across.map(place);
+        let normal = |to: Vector3<f64>| (b - a).cross(&to).try_normalize(0.0).unwrap_or_default();
+        let other = if self.across[0] == self.across[1] { Vector3::zeros() } else { normal(a - right) };
+        normal(left - a) + other
+    }
+}
+
+/// One of the surfaces.
+struct Side {
+    nodes: Vec<u32>,
+    faces: Vec<[u32; 3]>,
+    edges: Vec<Edge>,
+    /// Nodes at borders of an open surface, increasing.
+    border: Vec<u32>,
+    face_tree: Tree,
+    edge_tree: Tree,
+    /// Places [m] and outward normals of the nodes when candidates were listed.
+    listed: Vec<Vector3<f64>>,
+    normals: Vec<Vector3<f64>>,
+}
+
+impl Side {
+    fn new(surface: &Surface, place: &impl Fn(u32) -> Vector3<f64>) -> Self {
+        let mut edges = BTreeMap::<[u32; 2], Edge>::new();
+        for &[a, b, c] in &surface.faces {
+            for [from, to, across] in [[a, b, c], [b, c, a], [c, a, b]] {
+                let fresh = Edge { ends: [from, to], across: [across; 2] };
+                let both = edges.entry([from.min(to), from.max(to)]).or_insert(fresh);
+                both.across[1] = across;
+            }
+        }
+        let edges: Vec<Edge> = edges.into_values().collect();
+        let borders = edges.iter().filter(|edge| edge.across[0] == edge.across[1]);
+        let mut border: Vec<u32> = borders.flat_map(|edge| edge.ends).collect();
+        border.sort_unstable();
+        border.dedup();
+        let face_tree = Tree::new(surface.faces.len(), |face| around(surface.faces[face as usize], place));
+        let edge_tree = Tree::new(edges.len(), |edge| around(edges[edge as usize].ends, place));
+        let (nodes, faces) = (surface.nodes.clone(), surface.faces.clone());
+        Self { nodes, faces, edges, border, face_tree, edge_tree, listed: Vec::new(), normals: Vec::new() }
+    }
+
+    /// The square of the longest way [m²] of a node since candidates were listed.
+    fn moved(&self, place: &impl Fn(u32) -> Vector3<f64>) -> f64 {
+        let ways =
+            self.nodes.iter().zip(&self.listed).map(|(&node, then)| (place(node) - then).norm_squared());
+        if self.listed.is_empty() { f64::INFINITY } else { ways.fold(0.0, f64::max) }
+    }
+
+    fn take_places(&mut self, place: &impl Fn(u32) -> Vector3<f64>) {
+        self.listed.clear();
+        self.listed.extend(self.nodes.iter().map(|&node| place(node)));
+        self.normals.clear();
+        self.normals.resize(self.nodes.len(), Vector3::zeros());
+        for &face in &self.faces {
+            let [a, b, c] = face.map(place);
+            let area = (b - a).cross(&(c - a));
+            for node in face {
+                // Triangles are of nodes of the surface.
+                self.normals[self.nodes.partition_point(|&known| known < node)] += area;
+            }
+        }
+        for normal in &mut self.normals {
+            *normal = normal.try_normalize(0.0).unwrap_or_default();
+        }
+        let Self { faces, edges, face_tree, edge_tree, .. } = self;
+        face_tree.refit(|face| around(faces[face as usize], place));
+        edge_tree.refit(|edge| around(edges[edge as usize].ends, place));
+    }
+}
+
+fn around<const N: usize>(nodes: [u32; N], place: &impl Fn(u32) -> Vector3<f64>) -> Bounds {
+    Bounds::of(nodes.map(place))
+}
+
+/// Two surfaces, or one, with the candidates for contact.
+pub struct Pairs {
+    sides: Vec<Side>,
+    /// Distance [m] that they keep.
+    offset: f64,
+    skin: f64,
+    depth: f64,
+    /// Nodes with triangles of the other surface, by the surface of the node.
+    points: [Vec<[u32; 2]>; 2],
+    /// Edges of the first with edges of the second.
+    crossings: Vec<[u32; 2]>,
+    /// Candidates of one surface that never touch, since they are too near at rest: nodes with triangles, edges with edges.
+    apart: [Vec<[u32; 2]>; 2],
+    near: Vec<u32>,
+}
+
+impl Pairs {
+    /// Of two surfaces that keep a distance [m], or of a surface with itself; `place` is where nodes are at rest [m]. Nodes of surfaces are
+    /// increasing.
+    pub fn new(
+        first: &Surface,
+        second: Option<&Surface>,
+        offset: f64,
+        place: impl Fn(u32) -> Vector3<f64>,
+    ) -> Self {
+        let sides: Vec<Side> =
+            [Some(first), second].into_iter().flatten().map(|own| Side::new(own, &place)).collect();
+        let edges = sides.iter().flat_map(|side| &side.edges);
+        let (sum, count) = edges.fold((0.0, 0.0_f64), |(sum, count), edge| {
+            let [a, b] = edge.ends.map(&place);
+            (sum + (b - a).norm(), count + 1.0)
+        });
+        let mean = sum / count.max(1.0);
+        let (skin, depth) = (SKIN * mean, DEPTH * mean);
+        let (points, apart) = Default::default();
+        let mut own =
+            Self { sides, offset, skin, depth, points, crossings: Vec::new(), apart, near: Vec::new() };
+        if second.is_none() {
+            own.set_apart(&place);
+        }
+        own
+    }
+
+    /// Finds the parts of a surface that are too near each other at rest: beside each other, or on both sides of a thin part.
+    fn set_apart(&mut self, place: &impl Fn(u32) -> Vector3<f64>) {
+        self.list(place, 2.0 * self.depth + self.skin);
+        let keep = AT_REST * self.offset;
+        let side = &self.sides[0];
+        let behind = |distance: f64| -2.0 * self.depth < distance && distance < keep;
+        let points = self.points[0].iter().filter(|[node, face]| {
+            let corners = side.faces[*face as usize].map(place);
+            let above = Above::of(&corners, &place(*node));
+            above.is_inner && behind(above.height) || above.distance() < keep
+        });
+        let crossings = self.crossings.iter().filter(|[first, second]| {
+            let across = Across::of([first, second].map(|&edge| &side.edges[edge as usize]), place);
+            across.is_some_and(|across| behind(across.distance))
+        });
+        let mut apart = [points.copied().collect::<Vec<_>>(), crossings.copied().collect()];
+        apart.iter_mut().for_each(|list| list.sort_unstable());
+        self.apart = apart;
+        self.sides.iter_mut().for_each(|side| side.listed.clear());
+    }
+
+    /// How many candidates of a surface never touch each other since they are too near at rest.
+    pub fn set_apart_count(&self) -> usize {
+        self.apart.iter().map(Vec::len).sum()
+    }
+
+    /// Lists candidates anew if nodes have moved too far for the lists, or may in a step that takes each by at most `way` [m].
+    pub fn update(&mut self, place: impl Fn(u32) -> Vector3<f64>, way: f64) {
+        let moved = self.sides.iter().map(|side| side.moved(&place)).fold(0.0, f64::max).sqrt();
+        if moved + way > 0.5 * self.skin {
+            self.list(&place, self.offset + self.skin + 2.0 * way);
+        }
+    }
+
+    /// Lists what is within a reach [m] by its boxes.
+    fn list(&mut self, place: &impl Fn(u32) -> Vector3<f64>, reach: f64) {
+        self.sides.iter_mut().for_each(|side| side.take_places(place));
+        let Self { sides, points, crossings, apart, near, .. } = self;
+        near.clear();
+        let alone = sides.len() == 1;
+        let other = |side: usize| if alone { &sides[0] } else { &sides[1 - side] };
+        for (number, side) in sides.iter().enumerate() {
+            let (list, other) = (&mut points[number], other(number));
+            list.clear();
+            for (&node, at) in side.nodes.iter().zip(&side.listed) {
+                let wanted = Bounds::of([*at]).grown(reach);
+                let first = list.len();
+                other.face_tree.near(&wanted, |face| {
+                    let corners = other.faces[face as usize];
+                    let meets = !corners.contains(&node) && around(corners, place).touches(&wanted);
+                    if meets && apart[0].binary_search(&[node, face]).is_err() {
+                        list.push([node, face]);
+                    }
+                });
+                list[first..].sort_unstable();
+                for [_, face] in &list[first..] {
+                    near.extend(other.faces[*face as usize]);
+                }
+                near.extend((list.len() > first).then_some(node));
+            }
+        }
+        crossings.clear();
+        let (side, other) = (&sides[0], other(0));
+        for (edge, number) in side.edges.iter().zip(0..) {
+            let wanted = around(edge.ends, place).grown(reach);
+            let first = crossings.len();
+            other.edge_tree.near(&wanted, |against| {
+                let ends = other.edges[against as usize].ends;
+                let once = !alone || number < against && !edge.ends.iter().any(|end| ends.contains(end));
+                if once
+                    && around(ends, place).touches(&wanted)
+                    && apart[1].binary_search(&[number, against]).is_err()
+                {
+                    crossings.push([number, against]);
+                }
+            });
+            crossings[first..].sort_unstable();
+            for [_, against] in &crossings[first..] {
+                near.extend(other.edges[*against as usize].ends);
+            }
+            near.extend(edge.ends.iter().take(if crossings.len() > first { 2 } else { 0 }));
+        }
+        near.sort_unstable();
+        near.dedup();
+    }
+
+    /// Nodes of all candidates, increasing.
+    pub fn near(&self) -> &[u32] {
+        &self.near
+    }
+
+    /// What is nearer than the skin beyond the distance to keep, with nodes at these places [m].
+    pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Pair)) {
+        let alone = self.sides.len() == 1;
+        let other = |side: usize| if alone { &self.sides[0] } else { &self.sides[1 - side] };
+        let limit = self.offset + self.skin;
+        let wanted = |pair: &Pair| -self.depth < pair.distance && pair.distance < limit;
+        for (number, side) in self.sides.iter().enumerate() {
+            for list in self.points[number].chunk_by(|a, b| a[0] == b[0]) {
+                self.find_above(list, side, other(number), &place, |pair| {
+                    if wanted(&pair) {
+                        found(Pair { in_order: number == 0, ..pair });
+                    }
+                });
+            }
+        }
+        for &[first, second] in &self.crossings {
+            let edges = [&self.sides[0].edges[first as usize], &other(0).edges[second as usize]];
+            let Some(Across { weights: [s, t], normal, distance }) = Across::of(edges, &place) else {
+                continue;
+            };
+            let [[a, b], [c, d]] = edges.map(|edge| edge.ends);
+            let weights = [1.0 - s, s, t - 1.0, -t];
+            let pair = Pair { nodes: [a, b, c, d], weights, normal, distance, in_order: true };
+            if wanted(&pair) {
+                found(pair);
+            }
+        }
+    }
+
+    /// Of a node with the triangles that are near it.
+    fn find_above(
+        &self,
+        list: &[[u32; 2]],
+        side: &Side,
+        other: &Side,
+        place: &impl Fn(u32) -> Vector3<f64>,
+        mut found: impl FnMut(Pair),
+    ) {
+        let node = list[0][0];
+        let point = place(node);
+        let outward = side.normals[side.nodes.partition_point(|&known| known < node)];
+        let pair = |[a, b, c]: [u32; 3], [u, v, w]: [f64; 3], normal, distance| Pair {
+            nodes: [node, a, b, c],
+            weights: [1.0, -u, -v, -w],
+            normal,
+            distance,
+            in_order: true,
+        };
+        // The nearest edge or corner: its distance, the way from there, the normals of its triangles, its triangle and weights.
+        let mut nearest = (f64::INFINITY, Vector3::zeros(), Vector3::zeros(), [0; 3], [0.0; 3]);
+        // Of the triangles that the node lies beneath, the nearest one: whoever is inside leaves by the shortest way.
+        let mut beneath: Option<Pair> = None;
+        let mut above = f64::INFINITY;
+        // The least distance from a triangle that faces away: no contact, but perhaps a shorter way out.
+        let mut hidden = f64::INFINITY;
+        // Whether the nearest edge or corner is of a triangle that does not.
+        let mut faces = false;
+        let mut rows = Vec::new();
+        for [_, face] in list {
+            let nodes = other.faces[*face as usize];
+            let here = Above::of(&nodes.map(place), &point);
+            let faces_away = here.normal.dot(&outward) > FACING;
+            if here.is_inner && faces_away {
+                hidden = hidden.min(here.height.abs());
+                continue;
+            }
+            if here.is_inner {
+                let pair = pair(nodes, here.weights, here.normal, here.height);
+                if here.height >= 0.0 {
+                    above = above.min(here.height);
+                    rows.push(pair);
+                } else if beneath.is_none_or(|known| known.distance < here.height) {
+                    beneath = Some(pair);
+                }
+                continue;
+            }
+            let distance = here.distance();
+            let (known, ..) = nearest;
+            if distance < known * (1.0 - 1e-9) {
+                nearest = (distance, here.way, here.normal, nodes, here.weights);
+                faces = !faces_away;
+            } else if distance <= known * (1.0 + 1e-9) {
+                nearest.2 += here.normal;
+                faces |= !faces_away;
+            }
+        }
+        let (distance, way, normals, nodes, weights) = nearest;
+        if faces && distance < above.min(hidden) {
+            let sign = if way.dot(&normals) < 0.0 { -1.0 } else { 1.0 };
+            // Who is behind a border is beside the surface.
+            let mut on = nodes.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0);
+            let beside = sign < 0.0 && on.all(|(node, _)| other.border.binary_search(node).is_ok());
+            let normal = (way * sign).try_normalize(1e-6 * self.skin).or_else(|| normals.try_normalize(0.0));
+            if let Some(normal) = normal.filter(|_| !beside) {
+                let pair = pair(nodes, weights, normal, sign * distance);
+                if sign > 0.0 {
+                    above = distance;
+                    rows.push(pair);
+                } else if beneath.is_none_or(|known| known.distance < pair.distance) {
+                    beneath = Some(pair);
+                }
+            }
+        }
+        match beneath {
+            Some(Pair { distance, .. }) if -distance > hidden && -distance > SLIGHT * self.depth => {}
+            Some(pair) if -pair.distance < above => found(pair),
+            _ => rows.into_iter().for_each(found),
+        }
+    }
+}
+
+/// A point and a triangle.
+struct Above {
+    normal: Vector3<f64>,
+    /// Height [m] over the plane.
+    height: f64,
+    /// Weights of the point beneath, or of the closest point of the triangle if that is far beside it.
+    weights: [f64; 3],
+    /// The way [m] from there.
+    way: Vector3<f64>,
+    /// Whether the point is above or beneath the triangle.
+    is_inner: bool,
+}
+
+impl Above {
+    fn of(corners: &[Vector3<f64>; 3], point: &Vector3<f64>) -> Self {
+        let [a, b, c] = corners;
+        let area = (b - a).cross(&(c - a));
+        let normal = area.try_normalize(0.0).unwrap_or_default();
+        let height = normal.dot(&(point - a));
+        let part = |from: &Vector3<f64>, to: &Vector3<f64>| {
+            area.dot(&(from - point).cross(&(to - point))) / area.norm_squared()
+        };
+        let weights = [part(b, c), part(c, a), part(a, b)];
+        if weights.iter().all(|&weight| weight >= -BESIDE) {
+            return Self { normal, height, weights, way: normal * height, is_inner: true };
+        }
+        let weights = barycentric_of_closest(corners, point);
+        let way = point - (a * weights[0] + b * weights[1] + c * weights[2]);
+        Self { normal, height, weights, way, is_inner: false }
+    }
+
+    fn distance(&self) -> f64 {
+        self.way.norm()
+    }
+}
+
+/// Two edges whose closest points are within both and touch from outside.
+struct Across {
+    /// How far along each edge the closest points are, from 0 to 1.
+    weights: [f64; 2],
+    normal: Vector3<f64>,
+    distance: f64,
+}
+
+impl Across {
+    fn of([first, second]: [&Edge; 2], place: &impl Fn(u32) -> Vector3<f64>) -> Option<Self> {
+        let ([a, b], [c, d]) = (first.ends.map(place), second.ends.map(place));
+        let (along, other, between) = (b - a, d - c, a - c);
+        let normal = along.cross(&other);
+        let [aa, bb, ab] = [along.norm_squared(), other.norm_squared(), along.dot(&other)];
+        let crossed = normal.norm_squared();
+        // Edges that are nearly parallel touch at their ends.
+        if crossed <= 1e-6 * aa * bb {
+            return None;
+        }
+        let [da, db] = [along.dot(&between), other.dot(&between)];
+        let weights = [(ab * db - bb * da) / crossed, (aa * db - ab * da) / crossed];
+        if weights.iter().any(|weight| !(0.0..=1.0).contains(weight)) {
+            return None;
+        }
+        let normal = normal / crossed.sqrt();
+        // The normal leads out of the second and into the first, whose triangles are all behind it or before it.
+        let normal = if normal.dot(&second.outward(place)) < 0.0 { -normal } else { normal };
+        let behind = second.across.iter().all(|&node| normal.dot(&(place(node) - c)) <= 0.0);
+        let before = first.across.iter().all(|&node| normal.dot(&(place(node) - a)) >= 0.0);
+        if normal.dot(&first.outward(place)) >= 0.0 || !behind || !before {
+            return None;
+        }
+        let distance = normal.dot(&between);
+        // Edges that overlap by more than one of them goes on beyond the other leave each other past its end.
+        let [s, t] = weights;
+        let beyond = (s.min(1.0 - s) * aa.sqrt()).min(t.min(1.0 - t) * bb.sqrt());
+        (distance > -beyond).then_some(Self { weights, normal, distance })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square of cells in the plane z = 0 facing up (or down), corners at whole places.
+    fn square(cells: u32, up: bool, first: u32) -> (Surface, Vec<Vector3<f64>>) {
+        let node = |i: u32, j: u32| first + j * (cells + 1) + i;
+        let mut faces = Vec::new();
+        for (i, j) in (0..cells).flat_map(|j| (0..cells).map(move |i| (i, j))) {
+            let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+            faces.extend(if up { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
+        }
+        let places = (0..(cells + 1) * (cells + 1))
+            .map(|k| Vector3::new(f64::from(k % (cells + 1)), f64::from(k / (cells + 1)), 0.0));
+        (Surface { nodes: (first..first + (cells + 1) * (cells + 1)).collect(), faces }, places.collect())
+    }
+
+    fn found(pairs: &Pairs, places: &[Vector3<f64>]) -> Vec<Pair> {
+        let mut all = Vec::new();
+        pairs.find(|node| places[node as usize], |pair| all.push(pair));
+        all
+    }
+
+    /// Two sheets that face each other, shifted: distances and normals are those of the planes, weights give the way between the points, and lists
+    /// hold while nodes move by less than half of the skin.
+    #[test]
+    fn sheets_that_face_each_other_are_seen_with_their_distance() {
+        let (low, mut places) = square(3, true, 0);
+        let (high, above) = square(3, false, 16);
+        places.extend(above.iter().map(|x| x + Vector3::new(0.3, 0.2, 0.1)));
+        let mut pairs = Pairs::new(&low, Some(&high), 0.0, |node| places[node as usize]);
+        pairs.update(|node| places[node as usize], 0.0);
+        for height in [0.1, 0.05, -0.02] {
+            places[16..].iter_mut().for_each(|place| place.z = height);
+            pairs.update(|node| places[node as usize], 0.0);
+            let all = found(&pairs, &places);
+            let [points, edges] =
+                [true, false].map(|of| all.iter().filter(|p| (p.weights[0] == 1.0) == of).count());
+            assert!(points >= 18 && edges >= 10, "{points} {edges}");
+            for pair in all {
+                // Nodes beside a border are as far from it as they are beside it.
+                if pair.normal.z.abs() < 0.9 {
+                    assert!(pair.distance > 0.19, "{pair:?}");
+                    continue;
+                }
+                let sum = pair.weights.iter().sum::<f64>();
+                let way =
+                    (0..4).map(|k| places[pair.nodes[k] as usize] * pair.weights[k]).sum::<Vector3<f64>>();
+                let up = if pair.nodes[0] < 16 { -1.0 } else { 1.0 };
+                assert!((pair.normal - Vector3::z() * up).norm() < 1e-12 && sum.abs() < 1e-12, "{pair:?}");
+                assert!((pair.distance - height).abs() < 1e-12, "{pair:?}");
+                assert!((way - pair.normal * pair.distance).norm() < 1e-12, "{pair:?}");
+                assert_eq!(pair.in_order, pair.nodes[0] < 16);
+            }
+        }
+        // Looked at from behind, there is nothing to touch.
+        places[16..].iter_mut().for_each(|place| place.z = -0.9);
+        pairs.update(|node| places[node as usize], 0.0);
+        assert!(found(&pairs, &places).is_empty());
+    }
+
+    /// A sheet folded like a U touches itself across the fold, not beside it; the sides of a thin plate do not touch through it.
+    #[test]
+    fn a_folded_sheet_touches_itself_across_the_fold_only() {
+        let (sheet, flat) = square(8, true, 0);
+        let fold = |x: &Vector3<f64>| {
+            let (half, gap) = (4.0, 0.1);
+            if x.x <= half { *x } else { Vector3::new(2.0 * half - x.x, x.y, gap) }
+        };
+        let mut pairs = Pairs::new(&sheet, None, 0.0, |node| flat[node as usize]);
+        assert_eq!(pairs.set_apart_count(), 0);
+        pairs.update(|node| flat[node as usize], 0.0);
+        assert!(found(&pairs, &flat).is_empty());
+        let folded: Vec<Vector3<f64>> = flat.iter().map(fold).collect();
+        pairs.update(|node| folded[node as usize], 0.0);
+        let all = found(&pairs, &folded);
+        let across = all.iter().filter(|pair| (pair.distance - 0.1).abs() < 1e-12).count();
+        assert!(across > 40, "{across} of {}", all.len());
+        assert!(all.iter().all(|pair| pair.distance > 0.0));
+        // Too near at rest.
+        let pairs = Pairs::new(&sheet, None, 0.2, |node| folded[node as usize]);
+        assert!(pairs.set_apart_count() > 40);
+    }
+}
