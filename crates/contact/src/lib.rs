@@ -1,5 +1,5 @@
 //! Contact of soft bodies. With rigid things: [shapes](shape) with their signed distance, [motions](pose) of obstacles and tools, and the
-//! [least correction](touch) of a node that would go into one, with friction. With each other and themselves: [pairs](pairs) of points of
+//! [least correction](touch) of a node that would go into one, with friction. With each other and themselves: [pairs] of points of
 //! their surfaces, found by [trees](tree). Knows no solver: how a contact acts is the stepper's. SI units throughout.
 //!
 //! A node falls onto a plane:

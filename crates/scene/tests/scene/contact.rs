@@ -157,7 +157,7 @@ fn contact_that_cannot_be_is_refused_with_its_line() {
         ),
         (
             stacked("", "").replace("thickness = 0", "thickness = 0.001"),
-            ["overlap at the start in", "up to 0.0005000 m deep"],
+            ["overlap at the start in", "up to 5.000e-4 m deep"],
         ),
         (
             stacked(
