@@ -4,7 +4,7 @@
 //! node is the correction over its mobility: a step with this force is perfectly plastic along the normal, keeps momentum, and leaves the
 //! critical time step as it is.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Point3, Vector3};
 use pliant_mechanics::tensor::Vector;
 
 use crate::pairs::Surface;
@@ -31,9 +31,15 @@ impl Rigid {
     /// The distance of a point [m] from where it is free of the thing, and the direction there, at a pose.
     pub fn near(&self, pose: &Pose, point: &Vector3<f64>) -> Near {
         let local = pose.inverse_transform_point(&(*point).into());
-        let Near { distance, normal } = self.shape.near(&local.coords);
+        let Near { distance, normal } = self.near_local(&local.coords);
+        Near { distance, normal: pose.rotation * normal }
+    }
+
+    /// [`near`](Self::near) in the frame of the thing.
+    fn near_local(&self, point: &Vector3<f64>) -> Near {
+        let Near { distance, normal } = self.shape.near(point);
         let sign = if self.inside { -1.0 } else { 1.0 };
-        Near { distance: sign * distance, normal: pose.rotation * normal * sign }
+        Near { distance: sign * distance, normal: normal * sign }
     }
 
     /// Into how many parts a step between two times [s] is divided so that nothing is passed over: each moves the thing by half of its
@@ -122,6 +128,10 @@ impl Touch {
 pub struct Passage {
     /// Its poses before and after.
     poses: [Pose; 2],
+    /// How its frame is turned after.
+    turn: Matrix3<f64>,
+    /// The motion from the pose before to that after.
+    motion: Pose,
     parts: usize,
     times: [f64; 2],
 }
@@ -130,7 +140,9 @@ impl Passage {
     /// In the step between two times [s].
     pub fn new(rigid: &Rigid, times: [f64; 2]) -> Self {
         let poses = times.map(|time| rigid.course.at(time));
-        Self { poses, parts: rigid.parts(poses), times }
+        let [before, after] = poses;
+        let turn = after.rotation.to_rotation_matrix().into_inner();
+        Self { poses, turn, motion: after * before.inverse(), parts: rigid.parts(poses), times }
     }
 
     /// Whether the thing moves so far that it could pass over a point.
@@ -140,12 +152,14 @@ impl Passage {
 
     /// How far a point [m] is from the thing at the end of the step, and the direction away from it.
     pub fn near(&self, rigid: &Rigid, point: &Vector3<f64>) -> Near {
-        rigid.near(&self.poses[1], point)
+        let local = self.turn.tr_mul(&(point - self.poses[1].translation.vector));
+        let Near { distance, normal } = rigid.near_local(&local);
+        Near { distance, normal: self.turn * normal }
     }
 
     /// Where a point [m] of the thing before the step is after it.
     pub fn carry(&self, point: &Vector3<f64>) -> Vector3<f64> {
-        (self.poses[1] * self.poses[0].inverse_transform_point(&(*point).into())).coords
+        (self.motion * Point3::from(*point)).coords
     }
 
     /// The largest way [m] of a point of the thing.

@@ -420,11 +420,31 @@ impl AtRigid {
         }
         for &face in &self.surface.faces {
             let corners = face.map(|node| nodes[node as usize].now);
-            let around = (corners[0] - corners[1]).norm().max((corners[0] - corners[2]).norm());
-            let least = face.iter().map(|&node| distances[node as usize]).fold(f64::INFINITY, f64::min);
-            if least < room + around {
+            let middle = corners.iter().sum::<Vector3<f64>>() / 3.0;
+            let around = corners.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max);
+            // No point is nearer than one beside it by more than the way between both.
+            let own = face.map(|node| distances[node as usize]);
+            if own.iter().all(|&distance| distance > room + 2.0 * around) {
+                continue;
+            }
+            let between = self.passage.near(rigid, &middle).distance;
+            if between > room + around {
+                continue;
+            }
+            let mut is_near = false;
+            for &weights in &self.samples {
+                let place = (0..3).map(|k| corners[k] * weights[k]).sum::<Vector3<f64>>();
+                let is_beyond = |at: &Vector3<f64>, distance: f64| {
+                    let far = distance - room;
+                    far > 0.0 && (place - at).norm_squared() < far * far
+                };
+                if !is_beyond(&middle, between) && !(0..3).any(|k| is_beyond(&corners[k], own[k])) {
+                    is_near = true;
+                    found(Row::new(0, face, weights));
+                }
+            }
+            if is_near {
                 face.iter().for_each(|&node| nodes[node as usize].near = true);
-                self.samples.iter().for_each(|&weights| found(Row::new(0, face, weights)));
             }
         }
     }
