@@ -71,7 +71,7 @@ impl Shape {
             Self::Cuboid { size } => 0.5 * size.iter().copied().fold(f64::INFINITY, f64::min),
             Self::Cone { radius, height } => 0.5 * radius.min(*height),
             Self::HalfSpace => f64::INFINITY,
-            Self::Grid(grid) => grid.spacing(),
+            Self::Grid(grid) => grid.thinnest(),
         }
     }
 
@@ -95,7 +95,7 @@ pub type Triangles = (Vec<Vector3<f64>>, Vec<[u32; 3]>);
 const AROUND: u32 = 32;
 
 impl Shape {
-    /// Its surface in its own frame, to be drawn; of a half-space a square of this width [m], of a sampled surface nothing.
+    /// Its surface in its own frame, to be drawn; of a half-space a square of this width [m].
     pub fn surface(&self, width: f64) -> Triangles {
         let arc = |centre: f64, radius: f64, from: i32, to: i32| {
             (from..=to).map(move |step| {
@@ -123,7 +123,7 @@ impl Shape {
                 let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
                 (corners.map(corner).to_vec(), vec![[0, 1, 2], [0, 2, 3]])
             }
-            Self::Grid(_) => (Vec::new(), Vec::new()),
+            Self::Grid(ref grid) => grid.surface().clone(),
         }
     }
 }

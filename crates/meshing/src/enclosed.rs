@@ -28,7 +28,7 @@ const STEPS_PER_EDGE: [f64; 3] = [4.0, 3.0, 2.0];
 const REACH: f64 = 2.0;
 
 /// Points of the grid at most: 256 MiB.
-const MOST_POINTS: usize = 1 << 26;
+pub(crate) const MOST_POINTS: usize = 1 << 26;
 
 /// Points along each side of the blocks that are skipped where they are far from the surface.
 const BLOCK: usize = 8;
@@ -127,8 +127,8 @@ impl fmt::Display for EnclosedReport {
 /// A closed surface.
 #[derive(Clone, Debug)]
 pub struct Enclosed {
-    points: Vec<Vector3>,
-    triangles: Vec<[u32; 3]>,
+    pub(crate) points: Vec<Vector3>,
+    pub(crate) triangles: Vec<[u32; 3]>,
     /// Pairs of triangles that cross.
     crossing: Vec<[u32; 2]>,
     /// Findings and repairs.
@@ -159,6 +159,11 @@ impl Enclosed {
     /// The enclosed volume [m³]; what overlaps counts as often as it does.
     pub fn volume(&self) -> f64 {
         signed_volume(&self.points, &self.triangles)
+    }
+
+    /// Smallest and largest corner of a box round it [m].
+    pub fn bounds(&self) -> (Vector3, Vector3) {
+        box_of(self.triangles.iter().flatten().map(|&node| self.points[node as usize]))
     }
 
     /// Whether no part lies inside another and none intersects another.
@@ -216,7 +221,7 @@ impl Enclosed {
         progress: &dyn Fn(f64),
     ) -> Result<(DistanceField, TriangleMesh), MeshingError> {
         require_positive("edge", edge)?;
-        let (low, high) = bounds(&self.points, &self.triangles);
+        let (low, high) = self.bounds();
         // Four points on each side stay outside.
         let counts_of = |step: f64| ((high - low) / step).map(|n| n.ceil() + 9.0);
         let fits = |step: &f64| counts_of(*step).product() <= MOST_POINTS as f64;
@@ -243,7 +248,7 @@ impl Enclosed {
 
     /// The part of the surface that bounds the body: all of it, or the triangles with the body on one side only.
     /// Intersecting triangles are divided to below a step of the grid [m].
-    fn hull(&self, winding: &Winding, step: f64) -> TriangleMesh {
+    pub(crate) fn hull(&self, winding: &Winding, step: f64) -> TriangleMesh {
         if self.is_simple() {
             return TriangleMesh::new(self.points.clone(), self.triangles.clone());
         }
@@ -413,7 +418,7 @@ fn distances(grid: &Grid, surface: &SurfaceLocator, reach: f64) -> Vec<f32> {
 }
 
 /// Makes distances outside negative. Along a row of the grid the side changes only where the surface may lie between two points.
-fn sign(grid: &Grid, winding: &Winding, distances: &mut [f32]) {
+pub(crate) fn sign(grid: &Grid, winding: &Winding, distances: &mut [f32]) {
     let nx = grid.dims[0];
     let step = grid.spacing()[0];
     distances.par_chunks_exact_mut(nx).enumerate().for_each(|(row, line)| {
@@ -445,8 +450,4 @@ fn divided(corners: [Vector3; 3], longest: f64) -> Vec<[Vector3; 3]> {
         };
         triangles.into_iter().flat_map(four).collect()
     })
-}
-
-fn bounds(points: &[Vector3], triangles: &[[u32; 3]]) -> (Vector3, Vector3) {
-    box_of(triangles.iter().flatten().map(|&node| points[node as usize]))
 }

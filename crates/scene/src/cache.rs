@@ -1,8 +1,9 @@
-//! Cache of meshes made from images and surfaces. The name of a file is a hash of all inputs: the content of the image, all parameters and
-//! the source text of the mesher, so no mesh is stale. A file appears under its name only once it is complete. A file that is damaged, or
-//! holds a mesh that no mesher makes, counts as missing, so any number of processes can share a folder. Files unused for longest are deleted.
+//! Cache of meshes made from images and surfaces, and of distances to surfaces. The name of a file is a hash of all inputs: the content of the
+//! image, all parameters and the source text of the mesher, so no mesh is stale. A file appears under its name only once it is complete. A file
+//! that is damaged, or holds a mesh that no mesher makes, counts as missing, so any number of processes can share a folder. Files unused for
+//! longest are deleted.
 //!
-//! The file: [`MAGIC`], the CRC-32 of the body (u32, little-endian), the body in postcard's encoding.
+//! The file: [`MESH`] or [`GRID`], the CRC-32 of the body (u32, little-endian), the body in postcard's encoding.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -11,13 +12,16 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use pliant_geometry::{CellBlock, DataArray, Mesh, Vector3, relative_acoustic_length};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// The first bytes of every file.
-const MAGIC: [u8; 8] = *b"\x89PLMESH\n";
-/// Endings of files that are whole, and of those under way.
-const ENDINGS: [&str; 2] = ["pliant-mesh", "pliant-mesh-part"];
+/// A kind of file: its first bytes, and its ending.
+type Kind = ([u8; 8], &'static str);
+const MESH: Kind = (*b"\x89PLMESH\n", "pliant-mesh");
+const GRID: Kind = (*b"\x89PLGRID\n", "pliant-grid");
+/// Ending of files under way.
+const PART: &str = "pliant-mesh-part";
 /// Bytes that all files may take together unless the caller says otherwise.
 const DEFAULT_LIMIT: u64 = 1 << 30;
 /// Names the folder, or says `off`.
@@ -47,6 +51,33 @@ struct Body {
     point_data: BTreeMap<String, DataArray>,
     notes: Vec<String>,
     doubts: Vec<String>,
+}
+
+/// Distances to a surface on a grid as they were made, with what is told about them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct KeptGrid {
+    pub origin: [f64; 3],
+    pub spacing: f64,
+    pub counts: [u32; 3],
+    pub values: Vec<f32>,
+    pub thickness: f64,
+    pub points: Vec<[f64; 3]>,
+    pub triangles: Vec<[u32; 3]>,
+    pub notes: Vec<String>,
+}
+
+impl KeptGrid {
+    /// Whether it is whole, and all of its numbers are.
+    fn is_sound(&self) -> bool {
+        let points = self.counts.iter().try_fold(1_usize, |points, &n| points.checked_mul(n as usize));
+        let finite = |place: &[f64; 3]| place.iter().all(|x| x.is_finite());
+        points == Some(self.values.len())
+            && self.counts.iter().all(|&count| count > 1)
+            && self.values.iter().all(|value| value.is_finite())
+            && self.points.iter().chain([&self.origin]).all(finite)
+            && [self.spacing, self.thickness].iter().all(|length| length.is_finite() && *length > 0.0)
+            && self.triangles.iter().flatten().all(|&node| (node as usize) < self.points.len())
+    }
 }
 
 /// The least [`relative_acoustic_length`] of a volume cell. Those that are made have three quarters as a rule.
@@ -129,16 +160,7 @@ impl MeshCache {
 
     /// What was kept under a key, where it is whole.
     pub(crate) fn get(&self, key: &Key) -> Option<Kept> {
-        let path = self.path(key)?;
-        let bytes = fs::read(&path).ok()?;
-        let (crc, body) = bytes.strip_prefix(&MAGIC)?.split_first_chunk()?;
-        if u32::from_le_bytes(*crc) != crc32fast::hash(body) {
-            return None;
-        }
-        let Body { points, blocks, point_data, notes, doubts } = postcard::from_bytes(body).ok()?;
-        // Used now: it stays longer than others. Where that can't be noted, no harm is done.
-        let _ =
-            File::options().append(true).open(&path).and_then(|file| file.set_modified(SystemTime::now()));
+        let Body { points, blocks, point_data, notes, doubts } = self.read(key, MESH)?;
         let points = points.into_iter().map(Vector3::from).collect();
         let mesh = Mesh { points, blocks, point_data, ..Mesh::default() };
         is_sound(&mesh).then_some(Kept { mesh, notes, doubts })
@@ -146,28 +168,57 @@ impl MeshCache {
 
     /// Keeps a mesh under its key, and drops what was used longest ago where there is more than the limit.
     pub(crate) fn put(&self, key: &Key, kept: &Kept) -> io::Result<()> {
-        let (Some(path), Some(folder)) = (self.path(key), &self.folder) else { return Ok(()) };
         let Kept { mesh, notes, doubts } = kept.clone();
         let points = mesh.points.into_iter().map(Into::into).collect();
         let body = Body { points, blocks: mesh.blocks, point_data: mesh.point_data, notes, doubts };
-        let body = postcard::to_stdvec(&body).map_err(io::Error::other)?;
+        self.write(key, MESH, &body)
+    }
+
+    /// The distances that were kept under a key, where they are whole.
+    pub(crate) fn get_grid(&self, key: &Key) -> Option<KeptGrid> {
+        self.read(key, GRID).filter(KeptGrid::is_sound)
+    }
+
+    /// Keeps distances under their key, as [`put`](Self::put) does.
+    pub(crate) fn put_grid(&self, key: &Key, kept: &KeptGrid) -> io::Result<()> {
+        self.write(key, GRID, kept)
+    }
+
+    fn read<T: DeserializeOwned>(&self, key: &Key, kind: Kind) -> Option<T> {
+        let path = self.path(key, kind)?;
+        let bytes = fs::read(&path).ok()?;
+        let (crc, body) = bytes.strip_prefix(&kind.0)?.split_first_chunk()?;
+        if u32::from_le_bytes(*crc) != crc32fast::hash(body) {
+            return None;
+        }
+        let body = postcard::from_bytes(body).ok()?;
+        // Used now: it stays longer than others. Where that can't be noted, no harm is done.
+        let _ =
+            File::options().append(true).open(&path).and_then(|file| file.set_modified(SystemTime::now()));
+        Some(body)
+    }
+
+    fn write(&self, key: &Key, kind: Kind, body: &impl Serialize) -> io::Result<()> {
+        let (Some(path), Some(folder)) = (self.path(key, kind), &self.folder) else { return Ok(()) };
+        let body = postcard::to_stdvec(body).map_err(io::Error::other)?;
         fs::create_dir_all(folder)?;
-        let mut file = tempfile::Builder::new().suffix(&format!(".{}", ENDINGS[1])).tempfile_in(folder)?;
-        file.write_all(&MAGIC)?;
+        let mut file = tempfile::Builder::new().suffix(&format!(".{PART}")).tempfile_in(folder)?;
+        file.write_all(&kind.0)?;
         file.write_all(&crc32fast::hash(&body).to_le_bytes())?;
         file.write_all(&body)?;
         file.persist(&path).map_err(|error| error.error)?;
         self.drop_oldest(folder, &path)
     }
 
-    fn path(&self, key: &Key) -> Option<PathBuf> {
-        Some(self.folder.as_ref()?.join(&key.0).with_extension(ENDINGS[0]))
+    fn path(&self, key: &Key, kind: Kind) -> Option<PathBuf> {
+        Some(self.folder.as_ref()?.join(&key.0).with_extension(kind.1))
     }
 
     /// Drops the files used longest ago but one, until all take no more than the limit.
     fn drop_oldest(&self, folder: &Path, newest: &Path) -> io::Result<()> {
+        let endings = [MESH.1, GRID.1, PART];
         let own =
-            |path: &PathBuf| path.extension().is_some_and(|ending| ENDINGS.iter().any(|own| ending == *own));
+            |path: &PathBuf| path.extension().is_some_and(|ending| endings.iter().any(|own| ending == *own));
         let mut files: Vec<(SystemTime, PathBuf, u64)> = fs::read_dir(folder)?
             .filter_map(|entry| Some(entry.ok()?.path()).filter(own))
             .filter_map(|path| {
@@ -228,7 +279,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let cache = MeshCache::in_folder(folder.path().into());
         cache.put(&key("a"), &kept(4)).unwrap();
-        let path = cache.path(&key("a")).unwrap();
+        let path = cache.path(&key("a"), MESH).unwrap();
         let whole = fs::read(&path).unwrap();
         for length in [0, 4, 9, 12, whole.len() / 2, whole.len() - 1] {
             fs::write(&path, &whole[..length]).unwrap();
@@ -264,14 +315,50 @@ mod tests {
     }
 
     #[test]
+    fn distances_are_kept_beside_meshes_and_judged_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = MeshCache::in_folder(folder.path().into());
+        let whole = KeptGrid {
+            origin: [0.1, -0.0, 1e-300],
+            spacing: 0.1 + 0.2,
+            counts: [2, 3, 2],
+            values: (0..12).map(|k| 0.1 * k as f32).collect(),
+            thickness: 0.02,
+            points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+            notes: vec!["a note".into()],
+        };
+        cache.put(&key("a"), &kept(4)).unwrap();
+        cache.put_grid(&key("a"), &whole).unwrap();
+        assert_eq!((cache.get(&key("a")), cache.get_grid(&key("a"))), (Some(kept(4)), Some(whole.clone())));
+        let spoilt: [fn(&mut KeptGrid); 6] = [
+            |grid| grid.counts[0] = 3,
+            |grid| grid.counts = [u32::MAX; 3],
+            |grid| grid.values[3] = f32::NAN,
+            |grid| grid.spacing = 0.0,
+            |grid| grid.points[2][1] = f64::INFINITY,
+            |grid| grid.triangles[0][2] = 3,
+        ];
+        for (number, spoil) in spoilt.into_iter().enumerate() {
+            let mut bad = whole.clone();
+            spoil(&mut bad);
+            cache.put_grid(&key("a"), &bad).unwrap();
+            assert_eq!(cache.get_grid(&key("a")), None, "{number}");
+        }
+        // A mesh under the name of distances.
+        std::fs::copy(cache.path(&key("a"), MESH).unwrap(), cache.path(&key("a"), GRID).unwrap()).unwrap();
+        assert_eq!(cache.get_grid(&key("a")), None);
+    }
+
+    #[test]
     fn the_files_used_last_stay_and_those_of_others_are_let_alone() {
         let folder = tempfile::tempdir().unwrap();
         let cache = MeshCache::in_folder(folder.path().into());
         fs::write(folder.path().join("thesis.tex"), vec![0; 10_000]).unwrap();
-        let size = |cache: &MeshCache| fs::metadata(cache.path(&key("a")).unwrap()).unwrap().len();
+        let size = |cache: &MeshCache| fs::metadata(cache.path(&key("a"), MESH).unwrap()).unwrap().len();
         for (age, name) in [(30, "a"), (20, "b"), (10, "c")] {
             cache.put(&key(name), &kept(40)).unwrap();
-            let file = File::options().append(true).open(cache.path(&key(name)).unwrap()).unwrap();
+            let file = File::options().append(true).open(cache.path(&key(name), MESH).unwrap()).unwrap();
             file.set_modified(SystemTime::now() - Duration::from_secs(age)).unwrap();
         }
         // The first is used again, so that the second is the oldest.

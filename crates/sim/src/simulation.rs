@@ -11,7 +11,7 @@ use crate::device::OnDevice;
 use crate::failure::Failure;
 use crate::instant::Instant;
 use crate::kept::Kept;
-use crate::part::Part;
+use crate::part::{Method, Part};
 use crate::participant::Participant;
 use crate::penalty::{Memory, PenaltyTie, Springs, TieNow};
 use crate::schedule::steps_to;
@@ -709,5 +709,15 @@ impl<'a> Frame<'a> {
             own.map(|(index, _)| now.reaction(index))
         });
         forces.reduce(|a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
+    }
+
+    /// Force [N] of a contact on the obstacle or tool that it is with; `None` without one of this name.
+    pub fn contact_force(&self, contact: &str) -> Option<[f64; 3]> {
+        self.parts().find_map(|(part, now)| {
+            let Method::Explicit(explicit) = &part.method else { return None };
+            let contacts = &explicit.contacts.as_ref()?.contacts;
+            let index = contacts.iter().position(|own| own.name == contact)?;
+            now.contact_forces().get(index).copied()
+        })
     }
 }

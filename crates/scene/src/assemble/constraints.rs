@@ -234,6 +234,11 @@ impl Builder<'_> {
                 .any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)))
                 || springs.iter().any(|spring| body.nodes.contains(&spring.node))
                 || scene.tied_outside.contains(&body.name)
+                || scene
+                    .contacts
+                    .iter()
+                    .flat_map(|(_, contact)| &contact.between)
+                    .any(|name| *name == body.name || name == "all")
                 || self.assembly.ties.iter().flat_map(|tie| &tie.nodes).any(|node| body.nodes.contains(node));
             if held || scene.run.solver == SolverName::Static {
                 continue;

@@ -69,6 +69,8 @@ impl Builder<'_> {
             ShapeName::Box(of) => Shape::Cuboid { size: of.size },
             ShapeName::Cone(of) => Shape::Cone { radius: of.radius, height: of.height },
             ShapeName::HalfSpace => Shape::HalfSpace,
+            ShapeName::Mesh(of) => self.shape_of_mesh(of, &[kind, name, "shape", "mesh"])?,
+            ShapeName::Image(of) => self.shape_of_image(of, &[kind, name, "shape", "image"])?,
         };
         let start = Pose::new(table.at.into(), table.turn.into());
         let ways = [table.by.is_some(), table.rotate.is_some(), table.poses.is_some()];

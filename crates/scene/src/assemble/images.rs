@@ -286,14 +286,19 @@ impl Scan {
                 image.content(sink);
             }
             Self::Surface(file) => {
-                let points = file.mesh.points.iter().flat_map(|x| [x.x, x.y, x.z]);
-                sink(&points.flat_map(f64::to_le_bytes).collect::<Vec<u8>>());
-                for block in &file.mesh.blocks {
-                    sink(format!("{:?}", block.kind).as_bytes());
-                    sink(&block.nodes.iter().flat_map(|node| node.to_le_bytes()).collect::<Vec<u8>>());
-                }
+                content_of(&file.mesh, sink);
             }
         }
+    }
+}
+
+/// Gives all bytes of a mesh that its shape depends on, in pieces.
+pub(super) fn content_of(mesh: &Mesh, sink: &mut dyn FnMut(&[u8])) {
+    let points = mesh.points.iter().flat_map(|x| [x.x, x.y, x.z]);
+    sink(&points.flat_map(f64::to_le_bytes).collect::<Vec<u8>>());
+    for block in &mesh.blocks {
+        sink(format!("{:?}", block.kind).as_bytes());
+        sink(&block.nodes.iter().flat_map(|node| node.to_le_bytes()).collect::<Vec<u8>>());
     }
 }
 

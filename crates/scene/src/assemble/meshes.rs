@@ -90,7 +90,8 @@ impl Builder<'_> {
         Some(made)
     }
 
-    fn file(&mut self, file: PathBuf, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+    /// The mesh of a file, in metres.
+    pub(super) fn file(&mut self, file: PathBuf, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let at = |key| [path, &[key]].concat();
         if table.edge.is_some() {
             let message = "a mesh file has its own cells, whose `edge` is not for choosing";

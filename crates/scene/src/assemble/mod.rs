@@ -14,6 +14,7 @@ mod mass;
 mod mesh_files;
 mod meshes;
 mod node_vectors;
+mod obstacles;
 mod sheets;
 mod surfaces;
 mod ties;

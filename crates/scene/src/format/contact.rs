@@ -6,6 +6,7 @@ use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::body::{CleanTable, Label};
 use super::load::{RotateTable, Timing};
 
 /// A rigid thing that bodies touch: an obstacle such as a bone, or a tool. It stands where `at` and `turn` put it, and moves by one of `by`,
@@ -53,6 +54,10 @@ pub enum ShapeName {
     Cone(ConeTool),
     /// All below the plane z = 0: `shape = "half-space"`.
     HalfSpace,
+    /// What the closed surface of a mesh file encloses.
+    Mesh(MeshTool),
+    /// A part of a segmented image.
+    Image(ImageTool),
 }
 
 /// A ball.
@@ -94,6 +99,83 @@ pub struct ConeTool {
     /// Height [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub height: f64,
+}
+
+/// What the surface of a mesh file encloses. Distances to it are sampled once on a grid, and kept in the cache.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct MeshTool {
+    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu, .vtp), OBJ, OFF, STL, PLY, GIfTI, FreeSurfer. Its triangles and
+    /// quads are the surface, or the boundary of its tets and hexes.
+    pub file: PathBuf,
+    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres); 1 if not given. A file that would be
+    /// larger than 10 m needs it.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub scale: Option<f64>,
+    /// Distance [m] by which the surface is moved outward, or inward if it is negative.
+    #[serde(default)]
+    pub grow: f64,
+    /// Distance [m] between the points of the grid. If not given, 1/256 of the diagonal of the box, or half of the mean edge of the
+    /// triangles if this is less, as far as the grid fits into 64 MiB.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub resolution: Option<f64>,
+}
+
+/// A part of a segmented image, with the coordinates of the image. Distances to its surface are sampled once on a grid, and kept in the
+/// cache.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ImageTool {
+    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a DICOM segmentation, or the
+    /// folder of a DICOM series.
+    pub file: PathBuf,
+    /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    #[serde(default)]
+    pub names: Option<PathBuf>,
+    /// Label of the image, by number or name.
+    #[serde(default)]
+    pub label: Option<Label>,
+    /// Several labels of the image together, by number, name or range as `"5-8"`.
+    #[serde(default)]
+    pub labels: Option<Vec<Label>>,
+    /// Instead of labels: all voxels of at least this value, as bone in a CT.
+    #[serde(default)]
+    pub threshold: Option<f64>,
+    /// Cleaning of the labels.
+    #[serde(default)]
+    pub clean: Option<CleanTable>,
+    /// Distance [m] by which the surface is moved outward, or inward if it is negative.
+    #[serde(default)]
+    pub grow: f64,
+    /// Distance [m] between the points of the grid; if not given, chosen as for a mesh file.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub resolution: Option<f64>,
+}
+
+/// How the distances of a surface are sampled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// Distance [m] by which the surface is moved outward.
+    pub grow: f64,
+    /// Distance [m] between the points of the grid, if it is given.
+    pub resolution: Option<f64>,
+}
+
+impl MeshTool {
+    /// How its distances are sampled.
+    pub fn sampling(&self) -> Sampling {
+        Sampling { grow: self.grow, resolution: self.resolution }
+    }
+}
+
+impl ImageTool {
+    /// How its distances are sampled.
+    pub fn sampling(&self) -> Sampling {
+        Sampling { grow: self.grow, resolution: self.resolution }
+    }
 }
 
 /// Who touches whom: a body an obstacle or a tool, another body, or itself. No surface goes into the other. With the solver `explicit` on the

@@ -16,7 +16,10 @@ pub use body::{
     MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape, SurfaceTable,
     Thickness, ThicknessRule, TubeShape, TwistedStripShape,
 };
-pub use contact::{BoxTool, CapsuleTool, ConeTool, ContactTable, ShapeName, SphereTool, ToolTable};
+pub use contact::{
+    BoxTool, CapsuleTool, ConeTool, ContactTable, ImageTool, MeshTool, Sampling, ShapeName, SphereTool,
+    ToolTable,
+};
 pub use linear::{
     ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,
     StopTable,

@@ -6,6 +6,7 @@ mod contact;
 mod corpus;
 mod grips;
 mod niftysim;
+mod obstacles;
 mod participants;
 mod penalty;
 mod static_solids;
