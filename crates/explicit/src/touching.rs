@@ -205,7 +205,6 @@ impl Touching {
         }
         self.look(times, farthest, free);
         if self.nodes.iter().any(|node| node.near) {
-            self.sweep();
             self.measure();
             self.solve();
             self.lift();
@@ -251,26 +250,6 @@ impl Touching {
         }
     }
 
-    /// Takes nodes along that a fast thing would pass over.
-    fn sweep(&mut self) {
-        for ((contact, own), force) in self.contacts.contacts.iter().zip(&self.own).zip(&mut self.forces) {
-            if let Own::Rigid(own) = own
-                && own.passage.is_fast()
-            {
-                let rigid = &self.contacts.rigids[own.rigid];
-                for &node in &own.surface.nodes {
-                    let node = &mut self.nodes[node as usize];
-                    let Node { now, then, mobility, near, .. } = *node;
-                    let place = near.then(|| contact.touch.pass(rigid, &own.passage, &now, &then, &mobility));
-                    if let Some(place) = place.flatten() {
-                        node.then = place;
-                        *force = add(*force, over(&(place - then), &mobility).into());
-                    }
-                }
-            }
-        }
-    }
-
     /// Finds the gaps of all rows; leaves out those that are too wide to close.
     fn measure(&mut self) {
         let Self { contacts, nodes, own, rows, .. } = self;
@@ -278,8 +257,10 @@ impl Touching {
         rows.retain_mut(|row| {
             let Own::Rigid(own) = &own[row.contact] else { return false };
             let now = row.place(nodes);
-            let Near { distance, normal } = own.passage.near(&contacts.rigids[own.rigid], &row.place);
-            (row.normal, row.gap) = (normal, distance - contacts.contacts[row.contact].touch.offset);
+            let offset = contacts.contacts[row.contact].touch.offset;
+            let Near { distance, normal } =
+                own.passage.meet(&contacts.rigids[own.rigid], offset, &now, &row.place);
+            (row.normal, row.gap) = (normal, distance - offset);
             row.carried = own.passage.carry(&now);
             deepest = deepest.max(-row.gap);
             row.gap < own.margin
@@ -404,7 +385,7 @@ impl AtRigid {
         mut found: impl FnMut(Row),
     ) {
         self.passage = Passage::new(rigid, times);
-        let room = room + self.margin + self.passage.travel(rigid);
+        let room = room + self.margin + self.passage.travel();
         let mut nearest = f64::INFINITY;
         for &node in &self.surface.nodes {
             let distance = self.passage.near(rigid, &nodes[node as usize].now).distance;
