@@ -3,6 +3,7 @@
 
 mod brain_in_skull;
 mod brain_shift;
+mod contact_reference;
 mod coupling;
 mod critical_step;
 mod cube_compression;

@@ -20,7 +20,8 @@ const SKIN: f64 = 0.25;
 const DEPTH: f64 = 0.25;
 /// The cosine of the angle between outward normals up to which surfaces face each other.
 const FACING: f64 = 0.3;
-/// How far beside a triangle, over its height, a point still counts as above it: bodies with common borders hold each other there.
+/// How far beside a triangle, over its height, a node whose surface faces it still counts as above it: bodies with common borders hold each
+/// other there, and do not take hold of each other's sides.
 const BESIDE: f64 = 0.02;
 /// Overlap, over the deepest one, that is undone though a side that faces away is nearer.
 const SLIGHT: f64 = 0.1;
@@ -189,7 +190,7 @@ impl Pairs {
         let behind = |distance: f64| -2.0 * self.depth < distance && distance < keep;
         let points = self.points[0].iter().filter(|[node, face]| {
             let corners = side.faces[*face as usize].map(place);
-            let above = Above::of(&corners, &place(*node));
+            let above = Above::of(&corners, &place(*node), BESIDE);
             above.is_inner && behind(above.height) || above.distance() < keep
         });
         let crossings = self.crossings.iter().filter(|[first, second]| {
@@ -332,7 +333,11 @@ impl Pairs {
         let mut rows = Vec::new();
         for [_, face] in list {
             let nodes = other.faces[*face as usize];
-            let here = Above::of(&nodes.map(place), &point);
+            let corners = nodes.map(place);
+            let mut here = Above::of(&corners, &point, BESIDE);
+            if here.is_beside() && here.normal.dot(&outward) > -FACING {
+                here = Above::of(&corners, &point, 0.0);
+            }
             let faces_away = here.normal.dot(&outward) > FACING;
             if here.is_inner && faces_away {
                 hidden = hidden.min(here.height.abs());
@@ -397,7 +402,8 @@ struct Above {
 }
 
 impl Above {
-    fn of(corners: &[Vector3<f64>; 3], point: &Vector3<f64>) -> Self {
+    /// With points that are so far beside the triangle, over its height, as inner ones.
+    fn of(corners: &[Vector3<f64>; 3], point: &Vector3<f64>, beside: f64) -> Self {
         let [a, b, c] = corners;
         let area = (b - a).cross(&(c - a));
         let normal = area.try_normalize(0.0).unwrap_or_default();
@@ -406,12 +412,17 @@ impl Above {
             area.dot(&(from - point).cross(&(to - point))) / area.norm_squared()
         };
         let weights = [part(b, c), part(c, a), part(a, b)];
-        if weights.iter().all(|&weight| weight >= -BESIDE) {
+        if weights.iter().all(|&weight| weight >= -beside) {
             return Self { normal, height, weights, way: normal * height, is_inner: true };
         }
         let weights = barycentric_of_closest(corners, point);
         let way = point - (a * weights[0] + b * weights[1] + c * weights[2]);
         Self { normal, height, weights, way, is_inner: false }
+    }
+
+    /// Whether the point counts as inner though it is a little beside.
+    fn is_beside(&self) -> bool {
+        self.is_inner && self.weights.iter().any(|&weight| weight < 0.0)
     }
 
     fn distance(&self) -> f64 {
@@ -518,6 +529,27 @@ mod tests {
         places[16..].iter_mut().for_each(|place| place.z = -0.9);
         pairs.update(|node| places[node as usize], 0.0);
         assert!(found(&pairs, &places).is_empty());
+    }
+
+    /// A corner that comes down on the border of a square is above that; of the wall beneath, in one plane with the corner's own wall, it is none.
+    #[test]
+    fn walls_in_one_plane_do_not_touch() {
+        // The upper side and the wall x = 0 of a block, and a corner with three sides that faces down and to −x.
+        let mut places: Vec<Vector3<f64>> =
+            [[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 0], [0, 0, -9], [0, 9, -9]]
+                .map(|x| x.map(f64::from).into())
+                .to_vec();
+        let block =
+            Surface { nodes: (0..6).collect(), faces: vec![[0, 1, 2], [0, 2, 3], [4, 0, 3], [4, 3, 5]] };
+        places
+            .extend([[0.0, 4.0, 0.1], [3.0, 4.0, 0.1], [0.0, 4.0, 3.0], [0.0, 7.0, 3.0]].map(Vector3::from));
+        let corner = Surface { nodes: (6..10).collect(), faces: vec![[6, 8, 9], [6, 7, 8], [6, 9, 7]] };
+        let mut pairs = Pairs::new(&block, Some(&corner), 0.2, |node| places[node as usize]);
+        pairs.update(|node| places[node as usize], 0.0);
+        let all = found(&pairs, &places);
+        let of_corner: Vec<&Pair> = all.iter().filter(|pair| pair.nodes[0] == 6).collect();
+        assert!(!of_corner.is_empty());
+        assert!(of_corner.iter().all(|pair| pair.normal.z > 0.99), "{of_corner:?}");
     }
 
     /// A sheet folded like a U touches itself across the fold, not beside it; the sides of a thin plate do not touch through it.

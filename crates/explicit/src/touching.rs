@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use pliant_contact::pairs::{Pairs, Surface};
 use pliant_contact::pose::Pose;
 use pliant_contact::shape::Near;
-use pliant_contact::touch::{Contact, Contacts, Gripped, Passage, Rigid, With, lattice, parts_of};
+use pliant_contact::touch::{Contact, Contacts, Gripped, LEFT, Passage, Rigid, With, lattice, parts_of};
 use pliant_mechanics::tensor::{Vector, add};
 
 /// Passes over all rows at most.
@@ -21,9 +21,6 @@ const BAND: f64 = 8.0;
 /// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
 const MARGIN: f64 = 0.1;
 
-/// Part of a depth at the beginning of a step that may be left at its end. Sharp edges come between the points of a face, and the way out of
-/// a thing can turn to another side of it: points that come to lie in it so are pushed out over several steps, as one would throw them.
-const LEFT: f64 = 0.8;
 /// Distance [thinnest part of a jaw] at which a node touches it.
 const TOUCHING: f64 = 1e-6;
 /// Cosine of the angle to the normal of a jaw's inner face up to which nodes are between the jaws.
@@ -239,7 +236,6 @@ impl Touching {
         self.look(farthest, free, gripped);
         if self.nodes.iter().any(|node| node.near) {
             self.hold(gripped);
-            self.sweep();
             self.measure();
             self.solve();
             self.lift();
@@ -336,28 +332,7 @@ impl Touching {
         }
     }
 
-    /// Takes nodes along that a fast thing would pass over.
-    fn sweep(&mut self) {
-        for ((contact, own), force) in self.contacts.contacts.iter().zip(&self.own).zip(&mut self.forces) {
-            if let Own::Rigid(own) = own
-                && own.passage.is_fast()
-            {
-                let rigid = &self.contacts.rigids[own.rigid];
-                for &node in &own.surface.nodes {
-                    let node = &mut self.nodes[node as usize];
-                    let Node { now, then, mobility, near, .. } = *node;
-                    let place = near.then(|| contact.touch.pass(rigid, &own.passage, &now, &then, &mobility));
-                    if let Some(place) = place.flatten() {
-                        node.then = place;
-                        *force = add(*force, over(&(place - then), &mobility).into());
-                    }
-                }
-            }
-        }
-    }
-
-    /// Finds the gaps of all rows; leaves out those that are too wide to close. Forces of a squeezed body carry the prediction deep into a thing,
-    /// where its nearest side may be another one: what touches already keeps the normal that it has.
+    /// Finds the gaps of all rows; leaves out those that are too wide to close.
     fn measure(&mut self) {
         let Self { contacts, nodes, own, rows, .. } = self;
         let mut deepest = 0.0_f64;
@@ -366,17 +341,8 @@ impl Touching {
             let now = row.place(nodes);
             let rigid = &contacts.rigids[own.rigid];
             let offset = contacts.contacts[row.contact].touch.offset;
-            let Near { distance, normal } = own.passage.near(rigid, &row.place);
+            let Near { distance, normal } = own.passage.meet(rigid, offset, &now, &row.place);
             (row.normal, row.gap, row.carried) = (normal, distance - offset, own.passage.carry(&now));
-            if row.gap < 0.0 {
-                let Near { distance, normal } = own.passage.near_before(rigid, &now);
-                let before = distance - offset;
-                let gap = before + normal.dot(&(row.place - row.carried));
-                if gap < 0.0 && before < -row.gap {
-                    (row.normal, row.gap) = (normal, gap);
-                }
-                row.gap -= LEFT * before.min(0.0);
-            }
             deepest = deepest.max(-row.gap);
             row.gap < own.margin
         });
@@ -470,7 +436,7 @@ impl Touching {
                 let offset = contact.touch.offset;
                 let mut gap = distance - offset;
                 if gap < 0.0 {
-                    gap -= LEFT * (own.passage.near_before(rigid, &node.now).distance - offset).min(0.0);
+                    gap -= LEFT * (own.passage.distance_before(rigid, &node.now) - offset).min(0.0);
                 }
                 if gap < 0.0 && along.dot(&normal) > 0.0 {
                     let push = -gap / along.dot(&normal);
@@ -506,7 +472,7 @@ impl AtRigid {
         distances: &mut [f64],
         mut found: impl FnMut(Row),
     ) {
-        let room = room + self.margin + self.passage.travel(rigid);
+        let room = room + self.margin + self.passage.travel();
         let mut nearest = f64::INFINITY;
         for &node in &self.surface.nodes {
             let distance = self.passage.near(rigid, &nodes[node as usize].now).distance;

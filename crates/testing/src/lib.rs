@@ -1,11 +1,12 @@
-//! Helpers of tests: numbers at random that are the same in every run, files damaged by them, and the memory of the process; with the
-//! features `images` and `organs` image files, and label images and meshes of analytic organs.
+//! Helpers of tests: numbers at random that are the same in every run, files damaged by them, hexahedra of simple bodies, and the memory of
+//! the process; with the features `images` and `organs` image files, and label images and meshes of analytic organs.
 //!
 //! ```
 //! let mut random = pliant_testing::Random::new(1);
 //! assert!((-1.0..1.0).contains(&random.number()) && random.below(3) < 3);
 //! ```
 
+mod grown;
 #[cfg(feature = "images")]
 pub mod image_files;
 #[cfg(feature = "organs")]
@@ -14,6 +15,8 @@ pub mod mesh_checks;
 pub mod organs;
 
 use std::fs;
+
+pub use grown::{Hexes, ball_of_hexes, grown_hexes};
 
 /// A linear congruential generator (Knuth's MMIX): the same numbers on every machine.
 #[derive(Clone, Debug)]

@@ -1,14 +1,17 @@
 //! Soft bodies at rigid things, at each other and at themselves, held to closed forms.
 
 mod bodies;
+mod friction;
+mod impact;
 mod rigid;
+mod thin;
 
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 use pliant_contact::touch::Contacts;
-use pliant_explicit::CentralDifference;
 use pliant_explicit::critical_step::assembled;
+use pliant_explicit::{CentralDifference, Observable, State};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::model::{Cells, Material, Model, Solid};
 use pliant_mechanics::prony::Prony;
@@ -73,4 +76,16 @@ pub fn faces(solid: &Solid) -> Vec<[u32; 3]> {
 fn stepper(model: &Arc<Model>, contacts: &Arc<Contacts>, part: f64) -> CentralDifference<f64> {
     let step = part * assembled(model).unwrap().step;
     CentralDifference::new(Arc::clone(model), step).unwrap().touching(Arc::clone(contacts))
+}
+
+/// One step; the energy [J] before it that central differences keep: ½ Σ m v⁻·v⁺ of the velocities before and after the instant, and what
+/// is stored there.
+pub fn leapfrog_energy(model: &Model, stepper: &mut CentralDifference<f64>, state: &mut State<f64>) -> f64 {
+    stepper.evaluate(state).unwrap();
+    let before = state.increment.clone();
+    let stored = stepper.energies().internal;
+    stepper.advance(state);
+    let ways = before.iter().zip(&state.increment).zip(&model.mass);
+    let moving: f64 = ways.map(|((a, b), mass)| mass * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2])).sum();
+    0.5 * moving / stepper.step().powi(2) + stored
 }

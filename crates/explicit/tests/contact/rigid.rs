@@ -12,10 +12,10 @@ use pliant_mechanics::load::Load;
 use pliant_mechanics::model::Model;
 use pliant_mechanics::prony::Prony;
 
-use super::{block, faces, stepper};
+use super::{block, faces, leapfrog_energy, stepper};
 
 /// Contact of all nodes and outer faces with a thing.
-fn at(rigid: Rigid, model: &Model, friction: f64) -> Arc<Contacts> {
+pub fn at(rigid: Rigid, model: &Model, friction: f64) -> Arc<Contacts> {
     let faces = faces(&model.solids[0]);
     let nodes = (0..model.node_count() as u32).collect();
     let touch = Touch { friction, offset: 0.0 };
@@ -26,7 +26,7 @@ fn at(rigid: Rigid, model: &Model, friction: f64) -> Arc<Contacts> {
     })
 }
 
-fn floor() -> Rigid {
+pub fn floor() -> Rigid {
     Rigid {
         name: "floor".into(),
         shape: Shape::HalfSpace,
@@ -37,7 +37,8 @@ fn floor() -> Rigid {
 }
 
 /// Slope with a tangent of ½: sticks with μ = ½, and slides by ½ a t² with less (A4 of the acceptance tests of contact). The block is first
-/// pressed on, then tilted, so that it does not hop.
+/// pressed on, then tilted, so that it does not hop. At μ = ½ itself nothing holds back what an elastic block still trembles: it creeps by less
+/// than a thousandth of the way without friction. A particle sticks exactly (`pliant-contact`).
 #[test]
 fn a_block_on_an_incline_sticks_or_slides_by_coulombs_law() {
     let (sine, cosine) = (0.2_f64.sqrt(), 0.8_f64.sqrt());
@@ -45,7 +46,7 @@ fn a_block_on_an_incline_sticks_or_slides_by_coulombs_law() {
     let relaxing = Prony { isochoric: vec![(0.3, 0.005)], ..Prony::default() };
     let smooth = |from, to| Curve { shape: CurveShape::SmoothStep, from, to };
     for (friction, slid, bound) in
-        [(0.51, 0.0, 1e-5), (0.49, 0.0439, 0.05), (0.3, 0.877, 0.02), (0.0, 2.194, 0.02)]
+        [(0.51, 0.0, 1e-5), (0.5, 0.0, 2e-3), (0.49, 0.0439, 0.05), (0.3, 0.8774, 0.02), (0.0, 2.1936, 0.02)]
     {
         let mut model = block([2, 2, 1], 0.05, 3e5, relaxing.clone());
         for (pull, curve) in
@@ -72,9 +73,9 @@ fn a_block_on_an_incline_sticks_or_slides_by_coulombs_law() {
         let (from, place, speed) = start.unwrap();
         let time = state.time - from;
         let moved = (mean(&state.displacement) - place - speed * time) / (time * time);
-        println!("friction {friction}: {moved} m of {slid} m, lowest {lowest:.1e} m");
         assert!(lowest > -1e-12, "{lowest:.1e} m below the floor");
         let off = if slid == 0.0 { mean(&state.displacement) - place } else { moved / slid - 1.0 };
+        println!("friction {friction}: {moved} m of {slid} m, off by {off:.1e}, lowest {lowest:.1e} m");
         assert!(off.abs() < bound, "friction {friction}: {moved} m of {slid} m");
     }
 }
@@ -88,8 +89,7 @@ fn height(state: &State<f64>, model: &Model) -> f64 {
 /// that of the free bar up to 0.99 of the critical one (A7).
 #[test]
 fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
-    // At 0.99 the bar itself is not resolved: kinetic energy of mean velocities wavers.
-    for (part, limit) in [(0.5, 1e-6), (0.9, 1e-6), (0.99, 0.02)] {
+    for part in [0.5, 0.9, 0.99] {
         let mut model = block([1, 1, 40], 0.01, 5e4, Prony::default());
         model.initial_velocity = vec![[0.0, 0.0, -0.05]; model.node_count()];
         model.rest.iter_mut().for_each(|x| x[2] += 1e-4);
@@ -101,11 +101,8 @@ fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
         let (mut lowest, mut most, mut impulse) = (f64::INFINITY, 0.0_f64, 0.0);
         // Longer than a wave there and back.
         while state.time < 0.12 {
-            stepper.evaluate(&mut state).unwrap();
-            let all = stepper.energies();
-            most = most.max((all.kinetic + all.internal) / kinetic);
+            most = most.max(leapfrog_energy(&model, &mut stepper, &mut state) / kinetic);
             impulse -= stepper.contact_forces()[0][2] * stepper.step();
-            stepper.advance(&mut state);
             lowest = height(&state, &model).min(lowest);
         }
         stepper.evaluate(&mut state).unwrap();
@@ -113,7 +110,7 @@ fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
             (0..model.node_count()).map(|node| model.mass[node] * stepper.velocity(&state, node)[2]).sum();
         let before = -0.05 * model.mass.iter().sum::<f64>();
         println!("{part}: lowest {lowest:.1e} m, energy at most {most}, rebound {}", momentum / -before);
-        assert!(lowest > -1e-12 && most < 1.0 + limit, "{part}: {lowest:.1e} m, {most}");
+        assert!(lowest > -1e-12 && most < 1.0 + 1e-9, "{part}: {lowest:.1e} m, {most}");
         assert!((0.9..=1.0).contains(&(momentum / -before)), "{part}: {momentum} of {before}");
         assert!(
             ((momentum - before) / impulse - 1.0).abs() < 1e-9,

@@ -118,8 +118,8 @@ fn impossible_goals_are_told() {
     let step = simulation.step_length();
     let far = Pose::translation(5.0, 0.0, 0.0);
     let arrival = simulation.drive("grasper", far, 0.0).unwrap();
-    // 32 times half of the thickness of 4 mm in a step.
-    let least = 5.0 / (32.0 * 0.002) * step;
+    // 256 times half of the thickness of 4 mm in a step.
+    let least = 5.0 / (256.0 * 0.002) * step;
     assert!((1.0..1.1).contains(&(arrival / least)), "{arrival} s instead of {least} s");
     let other = simulation.drive("graspr", far, 0.1).unwrap_err().message;
     assert!(other.contains("`graspr`") && other.contains("floor, grasper"), "{other}");

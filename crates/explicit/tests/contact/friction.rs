@@ -1,0 +1,66 @@
+//! The cone of friction, in all directions.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use pliant_contact::pose::{Course, Pose};
+use pliant_contact::shape::Shape;
+use pliant_contact::touch::Rigid;
+use pliant_explicit::{Observable, State};
+use pliant_mechanics::curve::{Curve, Shape as CurveShape};
+use pliant_mechanics::model::{Constraint, Motion};
+use pliant_mechanics::prony::Prony;
+
+use super::rigid::at;
+use super::{block, stepper};
+
+/// A block that is pressed onto a floor, and drawn over it at 10 mm/s by its top, or rests while the floor is drawn away beneath it: the floor
+/// feels μ N along the slip in any direction (A5).
+#[test]
+fn friction_of_a_dragged_block_is_mu_times_the_load_along_the_slip() {
+    let (speed, friction) = (0.01, 0.3);
+    let (mut off, mut askew) = (0.0_f64, 0.0_f64);
+    for degrees in [0, 17, 45, 90, 137, 200, 265, 330] {
+        let angle = f64::from(degrees).to_radians();
+        let along = Vector3::new(angle.cos(), angle.sin(), 0.0);
+        for floor_moves in [false, true] {
+            let mut model = block([3, 2, 2], 0.01, 3e3, Prony::default());
+            model.bodies[0].damping = 60.0;
+            let nodes = 0..model.node_count() as u32;
+            let top: Vec<u32> = nodes.filter(|&node| model.rest[node as usize][2] > 0.0199).collect();
+            let press = Curve { shape: CurveShape::SmoothStep, from: 0.0, to: 0.1 };
+            let drag = Curve { shape: CurveShape::SmoothStep, from: 0.1, to: 0.2 };
+            let drawn = if floor_moves { Vector3::zeros() } else { along * speed };
+            let mut hold = |components: [bool; 3], motion| {
+                let [x, y, z] = components;
+                let components = [x, y, z, false, false, false];
+                let name = "top".into();
+                model.constraints.push(Constraint { name, nodes: top.clone(), components, motion });
+            };
+            hold([false, false, true], Motion::Displacement([0.0, 0.0, -0.001], press));
+            hold([true, true, false], Motion::Velocity(drawn.into(), drag));
+            let way = if floor_moves { -along * speed } else { Vector3::zeros() };
+            let curve = Curve { shape: CurveShape::Ramp, from: 0.2, to: 1.2 };
+            let course = Course::by(Pose::identity(), way.into(), curve);
+            let floor =
+                Rigid { name: "floor".into(), shape: Shape::HalfSpace, course, inside: false, jaw: None };
+            let contacts = at(floor, &model, friction);
+            let model = Arc::new(model);
+            let mut stepper = stepper(&model, &contacts, 0.8);
+            let mut state = State::at_rest(&model);
+            while state.time < 0.8 {
+                stepper.evaluate(&mut state).unwrap();
+                if state.time > 0.6 {
+                    let force = Vector3::from(stepper.contact_forces()[0]);
+                    let across = Vector3::new(force.x, force.y, 0.0);
+                    assert!(force.z < -0.1, "{force}");
+                    off = off.max((across.norm() / (friction * -force.z) - 1.0).abs());
+                    askew = askew.max(across.angle(&along).to_degrees());
+                }
+                stepper.advance(&mut state);
+            }
+        }
+    }
+    println!("friction off by {off:.1e} of mu N at most, and {askew:.1e} degrees beside the slip");
+    assert!(off < 0.01 && askew < 1.0, "{off:.1e} {askew:.1e}");
+}
