@@ -25,6 +25,8 @@ const FACING: f64 = 0.3;
 const BESIDE: f64 = 0.02;
 /// Overlap, over the deepest one, that is undone though a side that faces away is nearer.
 const SLIGHT: f64 = 0.1;
+/// Relative difference up to which distances are the same.
+const SAME: f64 = 1e-9;
 /// Rest distances, over the distance to keep, up to which parts of a surface never touch each other.
 const AT_REST: f64 = 1.02;
 
@@ -355,17 +357,18 @@ impl Pairs {
             }
             let distance = here.distance();
             let (known, ..) = nearest;
-            if distance < known * (1.0 - 1e-9) {
+            if distance < known * (1.0 - SAME) {
                 nearest = (distance, here.way, here.normal, nodes, here.weights);
                 faces = !faces_away;
-            } else if distance <= known * (1.0 + 1e-9) {
+            } else if distance <= known * (1.0 + SAME) {
                 nearest.2 += here.normal;
                 faces |= !faces_away;
             }
         }
         let (distance, way, normals, nodes, weights) = nearest;
-        if faces && distance < above.min(hidden) {
-            let sign = if way.dot(&normals) < 0.0 { -1.0 } else { 1.0 };
+        if faces && distance < above.min(hidden) * (1.0 - SAME) {
+            // In one plane with a triangle, beside it, is not beneath it.
+            let sign = if way.dot(&normals) < -SAME * distance * normals.norm() { -1.0 } else { 1.0 };
             // Who is behind a border is beside the surface.
             let mut on = nodes.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0);
             let beside = sign < 0.0 && on.all(|(node, _)| other.border.binary_search(node).is_ok());
@@ -544,12 +547,20 @@ mod tests {
         places
             .extend([[0.0, 4.0, 0.1], [3.0, 4.0, 0.1], [0.0, 4.0, 3.0], [0.0, 7.0, 3.0]].map(Vector3::from));
         let corner = Surface { nodes: (6..10).collect(), faces: vec![[6, 8, 9], [6, 7, 8], [6, 9, 7]] };
-        let mut pairs = Pairs::new(&block, Some(&corner), 0.2, |node| places[node as usize]);
-        pairs.update(|node| places[node as usize], 0.0);
-        let all = found(&pairs, &places);
-        let of_corner: Vec<&Pair> = all.iter().filter(|pair| pair.nodes[0] == 6).collect();
-        assert!(!of_corner.is_empty());
-        assert!(of_corner.iter().all(|pair| pair.normal.z > 0.99), "{of_corner:?}");
+        // In the plane of the wall, and to rounding before or behind it; close to the border and farther away from it.
+        for (shift, height) in [0.0, 1e-15, -1e-15].into_iter().flat_map(|x| [(x, 0.1), (x, 0.4)]) {
+            let mut places = places.clone();
+            places[6..].iter_mut().for_each(|place| *place += Vector3::new(shift, 0.0, height));
+            let mut pairs = Pairs::new(&block, Some(&corner), 1.0, |node| places[node as usize]);
+            pairs.update(|node| places[node as usize], 0.0);
+            let all = found(&pairs, &places);
+            let of_corner: Vec<&Pair> = all.iter().filter(|pair| pair.nodes[0] == 6).collect();
+            assert!(!of_corner.is_empty());
+            assert!(
+                of_corner.iter().all(|pair| pair.normal.z > 0.99 && pair.distance > 0.0),
+                "{of_corner:?}"
+            );
+        }
     }
 
     /// A sheet folded like a U touches itself across the fold, not beside it; the sides of a thin plate do not touch through it.

@@ -36,9 +36,9 @@ pub fn grown_hexes(
             }
         }
     }
-    for axis in 0..3 {
+    for (axis, both) in whole.into_iter().enumerate() {
         let [b, c] = [(axis + 1) % 3, (axis + 2) % 3];
-        for side in if whole[axis] { vec![-cells, cells] } else { vec![cells] } {
+        for side in if both { vec![-cells, cells] } else { vec![cells] } {
             for layer in 0..layers {
                 for q in ranges[c].clone() {
                     for p in ranges[b].clone() {

@@ -1,6 +1,7 @@
 //! Soft bodies at rigid things, at each other and at themselves, held to closed forms.
 
 mod bodies;
+mod degenerate;
 mod friction;
 mod impact;
 mod rigid;
