@@ -356,7 +356,7 @@ impl Touching {
                     let mut row = Row::new(index, pair.nodes, pair.weights);
                     row.carried = row.place(nodes);
                     (row.normal, row.sign) = (pair.normal, if pair.in_order { *sign } else { -sign });
-                    row.gap = row.normal.dot(&row.place) - offset - LEFT * (pair.distance - offset).min(0.0);
+                    row.gap = row.normal.dot(&row.place) - offset;
                     deepest = deepest.max(-row.gap);
                     rows.push(row);
                 },
