@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use nalgebra::Point3;
 use pliant_explicit::Wanted;
-use pliant_geometry::Mesh;
+use pliant_geometry::{Mesh, Vector3};
+use pliant_sim::contact::touch::Rigid;
 #[cfg(feature = "gpu")]
 use pliant_sim::gpu::{DeviceMapping, DevicePoints, PointValue};
 use pliant_sim::{Failure, Simulation, State};
@@ -85,6 +87,29 @@ impl Live {
     pub fn nodes_of(&self, point: u32) -> Vec<(u32, f64)> {
         let (part, nodes) = self.shown.nodes_of(&self.world, point);
         nodes.into_iter().map(|(node, weight)| (self.simulation.node(part, node), weight)).collect()
+    }
+
+    /// The tool or obstacle that a point of what is shown belongs to; `None` of a point of a body.
+    pub fn thing_of(&self, point: u32) -> Option<&Rigid> {
+        let (part, rigid) = self.shown.thing_of(point)?;
+        self.world.participants[part].built.contacts.as_ref()?.rigids.get(rigid)
+    }
+
+    /// Whether a point of what is shown can be taken hold of: of a body or a tool, not of an obstacle.
+    pub fn is_movable(&self, point: u32) -> bool {
+        let is_tool = |rigid: &Rigid| self.world.scene.tools.iter().any(|(name, _)| name == rigid.tool());
+        self.thing_of(point).is_none_or(is_tool)
+    }
+
+    /// Where a point of a tool in its place at the start [m] is now.
+    pub fn place_on(&self, point: u32, start: &Vector3) -> Vector3 {
+        let moved = self.shown.thing_of(point).and_then(|(part, number)| {
+            let rigid = self.world.participants[part].built.contacts.as_ref()?.rigids.get(number)?;
+            let now = self.simulation.instants().nth(part)?;
+            let motion = rigid.at(now.time(), now.leg(number)) * rigid.at(0.0, None).inverse();
+            Some((motion * Point3::from(*start)).coords)
+        });
+        moved.unwrap_or(*start)
     }
 
     /// Shows another series.

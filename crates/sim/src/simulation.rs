@@ -671,7 +671,7 @@ fn same_mesh(a: &Part, b: &Part) -> bool {
 /// A simulation at an instant whose forces are found.
 #[derive(Clone, Copy)]
 pub struct Frame<'a> {
-    simulation: &'a Simulation,
+    pub(crate) simulation: &'a Simulation,
 }
 
 impl<'a> Frame<'a> {

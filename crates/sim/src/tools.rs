@@ -129,8 +129,15 @@ impl Simulation {
 impl Frame<'_> {
     /// A tool or an obstacle; `None` without one of this name.
     pub fn tool(&self, name: &str) -> Option<ToolNow> {
+        self.simulation.tool(name)
+    }
+}
+
+impl Simulation {
+    /// A tool or an obstacle, with the force found last; `None` without one of this name.
+    pub fn tool(&self, name: &str) -> Option<ToolNow> {
         let mut found: Option<ToolNow> = None;
-        for (part, now) in self.parts() {
+        for (part, now) in self.world().parts.iter().zip(self.instants()) {
             let Some(all) = part.method.contacts() else { continue };
             let own = |number: usize| all.rigids[number].tool() == name;
             let Some(number) = (0..all.rigids.len()).find(|&number| own(number)) else { continue };

@@ -1,14 +1,17 @@
-//! The hand and the pins that hold a body.
+//! The hand and the pins that hold a body, and tools in the hand.
 //!
 //! A hand has no point: it holds the surface around the one that it took, within two edges of the elements there, with the
 //! weights of a Gaussian whose deviation is one edge. So a pull meets tissue as a grasper does, and not a single element.
 
 use std::collections::HashSet;
 
+use nalgebra::Point3;
 use pliant_geometry::Vector3;
 use pliant_mechanics::grip::Grip;
 use pliant_picture::Subject;
 use pliant_scene::Live;
+use pliant_sim::ToolNow;
+use pliant_sim::contact::pose::Pose;
 use serde::{Deserialize, Serialize};
 
 /// A point of what is drawn: a triangle and the weights of its corners.
@@ -28,12 +31,16 @@ pub enum Hand {
     Take(Point, f64),
     /// Pulls what it holds towards a place [m].
     Pull([f64; 3]),
-    /// Lets go.
+    /// Lets go; a tool stays.
     Release,
     /// Pins the surface around a point where it is.
     Pin(Point),
     /// Removes a pin, counted from 0.
     Unpin(usize),
+    /// Turns the tool that it holds about the point where it holds it, by a rotation vector [rad].
+    Turn([f64; 3]),
+    /// Opens the jaws of the tool that it holds by an angle [rad], or closes them if it is negative.
+    Open(f64),
 }
 
 /// What is held at the moment: by the hand first, then by pins.
@@ -42,6 +49,55 @@ pub struct Hold {
     grips: Vec<Grip>,
     taken: Vec<Taken>,
     by_hand: bool,
+    tool: Option<Tool>,
+}
+
+/// A tool in the hand.
+#[derive(Clone, Debug)]
+struct Tool {
+    name: String,
+    /// The point that was taken, in the frame of the tool [m].
+    point: Vector3,
+    /// Where it is led.
+    goal: Pose,
+    /// The angle [rad] between its jaws that it is led to.
+    opening: f64,
+}
+
+/// Simulated time [s] in which a tool follows the hand: a frame.
+const FOLLOWS: f64 = 1.0 / 60.0;
+/// The widest angle [rad] between jaws.
+const WIDEST: f64 = 3.0;
+
+impl Tool {
+    /// The tool that a point belongs to; `None` of a point of a body.
+    fn at(point: &Point, subject: &Subject, live: &Live) -> Option<Self> {
+        let corners = subject.triangles().nth(point.triangle as usize)?;
+        let name = live.thing_of(corners[0]).filter(|_| live.is_movable(corners[0]))?.tool().to_owned();
+        let ToolNow { pose, opening, .. } = live.simulation.tool(&name)?;
+        let place =
+            |(corner, weight): (u32, f64)| live.place_on(corner, &subject.points[corner as usize]) * weight;
+        let place: Vector3 = corners.into_iter().zip(point.weights).map(place).sum();
+        let point = pose.inverse_transform_point(&place.into()).coords;
+        Some(Self { name, point, goal: pose, opening })
+    }
+
+    /// The point that was taken [m] at a pose.
+    fn held(&self, pose: &Pose) -> Vector3 {
+        (pose * Point3::from(self.point)).coords
+    }
+
+    /// Turns it about the point that was taken, and brings this to a place [m].
+    fn lead(&mut self, place: &Vector3, turn: &Vector3, live: &mut Live) -> bool {
+        self.goal = Pose::rotation(*turn) * self.goal;
+        self.goal.translation.vector += place - self.held(&self.goal);
+        live.simulation.drive(&self.name, self.goal, FOLLOWS).is_ok()
+    }
+
+    fn open(&mut self, by: f64, live: &mut Live) -> bool {
+        self.opening = (self.opening + by).clamp(0.0, WIDEST);
+        live.simulation.open(&self.name, self.opening, FOLLOWS).is_ok()
+    }
 }
 
 /// How a grip was taken.
@@ -125,15 +181,24 @@ fn around(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
 impl Hold {
     /// Whether the first of what is held is the hand's.
     pub fn by_hand(&self) -> bool {
-        self.by_hand
+        self.by_hand || self.tool.is_some()
+    }
+
+    /// The tool that the hand holds.
+    pub fn tool(&self) -> Option<&str> {
+        self.tool.as_ref().map(|tool| tool.name.as_str())
     }
 
     /// Of each grip the point [m], and its force on the body [N].
     pub fn shown<'h>(&'h self, live: &'h Live) -> impl Iterator<Item = [[f64; 3]; 2]> + 'h {
-        self.grips.iter().zip(&self.taken).map(|(grip, taken)| {
+        let tool = self.tool.iter().filter_map(|tool| {
+            let now = live.simulation.tool(&tool.name)?;
+            Some([tool.held(&now.pose).into(), now.force.map(|f| -f)])
+        });
+        tool.chain(self.grips.iter().zip(&self.taken).map(|(grip, taken)| {
             let [middle, force] = live.simulation.pulled(grip);
             [(Vector3::from(middle) + taken.offset).into(), force]
-        })
+        }))
     }
 
     /// Does what hand and pins do; the stiffness stays below the bound of stable steps. False where the solver knows no hand.
@@ -143,6 +208,10 @@ impl Hold {
         match hand {
             Hand::Take(point, stiffness) => {
                 self.release();
+                self.tool = Tool::at(point, subject, live);
+                if self.tool.is_some() {
+                    return true;
+                }
                 match grip(point, *stiffness) {
                     Some((grip, taken)) => {
                         self.grips.insert(0, grip);
@@ -151,6 +220,16 @@ impl Hold {
                     }
                     None => found = false,
                 }
+            }
+            Hand::Turn(by) => {
+                let Some(tool) = &mut self.tool else { return true };
+                let place = tool.held(&tool.goal);
+                return tool.lead(&place, &(*by).into(), live);
+            }
+            Hand::Open(by) => return self.tool.as_mut().is_none_or(|tool| tool.open(*by, live)),
+            Hand::Pull(place) if self.tool.is_some() => {
+                let lead = |tool: &mut Tool| tool.lead(&(*place).into(), &Vector3::zeros(), live);
+                return self.tool.as_mut().is_none_or(lead);
             }
             Hand::Pull(place) if self.by_hand => {
                 self.grips[0].place = (Vector3::from(*place) - self.taken[0].offset).into();
@@ -177,6 +256,7 @@ impl Hold {
 
     /// Holds the same in another run.
     pub fn hold_on(&mut self, live: &mut Live) -> bool {
+        self.tool.take_if(|tool| live.simulation.tool(&tool.name).is_none());
         for (grip, taken) in self.grips.iter_mut().zip(&self.taken) {
             grip.stiffness = taken.stiffness.min(live.simulation.stiffest(grip));
         }
@@ -192,6 +272,7 @@ impl Hold {
     }
 
     fn release(&mut self) {
+        self.tool = None;
         if std::mem::take(&mut self.by_hand) {
             self.grips.remove(0);
             self.taken.remove(0);

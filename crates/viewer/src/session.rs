@@ -84,6 +84,10 @@ pub struct Frame {
     pub energies: Energies,
     /// What is held: the point [m] and the force on the body [N] of each grip, hand first.
     pub held: Vec<[[f64; 3]; 2]>,
+    /// The tool that the hand holds.
+    pub tool: Option<String>,
+    /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of obstacles.
+    pub movable: Arc<[bool]>,
     /// Steps since the frame before.
     pub steps_a_frame: u64,
     /// Mean wall time of a step [s].
@@ -265,6 +269,8 @@ enum Left {
 struct Player<'s> {
     world: &'s World,
     subject: Arc<Subject>,
+    /// Whether each triangle of the subject can be taken hold of.
+    movable: Arc<[bool]>,
     /// Labels whose cells are not shown.
     hidden: Vec<i32>,
     live: Live,
@@ -425,12 +431,20 @@ impl<'s> Player<'s> {
         let on_device = world.device().is_some();
         let known = subject.filter(|_| goes_on);
         let is_known = known.is_some();
-        let mut player =
-            Self { world, subject: known.unwrap_or_default(), hidden: Vec::new(), live, on_device, playback };
+        let mut player = Self {
+            world,
+            subject: known.unwrap_or_default(),
+            movable: Arc::default(),
+            hidden: Vec::new(),
+            live,
+            on_device,
+            playback,
+        };
         player.show_as_viewed();
         if !is_known {
             player.renew_subject()?;
         }
+        player.find_movable();
         player.name_columns();
         Ok(player)
     }
@@ -604,7 +618,12 @@ impl<'s> Player<'s> {
     fn renew_subject(&mut self) -> Result<(), String> {
         let mesh = self.live.mesh().map_err(|failure| failure.message)?;
         self.subject = Arc::new(Subject::new(&visible(mesh, &self.hidden)));
+        self.find_movable();
         Ok(())
+    }
+
+    fn find_movable(&mut self) {
+        self.movable = self.subject.triangles().map(|corners| self.live.is_movable(corners[0])).collect();
     }
 
     fn step(&mut self) {
@@ -717,6 +736,8 @@ impl<'s> Player<'s> {
         }
         frame.number = playback.frames;
         frame.subject = self.subject.clone();
+        frame.movable = Arc::clone(&self.movable);
+        frame.tool = playback.hold.tool().map(str::to_owned);
         frame.critical = playback.seen.critical;
         frame.time = self.live.simulation.time();
         frame.steps = playback.steps;

@@ -428,3 +428,83 @@ fn the_examples_start_and_play() {
         assert_eq!((frame.failure, name), (None, name));
     }
 }
+
+/// A block on a table, and jaws over it.
+const GRASPED: &str = "[scene]
+until = 1
+gravity = [0, 0, -9.81]
+[run]
+step = 2e-4
+[law.tissue]
+type = 'neo-hookean'
+young-modulus = 2e4
+poisson-ratio = 0.4
+[body.flap]
+mesh = { block = { size = [0.03, 0.006, 0.02], cells = [10, 2, 7] }, as = 'hexes' }
+law = 'tissue'
+element = 'hex8-full'
+density = 1000
+damping = 40
+[obstacle.floor]
+shape = 'half-space'
+[tool.grasper]
+shape = { jaws = { length = 0.04, width = 0.012, thickness = 0.004 } }
+at = [0.015, 0.003, 0.045]
+turn = [3.141592653589793, 0, 0]
+opening = { angle = 0.4, curve = 'hold' }
+ideal-grip = 0.2
+[contact.stands]
+between = ['flap', 'floor']
+[contact.holds]
+between = ['flap', 'grasper']
+";
+
+/// The hand takes a tool where it is seen, closes its jaws, turns and lifts it; obstacles are not taken; all of it is repeated to the same bits.
+#[test]
+fn a_tool_is_led_by_hand_and_repeated() {
+    let world = world(GRASPED);
+    let mut session = Session::start(world.clone(), || ()).unwrap();
+    session.order(Order::Record);
+    let first = wait(&mut session, |frame| !frame.points.is_empty());
+    let middle = |t: [u32; 3]| t.map(|p| first.points[p as usize]).iter().sum::<Vector3>() / 3.0;
+    let at = |wanted: &dyn Fn(Vector3) -> bool| {
+        first.subject.triangles().position(|corners| wanted(middle(corners))).unwrap()
+    };
+    let (floor, jaw) =
+        (at(&|place| place.z.abs() < 1e-9 && place.x.min(place.y) < 0.0), at(&|place| place.z > 0.03));
+    assert!(
+        first.movable.len() == first.subject.triangle_count() && !first.movable[floor] && first.movable[jaw]
+    );
+    assert!(first.movable[at(&|place| (place.z - 0.02).abs() < 1e-9 && (place.y - 0.003).abs() < 0.003)]);
+
+    let point = Point { triangle: jaw as u32, weights: [1.0 / 3.0; 3] };
+    let taken = middle(first.subject.triangles().nth(jaw).unwrap());
+    session.order(Order::Hand(Hand::Take(point, 100.0)));
+    session.order(Order::Hand(Hand::Open(-0.22)));
+    session.order(Order::Step(400));
+    let closed = wait(&mut session, |frame| frame.steps == 400);
+    assert_eq!(closed.tool.as_deref(), Some("grasper"));
+    for step in 1..=20 {
+        let place = taken + Vector3::z() * (0.001 * f64::from(step));
+        session.order(Order::Hand(Hand::Pull(place.into())));
+        session.order(Order::Hand(Hand::Turn([0.0, 0.0, 0.01])));
+        session.order(Order::Step(84));
+    }
+    session.order(Order::Step(500));
+    let steps = 400 + 20 * 84 + 500;
+    let lifted = wait(&mut session, |frame| frame.steps == steps);
+    // The point that was taken is where it was led, about which the jaws have turned.
+    let [place, force] = lifted.held[0].map(Vector3::from);
+    assert!((place - taken - Vector3::z() * 0.02).norm() < 1e-9, "{place:?}");
+    let weight = 0.03 * 0.006 * 0.02 * 1000.0 * 9.81;
+    assert!((force.z / weight - 1.0).abs() < 0.05, "{force:?} N, weight {weight} N");
+    let lowest = (0..264).map(|point| lifted.points[point].z).fold(f64::INFINITY, f64::min);
+    assert!(lowest > 0.015, "{lowest} m");
+    session.order(Order::Hand(Hand::Release));
+    session.order(Order::Step(1));
+    assert!(wait(&mut session, |frame| frame.steps == steps + 1).tool.is_none());
+    let recording = session.end().unwrap();
+    let once = replay(&world, &recording).unwrap();
+    assert_eq!(once, replay(&world, &recording).unwrap());
+    assert!(once.largest_force > 0.9 * weight, "{once:?}");
+}

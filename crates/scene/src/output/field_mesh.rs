@@ -65,6 +65,20 @@ impl FieldMesh {
         (0, Vec::new())
     }
 
+    /// The participant and the rigid thing that a point belongs to; `None` of a point of a body.
+    pub fn thing_of(&self, point: u32) -> Option<(usize, usize)> {
+        let mut point = point as usize;
+        for (index, own) in &self.parts {
+            let points = own.mesh.points.len();
+            if point < points {
+                let Content::Things(owners) = &own.content else { return None };
+                return Some((*index, owners[point] as usize));
+            }
+            point -= points;
+        }
+        None
+    }
+
     /// Takes the fields of an instant.
     pub fn fill(&mut self, frames: &[Frame<'_>]) {
         self.parts.iter_mut().for_each(|(index, own)| own.fill(&frames[*index]));

@@ -15,6 +15,9 @@ use crate::hand::{Hand, Point, pick};
 pub(super) const SCALE: f32 = 110.0;
 /// Length of the arrow of the strongest force of a pull on the screen.
 const ARROW: f32 = 120.0;
+/// Angle [rad] by which a tool turns for a point on the screen, and by which jaws open for one of the wheel.
+const TURN: f64 = 0.01;
+const OPEN: f64 = 0.002;
 /// Radius of a pin on the screen.
 const PIN_SIZE: f32 = 5.0;
 const PIN: Color32 = Color32::from_rgb(20, 90, 170);
@@ -23,8 +26,10 @@ const WARNING: Color32 = Color32::from_rgb(250, 225, 150);
 const FAILED: Color32 = Color32::from_rgb(245, 180, 170);
 
 /// Keys and what they do, as in `docs/viewer.md`.
-const KEYS: [(&str, &str); 16] = [
+const KEYS: [(&str, &str); 18] = [
     ("drag the body", "pull it"),
+    ("drag a tool", "lead it; with Shift turn it about where it is held"),
+    ("wheel while dragging a tool", "open and close its jaws"),
     ("Ctrl or P + click", "pin it; on a pin, take it away"),
     ("Alt + click", "follow a point: its displacement is plotted"),
     ("drag beside it", "turn the view"),
@@ -159,7 +164,12 @@ impl App {
         }
         let by = response.drag_delta();
         if let Some(at) = self.holding {
-            if response.dragged_by(PointerButton::Primary) {
+            let turns = context.input(|input| input.modifiers.shift) && self.frame.tool.is_some();
+            if response.dragged_by(PointerButton::Primary) && turns {
+                let [right, up, _] = self.camera.axes();
+                let turn = (up * f64::from(by.x) + right * f64::from(by.y)) * TURN;
+                self.act(Hand::Turn(turn.into()));
+            } else if response.dragged_by(PointerButton::Primary) {
                 let to = on_plane(&self.camera, &at, place, self.aspect());
                 self.holding = Some(to);
                 self.act(Hand::Pull(to.into()));
@@ -183,7 +193,9 @@ impl App {
         if response.hovered() {
             let scroll =
                 context.input(|input| input.smooth_scroll_delta.y + 200.0 * (input.zoom_delta() - 1.0));
-            if scroll != 0.0 {
+            if scroll != 0.0 && self.holding.is_some() && self.frame.tool.is_some() {
+                self.act(Hand::Open(OPEN * f64::from(scroll)));
+            } else if scroll != 0.0 {
                 self.camera.zoom((-0.002 * f64::from(scroll)).exp());
             }
         }
@@ -198,9 +210,11 @@ impl App {
     pub(super) fn hit(&self, place: [f64; 2]) -> Option<(Point, Vector3)> {
         let (from, along) = self.camera.ray(place, self.aspect());
         let clip = self.style.clip;
-        pick(&self.subject, &self.points, &from, &along, |point| {
+        let found = pick(&self.subject, &self.points, &from, &along, |point| {
             clip.is_none_or(|plane| plane.distance(point) <= 0.0)
-        })
+        });
+        // Obstacles hide what is behind them, and are not taken hold of.
+        found.filter(|(point, _)| self.frame.movable.get(point.triangle as usize).copied().unwrap_or(true))
     }
 
     /// The pin that is shown there.
