@@ -82,7 +82,7 @@ fn run(world: &World, settings: Settings, mover: &Mover) -> Outcome {
         Mover::Hand(trace, hand) => (trace, Some(hand)),
     };
     let mut renderer = Renderer::new(settings).unwrap();
-    let mut estimate = Estimate::new(300.0, [50.0, 5000.0]);
+    let mut estimate = Estimate::new(1000.0, [50.0, 5000.0]);
     let start = trace.at(0.0).translation.vector;
     let mut held = Held { place: start, ..Held::default() };
     let mut anchor = Vector3::zeros();
@@ -215,20 +215,23 @@ fn a_minute_of_pressing_and_scraping_gives_no_energy() {
 /// Colgate and Schenkel: a device of 1 N s/m holds 2000 N/m at 1 kHz; 20 N/m would be all at the rate of a slow simulation.
 #[test]
 fn the_stiffest_coupling() {
-    let hand = Hand { mass: 0.1, friction: 1.0, stiffness: 50.0, damping: 0.0 };
     let zero = Vector3::zeros();
     let rigid = [Plane { normal: Vector3::z(), gap: 0.0, friction: 0.0 }];
     let wall = LocalModel::new(zero, zero, Matrix3::zeros(), &rigid, 0.001).unwrap();
-    for (guard, most_damping) in [(false, 0.0), (true, 10.0), (true, 20.0), (true, 40.0)] {
-        let guard = guard.then_some(Guard { most_damping, ..Guard::default() });
-        let settings = Settings {
-            guard,
-            coupling: Coupling { stiffness: 1.0, damping: 0.0 },
-            soft_start: 0.0,
-            ..Settings::default()
-        };
-        let stiffest = hand.stiffest(&wall, settings, 0.02).unwrap();
-        println!("guard {guard:?}: {stiffest:.0} N/m of {:.0} N/m", Coupling::limit(1.0, 0.0, 1e-3, 0.0));
+    for ahead in [0.0, 0.5e-3] {
+        for friction in [0.25, 0.5, 1.0, 2.0] {
+            for guard in [None, Some(Guard::default())] {
+                let hand = Hand { mass: 0.1, friction, stiffness: 50.0, damping: 0.0 };
+                let coupling = Coupling { stiffness: 1.0, damping: 0.0 };
+                let settings = Settings { ahead, guard, coupling, soft_start: 0.0, ..Settings::default() };
+                let stiffest = hand.stiffest(&wall, settings, 0.02).unwrap();
+                println!(
+                    "{friction} N s/m, {ahead} s ahead, guard {}: {stiffest:.0} N/m of {:.0} N/m",
+                    guard.is_some(),
+                    Coupling::limit(friction, 0.0, 1e-3, 0.0)
+                );
+            }
+        }
     }
 }
 
@@ -237,17 +240,18 @@ fn above_the_limit() {
     let hand = Hand { mass: 0.1, friction: 0.5, stiffness: 50.0, damping: 0.0 };
     let trace = Trace::steps(at(0.001), Vector3::z() * -0.02, [0.1, 20.0], 6.0).unwrap();
     let world = World { friction: 0.0, stiffness: 1e5, ..WALL };
-    for stiffness in [500.0, 2000.0, 4000.0] {
+    let good = Guard::default();
+    for stiffness in [500.0, 1500.0, 2000.0, 4000.0] {
         for guard in [
             None,
-            Some(Guard::default()),
-            Some(Guard { reserve: 0.01, ..Guard::default() }),
-            Some(Guard { reserve: 0.001, ..Guard::default() }),
+            Some(good),
+            Some(Guard { most_jump: 0.2, ..good }),
+            Some(Guard { most_jump: 10.0, ..good }),
         ] {
             let coupling = Coupling { stiffness, damping: 0.0 };
-            let settings = Settings { guard, coupling, ..Settings::default() };
+            let settings = Settings { guard, coupling, ahead: 0.0, ..Settings::default() };
             let Outcome { record, trembling, .. } = run(&world, settings, &Mover::Hand(&trace, hand));
-            println!("{stiffness} {guard:?}: {trembling:.2e} m, {record:?}");
+            println!("{stiffness} {:?}: {trembling:.2e} m, {record:?}", guard.map(|g| g.most_jump));
         }
     }
 }
