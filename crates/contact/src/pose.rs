@@ -1,7 +1,8 @@
 //! Where rigid things are over time.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use pliant_mechanics::curve::Curve;
+use serde::{Deserialize, Serialize};
 
 /// A position and an orientation.
 pub type Pose = Isometry3<f64>;
@@ -67,12 +68,7 @@ impl Course {
             Motion::Table(poses) => {
                 let after = poses.partition_point(|&(own, _)| own <= time);
                 let pose = match (after.checked_sub(1).map(|before| poses[before]), poses.get(after)) {
-                    (Some((from, a)), Some((to, b))) => {
-                        let part = (time - from) / (to - from);
-                        let place = a.translation.vector.lerp(&b.translation.vector, part);
-                        let turn = a.rotation.try_slerp(&b.rotation, part, 1e-12).unwrap_or(b.rotation);
-                        Pose::from_parts(place.into(), turn)
-                    }
+                    (Some((from, a)), Some((to, b))) => between([&a, b], (time - from) / (to - from)),
                     (Some((_, only)), None) => only,
                     (None, Some(&(_, first))) => first,
                     (None, None) => Pose::identity(),
@@ -80,6 +76,50 @@ impl Course {
                 pose * self.start
             }
         }
+    }
+}
+
+/// A pose on the straight way and the shortest arc from one to another, after a part of it.
+pub fn between([from, to]: [&Pose; 2], part: f64) -> Pose {
+    let place = from.translation.vector.lerp(&to.translation.vector, part);
+    let turn = from.rotation.try_slerp(&to.rotation, part, 1e-12).unwrap_or(to.rotation);
+    Pose::from_parts(place.into(), turn)
+}
+
+/// Where a tool goes that is driven from outside: on a straight way and the shortest arc to a pose, where it stays. Its course is left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Leg {
+    /// When it begins and ends [s].
+    times: [f64; 2],
+    /// Position [m] and unit quaternion (i, j, k, w) at these times.
+    poses: [([f64; 3], [f64; 4]); 2],
+    /// Angles [rad] between jaws at these times.
+    openings: [f64; 2],
+}
+
+impl Leg {
+    /// Between two times [s], from a pose and an angle [rad] between jaws to others.
+    pub fn new(times: [f64; 2], [from, to]: [(Pose, f64); 2]) -> Self {
+        let plain = |pose: Pose| (pose.translation.vector.into(), pose.rotation.coords.into());
+        Self { times, poses: [plain(from.0), plain(to.0)], openings: [from.1, to.1] }
+    }
+
+    /// The pose and the angle [rad] between jaws at a time [s].
+    pub fn at(&self, time: f64) -> (Pose, f64) {
+        let [from, to] = self.times;
+        let part = if to > from { ((time - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
+        let poses = self.poses.map(|(place, turn)| {
+            let turn = UnitQuaternion::new_unchecked(Quaternion::from_vector(turn.into()));
+            Pose::from_parts(place.into(), turn)
+        });
+        let [closed, open] = self.openings;
+        (between([&poses[0], &poses[1]], part), closed + (open - closed) * part)
+    }
+
+    /// Whether all of its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let of_poses = self.poses.iter().flat_map(|(place, turn)| place.iter().chain(turn));
+        of_poses.chain(&self.times).chain(&self.openings).all(|x| x.is_finite())
     }
 }
 
@@ -108,6 +148,10 @@ mod tests {
         assert_eq!(place(&course, 0.0), Vector3::x());
         assert!((place(&course, 2.0) - Vector3::new(0.5_f64.cos(), 0.5_f64.sin(), 1.0)).norm() < 1e-15);
         assert_eq!(place(&course, 9.0), place(&course, 3.0));
+        let leg = Leg::new([1.0, 3.0], [(table[0].1, 0.5), (table[1].1, 0.1)]);
+        let (pose, opening) = leg.at(2.0);
+        assert!((pose.inverse() * course.at(2.0) * start.inverse()).translation.vector.norm() < 1e-15);
+        assert!((opening - 0.3).abs() < 1e-15 && leg.at(0.0) == leg.at(1.0) && leg.at(9.0) == leg.at(3.0));
         assert!(Course::table(start, Vec::new()).is_none());
         assert!(Course::table(start, table.into_iter().rev().collect()).is_none());
     }

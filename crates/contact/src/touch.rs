@@ -5,29 +5,79 @@
 //! critical time step as it is.
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use pliant_mechanics::curve::Curve;
 use pliant_mechanics::tensor::Vector;
+use serde::{Deserialize, Serialize};
 
 use crate::pairs::Surface;
-use crate::pose::{Course, Pose};
+use crate::pose::{Course, Leg, Pose, between};
 use crate::shape::{Near, Shape};
 
 /// Parts of a step at most that a fast thing is followed through.
 const MOST_PARTS: f64 = 64.0;
 
-/// A rigid thing: an obstacle or a tool.
+/// A rigid thing: an obstacle, a tool or a jaw of one.
 #[derive(Clone, Debug)]
 pub struct Rigid {
     /// Its name.
     pub name: String,
     /// Its shape.
     pub shape: Shape,
-    /// How it moves.
+    /// How it moves; of a jaw, how the tool does.
     pub course: Course,
     /// Whether bodies are inside of it, as a brain in its skull.
     pub inside: bool,
+    /// How it turns in the frame of the tool that it is a jaw of.
+    pub jaw: Option<Jaw>,
+}
+
+/// One of two jaws, which turn about the x axis of their tool.
+#[derive(Clone, Debug)]
+pub struct Jaw {
+    /// The name of the tool.
+    pub tool: String,
+    /// Which part of the angle between the jaws it turns by: one half, or minus one half.
+    pub part: f64,
+    /// The angle [rad] between the jaws over time.
+    pub opening: (f64, Curve),
+    /// Where its shape is in a closed tool.
+    pub place: Pose,
+    /// The angle [rad] between the jaws from which on down they hold all that touches their inner faces; `None`: they hold by friction.
+    pub grip: Option<f64>,
+}
+
+/// A node that jaws hold.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gripped {
+    /// The jaw, by its place in [`Contacts::rigids`].
+    pub rigid: u32,
+    /// The node, numbered in the model.
+    pub node: u32,
+    /// Where it is in the frame of the jaw's shape [m].
+    pub at: [f64; 3],
 }
 
 impl Rigid {
+    /// The name of the tool or obstacle that it is, or is a jaw of.
+    pub fn tool(&self) -> &str {
+        self.jaw.as_ref().map_or(&self.name, |jaw| &jaw.tool)
+    }
+
+    /// The pose of the tool or obstacle at a time [s], and the angle [rad] between its jaws; driven if there is a leg.
+    pub fn posture(&self, time: f64, leg: Option<&Leg>) -> (Pose, f64) {
+        let opening = |jaw: &Jaw| jaw.opening.0 * jaw.opening.1.value(time);
+        leg.map_or_else(|| (self.course.at(time), self.jaw.as_ref().map_or(0.0, opening)), |leg| leg.at(time))
+    }
+
+    /// Its pose at a time [s]; driven if there is a leg.
+    pub fn at(&self, time: f64, leg: Option<&Leg>) -> Pose {
+        let (pose, opening) = self.posture(time, leg);
+        match &self.jaw {
+            Some(jaw) => pose * Pose::rotation(Vector3::x() * (jaw.part * opening)) * jaw.place,
+            None => pose,
+        }
+    }
+
     /// The distance of a point [m] from where it is free of the thing, and the direction there, at a pose.
     pub fn near(&self, pose: &Pose, point: &Vector3<f64>) -> Near {
         let local = pose.inverse_transform_point(&(*point).into());
@@ -40,6 +90,21 @@ impl Rigid {
         let Near { distance, normal } = self.shape.near(point);
         let sign = if self.inside { -1.0 } else { 1.0 };
         Near { distance: sign * distance, normal: normal * sign }
+    }
+
+    /// Whether its jaws hold all that touches them at an angle [rad] between them.
+    pub fn grips(&self, opening: f64) -> bool {
+        self.jaw.as_ref().and_then(|jaw| jaw.grip).is_some_and(|closed| opening <= closed)
+    }
+
+    /// The shortest time [s] between two postures in steps of a length [s] in which no node is passed over.
+    pub fn shortest(&self, postures: [(Pose, f64); 2], step: f64) -> f64 {
+        let [(from, closed), (to, open)] = postures;
+        let opened = self.jaw.as_ref().map_or(0.0, |jaw| {
+            let reach = jaw.place.translation.vector.norm() + self.shape.reach();
+            (jaw.part * (open - closed)).abs() * reach
+        });
+        2.0 * (travel(self, &[from, to]) + opened) / (MOST_PARTS * self.shape.thinnest()) * step
     }
 
     /// Into how many parts a step between two times [s] is divided so that nothing is passed over: each moves the thing by half of its
@@ -75,7 +140,7 @@ impl Touch {
         predicted: Vector<f64>,
         mobility: Vector<f64>,
     ) -> Option<Vector<f64>> {
-        let passage = Passage::new(rigid, times);
+        let passage = Passage::new(rigid, times.map(|time| rigid.at(time, None)));
         let place = self.pass(rigid, &passage, &now.into(), &predicted.into(), &mobility.into())?;
         Some(place.into())
     }
@@ -92,7 +157,7 @@ impl Touch {
         let mut shift = Vector3::zeros();
         for part in 1..=passage.parts {
             let share = part as f64 / passage.parts as f64;
-            let pose = passage.at(rigid, part);
+            let pose = passage.at(part);
             let place = now.lerp(predicted, share) + shift;
             let Near { distance, normal } = rigid.near(&pose, &place);
             let gap = distance - self.offset;
@@ -133,16 +198,14 @@ pub struct Passage {
     /// The motion from the pose before to that after.
     motion: Pose,
     parts: usize,
-    times: [f64; 2],
 }
 
 impl Passage {
-    /// In the step between two times [s].
-    pub fn new(rigid: &Rigid, times: [f64; 2]) -> Self {
-        let poses = times.map(|time| rigid.course.at(time));
+    /// In the step from one pose to another.
+    pub fn new(rigid: &Rigid, poses: [Pose; 2]) -> Self {
         let [before, after] = poses;
         let turn = after.rotation.to_rotation_matrix().into_inner();
-        Self { poses, turn, motion: after * before.inverse(), parts: rigid.parts(poses), times }
+        Self { poses, turn, motion: after * before.inverse(), parts: rigid.parts(poses) }
     }
 
     /// Whether the thing moves so far that it could pass over a point.
@@ -152,9 +215,25 @@ impl Passage {
 
     /// How far a point [m] is from the thing at the end of the step, and the direction away from it.
     pub fn near(&self, rigid: &Rigid, point: &Vector3<f64>) -> Near {
-        let local = self.turn.tr_mul(&(point - self.poses[1].translation.vector));
-        let Near { distance, normal } = rigid.near_local(&local);
+        let (_, Near { distance, normal }) = self.within(rigid, point);
         Near { distance, normal: self.turn * normal }
+    }
+
+    /// How far a point [m] is from the thing at the beginning of the step, and the direction away from it as the step turns it.
+    pub fn near_before(&self, rigid: &Rigid, point: &Vector3<f64>) -> Near {
+        let Near { distance, normal } = rigid.near(&self.poses[0], point);
+        Near { distance, normal: self.motion.rotation * normal }
+    }
+
+    /// Where a point [m] at the end of the step is in the frame of the thing, and the direction away from it there.
+    pub fn within(&self, rigid: &Rigid, point: &Vector3<f64>) -> (Vector3<f64>, Near) {
+        let local = self.turn.tr_mul(&(point - self.poses[1].translation.vector));
+        (local, rigid.near_local(&local))
+    }
+
+    /// Where a point [m] in the frame of the thing is at the end of the step.
+    pub fn place(&self, local: &Vector3<f64>) -> Vector3<f64> {
+        (self.poses[1] * Point3::from(*local)).coords
     }
 
     /// Where a point [m] of the thing before the step is after it.
@@ -168,12 +247,9 @@ impl Passage {
     }
 
     /// The pose after a part of the step.
-    fn at(&self, rigid: &Rigid, part: usize) -> Pose {
-        if part == self.parts {
-            return self.poses[1];
-        }
-        let [from, to] = self.times;
-        rigid.course.at(from + (to - from) * part as f64 / self.parts as f64)
+    fn at(&self, part: usize) -> Pose {
+        let [from, to] = &self.poses;
+        if part == self.parts { *to } else { between([from, to], part as f64 / self.parts as f64) }
     }
 }
 
@@ -227,12 +303,12 @@ pub fn parts_of(edge: f64, shape: &Shape) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pliant_mechanics::curve::{Curve, Shape as CurveShape};
+    use pliant_mechanics::curve::Shape as CurveShape;
 
     fn tool(shift: [f64; 3]) -> Rigid {
         let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
         let course = Course::by(Pose::identity(), shift, curve);
-        Rigid { name: "tool".into(), shape: Shape::Sphere { radius: 0.01 }, course, inside: false }
+        Rigid { name: "tool".into(), shape: Shape::Sphere { radius: 0.01 }, course, inside: false, jaw: None }
     }
 
     /// A ball that passes over a node in one step takes it along, as it does in many.

@@ -1,5 +1,7 @@
 //! The state: everything that changes in a run. `Clone` is a snapshot.
 
+use pliant_contact::pose::Leg;
+use pliant_contact::touch::Gripped;
 use pliant_mechanics::model::{self, FREE, Model, placed};
 use pliant_mechanics::tensor::Vector;
 use serde::{Deserialize, Serialize};
@@ -27,6 +29,10 @@ pub struct State<R> {
     pub stability: Stability,
     /// Displacements [m] of the state whose critical time step is known, at first rest; see [`Monitor`](crate::stability::Monitor).
     pub reference: Vec<Vector<R>>,
+    /// Tools and jaws that were driven from outside, by their place among the rigid things of the contacts.
+    pub driven: Vec<(u32, Leg)>,
+    /// Nodes that jaws hold.
+    pub gripped: Vec<Gripped>,
 }
 
 /// Work accumulated over the steps [J].
@@ -77,7 +83,20 @@ impl<R: Scalar> State<R> {
             history: model.solids.iter().map(History::at_rest).collect(),
             work: Work::default(),
             stability: Stability::default(),
+            driven: Vec::new(),
+            gripped: Vec::new(),
         }
+    }
+
+    /// Where a tool or a jaw goes, if it was driven; counted among the rigid things of the contacts.
+    pub fn leg(&self, rigid: usize) -> Option<&Leg> {
+        self.driven.iter().find(|(own, _)| *own as usize == rigid).map(|(_, leg)| leg)
+    }
+
+    /// Drives a tool or a jaw from the step on that follows.
+    pub fn drive(&mut self, rigid: usize, leg: Leg) {
+        self.driven.retain(|(own, _)| *own as usize != rigid);
+        self.driven.push((rigid as u32, leg));
     }
 
     /// Brings it from a model to another one of the same mesh, after a (sub)step of a length [s]: displacements, velocities and what

@@ -11,7 +11,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use pliant_contact::touch::Contacts;
+use pliant_contact::touch::{Contacts, Rigid};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::weighted;
@@ -29,7 +29,7 @@ use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
-use crate::touching::{Free, Touching};
+use crate::touching::{Free, Posture, Touching};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -600,8 +600,9 @@ impl<R: Scalar> CentralDifference<R> {
     }
 
     /// Adds the forces of contacts, from where nodes would go without them; of their mobility this part counts. Whether there are contacts.
-    fn touch(&mut self, state: &State<R>, part: f64) -> bool {
+    fn touch(&mut self, state: &mut State<R>, part: f64) -> bool {
         let Some(mut touching) = self.touching.take() else { return false };
+        let mut gripped = std::mem::take(&mut state.gripped);
         let rest = |node: u32| self.model.rest[node as usize];
         let now = |node: u32| {
             let (moved, way) = (state.displacement[node as usize], state.increment[node as usize]);
@@ -619,8 +620,13 @@ impl<R: Scalar> CentralDifference<R> {
             Free { then: add(rest(node), displacement), mobility: moves }
         };
         let times = [state.time, state.time + self.lengths.next];
-        touching.find(times, now, free);
+        let postures = |number: usize, rigid: &Rigid| {
+            let leg = state.leg(number);
+            Posture { poses: times.map(|time| rigid.at(time, leg)), opening: rigid.posture(times[1], leg).1 }
+        };
+        touching.find(postures, now, free, &mut gripped);
         touching.nodal_forces().for_each(|(node, force)| self.applied.add(node, force));
+        state.gripped = gripped;
         self.touching = Some(touching);
         true
     }

@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use pliant_contact::pairs::{Pairs, Surface};
+use pliant_contact::pose::Pose;
 use pliant_contact::shape::Near;
-use pliant_contact::touch::{Contact, Contacts, Passage, Rigid, With, lattice, parts_of};
+use pliant_contact::touch::{Contact, Contacts, Gripped, Passage, Rigid, With, lattice, parts_of};
 use pliant_mechanics::tensor::{Vector, add};
 
 /// Passes over all rows at most.
@@ -19,6 +20,22 @@ const FOUND: f64 = 1e-3;
 const BAND: f64 = 8.0;
 /// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
 const MARGIN: f64 = 0.1;
+
+/// Part of a depth at the beginning of a step that may be left at its end. Sharp edges come between the points of a face, and the way out of
+/// a thing can turn to another side of it: points that come to lie in it so are pushed out over several steps, as one would throw them.
+const LEFT: f64 = 0.8;
+/// Distance [thinnest part of a jaw] at which a node touches it.
+const TOUCHING: f64 = 1e-6;
+/// Cosine of the angle to the normal of a jaw's inner face up to which nodes are between the jaws.
+const INWARD: f64 = 0.7;
+
+/// How a rigid thing is in a step.
+pub(crate) struct Posture {
+    /// Its poses before and after.
+    pub poses: [Pose; 2],
+    /// The angle [rad] between its jaws after.
+    pub opening: f64,
+}
 
 /// Where a node goes without contact.
 pub(crate) struct Free {
@@ -34,7 +51,12 @@ struct Node {
     now: Vector3<f64>,
     free: Vector3<f64>,
     then: Vector3<f64>,
+    /// By how much contacts can move each component; zero also of nodes that jaws hold.
     mobility: Vector3<f64>,
+    /// By how much a force does.
+    own: Vector3<f64>,
+    /// Impulses [N] of rows on it, of a node that jaws hold.
+    borne: Vector3<f64>,
     /// Whether it may touch something, so that its prediction is known.
     near: bool,
 }
@@ -42,7 +64,7 @@ struct Node {
 impl Node {
     const NONE: Self = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
-        Self { now: zero, free: zero, then: zero, mobility: zero, near: false }
+        Self { now: zero, free: zero, then: zero, mobility: zero, own: zero, borne: zero, near: false }
     };
 }
 
@@ -65,6 +87,8 @@ struct AtRigid {
     /// Distance [m] at which a node at rest still counts as near.
     margin: f64,
     passage: Passage,
+    /// Whether it is a jaw that holds what touches it.
+    grips: bool,
 }
 
 /// A pair of points that may touch.
@@ -188,13 +212,14 @@ impl Touching {
         }
     }
 
-    /// Finds the forces of contacts in the step between two times [s]. `now` is the place of a node [m] and about the way [m] it goes in the
-    /// step.
+    /// Finds the forces of contacts in a step. `now` is the place of a node [m] and about the way [m] it goes in the step; `gripped` are the
+    /// nodes that jaws hold.
     pub fn find(
         &mut self,
-        times: [f64; 2],
+        postures: impl Fn(usize, &Rigid) -> Posture,
         now: impl Fn(u32) -> (Vector<f64>, f64),
         free: impl Fn(u32) -> Free,
+        gripped: &mut Vec<Gripped>,
     ) {
         self.forces.fill([0.0; 3]);
         let mut farthest = 0.0_f64;
@@ -203,12 +228,23 @@ impl Touching {
             (node.now, node.near) = (place.into(), false);
             farthest = farthest.max(way);
         }
-        self.look(times, farthest, free);
+        for own in &mut self.own {
+            if let Own::Rigid(own) = own {
+                let rigid = &self.contacts.rigids[own.rigid];
+                let posture = postures(own.rigid, rigid);
+                (own.passage, own.grips) = (Passage::new(rigid, posture.poses), rigid.grips(posture.opening));
+            }
+        }
+        gripped.retain(|held| self.holder(held).is_some_and(|(_, own, _)| own.grips));
+        self.look(farthest, free, gripped);
         if self.nodes.iter().any(|node| node.near) {
+            self.hold(gripped);
             self.sweep();
             self.measure();
             self.solve();
             self.lift();
+            self.bear(gripped);
+            self.take(gripped);
         }
     }
 
@@ -216,27 +252,20 @@ impl Touching {
     pub fn nodal_forces(&self) -> impl Iterator<Item = (u32, Vector<f64>)> {
         let touching = |(node, _): &(&Node, &u32)| node.near && node.then != node.free;
         let nodes = self.nodes.iter().zip(&self.numbers).filter(touching);
-        nodes.map(|(node, &number)| (number, over(&(node.then - node.free), &node.mobility).into()))
+        nodes.map(|(node, &number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 
     /// Finds the nodes that may touch in the step, and where they go; rows of the points near rigid things.
-    fn look(&mut self, times: [f64; 2], farthest: f64, free: impl Fn(u32) -> Free) {
+    fn look(&mut self, farthest: f64, free: impl Fn(u32) -> Free, gripped: &[Gripped]) {
         let Self { contacts, numbers, nodes, own, distances, rows, .. } = self;
         rows.clear();
         for (index, own) in own.iter_mut().enumerate() {
             match own {
                 Own::Rigid(own) => {
                     let offset = contacts.contacts[index].touch.offset;
-                    own.look(
-                        &contacts.rigids[own.rigid],
-                        times,
-                        offset + 2.0 * farthest,
-                        nodes,
-                        distances,
-                        |row| {
-                            rows.push(Row { contact: index, ..row });
-                        },
-                    );
+                    own.look(&contacts.rigids[own.rigid], offset + 2.0 * farthest, nodes, distances, |row| {
+                        rows.push(Row { contact: index, ..row });
+                    });
                 }
                 Own::Bodies(pairs, _) => {
                     // A way can double in a step.
@@ -245,9 +274,65 @@ impl Touching {
                 }
             }
         }
+        for node in gripped.iter().filter_map(|held| numbers.binary_search(&held.node).ok()) {
+            nodes[node].near = true;
+        }
         for (node, &number) in nodes.iter_mut().zip(numbers.iter()).filter(|(node, _)| node.near) {
             let Free { then, mobility } = free(number);
-            (node.free, node.then, node.mobility) = (then.into(), then.into(), mobility.into());
+            (node.free, node.then) = (then.into(), then.into());
+            (node.mobility, node.own) = (mobility.into(), mobility.into());
+            node.borne = Vector3::zeros();
+        }
+    }
+
+    /// The contact by which a jaw holds a node, by its place, and the node's own number.
+    fn holder(&self, held: &Gripped) -> Option<(usize, &AtRigid, usize)> {
+        let node = self.numbers.binary_search(&held.node).ok()?;
+        self.own.iter().enumerate().find_map(|(index, own)| {
+            let Own::Rigid(own) = own else { return None };
+            let holds =
+                own.rigid == held.rigid as usize && own.surface.nodes.binary_search(&(node as u32)).is_ok();
+            holds.then_some((index, own, node))
+        })
+    }
+
+    /// Takes nodes along that jaws hold.
+    fn hold(&mut self, gripped: &[Gripped]) {
+        for held in gripped {
+            let Some((_, own, node)) = self.holder(held) else { continue };
+            let goal = own.passage.place(&held.at.into());
+            let node = &mut self.nodes[node];
+            for c in (0..3).filter(|&c| node.own[c] > 0.0) {
+                (node.then[c], node.mobility[c]) = (goal[c], 0.0);
+            }
+        }
+    }
+
+    /// Adds the forces of jaws on the nodes that they hold: what rows on these do not bear.
+    fn bear(&mut self, gripped: &[Gripped]) {
+        for held in gripped {
+            let Some((index, _, node)) = self.holder(held) else { continue };
+            let node = &self.nodes[node];
+            let force = over(&(node.then - node.free), &node.own) - node.borne;
+            self.forces[index] = add(self.forces[index], force.into());
+        }
+    }
+
+    /// Lets jaws that are closed hold the nodes that touch their inner faces.
+    fn take(&self, gripped: &mut Vec<Gripped>) {
+        for (contact, own) in self.contacts.contacts.iter().zip(&self.own) {
+            let Own::Rigid(own @ AtRigid { grips: true, .. }) = own else { continue };
+            let rigid = &self.contacts.rigids[own.rigid];
+            let inward = rigid.jaw.as_ref().map_or(0.0, |jaw| jaw.part.signum());
+            for &node in own.surface.nodes.iter().filter(|&&node| self.nodes[node as usize].near) {
+                let (at, Near { distance, normal }) =
+                    own.passage.within(rigid, &self.nodes[node as usize].then);
+                let node = self.numbers[node as usize];
+                let touches = distance - contact.touch.offset <= TOUCHING * rigid.shape.thinnest();
+                if touches && normal.y * inward > INWARD && gripped.iter().all(|held| held.node != node) {
+                    gripped.push(Gripped { rigid: own.rigid as u32, node, at: at.into() });
+                }
+            }
         }
     }
 
@@ -271,16 +356,27 @@ impl Touching {
         }
     }
 
-    /// Finds the gaps of all rows; leaves out those that are too wide to close.
+    /// Finds the gaps of all rows; leaves out those that are too wide to close. Forces of a squeezed body carry the prediction deep into a thing,
+    /// where its nearest side may be another one: what touches already keeps the normal that it has.
     fn measure(&mut self) {
         let Self { contacts, nodes, own, rows, .. } = self;
         let mut deepest = 0.0_f64;
         rows.retain_mut(|row| {
             let Own::Rigid(own) = &own[row.contact] else { return false };
             let now = row.place(nodes);
-            let Near { distance, normal } = own.passage.near(&contacts.rigids[own.rigid], &row.place);
-            (row.normal, row.gap) = (normal, distance - contacts.contacts[row.contact].touch.offset);
-            row.carried = own.passage.carry(&now);
+            let rigid = &contacts.rigids[own.rigid];
+            let offset = contacts.contacts[row.contact].touch.offset;
+            let Near { distance, normal } = own.passage.near(rigid, &row.place);
+            (row.normal, row.gap, row.carried) = (normal, distance - offset, own.passage.carry(&now));
+            if row.gap < 0.0 {
+                let Near { distance, normal } = own.passage.near_before(rigid, &now);
+                let before = distance - offset;
+                let gap = before + normal.dot(&(row.place - row.carried));
+                if gap < 0.0 && before < -row.gap {
+                    (row.normal, row.gap) = (normal, gap);
+                }
+                row.gap -= LEFT * before.min(0.0);
+            }
             deepest = deepest.max(-row.gap);
             row.gap < own.margin
         });
@@ -294,7 +390,7 @@ impl Touching {
                     let mut row = Row::new(index, pair.nodes, pair.weights);
                     row.carried = row.place(nodes);
                     (row.normal, row.sign) = (pair.normal, if pair.in_order { *sign } else { -sign });
-                    row.gap = row.normal.dot(&row.place) - offset;
+                    row.gap = row.normal.dot(&row.place) - offset - LEFT * (pair.distance - offset).min(0.0);
                     deepest = deepest.max(-row.gap);
                     rows.push(row);
                 },
@@ -353,6 +449,9 @@ impl Touching {
         for row in rows.iter() {
             let force = (row.normal * row.push + row.drag) * row.sign;
             forces[row.contact] = add(forces[row.contact], force.into());
+            for (node, weight) in row.parts() {
+                nodes[node].borne += (row.normal * row.push + row.drag) * weight;
+            }
         }
     }
 
@@ -368,7 +467,11 @@ impl Touching {
                 }
                 let Near { distance, normal } = own.passage.near(rigid, &node.then);
                 let along = node.mobility.component_mul(&normal);
-                let gap = distance - contact.touch.offset;
+                let offset = contact.touch.offset;
+                let mut gap = distance - offset;
+                if gap < 0.0 {
+                    gap -= LEFT * (own.passage.near_before(rigid, &node.now).distance - offset).min(0.0);
+                }
                 if gap < 0.0 && along.dot(&normal) > 0.0 {
                     let push = -gap / along.dot(&normal);
                     node.then += along * push;
@@ -388,22 +491,21 @@ impl AtRigid {
             samples: lattice(parts_of(longest, &rigid.shape)),
             reach: longest,
             margin: MARGIN * longest,
-            passage: Passage::new(rigid, [0.0; 2]),
+            passage: Passage::new(rigid, [Pose::identity(); 2]),
+            grips: false,
             surface,
         }
     }
 
-    /// Marks the nodes that may come nearer than a room [m] in the step between two times [s]; rows of these and of points between them.
+    /// Marks the nodes that may come nearer than a room [m] in the passage; rows of these and of points between them.
     fn look(
         &mut self,
         rigid: &Rigid,
-        times: [f64; 2],
         room: f64,
         nodes: &mut [Node],
         distances: &mut [f64],
         mut found: impl FnMut(Row),
     ) {
-        self.passage = Passage::new(rigid, times);
         let room = room + self.margin + self.passage.travel(rigid);
         let mut nearest = f64::INFINITY;
         for &node in &self.surface.nodes {

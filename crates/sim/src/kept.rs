@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+use pliant_contact::touch::Gripped;
 use pliant_explicit::{Scalar, State};
 use pliant_mechanics::{Energies, Model};
 use serde::de::DeserializeOwned;
@@ -134,6 +135,16 @@ fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
     let model: &Model = &part.model;
     let found = matches!(memory, Memory::Equilibrium(_));
     if found != matches!(part.method, Method::QuasiStatic { .. }) {
+        return false;
+    }
+    let things = part.method.contacts().map_or(0, |contacts| contacts.rigids.len());
+    let led = state.driven.iter().all(|(rigid, leg)| (*rigid as usize) < things && leg.is_finite());
+    let grips = |held: &Gripped| {
+        (held.rigid as usize) < things
+            && (held.node as usize) < model.node_count()
+            && held.at.iter().all(|x| x.is_finite())
+    };
+    if !led || !state.gripped.iter().all(grips) {
         return false;
     }
     let rest = State::<R>::at_rest(model);

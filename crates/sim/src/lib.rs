@@ -53,6 +53,7 @@ mod solids;
 mod solver;
 mod start;
 mod steps;
+mod tools;
 mod words;
 
 pub use bodies::{BodyCells, ImplicitBodies, RunControl, Stop};
@@ -66,6 +67,7 @@ pub use schedule::Schedule;
 pub use simulation::{Frame, Observer, Simulation, State, World};
 pub use solver::{Equilibria, LoadStepProgress};
 pub use steps::{Critical, SAFETY, Steps};
+pub use tools::ToolNow;
 pub use words::{counted, number};
 
 /// Obstacles, tools, and bodies that touch them.

@@ -105,6 +105,14 @@ impl Method {
         }
     }
 
+    /// Contacts, with their obstacles and tools.
+    pub fn contacts(&self) -> Option<&Arc<Contacts>> {
+        match self {
+            Self::Explicit(explicit) => explicit.contacts.as_ref(),
+            _ => None,
+        }
+    }
+
     /// The number type.
     pub fn precision(&self) -> Precision {
         match self {

@@ -1,5 +1,6 @@
 //! A participant under way: bodies that one stepper advances together, with their state. Its stepper and number type stay hidden here.
 
+use pliant_contact::pose::Leg;
 #[cfg(feature = "gpu")]
 use pliant_explicit::State;
 use pliant_explicit::{Clock, Wanted};
@@ -39,6 +40,9 @@ pub(crate) trait Participant: Instant + Send {
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a stepper that knows none.
     fn hold(&mut self, grips: &[Grip]) -> bool;
+
+    /// Drives a tool or a jaw from the step on whose forces are found next; only participants with contacts have one.
+    fn drive(&mut self, _rigid: usize, _leg: Leg) {}
 
     /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where they are stable with any.
     fn stiffest(&self, grip: &Grip) -> f64;

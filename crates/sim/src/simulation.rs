@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use pliant_contact::pose::Leg;
 use pliant_explicit::{Clock, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::{Energies, Model, fingerprint};
@@ -11,7 +12,7 @@ use crate::device::OnDevice;
 use crate::failure::Failure;
 use crate::instant::Instant;
 use crate::kept::Kept;
-use crate::part::{Method, Part};
+use crate::part::Part;
 use crate::participant::Participant;
 use crate::penalty::{Memory, PenaltyTie, Springs, TieNow};
 use crate::schedule::steps_to;
@@ -404,6 +405,11 @@ impl Simulation {
         self.participants[part].hold(&grips)
     }
 
+    /// Drives a tool or a jaw of a participant.
+    pub(crate) fn lead_part(&mut self, part: usize, rigid: usize, leg: Leg) {
+        self.participants[part].drive(rigid, leg);
+    }
+
     /// The ties between participants at the instant last evaluated.
     pub fn ties(&self) -> impl Iterator<Item = TieNow<'_>> {
         self.springs.now()
@@ -714,8 +720,7 @@ impl<'a> Frame<'a> {
     /// Force [N] of a contact on the obstacle or tool that it is with; `None` without one of this name.
     pub fn contact_force(&self, contact: &str) -> Option<[f64; 3]> {
         self.parts().find_map(|(part, now)| {
-            let Method::Explicit(explicit) = &part.method else { return None };
-            let contacts = &explicit.contacts.as_ref()?.contacts;
+            let contacts = &part.method.contacts()?.contacts;
             let index = contacts.iter().position(|own| own.name == contact)?;
             now.contact_forces().get(index).copied()
         })

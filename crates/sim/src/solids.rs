@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use pliant_contact::pose::Leg;
 use pliant_explicit::recover::{CellFields, Recovery};
 use pliant_explicit::stability::{Stability, cell_limit};
 use pliant_explicit::{Clock, Scalar, State, Wanted};
@@ -137,6 +138,10 @@ impl<R: Numeric> Instant for Solids<R> {
         self.solver.observable().contact_forces()
     }
 
+    fn leg(&self, rigid: usize) -> Option<&Leg> {
+        self.state.leg(rigid)
+    }
+
     fn energies(&self) -> Energies {
         *self.solver.observable().energies()
     }
@@ -212,6 +217,10 @@ impl<R: Numeric> Participant for Solids<R> {
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
         self.solver.hold(grips)
+    }
+
+    fn drive(&mut self, rigid: usize, leg: Leg) {
+        self.state.drive(rigid, leg);
     }
 
     fn stiffest(&self, grip: &Grip) -> f64 {

@@ -33,7 +33,8 @@ fn send(signal: &str, child: &Child) {
 #[test]
 fn sigterm_and_sighup_end_a_run_as_ctrl_c_does() {
     for (signal, code) in [("-TERM", 143), ("-HUP", 129), ("-INT", 130)] {
-        let scene = changed(BLOCK, "until = 0.02", "until = 50");
+        // Longer than any machine needs to send a signal.
+        let scene = changed(BLOCK, "until = 0.02", "until = 5000");
         let workshop =
             Workshop::new(&changed(&scene, "threads = 1", "threads = 1\ncheckpoint = { every = 1 }"));
         let child = started(&workshop, &mut workshop.command(&["run", "case", "--json"]));

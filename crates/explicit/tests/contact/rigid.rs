@@ -32,6 +32,7 @@ fn floor() -> Rigid {
         shape: Shape::HalfSpace,
         course: Course::fixed(Pose::identity()),
         inside: false,
+        jaw: None,
     }
 }
 
@@ -137,7 +138,7 @@ fn a_tool_presses_no_node_into_itself() {
         let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.3 / fast };
         let shape = Shape::Capsule { radius, length: 0.03 };
         let course = Course::by(over(0.04 + radius + 0.001), [0.0, 0.0, -depth - 0.001], curve);
-        let tool = Rigid { name: "tool".into(), shape, course, inside: false };
+        let tool = Rigid { name: "tool".into(), shape, course, inside: false, jaw: None };
         let contacts = at(tool.clone(), &model, 0.2);
         let model = Arc::new(model);
         let mut stepper = stepper(&model, &contacts, 0.6);
@@ -179,7 +180,13 @@ fn the_force_of_a_fast_tool_is_the_change_of_momentum() {
     let model = Arc::new(block([2, 2, 2], 0.01, 2e3, Prony::default()));
     let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.00105 };
     let course = Course::by(Pose::translation(0.01, 0.01, 0.03), [0.0, 0.0, -0.0105], curve);
-    let tool = Rigid { name: "tool".into(), shape: Shape::Sphere { radius: 0.002 }, course, inside: false };
+    let tool = Rigid {
+        name: "tool".into(),
+        shape: Shape::Sphere { radius: 0.002 },
+        course,
+        inside: false,
+        jaw: None,
+    };
     let mut stepper = stepper(&model, &at(tool, &model, 0.0), 0.1);
     let mut state = State::at_rest(&model);
     let momentum = |state: &State<f64>| {

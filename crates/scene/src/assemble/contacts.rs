@@ -5,11 +5,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
+use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::NO_NODE;
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::pose::{Course, Pose};
 use pliant_sim::contact::shape::Shape;
-use pliant_sim::contact::touch::{Contact, Contacts, Rigid, Touch, With};
+use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With};
 use pliant_sim::{counted, number};
 
 use super::{Builder, Target, suggestion};
@@ -46,7 +47,7 @@ impl Builder<'_> {
                     let message = format!("`{name}` is an obstacle already");
                     self.error(&[kind, name], message, "again", "give one of them another name");
                 }
-                all.rigids.extend(self.rigid(kind, name, table));
+                all.rigids.extend(self.rigids(kind, name, table).into_iter().flatten());
             }
         }
         for (name, table) in &scene.contacts {
@@ -56,9 +57,20 @@ impl Builder<'_> {
         (!all.contacts.is_empty()).then(|| Arc::new(all))
     }
 
-    fn rigid(&mut self, kind: &str, name: &str, table: &ToolTable) -> Option<Rigid> {
+    /// The rigid thing of a table, or its two jaws.
+    fn rigids(&mut self, kind: &str, name: &str, table: &ToolTable) -> Option<Vec<Rigid>> {
         let path = [kind, name];
         let at = |key| [kind, name, key];
+        let jaws = matches!(table.shape, ShapeName::Jaws(_));
+        for (key, given) in [("opening", table.opening.is_some()), ("ideal-grip", table.ideal_grip.is_some())]
+        {
+            if given && !jaws {
+                let help =
+                    "`shape = { jaws = { length = 0.03, width = 0.008, thickness = 0.004 } }` has jaws";
+                self.error(&at(key), format!("`{key}` is for a tool with jaws"), "no jaws", help);
+                return None;
+            }
+        }
         let shape = match &table.shape {
             ShapeName::Sphere(of) => Shape::Sphere { radius: of.radius },
             ShapeName::Capsule(of) => Shape::Capsule { radius: of.radius, length: of.length },
@@ -69,6 +81,7 @@ impl Builder<'_> {
             ShapeName::Box(of) => Shape::Cuboid { size: of.size },
             ShapeName::Cone(of) => Shape::Cone { radius: of.radius, height: of.height },
             ShapeName::HalfSpace => Shape::HalfSpace,
+            ShapeName::Jaws(of) => Shape::Cuboid { size: [of.width, of.thickness, of.length] },
             ShapeName::Mesh(of) => self.shape_of_mesh(of, &[kind, name, "shape", "mesh"])?,
             ShapeName::Image(of) => self.shape_of_image(of, &[kind, name, "shape", "image"])?,
         };
@@ -110,7 +123,34 @@ impl Builder<'_> {
         } else {
             Course::fixed(start)
         };
-        Some(Rigid { name: name.into(), shape, course, inside: table.inside })
+        let ShapeName::Jaws(of) = &table.shape else {
+            return Some(vec![Rigid { name: name.into(), shape, course, inside: table.inside, jaw: None }]);
+        };
+        if table.inside {
+            let help = "bodies are between the jaws, and outside of each";
+            self.error(&at("inside"), "no body is inside of a jaw", "of a tool with jaws", help);
+            return None;
+        }
+        let opening = match &table.opening {
+            Some(opening) => (opening.angle, self.curve(&opening.timing, &at("opening"))?),
+            None => (0.0, Curve { shape: CurveShape::Hold, from: 0.0, to: 1.0 }),
+        };
+        // The upper one turns from z towards y, against the axis x.
+        let sides = [("upper", 1.0), ("lower", -1.0)];
+        let rigids = sides.map(|(side, sign)| Rigid {
+            name: format!("{name}.{side}"),
+            shape: shape.clone(),
+            course: course.clone(),
+            inside: false,
+            jaw: Some(Jaw {
+                tool: name.into(),
+                part: -0.5 * sign,
+                opening: opening.clone(),
+                place: Pose::translation(0.0, 0.5 * sign * of.thickness, 0.5 * of.length),
+                grip: table.ideal_grip,
+            }),
+        });
+        Some(rigids.into())
     }
 
     /// The contacts of a table: one, or with `"all"` one for each pair.
@@ -194,8 +234,11 @@ impl Builder<'_> {
             let solids = solids.map(|(_, index)| Partner::Body(index));
             return Some(solids.chain((0..rigids.len()).map(Partner::Rigid)).collect());
         }
-        if let Some(rigid) = rigids.iter().position(|rigid| rigid.name == *wanted) {
-            return Some(vec![Partner::Rigid(rigid)]);
+        let own = |rigid: &Rigid| rigid.name == *wanted || rigid.tool() == wanted;
+        let found: Vec<Partner> =
+            (0..rigids.len()).filter(|&at| own(&rigids[at])).map(Partner::Rigid).collect();
+        if !found.is_empty() {
+            return Some(found);
         }
         let named = |(known, _): &(String, ToolTable)| known == wanted;
         if self.scene.obstacles.iter().chain(&self.scene.tools).any(named) {
@@ -331,7 +374,7 @@ impl Builder<'_> {
 
     /// Refuses bodies that are in an obstacle or a tool at the start: a step would throw them out.
     fn check_apart(&mut self, name: &str, table: &ContactTable, body: usize, rigid: &Rigid, nodes: &[u32]) {
-        let pose = rigid.course.at(0.0);
+        let pose = rigid.at(0.0, None);
         let places = nodes.iter().map(|&node| Vector3::from(self.assembly.rest[node as usize]));
         let gaps = places.map(|place| (rigid.near(&pose, &place).distance - table.thickness, place));
         let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));

@@ -25,6 +25,14 @@ pub struct ToolTable {
     /// True if bodies are inside of it, as a brain in its skull.
     #[serde(default)]
     pub inside: bool,
+    /// How far the jaws are open over time, of a tool with jaws; closed if not given.
+    #[serde(default)]
+    pub opening: Option<OpeningTable>,
+    /// The angle [rad] between jaws from which on down they hold all that touches their inner faces, as if tied; they let go where they open
+    /// wider. If not given, they hold by the contact's friction.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub ideal_grip: Option<f64>,
     /// Displacement [m], reached along the curve.
     #[serde(default)]
     pub by: Option<[f64; 3]>,
@@ -54,6 +62,8 @@ pub enum ShapeName {
     Cone(ConeTool),
     /// All below the plane z = 0: `shape = "half-space"`.
     HalfSpace,
+    /// Two jaws of a grasper: boxes along z from a hinge at the origin, which open about the x axis. They are `NAME.upper` and `NAME.lower`.
+    Jaws(JawsTool),
     /// What the closed surface of a mesh file encloses.
     Mesh(MeshTool),
     /// A part of a segmented image.
@@ -99,6 +109,34 @@ pub struct ConeTool {
     /// Height [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub height: f64,
+}
+
+/// Two jaws.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct JawsTool {
+    /// Length from the hinge to the tips [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub length: f64,
+    /// Width along the axis of the hinge [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub width: f64,
+    /// Thickness of each jaw [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub thickness: f64,
+}
+
+/// The angle between two jaws: 0 at `from`, `angle` at `to`. `curve = "hold"` keeps them open; a table opens and closes them:
+/// `curve = { table = [[0, 1], [0.5, 0.1]] }`. Curve: `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct OpeningTable {
+    /// The angle [rad].
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 3.0))]
+    pub angle: f64,
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
 }
 
 /// What the surface of a mesh file encloses. Distances to it are sampled once on a grid, and kept in the cache.

@@ -17,8 +17,8 @@ pub use body::{
     Thickness, ThicknessRule, TubeShape, TwistedStripShape,
 };
 pub use contact::{
-    BoxTool, CapsuleTool, ConeTool, ContactTable, ImageTool, MeshTool, Sampling, ShapeName, SphereTool,
-    ToolTable,
+    BoxTool, CapsuleTool, ConeTool, ContactTable, ImageTool, JawsTool, MeshTool, OpeningTable, Sampling,
+    ShapeName, SphereTool, ToolTable,
 };
 pub use linear::{
     ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::Vector3;
 use pliant_implicit::Carried;
 use pliant_mechanics::Energies;
+use pliant_mechanics::tensor::add;
 
 use crc32fast::Hasher;
 use pliant_sim::contact::touch::With;
@@ -95,6 +96,8 @@ struct Own {
     reactions: Vec<usize>,
     /// Contacts whose forces are columns: all but those of a body with itself, whose forces have no sum.
     contacts: Vec<usize>,
+    /// Contacts of each tool and obstacle that has several.
+    things: Vec<Vec<usize>>,
     /// The point [m] about which moments of reactions are taken, and what each of them prescribes.
     moments: Option<([f64; 3], Vec<Held>)>,
     energy: bool,
@@ -145,6 +148,11 @@ impl Own {
         for contact in paired.iter().map(|&at| &contacts[at]) {
             AXES.iter().for_each(|axis| add(format!("contact.{}.{axis}", contact.name), "N"));
         }
+        let things = several_contacts(built);
+        for (name, _) in &things {
+            AXES.iter().for_each(|axis| add(format!("tool.{name}.{axis}"), "N"));
+        }
+        let things = things.into_iter().map(|(_, contacts)| contacts).collect();
         let moments = table.moments_about.map(|point| {
             for &constraint in &reactions {
                 let name = &built.model.constraints[constraint].name;
@@ -175,7 +183,7 @@ impl Own {
         }
         let probes = probes().map(|(_, probe)| Probe::new(built, probe)).collect();
         let shells = fields::OfShells::default();
-        Self { reactions, contacts: paired, moments, energy: table.energy, probes, shells }
+        Self { reactions, contacts: paired, things, moments, energy: table.energy, probes, shells }
     }
 
     /// Adds the sample of an instant to a row.
@@ -186,7 +194,9 @@ impl Own {
         if !self.contacts.is_empty() {
             let forces = frame.now.contact_forces();
             // Before the first evaluation there are none.
-            self.contacts.iter().for_each(|&at| row.extend(forces.get(at).copied().unwrap_or_default()));
+            let force = |at: &usize| forces.get(*at).copied().unwrap_or_default();
+            self.contacts.iter().for_each(|at| row.extend(force(at)));
+            self.things.iter().for_each(|all| row.extend(all.iter().map(force).fold([0.0; 3], add)));
         }
         for (point, held) in
             self.moments.iter().flat_map(|(point, all)| all.iter().map(move |held| (point, held)))
@@ -218,6 +228,22 @@ impl Own {
             probe.read(frame, cells.as_deref(), &self.shells, row);
         }
     }
+}
+
+/// Tools and obstacles with several contacts, by name.
+fn several_contacts(built: &Built) -> Vec<(&str, Vec<usize>)> {
+    let mut things: Vec<(&str, Vec<usize>)> = Vec::new();
+    let Some(all) = &built.contacts else { return things };
+    for (contact, at) in all.contacts.iter().zip(0..) {
+        let With::Rigid(rigid) = contact.with else { continue };
+        let name = all.rigids[rigid].tool();
+        match things.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, contacts)) => contacts.push(at),
+            None => things.push((name, vec![at])),
+        }
+    }
+    things.retain(|(_, contacts)| contacts.len() > 1);
+    things
 }
 
 /// The nodes of a constraint, with the components that are its own: translations, of shells then rotations.

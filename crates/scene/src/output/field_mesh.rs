@@ -144,7 +144,7 @@ impl Own {
         let mut owners = Vec::new();
         for (rigid, index) in contacts.rigids.iter().zip(0..) {
             let (points, triangles) = rigid.shape.surface(1.3 * (high - low).norm());
-            let (first, pose) = (mesh.points.len() as u32, rigid.course.at(0.0));
+            let (first, pose) = (mesh.points.len() as u32, rigid.at(0.0, None));
             mesh.points.extend(points.iter().map(|point| (pose * nalgebra::Point3::from(*point)).coords));
             owners.resize(mesh.points.len(), index);
             block.nodes.extend(triangles.iter().flatten().map(|node| first + node));
@@ -222,8 +222,10 @@ impl Own {
 /// Displacements [m] of the points of obstacles and tools since the start.
 fn moved_things(frame: &Frame<'_>, points: &[Vector3], owners: &[u32]) -> Vec<f64> {
     let Some(contacts) = &frame.built().contacts else { return Vec::new() };
-    let motion = |rigid: &Rigid| rigid.course.at(frame.now.time()) * rigid.course.at(0.0).inverse();
-    let motions: Vec<Pose> = contacts.rigids.iter().map(motion).collect();
+    let motion = |(rigid, number): (&Rigid, usize)| {
+        rigid.at(frame.now.time(), frame.now.leg(number)) * rigid.at(0.0, None).inverse()
+    };
+    let motions: Vec<Pose> = contacts.rigids.iter().zip(0..).map(motion).collect();
     let moved = |(point, &owner): (&Vector3, &u32)| {
         let there = motions[owner as usize] * nalgebra::Point3::from(*point);
         let shift = there.coords - point;

@@ -4,6 +4,7 @@ mod bars;
 mod collective;
 mod contact;
 mod corpus;
+mod grasper;
 mod grips;
 mod niftysim;
 mod obstacles;

@@ -1,0 +1,147 @@
+//! Tools that are driven from outside: by a mouse, a haptic device or a program.
+
+use std::sync::Arc;
+
+use pliant_contact::pose::{Leg, Pose};
+use pliant_contact::touch::{Rigid, With};
+use pliant_mechanics::tensor::add;
+
+use crate::failure::Failure;
+use crate::simulation::{Frame, Simulation};
+
+/// A tool or an obstacle at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolNow {
+    /// Where its frame is.
+    pub pose: Pose,
+    /// The angle [rad] between its jaws; 0 without any.
+    pub opening: f64,
+    /// The force [N] of all that touches it.
+    pub force: [f64; 3],
+}
+
+/// Tools.
+///
+/// ```
+/// use std::sync::Arc;
+/// use pliant_mechanics::Model;
+/// use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+/// use pliant_mechanics::model::{Cells, Material, Solid};
+/// use pliant_sim::contact::pairs::Surface;
+/// use pliant_sim::contact::pose::{Course, Pose};
+/// use pliant_sim::contact::shape::Shape;
+/// use pliant_sim::contact::touch::{Contact, Contacts, Rigid, Touch, With};
+/// use pliant_sim::{Method, Part, Simulation};
+///
+/// // A tetrahedron on a held face, and a ball above its tip.
+/// let mut model = Model::default();
+/// let tet = model.add_body("tet", &[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
+/// let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
+/// let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
+/// model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
+/// model.fix("base", vec![0, 1, 2]);
+/// let mut part = Part::explicit("tet", model, 1.0)?;
+/// let above = Pose::translation(0.0, 0.0, 0.12);
+/// let ball = Rigid {
+///     name: "ball".into(),
+///     shape: Shape::Sphere { radius: 0.02 },
+///     course: Course::fixed(above),
+///     inside: false,
+///     jaw: None,
+/// };
+/// let surface = Surface { nodes: vec![3], faces: Vec::new() };
+/// let touch = Touch { friction: 0.0, offset: 0.0 };
+/// let contact = Contact { name: "press".into(), surface, with: With::Rigid(0), touch };
+/// let Method::Explicit(explicit) = &mut part.method else { unreachable!() };
+/// explicit.contacts = Some(Arc::new(Contacts { rigids: vec![ball], contacts: vec![contact] }));
+///
+/// let mut simulation = Simulation::new(part)?;
+/// let arrival = simulation.drive("ball", Pose::translation(0.0, 0.0, 0.11), 0.1)?;
+/// simulation.run(arrival, |_| ())?;
+/// let ball = simulation.frame()?.tool("ball").unwrap();
+/// assert!((ball.pose.translation.z - 0.11).abs() < 1e-12 && ball.force[2] > 0.0);
+/// # Ok::<(), pliant_sim::Failure>(())
+/// ```
+impl Simulation {
+    /// Drives a tool or an obstacle to a pose within a time [s], on a straight way and the shortest arc from where it is. There it stays; the
+    /// course that it has in the scene is left. When it arrives [s]: later than asked for where nodes would be passed over on the way, and
+    /// after one step at the earliest. The step under way, if its forces are found, is the last one of the motion before.
+    ///
+    /// # Errors
+    /// If there is no tool of this name, or a number is not finite.
+    pub fn drive(&mut self, tool: &str, pose: Pose, within: f64) -> Result<f64, Failure> {
+        self.lead(tool, within, |(_, opening)| (pose, opening))
+    }
+
+    /// Opens or closes the jaws of a tool to an angle [rad] within a time [s]. When they are there [s].
+    ///
+    /// # Errors
+    /// If there is no tool of this name, or a number is not finite.
+    pub fn open(&mut self, tool: &str, opening: f64, within: f64) -> Result<f64, Failure> {
+        self.lead(tool, within, |(pose, _)| (pose, opening))
+    }
+
+    fn lead(
+        &mut self,
+        tool: &str,
+        within: f64,
+        goal: impl Fn((Pose, f64)) -> (Pose, f64),
+    ) -> Result<f64, Failure> {
+        let world = Arc::clone(self.world());
+        let evaluated = self.is_evaluated();
+        let mut legs = Vec::new();
+        for (index, (part, now)) in world.parts.iter().zip(self.instants()).enumerate() {
+            let step = part.steps.step_from(now.time());
+            let begin = if evaluated { now.time() + step } else { now.time() };
+            let rigids = part.method.contacts().map_or(&[][..], |contacts| &contacts.rigids);
+            for (number, rigid) in rigids.iter().enumerate().filter(|(_, rigid)| rigid.tool() == tool) {
+                let from = rigid.posture(begin, now.leg(number));
+                let ways = [from, goal(from)];
+                let duration = within.max(step).max(rigid.shortest(ways, step));
+                legs.push((index, number, begin, duration, ways));
+            }
+        }
+        // Jaws of a tool arrive together.
+        let duration = legs.iter().map(|leg| leg.3).fold(0.0, f64::max);
+        let mut arrival = None;
+        for (index, number, begin, _, ways) in legs {
+            let leg = Leg::new([begin, begin + duration], ways);
+            if !(leg.is_finite() && within.is_finite()) {
+                return Err(Failure::input(&format_args!(
+                    "a number of the goal of `{tool}`, or the time to it, is not finite"
+                )));
+            }
+            self.lead_part(index, number, leg);
+            arrival = Some(begin + duration);
+        }
+        arrival.ok_or_else(|| {
+            let rigids = world.parts.iter().filter_map(|part| part.method.contacts());
+            let mut known: Vec<&str> = rigids.flat_map(|all| &all.rigids).map(Rigid::tool).collect();
+            known.dedup();
+            Failure::input(&match known.is_empty() {
+                true => format!("there is no tool `{tool}`: nothing touches one"),
+                false => format!("there is no tool `{tool}`; there are {}", known.join(", ")),
+            })
+        })
+    }
+}
+
+impl Frame<'_> {
+    /// A tool or an obstacle; `None` without one of this name.
+    pub fn tool(&self, name: &str) -> Option<ToolNow> {
+        let mut found: Option<ToolNow> = None;
+        for (part, now) in self.parts() {
+            let Some(all) = part.method.contacts() else { continue };
+            let own = |number: usize| all.rigids[number].tool() == name;
+            let Some(number) = (0..all.rigids.len()).find(|&number| own(number)) else { continue };
+            let (pose, opening) = all.rigids[number].posture(now.time(), now.leg(number));
+            let sum = found.get_or_insert(ToolNow { pose, opening, force: [0.0; 3] });
+            for (contact, force) in all.contacts.iter().zip(now.contact_forces()) {
+                if matches!(contact.with, With::Rigid(rigid) if own(rigid)) {
+                    sum.force = add(sum.force, force);
+                }
+            }
+        }
+        found
+    }
+}
