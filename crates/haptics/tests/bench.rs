@@ -158,7 +158,8 @@ fn at_rest_the_device_feels_the_force_of_the_simulation() {
     }
 }
 
-/// The largest change of the force in a tick at up to 3.3 N, with steps of the simulation of any length.
+/// The largest change of the force in a tick at up to 3.3 N, with steps of the simulation of any length. Speeds are those of a hand, up to
+/// 0.25 m/s: a spring k at a speed v has to change by k v T.
 #[test]
 fn the_force_does_not_jump() {
     let presses = |depth: f64, frequency: f64| {
@@ -167,7 +168,7 @@ fn the_force_does_not_jump() {
     let traces = [
         ("sine of 0.5 Hz", presses(0.01, 0.5)),
         ("sine of 2 Hz", presses(0.01, 2.0)),
-        ("sine of 10 Hz", presses(0.01, 10.0)),
+        ("sine of 10 Hz", presses(0.004, 10.0)),
         ("steps", Trace::steps(at(0.001), Vector3::z() * -0.011, [0.1, 0.5], 10.0).unwrap()),
         ("tremor", presses(0.01, 0.5).with_tremor(2e-4, 1e-5, 1).unwrap()),
         ("scrape", press_and_scrape(10.0)),
@@ -181,77 +182,88 @@ fn the_force_does_not_jump() {
                     "{name}, steps of {period} ms, {told:?}: jump {:.3} N at {:.2} N, guarded {}",
                     record.jump, record.peak, record.guarded
                 );
-                //assert!(record.jump < 0.3, "{name} {period} {told:?}: {} N", record.jump);
+                assert!(record.jump < 0.3, "{name} {period} {told:?}: {} N", record.jump);
             }
         }
     }
 }
 
-/// A minute of pressing and scraping: the device never gets back more than it has put in.
+/// A minute of pressing and scraping: the device never gets back more than it has put in. Pressing alone, without friction to take energy: that
+/// holds with a compliance that is right or too stiff. With one that is too soft, most of the force comes late, and the guard is needed.
 #[test]
 fn a_minute_of_pressing_and_scraping_gives_no_energy() {
-    let trace = press_and_scrape(60.0);
+    let scrape = press_and_scrape(60.0);
     let press = Trace::sine(at(0.0), Vector3::new(0.0, 0.0, 0.008), 0.5, 60.0).unwrap();
+    let hand = Hand::default();
     for period in PERIODS {
         for told in TOLD {
-            for (name, mover) in [
-                ("press", Mover::Trace(&press)),
-                ("press hand", Mover::Hand(&press, Hand::default())),
-                ("trace", Mover::Trace(&trace)),
-                ("hand", Mover::Hand(&trace, Hand::default())),
+            for (name, mover, passive) in [
+                ("scraping, a trace", Mover::Trace(&scrape), true),
+                ("scraping, a hand", Mover::Hand(&scrape, hand), true),
+                ("pressing, a trace", Mover::Trace(&press), matches!(told, Told::Times(1.0..))),
+                ("pressing, a hand", Mover::Hand(&press, hand), matches!(told, Told::Times(1.0..))),
             ] {
-                let record = run(&World { period, told, ..WALL }, Settings::default(), &mover).record;
+                let world = World { period, told, ..WALL };
+                let [guarded, alone] = [Some(Guard::default()), None]
+                    .map(|guard| run(&world, Settings { guard, ..Settings::default() }, &mover).record);
                 println!(
-                    "{name}, steps of {period} ms, {told:?}: {:.2} mJ, least {:.5} mJ, guarded {}",
-                    1e3 * record.energy,
-                    1e3 * record.least_energy,
-                    record.guarded
+                    "{name}, steps of {period} ms, {told:?}: {:.2} mJ, least {:.4} mJ, {} ticks guarded; without guard least {:.4} mJ",
+                    1e3 * guarded.energy,
+                    1e3 * guarded.least_energy,
+                    guarded.guarded,
+                    1e3 * alone.least_energy
                 );
+                match passive {
+                    true => assert!(guarded.least_energy >= 0.0 && guarded.guarded == 0),
+                    false => assert!(guarded.least_energy >= alone.least_energy),
+                }
             }
         }
     }
 }
 
-/// Colgate and Schenkel: a device of 1 N s/m holds 2000 N/m at 1 kHz; 20 N/m would be all at the rate of a slow simulation.
+/// Colgate and Schenkel: a device of b = 1 N s/m holds 2 b/T = 2000 N/m at 1 kHz. A free mass on such a wall loses b − K T/2 a time, so that the
+/// limit of passivity is also that of stability, to the 5 % of the search.
 #[test]
-fn the_stiffest_coupling() {
+fn colgate_schenkel_1997_stiffest_wall() {
     let zero = Vector3::zeros();
     let rigid = [Plane { normal: Vector3::z(), gap: 0.0, friction: 0.0 }];
     let wall = LocalModel::new(zero, zero, Matrix3::zeros(), &rigid, 0.001).unwrap();
-    for ahead in [0.0, 0.5e-3] {
-        for friction in [0.25, 0.5, 1.0, 2.0] {
-            for guard in [None, Some(Guard::default())] {
-                let hand = Hand { mass: 0.1, friction, stiffness: 50.0, damping: 0.0 };
-                let coupling = Coupling { stiffness: 1.0, damping: 0.0 };
-                let settings = Settings { ahead, guard, coupling, soft_start: 0.0, ..Settings::default() };
-                let stiffest = hand.stiffest(&wall, settings, 0.02).unwrap();
-                println!(
-                    "{friction} N s/m, {ahead} s ahead, guard {}: {stiffest:.0} N/m of {:.0} N/m",
-                    guard.is_some(),
-                    Coupling::limit(friction, 0.0, 1e-3, 0.0)
-                );
-            }
-        }
+    for friction in [0.5, 1.0, 2.0] {
+        let limit = Coupling::limit(friction, 0.0, 1e-3, 0.0);
+        let [held, ahead] = [0.0, 0.5e-3].map(|ahead| {
+            let hand = Hand { mass: 0.1, friction, stiffness: 50.0, damping: 0.0 };
+            let coupling = Coupling { stiffness: 1.0, damping: 0.0 };
+            let settings = Settings { ahead, guard: None, coupling, soft_start: 0.0, ..Settings::default() };
+            hand.stiffest(&wall, settings, 0.02).unwrap()
+        });
+        println!("{friction} N s/m: {held:.0} N/m, half a tick ahead {ahead:.0} N/m; limit {limit:.0} N/m");
+        assert!((0.9..1.1).contains(&(held / limit)), "{friction} N s/m: {held} N/m");
+        assert!(ahead > limit);
     }
 }
 
+/// Two and four times above the limit the device trembles in the wall; with the guard it stays.
 #[test]
-fn above_the_limit() {
+fn above_the_limit_only_the_guard_holds_the_device() {
     let hand = Hand { mass: 0.1, friction: 0.5, stiffness: 50.0, damping: 0.0 };
     let trace = Trace::steps(at(0.001), Vector3::z() * -0.02, [0.1, 20.0], 6.0).unwrap();
     let world = World { friction: 0.0, stiffness: 1e5, ..WALL };
-    let good = Guard::default();
-    for stiffness in [500.0, 1500.0, 2000.0, 4000.0] {
-        for guard in [
-            None,
-            Some(good),
-            Some(Guard { most_jump: 0.2, ..good }),
-            Some(Guard { most_jump: 10.0, ..good }),
-        ] {
-            let coupling = Coupling { stiffness, damping: 0.0 };
+    let limit = Coupling::limit(hand.friction, 0.0, 1e-3, 0.0);
+    for times in [0.5, 2.0, 4.0] {
+        let coupling = Coupling { stiffness: times * limit, damping: 0.0 };
+        let [guarded, alone] = [Some(Guard::default()), None].map(|guard| {
             let settings = Settings { guard, coupling, ahead: 0.0, ..Settings::default() };
-            let Outcome { record, trembling, .. } = run(&world, settings, &Mover::Hand(&trace, hand));
-            println!("{stiffness} {:?}: {trembling:.2e} m, {record:?}", guard.map(|g| g.most_jump));
+            run(&world, settings, &Mover::Hand(&trace, hand))
+        });
+        for (name, outcome) in [("guarded", &guarded), ("alone", &alone)] {
+            println!(
+                "{times} times the limit, {name}: trembles by {:.4} mm, least energy {:.3} mJ",
+                1e3 * outcome.trembling,
+                1e3 * outcome.record.least_energy
+            );
         }
+        assert!(guarded.trembling < 1e-4, "{} m", guarded.trembling);
+        assert_eq!(alone.trembling > 1e-3, times > 1.0, "{} m", alone.trembling);
     }
 }
