@@ -136,7 +136,7 @@ fn run(
         if state.ticks > 0 {
             last = state.proxy;
         }
-        match step(&mut simulation, &around, (state.ticks > 0).then_some(&last), pace.period) {
+        match step(&mut simulation, &around, (state.ticks > 0).then_some(&last), pace.until()) {
             Ok(period) => {
                 estimate.add(period.place, period.force);
                 let model = local_model(&period, &estimate, pace.done()).map_err(refused)?;
@@ -179,16 +179,15 @@ fn face_samples() -> Vec<[f64; 3]> {
     samples
 }
 
-/// One period of the simulation, with the tool on its way to a goal.
+/// The simulation until a time [s], with the tool on its way to a goal.
 fn step(
     simulation: &mut Simulation,
     around: &Around,
     goal: Option<&Isometry3<f64>>,
-    period: f64,
+    until: f64,
 ) -> Result<Period, pliant_sim::Failure> {
-    let until = simulation.time() + period;
     if let Some(goal) = goal {
-        simulation.drive(around.tool, *goal, period)?;
+        simulation.drive(around.tool, *goal, (until - simulation.time()).max(0.0))?;
     }
     let (mut place, mut force, mut count) = (Vector3::zeros(), Vector3::zeros(), 0.0);
     // The first instant is the last one of the period before.
@@ -282,6 +281,11 @@ impl Pace {
         let now = Instant::now();
         let period = (1.0 / rate).max(simulation.step_length());
         Self { period, begun: now, last: now, due: 0.0, from: simulation.time(), periods: Spread::default() }
+    }
+
+    /// The simulated time [s] at the end of this period.
+    fn until(&self) -> f64 {
+        self.from + self.due + self.period
     }
 
     /// The time [s] from the last model to the one that is done now.

@@ -26,6 +26,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Part of what is known that the next step leaves.
 const KEPT: f64 = 0.95;
+/// Way [m] below which a step teaches nothing, so that a tool at rest forgets nothing.
+const STILL: f64 = 2e-6;
 /// Weight [m²] of the first guess: that of a way of 0.05 mm.
 const GUESS: f64 = 2.5e-9;
 /// Compliance across the force over that along it.
@@ -56,6 +58,9 @@ impl Estimate {
             return;
         }
         let deeper = -normal.dot(&(place - before));
+        if deeper.abs() < STILL {
+            return;
+        }
         let more = normal.dot(&(force - force_before));
         let [product, square] = &mut self.sums;
         *product = KEPT * *product + deeper * more;
@@ -96,6 +101,10 @@ mod tests {
         assert!((press(800.0) - 800.0).abs() < 2e-3 * 800.0);
         assert!((press(1500.0) - 1500.0).abs() < 2e-3 * 1500.0);
         assert_eq!((press(10.0), press(1e5)), (200.0, 2000.0));
+        for _ in 0..1000 {
+            estimate.add(normal, normal);
+        }
+        assert_eq!(estimate.stiffness(), 2000.0, "a tool at rest forgets nothing");
         let compliance = estimate.compliance(&normal);
         assert!((compliance * normal - normal / 2000.0).norm() < 1e-15);
         assert!((compliance * Vector3::y() - Vector3::y() * 1.5 / 2000.0).norm() < 1e-15);

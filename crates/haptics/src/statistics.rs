@@ -13,10 +13,10 @@ use std::fmt;
 
 /// Width [s] of a bin.
 const WIDTH: f64 = 1e-6;
-/// Bins: up to 20 ms.
-const BINS: usize = 20_000;
+/// Bins: up to 100 ms.
+const BINS: usize = 100_000;
 
-/// Times, counted by microseconds up to 20 ms.
+/// Times, counted by microseconds up to 100 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
     bins: Vec<u32>,
