@@ -101,8 +101,9 @@ mod tests {
         assert!((press(800.0) - 800.0).abs() < 2e-3 * 800.0);
         assert!((press(1500.0) - 1500.0).abs() < 2e-3 * 1500.0);
         assert_eq!((press(10.0), press(1e5)), (200.0, 2000.0));
+        let depth = 0.01 + 0.003 * (0.2 * 199.0_f64).sin();
         for _ in 0..1000 {
-            estimate.add(normal, normal);
+            estimate.add(normal * -depth, normal);
         }
         assert_eq!(estimate.stiffness(), 2000.0, "a tool at rest forgets nothing");
         let compliance = estimate.compliance(&normal);
