@@ -324,7 +324,8 @@ fn words(report: &Report, pace: &Pace, simulation: &Simulation, estimate: &Estim
 /// The stiffest coupling on the model that was pressed most: what the theory says and what a simulated device holds.
 fn stiffest(model: &LocalModel, settings: Settings) -> Result<String, HapticsError> {
     let hand = Hand::default();
-    let limit = Coupling::limit(hand.friction, settings.coupling.damping, settings.period, 0.0);
+    // The time ahead damps as K times that, so it counts as a delay does.
+    let limit = Coupling::limit(hand.friction, settings.coupling.damping, settings.period, settings.ahead);
     let free = Settings { guard: None, soft_start: 0.0, ..settings };
     let found = hand.stiffest(model, free, 0.01)?;
     let here = if found > 0.9e6 { "1e6 N/m or more".into() } else { format!("{found:.0} N/m") };

@@ -28,7 +28,7 @@ pub struct Settings {
     /// What ties the proxy to the device.
     pub coupling: Coupling,
     /// Time [s] ahead of the pose for which the force is made; half a period makes up for the hold, a delay of the device adds to it. It damps
-    /// as K times that, which counts in the [limit](Coupling::limit), too.
+    /// as K times that, which counts in the [limit](Coupling::limit) as a delay does.
     pub ahead: f64,
     /// Largest force [N].
     pub force_limit: f64,
