@@ -102,6 +102,9 @@ pub enum Command {
     /// Make pictures or a film of a scene or of a finished run, without a screen.
     #[command(after_help = RENDER_HELP)]
     Render(Box<Render>),
+    /// Feel a scene: a haptic device, or a trace of one, holds a tool of the scene at 1 kHz.
+    #[command(after_help = HAPTICS_HELP)]
+    Haptics(Haptics),
     /// List the GPUs that scenes can run on.
     #[command(after_help = "Examples:\n  pliant devices\n  pliant run scenes/liver --device gpu\n  \
                             pliant run scenes/liver --device gpu --set run.adapter=nvidia\n\n\
@@ -112,6 +115,63 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+}
+
+const HAPTICS_HELP: &str = "\
+Examples:
+  pliant haptics scenes/palpation --replay scenes/palpation/finger.csv
+  pliant haptics scenes/palpation --replay finger.csv --hand --set output={}
+  pliant haptics scenes/palpation --listen 127.0.0.1:4270       devices connect as docs/haptics.md describes
+
+A trace is a table t,x,y,z,qw,qx,qy,qz of the tool in the scene (s, m). It prints the spread of the force period, the latency, the force
+jump, the energy and the stiffest coupling.
+
+Exit codes: 0 done, 1 the simulation failed, 2 invalid input.";
+
+#[derive(Debug, clap::Args)]
+pub struct Haptics {
+    /// A scene file, or a folder with a scene.toml.
+    pub scene: PathBuf,
+    /// The tool in the hand; the only one if not given.
+    #[arg(long, value_name = "NAME")]
+    pub tool: Option<String>,
+    /// Replay a trace in real time instead of waiting for a device.
+    #[arg(long, value_name = "FILE")]
+    pub replay: Option<PathBuf>,
+    /// A hand pulls a simulated device along the trace, so that it gives way to the force.
+    #[arg(long, requires = "replay")]
+    pub hand: bool,
+    /// Where devices send their poses; port 0 for a free one.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:4270", conflicts_with = "replay")]
+    pub listen: std::net::SocketAddr,
+    /// Allow an address that other machines reach: anyone there can move the tool.
+    #[arg(long)]
+    pub remote: bool,
+    /// Local models per second.
+    #[arg(long, value_name = "HZ", value_parser = model_rate, default_value_t = 200.0)]
+    pub rate: f64,
+    /// Stiffness of the virtual coupling [N/m].
+    #[arg(long, value_name = "N/m", default_value_t = 1000.0)]
+    pub stiffness: f64,
+    /// Damping of the virtual coupling [N s/m].
+    #[arg(long, value_name = "N s/m", default_value_t = 0.2)]
+    pub damping: f64,
+    /// Largest force [N].
+    #[arg(long, value_name = "N", default_value_t = 3.3)]
+    pub force_limit: f64,
+    /// Without the passivity guard.
+    #[arg(long)]
+    pub no_guard: bool,
+    #[command(flatten)]
+    pub overrides: Overrides,
+}
+
+/// Models per second, 10 to 1000.
+fn model_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if (10.0..=1000.0).contains(&rate) => Ok(rate),
+        _ => Err("give 10 to 1000".into()),
+    }
 }
 
 #[derive(Debug, clap::Args)]
@@ -807,6 +867,7 @@ impl Command {
             | Self::Import { .. }
             | Self::Render(_)
             | Self::View(_)
+            | Self::Haptics(_)
             | Self::Reproduce(_) => false,
         }
     }

@@ -15,6 +15,7 @@ use serde_json::{Value as Json, json};
 
 use crate::arguments::{self, Check, Command, Run};
 use crate::bench::bench;
+use crate::haptics::haptics;
 use crate::info::info;
 use crate::mesh;
 use crate::pictures;
@@ -45,6 +46,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Bench(arguments) => bench(&arguments),
         Command::View(arguments) => pictures::view(&arguments),
         Command::Render(arguments) => pictures::render(&arguments),
+        Command::Haptics(arguments) => haptics(&arguments),
         Command::Devices { json } => devices(json),
     }
 }

@@ -9,6 +9,7 @@ macro_rules! eprintln {
 mod arguments;
 mod bench;
 mod commands;
+mod haptics;
 mod info;
 #[cfg(feature = "viewer")]
 mod look;

@@ -5,6 +5,7 @@ mod bad_images;
 mod bad_input;
 mod bench;
 mod devices;
+mod haptics;
 mod label_names;
 mod meshing_images;
 mod meshing_surfaces;

@@ -1,0 +1,336 @@
+//! `pliant haptics`: a tool of a scene in the hand of a haptic device, or of a trace of one. The scene steps in real time; after each period its
+//! contact becomes a local model: the tangent planes of the tool at the nearest points of the surfaces that it can touch, the mean
+//! force of the period at its mean place, and the compliance that the last periods tell.
+
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use nalgebra::{Isometry3, Vector3};
+use pliant_haptics::coupling::Coupling;
+use pliant_haptics::error::HapticsError;
+use pliant_haptics::estimate::Estimate;
+use pliant_haptics::guard::Guard;
+use pliant_haptics::hand::Hand;
+use pliant_haptics::link::Link;
+use pliant_haptics::model::{LocalModel, MOST_PLANES, Plane};
+use pliant_haptics::renderer::Settings;
+use pliant_haptics::replay::Replay;
+use pliant_haptics::statistics::Spread;
+use pliant_haptics::thread::{Haptics as Thread, Report};
+use pliant_haptics::trace::Trace;
+use pliant_scene::{Scene, World};
+use pliant_sim::contact::touch::{With, lattice};
+use pliant_sim::{Frame, Simulation};
+
+use crate::arguments::Haptics;
+use crate::prepare::prepare;
+use crate::report::{Failure, say};
+use crate::signals;
+
+/// Bounds of the tissue's stiffness at a tool [N/m].
+const STIFFNESS: [f64; 2] = [50.0, 5000.0];
+/// Distance [m] from the tool up to which points of a surface become planes: farther than a hand goes in some periods.
+const REACH: f64 = 0.02;
+/// Time [s] in which the tool goes to the first pose of a trace, before this begins.
+const APPROACH: f64 = 0.5;
+/// Corners and points of a face that become planes.
+const FACE_PARTS: usize = 3;
+
+/// The points of all surfaces that a tool can touch.
+struct Around<'a> {
+    tool: &'a str,
+    /// Weights of the corners of a face.
+    samples: Vec<[f64; 3]>,
+}
+
+/// A period of the simulation.
+struct Period {
+    /// Mean place of the tool [m].
+    place: Vector3<f64>,
+    /// Mean force on it [N].
+    force: Vector3<f64>,
+    friction: f64,
+    planes: Vec<Plane>,
+}
+
+pub fn haptics(arguments: &Haptics) -> Result<ExitCode, Failure> {
+    let trace = arguments.replay.as_deref().map(Trace::of_file).transpose().map_err(refused)?;
+    let settings = settings(arguments);
+    let world = prepare(&arguments.scene, &arguments.overrides)?;
+    let tool = tool(&world.scene, arguments.tool.as_deref())?;
+    let threads = world.scene.run.threads as usize;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Failure::plain(error, "try fewer `threads`"))?;
+    pool.install(|| run(arguments, &world, &tool, trace, settings))
+}
+
+fn refused(error: HapticsError) -> Failure {
+    Failure::plain(error, "`pliant haptics --help` has examples")
+}
+
+fn settings(arguments: &Haptics) -> Settings {
+    let coupling = Coupling { stiffness: arguments.stiffness, damping: arguments.damping };
+    let guard = (!arguments.no_guard).then(Guard::default);
+    Settings { coupling, guard, force_limit: arguments.force_limit, ..Settings::default() }
+}
+
+/// The tool in the hand: that of a name, or the only one.
+fn tool(scene: &Scene, asked: Option<&str>) -> Result<String, Failure> {
+    let names: Vec<&str> = scene.tools.iter().map(|(name, _)| name.as_str()).collect();
+    let listed = || names.join(", ");
+    match (asked, &names[..]) {
+        (Some(asked), names) if names.contains(&asked) => Ok(asked.to_owned()),
+        (None, [only]) => Ok((*only).to_owned()),
+        (_, []) => Err(Failure::plain("the scene has no tool", "add a `[tool.NAME]` and a contact with it")),
+        (Some(asked), _) => {
+            Err(Failure::plain(format!("there is no tool `{asked}`"), format!("there are {}", listed())))
+        }
+        (None, _) => Err(Failure::plain(
+            "the scene has several tools",
+            format!("choose one of {} with `--tool`", listed()),
+        )),
+    }
+}
+
+fn run(
+    arguments: &Haptics,
+    world: &World,
+    tool: &str,
+    trace: Option<Trace>,
+    settings: Settings,
+) -> Result<ExitCode, Failure> {
+    let failed = |failure: pliant_sim::Failure| Failure::plain(failure.message, "");
+    let mut simulation = world.simulation().map_err(failed)?;
+    let around = Around { tool, samples: face_samples() };
+    let started = simulation.frame().map_err(failed)?.tool(tool).map(|now| now.pose);
+    let Some(start) = started else {
+        return Err(Failure::plain(
+            format!("nothing touches `{tool}`"),
+            "add a contact with it, solved by `explicit` on the CPU",
+        ));
+    };
+    let thread = match (trace, arguments.listen) {
+        (Some(trace), _) => {
+            let [first, _] = trace.times();
+            let arrival = simulation.drive(tool, trace.at(first), APPROACH).map_err(failed)?;
+            simulation.run(arrival, |_| ()).map_err(failed)?;
+            let hand = arguments.hand.then(Hand::default);
+            Thread::start(settings, Replay::new(trace, Duration::from_millis(1), hand))
+        }
+        (None, address) => {
+            let link = Link::open(address, arguments.remote).map_err(refused)?;
+            eprintln!("listening at {}; Ctrl-C ends it", link.address());
+            Thread::start(settings, link)
+        }
+    };
+    let mut thread = thread.map_err(refused)?;
+    let mut pace = Pace::new(&simulation, arguments.rate);
+    let mut estimate = Estimate::new(settings.coupling.stiffness, STIFFNESS);
+    let mut last = start;
+    let mut pressed: Option<LocalModel> = None;
+    let stop = signals::stop();
+    let mut ended = None;
+    while !thread.is_over() && !stop.load(Ordering::Relaxed) {
+        let state = thread.state();
+        if state.ticks > 0 {
+            last = state.proxy;
+        }
+        match step(&mut simulation, &around, (state.ticks > 0).then_some(&last), pace.until()) {
+            Ok(period) => {
+                estimate.add(period.place, period.force);
+                let model = local_model(&period, &estimate, pace.done()).map_err(refused)?;
+                let deeper = |before: &LocalModel| model.force().norm() > before.force().norm();
+                if pressed.as_ref().is_none_or(deeper) {
+                    pressed = Some(model.clone());
+                }
+                thread.publish(model);
+                pace.wait();
+            }
+            Err(failure) => {
+                ended = Some(failure);
+                break;
+            }
+        }
+    }
+    let state = thread.state();
+    let report = thread.finish().map_err(refused)?;
+    say(words(&report, &pace, &simulation, &estimate))?;
+    if let Some(force) = simulation.frame().ok().and_then(|frame| frame.tool(tool)).map(|now| now.force) {
+        let device: [f64; 3] = state.force.into();
+        say(format_args!("last force       device {}, simulation {} N", vector(device), vector(force)))?;
+    }
+    if let Some(model) = pressed.filter(|model| model.force().norm() > 0.0) {
+        say(stiffest(&model, settings).map_err(refused)?)?;
+    }
+    match ended {
+        Some(failure) => {
+            eprintln!("error: {failure}");
+            Ok(ExitCode::from(1))
+        }
+        None => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// Points of a face, by the weights of its corners; the corners, too.
+fn face_samples() -> Vec<[f64; 3]> {
+    let mut samples = lattice(FACE_PARTS);
+    samples.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    samples
+}
+
+/// The simulation until a time [s], with the tool on its way to a goal.
+fn step(
+    simulation: &mut Simulation,
+    around: &Around,
+    goal: Option<&Isometry3<f64>>,
+    until: f64,
+) -> Result<Period, pliant_sim::Failure> {
+    if let Some(goal) = goal {
+        simulation.drive(around.tool, *goal, (until - simulation.time()).max(0.0))?;
+    }
+    let (mut place, mut force, mut count) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+    // The first instant is the last one of the period before.
+    let begin = simulation.time() + 0.5 * simulation.step_length();
+    simulation.run(until, |frame| {
+        if let Some(now) = frame.tool(around.tool).filter(|_| frame.time() > begin) {
+            place += now.pose.translation.vector;
+            force += Vector3::from(now.force);
+            count += 1.0;
+        }
+    })?;
+    let frame = simulation.frame()?;
+    let Some(now) = frame.tool(around.tool) else {
+        return Err(pliant_sim::Failure::input(&"the tool has left the simulation"));
+    };
+    let (place, force) = match count > 0.0 {
+        true => (place / count, force / count),
+        false => (now.pose.translation.vector, Vector3::from(now.force)),
+    };
+    let back = place - now.pose.translation.vector;
+    let (planes, friction) = around.planes(&frame, &back);
+    Ok(Period { place, force, friction, planes })
+}
+
+impl Around<'_> {
+    /// The nearest tangent planes of the tool, for a place that is `back` [m] from where it is, and the largest friction.
+    fn planes(&self, frame: &Frame, back: &Vector3<f64>) -> (Vec<Plane>, f64) {
+        let mut planes = Vec::new();
+        let mut most = 0.0_f64;
+        for (part, now) in frame.parts() {
+            let Some(all) = part.method.contacts() else { continue };
+            for contact in &all.contacts {
+                let With::Rigid(index) = contact.with else { continue };
+                let rigid = &all.rigids[index];
+                if rigid.tool() != self.tool {
+                    continue;
+                }
+                let friction = contact.touch.friction;
+                most = most.max(friction);
+                let pose = rigid.at(now.time(), now.leg(index));
+                let place = |node: u32| {
+                    let node = node as usize;
+                    Vector3::from(part.model.rest[node]) + Vector3::from(now.displacement(node))
+                };
+                for face in &contact.surface.faces {
+                    let corners = face.map(place);
+                    let size = (corners[1] - corners[0]).norm().max((corners[2] - corners[0]).norm());
+                    if rigid.near(&pose, &corners[0]).distance > REACH + size {
+                        continue;
+                    }
+                    for weights in &self.samples {
+                        let point: Vector3<f64> = corners.iter().zip(weights).map(|(x, &w)| x * w).sum();
+                        let near = rigid.near(&pose, &point);
+                        let gap = near.distance - contact.touch.offset;
+                        if gap < REACH {
+                            // The tool goes away from the point against the direction in which its distance grows.
+                            let normal = -near.normal;
+                            planes.push(Plane { normal, gap: gap + normal.dot(back), friction });
+                        }
+                    }
+                }
+            }
+        }
+        planes.sort_by(|a, b| a.gap.total_cmp(&b.gap));
+        planes.truncate(MOST_PLANES);
+        (planes, most)
+    }
+}
+
+/// The contact of a period, for the time [s] that it took.
+fn local_model(period: &Period, estimate: &Estimate, time: f64) -> Result<LocalModel, HapticsError> {
+    let nearest = period.planes.first().map_or(Vector3::z(), |plane| plane.normal);
+    let normal = period.force.try_normalize(1e-9).unwrap_or(nearest);
+    let compliance = estimate.compliance(&normal);
+    LocalModel::touching(period.place, period.force, compliance, period.friction, &period.planes, time)
+}
+
+/// Keeps the simulation to the clock.
+struct Pace {
+    /// Simulated time [s] of a period.
+    period: f64,
+    begun: Instant,
+    last: Instant,
+    due: f64,
+    from: f64,
+    periods: Spread,
+}
+
+impl Pace {
+    fn new(simulation: &Simulation, rate: f64) -> Self {
+        let now = Instant::now();
+        let period = (1.0 / rate).max(simulation.step_length());
+        Self { period, begun: now, last: now, due: 0.0, from: simulation.time(), periods: Spread::default() }
+    }
+
+    /// The simulated time [s] at the end of this period.
+    fn until(&self) -> f64 {
+        self.from + self.due + self.period
+    }
+
+    /// The time [s] from the last model to the one that is done now.
+    fn done(&mut self) -> f64 {
+        let now = Instant::now();
+        let time = (now - self.last).as_secs_f64();
+        self.last = now;
+        self.periods.add(time);
+        time.clamp(1e-3, 1.0)
+    }
+
+    /// Waits for the end of the period.
+    fn wait(&mut self) {
+        self.due += self.period;
+        let left = self.due - self.begun.elapsed().as_secs_f64();
+        if left > 0.0 {
+            std::thread::sleep(Duration::from_secs_f64(left));
+        }
+    }
+}
+
+fn vector([x, y, z]: [f64; 3]) -> String {
+    format!("({x:.3}, {y:.3}, {z:.3})")
+}
+
+fn words(report: &Report, pace: &Pace, simulation: &Simulation, estimate: &Estimate) -> String {
+    let (simulated, wall) = (simulation.time() - pace.from, (pace.last - pace.begun).as_secs_f64());
+    format!(
+        "{report}\nsimulation       {simulated:.2} s in {wall:.2} s, {:.2} × real time; a model each {}\ntissue           {:.0} N/m at the tool",
+        simulated / wall.max(1e-9),
+        pace.periods,
+        estimate.stiffness()
+    )
+}
+
+/// The stiffest coupling on the model that was pressed most: what the theory says and what a simulated device holds.
+fn stiffest(model: &LocalModel, settings: Settings) -> Result<String, HapticsError> {
+    let hand = Hand::default();
+    // The time ahead damps as K times that, so it counts as a delay does.
+    let limit = Coupling::limit(hand.friction, settings.coupling.damping, settings.period, settings.ahead);
+    let free = Settings { guard: None, soft_start: 0.0, ..settings };
+    let found = hand.stiffest(model, free, 0.01)?;
+    let here = if found > 0.9e6 { "1e6 N/m or more".into() } else { format!("{found:.0} N/m") };
+    Ok(format!(
+        "stiffest coupling {here} on the tissue pressed most, without guard; {limit:.0} N/m are passive on anything (device of {} N s/m)",
+        hand.friction
+    ))
+}
