@@ -490,8 +490,8 @@ fn a_tool_is_led_by_hand_and_repeated() {
         session.order(Order::Hand(Hand::Turn([0.0, 0.0, 0.01])));
         session.order(Order::Step(84));
     }
-    session.order(Order::Step(500));
-    let steps = 400 + 20 * 84 + 500;
+    session.order(Order::Step(2500));
+    let steps = 400 + 20 * 84 + 2500;
     let lifted = wait(&mut session, |frame| frame.steps == steps);
     // The point that was taken is where it was led, about which the jaws have turned.
     let [place, force] = lifted.held[0].map(Vector3::from);
