@@ -17,6 +17,8 @@ use crate::shape::{Near, Shape};
 const MOST_PARTS: f64 = 512.0;
 /// Gap, over half of the thinnest part of a thing, at which a node has met it.
 const MEETS: f64 = 1e-3;
+/// Cosine of the angle between the directions away from a thing where a point meets it and where it would end, above which both are on one side.
+const ALIKE: f64 = 0.7;
 /// Part of a depth at the beginning of a step that may be left at its end. Sharp edges come between the points of a face, and the way out of a
 /// thing can turn to another side of it: points that come to lie in it so are pushed out over several steps, as one would throw them.
 pub const LEFT: f64 = 0.8;
@@ -229,7 +231,7 @@ impl Passage {
     /// [`near`](Self::near) of a point that is predicted to go from one place [m] to another, and keeps an offset [m]. If it ends in the thing,
     /// could pass through it or be passed over, it is followed on its way: by its gap, which it can go without reaching the thing, and by
     /// half of the thinnest part next to that. Where they meet, the tangent plane goes along with the thing; the distance is that from
-    /// the plane, if the point ends behind it. So nothing comes to another side, however thin the thing is, however far both go and
+    /// the plane, if the point ends behind it on another side or has come far. So nothing comes to another side, however thin the thing is, however far both go and
     /// however deep forces carry the prediction. Of a depth at the beginning, [`LEFT`] may be left.
     pub fn meet(&self, rigid: &Rigid, offset: f64, now: &Vector3<f64>, predicted: &Vector3<f64>) -> Near {
         let way = (predicted - now).norm() + self.travel;
@@ -245,12 +247,15 @@ impl Passage {
             let Near { distance, normal: outward } = rigid.near(&pose, &place);
             let gap = distance - offset;
             if gap <= MEETS * self.half_thinnest {
+                let left = if share == 0.0 { LEFT * gap.min(0.0) } else { 0.0 };
                 let onward = self.poses[1] * pose.inverse();
                 let normal = onward.rotation * outward;
+                if way <= self.half_thinnest && normal.dot(&end.normal) > ALIKE {
+                    return Near { distance: end.distance - left, normal: end.normal };
+                }
                 let on_surface = onward * Point3::from(place - outward * distance);
                 let distance = normal.dot(&(predicted - on_surface.coords));
                 if distance < offset {
-                    let left = if share == 0.0 { LEFT * gap.min(0.0) } else { 0.0 };
                     return Near { distance: distance - left, normal };
                 }
             }

@@ -10,7 +10,7 @@ use pliant_mechanics::load::NO_NODE;
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::pose::{Course, Pose};
 use pliant_sim::contact::shape::Shape;
-use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With};
+use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With, lattice, parts_of};
 use pliant_sim::{counted, number};
 
 use super::{Builder, Target, suggestion};
@@ -201,7 +201,7 @@ impl Builder<'_> {
             let touch = Touch { friction: table.friction, offset: table.thickness };
             let with = match with {
                 Partner::Rigid(rigid) => {
-                    self.check_apart(name, table, body, &rigids[rigid], &surface.nodes);
+                    self.check_apart(name, table, body, &rigids[rigid], &surface);
                     With::Rigid(rigid)
                 }
                 Partner::Body(other) if other == body => {
@@ -373,19 +373,47 @@ impl Builder<'_> {
     }
 
     /// Refuses bodies that are in an obstacle or a tool at the start: a step would throw them out.
-    fn check_apart(&mut self, name: &str, table: &ContactTable, body: usize, rigid: &Rigid, nodes: &[u32]) {
+    fn check_apart(
+        &mut self,
+        name: &str,
+        table: &ContactTable,
+        body: usize,
+        rigid: &Rigid,
+        surface: &Surface,
+    ) {
         let pose = rigid.at(0.0, None);
-        let places = nodes.iter().map(|&node| Vector3::from(self.assembly.rest[node as usize]));
-        let gaps = places.map(|place| (rigid.near(&pose, &place).distance - table.thickness, place));
+        let rest = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
         let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
-        let inside: Vec<(f64, Vector3)> = gaps.filter(|(gap, _)| *gap < -1e-9 * size).collect();
-        let Some((gap, place)) = inside.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        let inside = |places: &mut dyn Iterator<Item = Vector3>| -> Vec<(f64, Vector3)> {
+            let gaps = places.map(|place| (rigid.near(&pose, &place).distance - table.thickness, place));
+            gaps.filter(|(gap, _)| *gap < -1e-9 * size).collect()
+        };
+        let mut of = "node";
+        let mut found = inside(&mut surface.nodes.iter().map(|&node| rest(node)));
+        if found.is_empty() {
+            // A thin thing can go through a face between its corners.
+            of = "point";
+            let edges = surface.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+            let longest = edges.map(|[a, b]| (rest(a) - rest(b)).norm()).fold(0.0, f64::max);
+            let samples = lattice(parts_of(longest, &rigid.shape));
+            found = inside(&mut surface.faces.iter().flat_map(|face| {
+                let corners = face.map(rest);
+                samples.iter().map(move |weights| (0..3).map(|k| corners[k] * weights[k]).sum())
+            }));
+            // Faces hang into a round thing, on which their corners lie, by up to edge²/(8 R); more than a tenth of it is no touch any more.
+            let radius = rigid.shape.thinnest();
+            let hang = (longest * longest / (8.0 * radius)).min(0.1 * radius);
+            let rounded =
+                matches!(rigid.shape, Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Grid(_));
+            found.retain(|(gap, _)| !rounded || -gap > hang);
+        }
+        let Some((gap, place)) = found.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
         let [x, y, z] = [place.x, place.y, place.z].map(number);
         let message = format!(
             "{} of `{}` {} in `{}` at the start, up to {} m deep at ({x}, {y}, {z}) m",
-            counted(inside.len(), "node"),
+            counted(found.len(), of),
             self.bodies[body].name,
-            if inside.len() == 1 { "lies" } else { "lie" },
+            if found.len() == 1 { "lies" } else { "lie" },
             rigid.name,
             number(-gap)
         );

@@ -148,6 +148,13 @@ fn contact_that_cannot_be_is_refused_with_its_line() {
             ["there is no body, obstacle or tool `blok`", "did you mean `block`?"],
         ),
         (
+            with(
+                "radius = 0.01 } }\nat = [0.02, 0.02, 0.0301]",
+                "radius = 0.002 } }\nat = [0.0225, 0.0225, 0.0195]",
+            ),
+            ["of `block` lie in `ball` at the start, up to 0.001", "move one of them"],
+        ),
+        (
             with("['block', 'ball']", "['floor', 'ball']"),
             ["no body touches anything here", "name a body first"],
         ),
