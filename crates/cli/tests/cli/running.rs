@@ -1499,9 +1499,9 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
                    <Density>1000</Density><Thickness>1e-3</Thickness></Material></ShellElementSet></Model>";
     workshop.write("touching.xml", model.replace("</Model>", contact));
     let direct = workshop.pliant(&["run", "touching.xml", "--json"]).done();
-    workshop.pliant(&["import", "touching.xml", "-o", "touching"]).words();
-    assert!(workshop.path("touching/touching-surface-0.csv").is_file());
-    let scene = workshop.pliant(&["run", "touching", "--json"]).done();
+    workshop.pliant(&["import", "touching.xml", "-o", "carried"]).words();
+    assert!(workshop.path("carried/touching-surface-0.csv").is_file());
+    let scene = workshop.pliant(&["run", "carried", "--json"]).done();
     assert_eq!(direct["reactions"], scene["reactions"]);
     workshop.write("broken.xml", &model[..200]);
     let told = workshop.pliant(&["run", "broken.xml"]);

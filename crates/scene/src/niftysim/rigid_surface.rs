@@ -118,6 +118,8 @@ impl RigidSurface {
                 a.cross(&b).dot(&c) / 6.0
             };
             let inside = triangles.iter().map(volume).sum::<f64>() < 0.0;
+            let outward = |&[a, b, c]: &[u32; 3]| if inside { [a, c, b] } else { [a, b, c] };
+            let triangles: Vec<[u32; 3]> = triangles.iter().map(outward).collect();
             return Ok((mesh(points, &triangles), inside, None));
         }
         let (low, high) = bounds(&points);

@@ -437,6 +437,43 @@ fn two_cubes_touch() {
     assert!((top / between + 1.0).abs() < 2e-3, "{between} N, {top} N");
 }
 
+/// Two cubes of one mesh: the upper one falls on the lower one, in a box that is turned inward. The floor carries both, the box nothing.
+#[test]
+fn pieces_of_one_mesh_touch() {
+    let lower = Grid::block(3, 0.1, [0.0; 3]).tets();
+    let upper = Grid::block(2, 0.08, [0.01, 0.01, 0.101]).tets();
+    let base = lower.at(2, 0.0);
+    let first = lower.nodes.len();
+    let shifted = upper.cells.iter().map(|cell| cell.iter().map(|node| node + first).collect());
+    let cells = lower.cells.iter().cloned().chain(shifted).collect();
+    let both = Grid { nodes: [&lower.nodes[..], &upper.nodes].concat(), cells };
+    let corner = |k: usize| [0, 1, 2].map(|c| if k >> c & 1 == 1 { 0.3 } else { -0.1 });
+    let corners: Vec<String> = (0..8).map(corner).map(|[x, y, z]: [f64; 3]| format!("{x} {y} {z}")).collect();
+    // Seen from within, each side goes round as from without in a box for bodies outside of it.
+    let sides = "0 1 3  0 3 2  4 6 7  4 7 5  0 4 5  0 5 1  2 3 7  2 7 6  0 2 6  0 6 4  1 5 7  1 7 3";
+    let model = format!(
+        "<Model>\n{}{}{}<Constraint Type=\"Gravity\" NumNodes=\"all\" LoadShape=\"RAMPHOLD\"><AccelerationMagnitude>2\
+         </AccelerationMagnitude><AccelerationDirection>0 0 -1</AccelerationDirection></Constraint>\
+         <ContactSurface><Nodes NumNodes=\"8\">{}</Nodes><Elements NumEls=\"12\" Type=\"T3\">{sides}</Elements></ContactSurface>{}</Model>",
+        both.xml(),
+        set(),
+        fix("all", &base),
+        corners.join(" "),
+        system(5e-4, 2.0, 40.0, "<DoDeformableCollision>1</DoDeformableCollision>")
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let scene = imported(&model, folder.path());
+    assert!(scene.scene.contains("inside = true"), "{}", scene.scene);
+    assert!(scene.notes.iter().any(|note| note.contains("`model` has 2 pieces")), "{:?}", scene.notes);
+    let course = played(&model);
+    let weight = 2000.0 * (0.1_f64.powi(3) + 0.08_f64.powi(3));
+    let (base, walls) = (course.forces["fix-0"], course.forces["surface-0"]);
+    let fallen = course.displacements["model"][first][2];
+    println!("{base:?} N from the base for {weight} N, {walls:?} N on the walls, fallen by {fallen} m");
+    assert!((base.z / weight - 1.0).abs() < 1e-3 && walls.norm() == 0.0, "{base:?} of {weight}");
+    assert!((-0.02..-0.001).contains(&fallen), "{fallen}");
+}
+
 /// Two free cubes are pushed against each other by opposite forces: they have no momentum together, with friction or without.
 #[test]
 fn free_cubes_keep_their_momentum() {
