@@ -173,8 +173,9 @@ impl Reader<'_> {
         let edges = [b - a, c - a];
         let lengths = edges.map(|edge| edge.norm());
         for (length, what) in lengths.into_iter().zip(["the edge from a to b", "the edge from a to c"]) {
-            if length <= 0.0 {
-                let problem = ImportProblem::OutOfRange { what, value: length, range: "longer than 0" };
+            if !(length > 0.0 && length.is_finite()) {
+                let problem =
+                    ImportProblem::OutOfRange { what, value: length, range: "longer than 0 and finite" };
                 return Err(fault(of, problem));
             }
         }
@@ -187,8 +188,8 @@ impl Reader<'_> {
             return Ok(None);
         }
         self.note(
-            "ContactPlate: NiftySim's plate is a plane that nodes come through from one side only; the scene's is a box, \
-             as deep behind the plate as its shorter edge is long",
+            "ContactPlate: NiftySim's plate is a plane that pushes nodes to its front, also beyond its corner a; the scene's is a \
+             box, as deep behind the plate as its shorter edge is long",
         );
         let x = edges[0] / lengths[0];
         let z = edges[0].cross(&edges[1]).normalize();
@@ -197,7 +198,7 @@ impl Reader<'_> {
         let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame));
         let at = a + 0.5 * (edges[0] + edges[1]) - 0.5 * depth * z;
         let form = Form::Box([lengths[0], lengths[1], depth]);
-        Ok(Some(thing(of, "plate", form, (at, turn), motion, Some(nodes))))
+        thing(of, "plate", form, (at, turn), motion, Some(nodes)).map(Some)
     }
 
     /// A cylinder from its origin along its axis, or a probe, which has a round tip there.
@@ -208,14 +209,12 @@ impl Reader<'_> {
         let axis = vector("Axis", "<Axis>0 0 1</Axis>, along its length")?;
         let radius = positive(needed(of, "Radius", "<Radius>0.01</Radius>")?, "the radius")?;
         let length = positive(needed(of, "Length", "<Length>0.1</Length>")?, "the length")?;
-        let Some(along) = axis.try_normalize(0.0) else {
-            let problem = ImportProblem::OutOfRange {
-                what: "the length of the axis",
-                value: 0.0,
-                range: "greater than 0",
-            };
-            return Err(fault(of, problem));
-        };
+        let unit = axis.norm();
+        if !(unit > 0.0 && unit.is_finite()) {
+            let (what, range) = ("the length of the axis", "greater than 0 and finite");
+            return Err(fault(of, ImportProblem::OutOfRange { what, value: unit, range }));
+        }
+        let along = axis / unit;
         let nodes = self.slave_nodes(of)?;
         let motion = shift(of, "OrigDisp")?;
         let growth = child(of, "RadChange").map(number).transpose()?.unwrap_or(0.0);
@@ -223,11 +222,10 @@ impl Reader<'_> {
             self.leave_out(of, &format!("its radius changes by {growth}, and shapes of a scene keep theirs"));
             return Ok(None);
         }
-        if (axis.norm() - 1.0).abs() > 1e-3 {
-            let length = axis.norm();
+        if (unit - 1.0).abs() > 1e-3 {
             let line = line(of);
             self.note(&format!(
-                "the axis of line {line} has the length {length:.4}: it is taken as a direction only"
+                "the axis of line {line} has the length {unit:.4}: it is taken as a direction only"
             ));
         }
         let form = match kind {
@@ -248,7 +246,7 @@ impl Reader<'_> {
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), &along)
             .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
         let at = origin + 0.5 * length * along;
-        Ok(Some(thing(of, kind, form, (at, turn), motion, Some(nodes))))
+        thing(of, kind, form, (at, turn), motion, Some(nodes)).map(Some)
     }
 
     /// A rigid surface of triangles.
@@ -277,7 +275,7 @@ impl Reader<'_> {
             }
         };
         let at_rest = (Vector3::zeros(), UnitQuaternion::identity());
-        Ok(Some(Thing { friction, margin, ..thing(of, "surface", form, at_rest, motion, nodes) }))
+        Ok(Some(Thing { friction, margin, ..thing(of, "surface", form, at_rest, motion, nodes)? }))
     }
 
     /// The motion of a surface, which grows in proportion to time. NiftySim's code reads angles in radians, then the centre.
@@ -362,9 +360,13 @@ fn thing(
     (at, turn): (Vector3, UnitQuaternion<f64>),
     motion: Motion,
     nodes: Option<BTreeSet<u32>>,
-) -> Thing {
-    let (at, turn) = (at.into(), turn.scaled_axis().into());
-    Thing { line: line(of), kind, form, at, turn, motion, nodes, friction: 0.0, margin: 0.0 }
+) -> Result<Thing, Fault> {
+    let (at, turn): ([f64; 3], [f64; 3]) = (at.into(), turn.scaled_axis().into());
+    if let Some(&value) = at.iter().chain(&turn).find(|x| !x.is_finite()) {
+        let (what, range) = ("a coordinate of its frame", "a number that can be computed with");
+        return Err(fault(of, ImportProblem::OutOfRange { what, value, range }));
+    }
+    Ok(Thing { line: line(of), kind, form, at, turn, motion, nodes, friction: 0.0, margin: 0.0 })
 }
 
 /// The displacement of a plate, a cylinder or a probe.

@@ -702,6 +702,17 @@ fn mistakes_of_contact_and_membranes_are_named() {
     let errors: &[(&str, &str, &[&str])] = &[
         ("<b>-1 -0.5 2</b>", "", &["line 6, <ContactPlate>", "<b> is missing", "add <b>"]),
         ("<b>-1 -0.5 2</b>", "<b>-1 -0.5 -1</b>", &["the edge from a to b is 0", "longer than 0"]),
+        (
+            "<a>-1 -0.5 -1</a>",
+            "<a>1e200 -0.5 -1</a>",
+            &["line 6, <ContactPlate>", "longer than 0 and finite"],
+        ),
+        ("<Axis>1 0 0", "<Axis>1e200 1e200 0", &["<ContactCylinder>", "the length of the axis is inf"]),
+        (
+            "<Origin>0.3 -1 0.3</Origin><Axis>1 0 0</Axis><Radius>0.1</Radius><Length>1<",
+            "<Origin>1.7e308 -1 0.3</Origin><Axis>1 0 0</Axis><Radius>0.1</Radius><Length>1.7e308<",
+            &["a coordinate of its frame is inf"],
+        ),
         ("<c>2 -0.5 -1</c>", "<c>2 -0.5</c>", &["<c>", "found 2 coordinates, expected 3"]),
         ("<SlvNodes NumNodes=\"3\">0 1 3</SlvNodes></ContactP", "</ContactP", &["<SlvNodes> is missing"]),
         ("<SlvNodes NumNodes=\"3\">0 1 3", "<SlvNodes NumNodes=\"3\">0 1 5", &["no node 5"]),
