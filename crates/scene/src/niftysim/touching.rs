@@ -15,6 +15,8 @@ pub(super) struct Touching {
     contact: Contact,
     /// Names of the things in the scene.
     names: Vec<String>,
+    /// Which of them have nodes on the boundary of a body.
+    met: Vec<bool>,
     /// Names of the bodies, and of how many pieces they are.
     bodies: Vec<(String, usize)>,
     /// Whether there are several bodies.
@@ -26,11 +28,12 @@ impl Touching {
     pub fn new(contact: Contact, several: bool) -> Self {
         let before = |at: usize, kind| contact.things[..at].iter().filter(|thing| thing.kind == kind).count();
         let name = |(at, thing): (usize, &Thing)| format!("{}-{}", thing.kind, before(at, thing.kind));
-        let names = contact.things.iter().enumerate().map(name).collect();
-        Self { contact, names, bodies: Vec::new(), several, tables: String::new() }
+        let names: Vec<String> = contact.things.iter().enumerate().map(name).collect();
+        let met = vec![false; names.len()];
+        Self { contact, names, met, bodies: Vec::new(), several, tables: String::new() }
     }
 
-    /// Whether it counts of how many pieces a body is.
+    /// Whether the number of pieces of a body matters.
     pub fn asks_for_pieces(&self) -> bool {
         self.contact.bodies.is_some_and(|bodies| !bodies.themselves)
     }
@@ -51,7 +54,7 @@ impl Touching {
         }
         let surface = boundary(mesh);
         let outer: BTreeSet<u32> = surface.faces.iter().flat_map(|face| face.nodes()).copied().collect();
-        for (thing, name) in self.contact.things.iter().zip(&self.names) {
+        for ((thing, name), met) in self.contact.things.iter().zip(&self.names).zip(&mut self.met) {
             let set = if self.several { format!("{name}-{body}") } else { name.clone() };
             let mut lines = format!("[contact.{set}]\nbetween = [\"{body}\", \"{name}\"]\n");
             if let Some(nodes) = &thing.nodes {
@@ -60,6 +63,7 @@ impl Touching {
                 if own.is_empty() {
                     continue;
                 }
+                *met = true;
                 let chosen = surface.faces.iter().map(|face| face.nodes());
                 let chosen = chosen.filter(|face| face.iter().all(|node| own.contains(node)));
                 let chosen: Vec<Vec<u32>> = chosen.map(<[u32]>::to_vec).collect();
@@ -83,6 +87,7 @@ impl Touching {
                     let _ = writeln!(lines, "faces = {{ set = \"{set}\" }}");
                 }
             }
+            *met = true;
             lines.push_str(&how(thing.friction, thing.margin));
             self.tables.push_str(&lines);
         }
@@ -135,9 +140,14 @@ impl Writer {
         if let Some(bodies) = touching.contact.bodies {
             touching.write_bodies(self, bodies);
         }
-        let Touching { contact, names, tables, .. } = touching;
+        let Touching { contact, names, met, tables, .. } = touching;
         let mut meshes = Vec::new();
-        for (thing, name) in contact.things.into_iter().zip(names) {
+        for ((thing, name), met) in contact.things.into_iter().zip(names).zip(met) {
+            if !met {
+                self.notes.push(format!(
+                    "`{name}`: none of its listed nodes is on a boundary, so nothing touches it"
+                ));
+            }
             meshes.extend(self.thing(thing, &name, stem));
         }
         tables.lines().for_each(|line| self.line(line.to_owned()));

@@ -695,6 +695,30 @@ fn contact_and_membranes_become_tables() {
     assert_eq!(contacts.contacts[0].surface.nodes, [0, 1, 3]);
 }
 
+/// The nodes that touch are counted through all submodels; a thing with none of a body does not touch it.
+#[test]
+fn contact_counts_the_nodes_of_all_submodels() {
+    let plate = |nodes: &str| {
+        format!(
+            "<ContactPlate><a>-9 -9 -1</a><b>9 -9 -1</b><c>-9 9 -1</c>\
+             <SlvNodes NumNodes=\"3\">{nodes}</SlvNodes></ContactPlate>"
+        )
+    };
+    let model = |nodes: &str| {
+        format!("<Model>{}{}{}{SYSTEM}</Model>", submodel(0.0, ""), submodel(5.0, ""), plate(nodes))
+    };
+    let second = imported(&model("4 5 6"));
+    assert_lines(&second, &["[contact.plate-0-part-1]", "between = [\"part-1\", \"plate-0\"]"]);
+    assert_lines(&second, &["[obstacle.plate-0]"]);
+    assert_eq!(second.scene.matches("[contact.").count(), 1);
+    let (_, built) = build(&second);
+    assert_eq!(built.contacts.unwrap().contacts[0].surface.nodes, [4, 5, 6]);
+    let none = imported(&model("4 5 6").replace("NumNodes=\"3\">4 5 6", "NumNodes=\"0\">"));
+    assert_note(&none, "`plate-0`: none of its listed nodes is on a boundary");
+    let both = imported(&model("4 5 6").replace("NumNodes=\"3\">4 5 6", "NumNodes=\"all\">"));
+    assert_eq!(both.scene.matches("[contact.").count(), 2);
+}
+
 /// Each replacement in a good model with contact by a bad one, and what is said.
 #[test]
 fn mistakes_of_contact_and_membranes_are_named() {
