@@ -74,6 +74,7 @@ impl Builder<'_> {
         let shape = match &table.shape {
             ShapeName::Sphere(of) => Shape::Sphere { radius: of.radius },
             ShapeName::Capsule(of) => Shape::Capsule { radius: of.radius, length: of.length },
+            ShapeName::Cylinder(of) => Shape::Cylinder { radius: of.radius, length: of.length },
             ShapeName::Box(of) if of.size.iter().any(|&edge| edge <= 0.0) => {
                 self.error(&at("shape"), "a box without a volume", "its edges", "give three lengths above 0");
                 return None;
@@ -403,8 +404,10 @@ impl Builder<'_> {
             // Faces hang into a round thing, on which their corners lie, by up to edge²/(8 R); more than a tenth of it is no touch any more.
             let radius = rigid.shape.thinnest();
             let hang = (longest * longest / (8.0 * radius)).min(0.1 * radius);
-            let rounded =
-                matches!(rigid.shape, Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Grid(_));
+            let rounded = matches!(
+                rigid.shape,
+                Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Cylinder { .. } | Shape::Grid(_)
+            );
             found.retain(|(gap, _)| !rounded || -gap > hang);
         }
         let Some((gap, place)) = found.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
