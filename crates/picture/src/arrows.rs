@@ -8,7 +8,7 @@ use crate::legend::readable;
 use crate::picture::Picture;
 
 /// Length of the longest arrow, over the diagonal of the box around what is shown.
-const LENGTH: f64 = 0.2;
+const LENGTH: f64 = 0.14;
 /// Radius of a dot, half the width of a shaft, length and half the width of a head, width of a rim: over the height of the picture.
 const DOT: f32 = 0.0042;
 const SHAFT: f32 = 0.0021;
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn points_without_a_force_have_no_arrow_and_the_longest_one_is_a_fifth_of_the_body() {
+    fn points_without_a_force_have_no_arrow_and_the_longest_one_is_a_part_of_the_body() {
         let mut mesh = Mesh { points: vec![Vector3::zeros(), Vector3::x(), Vector3::y()], ..Mesh::default() };
         assert!(contact_forces(&mesh, &mesh.points).is_none());
         let values = vec![0.0, 0.0, 0.0, 0.0, 3.0, 4.0, f64::NAN, 0.0, 0.0];
@@ -158,7 +158,7 @@ mod tests {
         let forces = contact_forces(&mesh, &mesh.points).unwrap();
         assert_eq!(forces, [[Vector3::x(), Vector3::new(0.0, 3.0, 4.0)]]);
         assert_eq!(largest_force(&forces), 5.0);
-        assert!((arrow_unit(&mesh.points, 5.0) - 0.2 * 2.0_f64.sqrt() / 5.0).abs() < 1e-15);
+        assert!((arrow_unit(&mesh.points, 5.0) - LENGTH * 2.0_f64.sqrt() / 5.0).abs() < 1e-15);
         assert_eq!(arrow_unit(&mesh.points, 0.0), 0.0);
         for (force, words) in [(0.5312, "531 mN"), (12.34, "12.3 N"), (1.5, "1.50 N"), (0.0, "0.00 N")] {
             assert_eq!(arrow_note(force), format!("longest arrow {words}"));

@@ -317,14 +317,30 @@ impl Builder<'_> {
         Some(Surface { nodes, faces: halves })
     }
 
-    /// Remarks on parts of a body that are too near each other at rest to touch.
+    /// Remarks on parts of a body that are too near each other at rest to touch, and on gaps that are small for its faces.
     fn note_apart(&mut self, name: &str, surface: &Surface, thickness: f64) {
         let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
-        let count = Pairs::new(surface, None, thickness, place).set_apart_count();
+        let mut pairs = Pairs::new(surface, None, thickness, place);
+        let count = pairs.set_apart_count();
+        let mut narrow: Option<(f64, Vector3)> = None;
+        pairs.update(place, 0.0);
+        pairs.find(place, |pair| {
+            if pair.distance > 0.0 && narrow.is_none_or(|(least, _)| pair.distance < least) {
+                narrow = Some((pair.distance, place(pair.nodes[0])));
+            }
+        });
         if count > 0 {
             self.notes.push(format!(
                 "contact `{name}`: {} of nodes with faces or of edges never touch, since they are too near at rest",
                 counted(count, "pair")
+            ));
+        }
+        if let Some((gap, at)) = narrow {
+            let [x, y, z] = [at.x, at.y, at.z].map(number);
+            self.notes.push(format!(
+                "contact `{name}`: a gap of {} m at ({x}, {y}, {z}) m is less than a quarter of the edges there are on average; smaller \
+                 elements resolve it better",
+                number(gap)
             ));
         }
     }

@@ -116,6 +116,31 @@ fn fields_of_contacts_without_a_contact_are_refused_with_their_line() {
     }
 }
 
+/// A body that touches itself is told of a gap that is small for its elements: two legs of one body, half a millimetre apart.
+#[test]
+fn a_gap_that_is_small_for_the_elements_is_noted() {
+    let legs = |gap: f64| {
+        let place = tempfile::tempdir().unwrap();
+        let mut mesh = pliant_geometry::Mesh::default();
+        for z in [0.0, 0.01, 0.01 + gap, 0.02 + gap] {
+            let corners = [[0.0, 0.0], [0.01, 0.0], [0.01, 0.01], [0.0, 0.01]];
+            mesh.points.extend(corners.map(|[x, y]| pliant_geometry::Vector3::new(x, y, z)));
+        }
+        mesh.block_mut(CellKind::Hex).nodes.extend(0..16);
+        let file = place.path().join("legs.vtu");
+        io::write(&file, &mesh).unwrap();
+        let text = pressed("", "[contact.itself]\nbetween = ['block', 'block']\n").replace(
+            "{ block = { size = [0.04, 0.04, 0.02], cells = [8, 8, 4] }, as = 'hexes' }",
+            &format!("{{ file = '{}' }}", file.display()),
+        );
+        let world = world(&text.replace("0.0301]", "0.05]")).unwrap();
+        world.notes().find(|note| note.contains("contact `itself`: a gap of")).cloned()
+    };
+    let note = legs(5e-4).unwrap();
+    assert!(note.contains("a gap of 5.000e-4 m at (") && note.contains("smaller elements"), "{note}");
+    assert_eq!(legs(0.008), None);
+}
+
 /// The lid begins within the block.
 fn overlapping(depth: f64, more: &str) -> String {
     stacked("", more)
