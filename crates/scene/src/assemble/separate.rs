@@ -19,6 +19,8 @@ use super::contacts::{OVERLAP, hang};
 
 /// Passes at most.
 const PASSES: usize = 400;
+/// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the latter is taken.
+const FACING: f64 = 0.3;
 /// Sweeps in which inner nodes follow.
 const SWEEPS: usize = 200;
 
@@ -118,7 +120,12 @@ impl Builder<'_> {
     fn push_apart(&self, contact: &Contact, contacts: &Contacts, pushed: &mut Pushed) {
         let offset = contact.touch.offset;
         match &contact.with {
-            &With::Rigid(rigid) => push_out(&contacts.rigids[rigid], offset, &contact.surface, pushed),
+            &With::Rigid(rigid) => {
+                let is_solid = self.holder(&contact.surface).is_some_and(|body| {
+                    self.bodies[body].mesh.volume_blocks().any(|block| !block.is_empty())
+                });
+                push_out(&contacts.rigids[rigid], offset, &contact.surface, is_solid, pushed);
+            }
             With::Body(other) => {
                 self.push_nodes_out(&contact.surface, other, pushed);
                 self.push_nodes_out(other, &contact.surface, pushed);
@@ -129,10 +136,15 @@ impl Builder<'_> {
         }
     }
 
+    /// The body whose nodes a surface has.
+    fn holder(&self, surface: &Surface) -> Option<usize> {
+        let &node = surface.nodes.first()?;
+        self.assembly.bodies.iter().position(|body| body.nodes.contains(&node))
+    }
+
     /// Pushes nodes of a surface out of the cells of another body, the shortest way to its boundary.
     fn push_nodes_out(&self, surface: &Surface, other: &Surface, pushed: &mut Pushed) {
-        let holds = |node: u32| self.assembly.bodies.iter().position(|body| body.nodes.contains(&node));
-        let Some(body) = other.nodes.first().and_then(|&node| holds(node)) else { return };
+        let Some(body) = self.holder(other) else { return };
         let (own, built) = (&self.assembly.bodies[body], &self.bodies[body]);
         let mut mesh = built.mesh.clone();
         for (point, node) in mesh.points.iter_mut().zip(own.all_nodes()) {
@@ -227,27 +239,60 @@ impl Builder<'_> {
     }
 }
 
-/// Pushes nodes, and points of faces between them, out of a rigid thing.
-fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, pushed: &mut Pushed) {
+/// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the body. A solid then draws back into itself.
+fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushed: &mut Pushed) {
     let pose = rigid.at(0.0, None);
-    for &node in &surface.nodes {
-        let near = rigid.near(&pose, &pushed.places[node as usize]);
-        let row = Row { parts: vec![(node, 1.0)], normal: near.normal, offset: 0.0 };
-        pushed.push_by(&row, near.distance - offset);
+    let thinnest = rigid.shape.thinnest();
+    let push = |parts: Vec<(u32, f64)>, inward: Vector3, hangs: f64, pushed: &mut Pushed| {
+        let place: Vector3 = parts.iter().map(|&(node, c)| pushed.places[node as usize] * c).sum();
+        let gap = |place: &Vector3| rigid.near(&pose, place).distance - offset + hangs;
+        let near = rigid.near(&pose, &place);
+        let (mut normal, mut depth) = (near.normal, gap(&place));
+        if depth < 0.0
+            && normal.dot(&inward) < FACING
+            && let Some(way) = way_out(&place, &inward, thinnest, gap)
+        {
+            (normal, depth) = (inward, -way);
+        }
+        pushed.push_by(&Row { parts, normal, offset: 0.0 }, depth);
+    };
+    let mut inward = vec![Vector3::zeros(); if is_solid { pushed.places.len() } else { 0 }];
+    let mut longest = 0.0_f64;
+    for face in &surface.faces {
+        let [a, b, c] = face.map(|node| pushed.places[node as usize]);
+        longest = longest.max((b - a).norm()).max((c - b).norm()).max((a - c).norm());
+        let area = (b - a).cross(&(c - a));
+        if is_solid {
+            face.iter().for_each(|&node| inward[node as usize] -= area);
+        }
     }
-    let edges = surface.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-    let length = |[a, b]: [u32; 2]| (pushed.places[a as usize] - pushed.places[b as usize]).norm();
-    let longest = edges.map(length).fold(0.0, f64::max);
+    let unit = |sum: Vector3| sum.try_normalize(0.0).unwrap_or_default();
+    let at = |node: u32| inward.get(node as usize).copied().map_or(Vector3::zeros(), unit);
+    for &node in &surface.nodes {
+        push(vec![(node, 1.0)], at(node), 0.0, pushed);
+    }
     let samples = lattice(parts_of(longest, &rigid.shape));
     let hangs = hang(rigid, longest);
     for face in &surface.faces {
+        let inward = unit(face.iter().map(|&node| at(node)).sum());
         for weights in &samples {
-            let parts: Vec<(u32, f64)> = face.iter().copied().zip(*weights).collect();
-            let place: Vector3 = parts.iter().map(|&(node, c)| pushed.places[node as usize] * c).sum();
-            let near = rigid.near(&pose, &place);
-            pushed.push_by(&Row { parts, normal: near.normal, offset: 0.0 }, near.distance - offset + hangs);
+            push(face.iter().copied().zip(*weights).collect(), inward, hangs, pushed);
         }
     }
+}
+
+/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None` if it is not that thin there, or without
+/// a direction.
+fn way_out(from: &Vector3, along: &Vector3, thinnest: f64, gap: impl Fn(&Vector3) -> f64) -> Option<f64> {
+    let mut way = 0.0;
+    while way <= 4.0 * thinnest && *along != Vector3::zeros() {
+        let depth = -gap(&(from + along * way));
+        if depth <= 0.0 {
+            return Some(way);
+        }
+        way += depth.max(1e-3 * thinnest);
+    }
+    None
 }
 
 /// Pushes nodes and faces, and edges and edges, of surfaces apart.

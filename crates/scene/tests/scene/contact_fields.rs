@@ -219,6 +219,23 @@ fn nodes_in_a_tool_are_pushed_onto_its_surface() {
     assert!(balance < 0.02, "{balance}");
 }
 
+/// A thin plate that begins a little within the upper side of the block, between and on nodes, is left on the side where it comes from.
+#[test]
+fn faces_are_pushed_to_the_side_of_their_nodes() {
+    for (y, width) in [(0.02, 0.004), (0.0213, 0.003), (0.017, 0.012)] {
+        let plate = format!("{{ box = {{ size = [0.06, {width}, 0.004] }} }}\nat = [0.02, {y}, 0.021]");
+        let text = pressed("", "")
+            .replace("{ sphere = { radius = 0.01 } }\nat = [0.02, 0.02, 0.0301]", &plate)
+            .replace("friction = 0.2", "friction = 0.2\nseparate = true");
+        let world = world(&text).unwrap();
+        let ways = world.only().unwrap().built.pushed.clone().unwrap();
+        let [low, high] = ways.iter().fold([0.0_f64; 2], |[low, high], u| [low.min(u[2]), high.max(u[2])]);
+        println!("{width} m at {y} m: {low} m to {high} m");
+        // Points of faces rest on nodes beside the plate, which therefore go farther than its millimetre.
+        assert!(high < 1e-6 && (-0.0025..-0.9e-3).contains(&low), "{low} m to {high} m");
+    }
+}
+
 #[test]
 fn what_was_pushed_apart_is_not_so_again_in_a_resumed_run() {
     let run = "[run]\nstep = 1e-4\ncheckpoint = { every = 0.4 }\n";
