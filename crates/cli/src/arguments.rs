@@ -276,6 +276,9 @@ pub struct Render {
     /// Draw fibres as short lines on the surface and in a section. A finished run needs the field `fibre` on the cells of its series.
     #[arg(long)]
     pub fibres: bool,
+    /// Draw the forces of contacts as arrows, through the bodies. A finished run needs the field `contact-force` in its series.
+    #[arg(long)]
+    pub contacts: bool,
     /// Mark the element with the smallest stable step, through the body. A finished run needs the field `element-step` on the cells of
     /// its series.
     #[arg(long)]

@@ -18,6 +18,7 @@ pub fn look_of(scene: &Scene) -> Look {
             wireframe: view.wireframe,
             ghost: view.ghost,
             fibres: view.fibres,
+            contacts: view.contacts,
             critical: view.critical,
             texture: texture_of(view.texture),
             clip: view.clip.and_then(|clip| Plane::through(&clip.point.into(), &clip.normal.into())),

@@ -42,6 +42,7 @@ fn typed(look: &mut Look, arguments: &Render) {
     style.wireframe |= arguments.wireframe;
     style.ghost |= arguments.ghost;
     style.fibres |= arguments.fibres;
+    style.contacts |= arguments.contacts;
     style.critical |= arguments.critical;
     if let Some([x, y, z, nx, ny, nz]) = arguments.clip {
         style.clip = Plane::through(&Vector3::new(x, y, z), &Vector3::new(nx, ny, nz));
@@ -140,8 +141,8 @@ fn hidden(labels: &Labels, typed: &[CellLabel]) -> Result<Vec<i32>, Failure> {
 fn labelled_mesh(arguments: &Render) -> Result<Option<Mesh>, Failure> {
     let of_cells = matches!(arguments.colour.as_deref(), None | Some("label" | "none"));
     let runs = arguments.film.is_some() || arguments.frames.is_some() || changes_a_run(arguments);
-    if !of_cells || runs || arguments.critical || arguments.fibres || !pliant_scene::is_mesh(&arguments.what)
-    {
+    let marks = arguments.critical || arguments.fibres || arguments.contacts;
+    if !of_cells || runs || marks || !pliant_scene::is_mesh(&arguments.what) {
         return Ok(None);
     }
     let file = io::read(&arguments.what).map_err(|error| Failure::plain(error, "check the path"))?;
@@ -314,6 +315,7 @@ fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
         scene.view.component = None;
     }
     scene.view.fibres |= arguments.fibres;
+    scene.view.contacts |= arguments.contacts;
     scene.view.critical |= arguments.critical;
     arguments.every.or(own).unwrap_or(0.01 * scene.scene.until)
 }

@@ -72,6 +72,12 @@ impl Work {
         (self.external, self.at_start) = (kinetic, shock);
     }
 
+    /// Begins with an energy [J] that is stored at the start, too.
+    pub(crate) fn begin_with_stored(&mut self, stored: f64) {
+        self.external += stored;
+        self.internal = stored;
+    }
+
     /// Goes on with another model: a law that is stiffer at once strikes the body as a load would. The balance is judged again from when it
     /// has held once. `gained` is the kinetic energy [J] of mass that came.
     pub fn shake(&mut self, gained: f64) {

@@ -62,3 +62,4 @@ pub use state::{State, Work};
 pub use step_control::{Clock, Lengths, StepControl};
 pub use step_error::StepError;
 pub use stepper::{CentralDifference, Observable, Wanted};
+pub use touching::NodeContact;

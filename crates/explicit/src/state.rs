@@ -33,6 +33,8 @@ pub struct State<R> {
     pub driven: Vec<(u32, Leg)>,
     /// Nodes that jaws hold.
     pub gripped: Vec<Gripped>,
+    /// How far each node has slid on what it touches since its touch began [m]; empty without contacts.
+    pub slip: Vec<Option<f64>>,
 }
 
 /// Work accumulated over the steps [J].
@@ -85,6 +87,7 @@ impl<R: Scalar> State<R> {
             stability: Stability::default(),
             driven: Vec::new(),
             gripped: Vec::new(),
+            slip: Vec::new(),
         }
     }
 

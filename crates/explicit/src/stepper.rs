@@ -25,11 +25,12 @@ use crate::collective::{Collective, Predicted};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
 use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
+use crate::recover::Recovery;
 use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
-use crate::touching::{Free, Posture, Touching};
+use crate::touching::{Free, NodeContact, Posture, Touching};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -64,6 +65,11 @@ pub trait Observable<R> {
 
     /// Force [N] of each contact on the thing that its nodes touch.
     fn contact_forces(&self) -> Vec<Vector<f64>> {
+        Vec::new()
+    }
+
+    /// The nodes that may touch something, increasing, with what contacts do to them.
+    fn contact_nodes(&self, _state: &State<R>) -> Vec<NodeContact> {
         Vec::new()
     }
 }
@@ -179,6 +185,10 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
     fn contact_forces(&self) -> Vec<Vector<f64>> {
         let on_nodes = self.touching.iter().flat_map(|touching| &touching.forces);
         on_nodes.map(|force| force.map(|f| -f)).collect()
+    }
+
+    fn contact_nodes(&self, state: &State<R>) -> Vec<NodeContact> {
+        self.touching.as_ref().map_or_else(Vec::new, |touching| touching.nodal(&state.slip))
     }
 
     /// The mean of the increments before and after.
@@ -493,10 +503,11 @@ impl<R: Scalar> CentralDifference<R> {
         self.applied.update(state.time, &state.displacement);
         self.set_factors(state.time);
         if state.is_at_start() {
-            self.start(state);
+            let stored = self.stored_at_start(state, found.hourglass);
+            self.start(state, stored);
             // Half of a step's force moves a node in the first one: its other half is in the increment before.
             if self.touch(state, 0.5) {
-                self.start(state);
+                self.start(state, stored);
             }
         } else {
             self.touch(state, 1.0);
@@ -534,6 +545,10 @@ impl<R: Scalar> CentralDifference<R> {
             }
         });
         self.model.follow(&mut state.displacement);
+        if let Some(touching) = &mut self.touching {
+            state.slip.resize(self.next.len(), None);
+            touching.slide(&mut state.slip);
+        }
         state.work.advance();
         self.control.count(state);
     }
@@ -556,9 +571,19 @@ impl<R: Scalar> CentralDifference<R> {
         }
     }
 
+    /// The energy [J] stored in a state whose free nodes start displaced, that of hourglass patterns included.
+    fn stored_at_start(&self, state: &State<R>, hourglass: f64) -> f64 {
+        let mut free = state.displacement.iter().zip(&self.owners);
+        let moved = |(u, owner): (&Vector<R>, &[u32; 3])| (0..3).any(|c| owner[c] == FREE && u[c] != R::ZERO);
+        match free.any(moved) {
+            true => Recovery::new(&self.model, state).stored_energy() + hourglass,
+            false => 0.0,
+        }
+    }
+
     /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with a⁰ = (R − f)/m − α v⁰: the increment before the first step. A prescribed
     /// component has no velocity of its own.
-    fn start(&self, state: &mut State<R>) {
+    fn start(&self, state: &mut State<R>, stored: f64) {
         let dt = self.lengths.before;
         let half = 0.5 * dt * dt;
         let mut shock = 0.0;
@@ -580,6 +605,7 @@ impl<R: Scalar> CentralDifference<R> {
             }
         }
         state.work.begin(kinetic, shock);
+        state.work.begin_with_stored(stored);
     }
 
     /// Where a node goes with the forces that are found.

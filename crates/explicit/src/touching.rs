@@ -3,6 +3,8 @@
 //! λ g = 0, and against its slip by at most μ λ. Projected Gauss–Seidel finds them, in the order of the rows: momentum is kept to the last bit of
 //! each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
 
+mod nodal;
+
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -11,6 +13,8 @@ use pliant_contact::pose::Pose;
 use pliant_contact::shape::{Near, Shape};
 use pliant_contact::touch::{Contact, Contacts, Gripped, LEFT, Passage, Rigid, With, lattice, parts_of};
 use pliant_mechanics::tensor::{Vector, add};
+
+pub use nodal::NodeContact;
 
 /// Passes over all rows at most.
 const PASSES: usize = 30;
@@ -69,6 +73,8 @@ struct Node {
     own: Vector3<f64>,
     /// Impulses [N] of rows on it, of a node that jaws hold.
     borne: Vector3<f64>,
+    /// Impulses [N] of the last pass on it.
+    lifted: Vector3<f64>,
     /// Whether it may touch something, so that its prediction is known.
     near: bool,
     /// The count of motions by impulses when one last moved it.
@@ -87,6 +93,7 @@ impl Node {
             mobility: zero,
             own: zero,
             borne: zero,
+            lifted: zero,
             near: false,
             moved: 0,
             first: NONE,
@@ -286,6 +293,10 @@ pub(crate) struct Touching {
     /// Distances [m] of the nodes from a rigid thing, by node.
     distances: Vec<f64>,
     rows: Vec<Row>,
+    /// Triangles of all surfaces, each once.
+    faces: Vec<[u32; 3]>,
+    /// Impulses [N] on each node in a step, and their slips weighted by them.
+    slips: Vec<[f64; 2]>,
     /// The force [N] of each contact on its first surface at the last evaluation.
     pub forces: Vec<Vector<f64>>,
 }
@@ -327,6 +338,8 @@ impl Touching {
             nodes: vec![Node::NONE; numbers.len()],
             distances: vec![0.0; numbers.len()],
             rows: Vec::new(),
+            faces: nodal::faces(&contacts, &numbers),
+            slips: vec![[0.0; 2]; numbers.len()],
             numbers,
             own,
             forces: vec![[0.0; 3]; contacts.contacts.len()],
@@ -402,7 +415,7 @@ impl Touching {
             let Free { then, mobility } = free(number);
             (node.free, node.then) = (then.into(), then.into());
             (node.mobility, node.own) = (mobility.into(), mobility.into());
-            (node.borne, node.moved) = (Vector3::zeros(), 1);
+            (node.borne, node.lifted, node.moved) = (Vector3::zeros(), Vector3::zeros(), 1);
         }
     }
 
@@ -624,6 +637,7 @@ impl Touching {
                     }
                     let push = (left - gap) / along.dot(&normal);
                     node.then += along * push;
+                    node.lifted += normal * push;
                     *force = add(*force, (normal * push).into());
                 }
             }

@@ -22,6 +22,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arrows;
 mod camera;
 mod colour;
 mod error;
@@ -40,6 +41,7 @@ mod subject;
 mod text;
 mod vertex;
 
+pub use arrows::{PointForce, arrow_note, arrow_unit, contact_forces, largest_force};
 pub use camera::{Axis, Camera, Projection};
 pub use colour::{ColourMap, Extremes, label_colour};
 pub use error::PictureError;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::io::{MeshFileError, read, read_pvd};
 use pliant_geometry::{Labels, Mesh, Vector3};
 
+use crate::arrows::{self, PointForce, arrow_note, arrow_unit, contact_forces, largest_force};
 use crate::camera::Camera;
 use crate::colour::Extremes;
 use crate::error::PictureError;
@@ -52,6 +53,9 @@ pub enum SeriesError {
     /// The critical cell was requested, but the frames have no steps.
     #[error("the cells of the frames have no stable steps (the field `element-step`)")]
     NoSteps,
+    /// Forces of contacts were requested, but the frames have none.
+    #[error("the points of the frames have no forces of contacts (the field `contact-force`)")]
+    NoContacts,
     /// Colours of labels were requested, but the frames have none.
     #[error("the cells of the frames have no labels (the field `label`)")]
     NoLabels,
@@ -84,6 +88,9 @@ impl SeriesError {
             }
             Self::NoSteps => {
                 "show bodies instead of carried surfaces; a finished run needs `element-step` in `data` of its output, `at = \"cells\"`"
+            }
+            Self::NoContacts => {
+                "show bodies that touch something; a finished run needs `contact-force` in `data` of its output"
             }
             Self::NoLabels => {
                 "show bodies whose mesh has cell data `label`, such as meshes from images with several labels"
@@ -189,10 +196,31 @@ struct Common {
     extremes: Extremes,
     /// The middle of the points is enough for the camera: corners of the boxes around them.
     points: Vec<Vector3>,
+    /// The largest force of a contact [N].
+    largest: f64,
+}
+
+/// An instant that is drawn.
+struct Shown {
+    frame: Frame,
+    /// The smallest stable step of a cell [s] if that cell is marked.
+    step: Option<f64>,
+    /// Forces of contacts, if they are drawn.
+    forces: Vec<PointForce>,
+}
+
+/// What all pictures have in common.
+struct Settled {
+    camera: Camera,
+    style: Style,
+    /// Length of arrows over their force [m/N], and the largest force [N].
+    arrows: [f64; 2],
 }
 
 impl Common {
-    fn add(&mut self, subject: &Subject, frame: &Frame, ghost: bool) {
+    fn add(&mut self, subject: &Subject, shown: &Shown, ghost: bool) {
+        let frame = &shown.frame;
+        self.largest = self.largest.max(largest_force(&shown.forces));
         let surface = subject.surface_points();
         self.extremes.add(surface.iter().filter_map(|&point| frame.values.get(point as usize)).copied());
         self.points.extend(surface.iter().map(|&point| frame.points[point as usize]));
@@ -225,8 +253,8 @@ fn spread_directions() -> Vec<Vector3> {
 }
 
 impl Look {
-    /// A time, and the smallest stable step of a cell [s] if that cell is marked.
-    fn frame(&self, mesh: &Mesh) -> Result<(Frame, Option<f64>), SeriesError> {
+    /// What is drawn of a mesh with fields.
+    fn frame(&self, mesh: &Mesh) -> Result<Shown, SeriesError> {
         let missing =
             |field: &str| SeriesError::NoField { field: field.to_owned(), known: quoted(&fields(mesh)) };
         let values = match &self.field {
@@ -243,7 +271,11 @@ impl Look {
             }
         }
         let (critical, step) = critical.unzip();
-        Ok((Frame { points, values, critical }, step))
+        let forces = match self.style.contacts {
+            true => contact_forces(mesh, &points).ok_or(SeriesError::NoContacts)?,
+            false => Vec::new(),
+        };
+        Ok(Shown { frame: Frame { points, values, critical }, step, forces })
     }
 
     /// The same with the labels of a mesh in its legend.
@@ -276,8 +308,8 @@ impl Look {
         Ok(subject)
     }
 
-    /// Camera and style for all frames.
-    fn settle(&self, common: Common) -> (Camera, Style) {
+    /// Camera, style and the length of arrows for all frames.
+    fn settle(&self, common: Common) -> Settled {
         let mut style = self.style;
         style.range = self.field.as_ref().and_then(|_| self.style.range.or_else(|| common.extremes.range()));
         let [width, height] = self.size.map(f64::from);
@@ -292,13 +324,19 @@ impl Look {
             camera.zoom(1.0 / self.zoom);
         }
         camera.pan(-0.5 * taken * width / height, 0.0);
-        (camera, style)
+        let arrows = [arrow_unit(&common.points, common.largest), common.largest];
+        Settled { camera, style, arrows }
     }
 
-    fn finished(&self, mut picture: Picture, style: &Style, time: f64, step: Option<f64>) -> Picture {
+    fn finished(&self, mut picture: Picture, settled: &Settled, shown: &Shown, time: f64) -> Picture {
+        let Settled { camera, style, arrows: [unit, largest] } = settled;
+        arrows::draw(&mut picture, camera, &shown.forces, *unit);
         let mut note =
             if self.legend.note.is_empty() { format!("t = {time:.3} s") } else { self.legend.note.clone() };
-        if let Some(step) = step {
+        if *largest > 0.0 {
+            note.push_str(&format!(", {}", arrow_note(*largest)));
+        }
+        if let Some(step) = shown.step {
             let (unit, factor) = readable("s", step);
             note.push_str(&format!(", smallest element step {:.3} {unit} (marked)", step * factor));
         }
@@ -313,12 +351,13 @@ impl Look {
     pub fn picture(&self, graphics: &Graphics, mesh: &Mesh, time: f64) -> Result<Picture, SeriesError> {
         let look = self.with_labels_of(mesh)?;
         let subject = look.subject(mesh)?;
-        let (frame, step) = look.frame(mesh)?;
+        let shown = look.frame(mesh)?;
         let mut common = Common::default();
-        common.add(&subject, &frame, look.style.ghost);
-        let (camera, style) = look.settle(common);
-        let picture = Offscreen::new(graphics, &subject, look.size)?.draw(&frame, &camera, &style)?;
-        Ok(look.finished(picture, &style, time, step))
+        common.add(&subject, &shown, look.style.ghost);
+        let settled = look.settle(common);
+        let mut offscreen = Offscreen::new(graphics, &subject, look.size)?;
+        let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style)?;
+        Ok(look.finished(picture, &settled, &shown, time))
     }
 
     /// Pictures of chosen frames of a series: `take` receives each with its index.
@@ -348,14 +387,14 @@ impl Look {
         };
         let mut common = Common::default();
         for &index in frames {
-            common.add(&subject, &read(index)?.0, look.style.ghost);
+            common.add(&subject, &read(index)?, look.style.ghost);
         }
-        let (camera, style) = look.settle(common);
+        let settled = look.settle(common);
         let mut offscreen = Offscreen::new(graphics, &subject, look.size)?;
         for (count, &index) in frames.iter().enumerate() {
-            let (frame, step) = read(index)?;
-            let picture = offscreen.draw(&frame, &camera, &style)?;
-            take(count, look.finished(picture, &style, series.frames[index].0, step))?;
+            let shown = read(index)?;
+            let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style)?;
+            take(count, look.finished(picture, &settled, &shown, series.frames[index].0))?;
         }
         Ok(())
     }

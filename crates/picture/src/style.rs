@@ -72,6 +72,8 @@ pub struct Style {
     pub ghost: bool,
     /// Whether fibres are drawn, on the surface and in a section.
     pub fibres: bool,
+    /// Whether the forces of contacts are drawn, as arrows through the bodies.
+    pub contacts: bool,
     /// Whether the cell with the smallest stable step is marked.
     pub critical: bool,
     /// The texture of the surface.

@@ -255,3 +255,46 @@ fn the_same_picture_has_the_same_pixels_and_any_size_is_drawn() {
         Look { size: [most + 1, 10], ..look() }.picture(&graphics, &mesh, 0.0).unwrap_err().to_string();
     assert!(refused.contains("cannot draw"), "{refused}");
 }
+
+#[test]
+fn forces_of_contacts_are_drawn_where_they_act_and_told_in_the_note() {
+    let Some(graphics) = graphics() else { return };
+    let mut mesh = organs(false);
+    // At the middle of the upper side of the beam, 4 N upwards; elsewhere nothing, or no value.
+    let node = (0..mesh.points.len())
+        .min_by(|&a, &b| {
+            let far = |node: usize| (mesh.points[node] - Vector3::new(0.0, 0.0, 0.02)).norm();
+            far(a).total_cmp(&far(b))
+        })
+        .unwrap();
+    let mut values = vec![0.0; 3 * mesh.points.len()];
+    values[3 * node + 2] = 4.0;
+    values[..3].fill(f64::NAN);
+    let style = Style { contacts: true, range: None, ..Style::default() };
+    let camera = Camera { projection: Projection::Orthographic, elevation: 0.0, ..Camera::default() };
+    let look = Look { field: None, style, camera, ..look() };
+    let none = look.picture(&graphics, &mesh, 0.25).unwrap_err();
+    assert!(none.to_string().contains("`contact-force`") && !none.remedy().is_empty(), "{none}");
+    mesh.point_data.insert("contact-force".into(), DataArray { components: 3, values });
+    let plain = Look { style: Style { contacts: false, ..style }, ..look.clone() };
+    let [with, without] = [&look, &plain].map(|look| look.picture(&graphics, &mesh, 0.25).unwrap());
+    let above = with.width * (with.height - 40);
+    let changed: Vec<[u32; 2]> = (0..above)
+        .filter(|&pixel| {
+            let at = 4 * pixel as usize;
+            with.rgba[at..][..3] != without.rgba[at..][..3]
+        })
+        .map(|pixel| [pixel % with.width, pixel / with.width])
+        .collect();
+    let span = |c: usize| {
+        let all = || changed.iter().map(|at| at[c]);
+        all().max().unwrap_or(0) - all().min().unwrap_or(0)
+    };
+    // One upright arrow, of the one force.
+    println!("{} pixels, {} wide and {} high", changed.len(), span(0), span(1));
+    assert!(changed.len() > 100 && span(0) < 12 && (20..120).contains(&span(1)), "{changed:?}");
+    assert!(
+        with.rgba[4 * above as usize..] != without.rgba[4 * above as usize..],
+        "what it stands for is told"
+    );
+}

@@ -31,6 +31,7 @@ impl Part {
                     .as_ref()
                     .map_or(f64::INFINITY, |limits| limits.critical.assembled.step),
                 contacts: built.contacts.clone(),
+                start: built.pushed.clone(),
                 #[cfg(feature = "gpu")]
                 device: plan.target.device.clone(),
                 #[cfg(feature = "gpu")]

@@ -244,9 +244,24 @@ impl Scene {
         let table = self.participants.iter().find(|(known, _)| known == name);
         let bodies: Vec<_> = self.bodies.iter().filter(|(body, _)| owns(body)).cloned().collect();
         let models: Vec<BodyModel> = bodies.iter().map(|(_, body)| body.model).collect();
-        let has = |field: FieldName| models.iter().any(|&model| field.is_of(model));
+        let contacts: Vec<_> = self
+            .contacts
+            .iter()
+            .filter(|(_, table)| {
+                let body = table.between.iter().find(|name| owners.of.contains_key(*name));
+                body.map_or(index == 0 || table.between.iter().any(|name| name == "all"), |name| owns(name))
+            })
+            .cloned()
+            .collect();
+        let has = |field: FieldName| {
+            let touches = !contacts.is_empty() || !field.is_of_contact();
+            touches && models.iter().any(|&model| field.is_of(model))
+        };
         // A field that no body of the scene has is reported once, with the first participant.
-        let strange = |field: FieldName| !self.bodies.iter().any(|(_, body)| field.is_of(body.model));
+        let strange = |field: FieldName| {
+            let touches = !self.contacts.is_empty() || !field.is_of_contact();
+            !touches || !self.bodies.iter().any(|(_, body)| field.is_of(body.model))
+        };
         let uses = |bodies: &[(String, BodyTable)], law: &String| {
             let layered = |body: &BodyTable| body.layers.iter().any(|layer| layer.law.as_ref() == Some(law));
             bodies.iter().any(|(_, body)| body.law.values().contains(&law) || layered(body))
@@ -292,6 +307,7 @@ impl Scene {
         } else if !coloured {
             view.colour = None;
         }
+        view.contacts &= seen && (!contacts.is_empty() || self.contacts.is_empty() && index == 0);
         let on_part = |on: Option<&str>| on.is_none_or(owns);
         Self {
             run: self.run_of(table.map(|(_, table)| table), &models),
@@ -316,17 +332,7 @@ impl Scene {
             constraints: self.constraints.iter().filter(|(_, table)| owns(table.body())).cloned().collect(),
             obstacles: self.obstacles.clone(),
             tools: self.tools.clone(),
-            contacts: self
-                .contacts
-                .iter()
-                .filter(|(_, table)| {
-                    let body = table.between.iter().find(|name| owners.of.contains_key(*name));
-                    body.map_or(index == 0 || table.between.iter().any(|name| name == "all"), |name| {
-                        owns(name)
-                    })
-                })
-                .cloned()
-                .collect(),
+            contacts,
             loads: self.loads.iter().filter(|(_, load)| on_part(load.on())).cloned().collect(),
             outputs,
             view,

@@ -5,7 +5,7 @@ use std::fmt;
 
 use pliant_geometry::{Labels, Mesh};
 
-use crate::assemble::{Built, labels_of};
+use crate::assemble::{Built, labels_of, touches};
 use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, ViewTable, VtuTable};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
@@ -32,6 +32,13 @@ impl ViewTable {
 }
 
 impl Built {
+    /// Whether a body of a name, or any one, touches something.
+    pub fn touches(&self, on: Option<&str>) -> bool {
+        let Some(contacts) = &self.contacts else { return false };
+        let mut bodies = self.model.bodies.iter();
+        bodies.any(|body| on.is_none_or(|on| body.name == on) && touches(contacts, body))
+    }
+
     /// The labels of a body or a surface by name, or of all bodies.
     pub fn labels(&self, on: Option<&str>) -> Labels {
         labels_of(&self.model, &self.bodies, &self.surfaces, on)
@@ -93,6 +100,9 @@ impl Scene {
     pub fn shown_as(&self, view: &ViewTable, every: f64) -> VtuTable {
         let mut data = vec![FieldName::Displacement];
         data.extend(self.field_of(view).filter(|field| *field != FieldName::Displacement));
+        if view.contacts && !data.contains(&FieldName::ContactForce) {
+            data.push(FieldName::ContactForce);
+        }
         if view.critical && !data.contains(&FieldName::ElementStep) {
             data.push(FieldName::ElementStep);
         }

@@ -206,6 +206,11 @@ impl World {
         labels
     }
 
+    /// Whether a body of a name, or any one, touches something.
+    pub fn touches(&self, on: Option<&str>) -> bool {
+        self.participants.iter().any(|part| part.built.touches(on))
+    }
+
     /// The labels that a view hides.
     pub fn hidden(&self, view: &ViewTable) -> Vec<i32> {
         if view.hide.is_empty() { Vec::new() } else { view.hidden(&self.labels(view.on.as_deref())) }
@@ -240,7 +245,10 @@ impl Part {
 
     /// The fields of some that its bodies have.
     pub(crate) fn fields(&self, fields: &[FieldName]) -> Vec<FieldName> {
-        let has = |field: &FieldName| self.scene.bodies.iter().any(|(_, body)| field.is_of(body.model));
+        let has = |field: &FieldName| {
+            let is_of_bodies = self.scene.bodies.iter().any(|(_, body)| field.is_of(body.model));
+            is_of_bodies && (self.built.contacts.is_some() || !field.is_of_contact())
+        };
         fields.iter().copied().filter(has).collect()
     }
 

@@ -1,6 +1,7 @@
 //! A participant as observers read it. Numbers of any precision come out as `f64`.
 
 use pliant_contact::pose::Leg;
+use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
@@ -38,6 +39,11 @@ pub trait Instant {
 
     /// Force [N] of each contact on the rigid thing that it is with, in the order of the contacts.
     fn contact_forces(&self) -> Vec<[f64; 3]> {
+        Vec::new()
+    }
+
+    /// The nodes that may touch something, increasing, with what contacts do to them.
+    fn contact_nodes(&self) -> Vec<NodeContact> {
         Vec::new()
     }
 

@@ -144,7 +144,8 @@ fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
             && (held.node as usize) < model.node_count()
             && held.at.iter().all(|x| x.is_finite())
     };
-    if !led || !state.gripped.iter().all(grips) {
+    let slides = state.slip.is_empty() || state.slip.len() == model.node_count();
+    if !led || !slides || !state.gripped.iter().all(grips) {
         return false;
     }
     let rest = State::<R>::at_rest(model);

@@ -79,6 +79,8 @@ pub struct Explicit {
     pub critical_step: f64,
     /// Contacts with rigid things.
     pub contacts: Option<Arc<Contacts>>,
+    /// Displacements [m] of all nodes at the start; `None`: at rest.
+    pub start: Option<Arc<Vec<[f64; 3]>>>,
     /// The GPU; `None`: the CPU.
     #[cfg(feature = "gpu")]
     pub device: Option<Device>,
@@ -137,6 +139,7 @@ impl Part {
             on_unstable: OnUnstable::default(),
             critical_step: critical.assembled.step,
             contacts: None,
+            start: None,
             #[cfg(feature = "gpu")]
             device: None,
             #[cfg(feature = "gpu")]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pliant_contact::pose::Leg;
 use pliant_explicit::recover::{CellFields, Recovery};
 use pliant_explicit::stability::{Stability, cell_limit};
-use pliant_explicit::{Clock, Scalar, State, Wanted};
+use pliant_explicit::{Clock, NodeContact, Scalar, State, Wanted};
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuStepper;
 use pliant_mechanics::grip::Grip;
@@ -136,6 +136,10 @@ impl<R: Numeric> Instant for Solids<R> {
 
     fn contact_forces(&self) -> Vec<[f64; 3]> {
         self.solver.observable().contact_forces()
+    }
+
+    fn contact_nodes(&self) -> Vec<NodeContact> {
+        self.solver.observable().contact_nodes(&self.state)
     }
 
     fn leg(&self, rigid: usize) -> Option<&Leg> {

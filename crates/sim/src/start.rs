@@ -6,7 +6,7 @@ use pliant_mechanics::Model;
 use crate::failure::Failure;
 use crate::implicit::Implicit;
 use crate::kept::Kept;
-use crate::part::{Part, Precision};
+use crate::part::{Explicit, Method, Part, Precision};
 use crate::participant::Participant;
 use crate::solids::{Numeric, Solids};
 use crate::solver::Memory;
@@ -18,9 +18,26 @@ use crate::solver::Memory;
 pub(crate) fn begin(part: &Part) -> Result<Box<dyn Participant>, Failure> {
     Ok(match (part.method.bodies(), part.method.precision()) {
         (Some(bodies), _) => Box::new(Implicit::new(part, bodies)?),
-        (None, Precision::Single) => Box::new(Solids::<f32>::new(part, State::at_rest(&part.model))?),
-        (None, Precision::Double) => Box::new(Solids::<f64>::new(part, State::at_rest(&part.model))?),
+        (None, Precision::Single) => Box::new(Solids::<f32>::new(part, at_start(part)?)?),
+        (None, Precision::Double) => Box::new(Solids::<f64>::new(part, at_start(part)?)?),
     })
+}
+
+/// The state of solids at their start.
+///
+/// # Errors
+/// If the displacements that are given are of another model.
+fn at_start<R: Numeric>(part: &Part) -> Result<State<R>, Failure> {
+    let mut state = State::at_rest(&part.model);
+    if let Method::Explicit(Explicit { start: Some(start), .. }) = &part.method {
+        if start.len() != state.displacement.len() {
+            return Err(Failure::input(&"the displacements at the start are of another model"));
+        }
+        for (to, from) in state.displacement.iter_mut().zip(start.iter()) {
+            *to = from.map(R::of);
+        }
+    }
+    Ok(state)
 }
 
 /// The steps of a run whose state goes on with other numbers: how they are counted, their length [s], and the model.

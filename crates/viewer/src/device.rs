@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
 use pliant_mechanics::Energies;
+use pliant_picture::PointForce;
 use pliant_sim::gpu::PointValue;
 
 /// Wall time between two inspections of a state that lies on a device.
@@ -25,6 +26,8 @@ pub(crate) struct Seen {
     pub energies: Energies,
     /// What is held: point [m] and force [N].
     pub held: Vec<[[f64; 3]; 2]>,
+    /// Forces of contacts, where they are asked for.
+    pub contacts: Vec<PointForce>,
     /// The sample of that instant.
     pub sample: Vec<f64>,
     /// When it was; `None` where the next one is due at once.

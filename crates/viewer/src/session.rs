@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 use pliant_geometry::Vector3;
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
-use pliant_picture::{Subject, critical_cell, drawn_value, nodal_values, visible};
+use pliant_picture::{
+    PointForce, Subject, contact_forces, critical_cell, drawn_value, nodal_values, visible,
+};
 use pliant_scene::format::ViewTable;
 use pliant_scene::{Column, Live, World};
 use pliant_sim::gpu::{DevicePoints, PointValue};
@@ -84,6 +86,8 @@ pub struct Frame {
     pub energies: Energies,
     /// What is held: the point [m] and the force on the body [N] of each grip, hand first.
     pub held: Vec<[[f64; 3]; 2]>,
+    /// Forces of contacts on the nodes, where they are asked for.
+    pub contacts: Vec<PointForce>,
     /// The tool that the hand holds.
     pub tool: Option<String>,
     /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of obstacles.
@@ -666,6 +670,8 @@ impl<'s> Player<'s> {
                 }
                 seen.values =
                     playback.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
+                let contacts = playback.view.contacts.then(|| contact_forces(mesh, &seen.points));
+                seen.contacts = contacts.flatten().unwrap_or_default();
                 let critical = || critical_cell(&visible(mesh, &self.hidden));
                 seen.critical = playback.view.critical.then(critical).flatten().map(|(cell, _)| cell);
                 seen.energies = self.live.simulation.energies();
@@ -724,6 +730,7 @@ impl<'s> Player<'s> {
             frame.values.clone_from(&playback.seen.values);
             frame.energies = playback.seen.energies;
             frame.held.clone_from(&playback.seen.held);
+            frame.contacts.clone_from(&playback.seen.contacts);
             frame.sample.clone_from(&playback.seen.sample);
         }
         let device = self.world.device();

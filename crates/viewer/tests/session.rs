@@ -459,6 +459,22 @@ between = ['flap', 'floor']
 between = ['flap', 'grasper']
 ";
 
+/// Forces of contacts come with the frames where a view asks for them: those of the floor carry what lies on it.
+#[test]
+fn forces_of_contacts_are_shown_where_they_are_asked_for() {
+    let world = world(GRASPED);
+    let mut session = Session::start(world.clone(), || ()).unwrap();
+    session.order(Order::Step(2000));
+    let before = wait(&mut session, |frame| frame.steps == 2000);
+    assert!(before.contacts.is_empty() && world.touches(None));
+    session.order(Order::Show(Box::new(ViewTable { contacts: true, ..world.scene.view.clone() })));
+    let frame = wait(&mut session, |frame| !frame.contacts.is_empty());
+    let up: f64 = frame.contacts.iter().map(|[_, force]| force.z).sum();
+    let weight = 0.03 * 0.006 * 0.02 * 1000.0 * 9.81;
+    assert!((up / weight - 1.0).abs() < 0.1, "{up} N, weight {weight} N");
+    assert!(frame.contacts.iter().all(|[point, _]| frame.points.contains(point)));
+}
+
 /// The hand takes a tool where it is seen, closes its jaws, turns and lifts it; obstacles are not taken; all of it is repeated to the same bits.
 #[test]
 fn a_tool_is_led_by_hand_and_repeated() {

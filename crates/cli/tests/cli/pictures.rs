@@ -221,10 +221,15 @@ mod with_pictures {
         workshop.run(&["--step", "1e-3"]).done();
         workshop.write("full/letter.txt", "mine");
         workshop.write("empty/letter.txt", "mine");
-        let cases: [(&[&str], &str); 13] = [
+        let cases: [(&[&str], &str); 15] = [
             (&["render", "nowhere"], "nowhere"),
             (&["render", "out/case", "--fibres"], "needs `fibre` in `data`"),
             (&["render", "out/case", "--critical"], "needs `element-step` in `data`"),
+            (&["render", "out/case", "--contacts"], "needs `contact-force` in `data`"),
+            (
+                &["render", "case", "--contacts"],
+                "no body touches anything, so that there is no `contact-force`",
+            ),
             (&["render", "case", "--texture", "wood"], "possible values: none, skin"),
             (&["render", "empty"], "has no series of frames"),
             (&["render", "out/case", "--series", "skin"], "it has `fields`"),

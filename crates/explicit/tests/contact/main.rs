@@ -4,6 +4,7 @@ mod bodies;
 mod degenerate;
 mod friction;
 mod impact;
+mod nodal;
 mod rigid;
 mod thin;
 

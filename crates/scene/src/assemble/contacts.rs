@@ -7,6 +7,7 @@ use std::sync::Arc;
 use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::NO_NODE;
+use pliant_mechanics::model::Body;
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::pose::{Course, Pose};
 use pliant_sim::contact::shape::Shape;
@@ -22,6 +23,9 @@ const ROW: &str =
     "each row is `t,x,y,z,qw,qx,qy,qz`: a time in seconds, a position in metres, a unit quaternion";
 /// How far the length of a quaternion may be off 1.
 const UNIT: f64 = 1e-3;
+
+/// Overlap, over the size of all, above which bodies are in each other.
+pub(super) const OVERLAP: f64 = 1e-9;
 
 /// What to do about contact with other solvers.
 const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars";
@@ -55,6 +59,15 @@ impl Builder<'_> {
             all.contacts.extend(contacts.into_iter().flatten());
         }
         (!all.contacts.is_empty()).then(|| Arc::new(all))
+    }
+
+    /// Takes note of the bodies that touch something, unless a mistake leaves that open.
+    pub(super) fn note_touching(&mut self, contacts: Option<&Contacts>) {
+        if self.failed() {
+            return;
+        }
+        let bodies = self.assembly.bodies.iter();
+        self.touching = Some(bodies.map(|body| contacts.is_some_and(|all| touches(all, body))).collect());
     }
 
     /// The rigid thing of a table, or its two jaws.
@@ -305,14 +318,30 @@ impl Builder<'_> {
         Some(Surface { nodes, faces: halves })
     }
 
-    /// Remarks on parts of a body that are too near each other at rest to touch.
+    /// Remarks on parts of a body that are too near each other at rest to touch, and on gaps that are small for its faces.
     fn note_apart(&mut self, name: &str, surface: &Surface, thickness: f64) {
         let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
-        let count = Pairs::new(surface, None, thickness, place).set_apart_count();
+        let mut pairs = Pairs::new(surface, None, thickness, place);
+        let count = pairs.set_apart_count();
+        let mut narrow: Option<(f64, Vector3)> = None;
+        pairs.update(place, 0.0);
+        pairs.find(place, |pair| {
+            if pair.distance > 0.0 && narrow.is_none_or(|(least, _)| pair.distance < least) {
+                narrow = Some((pair.distance, place(pair.nodes[0])));
+            }
+        });
         if count > 0 {
             self.notes.push(format!(
                 "contact `{name}`: {} of nodes with faces or of edges never touch, since they are too near at rest",
                 counted(count, "pair")
+            ));
+        }
+        if let Some((gap, at)) = narrow {
+            let [x, y, z] = [at.x, at.y, at.z].map(number);
+            self.notes.push(format!(
+                "contact `{name}`: a gap of {} m at ({x}, {y}, {z}) m is less than a quarter of the edges there are on average; smaller \
+                 elements resolve it better",
+                number(gap)
             ));
         }
     }
@@ -360,7 +389,11 @@ impl Builder<'_> {
         pairs.find(place, |pair| {
             inside.push((table.thickness - pair.distance, place(pair.nodes[0])));
         });
-        inside.retain(|(depth, _)| *depth > 1e-9 * size);
+        inside.retain(|(depth, _)| *depth > OVERLAP * size);
+        if !inside.is_empty() && table.separate {
+            self.overlapping.get_or_insert_with(|| name.into());
+            return;
+        }
         let Some((depth, at)) = inside.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
         let [x, y, z] = [at.x, at.y, at.z].map(number);
         let [first, second] = &names;
@@ -369,7 +402,7 @@ impl Builder<'_> {
             counted(inside.len(), "place"),
             number(*depth)
         );
-        let help = "move one of them (`at` of its mesh), or make `thickness` smaller";
+        let help = "move one of them (`at` of its mesh), make `thickness` smaller, or let `separate = true` push them apart";
         self.error(&path, message, "overlapping", help);
     }
 
@@ -387,7 +420,7 @@ impl Builder<'_> {
         let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
         let inside = |places: &mut dyn Iterator<Item = Vector3>| -> Vec<(f64, Vector3)> {
             let gaps = places.map(|place| (rigid.near(&pose, &place).distance - table.thickness, place));
-            gaps.filter(|(gap, _)| *gap < -1e-9 * size).collect()
+            gaps.filter(|(gap, _)| *gap < -OVERLAP * size).collect()
         };
         let mut of = "node";
         let mut found = inside(&mut surface.nodes.iter().map(|&node| rest(node)));
@@ -401,14 +434,12 @@ impl Builder<'_> {
                 let corners = face.map(rest);
                 samples.iter().map(move |weights| (0..3).map(|k| corners[k] * weights[k]).sum())
             }));
-            // Faces hang into a round thing, on which their corners lie, by up to edge²/(8 R); more than a tenth of it is no touch any more.
-            let radius = rigid.shape.thinnest();
-            let hang = (longest * longest / (8.0 * radius)).min(0.1 * radius);
-            let rounded = matches!(
-                rigid.shape,
-                Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Cylinder { .. } | Shape::Grid(_)
-            );
-            found.retain(|(gap, _)| !rounded || -gap > hang);
+            let hangs = hang(rigid, longest);
+            found.retain(|(gap, _)| hangs == 0.0 || -gap > hangs);
+        }
+        if !found.is_empty() && table.separate {
+            self.overlapping.get_or_insert_with(|| name.into());
+            return;
         }
         let Some((gap, place)) = found.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
         let [x, y, z] = [place.x, place.y, place.z].map(number);
@@ -420,9 +451,31 @@ impl Builder<'_> {
             rigid.name,
             number(-gap)
         );
-        let help = "move one of them (`at`), or make `thickness` smaller; `inside = true` is for bodies within an obstacle";
+        let help = "move one of them (`at`), make `thickness` smaller, or let `separate = true` push them apart; \
+                    `inside = true` is for bodies within an obstacle";
         self.error(&["contact", name, "between"], message, "overlapping", help);
     }
+}
+
+/// How deep [m] faces with edges of a length [m] hang into a round thing on which their corners lie: by up to edge²/(8 R). More than a tenth of it is
+/// no touch any more.
+pub(super) fn hang(rigid: &Rigid, edge: f64) -> f64 {
+    let radius = rigid.shape.thinnest();
+    match rigid.shape {
+        Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Cylinder { .. } | Shape::Grid(_) => {
+            (edge * edge / (8.0 * radius)).min(0.1 * radius)
+        }
+        _ => 0.0,
+    }
+}
+
+/// Whether a body touches something.
+pub(crate) fn touches(contacts: &Contacts, body: &Body) -> bool {
+    let mut surfaces = contacts.contacts.iter().flat_map(|contact| {
+        let other = if let With::Body(other) = &contact.with { Some(other) } else { None };
+        std::iter::once(&contact.surface).chain(other)
+    });
+    surfaces.any(|surface| body.all_nodes().any(|node| surface.nodes.binary_search(&node).is_ok()))
 }
 
 /// The poses of a table. Empty lines, a header and what follows a # are passed over.

@@ -224,6 +224,9 @@ impl Builder<'_> {
         if !matches!(target, Some(None)) {
             self.check_labels_of_view();
         }
+        if view.contacts {
+            self.check_contacts_of_view(target);
+        }
         let Some(ColourBy::Field(field)) = view.colour else { return };
         match target {
             Some(None) => return,
@@ -236,6 +239,10 @@ impl Builder<'_> {
                         model.word(),
                         field.name()
                     );
+                    let help = "leave `on` out, to see the body itself";
+                    self.error(&["view", "colour"], message, "not on a surface", help);
+                } else if field.is_of_contact() {
+                    let message = format!("surfaces have no `{}`", field.name());
                     let help = "leave `on` out, to see the body itself";
                     self.error(&["view", "colour"], message, "not on a surface", help);
                 } else {
@@ -262,6 +269,22 @@ impl Builder<'_> {
             let at = if asked.is_some() { "component" } else { "colour" };
             let message = format!("`{}` needs another `component`", field.name());
             self.error(&["view", at], message, "here", help);
+        }
+    }
+
+    /// Refuses forces of contacts where there are none.
+    fn check_contacts_of_view(&mut self, target: Option<Option<Target>>) {
+        let path = ["view", "contacts"];
+        match target {
+            Some(None) => {}
+            Some(Some(Target::Surface(_))) => {
+                let help = "leave `on` out, to see the body itself";
+                self.error(&path, "surfaces have no contacts", "not on a surface", help);
+            }
+            Some(Some(Target::Body(body))) => {
+                self.refuse_other_fields(&[FieldName::ContactForce], Some(body), &path);
+            }
+            None => self.refuse_other_fields(&[FieldName::ContactForce], None, &path),
         }
     }
 
@@ -356,7 +379,33 @@ impl Builder<'_> {
             let given = self.source().node(&[path, &[index_text.as_str()]].concat()).is_some();
             let at = if given { [path, &[index_text.as_str()]].concat() } else { path.to_vec() };
             self.error(&at, message, "no such field", help);
+        } else {
+            self.refuse_fields_without_contact(fields, body, path);
         }
+    }
+
+    /// Refuses fields of contacts where no chosen body touches anything.
+    fn refuse_fields_without_contact(&mut self, fields: &[FieldName], body: Option<usize>, path: &[&str]) {
+        let Some(touching) = &self.touching else { return };
+        let chosen = touching.iter().enumerate().filter(|(index, _)| body.is_none_or(|body| body == *index));
+        let Some(index) = fields.iter().position(|field| field.is_of_contact()) else { return };
+        if chosen.into_iter().any(|(_, touches)| *touches) {
+            return;
+        }
+        let who = match body {
+            Some(body) => format!("`{}` touches", self.bodies[body].name),
+            None => "no body touches".into(),
+        };
+        let what = if body.is_some() { "nothing" } else { "anything" };
+        let message = format!("{who} {what}, so that there is no `{}`", fields[index].name());
+        let name = body.map_or("liver", |body| self.bodies[body].name.as_str()).to_owned();
+        let help = format!(
+            "add a contact: `[contact.NAME]` with `between = [\"{name}\", …]`, or leave the field out"
+        );
+        let index_text = index.to_string();
+        let own = [path, &[index_text.as_str()]].concat();
+        let at = if self.source().node(&own).is_some() { own } else { path.to_vec() };
+        self.error(&at, message, "no contact", help);
     }
 
     fn check_csv(&mut self, table: &CsvTable, path: &[&str]) {
@@ -401,7 +450,7 @@ impl Builder<'_> {
             return;
         }
         let of_nodes = [FieldName::Rotation, FieldName::Reaction, FieldName::ReactionMoment];
-        if let Some(field) = fields.iter().find(|field| of_nodes.contains(field)) {
+        if let Some(field) = fields.iter().find(|field| of_nodes.contains(field) || field.is_of_contact()) {
             let message = format!("surfaces have no `{}`", field.name());
             self.error(path, message, "not on a surface", "write it on the body");
             return;

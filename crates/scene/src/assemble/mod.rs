@@ -15,6 +15,7 @@ mod mesh_files;
 mod meshes;
 mod node_vectors;
 mod obstacles;
+mod separate;
 mod sheets;
 mod surfaces;
 mod ties;
@@ -36,6 +37,7 @@ use crate::nearest::nearest;
 use crate::scene::Scene;
 use crate::source::Source;
 
+pub(crate) use contacts::touches;
 pub use mesh_files::SizeDoubt;
 pub(crate) use meshes::MeshOrigin;
 pub(crate) use ties::{Placed, attach, holds_nothing};
@@ -53,6 +55,8 @@ pub struct Built {
     pub surfaces: Vec<Mesh>,
     /// Contacts with obstacles and tools.
     pub contacts: Option<Arc<Contacts>>,
+    /// Displacements [m] of all nodes at the start, where bodies were pushed apart.
+    pub pushed: Option<Arc<Vec<[f64; 3]>>>,
     /// Doubts that did not keep the model from being built.
     pub warnings: Vec<Diagnostic>,
     /// What a user may want to know, a sentence each.
@@ -212,6 +216,8 @@ pub fn build_watched(
         surfaces: Vec::new(),
         out: scene.doubts.clone(),
         notes: Vec::new(),
+        touching: None,
+        overlapping: None,
     };
     builder.check_models();
     builder.add_bodies();
@@ -227,11 +233,13 @@ pub fn build_watched(
     builder.add_constraints();
     builder.add_loads();
     let contacts = builder.contacts();
+    builder.note_touching(contacts.as_deref());
     builder.check_outputs();
     builder.check_view();
     builder.check_free_bodies();
     builder.check_held();
     let start = if builder.failed() { None } else { builder.start() };
+    let pushed = if builder.failed() { None } else { builder.separate(contacts.as_deref()) };
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }
@@ -240,7 +248,7 @@ pub fn build_watched(
     let implicit = start.map(|start| {
         Arc::new(ImplicitBodies { model: Arc::new(assembly), cells, control, start, surface: curved })
     });
-    Ok(Built { model, implicit, bodies, surfaces, contacts, warnings, notes })
+    Ok(Built { model, implicit, bodies, surfaces, contacts, pushed, warnings, notes })
 }
 
 /// The labels of a body or a surface by name, or of all bodies.
@@ -271,6 +279,10 @@ struct Builder<'s> {
     surfaces: Vec<Mesh>,
     out: Vec<Diagnostic>,
     notes: Vec<String>,
+    /// Whether each body touches something, once that is known.
+    touching: Option<Vec<bool>>,
+    /// A contact whose bodies overlap at the start, and are to be pushed apart.
+    overlapping: Option<String>,
 }
 
 /// What a load or an output acts on.

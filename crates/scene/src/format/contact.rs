@@ -252,4 +252,8 @@ pub struct ContactTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub thickness: f64,
+    /// Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their nodes. The shape at rest stays as it is, so that
+    /// the run starts deformed. Without it they are refused.
+    #[serde(default)]
+    pub separate: bool,
 }

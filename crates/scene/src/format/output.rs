@@ -79,11 +79,21 @@ pub enum FieldName {
     AxialForce,
     /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity holds to about 0.1.
     SurfaceStrain,
+    /// Sum of the forces [N] of contacts on a node.
+    ContactForce,
+    /// Pressure of contacts [Pa]: the force on a node along their normals, over its share of the deformed faces that it presses on, a third of
+    /// each triangle. Zero of nodes that touch nothing; not a number of nodes that cannot.
+    ContactPressure,
+    /// Least signed distance [m] of a node from the obstacles, tools and bodies that it may touch, less the `thickness` of the contact; bodies
+    /// count up to a quarter of a mean edge. Not a number where there is none.
+    Gap,
+    /// How far [m] a node has slid on what it touches since its touch began; not a number where it touches nothing.
+    Slip,
 }
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 34] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
@@ -114,6 +124,10 @@ impl FieldName {
         Self::AxialStretch,
         Self::AxialForce,
         Self::SurfaceStrain,
+        Self::ContactForce,
+        Self::ContactPressure,
+        Self::Gap,
+        Self::Slip,
     ];
 
     /// The name in files.
@@ -149,6 +163,10 @@ impl FieldName {
             Self::AxialStretch => "axial-stretch",
             Self::AxialForce => "axial-force",
             Self::SurfaceStrain => "surface-strain",
+            Self::ContactForce => "contact-force",
+            Self::ContactPressure => "contact-pressure",
+            Self::Gap => "gap",
+            Self::Slip => "slip",
         }
     }
 
@@ -160,15 +178,16 @@ impl FieldName {
     /// Its unit; empty for none.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Displacement | Self::Thickness | Self::CurrentThickness => "m",
+            Self::Displacement | Self::Thickness | Self::CurrentThickness | Self::Gap | Self::Slip => "m",
             Self::Velocity => "m/s",
             Self::Rotation => "rad",
-            Self::Reaction | Self::AxialForce => "N",
+            Self::Reaction | Self::AxialForce | Self::ContactForce => "N",
             Self::ReactionMoment => "N m",
             Self::CauchyStress
             | Self::Pk2Stress
             | Self::VonMises
             | Self::Pressure
+            | Self::ContactPressure
             | Self::StressTop
             | Self::StressMiddle
             | Self::StressBottom => "Pa",
@@ -221,6 +240,10 @@ impl FieldName {
             Self::AxialStretch => "axial stretch",
             Self::AxialForce => "axial force",
             Self::SurfaceStrain => "strain at the surface",
+            Self::ContactForce => "contact force",
+            Self::ContactPressure => "contact pressure",
+            Self::Gap => "gap",
+            Self::Slip => "slip",
         }
     }
 
@@ -232,7 +255,8 @@ impl FieldName {
             | Self::Rotation
             | Self::Reaction
             | Self::ReactionMoment
-            | Self::Fibre => 3,
+            | Self::Fibre
+            | Self::ContactForce => 3,
             Self::CauchyStress
             | Self::Pk2Stress
             | Self::GreenStrain
@@ -256,16 +280,25 @@ impl FieldName {
             | Self::CurrentThickness
             | Self::AxialStretch
             | Self::AxialForce
-            | Self::SurfaceStrain => 1,
+            | Self::SurfaceStrain
+            | Self::ContactPressure
+            | Self::Gap
+            | Self::Slip => 1,
         }
     }
 
     /// True for fields that live on nodes.
     pub fn is_nodal(self) -> bool {
-        matches!(
+        let moved = matches!(
             self,
             Self::Displacement | Self::Velocity | Self::Rotation | Self::Reaction | Self::ReactionMoment
-        )
+        );
+        moved || self.is_of_contact()
+    }
+
+    /// True for fields of bodies that touch something.
+    pub fn is_of_contact(self) -> bool {
+        matches!(self, Self::ContactForce | Self::ContactPressure | Self::Gap | Self::Slip)
     }
 
     /// True for fields that bodies of a model have.
@@ -276,7 +309,11 @@ impl FieldName {
             | Self::EnergyDensity
             | Self::Pk2Stress
             | Self::GreenStrain
-            | Self::DeformationGradient => model != BodyModel::Shell,
+            | Self::DeformationGradient
+            | Self::ContactForce
+            | Self::ContactPressure
+            | Self::Gap
+            | Self::Slip => model != BodyModel::Shell,
             Self::Pressure | Self::VolumeRatio | Self::CellVolumeRatio | Self::Fibre | Self::FibreStretch => {
                 matches!(model, BodyModel::Solid | BodyModel::Membrane)
             }

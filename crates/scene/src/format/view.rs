@@ -66,6 +66,10 @@ pub struct ViewTable {
     /// Whether fibres are drawn on the surface and in a section, as short lines that follow the deformation.
     #[serde(default)]
     pub fibres: bool,
+    /// Whether the forces of contacts are drawn, through the bodies: a dot at each node that touches something, and an arrow along the force on it. The
+    /// note tells what the longest one stands for.
+    #[serde(default)]
+    pub contacts: bool,
     /// Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat.
     #[serde(default)]
     pub critical: bool,

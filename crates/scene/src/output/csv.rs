@@ -127,6 +127,8 @@ pub(crate) const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "exter
 /// Parts of the internal energy of shells.
 const SHELL_ENERGIES: [&str; 3] = ["membrane", "bending", "drilling"];
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
+/// Weights of nodes of a cell that are round-off: the point lies on others.
+const ROUNDING: f64 = 1e-9;
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
 impl Own {
@@ -224,8 +226,10 @@ impl Own {
         if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built().implicit, frame.now.shells()) {
             self.shells.fill(&part.model, state, &of_cells);
         }
+        let of_nodes =
+            fields::OfNodes::new(frame, self.probes.iter().flat_map(|probe| &probe.fields).copied());
         for probe in &self.probes {
-            probe.read(frame, cells.as_deref(), &self.shells, row);
+            probe.read(frame, &of_nodes, cells.as_deref(), &self.shells, row);
         }
     }
 }
@@ -446,6 +450,7 @@ impl Probe {
     fn read(
         &self,
         frame: &Frame<'_>,
+        of_nodes: &fields::OfNodes<'_, '_>,
         cells: Option<&dyn CellsNow>,
         shells: &fields::OfShells,
         row: &mut Vec<f64>,
@@ -460,9 +465,12 @@ impl Probe {
                 value[..3].copy_from_slice((carried(frame, point) - rest).as_slice());
             } else if field.is_nodal() {
                 for &(node, weight) in &self.weights {
-                    let nodal = fields::nodal(frame, field, node as usize);
+                    let nodal = of_nodes.value(field, node as usize);
                     for (v, n) in value.iter_mut().zip(nodal) {
-                        *v += weight * n;
+                        // A node without a value counts where the point is not on another one.
+                        if !n.is_nan() || weight.abs() > ROUNDING {
+                            *v += weight * n;
+                        }
                     }
                 }
             } else {

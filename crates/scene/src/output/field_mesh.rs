@@ -254,9 +254,10 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
     let mapping = &model.surfaces[surface].mapping;
     let (nodal, of_cells): (Vec<FieldName>, Vec<FieldName>) =
         wanted.iter().partition(|field| field.is_nodal());
+    let of_nodes = fields::OfNodes::new(frame, nodal.iter().copied());
     for field in nodal {
         let value = |node| {
-            let value = fields::nodal(frame, field, node);
+            let value = of_nodes.value(field, node);
             [value[0], value[1], value[2]]
         };
         let parent: Vec<[f64; 3]> = (0..model.node_count()).map(value).collect();
@@ -449,13 +450,12 @@ fn fill_shells(
 }
 
 fn fill_nodal(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], nodes: &[u32]) {
+    let of_nodes = fields::OfNodes::new(frame, wanted.iter().copied());
     for &field in wanted.iter().filter(|field| field.is_nodal()) {
-        let value = |&node: &u32| {
-            let value = fields::nodal(frame, field, node as usize);
-            [value[0], value[1], value[2]]
-        };
+        let components = field.components();
+        let value = |&node: &u32| of_nodes.value(field, node as usize).into_iter().take(components);
         let values = nodes.iter().flat_map(value).collect();
-        mesh.point_data.insert(field.name().into(), DataArray { components: 3, values });
+        mesh.point_data.insert(field.name().into(), DataArray { components, values });
     }
 }
 

@@ -1,6 +1,7 @@
 //! Values of the fields a user can ask for, at nodes and cells.
 
 use nalgebra::Matrix3;
+use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
 use pliant_implicit::{Assembly, ShellFields, State};
 use pliant_mechanics::tensor::Symmetric;
@@ -12,16 +13,45 @@ use crate::format::FieldName;
 /// A value of up to nine numbers.
 pub(super) type Value = [f64; 9];
 
-/// The value of a nodal field on a node of the model; the first `components` numbers count.
-pub(super) fn nodal(frame: &Frame<'_>, field: FieldName, node: usize) -> Value {
-    let vector = match field {
-        FieldName::Velocity => frame.now.velocity(node),
-        FieldName::Reaction => frame.now.nodal_reaction(node),
-        FieldName::ReactionMoment => frame.now.nodal_reaction_moment(node),
-        FieldName::Rotation => frame.now.rotation(node),
-        _ => frame.now.displacement(node),
-    };
-    padded(&vector)
+/// Nodal fields at an instant.
+pub(super) struct OfNodes<'f, 'p> {
+    frame: &'f Frame<'p>,
+    /// Nodes that may touch something, increasing; empty where no field of contacts is wanted.
+    touching: Vec<NodeContact>,
+}
+
+impl<'f, 'p> OfNodes<'f, 'p> {
+    /// Finds those that are wanted.
+    pub fn new(frame: &'f Frame<'p>, mut wanted: impl Iterator<Item = FieldName>) -> Self {
+        let touching =
+            if wanted.any(FieldName::is_of_contact) { frame.now.contact_nodes() } else { Vec::new() };
+        Self { frame, touching }
+    }
+
+    /// The value of a field on a node of the model; the first `components` numbers count.
+    pub fn value(&self, field: FieldName, node: usize) -> Value {
+        let now = self.frame.now;
+        match field {
+            FieldName::Velocity => padded(&now.velocity(node)),
+            FieldName::Reaction => padded(&now.nodal_reaction(node)),
+            FieldName::ReactionMoment => padded(&now.nodal_reaction_moment(node)),
+            FieldName::Rotation => padded(&now.rotation(node)),
+            _ if field.is_of_contact() => self.of_contact(field, node),
+            _ => padded(&now.displacement(node)),
+        }
+    }
+
+    fn of_contact(&self, field: FieldName, node: usize) -> Value {
+        let found = self.touching.binary_search_by_key(&node, |own| own.node as usize);
+        let own = found.ok().map(|at| &self.touching[at]);
+        let number = match field {
+            FieldName::ContactForce => return padded(&own.map_or([0.0; 3], |own| own.force)),
+            FieldName::ContactPressure => own.and_then(|own| own.pressure),
+            FieldName::Gap => own.and_then(|own| own.gap),
+            _ => own.and_then(|own| own.slip),
+        };
+        padded(&[number.unwrap_or(f64::NAN)])
+    }
 }
 
 /// The value of a cell field; the first `components` numbers count.

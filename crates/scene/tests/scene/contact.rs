@@ -3,7 +3,7 @@
 use super::static_solids::{last_row, resumes, run, world};
 
 /// A block of 40 × 40 × 20 mm of tissue on a floor, a ball that is pressed into its top.
-fn pressed(run: &str, more: &str) -> String {
+pub(super) fn pressed(run: &str, more: &str) -> String {
     format!(
         "[scene]\nuntil = 0.5\n[run]\n{run}\n\
          [law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 5e3\npoisson-ratio = 0.4\n\
@@ -39,7 +39,7 @@ fn a_tool_presses_a_body_onto_an_obstacle() {
 }
 
 /// A block on a floor with a smaller lid of other cells that falls onto it and is pulled along by gravity.
-fn stacked(run: &str, more: &str) -> String {
+pub(super) fn stacked(run: &str, more: &str) -> String {
     format!(
         "[scene]\nuntil = 1.0\ngravity = [1, 0, -9.81]\n[run]\n{run}\n\
          [law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 2e4\npoisson-ratio = 0.4\n\

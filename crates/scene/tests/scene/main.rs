@@ -3,6 +3,7 @@
 mod bars;
 mod collective;
 mod contact;
+mod contact_fields;
 mod corpus;
 mod grasper;
 mod grips;

@@ -160,7 +160,7 @@ impl App {
 
     /// What is drawn beside colours; whether another surface is asked for.
     fn shape(&mut self, ui: &mut egui::Ui) -> bool {
-        let before = Surface::of(&self.view);
+        let before = (Surface::of(&self.view), self.view.contacts);
         let scene = &self.world.scene;
         let bodies = scene.bodies.iter().map(|(name, _)| name);
         let names: Vec<&String> = bodies.chain(scene.surfaces.iter().map(|(name, _)| name)).collect();
@@ -193,13 +193,16 @@ impl App {
         }
         ui.checkbox(&mut self.view.fibres, "Fibres");
         ui.checkbox(&mut self.view.critical, "Element that sets the step");
+        if self.world.touches(self.view.on.as_deref()) {
+            ui.checkbox(&mut self.view.contacts, "Forces of contacts");
+        }
         ui.checkbox(&mut self.style.wireframe, "Wireframe");
         let mut skin = self.style.texture == Texture::Skin;
         if ui.checkbox(&mut skin, "Skin").changed() {
             self.style.texture = if skin { Texture::Skin } else { Texture::None };
         }
         (self.style.fibres, self.style.critical) = (self.view.fibres, self.view.critical);
-        before != Surface::of(&self.view)
+        before != (Surface::of(&self.view), self.view.contacts)
     }
 
     fn hand(&mut self, ui: &mut egui::Ui) {
@@ -226,6 +229,8 @@ impl App {
         if models.is_empty() {
             return vec![FieldName::Displacement];
         }
-        all.filter(|field| models.iter().any(|&model| field.is_of(model))).collect()
+        let touches = self.world.touches(on.map(String::as_str));
+        let is_of = |field: &FieldName| models.iter().any(|&model| field.is_of(model));
+        all.filter(|field| is_of(field) && (touches || !field.is_of_contact())).collect()
     }
 }

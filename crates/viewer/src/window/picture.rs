@@ -5,7 +5,9 @@ use eframe::egui::{
 };
 use eframe::egui_wgpu::Callback;
 use pliant_geometry::Vector3;
-use pliant_picture::{Background, Camera, Plane, Style, Subject, ticks};
+use pliant_picture::{
+    Background, Camera, Plane, Style, Subject, arrow_note, arrow_unit, largest_force, ticks,
+};
 
 use super::App;
 use super::paint::Paint;
@@ -18,6 +20,8 @@ const ARROW: f32 = 120.0;
 /// Angle [rad] by which a tool turns for a point on the screen, and by which jaws open for one of the wheel.
 const TURN: f64 = 0.01;
 const OPEN: f64 = 0.002;
+/// Radius of a point of contact on the screen.
+const DOT: f32 = 2.5;
 /// Radius of a pin on the screen.
 const PIN_SIZE: f32 = 5.0;
 const PIN: Color32 = Color32::from_rgb(20, 90, 170);
@@ -107,6 +111,7 @@ impl App {
         };
         ui.painter().add(Callback::new_paint_callback(rect, paint));
         let painter = ui.painter_at(rect);
+        self.draw_contacts(&painter, rect);
         self.draw_held(&painter, rect);
         if style.range.is_some() {
             self.draw_scale(&painter, rect);
@@ -226,6 +231,21 @@ impl App {
             .map(|(pin, _)| pin)
     }
 
+    /// The forces of contacts as arrows.
+    fn draw_contacts(&self, painter: &egui::Painter, rect: Rect) {
+        let forces = &self.frame.contacts;
+        let unit = arrow_unit(&self.frame.points, largest_force(forces));
+        for [point, force] in forces {
+            let ends = [*point, point + force * unit].map(|end| to_screen(&self.camera, &end, rect));
+            let [Some(from), Some(to)] = ends else { continue };
+            painter.circle(from, DOT, FORCE, Stroke::new(1.0, Color32::WHITE));
+            if from.distance(to) > 2.0 {
+                painter.arrow(from, to - from, Stroke::new(3.0, Color32::WHITE));
+                painter.arrow(from, to - from, Stroke::new(1.5, FORCE));
+            }
+        }
+    }
+
     /// The force of the hand as an arrow with its newtons, the longest where it was strongest; and pins.
     fn draw_held(&self, painter: &egui::Painter, rect: Rect) {
         let hand = self.holding.is_some();
@@ -328,6 +348,13 @@ impl App {
         ));
         let energies = &frame.energies;
         lines.push(format!("kinetic {:.3e} J, internal {:.3e} J", energies.kinetic, energies.internal));
+        if !frame.contacts.is_empty() {
+            lines.push(format!(
+                "{} nodes touch, {}",
+                frame.contacts.len(),
+                arrow_note(largest_force(&frame.contacts))
+            ));
+        }
         lines.extend(self.told_of_device());
         let ink = self.ink();
         let galley = painter.layout_no_wrap(lines.join("\n"), FontId::proportional(14.0), ink);

@@ -1,0 +1,183 @@
+//! What contacts do to single nodes: forces, pressures, gaps, and how far nodes slide.
+//! The pressure is p = |N| / A: N is the sum of the impulses on a node along the normals of its contacts, and A = Σ ⅓ max(0, −a·N/|N|) is its
+//! share of the vector areas a of its deformed faces, outward, that N presses on.
+
+use nalgebra::Vector3;
+use pliant_contact::shape::Near;
+use pliant_contact::touch::{Contacts, With};
+use pliant_mechanics::tensor::Vector;
+
+use super::{AtRigid, Own, Touching, over};
+
+/// Gap, over [`AtRigid::margin`], up to which a touch lasts that nothing bears on.
+const LASTS: f64 = 0.1;
+
+/// A node of a surface that may touch, at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeContact {
+    /// Its number in the model.
+    pub node: u32,
+    /// Sum of the forces of contacts on it [N].
+    pub force: Vector<f64>,
+    /// Force along the normal over its share of the deformed faces [Pa]; `None` without faces.
+    pub pressure: Option<f64>,
+    /// Least signed distance to what it may touch, less the distance that is kept [m]; `None` where no body and no thing is near.
+    pub gap: Option<f64>,
+    /// How far it has slid since its touch began [m]; `None` where it touches nothing.
+    pub slip: Option<f64>,
+}
+
+/// Triangles of all surfaces of contacts, each once, in places of their nodes among `numbers`.
+pub(super) fn faces(contacts: &Contacts, numbers: &[u32]) -> Vec<[u32; 3]> {
+    let surfaces = contacts.contacts.iter().flat_map(|contact| {
+        let other = if let With::Body(other) = &contact.with { Some(other) } else { None };
+        std::iter::once(&contact.surface).chain(other)
+    });
+    let place = |node: u32| numbers.partition_point(|&known| known < node) as u32;
+    let mut faces: Vec<[u32; 3]> =
+        surfaces.flat_map(|surface| &surface.faces).map(|face| face.map(place)).collect();
+    faces.sort_unstable();
+    faces.dedup();
+    faces
+}
+
+impl Touching {
+    /// All nodes that may touch, increasing, at the instant whose forces were found last. `slip` is that of [`State`](crate::State).
+    pub fn nodal(&self, slip: &[Option<f64>]) -> Vec<NodeContact> {
+        let (pressures, gaps) = (self.pressures(), self.gaps());
+        let parts = self.numbers.iter().zip(&self.nodes).zip(pressures).zip(gaps);
+        parts
+            .map(|(((&node, own), pressure), gap)| NodeContact {
+                node,
+                force: if own.near { over(&(own.then - own.free), &own.own).into() } else { [0.0; 3] },
+                pressure,
+                gap: Some(gap).filter(|gap| gap.is_finite()),
+                slip: slip.get(node as usize).copied().flatten(),
+            })
+            .collect()
+    }
+
+    /// Sums of the impulses [N] on each node along the normals of its contacts.
+    fn normal_forces(&self) -> Vec<Vector3<f64>> {
+        let lifted = self.nodes.iter().map(|node| if node.near { node.lifted } else { Vector3::zeros() });
+        let mut all: Vec<Vector3<f64>> = lifted.collect();
+        for row in &self.rows {
+            for (node, weight) in row.parts() {
+                all[node] += row.normal * (row.push * weight);
+            }
+        }
+        // Jaws that hold a node press on it along their normal.
+        for own in &self.own {
+            let Own::Rigid(own @ AtRigid { grips: true, .. }) = own else { continue };
+            let rigid = &self.contacts.rigids[own.rigid];
+            for &number in &own.surface.nodes {
+                let node = &self.nodes[number as usize];
+                if node.near && node.mobility != node.own {
+                    let Near { normal, .. } = own.passage.near(rigid, &node.then);
+                    let held = over(&(node.then - node.free), &node.own) - node.borne;
+                    all[number as usize] += normal * normal.dot(&held).max(0.0);
+                }
+            }
+        }
+        all
+    }
+
+    fn pressures(&self) -> Vec<Option<f64>> {
+        let forces = self.normal_forces();
+        let directions: Vec<Vector3<f64>> =
+            forces.iter().map(|force| force.try_normalize(0.0).unwrap_or_default()).collect();
+        // Of faces that look against the force, and along it: sheets are pressed on from both sides.
+        let mut shares = vec![[0.0; 2]; self.nodes.len()];
+        let mut has_faces = vec![false; self.nodes.len()];
+        for face in &self.faces {
+            let [a, b, c] = face.map(|node| self.nodes[node as usize].now);
+            let third = (b - a).cross(&(c - a)) / 6.0;
+            for node in face.map(|node| node as usize) {
+                let along = third.dot(&directions[node]);
+                shares[node][0] += (-along).max(0.0);
+                shares[node][1] += along.max(0.0);
+                has_faces[node] = true;
+            }
+        }
+        let pressure = |((force, [against, along]), has_faces): ((&Vector3<f64>, [f64; 2]), bool)| {
+            let (force, area) = (force.norm(), against.max(along));
+            has_faces.then_some(if force > 0.0 && area > 0.0 { force / area } else { 0.0 })
+        };
+        forces.iter().zip(shares).zip(has_faces).map(pressure).collect()
+    }
+
+    /// Least gaps [m]; infinite where nothing is near.
+    fn gaps(&self) -> Vec<f64> {
+        let mut gaps = vec![f64::INFINITY; self.nodes.len()];
+        for (contact, own) in self.contacts.contacts.iter().zip(&self.own) {
+            let offset = contact.touch.offset;
+            match own {
+                Own::Rigid(own) => {
+                    let rigid = &self.contacts.rigids[own.rigid];
+                    for &node in &own.surface.nodes {
+                        let now = &self.nodes[node as usize].now;
+                        let gap = &mut gaps[node as usize];
+                        *gap = gap.min(own.passage.distance_before(rigid, now) - offset);
+                    }
+                }
+                Own::Bodies(pairs, _) => pairs.find(
+                    |node| self.nodes[node as usize].now,
+                    |pair| {
+                        if pair.weights[0] == 1.0 {
+                            let gap = &mut gaps[pair.nodes[0] as usize];
+                            *gap = gap.min(pair.distance - offset);
+                        }
+                    },
+                ),
+            }
+        }
+        gaps
+    }
+
+    /// Adds the ways [m] that nodes slide in the step whose forces were found last. Where several points bear on a node, their mean counts,
+    /// weighted by their impulses. A touch lasts while something bears on the node, or while it is as near as that.
+    pub fn slide(&mut self, slip: &mut [Option<f64>]) {
+        let Self { nodes, rows, slips, numbers, .. } = self;
+        slips.fill([0.0; 2]);
+        for row in rows.iter().filter(|row| row.push > 0.0) {
+            let place = row.parts().map(|(node, weight)| nodes[node].then * weight).sum::<Vector3<f64>>();
+            let way = across(&(place - row.carried), &row.normal);
+            for (node, weight) in row.parts() {
+                let load = weight.abs() * row.push;
+                slips[node] = [slips[node][0] + load, slips[node][1] + load * way];
+            }
+        }
+        let numbers = std::mem::take(numbers);
+        for (index, &number) in numbers.iter().enumerate() {
+            let slip = &mut slip[number as usize];
+            *slip = match (self.slips[index], *slip) {
+                ([load, ways], before) if load > 0.0 => Some(before.unwrap_or(0.0) + ways / load),
+                (_, Some(before)) => self.hovering(index).map(|way| before + way),
+                _ => None,
+            };
+        }
+        self.numbers = numbers;
+    }
+
+    /// The way [m] that a node slides in a step in which nothing bears on it; `None` if it leaves.
+    fn hovering(&self, index: usize) -> Option<f64> {
+        let node = Some(&self.nodes[index]).filter(|node| node.near)?;
+        let number = index as u32;
+        self.contacts.contacts.iter().zip(&self.own).find_map(|(contact, own)| match own {
+            Own::Rigid(own) => {
+                own.surface.nodes.binary_search(&number).ok()?;
+                let Near { distance, normal } =
+                    own.passage.near(&self.contacts.rigids[own.rigid], &node.then);
+                let near = distance - contact.touch.offset < LASTS * own.margin;
+                near.then(|| across(&(node.then - own.passage.carry(&node.now)), &normal))
+            }
+            // Its own part there is not known without a pair.
+            Own::Bodies(pairs, _) => pairs.near().binary_search(&number).ok().map(|_| 0.0),
+        })
+    }
+}
+
+/// Length [m] of a way across a normal.
+fn across(way: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
+    (way - normal * normal.dot(way)).norm()
+}

@@ -1,0 +1,313 @@
+//! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n, xᵢ += cᵢ n λ, λ = −g / Σ cᵢ².
+//! Passes over all contacts go on until nothing overlaps. The shape at rest stays, so that the run starts deformed; nodes inside of bodies follow
+//! harmonically. Leaves out: whether bodies could have been moved as a whole.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use nalgebra::Vector3 as Vector;
+use pliant_explicit::State;
+use pliant_explicit::recover::Recovery;
+use pliant_geometry::{Locator, SurfaceLocator, Vector3};
+use pliant_mechanics::model::FREE;
+use pliant_sim::contact::pairs::{Pairs, Surface};
+use pliant_sim::contact::touch::{Contact, Contacts, Rigid, With, lattice, parts_of};
+use pliant_sim::{counted, number};
+
+use super::Builder;
+use super::contacts::{OVERLAP, hang};
+
+/// Passes at most.
+const PASSES: usize = 400;
+/// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the latter is taken.
+const FACING: f64 = 0.3;
+/// Sweeps in which inner nodes follow.
+const SWEEPS: usize = 200;
+
+/// Points that are pushed along a normal: nodes with their weights.
+struct Row {
+    parts: Vec<(u32, f64)>,
+    normal: Vector3,
+    /// Distance [m] that they keep.
+    offset: f64,
+}
+
+/// Nodes that are pushed.
+struct Pushed {
+    places: Vec<Vector3>,
+    /// 1 along components that are free, else 0.
+    free: Vec<Vector3>,
+    /// Gap [m] that is left between what was pushed apart.
+    left: f64,
+    /// The deepest overlap [m] in a pass, and where.
+    deepest: (f64, Vector3),
+}
+
+impl Pushed {
+    fn push(&mut self, row: &Row) {
+        let place: Vector3 = row.parts.iter().map(|&(node, c)| self.places[node as usize] * c).sum();
+        let gap = row.normal.dot(&place) - row.offset;
+        self.push_by(row, gap);
+    }
+
+    /// Pushes points with a gap [m] < 0 apart.
+    fn push_by(&mut self, row: &Row, gap: f64) {
+        if gap >= 0.0 {
+            return;
+        }
+        if -gap > self.deepest.0 {
+            self.deepest = (-gap, self.places[row.parts[0].0 as usize]);
+        }
+        let along = |&(node, c): &(u32, f64)| {
+            c * c * row.normal.component_mul(&row.normal).dot(&self.free[node as usize])
+        };
+        let mobility: f64 = row.parts.iter().map(along).sum();
+        if mobility > 0.0 {
+            let push = (self.left - gap) / mobility;
+            for &(node, c) in &row.parts {
+                let at = node as usize;
+                self.places[at] += self.free[at].component_mul(&row.normal) * (c * push);
+            }
+        }
+    }
+}
+
+impl Builder<'_> {
+    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or cannot be.
+    pub(super) fn separate(&mut self, contacts: Option<&Contacts>) -> Option<Arc<Vec<[f64; 3]>>> {
+        let (contacts, name) = (contacts?, self.overlapping.clone()?);
+        let owners = self.assembly.constrained_components().ok()?;
+        let start = State::<f64>::at_rest(&self.assembly.model);
+        let at_rest = |(rest, u): (&[f64; 3], &[f64; 3])| Vector::from(*rest) + Vector::from(*u);
+        let before: Vec<Vector3> = self.assembly.rest.iter().zip(&start.displacement).map(at_rest).collect();
+        let size = before.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let is_free = |owner: &[u32; 3]| Vector3::from_fn(|c, _| if owner[c] == FREE { 1.0 } else { 0.0 });
+        let mut pushed = Pushed {
+            places: before.clone(),
+            free: owners.iter().map(is_free).collect(),
+            left: OVERLAP * size,
+            deepest: (0.0, Vector3::zeros()),
+        };
+        for pass in 0..=PASSES {
+            pushed.deepest.0 = 0.0;
+            contacts.contacts.iter().for_each(|contact| self.push_apart(contact, contacts, &mut pushed));
+            if pushed.deepest.0 <= OVERLAP * size {
+                break;
+            }
+            if pass == PASSES {
+                let (depth, at) = pushed.deepest;
+                self.refuse_overlap(&name, depth, &at);
+                return None;
+            }
+        }
+        let displacement = self.follow_inside(contacts, &owners, &before, &pushed.places, &start);
+        self.check_cells_apart(&name, &displacement, start)?;
+        self.note_pushed(&before, &pushed.places, OVERLAP * size);
+        Some(Arc::new(displacement))
+    }
+
+    fn refuse_overlap(&mut self, name: &str, depth: f64, at: &Vector3) {
+        let [x, y, z] = [at.x, at.y, at.z].map(number);
+        let message = format!(
+            "bodies cannot be pushed apart: an overlap of {} m at ({x}, {y}, {z}) m is left after {PASSES} passes",
+            number(depth)
+        );
+        let help = "move one of them (`at`), or release nodes that constraints hold there";
+        self.error(&["contact", name, "separate"], message, "still overlapping", help);
+    }
+
+    /// A pass over a contact.
+    fn push_apart(&self, contact: &Contact, contacts: &Contacts, pushed: &mut Pushed) {
+        let offset = contact.touch.offset;
+        match &contact.with {
+            &With::Rigid(rigid) => {
+                let is_solid = self.holder(&contact.surface).is_some_and(|body| {
+                    self.bodies[body].mesh.volume_blocks().any(|block| !block.is_empty())
+                });
+                push_out(&contacts.rigids[rigid], offset, &contact.surface, is_solid, pushed);
+            }
+            With::Body(other) => {
+                self.push_nodes_out(&contact.surface, other, pushed);
+                self.push_nodes_out(other, &contact.surface, pushed);
+                push_pairs(&contact.surface, Some(other), offset, pushed);
+            }
+            // What is near at rest never touches.
+            With::Itself => {}
+        }
+    }
+
+    /// The body whose nodes a surface has.
+    fn holder(&self, surface: &Surface) -> Option<usize> {
+        let &node = surface.nodes.first()?;
+        self.assembly.bodies.iter().position(|body| body.nodes.contains(&node))
+    }
+
+    /// Pushes nodes of a surface out of the cells of another body, the shortest way to its boundary.
+    fn push_nodes_out(&self, surface: &Surface, other: &Surface, pushed: &mut Pushed) {
+        let Some(body) = self.holder(other) else { return };
+        let (own, built) = (&self.assembly.bodies[body], &self.bodies[body]);
+        let mut mesh = built.mesh.clone();
+        for (point, node) in mesh.points.iter_mut().zip(own.all_nodes()) {
+            *point = pushed.places[node as usize];
+        }
+        let all: Vec<u32> = (0..built.boundary.faces.len() as u32).collect();
+        let cells = Locator::new(&mesh);
+        let faces = SurfaceLocator::new(&built.boundary, &all, &mesh.points);
+        for &node in &surface.nodes {
+            let at = pushed.places[node as usize];
+            let inside = cells.locate(at).is_some_and(|found| found.distance == 0.0);
+            let Some(on) = faces.closest(&at).filter(|_| inside) else { continue };
+            let Some(normal) = (on.position - at).try_normalize(pushed.left) else { continue };
+            let on = on.nodes.iter().zip(on.weights).map(|(&corner, weight)| (own.node(corner), -weight));
+            let parts = std::iter::once((node, 1.0)).chain(on).collect();
+            pushed.push(&Row { parts, normal, offset: 0.0 });
+        }
+    }
+
+    /// Displacements [m] of all nodes, where those inside of bodies are means of those around.
+    fn follow_inside(
+        &self,
+        contacts: &Contacts,
+        owners: &[[u32; 3]],
+        before: &[Vector3],
+        places: &[Vector3],
+        start: &State<f64>,
+    ) -> Vec<[f64; 3]> {
+        let model = &self.assembly.model;
+        let mut ways: Vec<Vector3> = places.iter().zip(before).map(|(now, then)| now - then).collect();
+        let surfaces = contacts.contacts.iter().flat_map(|contact| {
+            let other = if let With::Body(other) = &contact.with { Some(other) } else { None };
+            std::iter::once(&contact.surface).chain(other)
+        });
+        let mut stays: Vec<bool> = owners.iter().map(|owner| *owner != [FREE; 3]).collect();
+        surfaces.flat_map(|surface| &surface.nodes).for_each(|&node| stays[node as usize] = true);
+        let mut around = vec![BTreeSet::new(); places.len()];
+        for solid in &model.solids {
+            for cell in 0..solid.cells.len() {
+                let nodes = solid.cells.nodes(cell);
+                for &node in nodes.iter().filter(|&&node| !stays[node as usize]) {
+                    around[node as usize].extend(nodes.iter().copied().filter(|&other| other != node));
+                }
+            }
+        }
+        for _ in 0..SWEEPS {
+            for (node, around) in around.iter().enumerate().filter(|(_, around)| !around.is_empty()) {
+                let sum: Vector3 = around.iter().map(|&other| ways[other as usize]).sum();
+                ways[node] = sum / around.len() as f64;
+            }
+        }
+        let moved = ways.iter().zip(&start.displacement).map(|(way, u)| (Vector::from(*u) + way).into());
+        let mut displacement: Vec<[f64; 3]> = moved.collect();
+        model.follow(&mut displacement);
+        displacement
+    }
+
+    /// Refuses displacements that invert a cell; `None` then.
+    fn check_cells_apart(&mut self, name: &str, displacement: &[[f64; 3]], start: State<f64>) -> Option<()> {
+        let model = Arc::clone(&self.assembly.model);
+        let state = State { displacement: displacement.to_vec(), ..start };
+        let recovery = Recovery::new(&model, &state);
+        let all = model.solids.iter().enumerate();
+        let mut cells = all.flat_map(|(index, solid)| (0..solid.cells.len()).map(move |cell| (index, cell)));
+        // Of bars it is not a number.
+        let inverted = cells.find(|&(solid, cell)| recovery.cell(solid, cell).cell_volume_ratio <= 0.0);
+        let Some((solid, cell)) = inverted else { return Some(()) };
+        let own = &model.solids[solid];
+        let message = format!(
+            "pushing bodies apart would invert element {} of `{}`",
+            own.original[cell], model.bodies[own.body].name
+        );
+        let help = "move one of them (`at`): overlaps must be smaller than the elements there";
+        self.error(&["contact", name, "separate"], message, "too deep", help);
+        None
+    }
+
+    /// Tells how many nodes were pushed, and how far.
+    fn note_pushed(&mut self, before: &[Vector3], places: &[Vector3], least: f64) {
+        let ways = before.iter().zip(places).map(|(then, now)| (now - then).norm()).enumerate();
+        let moved: Vec<(usize, f64)> = ways.filter(|(_, way)| *way > least).collect();
+        let Some(&(node, way)) = moved.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
+        let [x, y, z] = [before[node].x, before[node].y, before[node].z].map(number);
+        let (body, _) = self.assembly.locate_node(node as u32);
+        self.notes.push(format!(
+            "{} that overlapped {} pushed apart before the run, by up to {} m at ({x}, {y}, {z}) m of `{}`",
+            counted(moved.len(), "node"),
+            if moved.len() == 1 { "was" } else { "were" },
+            number(way),
+            self.assembly.bodies[body].name
+        ));
+    }
+}
+
+/// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the body. A solid then draws back into itself.
+fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushed: &mut Pushed) {
+    let pose = rigid.at(0.0, None);
+    let thinnest = rigid.shape.thinnest();
+    let push = |parts: Vec<(u32, f64)>, inward: Vector3, hangs: f64, pushed: &mut Pushed| {
+        let place: Vector3 = parts.iter().map(|&(node, c)| pushed.places[node as usize] * c).sum();
+        let gap = |place: &Vector3| rigid.near(&pose, place).distance - offset + hangs;
+        let near = rigid.near(&pose, &place);
+        let (mut normal, mut depth) = (near.normal, gap(&place));
+        if depth < 0.0
+            && normal.dot(&inward) < FACING
+            && let Some(way) = way_out(&place, &inward, thinnest, gap)
+        {
+            (normal, depth) = (inward, -way);
+        }
+        pushed.push_by(&Row { parts, normal, offset: 0.0 }, depth);
+    };
+    let mut inward = vec![Vector3::zeros(); if is_solid { pushed.places.len() } else { 0 }];
+    let mut longest = 0.0_f64;
+    for face in &surface.faces {
+        let [a, b, c] = face.map(|node| pushed.places[node as usize]);
+        longest = longest.max((b - a).norm()).max((c - b).norm()).max((a - c).norm());
+        let area = (b - a).cross(&(c - a));
+        if is_solid {
+            face.iter().for_each(|&node| inward[node as usize] -= area);
+        }
+    }
+    let unit = |sum: Vector3| sum.try_normalize(0.0).unwrap_or_default();
+    let at = |node: u32| inward.get(node as usize).copied().map_or(Vector3::zeros(), unit);
+    for &node in &surface.nodes {
+        push(vec![(node, 1.0)], at(node), 0.0, pushed);
+    }
+    let samples = lattice(parts_of(longest, &rigid.shape));
+    let hangs = hang(rigid, longest);
+    for face in &surface.faces {
+        let inward = unit(face.iter().map(|&node| at(node)).sum());
+        for weights in &samples {
+            push(face.iter().copied().zip(*weights).collect(), inward, hangs, pushed);
+        }
+    }
+}
+
+/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None` if it is not that thin there, or without
+/// a direction.
+fn way_out(from: &Vector3, along: &Vector3, thinnest: f64, gap: impl Fn(&Vector3) -> f64) -> Option<f64> {
+    let mut way = 0.0;
+    while way <= 4.0 * thinnest && *along != Vector3::zeros() {
+        let depth = -gap(&(from + along * way));
+        if depth <= 0.0 {
+            return Some(way);
+        }
+        way += depth.max(1e-3 * thinnest);
+    }
+    None
+}
+
+/// Pushes nodes and faces, and edges and edges, of surfaces apart.
+fn push_pairs(first: &Surface, second: Option<&Surface>, offset: f64, pushed: &mut Pushed) {
+    let mut rows = Vec::new();
+    {
+        let place = |node: u32| pushed.places[node as usize];
+        let mut pairs = Pairs::new(first, second, offset, place);
+        pairs.update(place, 0.0);
+        pairs.find(place, |pair| {
+            if pair.distance < offset {
+                let parts = pair.nodes.into_iter().zip(pair.weights).collect();
+                rows.push(Row { parts, normal: pair.normal, offset });
+            }
+        });
+    }
+    rows.iter().for_each(|row| pushed.push(row));
+}
