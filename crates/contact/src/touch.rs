@@ -14,14 +14,20 @@ use crate::pose::{Course, Leg, Pose, between};
 use crate::shape::{Near, Shape};
 
 /// Parts of a step at most in which a node is followed along a thing.
-const MOST_PARTS: f64 = 512.0;
+pub(crate) const MOST_PARTS: f64 = 512.0;
 /// Gap, over half of the thinnest part of a thing, at which a node has met it.
-const MEETS: f64 = 1e-3;
+pub(crate) const MEETS: f64 = 1e-3;
 /// Cosine of the angle between the directions away from a thing where a point meets it and where it would end, above which both are on one side.
-const ALIKE: f64 = 0.7;
+pub(crate) const ALIKE: f64 = 0.7;
 /// Part of a depth at the beginning of a step that may be left at its end. Sharp edges come between the points of a face, and the way out of a
 /// thing can turn to another side of it: points that come to lie in it so are pushed out over several steps, as one would throw them.
 pub const LEFT: f64 = 0.8;
+/// Passes over all rows of a step at most.
+pub const PASSES: usize = 30;
+/// The change of a gap in a pass, over the deepest one, at which impulses are found.
+pub const FOUND: f64 = 1e-3;
+/// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
+pub const MARGIN: f64 = 0.1;
 
 /// A rigid thing: an obstacle, a tool or a jaw of one.
 #[derive(Clone, Debug)]
@@ -186,13 +192,13 @@ impl Touch {
 #[derive(Clone, Debug)]
 pub struct Passage {
     /// Its poses before and after.
-    poses: [Pose; 2],
+    pub(crate) poses: [Pose; 2],
     /// How its frame is turned after.
-    turn: Matrix3<f64>,
+    pub(crate) turn: Matrix3<f64>,
     /// The motion from the pose before to that after.
-    motion: Pose,
+    pub(crate) motion: Pose,
     /// The largest way [m] of a point of it.
-    travel: f64,
+    pub(crate) travel: f64,
     /// Half of its thinnest part [m].
     half_thinnest: f64,
 }

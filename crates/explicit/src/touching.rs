@@ -9,17 +9,13 @@ use nalgebra::Vector3;
 use pliant_contact::pairs::{Pairs, Surface};
 use pliant_contact::pose::Pose;
 use pliant_contact::shape::Near;
-use pliant_contact::touch::{Contact, Contacts, Gripped, LEFT, Passage, Rigid, With, lattice, parts_of};
+use pliant_contact::touch::{
+    Contact, Contacts, FOUND, Gripped, LEFT, MARGIN, PASSES, Passage, Rigid, With, lattice, parts_of,
+};
 use pliant_mechanics::tensor::{Vector, add};
 
-/// Passes over all rows at most.
-const PASSES: usize = 30;
-/// The change of a gap in a pass, over the deepest one, at which impulses are found.
-const FOUND: f64 = 1e-3;
 /// Gaps, over the depth of the deepest point, up to which points take part.
 const BAND: f64 = 8.0;
-/// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
-const MARGIN: f64 = 0.1;
 
 /// Distance [thinnest part of a jaw] at which a node touches it.
 const TOUCHING: f64 = 1e-6;
