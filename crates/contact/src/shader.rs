@@ -16,12 +16,26 @@ pub const PASSAGE: usize = 40;
 /// Half of the thinnest part [m] of a thing without one.
 const ENDLESS: f64 = 1e30;
 
-/// What bodies find at rigid things, in WGSL.
+/// The kind of a shape, by its place here; a half-space is what is none of these.
+const KINDS: [&str; 5] = ["SPHERE", "CAPSULE", "CUBOID", "CONE", "GRID"];
+
+fn kind(shape: &Shape) -> usize {
+    match shape {
+        Shape::Sphere { .. } => 0,
+        Shape::Capsule { .. } => 1,
+        Shape::Cuboid { .. } => 2,
+        Shape::Cone { .. } => 3,
+        Shape::Grid(_) => 4,
+        Shape::HalfSpace => KINDS.len(),
+    }
+}
+
+/// What bodies find at these rigid things, in WGSL.
 ///
 /// The module around it defines `fn thing_number(at: u32) -> f32` and `fn passage_number(at: u32) -> f32`, the numbers of [`things`] and of
 /// [`Passage::numbers`]. It gives `passage_of(thing, at)`, from where the numbers of both begin, and of a passage `near_after`, `distance_before`,
 /// `meet` and `carried`.
-pub fn shader() -> String {
+pub fn shader(rigids: &[Rigid]) -> String {
     let numbers = [
         ("FLATTEST", FLATTEST),
         ("MOST_PARTS", MOST_PARTS),
@@ -31,7 +45,13 @@ pub fn shader() -> String {
     ];
     let numbers: String =
         numbers.iter().map(|(name, value)| format!("const {name} = {:e}f;\n", *value as f32)).collect();
-    [&numbers, include_str!("shape.wgsl"), include_str!("touch.wgsl")].join("\n")
+    let kinds: String = (KINDS.iter().enumerate())
+        .map(|(own, name)| {
+            let is_there = rigids.iter().any(|rigid| kind(&rigid.shape) == own);
+            format!("const {name} = {own}u;\nconst HAS_{name} = {is_there};\n")
+        })
+        .collect();
+    [&numbers, &kinds, include_str!("shape.wgsl"), include_str!("touch.wgsl")].join("\n")
 }
 
 /// Rigid things as `thing_number` gives them: [`THING`] numbers each, in their order, then the values of grids.
@@ -42,19 +62,19 @@ pub fn things(rigids: &[Rigid]) -> Vec<f32> {
         let end = numbers.len() + THING;
         let sign = if rigid.inside { -1.0 } else { 1.0 };
         let half_thinnest = (0.5 * rigid.shape.thinnest()).min(ENDLESS);
-        let (kind, sizes) = match &rigid.shape {
-            Shape::Sphere { radius } => (0.0, vec![*radius]),
-            Shape::Capsule { radius, length } => (1.0, vec![*radius, *length]),
-            Shape::Cuboid { size } => (2.0, size.to_vec()),
-            Shape::Cone { radius, height } => (3.0, vec![*radius, *height]),
-            Shape::HalfSpace => (4.0, vec![]),
+        let sizes = match &rigid.shape {
+            Shape::Sphere { radius } => vec![*radius],
+            Shape::Capsule { radius, length } => vec![*radius, *length],
+            Shape::Cuboid { size } => size.to_vec(),
+            Shape::Cone { radius, height } => vec![*radius, *height],
+            Shape::HalfSpace => vec![],
             Shape::Grid(grid) => {
                 let origin = grid.origin().iter().copied();
                 let counts = grid.counts().map(|count| count as f64);
-                (5.0, origin.chain([grid.spacing(), grid.spacing().recip()]).chain(counts).collect())
+                origin.chain([grid.spacing(), grid.spacing().recip()]).chain(counts).collect()
             }
         };
-        numbers.extend([kind, sign, half_thinnest as f32, 0.0]);
+        numbers.extend([kind(&rigid.shape) as f32, sign, half_thinnest as f32, 0.0]);
         numbers.extend(sizes.iter().map(|&size| size as f32));
         if let Shape::Grid(grid) = &rigid.shape {
             numbers.push(f32::from_bits((rigids.len() * THING + values.len()) as u32));

@@ -1,16 +1,10 @@
-// Rigid shapes with their signed distance; twin of shape.rs and grid.rs. The module around it gives `thing_number`.
+// Rigid shapes with their signed distance; twin of shape.rs and grid.rs. The module around it gives `thing_number`, and shader.rs the kinds.
 
 // What a shape is at a point: its distance [m], negative inside, and the direction in which the distance grows.
 struct Near {
     distance: f32,
     normal: vec3f,
 }
-
-const SPHERE = 0u;
-const CAPSULE = 1u;
-const CUBOID = 2u;
-const CONE = 3u;
-const HALF_SPACE = 4u;
 
 fn thing_vector(at: u32) -> vec3f {
     return vec3f(thing_number(at), thing_number(at + 1u), thing_number(at + 2u));
@@ -119,28 +113,26 @@ fn sampled(at: u32, point: vec3f) -> Near {
     return Near(far, select(normal, from_surface / far, far > 0.0));
 }
 
-// The distance of a point [m] of its frame from a shape, whose numbers begin at a place, and the direction away from it.
+// The distance of a point [m] of its frame from a shape, whose numbers begin at a place, and the direction away from it. Kinds that no thing has
+// are left out, for devices that run all branches.
 fn shape_near(at: u32, point: vec3f) -> Near {
+    let kind = u32(thing_number(at));
     let a = thing_number(at + 4u);
     let b = thing_number(at + 5u);
-    switch u32(thing_number(at)) {
-        case SPHERE: {
-            return around(point, a);
-        }
-        case CAPSULE: {
-            return around(point - vec3f(0.0, 0.0, clamp(point.z, -0.5 * b, 0.5 * b)), a);
-        }
-        case CUBOID: {
-            return cuboid(point, 0.5 * thing_vector(at + 4u));
-        }
-        case CONE: {
-            return cone(point, a, b);
-        }
-        case HALF_SPACE: {
-            return Near(point.z, vec3f(0.0, 0.0, 1.0));
-        }
-        default: {
-            return sampled(at, point);
-        }
+    if HAS_SPHERE && kind == SPHERE {
+        return around(point, a);
     }
+    if HAS_CAPSULE && kind == CAPSULE {
+        return around(point - vec3f(0.0, 0.0, clamp(point.z, -0.5 * b, 0.5 * b)), a);
+    }
+    if HAS_CUBOID && kind == CUBOID {
+        return cuboid(point, 0.5 * thing_vector(at + 4u));
+    }
+    if HAS_CONE && kind == CONE {
+        return cone(point, a, b);
+    }
+    if HAS_GRID && kind == GRID {
+        return sampled(at, point);
+    }
+    return Near(point.z, vec3f(0.0, 0.0, 1.0));
 }

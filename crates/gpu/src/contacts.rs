@@ -101,7 +101,7 @@ impl DeviceContacts {
         let bound = nodes.of_contacts(device, &own);
         let constants = [constants, &lists.constants].concat();
         let limits = format!("const PASSES = {PASSES}u;\nconst FOUND = {:e}f;\n", FOUND as f32);
-        let things = shader();
+        let things = shader(&contacts.rigids);
         let touching: [&str; 4] =
             [include_str!("shaders/instant.wgsl"), &limits, &things, include_str!("shaders/touching.wgsl")];
         let loaded = loads.map(|loads| Bound::new(device, &loads.bindings()));

