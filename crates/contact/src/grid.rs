@@ -38,7 +38,7 @@ impl fmt::Debug for Grid {
 }
 
 /// How far the slope may be below 1, that of a distance, and is still mended; it is where the direction to the surface jumps.
-const FLATTEST: f64 = 0.3;
+pub(crate) const FLATTEST: f64 = 0.3;
 
 impl Grid {
     /// Of distances [m] at the points of a grid from `origin` [m] on, negative inside, x fastest. `None` if their number is not that of the
@@ -96,6 +96,21 @@ impl Grid {
     /// The same with a surface to be drawn; nothing if not given.
     pub fn with_surface(self, surface: Triangles) -> Self {
         Self { surface, ..self }
+    }
+
+    /// Its first point [m].
+    pub fn origin(&self) -> &Vector3<f64> {
+        &self.origin
+    }
+
+    /// Points along each axis.
+    pub fn counts(&self) -> [usize; 3] {
+        self.counts
+    }
+
+    /// Distances [m] at its points, negative inside, x fastest.
+    pub fn values(&self) -> &[f32] {
+        &self.values
     }
 
     /// Distance [m] between its points.

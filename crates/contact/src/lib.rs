@@ -20,6 +20,7 @@
 pub mod grid;
 pub mod pairs;
 pub mod pose;
+pub mod shader;
 pub mod shape;
 pub mod touch;
 pub mod tree;

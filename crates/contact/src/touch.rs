@@ -14,14 +14,30 @@ use crate::pose::{Course, Leg, Pose, between};
 use crate::shape::{Near, Shape};
 
 /// Parts of a step at most in which a node is followed along a thing.
-const MOST_PARTS: f64 = 512.0;
+pub(crate) const MOST_PARTS: f64 = 512.0;
 /// Gap, over half of the thinnest part of a thing, at which a node has met it.
-const MEETS: f64 = 1e-3;
+pub(crate) const MEETS: f64 = 1e-3;
 /// Cosine of the angle between the directions away from a thing where a point meets it and where it would end, above which both are on one side.
-const ALIKE: f64 = 0.7;
+pub(crate) const ALIKE: f64 = 0.7;
 /// Part of a depth at the beginning of a step that may be left at its end. Sharp edges come between the points of a face, and the way out of a
 /// thing can turn to another side of it: points that come to lie in it so are pushed out over several steps, as one would throw them.
 pub const LEFT: f64 = 0.8;
+/// Passes over all rows of a step at most.
+pub const PASSES: usize = 30;
+/// The largest motion by an impulse in a pass, over the depth of the deepest point, at which impulses are found.
+pub const FOUND: f64 = 1e-3;
+/// Times at most that impulses are found with sides of things where nodes came to lie.
+pub const ROUNDS: usize = 4;
+/// Sides of a thing at most that are looked for at a node in a round, and that a node has at a time.
+pub const SIDES: [usize; 2] = [8, 4];
+/// Distance of a node from the surface of a thing, over its depth as predicted, from which on it lies off or behind it.
+pub const OFF: f64 = 1e-3;
+/// Times at most that a node is lifted out of a thing: creases turn it from one side to another.
+pub const LIFTS: usize = 16;
+/// The gap, over the first one, at which it is out.
+pub const LIFTED: f64 = 1e-4;
+/// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
+pub const MARGIN: f64 = 0.1;
 
 /// A rigid thing: an obstacle, a tool or a jaw of one.
 #[derive(Clone, Debug)]
@@ -186,13 +202,13 @@ impl Touch {
 #[derive(Clone, Debug)]
 pub struct Passage {
     /// Its poses before and after.
-    poses: [Pose; 2],
+    pub(crate) poses: [Pose; 2],
     /// How its frame is turned after.
-    turn: Matrix3<f64>,
+    pub(crate) turn: Matrix3<f64>,
     /// The motion from the pose before to that after.
-    motion: Pose,
+    pub(crate) motion: Pose,
     /// The largest way [m] of a point of it.
-    travel: f64,
+    pub(crate) travel: f64,
     /// Half of its thinnest part [m].
     half_thinnest: f64,
 }

@@ -11,29 +11,16 @@ use nalgebra::Vector3;
 use pliant_contact::pairs::{Pairs, Surface};
 use pliant_contact::pose::Pose;
 use pliant_contact::shape::{Near, Shape};
-use pliant_contact::touch::{Contact, Contacts, Gripped, LEFT, Passage, Rigid, With, lattice, parts_of};
+use pliant_contact::touch::{
+    Contact, Contacts, FOUND, Gripped, LEFT, LIFTED, LIFTS, MARGIN, OFF, PASSES, Passage, ROUNDS, Rigid,
+    SIDES, With, lattice, parts_of,
+};
 use pliant_mechanics::tensor::{Vector, add};
 
 pub use nodal::NodeContact;
 
-/// Passes over all rows at most.
-const PASSES: usize = 30;
-/// The motion by an impulse, over the depth of the deepest point, that others are not found anew for.
-const FOUND: f64 = 1e-3;
-/// Times at most that impulses are found with sides of things where nodes came to lie.
-const ROUNDS: usize = 4;
-/// Sides of things at most that are looked for at a node in a round.
-const SIDES: usize = 8;
-/// Distance of a node from the surface of a thing, over the depth of the deepest point, from which on it lies off or behind it.
-const OFF: f64 = 1e-3;
 /// Gaps, over the depth of the deepest point, up to which points take part.
 const BAND: f64 = 8.0;
-/// Times at most that a node is lifted out of a thing: creases turn it from one side to another.
-const LIFTS: usize = 16;
-/// The gap, over the first one, at which it is out.
-const LIFTED: f64 = 1e-4;
-/// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
-const MARGIN: f64 = 0.1;
 /// How much farther than nodes count as near they are listed, over that margin.
 const SKIN: f64 = 1.0;
 
@@ -77,10 +64,10 @@ struct Node {
     lifted: Vector3<f64>,
     /// Whether it may touch something, so that its prediction is known.
     near: bool,
-    /// The count of motions by impulses when one last moved it.
-    moved: u32,
     /// The first of the rows on it alone.
     first: u32,
+    /// How deep [m] it lies in things as predicted.
+    depth: f64,
 }
 
 impl Node {
@@ -95,8 +82,8 @@ impl Node {
             borne: zero,
             lifted: zero,
             near: false,
-            moved: 0,
             first: NONE,
+            depth: 0.0,
         }
     };
 }
@@ -157,8 +144,6 @@ struct Row {
     drag: Vector3<f64>,
     /// 1 if the impulse acts on the first surface of the contact, −1 if on the second.
     sign: f64,
-    /// The count of motions by impulses when it was last looked at.
-    seen: u32,
     /// Of a row on a node alone: the next one.
     next: u32,
 }
@@ -183,7 +168,6 @@ impl Row {
             push: 0.0,
             drag,
             sign: 1.0,
-            seen: 0,
             next: NONE,
         }
     }
@@ -243,16 +227,23 @@ impl Row {
     }
 }
 
-/// Of the rows of a contact on a node alone, one without an impulse.
-fn idle(rows: &[Row], node: &Node, contact: usize) -> Option<u32> {
-    let mut next = node.first;
+/// Of the rows of a contact on a node alone, one without an impulse, or a new one; `None` if there are as many as can be.
+fn idle(rows: &mut Vec<Row>, node: &mut Node, new: Row) -> Option<u32> {
+    let (mut next, mut last, mut count) = (node.first, NONE, 0);
     while let Some(row) = rows.get(next as usize) {
-        if row.contact == contact && row.push == 0.0 {
+        let is_own = row.contact == new.contact;
+        if is_own && row.push == 0.0 {
             return Some(next);
         }
-        next = row.next;
+        count += usize::from(is_own);
+        (last, next) = (next, row.next);
     }
-    None
+    (count < SIDES[1]).then(|| {
+        let number = rows.len() as u32;
+        rows.push(new);
+        *rows.get_mut(last as usize).map_or(&mut node.first, |row| &mut row.next) = number;
+        number
+    })
 }
 
 /// Takes back the impulses of a contact on a node alone; the last such row, if there are any.
@@ -415,7 +406,7 @@ impl Touching {
             let Free { then, mobility } = free(number);
             (node.free, node.then) = (then.into(), then.into());
             (node.mobility, node.own) = (mobility.into(), mobility.into());
-            (node.borne, node.lifted, node.moved) = (Vector3::zeros(), Vector3::zeros(), 1);
+            (node.borne, node.lifted) = (Vector3::zeros(), Vector3::zeros());
         }
     }
 
@@ -512,15 +503,11 @@ impl Touching {
             return;
         }
         self.chain();
-        let (mut looked, mut motions) = (0, 1);
         for _ in 0..ROUNDS {
-            let before = motions;
-            motions = self.relax(deepest, motions);
-            if motions == before {
+            self.relax(deepest);
+            if self.settle(deepest) <= FOUND * deepest {
                 break;
             }
-            let since = std::mem::replace(&mut looked, motions);
-            motions = self.settle(deepest, since, motions);
         }
         let Self { nodes, rows, forces, .. } = self;
         for row in rows.iter() {
@@ -534,81 +521,70 @@ impl Touching {
 
     /// Links the rows of each node alone.
     fn chain(&mut self) {
-        self.nodes.iter_mut().for_each(|node| node.first = NONE);
-        for (row, number) in self.rows.iter_mut().zip(0..).filter(|(row, _)| row.count == 1) {
-            row.next = std::mem::replace(&mut self.nodes[row.nodes[0] as usize].first, number);
+        self.nodes.iter_mut().for_each(|node| (node.first, node.depth) = (NONE, 0.0));
+        let numbered = self.rows.iter_mut().enumerate().rev();
+        for (number, row) in numbered.filter(|(_, row)| row.count == 1) {
+            let node = &mut self.nodes[row.nodes[0] as usize];
+            node.depth = node.depth.max(-row.gap);
+            row.next = std::mem::replace(&mut node.first, number as u32);
         }
     }
 
-    /// Impulses of the rows there are, by projected Gauss–Seidel: of those whose nodes have moved since they were looked at. Counts motions.
-    fn relax(&mut self, deepest: f64, mut motions: u32) -> u32 {
+    /// Impulses of the rows there are, by projected Gauss–Seidel.
+    fn relax(&mut self, deepest: f64) {
         let Self { contacts, nodes, rows, .. } = self;
         for _ in 0..PASSES {
-            let mut is_found = true;
+            let mut moved = 0.0_f64;
             for row in rows.iter_mut() {
-                if row.parts().all(|(node, _)| nodes[node].moved <= row.seen) {
-                    continue;
-                }
-                (row.seen, is_found) = (motions, false);
-                if row.push_apart(nodes, contacts.contacts[row.contact].touch.friction) > FOUND * deepest {
-                    motions += 1;
-                    row.parts().for_each(|(node, _)| nodes[node].moved = motions);
-                }
+                moved = moved.max(row.push_apart(nodes, contacts.contacts[row.contact].touch.friction));
             }
-            if is_found {
+            if moved < FOUND * deepest {
                 break;
             }
         }
-        motions
     }
 
-    /// Sides of things beside nodes that have moved since a count of motions, and their impulses, a node at a time. Counts motions.
-    fn settle(&mut self, deepest: f64, since: u32, mut motions: u32) -> u32 {
+    /// Sides of things beside nodes that impulses have moved, and their impulses, a node at a time. How far that moves a node at most [m].
+    fn settle(&mut self, deepest: f64) -> f64 {
         let Self { contacts, nodes, own, rows, .. } = self;
+        let mut farthest = 0.0_f64;
         for (index, own) in own.iter().enumerate() {
             let Own::Rigid(own) = own else { continue };
             let (rigid, touch) = (&contacts.rigids[own.rigid], &contacts.contacts[index].touch);
             for &number in &own.listed.nodes {
                 let at = number as usize;
-                if !nodes[at].near || nodes[at].moved <= since {
+                if !nodes[at].near || nodes[at].then == nodes[at].free {
                     continue;
                 }
-                let mut has_moved = false;
-                for _ in 0..SIDES {
+                let depth = nodes[at].depth.max(FOUND * deepest);
+                let before = nodes[at].then;
+                for _ in 0..SIDES[0] {
                     let (place, now) = (nodes[at].then, nodes[at].now);
                     let Near { distance, normal } = own.passage.near(rigid, &place);
                     let mut gap = distance - touch.offset;
                     if gap < 0.0 {
                         gap -= own.left(rigid, touch.offset, &now);
                     }
-                    let side = if gap < -OFF * deepest {
-                        idle(rows, &nodes[at], index).unwrap_or_else(|| {
-                            let side = Row::new(index, [number], [1.0]);
-                            let carried = own.passage.carry(&now);
-                            rows.push(Row { carried, next: nodes[at].first, ..side });
-                            nodes[at].first = (rows.len() - 1) as u32;
-                            nodes[at].first
-                        })
-                    } else if gap > OFF * deepest
-                        && let Some(side) = take_back(rows, &mut nodes[at], index)
-                    {
-                        side
+                    let side = if gap < -OFF * depth {
+                        let carried = own.passage.carry(&now);
+                        idle(rows, &mut nodes[at], Row { carried, ..Row::new(index, [number], [1.0]) })
+                    } else if gap > OFF * depth {
+                        take_back(rows, &mut nodes[at], index)
                     } else {
-                        break;
+                        None
                     };
+                    let Some(side) = side else { break };
                     let row = &mut rows[side as usize];
                     (row.place, row.mobility) = (place, nodes[at].mobility);
                     (row.normal, row.gap) = (normal, gap);
-                    push_alone(rows, nodes, number, FOUND * deepest, |row| {
+                    push_alone(rows, nodes, number, FOUND * depth, |row| {
                         contacts.contacts[row.contact].touch.friction
                     });
-                    has_moved = true;
                 }
-                motions += u32::from(has_moved);
-                nodes[at].moved = if has_moved { motions } else { nodes[at].moved };
+                farthest = farthest.max((nodes[at].then - before).norm());
             }
         }
-        motions
+        farthest
     }
 
     /// Lifts nodes that are still in a thing.

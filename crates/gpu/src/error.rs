@@ -84,6 +84,12 @@ pub enum GpuError {
         /// What it is.
         what: String,
     },
+    /// A design without contact.
+    #[error("the design `{design}` has no contact")]
+    NoContact {
+        /// The design.
+        design: String,
+    },
     /// A force is too large for a design that adds forces up as whole numbers.
     #[error("a force at t = {time:.6} s is out of the range of the design `{design}`")]
     Overflow {
@@ -114,6 +120,7 @@ impl GpuError {
                 | Self::OutOfMemory { .. }
                 | Self::Crowded { .. }
                 | Self::Unsupported { .. }
+                | Self::NoContact { .. }
         )
     }
 
@@ -140,6 +147,7 @@ impl GpuError {
             }
             Self::Crowded { .. } => "take the design `gather`, which shares no memory",
             Self::Unsupported { .. } => "take `device = \"cpu\"`",
+            Self::NoContact { .. } => "take the design `gather` or `fast`, or leave `design` out",
             Self::Overflow { .. } => "take the design `gather`, whose forces are floating-point numbers",
             Self::Contradiction(_) => "leave the node out of one of the two, or give both the same motion",
             Self::Internal { .. } => {

@@ -100,9 +100,9 @@ impl<'d> Memory<'d> {
 /// What arrays are for.
 const ARRAY: BufferUsages = BufferUsages::STORAGE.union(BufferUsages::COPY_DST).union(BufferUsages::COPY_SRC);
 
-/// Bytes of an array, at least those of the largest element of any kernel.
+/// Bytes of an array, at least those of the largest element of any kernel: of a node that is held.
 fn array_size(bytes: usize) -> u64 {
-    (bytes as u64).max(16).next_multiple_of(16)
+    (bytes as u64).max(48).next_multiple_of(16)
 }
 
 /// An array that has two sides: at an instant one of them is now, the other one is next. Where a kernel changes it in place both

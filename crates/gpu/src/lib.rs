@@ -70,6 +70,13 @@
 //! before, in double precision. [`GpuStepper::advance_without_read_back`] takes steps for a given time without any read-back. [`DeviceMapping`] computes points
 //! that are combinations of nodes, with a value each, in an array that a renderer binds. [`Device::read_backs`] counts all read-backs.
 //!
+//! # Contact
+//!
+//! [`GpuStepper::touching`] lets nodes, and points on faces, touch rigid things as `touching.rs` does on the CPU. Where a node would go
+//! without contact is found before the node pass, from the forces of cells; a group solves the rows of points that share nodes, colour by
+//! colour; the node pass takes the forces. The ways of tools in a step are numbers of its row of the table. [`processor_only`] names what is
+//! not there.
+//!
 //! # Tests
 //!
 //! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
@@ -78,6 +85,7 @@
 //! all of them on Mesa's software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
 
 mod blocks;
+mod contacts;
 mod design;
 mod device;
 mod error;
@@ -94,6 +102,7 @@ mod solids;
 mod stepper;
 mod transfer;
 
+pub use contacts::processor_only;
 pub use design::{Design, UnknownDesign};
 pub use device::{Adapter, Device, Kind, adapters};
 pub use error::GpuError;

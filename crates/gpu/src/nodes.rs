@@ -102,7 +102,7 @@ impl DeviceNodes {
         })
     }
 
-    /// The passes, with `gather` and `gathered` how forces come from the cells.
+    /// The passes, with `gather` and `gathered` how forces come from the cells, and the forces of contacts on nodes [N].
     ///
     /// # Errors
     /// If the adapter allows fewer arrays.
@@ -112,25 +112,26 @@ impl DeviceNodes {
         instant: &Bound,
         (gather, gathered): (&str, &Bound),
         loads: Option<&DeviceLoads>,
+        contact_forces: Option<&wgpu::Buffer>,
         constants: &[(&str, usize)],
     ) -> Result<NodeKernels, GpuError> {
         let count = self.count;
-        let bound = Bound::new(
-            device,
-            &[
-                Binding::WriteNow(&self.displacement),
-                Binding::WriteNow(&self.increment),
-                Binding::WriteNow(&self.next),
-                Binding::Read(&self.constants),
-                Binding::Read(&self.holds),
-                Binding::Write(&self.reactions),
-                Binding::Write(&self.sums),
-            ],
-        );
+        let mut bindings = vec![
+            Binding::WriteNow(&self.displacement),
+            Binding::WriteNow(&self.increment),
+            Binding::WriteNow(&self.next),
+            Binding::Read(&self.constants),
+            Binding::Read(&self.holds),
+            Binding::Write(&self.reactions),
+            Binding::Write(&self.sums),
+        ];
+        bindings.extend(contact_forces.map(Binding::Read));
+        let bound = Bound::new(device, &bindings);
+        let touched = if contact_forces.is_some() { include_str!("shaders/touched.wgsl") } else { UNTOUCHED };
         let loaded = loads.map(|loads| Bound::new(device, &loads.bindings()));
         let common = [INSTANT, gather, MOVE, include_str!("shaders/in_place.wgsl")];
-        let pass =
-            [&common[..], &[external_forces(loads), MOTION, include_str!("shaders/node.wgsl")]].concat();
+        let pass = [external_forces(loads), touched, MOTION, include_str!("shaders/node.wgsl")];
+        let pass = [&common[..], &pass].concat();
         let advance = [&common[..], &[include_str!("shaders/advance.wgsl")]].concat();
         let numbers = [constants, &[("NODES", count)]].concat();
         let groups = [instant, gathered, &bound];
@@ -149,6 +150,21 @@ impl DeviceNodes {
             let place = (node as usize * size_of::<Four>() + 3 * size_of::<f32>()) as u64;
             device.queue.write_buffer(&self.constants, place, bytemuck::bytes_of(&tag));
         }
+    }
+
+    /// What contacts work on, with what is their own.
+    pub(crate) fn of_contacts(&self, device: &Device, own: &[Binding<'_>]) -> Bound {
+        let bindings = [
+            Binding::ReadNow(&self.displacement),
+            Binding::ReadNow(&self.increment),
+            Binding::Nothing,
+            Binding::Read(&self.constants),
+            Binding::Read(&self.holds),
+            Binding::Nothing,
+            Binding::Nothing,
+            Binding::Nothing,
+        ];
+        Bound::new(device, &[&bindings[..], own].concat())
     }
 
     /// What blocks of nodes work on, with `left` the forces that they leave.
@@ -176,6 +192,9 @@ const GRIPPED: u32 = 1 << 31;
 pub(crate) const MOVE: &str = include_str!("shaders/move.wgsl");
 /// The coming increment of a node.
 pub(crate) const MOTION: &str = include_str!("shaders/central_difference.wgsl");
+
+/// Without contacts.
+pub(crate) const UNTOUCHED: &str = include_str!("shaders/untouched.wgsl");
 
 /// What acts on nodes from outside.
 pub(crate) fn external_forces(loads: Option<&DeviceLoads>) -> &'static str {

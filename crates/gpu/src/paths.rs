@@ -17,7 +17,7 @@ use pliant_mechanics::tensor::dot;
 use crate::blocks::{DeviceBlocks, NodeBlocks};
 use crate::kernel::{Binding, Bound, Memory};
 use crate::loads::DeviceLoads;
-use crate::nodes::{DeviceNodes, MOTION, MOVE, external_forces};
+use crate::nodes::{DeviceNodes, MOTION, MOVE, UNTOUCHED, external_forces};
 use crate::run::table_constants;
 use crate::transfer::Four;
 use crate::{Design, Device, GpuError};
@@ -102,8 +102,8 @@ impl Paths {
     ) -> Result<Self, GpuError> {
         let left = memory.zeros("the forces on nodes", model.node_count() * size_of::<Four>())?;
         let scale = Scale::new(model).constants();
-        let snippets =
-            [&scale, FIXED, MOVE, external_forces(loads), MOTION, include_str!("shaders/node_blocks.wgsl")];
+        let moves = [external_forces(loads), UNTOUCHED, MOTION, include_str!("shaders/node_blocks.wgsl")];
+        let snippets = [&[&scale, FIXED, MOVE][..], &moves].concat();
         let mut first = 0;
         let mut blocks = Vec::new();
         for cut in cut {

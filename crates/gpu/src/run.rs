@@ -1,10 +1,15 @@
 //! Instants of a run as the device sees them, and their submission.
 
+use std::sync::Arc;
+
 use bytemuck::{Pod, Zeroable};
+use pliant_contact::pose::Leg;
+use pliant_contact::touch::Contacts;
 use pliant_explicit::{Lengths, StepError};
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::Model;
 
+use crate::contacts::{add_passages, passage_numbers};
 use crate::kernel::{Binding, Bound, Memory};
 use crate::transfer::Four;
 use crate::{Device, GpuError};
@@ -74,7 +79,7 @@ impl Instant {
     }
 }
 
-/// Instants of the next submission, with the factors of constraints and loads at each.
+/// Instants of the next submission, with the factors of constraints and loads, and the ways of obstacles and tools, at each.
 pub(crate) struct Instants {
     /// What all kernels read.
     pub bound: Bound,
@@ -88,13 +93,15 @@ pub(crate) struct Instants {
     numbers: Vec<f32>,
     /// Numbers in a row of the table.
     stride: usize,
+    contacts: Option<Arc<Contacts>>,
     count: usize,
 }
 
 /// Places of numbers in a row of the table.
-pub(crate) fn table_constants(model: &Model) -> [(&'static str, usize); 2] {
+pub(crate) fn table_constants(model: &Model) -> [(&'static str, usize); 3] {
     let loads = 4 * model.constraints.len();
-    [("LOADS", loads), ("GRAVITY", loads + model.loads.len())]
+    let gravity = loads + model.loads.len();
+    [("LOADS", loads), ("GRAVITY", gravity), ("PASSAGES", gravity + 3 * model.bodies.len())]
 }
 
 /// What all kernels read.
@@ -116,10 +123,16 @@ const NOTHING: [u32; 4] = [u32::MAX, u32::MAX, f32::to_bits(1.0), 0];
 impl Instants {
     /// # Errors
     /// If an array is too large.
-    pub(crate) fn new(memory: &Memory<'_>, device: &Device, model: &Model) -> Result<Self, GpuError> {
+    pub(crate) fn new(
+        memory: &Memory<'_>,
+        device: &Device,
+        model: &Model,
+        contacts: Option<Arc<Contacts>>,
+    ) -> Result<Self, GpuError> {
         let alignment = device.device.limits().min_uniform_buffer_offset_alignment as usize;
         let spacing = size_of::<Instant>().next_multiple_of(alignment);
         let stride = 4 * model.constraints.len() + model.loads.len() + 3 * model.bodies.len();
+        let stride = stride + passage_numbers(contacts.as_deref());
         let instants = memory.uniform("the instants", spacing * MOST);
         let table = memory.zeros("the factors of motions and loads", stride * MOST * size_of::<f32>())?;
         let findings = memory.filled("the findings", &NOTHING)?;
@@ -135,6 +148,7 @@ impl Instants {
             bytes: vec![],
             numbers: vec![],
             stride,
+            contacts,
             count: 0,
         })
     }
@@ -163,8 +177,14 @@ impl Instants {
         device.queue.write_buffer(&self.findings, 8, bytemuck::cast_slice(&NOTHING[2..]));
     }
 
-    /// Adds an instant at a time [s], `next` seconds before the one after it.
-    pub(crate) fn push(&mut self, model: &Model, time: f64, next: f64, mut instant: Instant) {
+    /// Adds an instant at a time [s], `next` seconds before the one after it, with the tools that are driven.
+    pub(crate) fn push(
+        &mut self,
+        (model, driven): (&Model, &[(u32, Leg)]),
+        time: f64,
+        next: f64,
+        mut instant: Instant,
+    ) {
         instant.row = self.numbers.len() as u32;
         for constraint in &model.constraints {
             let [now, then] = [time, time + next].map(|t| constraint.motion.factors(t));
@@ -183,6 +203,9 @@ impl Instants {
             }
         }
         self.numbers.extend(gravity.as_flattened().iter().map(|&g| g as f32));
+        if let Some(contacts) = &self.contacts {
+            add_passages(contacts, driven, [time, time + next], &mut self.numbers);
+        }
         debug_assert_eq!(self.numbers.len() % self.stride.max(1), 0);
         self.bytes.resize(self.count * self.spacing, 0);
         self.bytes.extend_from_slice(bytemuck::bytes_of(&instant));

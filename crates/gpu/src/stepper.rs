@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
 
+use pliant_contact::touch::Contacts;
 use pliant_explicit::stability::{Monitor, Stability};
 use pliant_explicit::{
     CentralDifference, Deformed, Lengths, Observable, State, StepControl, StepError, Sums, Wanted,
@@ -14,6 +15,7 @@ use pliant_mechanics::model::{FREE, Model};
 use pliant_mechanics::tensor::Vector;
 
 use crate::blocks::NodeBlocks;
+use crate::contacts::{DeviceContacts, processor_only};
 use crate::grips::DeviceGrips;
 use crate::kernel::{Kernel, Memory};
 use crate::loads::DeviceLoads;
@@ -60,6 +62,7 @@ struct Results {
     overflown: Option<u32>,
     deformed: Deformed,
     reactions: Vec<Four>,
+    contact_forces: Vec<Four>,
 }
 
 /// Steps a state of one model by one step size, in single precision, on a device. The current state is on the device: of the
@@ -80,6 +83,7 @@ pub struct GpuStepper {
     kernels: NodeKernels,
     loads: Option<DeviceLoads>,
     grips: DeviceGrips,
+    contacts: Option<DeviceContacts>,
     instants: Instants,
     transfer: Transfer,
     /// Length of a step [s] that relaxing laws are set to.
@@ -104,6 +108,8 @@ pub struct GpuStepper {
     /// Of each constraint, and of each node that is held.
     reactions: Vec<Vector<f64>>,
     held_reactions: Vec<Four>,
+    /// The force [N] of each contact on its surface.
+    contact_forces: Vec<Four>,
     /// Which held nodes each constraint moves, and which of their components.
     owned: Vec<Vec<(u32, [bool; 3])>>,
     next: Vec<Vector<f32>>,
@@ -122,6 +128,10 @@ impl Observable<f32> for GpuStepper {
         let Ok(hold) = self.nodes.held.binary_search(&(node as u32)) else { return [0.0; 3] };
         let force = self.held_reactions[hold];
         [0, 1, 2].map(|c| if self.owners[node][c] == FREE { 0.0 } else { f64::from(force[c]) })
+    }
+
+    fn contact_forces(&self) -> Vec<Vector<f64>> {
+        self.contact_forces.iter().map(|&[x, y, z, _]| [x, y, z].map(|f| -f64::from(f))).collect()
     }
 
     /// The mean of the increments before and after; belongs to the last instant of which everything was wanted.
@@ -143,7 +153,33 @@ impl GpuStepper {
         step: f64,
         design: Option<Design>,
     ) -> Result<Self, GpuError> {
-        let model = model.into();
+        Self::with(device, model.into(), None, step, design)
+    }
+
+    /// A stepper of bodies that touch rigid things; else as [`new`](Self::new).
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and if something of the contacts, or of contact in the design, runs [on the CPU only](processor_only).
+    pub fn touching(
+        device: &Device,
+        model: impl Into<Arc<Model>>,
+        contacts: Arc<Contacts>,
+        step: f64,
+        design: Option<Design>,
+    ) -> Result<Self, GpuError> {
+        if let Some(what) = processor_only(&contacts) {
+            return Err(GpuError::Unsupported { what });
+        }
+        Self::with(device, model.into(), Some(contacts), step, design)
+    }
+
+    fn with(
+        device: &Device,
+        model: Arc<Model>,
+        contacts: Option<Arc<Contacts>>,
+        step: f64,
+        design: Option<Design>,
+    ) -> Result<Self, GpuError> {
         let owners = model.constrained_components()?;
         if let Some(tie) = model.ties.first() {
             return Err(GpuError::Unsupported { what: format!("the tie `{}`", tie.name) });
@@ -154,13 +190,17 @@ impl GpuStepper {
         }
         let memory = Memory::new(device);
         let design = design.unwrap_or(Design::usual(device.adapter().kind));
-        device.fill(|| memory.bytes(), || Self::on_device(device, &memory, &model, step, design, owners))
+        if contacts.is_some() && design == Design::Blocks {
+            return Err(GpuError::NoContact { design: design.to_string() });
+        }
+        let of = (&model, contacts);
+        device.fill(|| memory.bytes(), || Self::on_device(device, &memory, of, step, design, owners))
     }
 
     fn on_device(
         device: &Device,
         memory: &Memory<'_>,
-        model: &Arc<Model>,
+        (model, contacts): (&Arc<Model>, Option<Arc<Contacts>>),
         step: f64,
         design: Design,
         owners: Vec<[u32; 3]>,
@@ -171,7 +211,7 @@ impl GpuStepper {
         };
         let blocks = (design == Design::Blocks).then(|| cut.iter().map(NodeBlocks::len).sum());
         let nodes = DeviceNodes::new(memory, model, &owners, blocks)?;
-        let instants = Instants::new(memory, device, model)?;
+        let instants = Instants::new(memory, device, model, contacts.clone())?;
         let constants = table_constants(model);
         let loads = if model.loads.is_empty() {
             None
@@ -183,7 +223,13 @@ impl GpuStepper {
             .map(|solid| DeviceSolid::new(memory, device, &instants.bound, solid, &paths))
             .collect::<Result<Vec<_>, _>>()?;
         let gather = (paths.node_snippet.as_str(), &paths.nodes);
-        let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), &constants)?;
+        let touching = contacts.map(|contacts| {
+            let (of, with) = ((model.as_ref(), &contacts), (memory, device));
+            DeviceContacts::new(with, &instants.bound, of, &nodes, gather, loads.as_ref(), &constants)
+        });
+        let contacts = touching.transpose()?;
+        let forces = contacts.as_ref().map(|contacts| &contacts.forces);
+        let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), forces, &constants)?;
         let grips = DeviceGrips::new(device, &instants.bound, &nodes.displacement)?;
         let control = StepControl::new(step);
         Ok(Self {
@@ -198,6 +244,11 @@ impl GpuStepper {
             kernels,
             loads,
             grips,
+            contact_forces: vec![
+                Four::default();
+                contacts.as_ref().map_or(0, |own| own.contacts.contacts.len())
+            ],
+            contacts,
             instants,
             transfer: Transfer::default(),
             relaxing: None,
@@ -300,7 +351,7 @@ impl GpuStepper {
         self.relax(self.control.relaxing(state));
         self.instants.forget_deformation(&self.device);
         let starts = if state.is_at_start() { flags::STARTS } else { 0 };
-        let mut results = self.submit_evaluation(state.time, flags::MEASURES | starts, true)?;
+        let mut results = self.submit_evaluation(state, flags::MEASURES | starts, true)?;
         self.check(state, &results)?;
         self.enter_passed(state, &results, self.lengths.before);
         let below = if state.is_between_steps() { self.watch(state, &results.deformed)? } else { Ok(()) };
@@ -310,7 +361,7 @@ impl GpuStepper {
         if self.lengths != self.control.lengths(state) {
             self.lengths = self.control.lengths(state);
             let shock = results.shock;
-            results = self.submit_evaluation(state.time, flags::MEASURES, false)?;
+            results = self.submit_evaluation(state, flags::MEASURES, false)?;
             results.shock = shock;
         }
         if !results.sums.is_finite() {
@@ -323,6 +374,7 @@ impl GpuStepper {
         let before = (!at_start).then_some(self.lengths.before);
         self.energies = state.work.settle(&results.sums, results.hourglass, before, self.balance_floor);
         self.enter_reactions(&results.reactions);
+        self.contact_forces.clone_from(&results.contact_forces);
         (self.evaluated, self.since) = (true, 0);
         self.origin = Some(Origin {
             side: self.side,
@@ -461,7 +513,8 @@ impl GpuStepper {
                     _ => Lengths { before: self.lengths.next, next: self.lengths.next },
                 };
                 let instant = Instant::new(self.since, flags::MOVES, lengths);
-                self.instants.push(&self.model, state.time, lengths.next, instant);
+                let of = (self.model.as_ref(), &state.driven[..]);
+                self.instants.push(of, state.time, lengths.next, instant);
                 self.count(state);
             }
             let count = self.instants.len();
@@ -542,14 +595,18 @@ impl GpuStepper {
     }
 
     /// Evaluates an instant, with the forces of cells found anew or as they stand.
-    fn submit_evaluation(&mut self, time: f64, flags: u32, anew: bool) -> Result<Results, GpuError> {
+    fn submit_evaluation(&mut self, state: &State<f32>, flags: u32, anew: bool) -> Result<Results, GpuError> {
         let instant = Instant::new(self.since, flags, self.lengths);
-        self.instants.push(&self.model, time, self.lengths.next, instant);
-        let (nodes, side) = (&self.kernels, self.side);
+        self.instants.push((&self.model, &state.driven), state.time, self.lengths.next, instant);
+        let (nodes, side, contacts) = (&self.kernels, self.side, &self.contacts);
         let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
         self.instants.submit(&self.device, |pass, bound, _, offset| {
             if anew {
                 forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
+            }
+            if let Some(contacts) = contacts {
+                contacts.kernels.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
+                contacts.sum.run(pass, bound, offset, side);
             }
             nodes.pass.run(pass, bound, offset, side);
         });
@@ -560,13 +617,15 @@ impl GpuStepper {
     fn submit_steps(&mut self, from_look: bool, mut side: usize) -> wgpu::SubmissionIndex {
         let nodes = &self.kernels;
         let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
-        let moves = self.paths.moves;
+        let (moves, contacts) = (self.paths.moves, &self.contacts);
         self.instants.submit(&self.device, |pass, bound, place, offset| {
             if from_look && place == 0 {
                 nodes.advance.run(pass, bound, offset, side);
                 return;
             }
             forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
+            let touching = contacts.iter().flat_map(|contacts| &contacts.kernels);
+            touching.for_each(|kernel| kernel.run(pass, bound, offset, side));
             if !moves {
                 nodes.pass.run(pass, bound, offset, side);
             }
@@ -578,11 +637,12 @@ impl GpuStepper {
     fn results(&mut self) -> Result<Results, GpuError> {
         let (nodes, findings) = (&self.nodes, &self.instants.findings);
         let bytes = |count: usize| (count * size_of::<f32>()) as u64;
-        let arrays = [
+        let mut arrays = vec![
             (&nodes.sums, bytes(nodes.groups * SUMS)),
             (findings, bytes(4)),
             (&nodes.reactions, bytes(nodes.held.len() * 4)),
         ];
+        arrays.extend(self.contacts.iter().map(|own| (&own.sums, bytes(self.contact_forces.len() * 4))));
         let mut read = None;
         self.transfer.read_all(&self.device, &arrays, |parts| {
             let mut sums = [0.0; SUMS];
@@ -594,9 +654,10 @@ impl GpuStepper {
                 sums,
                 [found[0], found[1], found[2], found[3]],
                 bytemuck::cast_slice(parts[2]).to_vec(),
+                parts.get(3).map_or_else(Vec::new, |forces| bytemuck::cast_slice(forces).to_vec()),
             ));
         })?;
-        let (sums, [broken, overflown, least, largest], reactions) = read.unwrap_or_default();
+        let (sums, [broken, overflown, least, largest], reactions, contact_forces) = read.unwrap_or_default();
         Ok(Results {
             sums: Sums {
                 kinetic: sums[0],
@@ -616,6 +677,7 @@ impl GpuStepper {
                 largest_strain: f64::from(f32::from_bits(largest)),
             },
             reactions,
+            contact_forces,
         })
     }
 

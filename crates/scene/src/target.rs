@@ -2,7 +2,7 @@
 
 use pliant_sim::Precision;
 #[cfg(feature = "gpu")]
-use pliant_sim::gpu::{Device, GpuError, Kind};
+use pliant_sim::gpu::{Design, Device, GpuError, Kind};
 
 use crate::assemble::Built;
 use crate::diagnostic::Diagnostic;
@@ -28,7 +28,7 @@ impl Target {
     /// If a GPU is requested, and there is none or it can't run the scene.
     pub(crate) fn choose(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
         let run = &scene.run;
-        let (implicit, touches) = (built.implicit.is_some(), built.contacts.is_some());
+        let only = processor_only(run, built);
         match run.device {
             DeviceName::Cpu => match key_of_gpu(run) {
                 None => Ok(Self::processor(run, None)),
@@ -39,8 +39,8 @@ impl Target {
                     Err(Box::new(Diagnostic::error(message).at(place, "not used").help(help)))
                 }
             },
-            DeviceName::Gpu => match processor_only(run, implicit, touches) {
-                None => Self::gpu(scene),
+            DeviceName::Gpu => match only {
+                None => Self::gpu(scene, built),
                 Some((key, what, help)) => {
                     let error = Diagnostic::error(format!("{what} runs on the CPU only"))
                         .at(scene.source.span(&scene.run_at("device")), "not for this")
@@ -48,17 +48,18 @@ impl Target {
                     Err(Box::new(error.help(help)))
                 }
             },
-            DeviceName::Auto => Ok(match processor_only(run, implicit, touches) {
-                Some((_, what, _)) => Self::processor(run, Some(format!("{what} runs on the CPU only"))),
-                None => Self::best(run),
-            }),
+            DeviceName::Auto => match only {
+                Some((_, what, _)) => Ok(Self::processor(run, Some(format!("{what} runs on the CPU only")))),
+                None => Self::best(scene, built),
+            },
         }
     }
 
     /// The GPU of the scene.
     #[cfg(feature = "gpu")]
-    fn gpu(scene: &Scene) -> Result<Self, Box<Diagnostic>> {
+    fn gpu(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
         let run = &scene.run;
+        with_design(scene, built)?;
         match open(run) {
             Ok(device) => {
                 let software = device.adapter().kind == Kind::Software;
@@ -79,7 +80,7 @@ impl Target {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn gpu(scene: &Scene) -> Result<Self, Box<Diagnostic>> {
+    fn gpu(scene: &Scene, _built: &Built) -> Result<Self, Box<Diagnostic>> {
         let place = scene.source.span(&scene.run_at("device"));
         let help = "set `device = \"cpu\"`, or build it with the feature `gpu`";
         Err(Box::new(Diagnostic::error(WITHOUT).at(place, "not in this build").help(help)))
@@ -87,8 +88,10 @@ impl Target {
 
     /// A GPU that is one, else the CPU.
     #[cfg(feature = "gpu")]
-    fn best(run: &RunTable) -> Self {
-        match open(run) {
+    fn best(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
+        let run = &scene.run;
+        with_design(scene, built)?;
+        Ok(match open(run) {
             Ok(device) if device.adapter().kind == Kind::Software => {
                 let name = &device.adapter().name;
                 let note = format!("the only adapter, `{name}`, is software: the run uses the CPU directly");
@@ -99,12 +102,12 @@ impl Target {
                 Self { device: Some(device), precision: Precision::Single, note }
             }
             Err(error) => Self::processor(run, Some(format!("{error}: it runs on the CPU"))),
-        }
+        })
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn best(run: &RunTable) -> Self {
-        Self::processor(run, Some(format!("{WITHOUT}: it runs on the CPU")))
+    fn best(scene: &Scene, _built: &Built) -> Result<Self, Box<Diagnostic>> {
+        Ok(Self::processor(&scene.run, Some(format!("{WITHOUT}: it runs on the CPU"))))
     }
 
     fn processor(run: &RunTable, note: Option<String>) -> Self {
@@ -149,26 +152,44 @@ fn key_of_gpu(run: &RunTable) -> Option<&'static str> {
     None
 }
 
-/// The key that a GPU can't support, in words, and a remedy.
-fn processor_only(
-    run: &RunTable,
-    implicit: bool,
-    touches: bool,
-) -> Option<(&'static str, &'static str, &'static str)> {
-    if implicit {
-        let help = "set `device = \"cpu\"`, or leave it out";
-        return Some(("device", "the model of shells, `implicit` and `static`", help));
+/// Whether the design that the scene asks for, if it does, has what the scene needs.
+#[cfg(feature = "gpu")]
+fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
+    match scene.run.design {
+        Some(design @ Design::Blocks) if built.contacts.is_some() => {
+            let error = GpuError::NoContact { design: design.to_string() };
+            let place = scene.source.span(&scene.run_at("design"));
+            Err(Box::new(Diagnostic::error(error.to_string()).at(place, "").help(error.remedy())))
+        }
+        _ => Ok(()),
     }
-    if touches {
-        return Some(("device", "contact", "set `device = \"cpu\"`, or leave it out"));
+}
+
+/// What of its contacts a GPU can't support, in words.
+fn contact_only(built: &Built) -> Option<String> {
+    #[cfg(feature = "gpu")]
+    return built.contacts.as_deref().and_then(pliant_sim::gpu::processor_only);
+    #[cfg(not(feature = "gpu"))]
+    return built.contacts.as_ref().map(|_| "contact".to_owned());
+}
+
+/// The key that a GPU can't support, in words, and a remedy.
+fn processor_only(run: &RunTable, built: &Built) -> Option<(&'static str, String, &'static str)> {
+    let leave_out = "set `device = \"cpu\"`, or leave it out";
+    if built.implicit.is_some() {
+        let what = "the model of shells, `implicit` and `static`";
+        return Some(("device", what.into(), leave_out));
+    }
+    if let Some(what) = contact_only(built) {
+        return Some(("device", what, leave_out));
     }
     if run.solver == SolverName::QuasiStatic {
         let help = "set `device = \"cpu\"`, or `solver = \"explicit\"`";
-        return Some(("solver", "the solver `quasi-static`", help));
+        return Some(("solver", "the solver `quasi-static`".into(), help));
     }
     if run.precision == Some(Precision::Double) {
         let help = "set `device = \"cpu\"`, or leave `precision` out";
-        return Some(("precision", "double precision", help));
+        return Some(("precision", "double precision".into(), help));
     }
     None
 }

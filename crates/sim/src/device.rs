@@ -66,7 +66,11 @@ impl Failure {
 pub(crate) fn on_device(part: &Part, state: &State<f32>) -> Option<Result<Box<dyn Solver<f32>>, Failure>> {
     let Method::Explicit(settings) = &part.method else { return None };
     let device = settings.device.as_ref()?;
-    let stepper = GpuStepper::new(device, Arc::clone(&part.model), part.steps.step, settings.design);
+    let (model, step, design) = (Arc::clone(&part.model), part.steps.step, settings.design);
+    let stepper = match &settings.contacts {
+        Some(contacts) => GpuStepper::touching(device, model, Arc::clone(contacts), step, design),
+        None => GpuStepper::new(device, model, step, design),
+    };
     Some(stepper.map_err(|error| Failure::device(&error, None)).map(|mut stepper| {
         if let Some(monitor) = settings.monitor(&part.model) {
             stepper = stepper.watched(monitor);

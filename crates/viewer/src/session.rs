@@ -716,12 +716,14 @@ impl<'s> Player<'s> {
         let started = Instant::now();
         self.playback.shown = started;
         let playback = &self.playback;
-        let inspects =
-            !self.on_device || playback.in_memory || !playback.is_going() || playback.seen.is_old();
+        // Obstacles and tools are moved in ordinary memory.
+        let is_there =
+            self.on_device && self.world.participants.iter().all(|part| part.built.contacts.is_none());
+        let inspects = !is_there || playback.in_memory || !playback.is_going() || playback.seen.is_old();
         if inspects {
             self.inspect();
         }
-        let on_device = if self.on_device { self.place(inspects) } else { None };
+        let on_device = if is_there { self.place(inspects) } else { None };
         let playback = &mut self.playback;
         let frame = frames.input_buffer_mut();
         if frame.inspections != playback.seen.number {

@@ -70,7 +70,7 @@ fn motion(node: u32, internal: vec3f) -> Motion {
     let inertia = of_node.x;
     let damping = of_node.y;
     let held = hold_of(of_node.w);
-    var applied = external_force(node, of_node.z);
+    var applied = external_force(node, of_node.z) + contact_force(node);
     if (bitcast<u32>(of_node.w) & GRIPPED) != 0u {
         applied += grip_force(node);
     }

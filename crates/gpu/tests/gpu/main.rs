@@ -1,7 +1,8 @@
-//! The GPU against the CPU: laws, steppers, devices. One program, since each would link all of wgpu.
+//! The GPU against the CPU: laws, shapes, steppers, devices. One program, since each would link all of wgpu.
 
 mod compute;
 mod devices;
 mod laws;
+mod shapes;
 mod stepper;
 mod support;

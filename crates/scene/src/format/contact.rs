@@ -230,8 +230,8 @@ impl ImageTool {
     }
 }
 
-/// Who touches whom: a body an obstacle or a tool, another body, or itself. No surface goes into the other. With the solver `explicit` on the
-/// CPU, for bodies without bending; bodies that touch each other are solids. The force on the second is in `csv` outputs as `contact.NAME`.
+/// Who touches whom: a body an obstacle or a tool, another body, or itself. No surface goes into the other. With the solver `explicit`, for bodies
+/// without bending; bodies that touch each other are solids, on the CPU. The force on the second is in `csv` outputs as `contact.NAME`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactTable {

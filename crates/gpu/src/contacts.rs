@@ -1,0 +1,313 @@
+//! Contacts with rigid things on the device: nodes and points between them as rows, found and solved there at every instant. Only the ways of the
+//! things go up, with the factors of loads. Leaves out: contacts of bodies with each other or themselves, ideal grips of jaws.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use pliant_contact::pairs::Surface;
+use pliant_contact::pose::Leg;
+use pliant_contact::shader::{PASSAGE, THING, shader, split, things};
+use pliant_contact::touch::{
+    Contact, Contacts, FOUND, LIFTED, LIFTS, MARGIN, OFF, PASSES, Passage, ROUNDS, SIDES, With, lattice,
+    parts_of,
+};
+use pliant_mechanics::model::Model;
+use pliant_mechanics::tensor::Vector;
+
+use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::loads::DeviceLoads;
+use crate::nodes::{DeviceNodes, MOTION, MOVE, UNTOUCHED, external_forces};
+use crate::transfer::Four;
+use crate::{Device, GpuError};
+
+/// What of contacts runs on the CPU only, in words.
+pub fn processor_only(contacts: &Contacts) -> Option<String> {
+    let of_bodies = contacts.contacts.iter().find(|contact| !matches!(contact.with, With::Rigid(_)));
+    let gripping =
+        contacts.rigids.iter().find(|rigid| rigid.jaw.as_ref().is_some_and(|jaw| jaw.grip.is_some()));
+    match (of_bodies, gripping) {
+        (Some(Contact { name, with: With::Itself, .. }), _) => {
+            Some(format!("the contact `{name}` of a body with itself"))
+        }
+        (Some(Contact { name, .. }), _) => Some(format!("the contact `{name}` of two bodies")),
+        (None, Some(rigid)) => Some(format!("the ideal grip of `{}`", rigid.tool())),
+        (None, None) => None,
+    }
+}
+
+/// Adds the ways of all things in the step between two times [s], as touch.wgsl reads them.
+pub(crate) fn add_passages(
+    contacts: &Contacts,
+    driven: &[(u32, Leg)],
+    times: [f64; 2],
+    numbers: &mut Vec<f32>,
+) {
+    for (index, rigid) in (0..).zip(&contacts.rigids) {
+        let leg = driven.iter().find(|(own, _)| *own == index).map(|(_, leg)| leg);
+        numbers.extend(Passage::new(rigid, times.map(|time| rigid.at(time, leg))).numbers());
+    }
+}
+
+/// Numbers of the ways of all things in a step.
+pub(crate) fn passage_numbers(contacts: Option<&Contacts>) -> usize {
+    PASSAGE * contacts.map_or(0, |contacts| contacts.rigids.len())
+}
+
+/// The contacts of a model.
+pub(crate) struct DeviceContacts {
+    /// The things and who touches them.
+    pub contacts: Arc<Contacts>,
+    /// The force on each node [N].
+    pub forces: wgpu::Buffer,
+    /// The force [N] of each contact on its surface, four numbers each, once [`sum`](Self::sum) has run.
+    pub sums: wgpu::Buffer,
+    /// What finds the forces on nodes, in order.
+    pub kernels: Vec<Kernel>,
+    /// Sums the forces of each contact.
+    pub sum: Kernel,
+}
+
+impl DeviceContacts {
+    /// With `gather` and `gathered` how forces come from the cells.
+    ///
+    /// # Errors
+    /// If an array is too large, or the adapter allows fewer of them.
+    pub(crate) fn new(
+        (memory, device): (&Memory<'_>, &Device),
+        instant: &Bound,
+        (model, contacts): (&Model, &Arc<Contacts>),
+        nodes: &DeviceNodes,
+        (gather, gathered): (&str, &Bound),
+        loads: Option<&DeviceLoads>,
+        constants: &[(&str, usize)],
+    ) -> Result<Self, GpuError> {
+        let passages = constants.iter().find(|(name, _)| *name == "PASSAGES").map_or(0, |&(_, at)| at);
+        let lists = Lists::new(contacts, &model.rest, passages);
+        let forces = memory.zeros("the forces of contacts", model.node_count() * size_of::<Four>())?;
+        let sums = memory.zeros("the forces of contacts", contacts.contacts.len() * size_of::<Four>())?;
+        let surface = memory.filled("the nodes that touch", &lists.surface)?;
+        let things = memory.filled("obstacles and tools", &lists.things)?;
+        let numbers = memory.filled("the faces that touch", &lists.numbers)?;
+        let states = memory.zeros("the nodes that touch", 2 * lists.nodes * size_of::<Four>())?;
+        let rows = memory.zeros("the points that touch", lists.rows * size_of::<Four>())?;
+        let queue = memory.zeros("the faces that touch", lists.queue() * size_of::<u32>())?;
+        let own = [
+            Binding::Read(&surface),
+            Binding::Read(&things),
+            Binding::Read(&numbers),
+            Binding::Write(&states),
+            Binding::Write(&rows),
+            Binding::Write(&forces),
+            Binding::Write(&queue),
+            Binding::Write(&sums),
+        ];
+        let bound = nodes.of_contacts(device, &own);
+        let constants = [constants, &lists.constants].concat();
+        let counts = [
+            ("PASSES", PASSES),
+            ("ROUNDS", ROUNDS),
+            ("LOOKED", SIDES[0]),
+            ("SIDES", SIDES[1]),
+            ("LIFTS", LIFTS),
+            ("ROWS", NODE_ROWS),
+        ];
+        let counts = counts.map(|(name, count)| format!("const {name} = {count}u;\n"));
+        let parts = [("FOUND", FOUND), ("OFF", OFF), ("LIFTED", LIFTED)];
+        let parts = parts.map(|(name, part)| format!("const {name} = {:e}f;\n", part as f32));
+        let limits = [counts.concat(), parts.concat()].concat();
+        let things = shader(&contacts.rigids);
+        let touching: [&str; 4] =
+            [include_str!("shaders/instant.wgsl"), &limits, &things, include_str!("shaders/touching.wgsl")];
+        let loaded = loads.map(|loads| Bound::new(device, &loads.bindings()));
+        let groups = [instant, gathered, &bound];
+        let with_loads: Vec<&Bound> = groups.into_iter().chain(&loaded).collect();
+        let predicting = [
+            gather,
+            MOVE,
+            external_forces(loads),
+            UNTOUCHED,
+            MOTION,
+            include_str!("shaders/touch_nodes.wgsl"),
+        ];
+        let predicting = [&touching[..], &predicting].concat();
+        let mut kernels =
+            vec![Kernel::new(device, "contacts", &constants, &predicting, &with_loads, lists.nodes)?];
+        let with = |entry: &str, invocations: usize| {
+            let snippets = [&touching[..], &[entry]].concat();
+            Kernel::new(device, "contacts", &constants, &snippets, &groups, invocations)
+        };
+        if lists.faces > 0 {
+            kernels.push(with(include_str!("shaders/touch_faces.wgsl"), lists.faces)?);
+            kernels.push(with(include_str!("shaders/touch_solve.wgsl"), 1)?);
+            kernels.push(with(include_str!("shaders/touch_lift.wgsl"), lists.nodes)?);
+        }
+        let mut sum = with(include_str!("shaders/touch_sums.wgsl"), 1)?;
+        sum.dispatch_groups(contacts.contacts.len() as u32);
+        Ok(Self { contacts: Arc::clone(contacts), forces, sums, kernels, sum })
+    }
+}
+
+/// Fours of `rows` of a contact at a node: its force, and three of each side of the thing.
+const NODE_ROWS: usize = 1 + 3 * SIDES[1];
+
+/// A face with points that touch.
+#[derive(Default)]
+struct Face {
+    colour: usize,
+    contacts: Vec<usize>,
+}
+
+/// What touching.wgsl reads.
+struct Lists {
+    surface: Vec<Four>,
+    things: Vec<f32>,
+    numbers: Vec<u32>,
+    nodes: usize,
+    faces: usize,
+    colours: usize,
+    /// Length of `rows`.
+    rows: usize,
+    constants: Vec<(&'static str, usize)>,
+}
+
+impl Lists {
+    /// From where the ways of things begin in a row of the table.
+    fn new(Contacts { rigids, contacts }: &Contacts, rest: &[Vector<f64>], passages: usize) -> Self {
+        let mut nodes: Vec<u32> =
+            contacts.iter().flat_map(|contact| &contact.surface.nodes).copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let place_of = |node: u32| nodes.partition_point(|&known| known < node);
+        let mut at_node = vec![Vec::new(); nodes.len()];
+        let mut things = things(rigids);
+        let first_contact = things.len();
+        let mut points: Vec<[f64; 3]> = Vec::new();
+        let mut faces: BTreeMap<[u32; 3], Face> = BTreeMap::new();
+        let mut points_of = Vec::new();
+        for (index, Contact { surface, with, touch, .. }) in contacts.iter().enumerate() {
+            let &With::Rigid(rigid) = with else { continue };
+            surface.nodes.iter().for_each(|&node| at_node[place_of(node)].push(index));
+            let longest = longest_edge(surface, rest);
+            let own = lattice(parts_of(longest, &rigids[rigid].shape));
+            // Edges may be twice as long as at rest.
+            let beyond = if own.is_empty() { 0.0 } else { 2.0 * longest };
+            let numbers = [touch.friction, touch.offset, MARGIN * longest, beyond].map(|x| x as f32);
+            let whole = |number: usize| number as f32;
+            things.extend([whole(THING * rigid), whole(passages + PASSAGE * rigid)]);
+            things.extend(numbers);
+            things.extend([whole(points.len()), whole(own.len())]);
+            points_of.push(own.len());
+            if !own.is_empty() {
+                for face in &surface.faces {
+                    let face = face.map(|node| place_of(node) as u32);
+                    faces.entry(face).or_default().contacts.push(index);
+                }
+            }
+            points.extend(own);
+        }
+        let first_point = things.len();
+        things.extend(points.as_flattened().iter().map(|&weight| weight as f32));
+        let faces = coloured(faces, nodes.len());
+        let colours = faces.last().map_or(0, |(_, face)| face.colour + 1);
+
+        let mut surface = Vec::with_capacity(2 * nodes.len() + 2);
+        let mut numbers: Vec<u32> = Vec::new();
+        let mut sums = vec![Vec::new(); contacts.len()];
+        for (&node, touched) in nodes.iter().zip(&at_node) {
+            let [[a, b, c], [d, e, f]] = split(rest[node as usize].into());
+            surface
+                .extend([[a, b, c, f32::from_bits(node)], [d, e, f, f32::from_bits(numbers.len() as u32)]]);
+            for &contact in touched {
+                sums[contact].push((NODE_ROWS * numbers.len()) as u32);
+                numbers.push(contact as u32);
+            }
+        }
+        surface.extend([[0.0; 4], [0.0, 0.0, 0.0, f32::from_bits(numbers.len() as u32)]]);
+        let mut rows = NODE_ROWS * numbers.len();
+
+        let first_face = numbers.len();
+        let mut of_faces: Vec<u32> = Vec::new();
+        for (corners, face) in &faces {
+            numbers.extend(corners);
+            numbers.extend([face.colour as u32, of_faces.len() as u32 / 2]);
+            for &contact in &face.contacts {
+                sums[contact].push(rows as u32);
+                of_faces.extend([contact as u32, rows as u32]);
+                rows += 1 + 3 * points_of[contact];
+            }
+        }
+        numbers.extend([0, 0, 0, 0, of_faces.len() as u32 / 2]);
+        let contacts_of_faces = numbers.len();
+        numbers.append(&mut of_faces);
+        let first_colour = numbers.len();
+        let begins = |colour: usize| faces.partition_point(|(_, face)| face.colour < colour) as u32;
+        numbers.extend((0..colours).map(begins));
+        let first_sum = numbers.len();
+        let mut end = first_sum + contacts.len() + 1;
+        for own in &sums {
+            numbers.push(end as u32);
+            end += own.len();
+        }
+        numbers.push(end as u32);
+        numbers.extend(sums.concat());
+        let constants = vec![
+            ("TOUCHING", nodes.len()),
+            ("FACES", faces.len()),
+            ("COLOURS", colours),
+            ("CONTACTS", first_contact),
+            ("POINTS", first_point),
+            ("FACES_AT", first_face),
+            ("FACE_CONTACTS", contacts_of_faces),
+            ("COLOURS_AT", first_colour),
+            ("SUMS_AT", first_sum),
+        ];
+        let (nodes, faces) = (nodes.len(), faces.len());
+        Self { surface, things, numbers, nodes, faces, colours, rows, constants }
+    }
+
+    /// Length of the queue.
+    fn queue(&self) -> usize {
+        2 + self.colours + self.nodes + self.faces
+    }
+}
+
+/// The longest edge [m] of a surface at rest.
+fn longest_edge(surface: &Surface, rest: &[Vector<f64>]) -> f64 {
+    let edges = surface.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let length = |[a, b]: [u32; 2]| {
+        let square = |c: usize| (rest[a as usize][c] - rest[b as usize][c]).powi(2);
+        (square(0) + square(1) + square(2)).sqrt()
+    };
+    edges.map(length).fold(0.0, f64::max)
+}
+
+/// Faces in the order of colours, so that those of a colour share no node: each takes the first one that is free.
+fn coloured(faces: BTreeMap<[u32; 3], Face>, nodes: usize) -> Vec<([u32; 3], Face)> {
+    let mut taken: Vec<Vec<usize>> = vec![Vec::new(); nodes];
+    let mut faces: Vec<_> = faces.into_iter().collect();
+    for (corners, face) in &mut faces {
+        let is_free = |colour: &usize| corners.iter().all(|&node| !taken[node as usize].contains(colour));
+        face.colour = (0..).find(is_free).unwrap_or_default();
+        corners.iter().for_each(|&node| taken[node as usize].push(face.colour));
+    }
+    faces.sort_by_key(|(_, face)| face.colour);
+    faces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Around a point with many faces each has a colour of its own; others use these again.
+    #[test]
+    fn faces_of_a_colour_share_no_node() {
+        let fan = (1..=7).map(|k| [0, k, k % 7 + 1]).chain([[8, 9, 10], [10, 11, 12]]);
+        let faces = coloured(fan.map(|face| (face, Face::default())).collect(), 13);
+        for (one, (a, of_a)) in faces.iter().enumerate() {
+            for (b, of_b) in &faces[one + 1..] {
+                assert!(of_a.colour != of_b.colour || !a.iter().any(|node| b.contains(node)), "{a:?} {b:?}");
+            }
+        }
+        assert_eq!(faces.last().map(|(_, face)| face.colour), Some(6));
+    }
+}

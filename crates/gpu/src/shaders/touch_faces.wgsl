@@ -1,0 +1,60 @@
+// Measures the gaps of points on faces whose corners may touch something.
+
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let face = number(group, groups, local);
+    if face >= FACES || end() <= instant.index {
+        return;
+    }
+    let record = FACES_AT + 5u * face;
+    let corners = vec3u(lists[record], lists[record + 1u], lists[record + 2u]);
+    let are_near = is_near(corners.x) && is_near(corners.y) && is_near(corners.z);
+    var deepest = 0.0;
+    var takes_part = false;
+    for (var entry = lists[record + 4u]; entry < lists[record + 9u]; entry++) {
+        let at = lists[FACE_CONTACTS + 2u * entry + 1u];
+        var count = 0u;
+        if are_near {
+            let touch = touch_of(lists[FACE_CONTACTS + 2u * entry]);
+            var places = array<vec3f, 3>();
+            var moved = array<vec3f, 3>();
+            var way = 0.0;
+            for (var k = 0u; k < 3u; k++) {
+                places[k] = place_at(corners[k], touch.passage);
+                moved[k] = states[2u * corners[k]].xyz;
+                way = max(way, length(moved[k]));
+            }
+            let middle = (places[0] + places[1] + places[2]) / 3.0;
+            let around = max(
+                max(distance(places[0], middle), distance(places[1], middle)), distance(places[2], middle),
+            );
+            let room = touch.offset + way + touch.margin + touch.passage.travel;
+            // No point is nearer than one beside it by more than the way between both.
+            if near_after(touch.passage, middle - touch.passage.shift).distance <= room + around {
+                for (var point = 0u; point < touch.points; point++) {
+                    let weights = weights_of(touch.first_point + point);
+                    let place = weights.x * places[0] + weights.y * places[1] + weights.z * places[2];
+                    let goes = weights.x * moved[0] + weights.y * moved[1] + weights.z * moved[2];
+                    let tag = f32(touch.first_point + point);
+                    let gap = measure(at + 1u + 3u * count, touch, place, goes, tag);
+                    if gap < touch.margin {
+                        count += 1u;
+                        deepest = max(deepest, -gap);
+                        takes_part = true;
+                    }
+                }
+            }
+        }
+        rows[at] = vec4f(0.0, 0.0, 0.0, f32(count));
+    }
+    if takes_part {
+        let colour = lists[record + 3u];
+        atomicMax(&queue[DEEPEST], bitcast<u32>(deepest));
+        let place = lists[COLOURS_AT + colour] + atomicAdd(&queue[FACES_TOLD + colour], 1u);
+        atomicStore(&queue[QUEUED_FACES + place], face);
+    }
+}
